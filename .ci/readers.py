@@ -1,4 +1,4 @@
-"""Exports networks and checks the bundles with the programs that read them. Usage: readers.py PROGRAM FOLDER.
+"""Exports networks and other decoders and checks the bundles with the programs that read them. Usage: readers.py PROGRAM FOLDER.
 
 Deviations are relative to the widest range of a coordinate in training, and for own data to the range of each target. The
 truth is golden.csv of each bundle, and for
@@ -27,8 +27,12 @@ NETWORKS = {
     "sharp": "--preset best --samples 1000 --epochs 100",
 }
 MAGNIFYING = {"long", "sharp"}
+# Other decoders that leave beside the networks, as "network:decoder". Equations are solved in double precision only.
+LAYERED = ["paper:ridge", "paper:linear", "paper:rbf", "paper:fuzzy", "paper:mean", "known:ridge", "known:rbf", "known:fuzzy"]
+EQUATIONS = ["paper:newton", "paper:polish", "sharp:newton", "sharp:polish"]
 # Trained on a recording of its own: readings of any sign, targets of very different sizes.
 OWN = "own"
+LAYERED += [f"{OWN}:{decoder}" for decoder in ["ridge", "rbf", "fuzzy"]]
 LIMITS = {"f64": 1e-12, "f32": 1e-5}
 FLAGS = "-std=c99 -O2 -Wall -Wextra -Werror -pedantic -Wconversion".split()
 failures = []
@@ -39,7 +43,21 @@ def limit_of(network, precision, report):
     if precision == "f32":
         # The golden readings are in double precision, and rounding them to single precision changes the answers.
         usual += max(report["change_by_rounding_readings"].values())
-    return max(usual, report["limit"]) if network in MAGNIFYING and precision == "f64" else usual
+    if decoder_of(network) == "network":
+        return max(usual, report["limit"]) if network in MAGNIFYING and precision == "f64" else usual
+    return max(usual, report["limit"])
+
+
+def file_of(network):
+    return network.partition(":")[0]
+
+
+def decoder_of(network):
+    return network.partition(":")[2] or "network"
+
+
+def stem(network):
+    return "network" if decoder_of(network) == "network" else "decoder"
 
 
 def run(*command, **options):
@@ -58,12 +76,13 @@ def show(network, bundle, reader, deviation, limit, note=""):
     if not passed:
         failures.append(f"{network} {bundle} {reader}")
     verdict = "" if passed else "FAILED"
-    print(f"{network:<6} {bundle:<12} {reader:<34} {deviation:8.1e} {limit:8.1e} {note} {verdict}".rstrip(), flush=True)
+    print(f"{network:<12} {bundle:<12} {reader:<34} {deviation:8.1e} {limit:8.1e} {note} {verdict}".rstrip(), flush=True)
 
 
 def export(network, form, precision):
-    folder = HOME / network / f"{form}_{precision}"
-    command = [PROGRAM, "export", "--network", HOME / network / "network.json", "--format", form]
+    folder = HOME / file_of(network) / f"{decoder_of(network)}_{form}_{precision}"
+    command = [PROGRAM, "export", "--network", HOME / file_of(network) / "network.json", "--format", form]
+    command += ["--decoder", decoder_of(network)]
     try:
         report = json.loads(run(*command, "--precision", precision, "--out", folder, "--json"))
     except RuntimeError as error:
@@ -97,19 +116,20 @@ def check_onnx(network, precision):
 
     folder, report = export(network, "onnx", precision)
     limit = limit_of(network, precision, report)
-    model = onnx.load(folder / "network.onnx")
+    path = folder / f"{stem(network)}.onnx"
+    model = onnx.load(path)
     onnx.checker.check_model(model, full_check=True)
     names = {entry.key: entry.value for entry in model.metadata_props}
-    if network == OWN:
+    if file_of(network) == OWN:
         assert json.loads(names["outputs"]) == {"names": ["force", "torque"], "units": ["N", "N·m"]}, names
         assert "torque (N·m)" in model.graph.output[0].doc_string
     else:
         assert names["array"] == "10×10_5×30" and json.loads(names["geometry"])["height_mm"] == 5, names
-    session = onnxruntime.InferenceSession(folder / "network.onnx")
+    session = onnxruntime.InferenceSession(path)
     readings, expected, rows = golden(folder)
     kind = np.float32 if precision == "f32" else np.float64
     taken, given = session.get_inputs()[0].name, session.get_outputs()[0].name
-    assert (taken, given) == (("readings", "targets") if network == OWN else ("resistances_ohm", "coordinates_mm"))
+    assert (taken, given) == (("readings", "targets") if file_of(network) == OWN else ("resistances_ohm", "coordinates_mm"))
     inputs = {taken: readings.astype(kind)}
     if rows is not None:
         inputs["row"] = rows
@@ -118,7 +138,7 @@ def check_onnx(network, precision):
     assert outside.shape == (len(readings),), outside.shape
     # What is invalid has no answer.
     bad = {**inputs, taken: inputs[taken].copy()}
-    bad[taken][0, 3] = np.inf if network == OWN else -1
+    bad[taken][0, 3] = np.nan if decoder_of(network) == "mean" else np.inf if file_of(network) == OWN else -1
     answers = session.run([given], bad)[0]
     assert np.isnan(answers[0]).all() and not np.isnan(answers[1:]).any()
     if rows is not None:
@@ -130,13 +150,13 @@ def check_onnx(network, precision):
 def check_onnx_to_c(network, precision, limit, folder, inputs, coordinates):
     """C of an independent compiler of the same graph."""
     if importlib.util.find_spec("emx_onnx_cgen") is None:
-        print(f"{network:<6} onnx {precision}     emx-onnx-cgen is not installed: not checked")
+        print(f"{network:<12} onnx {precision}     emx-onnx-cgen is not installed: not checked")
         return
     import ctypes
     import onnx
 
     # The compiler wants one size: the batch of the golden vectors.
-    model = onnx.load(folder / "network.onnx")
+    model = onnx.load(folder / f"{stem(network)}.onnx")
     for value in [*model.graph.input, *model.graph.output]:
         value.type.tensor_type.shape.dim[0].dim_value = len(coordinates)
     onnx.save(model, folder / "fixed_batch.onnx")
@@ -145,7 +165,7 @@ def check_onnx_to_c(network, precision, limit, folder, inputs, coordinates):
         run(sys.executable, "-m", "emx_onnx_cgen", "compile", folder / "fixed_batch.onnx", source, "--model-name", "emx")
         run("gcc", "-O2", "-shared", "-fPIC", source, "-lm", "-o", library)
     except RuntimeError as error:
-        print(f"{network:<6} onnx {precision}     emx-onnx-cgen cannot compile it: {str(error).splitlines()[-1]}")
+        print(f"{network:<12} onnx {precision}     emx-onnx-cgen cannot compile it: {str(error).splitlines()[-1]}")
         return
     declaration = re.search(r"void emx\(([^;{]*)\)", source.read_text()).group(1)
     answers, outside = np.zeros_like(coordinates), np.zeros(len(coordinates), np.int64)
@@ -161,8 +181,12 @@ def check_onnx_to_c(network, precision, limit, folder, inputs, coordinates):
 def check_c(network, precision):
     try:
         folder, report = export(network, "c99", precision)
+    except Refused:
+        raise
     except RuntimeError as error:
-        print(f"{network:<6} c99 {precision}  refused: {str(error).splitlines()[-1]}")
+        if precision != "fixed16":
+            raise
+        print(f"{network:<12} c99 {precision}  refused: {str(error).splitlines()[-1]}")
         return
     limit = limit_of(network, precision, report)
     sources = sorted(folder.glob("*.c"))
@@ -198,7 +222,7 @@ def check_octave(network):
     run("octave-cli", "--no-gui", "--quiet", "--eval", script, cwd=folder)
     answers = np.loadtxt(folder / "answers.txt", delimiter=",", ndmin=2)
     show(network, "matlab f64", "GNU Octave", deviation(folder, answers[:, :-1], expected), limit_of(network, "f64", report))
-    value = "Inf" if network == OWN else "-1"
+    value = "Inf" if file_of(network) == OWN or decoder_of(network) == "mean" else "-1"
     bad = f"try, {function}({value} * ones(1, {readings.shape[1]}){', 1' if row else ''}); disp('accepted'), catch e, disp(e.message), end"
     assert "finite numbers" in run("octave-cli", "--no-gui", "--quiet", "--eval", bad, cwd=folder)
 
@@ -206,14 +230,14 @@ def check_octave(network):
 def check_numpy(network, precision):
     folder, report = export(network, "numpy", precision)
     readings, expected, rows = golden(folder)
-    spec = importlib.util.spec_from_file_location(f"decode_{network}_{precision}", folder / "decode.py")
+    spec = importlib.util.spec_from_file_location(f"decode_{network.replace(':', '_')}_{precision}", folder / "decode.py")
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     coordinates, _ = module.decode(readings, *([] if rows is None else [rows]))
     assert coordinates.dtype == (np.float32 if precision == "f32" else np.float64)
     show(network, f"numpy {precision}", f"NumPy {np.__version__}", deviation(folder, coordinates, expected), limit_of(network, precision, report))
     try:
-        module.decode(readings * np.inf if network == OWN else -readings, *([] if rows is None else [rows]))
+        module.decode(readings * np.inf if file_of(network) == OWN or decoder_of(network) == "mean" else -readings, *([] if rows is None else [rows]))
     except ValueError:
         return
     failures.append(f"{network} numpy {precision}: readings that are none are accepted")
@@ -244,7 +268,18 @@ def train_on_own_data():
     run(PROGRAM, "train", "--recipe", HOME / OWN / "recipe.json", "--epochs", 40, "--out", HOME / OWN / "network.json", "--json")
 
 
-print(f"{'net':<6} {'bundle':<12} {'reader':<34} {'found':>8} {'limit':>8}")
+def check_layers(network):
+    """All formats of a decoder that consists of layers."""
+    for precision in ["f64", "f32"]:
+        for check, form in [(check_onnx, "onnx"), (check_numpy, "numpy"), (check_c, "c99")]:
+            try:
+                check(network, precision)
+            except Refused as error:
+                print(f"{network:<12} {form} {precision}  refused: {error}", flush=True)
+    check_octave(network)
+
+
+print(f"{'net':<12} {'bundle':<12} {'reader':<34} {'found':>8} {'limit':>8}")
 for network, arguments in [*NETWORKS.items(), (OWN, None)]:
     (HOME / network).mkdir()
     if network == OWN:
@@ -252,15 +287,13 @@ for network, arguments in [*NETWORKS.items(), (OWN, None)]:
     else:
         run(PROGRAM, "train", *arguments.split(), "--out", HOME / network / "network.json", "--json")
         run(PROGRAM, "simulate", "--samples", 100, "--seed", 9, "--out", HOME / network / "readings.csv")
-    for precision in ["f64", "f32"]:
-        for check, form in [(check_onnx, "onnx"), (check_numpy, "numpy")]:
-            try:
-                check(network, precision)
-            except Refused as error:
-                print(f"{network:<6} {form} {precision}  refused: {error}", flush=True)
-    for precision in ["f64", "f32", "fixed16"]:
-        check_c(network, precision)
-    check_octave(network)
+    check_layers(network)
+    check_c(network, "fixed16")
     check_json(network)
+for network in LAYERED:
+    check_layers(network)
+for network in EQUATIONS:
+    check_c(network, "f64")
+    check_numpy(network, "f64")
 if failures:
     sys.exit("failed: " + ", ".join(failures))

@@ -17,7 +17,7 @@
 //! | `import` | measured data out of files: tables, joins by time, meanings of columns (feature `files`) |
 //! | [`live`] | frames as they come: sources, re-zero, recorder, faults named from the residual |
 //! | `figure` | what a picture says, for the window and for print (feature `figures`) |
-//! | `export` | files for other programs (feature `files`); `export::bundle` writes networks (feature `bundle`), `export::figures` draws (feature `figures`) |
+//! | `export` | files for other programs (feature `files`); `export::bundle` writes decoders for other programs (feature `bundle`), `export::figures` draws (feature `figures`) |
 //! | `cli` | the work in a terminal (feature `cli`) |
 //! | `app` | the window (feature `gui`) |
 //!
@@ -69,8 +69,8 @@
 //! settings.training.stopping.epochs = 20; // cut short.
 //! let mut run = Run::prepare(settings)?;
 //! while run.step().is_none() {}
-//! let scores = run.node_scores().expect("the run is simulated");
-//! assert!(scores.network.z_mm < scores.baselines.mean.z_mm);
+//! let scores = run.scores().expect("the baselines are measured");
+//! assert!(scores.network.percent() < scores.baselines.mean.percent());
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!

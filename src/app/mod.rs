@@ -29,6 +29,8 @@ mod window;
 
 use crate::figure::ticks;
 
-pub use shared::{Effect, Matter, Notice, Phase, Shared};
-pub use views::{Analysis, BottomTab, DecoderResult, Question, TradeOffEnding, TradeOffPlan, Views};
+pub use shared::{Effect, Matter, Notice, Phase, Shared, SourceKind};
+pub use views::{
+    Analysis, BottomTab, DecoderResult, PlannedLevel, PlannedRun, Question, TradeOffEnding, TradeOffPlan, Views,
+};
 pub use window::{DecouplerWindow, Desktop, OpenError, WindowFile, open};

@@ -54,7 +54,7 @@ pub fn run<A: Into<OsString> + Clone>(arguments: impl IntoIterator<Item = A>, wi
     };
     match done {
         Err(failure) if !failure.is_broken_pipe() => {
-            // Nobody is left to tell if this fails.
+            // There is no one to report to if this fails.
             let _ = match &failure {
                 Failure::Interrupted(_)
                 | Failure::InterruptedTrials { .. }

@@ -18,7 +18,7 @@ use crate::{
 ///
 /// A line of the file is a row-wire at one moment: its number (--row-wire), its resistances (--inputs), and how far its nodes
 /// are pressed (--depths, or --targets for all coordinates); --group names the column of frames. Parameters that the frames
-/// do not tell keep their nominal values, and are named; the others have intervals of 95 % that hold together. train --sensor
+/// do not determine keep their nominal values, and are named; the others have simultaneous 95 % intervals. train --sensor
 /// takes what --out writes, and fine-tune continues its network on the frames.
 #[derive(Args)]
 pub(super) struct Calibrate {
@@ -57,7 +57,7 @@ struct Parameter {
     unit: &'static str,
     nominal: f64,
     value: f64,
-    /// Half of the interval; absent where the frames do not tell the parameter.
+    /// Half of the interval; absent where the frames do not determine the parameter.
     half_width: Option<f64>,
 }
 

@@ -114,7 +114,7 @@ impl Checkpointing {
             && !self.has_warned
         {
             self.has_warned = true;
-            // Nobody is left to tell if this fails.
+            // There is no one to report to if this fails.
             let _ = writeln!(stderr(), "warning: {error}; training continues");
         }
         self.next = Instant::now() + self.interval.max(LARGEST_SHARE * begun.elapsed());

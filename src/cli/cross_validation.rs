@@ -139,7 +139,7 @@ impl Train {
 
 /// Reports on standard error that the same settings are trained again.
 fn announce_comparison(by: SplitBy) {
-    // Nobody is left to read it if this fails.
+    // There is no one to report to if this fails.
     let _ = writeln!(
         stderr(),
         "training again on a split by {by}, to measure how optimistic random test samples are; Ctrl-C skips this"

@@ -18,7 +18,7 @@ struct Report<'a> {
     verified_vectors: usize,
     golden_vectors: usize,
     checks: Vec<Check>,
-    /// Largest of all checks; like these relative to `output_range_mm`, or for own data to the range of each target.
+    /// Largest of all checks; like these relative to `output_range_mm`, or for a recording to the range of each target.
     deviation: f64,
     limit: f64,
     /// Of `f32`: by rounding the readings alone.
@@ -30,7 +30,7 @@ struct Report<'a> {
     /// In mm, of any coordinate of an array.
     #[serde(skip_serializing_if = "Option::is_none")]
     error_bound_mm: Option<f64>,
-    /// Of each target of own data, in its unit.
+    /// Of each target of a recording, in its unit.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     error_bounds: Vec<Bound<'a>>,
     remarks: &'a [String],

@@ -23,10 +23,10 @@ use crate::{
     scene::RowModel,
 };
 
-// What is fitted to find out what the readings tell.
+// Models that are fitted to measure how well the readings determine the targets.
 #[derive(Args)]
 pub(super) struct StudyArguments {
-    /// Columns that the sensor gives; with --targets, what they tell of these is measured and printed
+    /// Columns that the sensor gives; with --targets, how well they determine the targets is measured and printed
     #[arg(long, value_name = "COLUMNS", value_delimiter = ',')]
     pub(super) inputs: Vec<String>,
     /// Hidden nodes of the networks [default: 12]
@@ -54,12 +54,12 @@ impl StudyArguments {
         !self.inputs.is_empty() || self.hidden.is_some() || self.model.is_some() || self.seed.is_some()
     }
 
-    /// Measures what the recording tells, and prints it.
+    /// Measures how well the readings of a recording determine its targets, and prints it.
     pub(super) fn run(&self, import: &ImportArguments, is_json: bool) -> Result<(), Failure> {
         const FOLDS: usize = 5;
         let plan = import.plan(&self.inputs)?;
         if plan.test.is_some() {
-            let message = "--test-data: what a recording tells is measured on parts of it; leave the test files out";
+            let message = "--test-data: a recording is analysed by cross-validation; leave the test files out";
             return Err(Failure::Arguments(message.to_owned()));
         }
         let recording = with_bar(is_json, |watch| plan.recording(working_folder(), watch))?;

@@ -11,9 +11,10 @@ use crate::{
     evaluation::Channel,
     evaluation::{
         RunSettings, TargetErrors,
+        format::capitalised,
         recorded::{ChannelImportance, Determination, Findings, FittedModel, Interval, LearningCurve, Standing},
     },
-    export::{describe_target, describe_warnings, format_number},
+    export::{Cell, Table, describe_target, describe_warnings, format_number},
     import::{Dropped, Plan, Recording},
 };
 
@@ -101,13 +102,6 @@ impl From<Figure> for Interval {
     fn from(Figure { value, low, high }: Figure) -> Self {
         Self { value, low, high }
     }
-}
-
-/// A sentence of its own.
-fn capitalised(sentence: &str) -> String {
-    let mut letters = sentence.chars();
-    let first = letters.next().into_iter().flat_map(char::to_uppercase);
-    first.chain(letters).collect()
 }
 
 fn name_of(model: FittedModel) -> &'static str {
@@ -208,6 +202,10 @@ impl<'a> Report<'a> {
         writeln!(out)
     }
 
+    fn target_names(&self) -> impl Iterator<Item = &str> {
+        self.targets.iter().map(|target| target.name)
+    }
+
     fn write_channels(&self, out: &mut impl Write) -> io::Result<()> {
         if self.channels.is_empty() {
             return Ok(());
@@ -217,31 +215,18 @@ impl<'a> Report<'a> {
             "Error (RMSE) without a channel, in proportion to that with all of them (fits: {})",
             self.model
         )?;
-        let width = self
-            .channels
-            .iter()
-            .map(|channel| channel.name.chars().count())
-            .max()
-            .unwrap_or(0)
-            .max(7);
-        let columns: Vec<usize> = self
-            .targets
-            .iter()
-            .map(|target| target.name.chars().count().max(19))
-            .collect();
-        write!(out, "{:<width$}", "channel")?;
-        for (target, column) in self.targets.iter().zip(&columns) {
-            write!(out, "  {:>column$}", target.name)?;
-        }
-        writeln!(out)?;
-        for channel in &self.channels {
-            write!(out, "{:<width$}", channel.name)?;
-            for (growth, column) in channel.growth.iter().zip(&columns) {
-                let text = growth.map_or_else(|| "–".to_owned(), |growth| Interval::from(growth).to_string());
-                write!(out, "  {text:>column$}")?;
-            }
-            writeln!(out, "{}", if channel.is_dispensable { "  dispensable" } else { "" })?;
-        }
+        let row = |channel: &Worth<'_>| {
+            let growth = channel.growth.iter().map(|growth| match growth {
+                Some(growth) => Interval::from(*growth).to_string(),
+                None => format_number(None),
+            });
+            let note = if channel.is_dispensable { "dispensable" } else { "" };
+            let texts = std::iter::once(channel.name.to_string()).chain(growth);
+            texts.chain([note.to_owned()]).map(Cell::from).collect()
+        };
+        let headings = std::iter::once("channel").chain(self.target_names()).chain([""]);
+        let table = Table::of_headings(headings, self.channels.iter().map(row));
+        write!(out, "{}", table.aligned())?;
         writeln!(out)
     }
 
@@ -254,20 +239,14 @@ impl<'a> Report<'a> {
             "Test error (RMSE) by the number of training samples (fits: {})",
             self.model
         )?;
-        write!(out, "{:>8}", "samples")?;
-        for target in &self.targets {
-            write!(out, "  {:>12}", target.name)?;
-        }
-        writeln!(out)?;
-        for (index, point) in first.learning_curve.iter().enumerate() {
-            write!(out, "{:>8}", point.samples)?;
-            for target in &self.targets {
-                let width = target.name.chars().count().max(12);
-                let rmse = target.learning_curve.get(index).map_or(f64::NAN, |point| point.rmse);
-                write!(out, "  {:>width$}", format_number(rmse))?;
-            }
-            writeln!(out)?;
-        }
+        let row = |(index, point): (usize, &Point)| {
+            let errors = self.targets.iter().map(|target| target.learning_curve.get(index));
+            let errors = errors.map(|point| Cell::from(point.map(|point| point.rmse)));
+            std::iter::once(point.samples.into()).chain(errors).collect()
+        };
+        let headings = std::iter::once("samples").chain(self.target_names());
+        let table = Table::of_headings(headings, first.learning_curve.iter().enumerate().map(row));
+        write!(out, "{}", table.aligned())?;
         for target in &self.targets {
             writeln!(out, "{}", capitalised(&target.outlook))?;
         }

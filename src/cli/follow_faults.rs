@@ -129,6 +129,6 @@ impl Faults {
 }
 
 fn tell(message: &str) {
-    // Nobody is left to tell if this fails.
+    // There is no one to report to if this fails.
     let _ = writeln!(stderr(), "warning: {message}");
 }

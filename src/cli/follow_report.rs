@@ -107,7 +107,7 @@ impl Report {
     pub(super) fn tell(&self, dropped: u64) {
         let (decoded, seconds) = (self.latencies.count(), self.begin.elapsed().as_secs_f64());
         let (rate, bad, latencies) = (decoded as f64 / seconds.max(1e-9), self.bad, &self.latencies);
-        // Nobody is left to tell if this fails.
+        // There is no one to report to if this fails.
         let _ = writeln!(
             stderr(),
             "{decoded} lines decoded in {seconds:.1} s ({rate:.0} a second), {bad} bad, {dropped} dropped; {latencies}"

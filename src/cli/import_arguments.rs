@@ -21,7 +21,7 @@ pub(super) struct DialectArguments {
     /// Decimal separator [default: found]
     #[arg(long, value_name = "point|comma")]
     decimal: Option<Decimal>,
-    /// Whether the first row has the names of the columns [default: found]
+    /// yes if the first row has the names of the columns [default: found]
     #[arg(long, value_name = "yes|no", value_parser = yes_or_no)]
     header: Option<bool>,
     /// Encoding [default: found]
@@ -32,11 +32,11 @@ pub(super) struct DialectArguments {
     skip_lines: Option<usize>,
 }
 
-// Own data: files, meanings of their columns, and the split.
+// A recording: files, meanings of their columns, and the split.
 #[derive(Args)]
-#[command(next_help_heading = "Own data")]
+#[command(next_help_heading = "Recording")]
 pub(super) struct ImportArguments {
-    /// Train on the samples of this file (CSV, .npy, .npz or .mat) instead of a simulated sensor
+    /// Use the samples of this file (CSV, .npy, .npz or .mat) instead of a simulated array
     ///
     /// A column is named as in the header, or c1, c2, … without one; c2..c16 is a range. --inputs and --targets name
     /// columns, separated by commas.
@@ -52,7 +52,7 @@ pub(super) struct ImportArguments {
     /// Largest time between a row and its partner [default: half the median interval of the joined file]
     #[arg(long, value_name = "TIME", requires = "join", value_parser = positive)]
     join_limit: Option<f64>,
-    /// Columns to be told from the inputs
+    /// Columns to be predicted from the inputs
     #[arg(long, value_name = "COLUMNS", value_delimiter = ',', requires = "data")]
     targets: Vec<String>,
     /// Column of the times
@@ -133,6 +133,14 @@ fn assignment(text: &str) -> Result<(String, String), String> {
     Ok((column.trim().to_owned(), unit.trim().to_owned()))
 }
 
+/// Refuses the first argument that is given.
+fn refuse(given: &[(bool, &str)], message: impl Fn(&str) -> String) -> Result<(), Failure> {
+    match given.iter().find(|(is_given, _)| *is_given) {
+        Some((_, argument)) => Err(Failure::Arguments(message(argument))),
+        None => Ok(()),
+    }
+}
+
 impl DialectArguments {
     pub(super) fn choice(&self) -> DialectChoice {
         DialectChoice {
@@ -176,9 +184,7 @@ impl ImportArguments {
             (self.test_data.is_some(), "--test-data"),
             (self.folds.is_some(), "--folds"),
         ];
-        if let Some((_, argument)) = given.into_iter().find(|(is_given, _)| *is_given) {
-            return Err(Failure::Arguments(format!("{argument} needs --inputs and --targets")));
-        }
+        refuse(&given, |argument| format!("{argument} needs --inputs and --targets"))?;
         let message = "--data: name the file to inspect";
         self.data
             .as_deref()
@@ -190,7 +196,7 @@ impl ImportArguments {
         self.validation_fraction.is_some() || self.recipe.is_some()
     }
 
-    /// Refuses arguments that have no meaning without own data.
+    /// Refuses arguments that have no meaning without a recording.
     pub(super) fn check_unused(&self) -> Result<(), Failure> {
         let given = [
             (self.save_recipe.is_some(), "--save-recipe"),
@@ -201,10 +207,7 @@ impl ImportArguments {
             (self.folds.is_some(), "--folds"),
             (self.dialect.choice() != DialectChoice::default(), "the layout of files"),
         ];
-        match given.into_iter().find(|(is_given, _)| *is_given) {
-            Some((_, argument)) => Err(Failure::Arguments(format!("{argument} needs --data or --recipe"))),
-            None => Ok(()),
-        }
+        refuse(&given, |argument| format!("{argument} needs --data or --recipe"))
     }
 
     /// Refuses arguments that differ from the `saved` plan of a training that is resumed. Names of files are not compared: they
@@ -238,13 +241,12 @@ impl ImportArguments {
             (self.save_recipe.is_some(), "--save-recipe"),
             (self.dialect.choice() != DialectChoice::default(), "the layout of files"),
         ];
-        match given.into_iter().find(|(is_given, _)| *is_given) {
-            Some((_, argument)) => Err(Failure::Arguments(format!(
+        refuse(&given, |argument| {
+            format!(
                 "{argument}: the checkpoint has the columns and the division of the recording; leave it out to resume, or start \
                  a new training with another --checkpoint"
-            ))),
-            None => Ok(()),
-        }
+            )
+        })
     }
 
     /// Returns the origin of the samples of a checkpoint with its files where the arguments name them. A file is recognised by
@@ -319,7 +321,7 @@ impl ImportArguments {
                     let message = "--inputs: the recipe names the inputs; leave it out, or give --data";
                     return Err(Failure::Arguments(message.to_owned()));
                 }
-                RecipeFile::load(path)?
+                RecipeFile::load_recording(path)?
             }
             None => {
                 let mut plan = Plan {

@@ -11,21 +11,20 @@ use super::{
     findings::StudyArguments,
     import_arguments::ImportArguments,
     output::{print, print_object},
-    recording_report::format_words,
     samples::with_bar,
 };
 use crate::{
-    export::format_number,
+    export::{Cell, Table, TableColumn, format_number},
     import::{ColumnKind, ColumnSummary, Dialect, Inspection, TimeSummary},
     sensor::counted,
 };
 
-/// Show what is in a file of own data, and what its readings tell of targets
+/// List the columns of a recording, and measure how well its readings determine targets
 ///
 /// Reads CSV, .npy, .npz and .mat. Each column has its name, unit, kind, range, number of missing cells and a histogram over
 /// its range. The names are those that train --data takes. With --inputs and --targets (or --recipe), and with the arguments
-/// of train --data, it measures on held-out samples how well the readings tell each target, how much a random split would
-/// flatter, what each channel is worth and what more samples would bring, with confidence intervals.
+/// of train --data, it measures on held-out samples how well the readings determine each target, how optimistic a random split
+/// would be, what each channel is worth and what more samples would bring, with confidence intervals.
 #[derive(Args)]
 pub(super) struct Inspect {
     #[command(flatten)]
@@ -58,7 +57,7 @@ impl Inspect {
         if self.json {
             return print_object(&Report {
                 file: data,
-                format: format_words(&table.format),
+                format: table.format.to_string(),
                 dialect: table.dialect(),
                 inspection: &inspection,
             });
@@ -71,8 +70,8 @@ impl Inspect {
                 counted(inspection.rows, "row"),
                 counted(inspection.columns.len(), "column")
             )?;
-            writeln!(out, "{}\n", format_words(&table.format))?;
-            write_columns(&inspection.columns, out)?;
+            writeln!(out, "{}\n", table.format)?;
+            write!(out, "{}", columns_table(&inspection.columns).aligned())?;
             if let Some(time) = &inspection.time {
                 write_time(time, out)?;
             }
@@ -84,19 +83,9 @@ impl Inspect {
     }
 }
 
-fn write_columns(columns: &[ColumnSummary], out: &mut impl Write) -> io::Result<()> {
-    let width = |of: fn(&ColumnSummary) -> usize, least: usize| columns.iter().map(of).max().unwrap_or(0).max(least);
-    let name_width = width(|column| column.name.chars().count(), 6);
-    let unit_width = width(
-        |column| column.unit.as_deref().map_or(0, |unit| unit.chars().count()),
-        4,
-    );
-    writeln!(
-        out,
-        "{:<name_width$}  {:<unit_width$}  {:<8}{:>14}{:>14}{:>9}  histogram",
-        "column", "unit", "kind", "least", "largest", "missing"
-    )?;
-    for column in columns {
+/// The table of the columns of a file.
+fn columns_table(columns: &[ColumnSummary]) -> Table {
+    let row = |column: &ColumnSummary| -> Vec<Cell> {
         let kind = match column.kind {
             ColumnKind::Number => "number",
             ColumnKind::Integer => "integer",
@@ -104,32 +93,32 @@ fn write_columns(columns: &[ColumnSummary], out: &mut impl Write) -> io::Result<
             ColumnKind::Empty => "empty",
         };
         let number = |number: Option<f64>| number.map_or("–".to_owned(), plain);
-        write!(
-            out,
-            "{:<name_width$}  {:<unit_width$}  {kind:<8}{:>14}{:>14}{:>9}  {:<16}",
-            column.name,
-            column.unit.as_deref().unwrap_or(""),
-            number(column.min),
-            number(column.max),
-            column.missing,
-            bars(&column.histogram)
-        )?;
-        let mut notes = Vec::new();
-        if column.is_constant {
-            notes.push("constant".to_owned());
-        }
-        if let Some(other) = &column.duplicate_of {
-            notes.push(format!("the same as {other}"));
-        }
-        if let Some((line, text)) = &column.first_text {
-            notes.push(format!(
-                "{} cells are no numbers, first '{text}' on line {line}",
-                column.texts
-            ));
-        }
-        writeln!(out, "{}", notes.join("; "))?;
+        let notes = [
+            column.is_constant.then(|| "constant".to_owned()),
+            column.duplicate_of.as_ref().map(|other| format!("the same as {other}")),
+            column.first_text.as_ref().map(|(line, text)| {
+                format!(
+                    "{} cells are not numbers, the first is '{text}' on line {line}",
+                    column.texts
+                )
+            }),
+        ];
+        vec![
+            column.name.as_str().into(),
+            column.unit.as_deref().unwrap_or("").into(),
+            kind.into(),
+            number(column.min).into(),
+            number(column.max).into(),
+            column.missing.into(),
+            bars(&column.histogram).into(),
+            Vec::from_iter(notes.into_iter().flatten()).join("; ").into(),
+        ]
+    };
+    let names = ["column", "unit", "kind", "min", "max", "missing", "histogram", ""];
+    Table {
+        columns: names.map(TableColumn::field).into(),
+        rows: columns.iter().map(row).collect(),
     }
-    Ok(())
 }
 
 /// A number as short as it can be within 13 characters.

@@ -86,7 +86,7 @@ impl<'a> OutsideTraining<'a> {
         }
         let mut stderr = stderr().lock();
         for line in listed {
-            // Nobody is left to read it if this fails.
+            // There is no one to report to if this fails.
             let _ = writeln!(stderr, "warning: {line}");
         }
         let _ = writeln!(

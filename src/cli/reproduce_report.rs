@@ -16,7 +16,9 @@ use crate::{
         CrossValidation,
         experiments::{CellSummary, ExperimentResults, Figure, PaperTable, SummaryErrors, Verdict},
     },
-    export::{ExperimentTable, describe_conditions, describe_failures, describe_worse_than_mean, format_duration},
+    export::{
+        Cell, ExperimentTable, Table, describe_conditions, describe_failures, describe_worse_than_mean, format_duration,
+    },
     sensor::{ArrayScale, Geometry},
 };
 
@@ -158,9 +160,13 @@ fn write_text(reproduced: &[Reproduced], took: Duration, out: &mut impl Write) -
             describe_conditions(&results.experiment)
         )?;
         let table = ExperimentTable::new(results);
-        write_aligned(&table, out)?;
+        let headings = table.columns.iter().map(|column| column.heading);
+        let rows = table
+            .rows
+            .iter()
+            .map(|row| row.iter().map(|text| Cell::from(text.as_str())).collect());
+        writeln!(out, "{}", Table::of_headings(headings, rows).aligned())?;
         notes.insert(table.note);
-        writeln!(out)?;
         for Verdict {
             claim,
             standing,
@@ -182,26 +188,4 @@ fn write_text(reproduced: &[Reproduced], took: Duration, out: &mut impl Write) -
     }
     writeln!(out, "{}", Geometry::ASSUMPTION)?;
     writeln!(out, "Took {}", format_duration(took))
-}
-
-fn write_aligned(table: &ExperimentTable, out: &mut impl Write) -> io::Result<()> {
-    let width = |column: usize, heading: &str| {
-        let cells = table.rows.iter().map(|row| row[column].chars().count());
-        cells.max().unwrap_or(0).max(heading.chars().count())
-    };
-    let widths: Vec<_> = table
-        .columns
-        .iter()
-        .enumerate()
-        .map(|(column, of_table)| width(column, of_table.heading))
-        .collect();
-    let line = |cells: &mut dyn Iterator<Item = &str>| {
-        let padded = cells.zip(&widths).map(|(cell, width)| format!("{cell:>width$}"));
-        padded.collect::<Vec<_>>().join("  ")
-    };
-    writeln!(out, "{}", line(&mut table.columns.iter().map(|column| column.heading)))?;
-    for row in &table.rows {
-        writeln!(out, "{}", line(&mut row.iter().map(String::as_str)))?;
-    }
-    Ok(())
 }

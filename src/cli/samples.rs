@@ -71,7 +71,7 @@ pub(super) fn announce(settings: &RunSettings) -> Result<(), RunError> {
 pub(super) fn announce_workload(workload: &Workload) -> Result<(), RunError> {
     workload.check_memory()?;
     if workload.is_large() {
-        // Nobody is left to read it if this fails.
+        // There is no one to report to if this fails.
         let _ = writeln!(stderr(), "{}", describe_workload(workload));
     }
     Ok(())

@@ -8,8 +8,9 @@ use crate::{
 /// Width of the plot in characters.
 const WIDTH: usize = 64;
 
-/// Writes the spread of the results of several starts: a table, and a box plot of Z % above a strip of the starts.
-pub(super) fn write_starts(starts: &[StartRecord], out: &mut dyn Write) -> io::Result<()> {
+/// Writes the spread of the results of several starts: a table, and a box plot of the error on the test set, called
+/// `error_name`, above a strip of the starts.
+pub(super) fn write_starts(starts: &[StartRecord], error_name: &str, out: &mut dyn Write) -> io::Result<()> {
     let Some(best) = best_start(starts) else { return Ok(()) };
     let held_out = starts.iter().all(|start| start.validation_mse.is_some());
     let error = if held_out { "validation mse" } else { "training mse" };
@@ -21,10 +22,11 @@ pub(super) fn write_starts(starts: &[StartRecord], out: &mut dyn Write) -> io::R
     )?;
     let z_percent: Vec<f64> = starts.iter().filter_map(|start| start.z_percent).collect();
     let rows = [
-        ("test Z %", Spread::of(z_percent.iter().copied())),
+        (error_name, Spread::of(z_percent.iter().copied())),
         (error, Spread::of(starts.iter().map(StartRecord::deciding_mse))),
     ];
-    write!(out, "{:<16}", "")?;
+    let width = error_name.len().max(14) + 2;
+    write!(out, "{:<width$}", "")?;
     for heading in ["smallest", "quartile 1", "median", "quartile 3", "largest"] {
         write!(out, "{heading:>11}")?;
     }
@@ -38,7 +40,7 @@ pub(super) fn write_starts(starts: &[StartRecord], out: &mut dyn Write) -> io::R
             spread.upper_quartile,
             spread.largest,
         ];
-        write!(out, "{name:<16}")?;
+        write!(out, "{name:<width$}")?;
         for figure in figures {
             write!(out, "{:>11}", format_number(figure))?;
         }
@@ -47,7 +49,7 @@ pub(super) fn write_starts(starts: &[StartRecord], out: &mut dyn Write) -> io::R
     match (rows[0].1, starts[best].z_percent) {
         (Some(spread), Some(kept)) if spread.smallest < spread.largest => {
             let [plot, strip] = plot(&spread, &z_percent, kept);
-            writeln!(out, "\n{plot}  box: quartiles of test Z %, | median")?;
+            writeln!(out, "\n{plot}  box: quartiles of {error_name}, | median")?;
             writeln!(out, "{strip}  o a start, * the one kept")
         }
         _ => Ok(()),
@@ -94,7 +96,7 @@ mod tests {
     fn the_plot_shows_quartiles_and_the_start_that_is_kept() {
         let starts = [start(3.0, 1.0), start(1.0, 2.0), start(2.0, 4.15), start(5.0, 7.3)];
         let mut text = Vec::new();
-        write_starts(&starts, &mut text).unwrap();
+        write_starts(&starts, "test Z %", &mut text).unwrap();
         let text = String::from_utf8(text).unwrap();
         let lines: Vec<_> = text.lines().collect();
         assert_eq!(
@@ -113,7 +115,7 @@ mod tests {
     #[test]
     fn starts_that_all_end_alike_need_no_plot() {
         let mut text = Vec::new();
-        write_starts(&[start(1.0, 2.0); 3], &mut text).unwrap();
+        write_starts(&[start(1.0, 2.0); 3], "test Z %", &mut text).unwrap();
         assert_eq!(String::from_utf8(text).unwrap().lines().count(), 4);
     }
 }

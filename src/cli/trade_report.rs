@@ -1,7 +1,4 @@
-use std::{
-    io::{self, Write},
-    time::Duration,
-};
+use std::io::{self, Write};
 
 use serde::Serialize;
 
@@ -18,7 +15,8 @@ use crate::{
         ErrorTable, Problem, RunSets, TradeOffCost, TradeOffLevel, TradeOffPoint, decoded_unit, fastest_under,
         most_accurate_under,
     },
-    export::{Cell, Table, TableColumn, error_table, format_duration, format_number},
+    export::{Table, TableColumn, error_table, format_number, trade_off_summary},
+    figure::trade_words::point_name,
     import::Recordings,
     sensor::ArrayScale,
 };
@@ -248,79 +246,22 @@ impl MeasuredLevel {
         }
     }
 
-    /// The table of the points in the order in which they were measured.
+    /// The table of the points, fastest first, with marks of those on the Pareto fronts.
     fn table(&self) -> Table {
-        let points = &self.level.points;
-        let has_nodes = points.iter().any(|point| point.report.errors.nodes().is_some());
-        let row = |(point, (on_decoding_front, on_training_front)): (&TradeOffPoint, (bool, bool))| -> Vec<Cell> {
-            let text = |text: Option<String>| Cell::from(text.unwrap_or_default());
-            let training = Duration::try_from_secs_f64(point.training_seconds).unwrap_or_default();
-            let marks = [(on_decoding_front, "*"), (on_training_front, "+")];
-            let marks = marks.map(|(is_on, mark)| if is_on { mark } else { " " }).concat();
-            let source = if has_nodes {
-                vec![
-                    text(point.preset.map(|preset| preset.to_string())),
-                    point.report.errors.percent().into(),
-                    point.report.errors.nodes().map(|errors| errors.z_mm).into(),
-                    point.to_reference().into(),
-                ]
-            } else {
-                vec![
-                    text(point.method().map(|method| method.short_name().to_owned())),
-                    point.report.errors.percent().into(),
-                ]
-            };
-            [
-                point.report.kind.name(point.report.precision).into(),
-                point.hidden().map_or(Cell::Number(None), Cell::from),
-            ]
-            .into_iter()
-            .chain(source)
-            .chain([
-                point.report.cost.frame_us.into(),
-                format_duration(training).into(),
-                marks.into(),
-            ])
-            .collect()
-        };
-        let column = TableColumn::new;
-        let of_source = if has_nodes {
-            vec![
-                column("preset", "preset", ""),
-                column("z_percent", "Z", "%"),
-                column("z_mm", "Z", "mm"),
-                column("times_reference", "times reference", ""),
-            ]
-        } else {
-            vec![
-                column("method", "method", ""),
-                column("percent_of_range", "MAE", "% of range"),
-            ]
-        };
-        Table {
-            columns: [column("decoder", "Decoder", ""), column("hidden", "hidden", "")]
-                .into_iter()
-                .chain(of_source)
-                .chain([
-                    column("frame_us", "a frame", "µs"),
-                    column("training", "training", ""),
-                    column("fronts", "", ""),
-                ])
-                .collect(),
-            rows: points.iter().zip(self.fronts()).map(row).collect(),
+        let mut table = trade_off_summary(&self.level);
+        let mut points = Vec::from_iter(self.level.points.iter().zip(self.fronts()));
+        points.sort_by(|(one, _), (other, _)| one.report.cost.frame_us.total_cmp(&other.report.cost.frame_us));
+        table.columns.push(TableColumn::field(""));
+        for (row, (_, (is_on_decoding_front, is_on_training_front))) in table.rows.iter_mut().zip(points) {
+            let marks = [(is_on_decoding_front, "*"), (is_on_training_front, "+")];
+            row.push(
+                marks
+                    .map(|(is_on, mark)| if is_on { mark } else { " " })
+                    .concat()
+                    .into(),
+            );
         }
-    }
-
-    /// Name of a point among all of the level.
-    fn name(point: &TradeOffPoint) -> String {
-        let preset = point.preset.map(|preset| format!("{preset} preset"));
-        let hidden = point.hidden().map(|hidden| format!("{hidden} hidden"));
-        // Every network of a preset has its method.
-        let method = point.method().filter(|_| preset.is_none());
-        let method = method.map(|method| method.short_name().to_owned());
-        let name = point.report.kind.name(point.report.precision).to_owned();
-        let parts = [Some(name), preset, method, hidden];
-        Vec::from_iter(parts.into_iter().flatten()).join(", ")
+        table
     }
 
     fn write(&self, limits: Limits, out: &mut dyn Write) -> io::Result<()> {
@@ -337,7 +278,7 @@ impl MeasuredLevel {
         write!(out, "\n{}", self.table().aligned())?;
         for point in &self.level.points {
             for remark in &point.report.remarks {
-                writeln!(out, "Warning: {}: {remark}", Self::name(point))?;
+                writeln!(out, "Warning: {}: {remark}", point_name(point))?;
             }
         }
         write_warnings(&self.refused, out)?;
@@ -347,7 +288,7 @@ impl MeasuredLevel {
             most_accurate.map(|choice| (format!("Most accurate under {} us", choice.limit), choice)),
         ];
         for (what, choice) in choices.into_iter().flatten() {
-            let decoder = choice.point.map(|place| Self::name(&self.level.points[place]));
+            let decoder = choice.point.map(|place| point_name(&self.level.points[place]));
             let answer = choice.command.or(decoder).unwrap_or_else(|| "none".to_owned());
             writeln!(out, "{what}: {answer}")?;
         }
@@ -361,7 +302,7 @@ impl MeasuredLevel {
         let mut table = error_table(&ErrorTable::new(problem, &Vec::from_iter(errors)));
         // The rows of each target are the points in their order.
         for (row, point) in table.rows.iter_mut().zip(points.iter().cycle()) {
-            row[1] = Self::name(point).into();
+            row[1] = point_name(point).into();
         }
         table
     }

@@ -16,7 +16,7 @@ use super::{
 use crate::{
     evaluation::{
         Baselines, Channel, DecoderReport, Errors, Outlook, ReferenceNote, Run, RunError, SimulatedSettings,
-        StartRecord, best_start, error_remarks,
+        StartRecord, TestErrors, best_start, error_remarks,
         recorded::{Determination, Undetermined},
     },
     export::{
@@ -312,7 +312,7 @@ impl<'a> Trained<'a> {
         )?;
         writeln!(out, "Weights kept from epoch {}\n", training.best_epoch)?;
         if training.starts.len() > 1 {
-            write_starts(&training.starts, out)?;
+            write_starts(&training.starts, file.problem.test_percent_name(), out)?;
             writeln!(out)?;
         }
         write!(out, "{}", error_table(&file.error_table()).aligned())?;
@@ -335,8 +335,7 @@ impl<'a> Trained<'a> {
     /// Writes the errors of each decoder and their ratio to the reference.
     fn write_decoders(&self, out: &mut dyn Write) -> io::Result<()> {
         let reference = self.file.scores.baselines.reference.as_ref();
-        let reference = reference.and_then(|errors| errors.nodes());
-        if reference.is_some_and(Errors::is_rounding) {
+        if reference.and_then(TestErrors::nodes).is_some_and(Errors::is_rounding) {
             writeln!(
                 out,
                 "The reference is nothing but rounding: the readings determine the deformation, and no ratio to it is \
@@ -346,7 +345,16 @@ impl<'a> Trained<'a> {
         if self.decoders.is_empty() {
             return Ok(());
         }
-        write!(out, "\n{}", decoder_table(self.decoders, reference).aligned())?;
+        write!(
+            out,
+            "\n{}",
+            decoder_table(
+                &self.file.problem,
+                self.decoders,
+                self.file.scores.baselines.reference.as_ref()
+            )
+            .aligned()
+        )?;
         for report in self.decoders {
             let name = report.kind.name(report.precision);
             for remark in &report.remarks {

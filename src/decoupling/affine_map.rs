@@ -1,6 +1,9 @@
 use ndarray::{Array2, Axis, Slice};
 
-use super::{DecodeError, Decoder, least_squares::fit_least_squares, linear_fit::LinearFit, units::Units};
+use super::{
+    AffineLayer, DecodeError, Decoder, Description, Layer, LayeredMap, NotDescribed, least_squares::fit_least_squares,
+    linear_fit::LinearFit, units::Units,
+};
 use crate::{
     dataset::Dataset,
     network::{InputChoice, InputScaling, Inputs, MinMax, Quantity, ScalingError, channel_noise},
@@ -123,6 +126,15 @@ impl Decoder for AffineMap {
             targets[target] += change;
         }
         Ok(())
+    }
+
+    fn description(&self) -> Result<Description, NotDescribed> {
+        let map = AffineLayer::of_varying(&self.matrix, &self.varying, &self.base);
+        Ok(Description::of_maps(vec![LayeredMap {
+            quantity: self.quantity,
+            centre: self.centre.clone(),
+            layers: vec![Layer::Affine(map)],
+        }]))
     }
 }
 

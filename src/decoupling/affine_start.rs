@@ -1,8 +1,12 @@
 use faer::{Mat, Side, linalg::solvers::Solve};
 use glam::DVec3;
+use ndarray::Array2;
 
-use super::row_problem::Range;
-use crate::sensor::{Axes, RowConductance, SensorModel};
+use super::{AffineLayer, Layer, LayeredMap, row_problem::Range};
+use crate::{
+    network::Quantity,
+    sensor::{Axes, RowConductance, SensorModel},
+};
 
 /// Affine estimate of the compressions of a row-wire's nodes from its readings, of the least expected squared error if
 /// every node is pressed independently and uniformly over the stroke: where to start to solve Eq. (2).
@@ -79,6 +83,25 @@ impl AffineStart {
             middle_mm: stroke.middle(),
             means_ohm: mean.iter().map(|mean| model.resistivity_ohm_per_mm / mean).collect(),
             gains_mm: (0..nodes * readings).map(gain).collect(),
+        }
+    }
+
+    /// Describes the coordinates (3·M2) of the nodes of row-wire `row` at the estimate, before they are cut to the stroke.
+    pub(super) fn description(&self, model: &SensorModel, row: usize) -> LayeredMap {
+        let (readings, nodes) = (self.means_ohm.len(), model.scale.nodes_per_row());
+        let middles = (0..nodes).flat_map(|node| model.displaced_mm(row, node, DVec3::Z * self.middle_mm).to_array());
+        let weight = |(reading, coordinate): (usize, usize)| match coordinate % 3 {
+            // z counts upwards, and (mean − R)/R is the mean times the change of the conductance.
+            2 => -self.gains_mm[coordinate / 3 * readings + reading] * self.means_ohm[reading],
+            _ => 0.0,
+        };
+        LayeredMap {
+            quantity: Quantity::Conductance,
+            centre: self.means_ohm.iter().map(|ohm| 1.0 / ohm).collect(),
+            layers: vec![Layer::Affine(AffineLayer {
+                weights: Array2::from_shape_fn((readings, 3 * nodes), weight),
+                biases: middles.collect(),
+            })],
         }
     }
 

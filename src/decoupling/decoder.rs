@@ -1,7 +1,7 @@
 use ndarray::{Array2, Axis};
 use thiserror::Error;
 
-use super::SolvedRows;
+use super::{Description, NotDescribed, SolvedRows};
 use crate::{
     dataset::{Dataset, PerRow},
     network::Quantity,
@@ -72,6 +72,14 @@ pub trait Decoder: Send {
     /// no rows.
     fn take_solved_rows(&mut self) -> SolvedRows {
         SolvedRows::default()
+    }
+
+    /// Describes what the decoder computes, for programs that decode without this one.
+    ///
+    /// # Errors
+    /// If the decoder has no such description.
+    fn description(&self) -> Result<Description, NotDescribed> {
+        Err(NotDescribed::Unknown)
     }
 }
 
@@ -159,5 +167,13 @@ impl<D: Decoder> Decoder for PerRow<D> {
 
     fn decode_row(&mut self, row_index: usize, readings: &[f64], targets: &mut [f64]) -> Result<(), DecodeError> {
         self.at_mut(row_index).decode_row(row_index, readings, targets)
+    }
+
+    fn description(&self) -> Result<Description, NotDescribed> {
+        let mut maps = Vec::new();
+        for of_row in self.values() {
+            maps.extend(of_row.description()?.maps);
+        }
+        Ok(Description::of_maps(maps))
     }
 }

@@ -14,13 +14,15 @@
 //!
 //! [`DecoderKind`] lists them with their names, meanings and colours. Decoders of readings alone come as
 //! [`PerRow`](crate::dataset::PerRow): one shared by all row-wires, or one per row-wire. [`resistance_residual`] tells
-//! how well an answer explains the readings, without ground truth.
+//! how well an answer explains the readings, without ground truth. [`Description`] is what a decoder computes, in plain
+//! numbers, for programs that decode without this one.
 
 mod affine_map;
 mod affine_start;
 mod clusters;
 mod compiled;
 mod decoder;
+mod description;
 mod equation_decoders;
 mod gauss_newton;
 mod kind;
@@ -37,6 +39,7 @@ mod radial_basis;
 mod residual;
 mod ridge;
 mod row_problem;
+mod row_problem_description;
 mod side_by_side;
 mod solved_rows;
 mod takagi_sugeno;
@@ -48,6 +51,7 @@ mod units;
 pub use affine_map::AffineMap;
 pub use compiled::{CompiledNetworks, Real};
 pub use decoder::{DecodeError, Decoder, decode_set};
+pub use description::{AffineLayer, Description, Layer, LayeredMap, NotDescribed};
 pub use equation_decoders::{NewtonDecoder, PolishedDecoder, PosteriorDecoder};
 pub use kind::{ColourKey, DecoderKind, DecoderKindError, Precision};
 pub use newton::Newton;
@@ -56,6 +60,7 @@ pub(crate) use posterior::SampledPosterior;
 pub use posterior::{Posterior, PosteriorReport};
 pub use radial_basis::{Centres, RadialBasisNetwork, RadialBasisSettings};
 pub use residual::resistance_residual;
+pub use row_problem_description::{RowChoice, RowProblemDescription};
 pub use solved_rows::SolvedRows;
 pub use takagi_sugeno::TakagiSugeno;
 pub use training_mean::TrainingMean;

@@ -36,8 +36,6 @@ pub struct Newton {
 
 /// Damping of the first retry after a failed step, relative to the largest diagonal entry of JᵀJ.
 const FIRST_DAMPING: f64 = 1e-12;
-/// Largest number of plain steps before damped ones.
-const MOST_PLAIN_STEPS: usize = 25;
 /// Relative damping beyond which steps only get shorter.
 const LARGEST_DAMPING: f64 = 1e6;
 /// Distance, in proportion to the range, within which minima found from different starts count as the same.
@@ -46,6 +44,9 @@ const SAME: f64 = 1e-3;
 const AGREEING_STARTS: usize = 6;
 
 impl Newton {
+    /// Largest number of plain steps before damped ones.
+    pub(super) const MOST_PLAIN_STEPS: usize = 25;
+
     /// Creates a solver for rows of `model` in `scene`.
     pub fn new(model: &SensorModel, scene: &Scene, rules: NewtonRules) -> Self {
         let problem = RowProblem::new(model, scene.movement.axes());
@@ -273,7 +274,7 @@ impl Newton {
 
     /// Takes plain steps, each shortened to stay where the model is valid.
     fn take_plain_steps(&mut self, unknowns: &mut [f64]) -> (NewtonStop, usize) {
-        let most = self.rules.steps.min(MOST_PLAIN_STEPS);
+        let most = self.rules.steps.min(Self::MOST_PLAIN_STEPS);
         for steps in 1..=most {
             let Self {
                 linearised,

@@ -1,7 +1,7 @@
-use ndarray::{Array1, Axis};
+use ndarray::{Array1, Array2, Axis};
 
-use super::{DecodeError, Decoder};
-use crate::dataset::Dataset;
+use super::{AffineLayer, DecodeError, Decoder, Description, Layer, LayeredMap, NotDescribed};
+use crate::{dataset::Dataset, network::Quantity};
 
 /// Decoder that always answers the mean targets of the training set, the score of knowing nothing.
 #[derive(Clone, Debug, PartialEq)]
@@ -36,5 +36,17 @@ impl Decoder for TrainingMean {
     fn decode_row(&mut self, _row_index: usize, _readings: &[f64], targets: &mut [f64]) -> Result<(), DecodeError> {
         targets.copy_from_slice(self.targets.as_slice().expect("a mean is contiguous"));
         Ok(())
+    }
+
+    fn description(&self) -> Result<Description, NotDescribed> {
+        let mean = AffineLayer {
+            weights: Array2::zeros((self.channels, self.targets.len())),
+            biases: self.targets.to_vec(),
+        };
+        Ok(Description::of_maps(vec![LayeredMap {
+            quantity: Quantity::Raw,
+            centre: vec![0.0; self.channels],
+            layers: vec![Layer::Affine(mean)],
+        }]))
     }
 }

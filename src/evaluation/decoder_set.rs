@@ -3,8 +3,8 @@ use std::time::Instant;
 use ndarray::Array2;
 
 use super::{
-    MissingFigures, Remark, RunError, RunSettings, SimulatedSettings, Source, TestErrors, frame_time::frame_us,
-    task::unseen_noise,
+    MissingFigures, Remark, RunError, RunSettings, SimulatedSettings, Source, TestErrors, baselines::fit_baselines,
+    frame_time::frame_us, task::unseen_noise,
 };
 use crate::{
     dataset::{Dataset, PerRow, Stream},
@@ -139,6 +139,14 @@ impl DecoderSet {
                 }
             }
         }))
+    }
+
+    /// Fits the linear map of the error table.
+    ///
+    /// # Errors
+    /// If samples cannot be scaled.
+    pub fn linear(&self) -> Result<Box<dyn Decoder>, RunError> {
+        Ok(Box::new(fit_baselines(&self.training, &self.settings)?.1))
     }
 
     /// Compiles the networks for decoding.

@@ -25,6 +25,27 @@ pub fn format_number(value: impl Into<Option<f64>>) -> String {
     format!("{value:.*}", usize::try_from(decimals).unwrap_or(0))
 }
 
+/// Formats a number with `decimals` decimals, for figures whose distance from a round value matters, as of R² from 1:
+/// `0.9987`. As [`format_number`] does where it is 10000 or more in magnitude, or none.
+pub fn format_decimals(value: impl Into<Option<f64>>, decimals: usize) -> String {
+    match value.into() {
+        Some(value) if value.abs() < 1e4 => {
+            let text = format!("{value:.decimals$}");
+            // No -0.0000.
+            match text.strip_prefix('-') {
+                Some(zero) if zero.chars().all(|digit| "0.".contains(digit)) => zero.to_owned(),
+                _ => text,
+            }
+        }
+        value => format_number(value),
+    }
+}
+
+/// Formats R², the coefficient of determination, with four decimals.
+pub fn format_r2(value: impl Into<Option<f64>>) -> String {
+    format_decimals(value, 4)
+}
+
 /// Formats a number as [`format_number`] does, with a percent sign.
 #[cfg(feature = "files")]
 pub fn format_percent(value: impl Into<Option<f64>>) -> String {
@@ -45,6 +66,13 @@ pub fn format_duration(duration: Duration) -> String {
         60..3600 => format!("{} min {} s", whole / 60, whole % 60),
         _ => format!("{} h {} min", whole / 3600, whole % 3600 / 60),
     }
+}
+
+/// Returns the text with its first letter as a capital.
+pub fn capitalised(text: &str) -> String {
+    let mut letters = text.chars();
+    let first = letters.next().into_iter().flat_map(char::to_uppercase);
+    first.chain(letters).collect()
 }
 
 #[cfg(all(test, feature = "files"))]
@@ -78,6 +106,23 @@ mod tests {
         assert_eq!(format_number(None), "–");
         assert_eq!(format_percent(2.28), "2.28 %");
         assert_eq!(format_percent(Some(f64::NAN)), "–");
+    }
+
+    #[test]
+    fn decimals_are_kept_where_they_are_asked_for() {
+        let cases = [
+            (Some(0.998_76), "0.9988"),
+            (Some(1.0), "1.0000"),
+            (Some(-0.12), "-0.1200"),
+            (Some(-1e-7), "0.0000"),
+            (Some(-123_456.0), "-1.23e5"),
+            (Some(f64::NAN), "–"),
+            (Some(f64::NEG_INFINITY), "–"),
+            (None, "–"),
+        ];
+        for (value, text) in cases {
+            assert_eq!(format_r2(value), text);
+        }
     }
 
     #[test]

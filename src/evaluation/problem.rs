@@ -50,6 +50,15 @@ pub struct TargetPosition {
 }
 
 impl Problem {
+    /// Name of the [error in percent](super::TestErrors::percent) on the test set.
+    pub fn test_percent_name(&self) -> &'static str {
+        if self.has_nodes {
+            "test Z %"
+        } else {
+            "test error, % of range"
+        }
+    }
+
     /// Returns the description of channels without names: readings `c1`, `c2`, … and targets `t1`, `t2`, ….
     pub fn unnamed(inputs: usize, targets: usize) -> Self {
         let channels = |letter: &str, count: usize| {

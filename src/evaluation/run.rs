@@ -140,10 +140,7 @@ impl Run {
             StartRecord {
                 train_mse: best.training_mse,
                 validation_mse: best.validation_mse,
-                z_percent: self
-                    .errors_of(&self.network_of(trainer).decouple(&self.test))
-                    .nodes()
-                    .and_then(|errors| errors.z_percent),
+                z_percent: self.errors_of(&self.network_of(trainer).decouple(&self.test)).percent(),
                 epochs: trainer.latest().epoch,
                 best_epoch: trainer.best_epoch(),
                 stop_reason: trainer.stop_reason(),

@@ -14,7 +14,7 @@ impl SimulatedSettings {
     }
 
     /// As [`Self::draw`], but only those training samples that a run holds.
-    pub(super) fn draw_held(&self) -> Result<(Split, Dataset), RunError> {
+    pub(crate) fn draw_held(&self) -> Result<(Split, Dataset), RunError> {
         Ok(self.draw_held_unless(&|| false)?.expect("nothing cancels it"))
     }
 

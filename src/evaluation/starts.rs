@@ -10,7 +10,8 @@ pub struct StartRecord {
     pub train_mse: f64,
     /// Validation error (mse, scaled) of the best network, if anything was held out.
     pub validation_mse: Option<f64>,
-    /// AveZerr of the best network on the test set, in percent; never used for selection.
+    /// [Error in percent](super::TestErrors::percent) of the best network on the test set: AveZerr, or of a recording in
+    /// percent of the range; never used for selection.
     pub z_percent: Option<f64>,
     /// Number of epochs run.
     pub epochs: usize,

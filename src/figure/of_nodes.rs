@@ -5,8 +5,8 @@ use ndarray::Array2;
 
 use super::{
     axis::{PlotAxis, TickRule},
-    look::{Hue, Key, LineStyle, Look, Marker},
-    plot::{LineAt, Plot, PlotPoint, ReferenceLine, Series},
+    look::{Hue, Key, Look, Marker},
+    plot::{Plot, PlotPoint, Series},
     plot_figure::PlotFigure,
 };
 use crate::{
@@ -16,7 +16,6 @@ use crate::{
 
 /// Largest number of nodes looked at in a figure; of a larger test set, evenly spaced ones.
 const MOST_PAIRS: usize = 20_000;
-const BINS: usize = 41;
 
 /// Every so many nodes of a test set are looked at.
 fn stride(test: &Dataset) -> usize {
@@ -44,91 +43,6 @@ pub fn pair_address(test: &Dataset, pair: usize) -> Option<NodeAddress> {
         row: test.row_wire(sample).unwrap_or(0),
         node,
     })
-}
-
-/// Bins of a histogram of errors of z, symmetric about 0: as many on either side of the middle one, which holds no error.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ErrorBins {
-    width_mm: f64,
-}
-
-impl ErrorBins {
-    /// Returns the bins that hold all finite errors of these pairs of actual and decoupled z.
-    pub fn new(pairs_mm: &[(f64, f64)]) -> Self {
-        let errors = pairs_mm.iter().map(|(actual, decoupled)| (decoupled - actual).abs());
-        let largest = errors.filter(|error| error.is_finite()).fold(1e-12, f64::max);
-        Self {
-            width_mm: largest / (BINS / 2) as f64,
-        }
-    }
-
-    /// Number of bins.
-    pub const COUNT: usize = BINS;
-
-    /// Returns the bin of an error; `None` if it is not a number or beyond them.
-    pub fn bin(&self, error_mm: f64) -> Option<usize> {
-        let bin = (error_mm / self.width_mm).round() + (BINS / 2) as f64;
-        (0.0..BINS as f64).contains(&bin).then_some(bin as usize)
-    }
-
-    /// Returns the errors that a bin holds, in millimetres.
-    pub fn range_mm(&self, bin: usize) -> [f64; 2] {
-        [-0.5, 0.5].map(|half| self.width_mm * (bin as f64 - (BINS / 2) as f64 + half))
-    }
-
-    /// Returns the pairs in a bin, those with the largest error first.
-    pub fn pairs_in(&self, bin: usize, pairs_mm: &[(f64, f64)]) -> Vec<usize> {
-        let error = |pair: usize| pairs_mm[pair].1 - pairs_mm[pair].0;
-        let mut found: Vec<usize> = (0..pairs_mm.len())
-            .filter(|&pair| self.bin(error(pair)) == Some(bin))
-            .collect();
-        found.sort_by(|&one, &other| error(other).abs().total_cmp(&error(one).abs()));
-        found
-    }
-
-    fn counts(&self, pairs_mm: &[(f64, f64)]) -> [usize; BINS] {
-        let mut counts = [0; BINS];
-        let bins = pairs_mm
-            .iter()
-            .filter_map(|(actual, decoupled)| self.bin(decoupled - actual));
-        bins.for_each(|bin| counts[bin] += 1);
-        counts
-    }
-}
-
-/// Distribution of the errors of z (decoupled − actual), in [`ErrorBins`]; the bar `chosen` stands out.
-pub fn error_histogram_figure(pairs_mm: &[(f64, f64)], chosen: Option<usize>) -> PlotFigure {
-    let bins = ErrorBins::new(pairs_mm);
-    let counts = bins.counts(pairs_mm);
-    let bars = |name: &str, hue: Hue, is_shown: &dyn Fn(usize) -> bool| Series {
-        bar_width: Some(0.92 * bins.width_mm),
-        points: (0..BINS)
-            .filter(|&bin| is_shown(bin))
-            .map(|bin| PlotPoint {
-                item: Some(bin),
-                ..PlotPoint::from([bins.width_mm * (bin as f64 - (BINS / 2) as f64), counts[bin] as f64])
-            })
-            .collect(),
-        ..Series::new(name, Look::area(hue), [])
-    };
-    let mut series = vec![bars("nodes", Hue::Blue, &|bin| Some(bin) != chosen)];
-    if let Some(chosen) = chosen {
-        series.push(bars("chosen nodes", Hue::Orange, &|bin| bin == chosen));
-    }
-    let plot = Plot::new(
-        PlotAxis::linear("error of z (mm), decoupled − actual"),
-        PlotAxis::linear("nodes of the test set").including([0.0]),
-        series,
-    );
-    let no_error = ReferenceLine::new("no error", LineAt::X(0.0), Hue::Grey, LineStyle::Dashed);
-    PlotFigure {
-        keys: vec![Key::new("no error", Look::line(no_error.hue, no_error.style))],
-        plots: vec![Plot {
-            lines: vec![no_error],
-            ..plot
-        }],
-        notes: Vec::new(),
-    }
 }
 
 /// The paper's Fig. 6: z of the nodes at these positions, row by row; actual as squares, decoupled as discs, each with a
@@ -186,47 +100,6 @@ fn node_words(name: &str, point: &PlotPoint, node: usize, nodes_per_row: usize) 
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn every_finite_error_is_counted_once_and_zero_stands_in_the_middle() {
-        let pairs = [0.0, 0.0, 1.0, -1.0, 0.5, f64::NAN].map(|error| (4.0, 4.0 + error));
-        let bins = ErrorBins::new(&pairs);
-        let counts = bins.counts(&pairs);
-        assert_eq!(counts.iter().sum::<usize>(), 5);
-        assert_eq!((counts[0], counts[BINS / 2], counts[BINS - 1]), (1, 2, 1));
-        assert!((bins.width_mm - 0.05).abs() < 1e-15);
-        assert_eq!(ErrorBins::new(&[]).counts(&[]), [0; BINS]);
-        assert_eq!(ErrorBins::new(&[(4.0, 4.0); 3]).counts(&[(4.0, 4.0); 3])[BINS / 2], 3);
-    }
-
-    #[test]
-    fn a_bar_holds_the_nodes_whose_errors_it_spans() {
-        let pairs: Vec<(f64, f64)> = (0..200).map(|i| (4.0, 4.0 + (f64::from(i) * 0.731).sin())).collect();
-        let bins = ErrorBins::new(&pairs);
-        let mut held = 0;
-        for bin in 0..ErrorBins::COUNT {
-            let [low, high] = bins.range_mm(bin);
-            let found = bins.pairs_in(bin, &pairs);
-            held += found.len();
-            let errors: Vec<f64> = found.iter().map(|&pair| pairs[pair].1 - pairs[pair].0).collect();
-            assert!(
-                errors.iter().all(|error| (low..=high).contains(error)),
-                "{low} to {high}: {errors:?}"
-            );
-            assert!(
-                errors.windows(2).all(|pair| pair[0].abs() >= pair[1].abs()),
-                "{errors:?}"
-            );
-        }
-        assert_eq!(held, pairs.len());
-        let figure = error_histogram_figure(&pairs, Some(3));
-        let bars = figure.plots[0]
-            .series
-            .iter()
-            .map(|series| series.points.len())
-            .collect::<Vec<_>>();
-        assert_eq!(bars, [ErrorBins::COUNT - 1, 1]);
-    }
 
     #[test]
     fn a_pair_leads_back_to_its_node() {

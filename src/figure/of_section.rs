@@ -11,7 +11,10 @@ use super::{
     plot_figure::PlotFigure,
     surface::{Section, SectionLine},
 };
-use crate::{evaluation::format::format_number, surface::SurfaceMap};
+use crate::{
+    evaluation::format::{capitalised, format_number},
+    surface::SurfaceMap,
+};
 
 /// A surface to be cut, with its nodes.
 #[derive(Clone, Copy, Debug)]
@@ -57,7 +60,7 @@ pub fn section_figure(
         let points = on.map(|(node, of_row, at)| PlotPoint {
             note: Some(format!(
                 "{}, node {}\n{name} z: {} mm",
-                capital(&section.line.name()),
+                capitalised(&section.line.name()),
                 of_row + 1,
                 format_number(at.z)
             )),
@@ -84,7 +87,7 @@ pub fn section_figure(
     let notes = if curves.is_empty() {
         vec![format!(
             "{} lies beyond the nodes: there is no surface above it.",
-            capital(&section.line.name())
+            capitalised(&section.line.name())
         )]
     } else {
         Vec::new()
@@ -133,13 +136,6 @@ fn beyond(line: SectionLine, map: &SurfaceMap) -> Vec<Span> {
         range: points_mm[from]..=points_mm[to],
     });
     spans.collect()
-}
-
-fn capital(text: &str) -> String {
-    let mut letters = text.chars();
-    letters
-        .next()
-        .map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
 }
 
 #[cfg(test)]

@@ -2,7 +2,10 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
-use super::{Cure, ImportError, Joined, Recipe, Recording, Watch};
+use super::{
+    Cure, ImportError, Joined, Recipe, Recording, Watch,
+    stored_path::{restored, stored},
+};
 use crate::dataset::{Dataset, Division, Seed, Split, SplitBy};
 
 /// Files, the meanings of their columns, and the division of their samples: all that a run on measured samples needs to be
@@ -111,16 +114,24 @@ impl Plan {
         self.import.import(folder, watch)
     }
 
-    /// This plan with paths that do not depend on the working folder: relative to `folder` where they lead below it, else
-    /// absolute.
+    /// This plan, whose paths are relative to the working folder, with paths for a file in `folder`: relative to that
+    /// folder; the name alone for a recording in the user's home if the folder lies elsewhere.
     #[must_use]
     pub fn relative_to(&self, folder: &Path) -> Self {
-        let folder = std::path::absolute(folder).unwrap_or_else(|_| folder.to_owned());
-        let relative = |path: &PathBuf| {
-            let absolute = std::path::absolute(path).unwrap_or_else(|_| path.clone());
-            absolute.strip_prefix(&folder).map(Path::to_owned).unwrap_or(absolute)
-        };
-        self.with_paths(relative)
+        self.with_paths(|path| stored(path, folder))
+    }
+
+    /// This plan, read from a file in `folder`, with paths relative to the working folder. A recording that is not where it
+    /// was may lie next to the file.
+    #[must_use]
+    pub fn restored(&self, folder: &Path) -> Self {
+        self.with_paths(|path| restored(path, folder))
+    }
+
+    /// Returns `true` if the test samples are random ones of the recording: errors on them are optimistic where neighbouring
+    /// rows are similar.
+    pub fn is_optimistic(&self) -> bool {
+        self.division.by == SplitBy::Random && self.test.is_none()
     }
 
     /// All files that it reads.

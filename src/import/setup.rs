@@ -239,6 +239,19 @@ impl SetupSets {
         Run::resume_unless(setup.settings, states, self.sets, is_cancelled)
     }
 
+    /// Compares recorded samples with those that were `saved` with a run.
+    ///
+    /// # Errors
+    /// [`SetupError::OtherSamples`] if the recording has changed.
+    pub fn check_saved(&self, saved: Option<&Recorded>) -> Result<(), SetupError> {
+        match (saved, self.recorded()) {
+            (Some(saved), Some(found)) if saved.samples_crc32 != found.samples_crc32 => {
+                Err(SetupError::OtherSamples(saved.plan.import.data.display().to_string()))
+            }
+            _ => Ok(()),
+        }
+    }
+
     /// Origin of recorded samples, to be saved with the run; `None` for a simulated array.
     pub fn recorded(&self) -> Option<&Recorded> {
         self.recordings.as_ref().map(|recordings| &recordings.recorded)

@@ -217,7 +217,7 @@ fn simulate_and_decode_agree_with_the_library() {
         assert!(numbers.eq(row.iter().map(|number| number.to_bits())));
     }
     let errors = Errors::measure(&truth, &decoded, SimulatedSettings::default().source.stroke_mm());
-    assert_eq!(file.errors, errors);
+    assert_eq!(file.scores.network.nodes(), Some(&errors));
     assert_eq!(
         serde_json::from_value::<Errors>(report["errors"].clone()).unwrap(),
         errors

@@ -149,6 +149,50 @@ fn help_tells_formats_precisions_and_units() {
 }
 
 #[cfg(unix)]
+/// Each decoder is fitted again to the samples of the network, deterministically.
+#[test]
+fn other_decoders_leave_beside_the_network_or_say_why_not() {
+    let folder = trained("--rows known --noise 1e-3");
+    let path = folder.path();
+    let exported = |decoder: &str, out: &str| {
+        let arguments = format!("export --network n.json --decoder {decoder} --format numpy --out {out} --json");
+        let output = decoupler(&arguments, path);
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        let report: Value = serde_json::from_slice(&output.stdout).unwrap();
+        assert!(
+            report["deviation"].as_f64().unwrap() <= report["limit"].as_f64().unwrap(),
+            "{report}"
+        );
+        fs::read(path.join(out).join("golden.csv")).unwrap()
+    };
+    let answers: Vec<_> = ["network", "ridge", "rbf", "fuzzy"]
+        .map(|decoder| {
+            (
+                exported(decoder, decoder),
+                exported(decoder, &format!("{decoder} again").replace(' ', "_")),
+            )
+        })
+        .into();
+    for (index, (first, again)) in answers.iter().enumerate() {
+        assert_eq!(first, again);
+        assert!(answers[..index].iter().all(|(other, _)| other != first));
+    }
+    for (arguments, status, expected) in [
+        ("--decoder newton --format c99 --out b", 1, "have noise"),
+        ("--decoder newton --format onnx --out b", 2, "give c99 or numpy"),
+        (
+            "--decoder ridge --format c99 --precision fixed16 --out b",
+            2,
+            "networks only",
+        ),
+        ("--decoder knn --format c99 --out b", 2, "ridge"),
+    ] {
+        let message = failure(&format!("export --network n.json {arguments}"), path, status);
+        assert!(message.contains(expected), "{message}");
+    }
+    assert!(!path.join("b").exists());
+}
+
 #[test]
 fn the_folder_of_an_export_that_was_killed_is_removed_by_the_next_and_no_other() {
     let folder = trained("");

@@ -122,6 +122,35 @@ fn every_format_is_verified_and_says_names_units_and_rows() {
     assert_eq!(decode("copy.json"), decode("n.json"));
 }
 
+#[test]
+fn other_decoders_of_a_recording_keep_names_units_and_rows() {
+    let folder = trained("--rows known");
+    let path = folder.path();
+    for decoder in ["ridge", "rbf", "fuzzy"] {
+        let report = export(&format!("--decoder {decoder} --format onnx --out {decoder}"), path);
+        assert!(
+            report["deviation"].as_f64().unwrap() <= report["limit"].as_f64().unwrap(),
+            "{report}"
+        );
+        let metadata = fs::read_to_string(path.join(decoder).join("metadata.json")).unwrap();
+        let metadata: Value = serde_json::from_str(&metadata).unwrap();
+        assert_eq!(metadata["decoder"], decoder);
+        assert_eq!(metadata["row_numbers"], serde_json::json!([1, 3]));
+        assert_eq!(metadata["outputs"]["names"], serde_json::json!(["force", "torque"]));
+        assert!(
+            metadata["errors"][0]["errors"]["rmse"].as_f64().unwrap() > 0.0,
+            "{metadata}"
+        );
+        assert!(path.join(decoder).join("decoder.onnx").exists());
+    }
+    let output = decoupler("export --network n.json --decoder newton --format c99 --out b", path);
+    let message = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(
+        !output.status.success() && message.contains("no model of one"),
+        "{message}"
+    );
+}
+
 /// The golden vectors, rounded to the units that the header defines, are answered within the bound of each target by the
 /// program's own model, and where there is a compiler by the compiled source.
 #[test]

@@ -1,6 +1,6 @@
 //! Finished trainings kept, compared, and found again after a restart; figures of the paper; pictures for print.
 
-use std::{fs, path::Path};
+use std::{fs, path::Path, sync::Arc};
 
 use decoupler::{
     app::{BottomTab, Phase},
@@ -9,7 +9,10 @@ use decoupler::{
 };
 use eframe::egui::{Event, Key};
 
-use crate::driver::{Driver, small, trained};
+use crate::{
+    driver::{Driver, small, trained},
+    recordings::{recording, written},
+};
 
 const FIRST: &str = "10×6_3×18 h6 lm";
 /// Folder in which the window keeps its runs.
@@ -79,13 +82,13 @@ fn two_runs_are_compared_and_survive_a_restart() {
         for (letter, errors) in [("A", a), ("B", b)] {
             let cell = format!("Z error, %, {letter}: {}", format_number(errors.z_percent));
             assert!(driver.has(&cell), "{cell} in {:#?}", driver.texts());
-            let cell = format!("worst node, mm, {letter}: {}", format_number(errors.worst_mm));
+            let cell = format!("Worst node, mm, {letter}: {}", format_number(errors.worst_mm));
             assert!(driver.has(&cell), "{cell} in {:#?}", driver.texts());
         }
         assert!(driver.has("Surface of A") && driver.has("Surface of B"));
         let places = driver.views().compare.places.iter();
         for (compared, run) in places.filter_map(|place| place.compared.as_ref()).zip(&runs) {
-            assert_eq!(*compared.decoupled_mm, run.decouple_test(), "the same bits");
+            assert_eq!(*compared.answers, run.decouple_test(), "the same bits");
         }
         let kept = driver.state().runs.workspace.runs.iter();
         for (kept, file) in kept.zip(&shown) {
@@ -340,4 +343,72 @@ fn the_error_card_in_view_is_saved_with_its_own_colours() {
     assert_eq!(says(&mut driver), [1, 1, 0, 0]);
     driver.click_button("Error");
     assert_eq!(says(&mut driver), [1, 0, 1, 2], "the error's axis and key");
+}
+
+#[test]
+fn two_runs_of_a_recording_are_compared_target_by_target() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = written(&folder, "press.csv", &recording(60));
+    let runs = folder.path().join(PLACE);
+    let mut driver = Driver::open_keeping(&runs);
+    driver.open_recordings(&[&path]);
+    driver.limit_epochs("2");
+    train_and_keep(&mut driver, 1);
+    driver.enter("Hidden nodes", "3");
+    train_and_keep(&mut driver, 2);
+    driver.click_button("Compare");
+    wait_for_both(&mut driver);
+    driver.settle();
+    let kept = Vec::from_iter(
+        driver
+            .state()
+            .runs
+            .workspace
+            .runs
+            .iter()
+            .map(|run| Arc::clone(&run.file)),
+    );
+    for (file, letter) in kept.iter().zip(["A", "B"]) {
+        let errors = file.scores.network.targets()[1];
+        for (name, value) in [("RMSE", errors.rmse), ("R²", errors.r2.unwrap())] {
+            let value = format_number(value);
+            let shown = driver
+                .texts()
+                .into_iter()
+                .find(|text| text.contains(&format!("{name} of y (mm)")));
+            assert!(
+                shown.as_ref().is_some_and(|shown| shown.contains(&value)) || driver.says(&value),
+                "{name} of {letter} {value}: {:#?}",
+                driver.texts()
+            );
+        }
+    }
+    assert!(
+        driver.says("decoded x (mm) against actual x (mm)"),
+        "{:#?}",
+        driver.texts()
+    );
+    assert!(!driver.says("not comparable"));
+    let picture = folder.path().join("regression.svg");
+    driver.save("Regression of A, SVG", &picture);
+    driver.click("Dismiss");
+    assert!(fs::read_to_string(&picture).unwrap().contains("</svg>"));
+    let name = driver.state().runs.workspace.runs[0].name.clone();
+    driver.click(&format!("Use the settings of {name}"));
+    assert_eq!(
+        (driver.shown(), driver.state().settings().hidden),
+        ("Train", kept[0].settings.hidden)
+    );
+    drop(driver);
+
+    // Without the file the figures stay, and the reason for which there is no chart is shown.
+    fs::remove_file(&path).unwrap();
+    let mut driver = Driver::open_keeping(&runs);
+    wait_for_file(&mut driver);
+    driver.click_button("Compare");
+    driver.wait("the reason", |driver| driver.says("is not there any more"));
+    driver.settle();
+    assert!(driver.says("press.csv") && driver.has(&format!("{name} as A")));
+    let rmse = format_number(kept[0].scores.network.targets()[0].rmse);
+    assert!(driver.says(&rmse), "{:#?}", driver.texts());
 }

@@ -30,7 +30,7 @@ fn it_opens_on_the_papers_array_with_a_surface_and_says_what_to_do() {
         matches!(numbers[..], [low, high] if (4.0..4.2).contains(&low) && (4.8..=5.0).contains(&high)),
         "{value}"
     );
-    assert!(driver.has("1 of 10"), "100 test samples are 10 snapshots of 10 rows");
+    assert!(driver.says("1 of 10"), "100 test samples are 10 snapshots of 10 rows");
     assert!(!driver.has("Decoupled surface"));
 }
 
@@ -157,7 +157,7 @@ fn numbers_are_typed_and_kept_within_what_is_possible() {
         panic!("{draft:?}")
     };
     assert_eq!(settings.mu, 1e-4);
-    driver.wait("the new test set", |driver| driver.has("1 of 4"));
+    driver.wait("the new test set", |driver| driver.says("1 of 4"));
 
     for (label, text) in [("Hidden nodes", "0"), ("Training samples", "-5"), ("Epochs", "0")] {
         driver.enter(label, text);

@@ -14,6 +14,7 @@ use eframe::egui::vec2;
 use crate::{
     configuring::choose_method,
     driver::{Driver, small, table_of, trained},
+    sources::{BOTH, begun, network_figures, open_small, run_of, with_epochs},
 };
 
 const SAVE: &str = "Checkpoint, resumable";
@@ -76,38 +77,46 @@ fn ended(driver: &mut Driver) {
 
 #[test]
 fn several_starts_keep_the_best_and_show_how_all_spread() {
-    let mut driver = Driver::open();
-    driver.configure_small();
-    driver.enter("Starts", "4");
-    driver.train();
-    let run = trained(SimulatedSettings { starts: 4, ..small() });
-    let (starts, shown) = (run.starts(), driver.state().run.as_ref().unwrap());
-    assert_eq!(shown.starts, starts);
-    assert_eq!(shown.history, run.leader().history());
-    assert_eq!(driver.table(), table_of(&run));
-    assert!(driver.has("SPREAD OVER 4 STARTS"));
-    let z = Spread::of(starts.iter().filter_map(|start| start.z_percent)).unwrap();
-    let validation = Spread::of(starts.iter().map(StartRecord::deciding_mse)).unwrap();
-    assert!(z.smallest < z.largest, "the starts differ");
-    for (name, spread) in [("test Z %", z), ("validation mse", validation)] {
-        for (column, value) in [
-            ("min", spread.smallest),
-            ("median", spread.median),
-            ("max", spread.largest),
-        ] {
-            let cell = format!("{name}, {column}: {}", format_number(value));
-            assert!(driver.has(&cell), "{cell} is not in {:#?}", driver.texts());
+    for source in BOTH {
+        let mut opened = open_small(source);
+        opened.change(|settings| settings.starts = 4);
+        opened.driver.train();
+        let run = run_of(&opened.setup);
+        let (starts, shown) = (run.starts(), opened.driver.state().run.as_ref().unwrap());
+        assert_eq!(shown.starts, starts);
+        assert_eq!(shown.history, run.leader().history());
+        opened.driver.assert_shows(&network_figures(&run));
+        assert!(opened.driver.has("SPREAD OVER 4 STARTS"));
+        let percent = Spread::of(starts.iter().filter_map(|start| start.z_percent)).unwrap();
+        let validation = Spread::of(starts.iter().map(StartRecord::deciding_mse)).unwrap();
+        assert!(percent.smallest < percent.largest, "the starts differ");
+        let deciding = match starts[0].validation_mse {
+            Some(_) => "validation mse",
+            None => "training mse",
+        };
+        let of_test = run.problem().test_percent_name();
+        let mut expected = Vec::new();
+        for (name, spread) in [(of_test, percent), (deciding, validation)] {
+            for (column, value) in [
+                ("min", spread.smallest),
+                ("median", spread.median),
+                ("max", spread.largest),
+            ] {
+                expected.push(format!("{name}, {column}: {}", format_number(value)));
+            }
         }
-    }
-    let kept = run.leader_number() + 1;
-    assert!(driver.has(&format!("Start {kept} is kept: it has the lowest validation mse.")));
-    let [low, high, median] = [z.smallest, z.largest, z.median].map(format_number);
-    let strip = format!("Spread of Z %: 4 dots from {low} to {high}, median {median}");
-    assert!(driver.has(&strip), "{strip}");
+        let kept = run.leader_number() + 1;
+        expected.push(format!("Start {kept} is kept: it has the lowest {deciding}."));
+        let [low, high, median] = [percent.smallest, percent.largest, percent.median].map(format_number);
+        expected.push(format!(
+            "Spread of {of_test}: 4 dots from {low} to {high}, median {median}"
+        ));
+        opened.driver.assert_shows(&expected);
 
-    driver.enter("Starts", "1");
-    driver.train();
-    assert!(!driver.says("SPREAD OVER"), "one start has no spread");
+        opened.change(|settings| settings.starts = 1);
+        opened.driver.train();
+        assert!(!opened.driver.says("SPREAD OVER"), "one start has no spread");
+    }
 }
 
 #[test]
@@ -139,49 +148,54 @@ fn the_spread_is_shown_while_the_starts_train() {
 
 #[test]
 fn a_training_saved_and_opened_ends_in_the_same_network_file_as_one_never_interrupted() {
-    let folder = tempfile::tempdir().unwrap();
-    let [checkpoint, network] = ["run.checkpoint", "network.json"].map(|name| folder.path().join(name));
-    let mut driver = Driver::open();
-    start_endless(&mut driver);
-    driver.open_menu();
-    assert!(!driver.is_enabled(SAVE), "a training is held first");
-    assert!(driver.says("A training under way cannot be saved"));
-    driver.press(eframe::egui::Key::Escape);
-    pause(&mut driver);
-    save(&mut driver, SAVE, &checkpoint);
-    let (held, history) = (driver.epochs(), driver.state().run.as_ref().unwrap().history.clone());
-    drop(driver);
+    for source in BOTH {
+        let mut opened = open_small(source);
+        let [checkpoint, network] = ["run.checkpoint", "network.json"].map(|name| opened.folder.path().join(name));
+        opened.change(|settings| settings.training = momentum(1_000_000).training);
+        let (driver, setup) = (&mut opened.driver, &opened.setup);
+        driver.click("▶ Train");
+        driver.wait_for_epochs(5);
+        driver.open_menu();
+        assert!(!driver.is_enabled(SAVE), "a training is held first");
+        assert!(driver.says("A training under way cannot be saved"));
+        driver.press(eframe::egui::Key::Escape);
+        pause(driver);
+        save(driver, SAVE, &checkpoint);
+        let (held, history) = (driver.epochs(), driver.state().run.as_ref().unwrap().history.clone());
 
-    let mut driver = Driver::open();
-    give_path(&mut driver, OPEN, &checkpoint);
-    driver.wait("the training", |driver| driver.epochs() == held);
-    driver.settle();
-    assert_eq!(driver.state().phase, Phase::Paused);
-    assert_eq!(driver.state().draft, momentum(1_000_000), "the settings are the file's");
-    assert_eq!(driver.state().run.as_ref().unwrap().history, history);
-    assert!(driver.has("Decoupled surface") && driver.has(&format!("Epoch {held} of 1000000")));
+        let mut driver = Driver::open();
+        give_path(&mut driver, OPEN, &checkpoint);
+        driver.wait("the training", |driver| driver.epochs() == held);
+        driver.settle();
+        assert_eq!(driver.state().phase, Phase::Paused);
+        driver.wait("the settings of the file", |driver| {
+            driver.state().setup().as_ref() == Ok(setup)
+        });
+        assert_eq!(driver.state().run.as_ref().unwrap().history, history);
+        assert!(driver.has(&format!("Epoch {held} of 1000000")));
 
-    driver.click("▶ Resume");
-    driver.wait_for_epochs(20);
-    driver.click("■ Stop");
-    ended(&mut driver);
-    save(&mut driver, "Network file, JSON", &network);
-    let mut whole = stepped(momentum(1_000_000), driver.epochs());
-    whole.stop();
-    let mut expected = NetworkFile::from_run(&whole, None).unwrap();
-    let found = NetworkFile::load(&network).unwrap();
-    // Only the time it took differs.
-    expected.training.seconds = found.training.seconds;
-    assert_eq!(found, expected);
-    let bits = |file: &NetworkFile| -> Vec<u64> {
-        file.network.values()[0]
-            .mlp()
-            .weights()
-            .iter()
-            .map(|w| w.to_bits())
-            .collect()
-    };
-    assert_eq!(bits(&found), bits(&expected));
+        driver.click("▶ Resume");
+        driver.wait_for_epochs(20);
+        driver.click("■ Stop");
+        ended(&mut driver);
+        save(&mut driver, "Network file, JSON", &network);
+        let mut whole = begun(setup);
+        (0..driver.epochs()).for_each(|_| {
+            whole.step();
+        });
+        whole.stop();
+        let found = NetworkFile::load(&network).unwrap();
+        let mut expected = NetworkFile::from_run(&whole, found.recorded.as_ref()).unwrap();
+        // Only the time it took differs.
+        expected.training.seconds = found.training.seconds;
+        assert_eq!(found, expected);
+        assert_eq!(found.setup(), *setup);
+        let bits = |file: &NetworkFile| -> Vec<u64> {
+            let weights = file.network.values()[0].mlp().weights();
+            weights.iter().map(|weight| weight.to_bits()).collect()
+        };
+        assert_eq!(bits(&found), bits(&expected));
+    }
 }
 
 #[test]
@@ -318,18 +332,20 @@ fn levenberg_marquardt_goes_on_where_momentum_ended() {
 
 #[test]
 fn more_epochs_of_the_same_method_are_those_of_a_longer_training() {
-    let mut driver = Driver::open();
-    driver.configure_small();
-    choose_method(&mut driver, "Momentum, Eq. (11)");
-    driver.train();
-    driver.click("Continue");
-    ended(&mut driver);
-    let whole = trained(momentum(30));
-    assert_eq!(driver.state().run.as_ref().unwrap().history, whole.leader().history());
-    assert_eq!(driver.table(), table_of(&whole));
-    driver.click("▶ Train");
-    ended(&mut driver);
-    assert_eq!(driver.epochs(), 15, "Train begins anew");
+    for source in BOTH {
+        let mut opened = open_small(source);
+        opened.change(|settings| settings.training = momentum(15).training);
+        let (driver, setup) = (&mut opened.driver, &opened.setup);
+        driver.train();
+        driver.click("Continue");
+        ended(driver);
+        let whole = run_of(&with_epochs(setup, 30));
+        assert_eq!(driver.state().run.as_ref().unwrap().history, whole.leader().history());
+        driver.assert_shows(&network_figures(&whole));
+        driver.click("▶ Train");
+        ended(driver);
+        assert_eq!(driver.epochs(), 15, "Train begins again");
+    }
 }
 
 #[test]

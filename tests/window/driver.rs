@@ -8,7 +8,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use decoupler::app::{DecouplerWindow, Desktop, Notice, Phase, Shared, Views, WindowFile};
+use decoupler::app::{DecouplerWindow, Desktop, Notice, Phase, Shared, SourceKind, Views, WindowFile};
 use decoupler::evaluation::{ErrorTable, Run, SimulatedSettings, Simulation};
 use decoupler::export::format_number;
 use eframe::egui::{Context, Key, Modifiers, OutputCommand, Rect, Ui, UiBuilder, Vec2, accesskit::Role, vec2};
@@ -119,7 +119,9 @@ impl Driver {
         let builder = builder.renderer(Rasteriser::default()).with_render_cursor(false);
         let harness = builder.build_ui_state(frame, None);
         let mut driver = Self { harness, asked };
-        driver.wait("the first surface", |driver| driver.state().test().is_some());
+        driver.wait("the first surface", |driver| {
+            driver.state().test().is_some() || driver.state().source == SourceKind::Recording
+        });
         driver
     }
 

@@ -301,11 +301,9 @@ fn a_sweep_of_the_window_is_trained_by_the_terminal_and_seen_to_grow() {
     driver.click("Open sweep folder…");
     driver.type_into("File", &home.path().join("trials").display().to_string());
     driver.click_button("Open");
-    driver.wait("the first trials", |driver| {
-        driver.says("2 of 4 trials finished; new ones")
-    });
+    driver.wait("the first trials", |driver| driver.says("2 of 4 trials finished"));
     train("2/2");
-    driver.wait("the other trials", |driver| driver.says("All 4 trials finished."));
+    driver.wait("the other trials", |driver| driver.says("4 of 4 trials finished"));
     assert!(
         driver.says("Sweep folder trials: 4 of 4 trials finished"),
         "{:#?}",

@@ -6,11 +6,12 @@ use decoupler::{
     export::{NetworkFile, format_number},
     network::Networks,
 };
-use eframe::egui::{Key, Modifiers, OutputCommand};
+use eframe::egui::{Key, Modifiers};
 
 use crate::{
     driver::{Driver, small, trained},
     folders::names,
+    sources::{BOTH, Opened, network_figures, run_of, trained_small},
 };
 
 const NETWORK: &str = "Network file, JSON";
@@ -26,56 +27,73 @@ fn trained_driver() -> Driver {
 
 #[test]
 fn a_saved_network_gives_the_same_outputs_bit_by_bit() {
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("network.json");
-    let mut driver = trained_driver();
-    driver.save(NETWORK, &path);
-    assert!(
-        driver.has(&format!("Saved {}", path.display())),
-        "{:#?}",
-        driver.texts()
-    );
-    assert_eq!(names(folder.path()), ["network.json"]);
-    let file = NetworkFile::load(&path).unwrap();
-    let run = trained(small());
-    assert_eq!(file.settings, small().into());
-    let bits = |network: &Networks| network.decouple(run.test()).mapv(f64::to_bits);
-    assert_eq!(bits(&file.network), bits(&run.network()));
-    driver.click("Dismiss");
-    assert!(!driver.says("Saved "));
+    for source in BOTH {
+        let Opened {
+            mut driver,
+            setup,
+            folder,
+        } = trained_small(source);
+        let path = folder.path().join("network.json");
+        driver.save(NETWORK, &path);
+        assert!(
+            driver.has(&format!("Saved {}", path.display())),
+            "{:#?}",
+            driver.texts()
+        );
+        let file = NetworkFile::load(&path).unwrap();
+        let run = run_of(&setup);
+        assert_eq!(file.setup(), setup);
+        let bits = |network: &Networks| network.decouple(run.test()).mapv(f64::to_bits);
+        assert_eq!(bits(&file.network), bits(&run.network()));
+        driver.click("Dismiss");
+        assert!(!driver.says("Saved "));
+    }
 }
 
 #[test]
 fn saved_tables_hold_what_is_shown() {
-    let folder = tempfile::tempdir().unwrap();
-    let [errors, loss] = ["errors.csv", "loss.csv"].map(|name| folder.path().join(name));
-    let mut driver = trained_driver();
-    driver.save(ERRORS, &errors);
-    driver.click("Dismiss");
-    driver.save(LOSS, &loss);
-    assert_eq!(names(folder.path()), ["errors.csv", "loss.csv"]);
+    for source in BOTH {
+        let Opened {
+            mut driver,
+            setup,
+            folder,
+        } = trained_small(source);
+        let [errors, loss] = ["errors.csv", "loss.csv"].map(|name| folder.path().join(name));
+        driver.save(ERRORS, &errors);
+        driver.click("Dismiss");
+        driver.save(LOSS, &loss);
 
-    let mut cells = Vec::new();
-    for record in csv::Reader::from_path(&errors).unwrap().records() {
-        let record = record.unwrap();
-        for (place, column) in ["Z %", "X %", "Y %", "mm", "stroke %"].iter().enumerate() {
-            let number: f64 = record[place + 1].parse().unwrap();
-            cells.push(format!("{}, {column}: {}", &record[0], format_number(number)));
+        let mut numbers = Vec::new();
+        for record in csv::Reader::from_path(&errors).unwrap().records() {
+            let record = record.unwrap();
+            if record.iter().any(|cell| cell == "network") {
+                numbers.extend(
+                    record
+                        .iter()
+                        .filter_map(|cell| cell.parse::<f64>().ok())
+                        .map(format_number),
+                );
+            }
         }
-    }
-    assert_eq!(cells, driver.table());
+        let figures = network_figures(&run_of(&setup));
+        driver.assert_shows(&figures);
+        for figure in figures {
+            let (_, number) = figure.rsplit_once(": ").unwrap();
+            assert!(numbers.iter().any(|saved| saved == number), "{figure} in {numbers:?}");
+        }
 
-    let history = &driver.state().run.as_ref().unwrap().history;
-    let mut rows = 0;
-    for (record, epoch) in csv::Reader::from_path(&loss).unwrap().records().zip(history) {
-        let record = record.unwrap();
-        assert_eq!(record[0].parse(), Ok(epoch.epoch));
-        assert_eq!(record[1].parse(), Ok(epoch.training_mse));
-        assert_eq!(record[2].parse::<f64>().ok(), epoch.validation_mse);
-        assert_eq!(record[3].parse::<f64>().ok(), epoch.test_mse);
-        rows += 1;
+        let history = &driver.state().run.as_ref().unwrap().history;
+        let mut rows = 0;
+        for (record, epoch) in csv::Reader::from_path(&loss).unwrap().records().zip(history) {
+            let record = record.unwrap();
+            assert_eq!(record[0].parse(), Ok(epoch.epoch));
+            assert_eq!(record[1].parse(), Ok(epoch.training_mse));
+            assert_eq!(record[2].parse::<f64>().ok(), epoch.validation_mse);
+            assert_eq!(record[3].parse::<f64>().ok(), epoch.test_mse);
+            rows += 1;
+        }
+        assert_eq!(rows, history.len());
     }
-    assert_eq!(rows, history.len());
 }
 
 #[test]
@@ -176,86 +194,78 @@ fn what_worked_closes_by_itself_and_the_window_rests_and_what_failed_stays() {
 }
 
 #[test]
-fn every_network_format_leaves_in_three_clicks_read_back_and_with_its_deviation() {
-    let folder = tempfile::tempdir().unwrap();
-    let mut driver = trained_driver();
-    let bundles = [
-        ("ONNX, f64", "network.onnx"),
-        ("ONNX, f32", "network.onnx"),
-        ("C99, f64", "c99_f64_decode.c"),
-        ("C99, f32", "c99_f32_decode.c"),
-        ("C99, fixed16", "c99_fixed16_decode.c"),
-        ("MATLAB/Octave, f64", "matlab_octave_f64_decode.m"),
-        ("NumPy, f64", "network.npz"),
-        ("NumPy, f32", "decode.py"),
-    ];
-    for (name, file) in bundles {
-        let path = folder
-            .path()
-            .join(name.to_lowercase().replace(", ", "_").replace('/', "_"));
-        driver.save(name, &path);
-        let (format, _) = name.split_once(", ").unwrap();
-        let told = format!("{format} written and read back: largest deviation ");
-        assert!(driver.says(&told), "{:#?}", driver.texts());
-        assert!(driver.says(&path.display().to_string()));
-        let found = names(&path);
-        for expected in [file, "README.txt", "golden.csv", "metadata.json"] {
-            assert!(found.iter().any(|name| name == expected), "{name}: {found:?}");
+fn every_network_format_is_exported_read_back_and_with_its_deviation() {
+    for source in BOTH {
+        let Opened {
+            mut driver,
+            setup,
+            folder,
+        } = trained_small(source);
+        let bundles = [
+            ("ONNX, f64", "network.onnx"),
+            ("ONNX, f32", "network.onnx"),
+            ("C99, f64", "c99_f64_decode.c"),
+            ("C99, f32", "c99_f32_decode.c"),
+            ("C99, fixed16", "c99_fixed16_decode.c"),
+            ("MATLAB/Octave, f64", "matlab_octave_f64_decode.m"),
+            ("NumPy, f64", "network.npz"),
+            ("NumPy, f32", "decode.py"),
+        ];
+        for (name, file) in bundles {
+            let path = folder
+                .path()
+                .join(name.to_lowercase().replace(", ", "_").replace('/', "_"));
+            driver.save(name, &path);
+            let (format, _) = name.split_once(", ").unwrap();
+            let text = format!("{format} written and read back: largest deviation ");
+            assert!(driver.says(&text), "{source:?}: {:#?}", driver.texts());
+            assert!(driver.says(&path.display().to_string()));
+            let found = names(&path);
+            for expected in [file, "README.txt", "golden.csv", "metadata.json"] {
+                assert!(found.iter().any(|name| name == expected), "{name}: {found:?}");
+            }
+            driver.click("Dismiss");
         }
-        driver.click("Dismiss");
+        // The bundle names the source of its network.
+        let metadata = fs::read_to_string(folder.path().join("onnx_f64/metadata.json")).unwrap();
+        assert!(metadata.contains(&setup.source_name()), "{metadata}");
+        let taken = folder.path().join("onnx_f64");
+        driver.save("ONNX, f64", &taken);
+        assert!(driver.says("is there already"), "{:#?}", driver.texts());
     }
-    // The bundle knows the network of the run: its golden answers are those of the library.
-    let metadata = fs::read_to_string(folder.path().join("onnx_f64/metadata.json")).unwrap();
-    assert!(metadata.contains("10×6_3×18"), "{metadata}");
-    let taken = folder.path().join("onnx_f64");
-    driver.save("ONNX, f64", &taken);
-    assert!(driver.says("is there already"), "{:#?}", driver.texts());
 }
 
 #[test]
 fn tables_are_copied_as_they_are_shown() {
-    let mut driver = trained_driver();
-    let shown = driver.table();
-    for form in ["Markdown", "LaTeX", "tab-separated"] {
-        driver.open_menu();
-        let name = format!("Copy error table as {form}");
-        driver.get(&name).scroll_to_me();
-        driver.harness().run_steps(5);
-        driver.get(&name).click();
-        let mut copied = None;
-        for _ in 0..3 {
-            driver.harness().step();
-            let commands = &driver.harness().output().platform_output.commands;
-            copied = copied.or(commands.iter().find_map(|command| match command {
-                OutputCommand::CopyText(text) => Some(text.clone()),
-                _ => None,
-            }));
-        }
-        let copied = copied.unwrap_or_else(|| panic!("{name} copied nothing"));
-        let line = copied.lines().find(|line| line.contains("network")).unwrap();
-        let cell = |column: &str| {
-            let name = format!("network, {column}: ");
-            shown.iter().find_map(|cell| cell.strip_prefix(&name)).unwrap()
-        };
-        let (percent, mm) = (cell("Z %"), cell("mm"));
-        match form {
-            "tab-separated" => {
-                let error = *driver.state().result().unwrap().errors.nodes().unwrap();
-                let cells: Vec<&str> = line.split('\t').collect();
-                assert_eq!(cells[1].parse(), Ok(error.z_percent.unwrap()));
-                assert_eq!(cells[4].parse(), Ok(error.z_mm));
+    for source in BOTH {
+        let Opened { mut driver, setup, .. } = trained_small(source);
+        let figures = network_figures(&run_of(&setup));
+        for form in ["Markdown", "LaTeX", "tab-separated"] {
+            driver.open_menu();
+            let name = format!("Copy error table as {form}");
+            driver.get(&name).scroll_to_me();
+            driver.harness().run_steps(5);
+            let copied = driver.click_and_copy(&name);
+            let copied = copied.unwrap_or_else(|| panic!("{name} copied nothing"));
+            let mut numbers = Vec::new();
+            for line in copied.lines().filter(|line| line.contains("network")) {
+                let cells = line.split(['\t', '|', '&', ' ']).map(str::trim);
+                numbers.extend(cells.filter_map(|cell| cell.parse::<f64>().ok()).map(format_number));
             }
-            _ => assert!(
-                line.contains(&format!(" {percent} ")) && line.contains(&format!(" {mm} ")),
-                "{line}"
-            ),
+            for figure in &figures {
+                let (_, number) = figure.rsplit_once(": ").unwrap();
+                assert!(
+                    numbers.iter().any(|copied| copied == number),
+                    "{form}, {figure} in {copied}"
+                );
+            }
+            assert!(
+                driver.has(&format!("Copied the error table as {form}")),
+                "{:#?}",
+                driver.texts()
+            );
+            driver.click("Dismiss");
         }
-        assert!(
-            driver.has(&format!("Copied the error table as {form}")),
-            "{:#?}",
-            driver.texts()
-        );
-        driver.click("Dismiss");
     }
 }
 

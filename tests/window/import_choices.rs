@@ -1,4 +1,4 @@
-//! What the user chose for an import stays when a file is added, or the files are looked at again.
+//! Choices of an import stay when a file is added, or the files are read again.
 
 use std::{fmt::Write as _, fs, path::Path};
 
@@ -23,9 +23,7 @@ fn saved_plan(driver: &mut Driver, folder: &TempDir) -> Plan {
 
 /// Looks at the files again, with other cells that mean missing.
 fn call_missing(driver: &mut Driver, text: &str) {
-    if !driver.has("Missing cells") {
-        driver.click("Rows");
-    }
+    driver.unfold_to("Filter", "Missing cells");
     driver.enter("Missing cells", text);
     driver.wait("the files", |driver| !driver.says("Reading "));
     driver.wait("the samples", |driver| driver.says("Test: "));
@@ -34,9 +32,7 @@ fn call_missing(driver: &mut Driver, text: &str) {
 
 /// Picks an option of the layout of text.
 fn lay_out(driver: &mut Driver, field: &str, option: &str) {
-    if !driver.has(field) {
-        driver.click("Layout of text");
-    }
+    driver.unfold_to("Layout of text", field);
     driver.click(field);
     driver.click_button(option);
     driver.wait("the files", |driver| !driver.says("Reading "));
@@ -106,7 +102,7 @@ fn conditions_name_their_columns_also_where_another_file_comes_first() {
     let states = written(&folder, "states.csv", &states);
     let mut driver = Driver::open();
     driver.open_recordings(&[&states]);
-    driver.click("Rows");
+    driver.unfold_to("Filter", "Only rows with");
     driver.enter("Only rows with", "c3<3 and c2 >= 1");
     driver.enter("Missing cells", "-1, c2=99");
     driver.wait("the samples", |driver| driver.says("c3<3"));
@@ -133,7 +129,7 @@ fn sessions() -> String {
 fn a_split_and_its_shares_survive_where_a_column_is_a_group() {
     let (mut driver, _path, folder) = opened_text(&sessions());
     assert!(driver.says("group, 20 % test"), "{:#?}", driver.texts());
-    driver.click("Split");
+    driver.unfold_to("Samples", "Test share");
     driver.click_button("time");
     driver.enter("Test share", "30");
     driver.enter("Validation share", "25");
@@ -172,7 +168,7 @@ fn the_group_chosen_last_is_the_group_and_a_wrong_layout_forgets_nothing() {
 
 fn choose_test_file(driver: &mut Driver, path: &Path) {
     if !driver.has("Test file…") {
-        driver.click("Split");
+        driver.unfold_to("Samples", "Test share");
     }
     driver.open_form("Test file…");
     driver.type_into("File", &path.display().to_string());

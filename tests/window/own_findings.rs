@@ -51,7 +51,7 @@ fn what_the_readings_tell_is_told_as_by_the_library() {
     for channel in &found.importance {
         let growth = channel.growth[0].unwrap();
         let expected = format!("{:.2} ({:.2} to {:.2})", growth.value, growth.low, growth.high);
-        assert!(driver.has(&expected), "{expected} is not among {:#?}", driver.texts());
+        assert!(driver.says(&expected), "{expected} is not among {:#?}", driver.texts());
     }
     assert!(driver.says("RMSE of x (mm)"), "the learning curve is drawn");
     // What is changed since is said.

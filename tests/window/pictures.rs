@@ -2,9 +2,14 @@
 
 use std::fs;
 
+use decoupler::import::Setup;
 use eframe::egui::{Vec2, vec2};
 
-use crate::{configuring::choose_method, driver::Driver};
+use crate::{
+    configuring::choose_method,
+    driver::Driver,
+    sources::{probe, skin_with_positions},
+};
 
 struct Album {
     driver: Driver,
@@ -33,6 +38,54 @@ fn pictures_of_the_window() {
             album(size, is_dark);
         }
     }
+}
+
+#[test]
+#[ignore = "writes pictures"]
+fn pictures_of_recordings() {
+    fs::create_dir_all("target/pictures").unwrap();
+    let grid = "target,x,y\nd6,4,10\nd1,0,0\nd2,0,5\nd4,4,0\nd3,0,10\nd5,4,5\n";
+    let folder = tempfile::tempdir().unwrap();
+    let setups = [
+        ("skin", skin_with_positions(folder.path(), grid)),
+        ("probe", probe(folder.path())),
+    ];
+    for size in [vec2(1440.0, 900.0), vec2(1024.0, 700.0)] {
+        for is_dark in [true, false] {
+            for (name, setup) in &setups {
+                album_of_recording(size, is_dark, name, setup);
+            }
+        }
+    }
+}
+
+fn album_of_recording(size: Vec2, is_dark: bool, name: &str, setup: &Setup) {
+    let theme = if is_dark { "dark" } else { "light" };
+    let mut driver = Driver::open_sized(size);
+    if !is_dark {
+        driver.act("Light theme");
+    }
+    driver.take_recording(setup);
+    let prefix = format!("{name}-{}x{}-{theme}", size.x, size.y);
+    let mut album = Album { driver, prefix };
+    album.take("1-opened");
+    album.driver.train();
+    album.driver.wait_for_hold();
+    album.take("2-trained");
+    for tab in ["Training state", "Histogram", "Regression", "Sample", "Error map"] {
+        if album.driver.has(tab) {
+            album.driver.click(tab);
+            album.take(&format!("3-{}", tab.replace(' ', "-").to_lowercase()));
+        }
+    }
+    album.driver.click("More decoders");
+    album.driver.wait("all decoders", |driver| {
+        let decoders = &driver.views().train.decoders;
+        decoders.measured.is_some() && !decoders.is_measuring()
+    });
+    album.take("4-decoders");
+    album.driver.open_menu();
+    album.take("5-menu");
 }
 
 fn album(size: Vec2, is_dark: bool) {

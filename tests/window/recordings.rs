@@ -7,6 +7,7 @@ use std::{
 };
 
 use decoupler::{
+    app::Phase,
     dataset::{Division, Seed},
     evaluation::{Measured, Run, RunSettings},
     import::{Plan, Recipe},
@@ -57,22 +58,31 @@ impl Driver {
         self.settle();
     }
 
+    /// Presses Train and waits for the end.
+    #[track_caller]
+    pub(crate) fn train_recording(&mut self) {
+        self.click("▶ Train");
+        self.wait("the end of the training", |driver| {
+            let result = driver.state().result();
+            matches!(driver.state().phase, Phase::Ended(_)) && result.is_some_and(|result| result.is_standing)
+        });
+        self.settle();
+    }
+
+    /// Unfolds the part of the form with this field.
+    #[track_caller]
+    pub(crate) fn unfold_to(&mut self, part: &str, field: &str) {
+        if !self.has(field) {
+            self.click(part);
+            self.settle();
+        }
+    }
+
     /// Limits the training to so many epochs.
     #[track_caller]
     pub(crate) fn limit_epochs(&mut self, epochs: &str) {
-        // What is unfolded in one view is in the others too.
-        if !self.has("Epochs") {
-            self.click("When to stop");
-        }
+        self.unfold_to("When to stop", "Epochs");
         self.enter("Epochs", epochs);
-    }
-
-    /// Presses Train and waits for the end.
-    #[track_caller]
-    pub(crate) fn train_own_data(&mut self) {
-        self.click("▶ Train");
-        self.wait("the end of the training", |driver| driver.says("Finished: "));
-        self.settle();
     }
 }
 
@@ -124,12 +134,6 @@ pub(crate) fn trained(plan: &Plan) -> Run {
     let mut run = Run::on_sets(settings(), sets.split, sets.test).unwrap();
     while run.step().is_none() {}
     run
-}
-
-/// Cells of the error tables on show: `x (mm), network, RMSE: 0.1`.
-pub(crate) fn cells(driver: &Driver) -> Vec<String> {
-    let is_cell = |text: &String| text.contains(", RMSE: ") || text.contains(", MAE: ") || text.contains(", worst: ");
-    driver.texts().into_iter().filter(is_cell).collect()
 }
 
 /// A window with [`recording`] open, its file, and the folder of that.

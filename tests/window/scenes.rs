@@ -63,7 +63,7 @@ fn one_row_is_all_that_is_drawn() {
     assert!(driver.has("6 unknowns, 18 equations a frame"));
     wait_for_scene(&mut driver);
     assert_eq!(driver.views().train.drawn.frames.actual.nodes_mm.len(), 6);
-    assert!(driver.has("1 of 100"), "a snapshot is one sample");
+    assert!(driver.says("1 of 100"), "a snapshot is one sample");
     driver.train();
     let mut settings = small();
     settings.source.scene.rows = Rows::One(3);

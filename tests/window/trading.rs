@@ -1,15 +1,18 @@
 //! Speed against accuracy: measured, asked, loaded, cancelled and taken away.
 
-use std::fs;
+use std::{fs, path::Path};
 
 use decoupler::{
-    app::{TradeOffEnding, TradeOffPlan},
+    app::{PlannedLevel, TradeOffEnding, TradeOffPlan},
     evaluation::{Preset, TradeOffPoint, fastest_under, measure_trade_off, most_accurate_under},
     export::format_percent,
 };
 use eframe::egui::vec2;
 
-use crate::driver::Driver;
+use crate::{
+    driver::Driver,
+    recordings::{opened, settings},
+};
 
 fn open() -> Driver {
     let mut driver = Driver::open();
@@ -29,7 +32,7 @@ fn tiny(driver: &mut Driver) -> TradeOffPlan {
     driver.enter("Maximum epochs", "3");
     driver.enter("Test samples", "20");
     assert!(driver.has("16 points"), "{:#?}", driver.texts());
-    driver.views().trade_off.plan(&driver.state().draft).unwrap()
+    driver.views().trade_off.plan(driver.state()).unwrap()
 }
 
 fn measure(driver: &mut Driver) {
@@ -40,21 +43,13 @@ fn measure(driver: &mut Driver) {
 }
 
 /// What the library measures by itself.
-fn by_library(plan: &TradeOffPlan, noise: f64) -> Vec<TradeOffPoint> {
+fn by_library(plan: &TradeOffPlan, level: &PlannedLevel) -> Vec<TradeOffPoint> {
     let mut points = Vec::new();
-    for &preset in &plan.presets {
-        let settings = plan.settings(preset, noise);
+    for run in &level.runs {
         let on_point = |_, point: Result<TradeOffPoint, _>| points.push(point.unwrap());
-        let sets = settings.draw_sets().unwrap();
-        measure_trade_off(
-            &settings.into(),
-            &sets,
-            &plan.hidden,
-            &plan.decoders,
-            || false,
-            on_point,
-        )
-        .unwrap();
+        let sets = run.setup.sets(Path::new(""), &|| false, &mut |_| ()).unwrap().unwrap();
+        let settings = run.setup.settings();
+        measure_trade_off(settings, &sets.sets, &plan.hidden, &run.decoders, || false, on_point).unwrap();
     }
     points
 }
@@ -69,8 +64,8 @@ fn every_point_is_the_librarys_and_both_questions_are_answered() {
         (outcome.points(), outcome.ending),
         ((16, 16), Some(TradeOffEnding::Complete))
     );
-    for level in &outcome.levels {
-        for (shown, own) in level.points.iter().zip(by_library(&plan, level.noise.unwrap())) {
+    for (level, planned) in outcome.levels.iter().zip(&plan.levels) {
+        for (shown, own) in level.points.iter().zip(by_library(&plan, planned)) {
             assert_eq!(
                 (shown.report.kind, shown.report.precision),
                 (own.report.kind, own.report.precision)
@@ -133,7 +128,9 @@ fn a_click_on_a_point_loads_its_configuration() {
     measure(&mut driver);
     driver.click("Decoding: Ridge, best preset");
     assert_eq!(driver.shown(), "Train");
-    let ridge = plan.settings(Preset::Best, 0.0);
+    let mut runs = plan.levels[0].runs.iter();
+    let best = runs.find(|run| run.preset == Some(Preset::Best)).unwrap();
+    let ridge = best.setup.simulated().unwrap();
     let draft = driver.state().draft;
     assert_eq!(
         (draft.source.scene, draft.inputs, draft.source.samples),
@@ -263,4 +260,62 @@ fn charts_and_form_keep_to_a_narrow_window() {
             assert!(rect.max.x < 1024.0 && rect.min.x > 272.0, "{text}: {rect}");
         }
     }
+}
+
+#[test]
+fn decoders_of_a_recording_are_the_librarys_and_a_point_is_loaded() {
+    let (mut driver, _path, folder) = opened(120);
+    driver.click_button("Trade-off");
+    driver.type_into("Hidden nodes", "3");
+    for decoder in ["Radial basis", "Fuzzy rules"] {
+        driver.click(decoder);
+    }
+    driver.enter("Maximum epochs", "3");
+    assert!(
+        !driver.has("Newton") && !driver.has("Noise levels"),
+        "{:#?}",
+        driver.texts()
+    );
+    // Mean and ridge once, then a network in two precisions by each of two methods.
+    assert!(driver.has("6 points"), "{:#?}", driver.texts());
+    let plan = driver.views().trade_off.plan(driver.state()).unwrap();
+    measure(&mut driver);
+    let outcome = driver.views().trade_off.outcome.as_ref().unwrap();
+    assert_eq!(
+        (outcome.points(), outcome.ending),
+        ((6, 6), Some(TradeOffEnding::Complete))
+    );
+    let own = by_library(&plan, &plan.levels[0]);
+    assert_eq!(own.len(), outcome.levels[0].points.len());
+    for (shown, own) in outcome.levels[0].points.iter().zip(own) {
+        assert_eq!(
+            (shown.report.kind, shown.report.precision),
+            (own.report.kind, own.report.precision)
+        );
+        assert_eq!(shown.report.errors, own.report.errors, "times differ, errors do not");
+        assert_eq!((shown.settings, shown.preset), (own.settings, None));
+    }
+    for name in ["Ridge", "Network, lm, 3 hidden", "Network f32, br, 3 hidden"] {
+        assert!(
+            driver.has(&format!("Decoding: {name}")),
+            "{name}: {:#?}",
+            driver.texts()
+        );
+    }
+    let table = folder.path().join("points.csv");
+    driver.save("All points, CSV", &table);
+    driver.click("Dismiss");
+    let table = fs::read_to_string(table).unwrap();
+    assert!(table.starts_with("decoder,precision,hidden,method,"), "{table}");
+    assert!(
+        table.contains("percent_of_range") && !table.contains("z_percent"),
+        "{table}"
+    );
+    assert_eq!(table.lines().count(), 1 + 6);
+
+    driver.click("Decoding: Network, lm, 3 hidden");
+    assert_eq!(driver.shown(), "Train");
+    let loaded = driver.state().recording.settings;
+    assert_eq!((loaded.hidden, loaded.training.method.short_name()), (3, "lm"));
+    assert_eq!(loaded.source, settings().source);
 }

@@ -13,9 +13,9 @@ use crate::{
 #[derive(Clone, Copy, Debug)]
 pub struct StripChart<'a> {
     /// Name of the picture, for assistive technology.
-    pub label: &'static str,
+    pub label: &'a str,
     /// Name of the axis, drawn below it.
-    pub axis: &'static str,
+    pub axis: &'a str,
     /// The values; those that are not numbers have no dot.
     pub values: &'a [Option<f64>],
     /// The place of the value in the accent colour.

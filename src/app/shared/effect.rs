@@ -1,8 +1,9 @@
-use std::sync::Arc;
+use std::{path::PathBuf, sync::Arc};
 
 use super::{FileTask, Look, Matter, Notice, SourceKind};
 use crate::{
     evaluation::{RunSettings, SimulatedSettings},
+    export::NetworkFile,
     figure::Figure,
     import::{Plan, Setup},
     training::TrainerState,
@@ -25,6 +26,8 @@ pub enum Effect {
     ShowTraining,
     /// Begin training.
     Train,
+    /// Take up the training saved in this checkpoint.
+    OpenTraining(PathBuf),
     /// Show the training that has these settings and whose starts stand so.
     TakeUp(Box<Setup>, Vec<TrainerState>),
     /// Hold the training.
@@ -57,6 +60,8 @@ pub enum Effect {
         /// Sentence that tells so.
         notice: String,
     },
+    /// Keep the run of a network file that was opened.
+    KeepRun(Box<NetworkFile>),
     /// Call the kept run with this number so.
     RenameRun(u64, String),
     /// Show the kept run with this number in one of the two places, or nothing.

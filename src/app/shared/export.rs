@@ -177,6 +177,9 @@ pub fn copy_exports<'a>(
                 TableForm::TabSeparated => {
                     "Copies the table with tabs between its columns, numbers with every digit: for spreadsheets."
                 }
+                TableForm::Json => {
+                    "Copies the table as a JSON array with an object for each row, numbers with every digit."
+                }
             },
             ask: table.clone().map(|table| -> Ask<'a> {
                 Box::new(move || Effect::Copy {

@@ -3,6 +3,7 @@
 
 mod colour_scale;
 mod effect;
+mod error_table;
 mod export;
 mod file_in_use;
 mod file_task;
@@ -14,8 +15,10 @@ mod opening;
 mod run_buttons;
 mod run_list;
 mod run_view;
+mod sentence;
 mod state;
 mod surfaces;
+mod target_choice;
 mod training_form;
 mod training_status;
 mod unfinished;
@@ -24,6 +27,7 @@ mod view;
 pub use super::training_worker::RunResult;
 pub use colour_scale::colour_scale_ui;
 pub use effect::Effect;
+pub use error_table::error_table_ui;
 pub use export::{
     Ask, Export, ExportGroup, copy_exports, csv_export, error_table_export, loss_export, picture_exports,
 };
@@ -37,10 +41,12 @@ pub use opening::opening_settings;
 pub use run_buttons::{RunWish, run_buttons_ui};
 pub use run_list::{PLACES, RunList, RunsWorker};
 pub use run_view::RunView;
+pub use sentence::sentence;
 pub use state::{Phase, Preview, RecordingDraft, Shared, SourceKind};
 pub use surfaces::{follow_surface, view_mode_ui};
+pub use target_choice::target_choice_ui;
 pub use training_form::{method_choice_ui, method_settings_ui, stopping_ui};
-pub use training_status::phase_in_words;
+
 use training_status::training_status_ui;
 pub use unfinished::Unfinished;
 pub use view::{Columns, View};

@@ -24,14 +24,14 @@ pub enum Matter {
     RunList,
     /// The view with the paper's tables and sweeps.
     Experiments,
+    /// The view of what the readings determine.
+    Identifiability,
     /// The view with what each way of decoding costs.
     TradeOff,
-    /// The view with two trainings side by side.
-    Comparison,
     /// Frames decoded as they come.
     Live,
-    /// Recordings, and networks trained on them.
-    OwnData,
+    /// Files of the recording that is trained on.
+    Recording,
     /// The file by which the next window opens as this one was left.
     Memory,
 }

@@ -60,11 +60,16 @@ pub struct RecordingDraft {
     pub plan: Result<Arc<Plan>, String>,
 }
 
+impl RecordingDraft {
+    /// Reason for which there is no plan before a file is opened.
+    pub const NOTHING_OPEN: &str = "Open a recording first: drop files on the window.";
+}
+
 impl Default for RecordingDraft {
     fn default() -> Self {
         Self {
             settings: RunSettings::from(Measured { rows: RowModel::Shared }),
-            plan: Err("Open a recording first: drop files on the window.".to_owned()),
+            plan: Err(Self::NOTHING_OPEN.to_owned()),
         }
     }
 }

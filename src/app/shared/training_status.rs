@@ -1,23 +1,32 @@
 use std::time::Duration;
 
-use eframe::egui::{Align, Color32, Layout, RichText, Sense, Ui, Vec2};
+use eframe::egui::{Color32, RichText, Ui};
 
-use super::{Phase, RunView, Shared};
+use super::{Phase, RunView, Shared, SourceKind};
 use crate::{
     app::{
-        theme::{Palette, Theme, space, type_size},
-        widgets::state_ui,
+        theme::{Palette, Theme, type_size},
+        widgets::{state_ui, status_progress_ui},
     },
+    evaluation::TestErrors,
     export::{format_duration, format_number, format_percent},
+    import::Progress,
     training::StopReason,
 };
 
-/// Shows the state of the training: phase, epoch, error, speed, time left, and why it stopped.
+/// Shows the state of the training: phase, epoch, error, speed, time left, and why it stopped; before it how much of a
+/// recording is read.
 pub fn training_status_ui(ui: &mut Ui, shared: &Shared) {
     let palette = Theme::of(ui).palette;
     ui.horizontal_centered(|ui| {
-        let (colour, text) = phase_in_words(shared.phase, "Drawing samples", &palette);
+        let (colour, text) = phase_in_words(shared, &palette);
         state_ui(ui, colour, &text);
+        if let (Phase::Preparing, SourceKind::Recording) = (shared.phase, shared.source) {
+            if let Some(Progress { bytes, of: Some(of) }) = shared.reading {
+                status_progress_ui(ui, "Reading", bytes as f32 / of.max(1) as f32);
+            }
+            return;
+        }
         let Some(run) = shared
             .shown_run()
             .or(shared.run.as_ref().filter(|_| shared.phase.is_busy()))
@@ -28,16 +37,23 @@ pub fn training_status_ui(ui: &mut Ui, shared: &Shared) {
             ui.label(RichText::new(part).size(type_size().note).color(palette.dim));
         }
         if shared.phase.is_busy() {
-            ui.with_layout(Layout::right_to_left(Align::Center), |ui| progress_bar_ui(ui, run));
+            let epochs_run = run.result.as_ref().map_or(0, |result| result.epochs_run);
+            let epochs = run.settings().training.stopping.epochs.max(1);
+            status_progress_ui(ui, "Training", epochs_run as f32 / epochs as f32);
         }
     });
 }
 
-/// Colour and words of a phase; `preparing` are those of the work before a training.
-pub fn phase_in_words(phase: Phase, preparing: &str, palette: &Palette) -> (Color32, String) {
-    match phase {
+/// Colour and words of the phase.
+fn phase_in_words(shared: &Shared, palette: &Palette) -> (Color32, String) {
+    let is_recording = shared.source == SourceKind::Recording;
+    match shared.phase {
+        Phase::Idle if is_recording && shared.recording.plan.is_err() => {
+            (palette.dim, "Ready: open a recording".to_owned())
+        }
         Phase::Idle => (palette.dim, "Ready: press Train".to_owned()),
-        Phase::Preparing => (palette.accent, preparing.to_owned()),
+        Phase::Preparing if is_recording => (palette.accent, "Reading the recording".to_owned()),
+        Phase::Preparing => (palette.accent, "Drawing samples".to_owned()),
         Phase::Training => (palette.accent, "Training".to_owned()),
         Phase::Paused => (palette.warning, "Paused".to_owned()),
         Phase::Ended(StopReason::Stopped) => (palette.dim, format!("Ended: {}", StopReason::Stopped)),
@@ -54,7 +70,10 @@ fn progress_in_words(run: &RunView, phase: Phase) -> Vec<String> {
     let (epochs, epochs_run) = (run.settings().training.stopping.epochs, result.epochs_run);
     let mut parts = vec![
         format!("Epoch {epochs_run} of {epochs}"),
-        format!("z error {}", format_percent(result.errors.percent())),
+        match result.errors {
+            TestErrors::Nodes(_) => format!("z error {}", format_percent(result.errors.percent())),
+            TestErrors::Targets(_) => format!("error {} of range", format_percent(result.errors.percent())),
+        },
         format!("mse {}", format_number(latest.training_mse)),
         format!(
             "{} {}",
@@ -88,20 +107,4 @@ fn progress_in_words(run: &RunView, phase: Phase) -> Vec<String> {
 
 fn time_left(per_epoch: Duration, epochs: usize) -> Duration {
     Duration::try_from_secs_f64(per_epoch.as_secs_f64() * epochs as f64).unwrap_or(Duration::MAX)
-}
-
-fn progress_bar_ui(ui: &mut Ui, run: &RunView) {
-    let palette = Theme::of(ui).palette;
-    let share = run.result.as_ref().map_or(0.0, |result| {
-        result.epochs_run as f32 / run.settings().training.stopping.epochs as f32
-    });
-    let (rect, response) = ui.allocate_exact_size(Vec2::new(space(40), space(1)), Sense::hover());
-    let radius = 0.5 * space(1);
-    ui.painter().rect_filled(rect, radius, palette.line);
-    let done = rect.with_max_x(rect.left() + share.clamp(0.0, 1.0) * rect.width());
-    ui.painter().rect_filled(done, radius, palette.accent);
-    response.widget_info(|| {
-        let label = format!("Progress {:.0} %", 100.0 * share);
-        eframe::egui::WidgetInfo::labeled(eframe::egui::accesskit::Role::ProgressIndicator, true, label)
-    });
 }

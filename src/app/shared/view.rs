@@ -23,7 +23,7 @@ pub trait View: Debug {
     }
 
     /// Takes files dropped on the window; false if they are not for it.
-    fn take_files(&mut self, _paths: &[PathBuf], _effects: &mut Vec<Effect>) -> bool {
+    fn take_files(&mut self, _paths: &[PathBuf], _shared: &Shared, _effects: &mut Vec<Effect>) -> bool {
         false
     }
 

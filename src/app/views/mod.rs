@@ -11,13 +11,13 @@ mod live;
 mod trade_off;
 mod train;
 
-use std::sync::Arc;
+use std::{path::PathBuf, sync::Arc};
 
 use super::{job::Wake, shared::View};
 use crate::import::Plan;
 
 pub use identifiability::{Analysis, Question};
-pub use trade_off::{TradeOffEnding, TradeOffPlan};
+pub use trade_off::{PlannedLevel, PlannedRun, TradeOffEnding, TradeOffPlan};
 pub(super) use train::CHECKPOINT;
 pub use train::{BottomTab, DecoderResult};
 
@@ -57,7 +57,19 @@ impl Views {
     }
 
     /// Opens the recordings of this plan in the Train view.
-    pub fn open_plan(&mut self, _plan: &Plan) {}
+    pub fn open_plan(&mut self, plan: &Plan) {
+        self.train.recording.open_plan(plan);
+    }
+
+    /// Looks for the recordings of the checkpoint at `path`, which could not be resumed.
+    pub fn look_for_recordings(&mut self, path: PathBuf) {
+        self.train.recording.look_for_recordings(path);
+    }
+
+    /// Returns true if the user has opened a recording, also one whose files are missing.
+    pub fn has_recording(&self) -> bool {
+        !self.train.recording.is_empty()
+    }
 
     /// In the order of the top bar. The first is the one that trains.
     pub fn all(&mut self) -> [&mut dyn View; 6] {

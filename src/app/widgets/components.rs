@@ -1,8 +1,8 @@
 //! The few components that egui lacks, each reachable by its label.
 
 use eframe::egui::{
-    self, Align, Button, Color32, Frame, Id, Label, Layout, Margin, Rect, Response, RichText, ScrollArea, Sense,
-    Stroke, Ui, UiBuilder, Vec2, Widget, WidgetInfo, WidgetText, accesskit::Role, vec2,
+    self, Align, Button, Color32, Frame, Id, Label, Layout, Margin, ProgressBar, Rect, Response, RichText, ScrollArea,
+    Sense, Stroke, Ui, UiBuilder, Vec2, Widget, WidgetInfo, WidgetText, accesskit::Role, vec2,
 };
 
 use crate::app::theme::{Theme, radius, semibold, space, type_size};
@@ -274,19 +274,40 @@ pub fn state_ui(ui: &mut Ui, colour: Color32, text: &str) {
     ui.label(RichText::new(text).size(type_size().note));
 }
 
-/// Shows a progress bar over the available width; `name` is what is being done.
-pub fn progress_bar_ui(ui: &mut Ui, name: &str, share: f32) -> Response {
+/// Shows the progress of work over the available width: `name` is the work, `text` is written into the bar.
+pub fn progress_bar_ui(ui: &mut Ui, name: &str, share: f32, text: &str) -> Response {
     let palette = &Theme::of(ui).palette;
-    let (rect, response) = ui.allocate_exact_size(vec2(ui.available_width(), space(1)), Sense::hover());
-    let radius = 0.5 * space(1);
-    ui.painter().rect_filled(rect, radius, palette.line);
-    let done = rect.with_max_x(rect.left() + share.clamp(0.0, 1.0) * rect.width());
-    ui.painter().rect_filled(done, radius, palette.accent);
+    let label = format!("{name}: {text}");
+    let text = RichText::new(text).size(type_size().small).color(palette.text);
+    let bar = ProgressBar::new(share)
+        .desired_height(space(4))
+        .corner_radius(radius() - 2)
+        .fill(palette.selected)
+        .text(text);
+    let response = ui
+        .scope(|ui| {
+            ui.visuals_mut().extreme_bg_color = palette.raised;
+            ui.add(bar)
+        })
+        .inner;
     response.widget_info(|| {
-        let label = format!("{name} progress {:.0} %", 100.0 * share);
-        WidgetInfo::labeled(Role::ProgressIndicator, true, label)
+        let mut info = WidgetInfo::labeled(Role::ProgressIndicator, true, &label);
+        info.value = Some(f64::from(100.0 * share.clamp(0.0, 1.0)).floor());
+        info
     });
     response
+}
+
+/// Shows the progress of work in percent at the right end of a status line.
+pub fn status_progress_ui(ui: &mut Ui, name: &str, share: f32) {
+    ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
+        ui.set_max_width(space(40).min(ui.available_width()));
+        progress_bar_ui(ui, name, share, &percent(share));
+    });
+}
+
+fn percent(share: f32) -> String {
+    format!("{:.0} %", 100.0 * share.clamp(0.0, 1.0))
 }
 
 /// A sentence in the middle of an empty card: why there is nothing, and what to do.

@@ -12,6 +12,9 @@ use super::{
 use crate::app::theme::space;
 
 pub use super::number_field::usually;
+pub use crate::evaluation::format::capitalised;
+/// A number as one would type it: all its digits, and no more.
+pub(crate) use crate::sensor::short as input_text;
 
 /// Lays out `name` and the widget made by `value_ui`; joins them for assistive technology and tests. Below it stands why
 /// what was typed into it was not taken.
@@ -119,34 +122,4 @@ pub fn list_ui<T: Copy + PartialEq>(
         combo.response
     });
     picked
-}
-
-/// The name with its first letter large.
-pub fn capitalised(name: &str) -> String {
-    let mut letters = name.chars();
-    letters
-        .next()
-        .map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
-}
-
-/// A number as one would type it: all its digits, and no more.
-pub fn input_text(value: f64) -> String {
-    let magnitude = value.abs();
-    if magnitude == 0.0 || (1e-3..1e6).contains(&magnitude) {
-        format!("{value}")
-    } else {
-        format!("{value:e}")
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn inputs_show_what_was_typed() {
-        for text in ["0", "0.001", "20", "1e10", "1e-7", "-3.25", "123456"] {
-            assert_eq!(input_text(text.parse().unwrap()), text);
-        }
-    }
 }

@@ -8,7 +8,8 @@ use crate::{
     app::{
         preview,
         shared::{
-            Effect, FileInUse, FileTask, Look, Matter, Offers, Phase, Purpose, RunView, SourceKind, refuse_in_use,
+            Effect, FileInUse, FileTask, Look, Matter, Offers, Phase, Purpose, RecordingDraft, RunView, SourceKind,
+            refuse_in_use,
         },
         test_view::HeightScale,
         theme,
@@ -43,8 +44,10 @@ impl DecouplerWindow {
                 }
             }
             // A training may have begun in the same frame.
-            Effect::TakeUp(..) if shared.phase.is_busy() => {}
+            Effect::OpenTraining(_) | Effect::TakeUp(..) if shared.phase.is_busy() => {}
+            Effect::OpenTraining(path) => self.open_training(path),
             Effect::TakeUp(setup, states) => {
+                self.opened = None;
                 self.take_setup(&setup);
                 self.prepare(Request::TakeUp(setup, states));
             }
@@ -88,6 +91,7 @@ impl DecouplerWindow {
             Effect::TypePath(task) => self.type_path(task),
             Effect::Copy { text, notice } => self.copy_text(text, notice),
             Effect::CopyPicture { figure, notice } => self.copying.start(ToCopy::Picture(figure), notice),
+            Effect::KeepRun(file) => self.runs.keep(*file),
             Effect::RenameRun(id, name) => shared.runs.rename(id, &name, &self.runs),
             Effect::PinRun(place, id) => shared.runs.pin(place, id, &self.runs),
             Effect::RemoveRun(id) => shared.runs.remove(id, &self.runs),
@@ -102,6 +106,12 @@ impl DecouplerWindow {
         self.notices.settle(Matter::Training);
         self.notices.settle(Matter::Settings);
         self.worker.ask(request);
+    }
+
+    /// Takes up the training saved in this checkpoint.
+    fn open_training(&mut self, path: PathBuf) {
+        self.opened = Some(path.clone());
+        self.prepare(Request::Open(path));
     }
 
     /// Shows the view in this place.
@@ -248,10 +258,7 @@ impl DecouplerWindow {
             }
             // A training may have begun while the desktop's dialog was open.
             Purpose::Open if self.shared.phase.is_busy() => {}
-            Purpose::Open => {
-                self.opened = Some(path.clone());
-                self.prepare(Request::Open(path));
-            }
+            Purpose::Open => self.open_training(path),
         }
     }
 
@@ -296,8 +303,12 @@ impl DecouplerWindow {
             }
             (None, Some(plan)) => {
                 self.shared.source = SourceKind::Recording;
-                self.shared.recording.settings = *setup.settings();
-                self.views.open_plan(plan);
+                let plan = plan.absolute();
+                self.views.open_plan(&plan);
+                self.shared.recording = RecordingDraft {
+                    settings: *setup.settings(),
+                    plan: Ok(Arc::new(plan)),
+                };
             }
             (None, None) => {}
         }

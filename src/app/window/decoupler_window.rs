@@ -129,6 +129,10 @@ impl DecouplerWindow {
             window.shared.recording.settings = settings;
         }
         window.shared.source = window.remembered.source.unwrap_or_default();
+        if let Some(plan) = window.remembered.plan.clone() {
+            window.views.open_plan(&plan);
+            window.shared.recording.plan = Ok(Arc::new(plan));
+        }
         if let Some(place) = window.place_of(window.remembered.view.as_deref()) {
             window.show(place);
         }

@@ -21,7 +21,7 @@ impl DecouplerWindow {
             .views
             .all()
             .into_iter()
-            .position(|view| view.take_files(&paths, effects));
+            .position(|view| view.take_files(&paths, &self.shared, effects));
         if let Some(place) = place {
             self.show(place);
             ctx.request_repaint();
@@ -47,7 +47,30 @@ impl DecouplerWindow {
             StrokeKind::Inside,
         );
         let font = FontId::proportional(type_size().title);
-        let text = "Drop to open as a recording";
+        let text = self.dropping_in_words(ui);
         painter.text(whole.center(), Align2::CENTER_CENTER, text, font, palette.text);
+    }
+
+    /// Returns a sentence on what dropping the files under the pointer does.
+    fn dropping_in_words(&self, ui: &Ui) -> &'static str {
+        if self.shared.phase.is_busy() {
+            return "A training is running: stop it before you open other files";
+        }
+        // Only their names: reading files would block the window.
+        let is_document = |path: &PathBuf| {
+            let extension = path.extension().map(|extension| extension.to_ascii_lowercase());
+            extension.is_some_and(|extension| extension == "json" || extension == "checkpoint")
+        };
+        let has_document = ui.input(|input| {
+            let mut paths = input.raw.hovered_files.iter().filter_map(|file| file.path.as_ref());
+            paths.any(is_document)
+        });
+        if has_document {
+            "Drop to open the recipe, network or checkpoint"
+        } else if self.views.has_recording() {
+            "Drop to add to the recording"
+        } else {
+            "Drop to open as a recording"
+        }
     }
 }

@@ -1,12 +1,12 @@
-use eframe::egui::{
-    Frame, Grid, Id, Margin, Modal, RichText, ScrollArea, TextEdit, Ui, WidgetInfo, accesskit::Role, vec2,
-};
+use eframe::egui::{Frame, Id, Margin, Modal, RichText, ScrollArea, TextEdit, Ui, WidgetInfo, accesskit::Role, vec2};
 
 use crate::app::{
     glossary::{self, Term},
     shared::Action,
     theme::{Theme, semibold, space, type_size},
-    widgets::{dim_ui, ghost_button, section_heading_ui, tabs_ui},
+    widgets::{
+        ColumnWidth, TableCell, TableColumn, TableRow, TableView, dim_ui, ghost_button, section_heading_ui, tabs_ui,
+    },
 };
 
 /// Keys that the part of the window in focus hears.
@@ -81,20 +81,19 @@ fn keys_ui(ui: &mut Ui, actions: &[Action]) {
         .max_height(space(120))
         .min_scrolled_height(space(120));
     scroll.auto_shrink([false, true]).show(ui, |ui| {
-        let columns = Grid::new("keys").num_columns(2).min_col_width(space(40));
-        columns.spacing([space(4), space(2)]).show(ui, |ui| {
-            for action in actions {
-                let Some(keys) = action.keys else { continue };
-                ui.label(&action.name);
-                dim_ui(ui, &ui.ctx().format_shortcut(&keys));
-                ui.end_row();
-            }
-            for (name, keys) in IN_FOCUS {
-                ui.label(name);
-                dim_ui(ui, keys);
-                ui.end_row();
-            }
+        let dim = Theme::of(ui).palette.dim;
+        let row = |name: &str, keys: &str| TableRow::new([TableCell::new(name), TableCell::new(keys).colour(dim)]);
+        let of_actions = actions.iter().filter_map(|action| {
+            let keys = ui.ctx().format_shortcut(&action.keys?);
+            Some(row(&action.name, &keys))
         });
+        let in_focus = IN_FOCUS.map(|(name, keys)| row(name, keys));
+        let rows = of_actions.chain(in_focus).collect();
+        let columns = [
+            TableColumn::text("Action"),
+            TableColumn::text("Keys").width(ColumnWidth::Rest),
+        ];
+        TableView::new("keys", &columns).show_all(ui, rows);
     });
 }
 

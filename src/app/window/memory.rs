@@ -10,6 +10,7 @@ use crate::{
         shared::Matter,
     },
     export::WriteError,
+    import::Plan,
 };
 
 /// Longest time that closing waits for the file.
@@ -80,6 +81,15 @@ impl DecouplerWindow {
         self.remembered.draft = Some(self.shared.draft);
         self.remembered.source = Some(self.shared.source);
         self.remembered.recording = Some(self.shared.recording.settings);
+        match &self.shared.recording.plan {
+            Ok(plan) if self.remembered.plan.as_ref() != Some(&**plan) => {
+                self.remembered.plan = Some(Plan::clone(plan))
+            }
+            Ok(_) => {}
+            // An import that is incomplete now may be completed again.
+            Err(_) if self.views.has_recording() => {}
+            Err(_) => self.remembered.plan = None,
+        }
         let (is_usual_size, is_held) = self.ctx.input(|input| {
             let viewport = input.viewport();
             let is_unusual = [viewport.maximized, viewport.fullscreen, viewport.minimized].contains(&Some(true));

@@ -120,7 +120,12 @@ impl DecouplerWindow {
                 // If it has ended, the news of it say so.
                 shared.phase = Phase::Paused;
             }
-            Event::Opened(Err(reason)) => self.refuse(Matter::Training, reason),
+            Event::Opened(Err(reason)) => {
+                self.refuse(Matter::Training, reason);
+                if let Some(path) = self.opened.clone() {
+                    self.views.look_for_recordings(path);
+                }
+            }
             Event::Continued(Ok(settings)) => {
                 if let Some(run) = &mut shared.run {
                     let training = match shared.source {

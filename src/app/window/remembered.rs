@@ -10,6 +10,7 @@ use crate::{
     evaluation::{RunSettings, SimulatedSettings, Workload},
     export::{WriteError, atomic_write},
     figure::SequentialMap,
+    import::Plan,
 };
 
 /// The size of a window that remembers none, in points.
@@ -45,6 +46,9 @@ pub(super) struct Remembered {
     /// Settings of the next training on a recording.
     #[serde(deserialize_with = "if_readable")]
     pub(super) recording: Option<RunSettings>,
+    /// Plan of the recording that is open, with absolute paths.
+    #[serde(deserialize_with = "if_readable")]
+    pub(super) plan: Option<Plan>,
     /// Width and height of the window.
     #[serde(deserialize_with = "if_readable")]
     pub(super) size_points: Option<[f32; 2]>,

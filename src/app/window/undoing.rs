@@ -66,11 +66,12 @@ impl DecouplerWindow {
         }
     }
 
-    fn take_drafts(&mut self, (source, draft, recording): Drafts) {
-        if let Ok(plan) = &recording.plan
-            && recording.plan != self.shared.recording.plan
-        {
-            self.views.open_plan(plan);
+    fn take_drafts(&mut self, (source, draft, mut recording): Drafts) {
+        match &recording.plan {
+            Ok(plan) if recording.plan != self.shared.recording.plan => self.views.open_plan(plan),
+            Ok(_) => {}
+            // Undoing closes no files.
+            Err(_) => recording.plan.clone_from(&self.shared.recording.plan),
         }
         self.shared.recording = recording;
         self.shared.draft = draft;

@@ -75,7 +75,7 @@ impl TrainOptions {
             return Err("a sweep keeps its results and checkpoints itself; leave this option out".to_owned());
         }
         let Some(argument) = arguments.find(|argument| argument.get_long() == Some(option)) else {
-            return Err(self.unknown(option));
+            return Err(self.unknown());
         };
         let is_repeated = matches!(argument.get_action(), ArgAction::Append);
         let word = |value: &Value| {
@@ -98,7 +98,7 @@ impl TrainOptions {
         }
     }
 
-    fn unknown(&self, option: &str) -> String {
+    fn unknown(&self) -> String {
         let names: Vec<_> = self
             .0
             .get_arguments()

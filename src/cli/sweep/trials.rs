@@ -13,7 +13,7 @@ use crate::{
         PlanAxis, SweepPlan, Trial, TrialId, TrialOptions, WriteError, decoders_in_order, recording_options,
         train_options,
     },
-    import::{FileChecksum, ImportError, Plan, Setup, file_crc32, relative_path},
+    import::{FileChecksum, ImportError, Plan, Setup, file_crc32, stored},
 };
 
 /// All trials of a specification, each of which `train` accepts and none of which is there twice.
@@ -118,7 +118,7 @@ impl Trials {
     pub(super) fn save_plan(&self, folder: &Path) -> Result<(), WriteError> {
         let checksums = self.checksums.lock().unwrap_or_else(PoisonError::into_inner);
         let mut recordings = Vec::from_iter(checksums.iter().map(|(path, crc32)| FileChecksum {
-            path: relative_path(path, folder),
+            path: stored(path, folder),
             crc32: crc32.clone(),
         }));
         recordings.sort_by(|one, other| one.path.cmp(&other.path));

@@ -4,11 +4,15 @@ mod folded_network;
 pub(super) mod padded_layer;
 mod real;
 
+use ndarray::{Array1, Array2, Axis, Slice};
 use pulp::{Simd, WithSimd};
 
 use self::{folded_network::FoldedNetwork, padded_layer::affine};
-use super::{DecodeError, Decoder};
-use crate::{dataset::PerRow, network::Networks};
+use super::{AffineLayer, DecodeError, Decoder, Description, Layer, LayeredMap, NotDescribed};
+use crate::{
+    dataset::PerRow,
+    network::{DecouplingNetwork, Networks},
+};
 
 pub use real::Real;
 
@@ -26,6 +30,8 @@ pub struct CompiledNetworks<T> {
     channels: usize,
     outputs_per_row: usize,
     networks: PerRow<FoldedNetwork<T>>,
+    /// The networks as they were trained, for their description.
+    trained: Networks,
     /// Inputs of one row.
     inputs: Vec<T>,
     /// Hidden nodes of all rows, so that hyperbolic tangents fill the vector registers.
@@ -42,8 +48,8 @@ impl<T: Real> CompiledNetworks<T> {
     ///
     /// # Panics
     /// If the networks differ in channels or outputs.
-    pub fn new(networks: &Networks, rows: usize) -> Self {
-        let networks = networks.map(FoldedNetwork::new);
+    pub fn new(trained: &Networks, rows: usize) -> Self {
+        let networks = trained.map(FoldedNetwork::new);
         let (channels, outputs) = (networks.at(0).centre_ohm.len(), networks.at(0).middles.len());
         let of_same_size =
             |network: &FoldedNetwork<T>| (network.centre_ohm.len(), network.middles.len()) == (channels, outputs);
@@ -60,6 +66,7 @@ impl<T: Real> CompiledNetworks<T> {
             wide_inputs: vec![0.0; channels],
             wide_sums: vec![0.0; hidden],
             networks,
+            trained: trained.clone(),
         }
     }
 }
@@ -86,6 +93,39 @@ impl<T: Real> Decoder for CompiledNetworks<T> {
             channel: error.channel % self.channels,
             ..error
         })
+    }
+
+    fn description(&self) -> Result<Description, NotDescribed> {
+        Ok(Description::of_maps(
+            self.trained.values().iter().map(layers_of).collect(),
+        ))
+    }
+}
+
+/// Scaling, both layers and the restoring of a network, none of them folded into another.
+fn layers_of(network: &DecouplingNetwork) -> LayeredMap {
+    let (centre, to_inputs) = network.inputs().affine();
+    let layer = |layer: ndarray::ArrayView2<'_, f64>| {
+        let inputs = layer.nrows() - 1;
+        Layer::Affine(AffineLayer {
+            weights: layer.slice_axis(Axis(0), Slice::from(..inputs)).to_owned(),
+            biases: layer.row(inputs).to_vec(),
+        })
+    };
+    let (middles, half_widths): (Vec<f64>, Vec<f64>) = network.outputs().middles_and_half_widths().into_iter().unzip();
+    let varying = network.outputs().varying();
+    let of_varying: Vec<f64> = varying.iter().map(|&target| half_widths[target]).collect();
+    let restoring = AffineLayer::of_varying(&Array2::from_diag(&Array1::from(of_varying)), &varying, &middles);
+    LayeredMap {
+        quantity: network.inputs().quantity(),
+        centre,
+        layers: vec![
+            Layer::Affine(AffineLayer::linear(to_inputs.t().as_standard_layout().into_owned())),
+            layer(network.mlp().hidden_layer()),
+            Layer::Tanh,
+            layer(network.mlp().output_layer()),
+            Layer::Affine(restoring),
+        ],
     }
 }
 

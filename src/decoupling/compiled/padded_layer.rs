@@ -1,3 +1,5 @@
+use ndarray::Array2;
+
 use super::Real;
 
 /// Layers are padded to a multiple of this number.
@@ -40,6 +42,18 @@ impl PaddedLayer {
     /// Number of outputs with padding.
     pub(in crate::decoupling) fn padded_outputs(&self) -> usize {
         self.padded_outputs
+    }
+
+    /// Weights of the first inputs (inputs × outputs).
+    pub(in crate::decoupling) fn weights(&self, inputs: usize) -> Array2<f64> {
+        let weight = |(input, output): (usize, usize)| self.weights[input * self.padded_outputs + output];
+        Array2::from_shape_fn((inputs, self.outputs), weight)
+    }
+
+    /// Constant of each output.
+    pub(in crate::decoupling) fn constants(&self) -> &[f64] {
+        let first = self.weights.len() - self.padded_outputs;
+        &self.weights[first..first + self.outputs]
     }
 
     /// Computes the outputs, with padding.

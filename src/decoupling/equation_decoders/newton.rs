@@ -1,3 +1,6 @@
+use glam::DVec3;
+use ndarray::Array2;
+
 use super::{
     PosteriorDecoder,
     plain_first::PlainFirst,
@@ -6,10 +9,13 @@ use super::{
 use crate::{
     decoupling::side_by_side::LANES,
     decoupling::{
-        DecodeError, Decoder, LARGEST_ERROR, Newton, NewtonReport, NewtonRules, Posterior, Solution, SolvedRows,
+        AffineLayer, DecodeError, Decoder, Description, LARGEST_ERROR, Layer, LayeredMap, Newton, NewtonReport,
+        NewtonRules, NotDescribed, Posterior, RowProblemDescription, Solution, SolvedRows, affine_start::AffineStart,
+        row_problem::ranges,
     },
+    network::Quantity,
     scene::Scene,
-    sensor::{SensorError, SensorModel},
+    sensor::{Axes, SensorError, SensorModel},
 };
 
 /// Decodes every row of a frame by the Gauss-Newton method. If rows are not known, the one that fits the readings best
@@ -19,6 +25,8 @@ use crate::{
 /// [`PosteriorDecoder`], whose unknowns include the gain of the snapshot; here they count as not solved.
 #[derive(Clone, Debug)]
 pub struct NewtonDecoder {
+    model: SensorModel,
+    scene: Scene,
     newton: Newton,
     search: RowSearch,
     /// Rules that give each row-wire one start.
@@ -36,6 +44,8 @@ impl NewtonDecoder {
     /// If the sensor has no resistances at rest.
     pub fn new(model: &SensorModel, scene: &Scene, rows: &[usize], rules: NewtonRules) -> Result<Self, SensorError> {
         Ok(Self {
+            model: *model,
+            scene: *scene,
             newton: Newton::new(model, scene, rules),
             search: RowSearch::new(model, scene, rows)?,
             brief: NewtonRules { starts: 1, ..rules },
@@ -83,6 +93,29 @@ impl NewtonDecoder {
                     report,
                 })
             })
+    }
+}
+
+/// The coordinates of the nodes of a row-wire from which the iteration starts: the affine estimate where nodes move along z
+/// only, and mid-range otherwise.
+fn start_of((model, scene): (&SensorModel, &Scene), row: usize) -> LayeredMap {
+    let ranges = ranges(model, scene);
+    let channels = model.scale.columns();
+    if scene.movement.axes() == Axes::Z {
+        return AffineStart::new(model, row, ranges[0]).description(model, row);
+    }
+    let nodes = 0..model.scale.nodes_per_row();
+    let middles = nodes.zip(ranges.chunks_exact(3)).flat_map(|(node, ranges)| {
+        let middle = DVec3::new(ranges[0].middle(), ranges[1].middle(), ranges[2].middle());
+        model.displaced_mm(row, node, middle).to_array()
+    });
+    LayeredMap {
+        quantity: Quantity::Conductance,
+        centre: vec![1.0; channels],
+        layers: vec![Layer::Affine(AffineLayer {
+            weights: Array2::zeros((channels, model.scale.coordinates_per_row())),
+            biases: middles.collect(),
+        })],
     }
 }
 
@@ -142,5 +175,23 @@ impl Decoder for NewtonDecoder {
 
     fn take_solved_rows(&mut self) -> SolvedRows {
         std::mem::take(&mut self.solved)
+    }
+
+    fn description(&self) -> Result<Description, NotDescribed> {
+        let (rows, row_choice) = self.search.description();
+        let (readings, unknowns) = (self.channels(), self.newton.unknowns());
+        if readings <= unknowns && unknowns > 1 {
+            return Err(NotDescribed::Undetermined { readings, unknowns });
+        }
+        let of_scene = (&self.model, &self.scene);
+        Ok(Description {
+            maps: rows.iter().map(|&row| start_of(of_scene, row)).collect(),
+            equations: Some(RowProblemDescription::new(
+                of_scene,
+                (rows, row_choice),
+                self.rules,
+                true,
+            )),
+        })
     }
 }

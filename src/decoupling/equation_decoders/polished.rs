@@ -7,8 +7,8 @@ use super::{
 };
 use crate::{
     decoupling::{
-        DecodeError, Decoder, Newton, NewtonRules, Posterior, PosteriorReport, Solution, SolvedRows,
-        side_by_side::LANES,
+        DecodeError, Decoder, Description, Newton, NewtonRules, NotDescribed, Posterior, PosteriorReport, RowChoice,
+        RowProblemDescription, Solution, SolvedRows, side_by_side::LANES,
     },
     scene::{NoiseSource, RowModel, Scene},
     sensor::{SensorError, SensorModel},
@@ -21,6 +21,7 @@ const NOISES: f64 = 6.0;
 pub struct PolishedDecoder {
     first: Box<dyn Decoder>,
     model: SensorModel,
+    scene: Scene,
     improvement: Improvement,
     rows: Vec<usize>,
     row_model: RowModel,
@@ -65,6 +66,7 @@ impl PolishedDecoder {
         Ok(Self {
             first,
             model: *model,
+            scene: *scene,
             improvement,
             rows: rows.to_vec(),
             row_model: scene.rows.model(),
@@ -182,5 +184,29 @@ impl Decoder for PolishedDecoder {
 
     fn take_solved_rows(&mut self) -> SolvedRows {
         std::mem::take(&mut self.solved)
+    }
+
+    fn description(&self) -> Result<Description, NotDescribed> {
+        if let Improvement::Posterior(..) = self.improvement {
+            return Err(NotDescribed::Posterior);
+        }
+        let rules = NewtonRules {
+            steps: self.steps,
+            ..NewtonRules::default()
+        };
+        let row_choice = match self.row_model {
+            RowModel::Each => RowChoice::Given,
+            RowModel::Shared => RowChoice::Nearest,
+        };
+        let of_scene = (&self.model, &self.scene);
+        Ok(Description {
+            maps: self.first.description()?.maps,
+            equations: Some(RowProblemDescription::new(
+                of_scene,
+                (&self.rows, row_choice),
+                rules,
+                false,
+            )),
+        })
     }
 }

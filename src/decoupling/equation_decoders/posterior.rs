@@ -1,6 +1,6 @@
 use super::row_search::{EXPLAINED, RowSearch, Trial};
 use crate::{
-    decoupling::{DecodeError, Decoder, Posterior, PosteriorReport, Solution, SolvedRows},
+    decoupling::{DecodeError, Decoder, Description, NotDescribed, Posterior, PosteriorReport, Solution, SolvedRows},
     scene::Scene,
     sensor::{SensorError, SensorModel},
 };
@@ -111,5 +111,9 @@ impl Decoder for PosteriorDecoder {
 
     fn take_solved_rows(&mut self) -> SolvedRows {
         std::mem::take(&mut self.solved)
+    }
+
+    fn description(&self) -> Result<Description, NotDescribed> {
+        Err(NotDescribed::Posterior)
     }
 }

@@ -1,6 +1,6 @@
 use super::row_twins::{RowTwins, rest_of_searched};
 use crate::{
-    decoupling::DecodeError,
+    decoupling::{DecodeError, RowChoice},
     scene::Scene,
     sensor::{ArrayScale, SensorError, SensorModel},
 };
@@ -65,6 +65,19 @@ impl RowSearch {
     /// Row-wires read, if the row-wire of each row of a frame is known.
     pub(super) fn known_rows(&self) -> Option<&[usize]> {
         self.rest.is_empty().then_some(&self.rows)
+    }
+
+    /// Row-wires read, and how that of a reading is known.
+    pub(super) fn description(&self) -> (&[usize], RowChoice) {
+        let tried = || RowChoice::Tried {
+            rest: self.rest.clone(),
+        };
+        let choice = if self.rest.is_empty() {
+            RowChoice::Given
+        } else {
+            tried()
+        };
+        (&self.rows, choice)
     }
 
     /// Returns `true` if rows are not known.

@@ -37,6 +37,14 @@ impl Gaussians {
         self.width
     }
 
+    /// Roots of the sharpness, and centres (inputs × `count`) in proportion to it.
+    pub(super) fn in_units_of_width(&self, count: usize) -> (f64, Array2<f64>) {
+        let root = self.sharpness.sqrt();
+        let inputs = self.centres.len() / self.width.max(1);
+        let centre = |(input, centre): (usize, usize)| root * self.centres[input * self.width + centre];
+        (root, Array2::from_shape_fn((inputs, count), centre))
+    }
+
     /// Writes the Gaussians at `x`, one for each centre with padding, whose values mean nothing.
     #[inline(always)]
     pub(super) fn evaluate(&self, x: &[f64], values: &mut [f64]) {

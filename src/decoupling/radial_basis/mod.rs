@@ -8,7 +8,7 @@ use rand::Rng;
 
 use self::gaussians::{Gaussians, gaussian};
 use super::{
-    DecodeError, Decoder,
+    AffineLayer, DecodeError, Decoder, Description, Layer, LayeredMap, NotDescribed,
     clusters::k_means,
     compiled::padded_layer::PaddedLayer,
     ridge::Ridge,
@@ -179,6 +179,24 @@ impl Decoder for RadialBasisNetwork {
             targets,
         });
         Ok(())
+    }
+
+    fn description(&self) -> Result<Description, NotDescribed> {
+        let (root, centres) = self.gaussians.in_units_of_width(self.centres);
+        let inputs = self.input_layer.weights(self.channels()) * root;
+        let changes = self.output_layer.weights(self.centres);
+        let mut constants = self.middles.clone();
+        let of_varying = self.output_layer.constants().iter().zip(&self.varying);
+        of_varying.for_each(|(constant, &target)| constants[target] += constant);
+        Ok(Description::of_maps(vec![LayeredMap {
+            quantity: self.quantity,
+            centre: self.channel_centres.clone(),
+            layers: vec![
+                Layer::Affine(AffineLayer::linear(inputs)),
+                Layer::Gaussians { centres },
+                Layer::Affine(AffineLayer::of_varying(&changes, &self.varying, &constants)),
+            ],
+        }]))
     }
 }
 

@@ -4,12 +4,12 @@ mod antecedents;
 mod consequents;
 mod selection;
 
-use ndarray::{Array2, Axis};
+use ndarray::{Array2, Axis, Slice};
 use rand::Rng;
 
 use self::antecedents::{Antecedents, normalise};
 use super::{
-    DecodeError, Decoder,
+    AffineLayer, DecodeError, Decoder, Description, Layer, LayeredMap, NotDescribed,
     linear_fit::LinearFit,
     units::{Units, with_noise},
 };
@@ -153,6 +153,33 @@ impl Decoder for TakagiSugeno {
             }
         }
         Ok(())
+    }
+
+    fn description(&self) -> Result<Description, NotDescribed> {
+        let (channels, outputs, rules) = (self.channels(), self.outputs(), self.rules());
+        let memberships = AffineLayer {
+            weights: self.antecedents.slice_axis(Axis(0), Slice::from(..channels)).to_owned(),
+            biases: self.antecedents.row(channels).to_vec(),
+        };
+        let mut consequents = AffineLayer::linear(Array2::zeros((channels, rules * outputs)));
+        let of_rules = self.consequents.axis_chunks_iter(Axis(0), channels + 1);
+        for (rule, of_rule) in of_rules.enumerate() {
+            let first = rule * outputs;
+            consequents.biases[first..first + outputs].copy_from_slice(&self.middles);
+            for (column, &target) in of_rule.columns().into_iter().zip(&self.varying) {
+                let (gains, constant) = column.split_at(Axis(0), channels);
+                consequents.weights.column_mut(first + target).assign(&gains);
+                consequents.biases[first + target] += constant[0];
+            }
+        }
+        Ok(Description::of_maps(vec![LayeredMap {
+            quantity: self.quantity,
+            centre: self.centre.clone(),
+            layers: vec![Layer::Rules {
+                memberships,
+                consequents,
+            }],
+        }]))
     }
 }
 

@@ -2,6 +2,13 @@ use std::{fmt, str::FromStr};
 
 use thiserror::Error;
 
+use super::{
+    BundleDecoder, BundleError, c99,
+    draft::{Call, Draft},
+    json, matlab, numpy, onnx,
+    report::BundleCheck,
+};
+
 /// Form in which a network leaves the program.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum BundleFormat {
@@ -34,8 +41,28 @@ pub enum BundlePrecision {
 #[non_exhaustive]
 pub enum ChoiceError {
     /// No such format.
-    #[error("'{0}' is not a format: give onnx, c99, matlab, numpy or json")]
+    #[error("'{0}' is not a format: give {words}", words = BundleFormat::words())]
     Format(String),
+    /// No such decoder.
+    #[error("'{0}' is not a decoder: give one of {all}", all = decoder_words())]
+    Decoder(String),
+    /// Whole numbers for another decoder than a network.
+    #[error("fixed16 is for networks only: give f64 or f32")]
+    WholeNumbers,
+    /// A format that has no iterations.
+    #[error(
+        "{format} cannot express the iteration of {decoder} on the equations of the sensor: give {}, or take another decoder",
+        iterating()
+    )]
+    Iteration {
+        /// The format.
+        format: BundleFormat,
+        /// The decoder.
+        decoder: BundleDecoder,
+    },
+    /// Equations in single precision.
+    #[error("{0} solves equations that magnify the rounding of readings in single precision beyond use: give f64")]
+    SingleEquations(BundleDecoder),
     /// No such precision.
     #[error("'{0}' is not a precision: give f64, f32 or fixed16")]
     Precision(String),
@@ -49,18 +76,106 @@ pub enum ChoiceError {
     },
 }
 
+/// Properties of a format, all in one place.
+struct Entry {
+    word: &'static str,
+    help: &'static str,
+    precisions: &'static [BundlePrecision],
+    /// True if it can express an iteration.
+    has_iterations: bool,
+    writer: Writer,
+}
+
+/// Functions that write a format.
+#[derive(Clone, Copy)]
+pub(super) struct Writer {
+    /// Writes the files of a folder in floating point, and evaluates them as they are read back.
+    pub(super) export: fn(&mut Draft<'_>) -> Result<Vec<BundleCheck>, BundleError>,
+    /// Says how to call the bundle.
+    pub(super) call: fn(&Call<'_>) -> String,
+}
+
 impl BundleFormat {
     /// All formats, in the order offered to the user.
     pub const ALL: [Self; 5] = [Self::Onnx, Self::C99, Self::Matlab, Self::NumPy, Self::Json];
 
-    /// Precisions in which the format can be written.
-    pub fn precisions(self) -> &'static [BundlePrecision] {
+    fn entry(self) -> Entry {
         use BundlePrecision::{Double, Fixed16, Single};
         match self {
-            Self::Onnx | Self::NumPy => &[Double, Single],
-            Self::C99 => &[Double, Single, Fixed16],
-            Self::Matlab | Self::Json => &[Double],
+            Self::Onnx => Entry {
+                word: "onnx",
+                help: "a graph (opset 13) for ONNX runtimes",
+                precisions: &[Double, Single],
+                has_iterations: false,
+                writer: Writer {
+                    export: onnx::export,
+                    call: onnx::call,
+                },
+            },
+            Self::C99 => Entry {
+                word: "c99",
+                help: "one header and one source in C",
+                precisions: &[Double, Single, Fixed16],
+                has_iterations: true,
+                writer: Writer {
+                    export: c99::export,
+                    call: c99::call,
+                },
+            },
+            Self::Matlab => Entry {
+                word: "matlab",
+                help: "one function file for MATLAB and GNU Octave",
+                precisions: &[Double],
+                has_iterations: false,
+                writer: Writer {
+                    export: matlab::export,
+                    call: matlab::call,
+                },
+            },
+            Self::NumPy => Entry {
+                word: "numpy",
+                help: "weights (.npz) and a decode.py",
+                precisions: &[Double, Single],
+                has_iterations: true,
+                writer: Writer {
+                    export: numpy::export,
+                    call: numpy::call,
+                },
+            },
+            Self::Json => Entry {
+                word: "json",
+                help: "the network file itself, or the numbers of another decoder",
+                precisions: &[Double],
+                has_iterations: false,
+                writer: Writer {
+                    export: json::export,
+                    call: |_| String::new(),
+                },
+            },
         }
+    }
+
+    /// Functions that write the format.
+    pub(super) fn writer(self) -> Writer {
+        self.entry().writer
+    }
+
+    /// Precisions in which the format can be written.
+    pub fn precisions(self) -> &'static [BundlePrecision] {
+        self.entry().precisions
+    }
+
+    /// Says what each format is, for the help of a command.
+    pub fn help() -> String {
+        let lines = Self::ALL.map(|format| format!("{format}: {}", format.entry().help));
+        lines.join("; ")
+    }
+
+    /// Lists all formats: `onnx, c99 … or json`.
+    fn words() -> String {
+        let words = Self::ALL.map(|format| format.entry().word);
+        let [others @ .., last] = &words;
+        format!("{} or {last}", others.join(", "))
     }
 
     /// Checks that the format can be written in `precision`.
@@ -77,10 +192,47 @@ impl BundleFormat {
         })
     }
 
+    /// Checks that the format can express `decoder` in `precision`.
+    ///
+    /// # Errors
+    /// It cannot.
+    pub fn check_for(self, decoder: BundleDecoder, precision: BundlePrecision) -> Result<(), ChoiceError> {
+        self.check(precision)?;
+        let has_iterations = self.entry().has_iterations;
+        if precision == BundlePrecision::Fixed16 && !decoder.is_network() {
+            Err(ChoiceError::WholeNumbers)
+        } else if decoder.solves_equations() && !has_iterations {
+            Err(ChoiceError::Iteration { format: self, decoder })
+        } else if decoder.solves_equations() && precision != BundlePrecision::Double {
+            Err(ChoiceError::SingleEquations(decoder))
+        } else {
+            Ok(())
+        }
+    }
+
     fn precision_names(self) -> String {
         let names = self.precisions().iter().map(BundlePrecision::to_string);
         names.collect::<Vec<_>>().join(" or ")
     }
+}
+
+/// Lists the formats that have iterations.
+fn iterating() -> String {
+    let formats = BundleFormat::ALL
+        .into_iter()
+        .filter(|format| format.entry().has_iterations);
+    formats
+        .map(|format| format.to_string())
+        .collect::<Vec<_>>()
+        .join(" or ")
+}
+
+/// Lists all decoders.
+fn decoder_words() -> String {
+    BundleDecoder::all()
+        .map(|decoder| decoder.to_string())
+        .collect::<Vec<_>>()
+        .join(", ")
 }
 
 impl BundlePrecision {
@@ -90,13 +242,7 @@ impl BundlePrecision {
 
 impl fmt::Display for BundleFormat {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.pad(match self {
-            Self::Onnx => "onnx",
-            Self::C99 => "c99",
-            Self::Matlab => "matlab",
-            Self::NumPy => "numpy",
-            Self::Json => "json",
-        })
+        f.pad(self.entry().word)
     }
 }
 

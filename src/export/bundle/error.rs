@@ -2,8 +2,9 @@ use std::path::PathBuf;
 
 use thiserror::Error;
 
-use super::{choice::ChoiceError, fixed_point::FixedPointError, portable::FoldError};
+use super::{BundleDecoder, choice::ChoiceError, fixed_point::FixedPointError, portable::FoldError};
 use crate::{
+    decoupling::NotDescribed,
     evaluation::RunError,
     export::{DocumentError, WriteError},
 };
@@ -15,6 +16,29 @@ pub enum BundleError {
     /// The format does not have the precision.
     #[error(transparent)]
     Choice(#[from] ChoiceError),
+    /// The decoder solves the equations of a sensor, and the samples have none.
+    #[error("{0} solves the equations of a sensor, and a recording has no model of one: take another decoder")]
+    NoSensor(BundleDecoder),
+    /// No other program can compute what the decoder does.
+    #[error("{decoder} cannot be exported: {reason}")]
+    NotDescribed {
+        /// The decoder.
+        decoder: BundleDecoder,
+        /// The cause.
+        reason: NotDescribed,
+    },
+    /// Rows whose equations leave the answer open.
+    #[error(
+        "{decoder} cannot be exported: the equations of {open} of {rows} rows drawn in the scene have no solution or more than one; take another decoder"
+    )]
+    OpenRows {
+        /// The decoder.
+        decoder: BundleDecoder,
+        /// Such rows.
+        open: usize,
+        /// All rows.
+        rows: usize,
+    },
     /// The scaling cannot be folded into the weights.
     #[error(transparent)]
     Fold(#[from] FoldError),
@@ -74,7 +98,7 @@ pub enum BundleError {
         /// First lines of the message.
         reason: String,
     },
-    /// The bundle gives other answers than the network.
+    /// The bundle gives other answers than the decoder.
     #[error(
         "{evaluator} gives answers that deviate by {deviation:.1e} of the range of the outputs, more than {limit:.1e}; nothing is left of the bundle"
     )]
@@ -86,4 +110,14 @@ pub enum BundleError {
         /// Largest deviation allowed.
         limit: f64,
     },
+}
+
+impl BundleError {
+    /// The error for a file of a bundle that could not be read back.
+    pub(super) fn read_back(file: &str, reason: String) -> Self {
+        Self::ReadBack {
+            file: file.to_owned(),
+            reason,
+        }
+    }
 }

@@ -3,13 +3,14 @@ use std::{fs, path::Path};
 use super::{
     c99::{self, Compiled, run_self_test},
     choice::{BundleFormat, BundlePrecision},
+    draft::{Draft, deviation},
     error::BundleError,
-    exported_network::{ExportedNetwork, Metadata},
+    exported_decoder::{ExportedDecoder, Metadata},
     fixed_point::{FixedNetworks, HiddenWidth, USUAL_BOUND},
     folder::AtomicFolder,
     golden::golden_csv,
     identifier::identifier,
-    matlab, numpy, onnx,
+    json,
     portable::Portable,
     readme::readme,
     report::{BundleCheck, BundleReport, VectorCounts},
@@ -18,32 +19,36 @@ use super::{
     vectors::{Deviation, Vectors},
     weights::{Arithmetic, Weights},
 };
+use crate::export::{NetworkFile, WriteError};
 
-/// Writes a network as a bundle at `path`: a folder, or for [`BundleFormat::Json`] a file. What was written is
-/// read back and compared with the network before it is put in its place.
+/// Writes a decoder as a bundle at `path`: a folder, or for [`BundleFormat::Json`] a file. What was written is
+/// read back and compared with the decoder before it is put in its place.
 ///
 /// # Errors
-/// The format lacks the precision, the network cannot be written in it, `path` is taken or cannot be written, or the
-/// bundle deviates from the network. Nothing is left behind.
+/// The format lacks the precision, the decoder cannot be written in it, `path` is taken or cannot be written, or the
+/// bundle deviates from the decoder. Nothing is left behind.
 pub fn export_bundle<'a>(
-    network: impl Into<ExportedNetwork<'a>>,
+    decoder: impl Into<ExportedDecoder<'a>>,
     format: BundleFormat,
     precision: BundlePrecision,
     path: &Path,
 ) -> Result<BundleReport, BundleError> {
-    let exported = network.into();
-    format.check(precision)?;
-    if format == BundleFormat::Json {
-        return export_network_file(exported, path);
+    let exported = decoder.into();
+    format.check_for(exported.kind(), precision)?;
+    if format == BundleFormat::Json && exported.kind().is_network() {
+        return export_network_file(&exported, path);
+    }
+    if format == BundleFormat::Json && fs::symlink_metadata(path).is_ok() {
+        return Err(BundleError::Exists(path.to_owned()));
     }
     let folder = AtomicFolder::create(path)?;
-    let portable = Portable::of(exported)?;
+    let portable = Portable::of(&exported)?;
     let mut bundle = Bundle {
-        exported,
         name: identifier(path),
         format,
         precision,
         metadata: exported.metadata(&portable, precision),
+        exported,
         portable,
         folder,
         remarks: Vec::new(),
@@ -64,58 +69,73 @@ pub fn export_bundle<'a>(
 }
 
 /// Copies the network file.
-fn export_network_file(exported: ExportedNetwork<'_>, path: &Path) -> Result<BundleReport, BundleError> {
+fn export_network_file(exported: &ExportedDecoder<'_>, path: &Path) -> Result<BundleReport, BundleError> {
     if fs::symlink_metadata(path).is_ok() {
         return Err(BundleError::Exists(path.to_owned()));
     }
-    let trial = tempfile::tempdir().map_err(|error| crate::export::WriteError::io(path, error))?;
+    let trial = tempfile::tempdir().map_err(|error| WriteError::io(path, error))?;
     let copy = trial.path().join("network.json");
-    exported.save(&copy)?;
-    if !exported.is_saved_at(&copy)? {
+    let file = exported.file();
+    file.save(&copy)?;
+    let read = NetworkFile::load(&copy)?;
+    if (&read.network, &read.settings) != (&file.network, &file.settings) {
         return Err(BundleError::ReadBack {
             file: path.display().to_string(),
             reason: "it is another network".to_owned(),
         });
     }
-    exported.save(path)?;
+    file.save(path)?;
     let portable = Portable::of(exported)?;
+    let check = BundleCheck {
+        evaluator: "network file, read back",
+        deviation: 0.0,
+        of_arithmetic: 0.0,
+    };
+    Ok(of_file(path, &portable, vec![check]))
+}
+
+/// The report on a single file in double precision.
+fn of_file(path: &Path, portable: &Portable, checks: Vec<BundleCheck>) -> BundleReport {
     let size = fs::metadata(path).map_or(0, |found| found.len());
-    Ok(BundleReport {
+    BundleReport {
         format: BundleFormat::Json,
         precision: BundlePrecision::Double,
         path: path.to_owned(),
         files: vec![(path.display().to_string(), size)],
         vectors: VectorCounts { verified: 0, golden: 0 },
-        checks: vec![BundleCheck {
-            evaluator: "network file, read back",
-            deviation: 0.0,
-            of_arithmetic: 0.0,
-        }],
+        checks,
         limit: 0.0,
         rounding: None,
         output_range_mm: portable.output_range_mm(),
         program_deviation: 0.0,
         bounds: Vec::new(),
         remarks: Vec::new(),
-    })
+    }
 }
 
-/// Single precision throughout where that is enough, and otherwise the hidden sums in double.
+/// Single precision throughout where that is enough, and otherwise as many first layers in double as it takes.
 fn single_arithmetic(portable: &Portable, vectors: &Vectors) -> Arithmetic {
     /// Part of the limit that single precision may use in this evaluation: others add up in another order.
     const PART: f64 = 0.2;
-    let single = Weights::of(portable, Arithmetic::SINGLE);
-    let deviation = vectors.deviation(|vector| single.decode(vector.network, &vector.taken));
-    if deviation.of_arithmetic <= PART * Tolerance::SINGLE {
-        Arithmetic::SINGLE
-    } else {
-        Arithmetic::MIXED
-    }
+    /// The part where the large products that nearly cancel are in double.
+    const PART_BEHIND_WIDE_LAYERS: f64 = 0.5;
+    let is_enough = |wide_layers: &usize| {
+        let single = Weights::of(portable, Arithmetic::single(*wide_layers));
+        let deviation = deviation(portable, &single, vectors);
+        let part = if *wide_layers == 0 {
+            PART
+        } else {
+            PART_BEHIND_WIDE_LAYERS
+        };
+        deviation.of_arithmetic <= part * Tolerance::SINGLE
+    };
+    let layers = portable.layers().len();
+    Arithmetic::single((0..layers).find(is_enough).unwrap_or(layers))
 }
 
 /// A bundle in the making.
 struct Bundle<'a> {
-    exported: ExportedNetwork<'a>,
+    exported: ExportedDecoder<'a>,
     name: String,
     format: BundleFormat,
     precision: BundlePrecision,
@@ -127,8 +147,8 @@ struct Bundle<'a> {
 }
 
 impl Bundle<'_> {
-    fn vectors(&self, taking: Taking<'_>) -> Result<Vectors, BundleError> {
-        Vectors::of(self.exported, &self.portable, taking)
+    fn vectors(&mut self, taking: Taking<'_>) -> Result<Vectors, BundleError> {
+        Vectors::of(&mut self.exported, &self.portable, taking)
     }
 
     /// Notes what rounding the readings to single precision changes.
@@ -148,7 +168,8 @@ impl Bundle<'_> {
         self.metadata.insert("change_by_rounding_readings".to_owned(), figures);
         if worst > Tolerance::SINGLE {
             self.remarks.push(format!(
-                "rounding the readings to single precision changes a {output} by up to {largest} in the verification and by                  at most {bound}; if that is too much, {cure}",
+                "rounding the readings to single precision changes a {output} by up to {largest} in the verification and by \
+                 at most {bound}; if that is too much, {cure}",
                 output = portable.meaning.output(),
                 largest = portable.in_words(rounding.largest),
                 bound = portable.in_words(rounding.worst()),
@@ -166,60 +187,36 @@ impl Bundle<'_> {
     ) -> Result<BundleReport, BundleError> {
         let portable = &self.portable;
         let weights = Weights::of(portable, arithmetic);
-        let model = |weights: &Weights| vectors.deviation(|vector| weights.decode(vector.network, &vector.taken));
-        let tolerance = Tolerance::of(portable, arithmetic, vectors.growth, model(&weights).of_arithmetic);
+        let tolerance = match portable.equations {
+            Some(_) => Tolerance::of_equations(),
+            None => Tolerance::of(
+                portable,
+                arithmetic,
+                &vectors.growth,
+                deviation(portable, &weights, vectors).of_arithmetic,
+            ),
+        };
         self.remarks.extend(tolerance.remarks(arithmetic, portable));
+        if portable.equations.is_some() {
+            let exact = "it takes the readings to be exact and magnifies noise in them many times; for readings with noise, \
+                         take a decoder fitted to noisy samples";
+            self.remarks.push(exact.to_owned());
+        }
         let limits = Deviation {
             total: tolerance.limit + vectors.rounding.worst(),
             of_arithmetic: tolerance.limit,
         };
-        let mut checks = Vec::new();
-        let mut check = |evaluator, deviation| checks.push(BundleCheck::of(evaluator, deviation));
-        match self.format {
-            BundleFormat::Onnx => {
-                self.folder.write(
-                    "network.onnx",
-                    onnx::write(portable, &weights, &self.metadata, &self.remarks),
-                )?;
-                let damaged = |reason| read_back("network.onnx", reason);
-                let graph = onnx::OnnxGraph::read(&self.read("network.onnx")?).map_err(damaged)?;
-                let answers = graph.decode(vectors.all()).map_err(damaged)?.answers;
-                if answers.len() != vectors.all().len() {
-                    return Err(read_back("network.onnx", "it has another number of answers".to_owned()));
-                }
-                let mut answers = answers.into_iter();
-                let deviation = vectors.deviation(|_| answers.next().unwrap_or_default());
-                check("ONNX graph, read back and evaluated", deviation);
-            }
-            BundleFormat::NumPy => {
-                self.folder
-                    .write("network.npz", numpy::write_weights(portable, &weights))?;
-                self.folder
-                    .write("decode.py", numpy::write_program(portable, arithmetic))?;
-                let read = numpy::read_weights(&self.read("network.npz")?, portable);
-                let read = read.map_err(|reason| read_back("network.npz", reason))?;
-                check("NumPy weights, read back and evaluated", model(&read));
-            }
-            BundleFormat::Matlab => {
-                let (function, file) = (format!("{}_decode", self.name), format!("{}_decode.m", self.name));
-                self.folder.write(&file, matlab::write(&function, portable, &weights))?;
-                let text = String::from_utf8(self.read(&file)?).map_err(|error| read_back(&file, error.to_string()))?;
-                let read = matlab::read_weights(&text, portable).map_err(|reason| read_back(&file, reason))?;
-                check("MATLAB matrices, read back and evaluated", model(&read));
-            }
-            BundleFormat::C99 | BundleFormat::Json => {
-                let notes = &self.remarks;
-                let files = c99::write_floating(&self.name, portable, &weights, vectors.golden(), limits, notes);
-                for (name, text) in files {
-                    self.folder.write(&name, text)?;
-                }
-                check("model of the C source", model(&weights));
-                match run_self_test(self.folder.path(), &self.name)? {
-                    Compiled::Ran { deviation } => check("C source, compiled and run", deviation),
-                    Compiled::NoCompiler(why) => self.remarks.push(format!("the C source was not compiled: {why}")),
-                }
-            }
-        }
+        let mut draft = Draft {
+            name: &self.name,
+            folder: &self.folder,
+            portable,
+            weights: &weights,
+            vectors,
+            limits,
+            metadata: &self.metadata,
+            remarks: &mut self.remarks,
+        };
+        let checks = (self.format.writer().export)(&mut draft)?;
         self.finish(path, vectors, checks, limits, None)
     }
 
@@ -232,12 +229,12 @@ impl Bundle<'_> {
         for (name, text) in files {
             self.folder.write(&name, text)?;
         }
-        let deviation = vectors.deviation(|vector| {
-            let outputs = fixed.decode(vector.network, &vector.readings);
+        let found = vectors.deviation(|vector| {
+            let outputs = fixed.decode(vector.row, &vector.readings);
             // Readings that it cannot take were refused when they were drawn.
             outputs.map(|outputs| fixed.in_own_units(&outputs)).unwrap_or_default()
         });
-        let mut checks = vec![BundleCheck::of("bit-exact model in whole numbers", deviation)];
+        let mut checks = vec![BundleCheck::of("bit-exact model in whole numbers", found)];
         let mut remarks = Vec::new();
         if fixed.hidden_width == HiddenWidth::TwentyFour {
             let remark = "the hidden weights have 24 bits, because their large products nearly cancel; the rest has 16";
@@ -248,7 +245,7 @@ impl Bundle<'_> {
                 "the error is only known to be below {:.0} % of the range of the outputs; {} for a network that amplifies \
                  rounding errors less",
                 100.0 * limit,
-                self.portable.meaning.smaller_weights()
+                self.portable.smaller_weights()
             ));
         }
         match run_self_test(self.folder.path(), &self.name)? {
@@ -266,10 +263,6 @@ impl Bundle<'_> {
         self.finish(path, &vectors, checks, limits, Some(&fixed))
     }
 
-    fn read(&self, name: &str) -> Result<Vec<u8>, BundleError> {
-        fs::read(self.folder.path().join(name)).map_err(|error| read_back(name, error.to_string()))
-    }
-
     /// Checks the deviations, adds the files that every bundle has, and puts the folder in its place.
     fn finish(
         self,
@@ -280,18 +273,7 @@ impl Bundle<'_> {
         fixed: Option<&FixedNetworks>,
     ) -> Result<BundleReport, BundleError> {
         for check in &checks {
-            for (deviation, limit) in [
-                (check.of_arithmetic, limits.of_arithmetic),
-                (check.deviation, limits.total),
-            ] {
-                if deviation.is_nan() || deviation > limit {
-                    return Err(BundleError::Deviation {
-                        evaluator: check.evaluator.to_owned(),
-                        deviation,
-                        limit,
-                    });
-                }
-            }
+            check.admit(limits)?;
         }
         let portable = &self.portable;
         let mut report = BundleReport {
@@ -299,10 +281,7 @@ impl Bundle<'_> {
             precision: self.precision,
             path: path.to_owned(),
             files: Vec::new(),
-            vectors: VectorCounts {
-                verified: vectors.all().len(),
-                golden: vectors.golden().len(),
-            },
+            vectors: vectors.counts(),
             checks,
             limit: limits.total,
             rounding: (self.precision == BundlePrecision::Single).then_some(vectors.rounding),
@@ -311,6 +290,13 @@ impl Bundle<'_> {
             bounds: fixed.map_or_else(Vec::new, |fixed| portable.meaning.named(&fixed.bounds)),
             remarks: self.remarks,
         };
+        if self.format == BundleFormat::Json {
+            self.folder.commit_only(json::FILE)?;
+            return Ok(BundleReport {
+                files: of_file(path, portable, Vec::new()).files,
+                ..report
+            });
+        }
         self.folder
             .write("golden.csv", golden_csv(portable, vectors.golden()))?;
         let mut metadata = self.metadata;
@@ -318,20 +304,13 @@ impl Bundle<'_> {
             "deviation": report.deviation(), "limit": report.limit, "remarks": report.remarks,
         });
         metadata.insert("verification".to_owned(), verified);
-        let metadata =
-            serde_json::to_string_pretty(&metadata).map_err(|error| read_back("metadata.json", error.to_string()))?;
+        let metadata = serde_json::to_string_pretty(&metadata)
+            .map_err(|error| BundleError::read_back("metadata.json", error.to_string()))?;
         self.folder.write("metadata.json", metadata + "\n")?;
         self.folder
             .write("README.txt", readme(&self.name, portable, fixed, &report))?;
         report.files = self.folder.sizes()?;
         self.folder.commit()?;
         Ok(report)
-    }
-}
-
-fn read_back(file: &str, reason: String) -> BundleError {
-    BundleError::ReadBack {
-        file: file.to_owned(),
-        reason,
     }
 }

@@ -74,6 +74,18 @@ impl AtomicFolder {
         Ok(sizes().map_err(|error| WriteError::io(&self.target, error))?)
     }
 
+    /// Puts one of its files in the place of its target, and leaves nothing of the folder.
+    ///
+    /// # Errors
+    /// Something came to be there meanwhile, or the operating system refuses.
+    pub(super) fn commit_only(self, name: &str) -> Result<(), BundleError> {
+        if fs::symlink_metadata(&self.target).is_ok() {
+            return Err(BundleError::Exists(self.target));
+        }
+        let renamed = fs::rename(self.path().join(name), &self.target);
+        Ok(renamed.map_err(|error| WriteError::io(&self.target, error))?)
+    }
+
     /// Renames it to its target.
     ///
     /// # Errors

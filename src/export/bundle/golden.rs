@@ -17,7 +17,7 @@ pub(super) fn golden_csv(portable: &Portable, vectors: &[Vector]) -> String {
     let mut write = |fields: Vec<String>| writer.write_record(fields).expect("memory takes everything");
     write(names.collect());
     for vector in vectors {
-        let row = portable.takes_row().then(|| (vector.network + 1).to_string());
+        let row = portable.takes_row().then(|| (vector.row + 1).to_string());
         let numbers = vector.readings.iter().chain(&vector.answers).map(f64::to_string);
         write(row.into_iter().chain(numbers).collect());
     }

@@ -3,31 +3,24 @@
 use std::fmt::Write;
 
 use super::{
+    draft::{Call, Draft},
+    error::BundleError,
     meaning::Meaning,
     portable::Portable,
-    weights::{Arithmetic, RoundedNetwork, Weights},
+    report::BundleCheck,
+    tables::names,
+    weights::{Arithmetic, Weights},
 };
-use crate::network::Quantity;
-
-/// Matrices of the file: their names and numbers of columns, and the part of each network.
-type Matrix = (&'static str, fn(&RoundedNetwork) -> &Vec<f64>);
-
-/// Stands for [`Meaning::centre`].
-const CENTRE: &str = "";
-
-const MATRICES: [Matrix; 5] = [
-    (CENTRE, |network| &network.centre),
-    ("hidden_weights", |network| &network.hidden_weights),
-    ("hidden_biases", |network| &network.hidden_biases),
-    ("output_weights", |network| &network.output_weights),
-    ("output_biases", |network| &network.output_biases),
-];
+use crate::{
+    decoupling::{AffineLayer, Layer},
+    network::Quantity,
+};
 
 /// Writes the function `name`. The matrices of the rows stand one below the other.
 pub(super) fn write(name: &str, portable: &Portable, weights: &Weights) -> String {
-    let (channels, rows) = (portable.channels, portable.networks.len());
+    let (channels, rows) = (portable.channels, portable.rows());
     let (input, output) = (portable.meaning.readings(), portable.meaning.outputs());
-    let ranges = portable.ranges();
+    let ranges = portable.known_ranges();
     let (argument, help, check) = if portable.takes_row() {
         (
             ", row",
@@ -89,14 +82,9 @@ pub(super) fn write(name: &str, portable: &Portable, weights: &Weights) -> Strin
          end\n\
          {check}",
     );
-    for (matrix, of) in MATRICES {
-        let columns = match matrix {
-            CENTRE => channels,
-            "hidden_weights" | "hidden_biases" => portable.hidden,
-            _ => portable.outputs,
-        };
-        let values = weights.networks.iter().flat_map(|network| of(network).iter().copied());
-        push_matrix(&mut text, name_of(matrix, portable), columns, values);
+    for table in weights.tables(portable) {
+        let columns = table.shape.last().copied().unwrap_or(1);
+        push_matrix(&mut text, &table.name, columns, table.values.into_iter());
     }
     let mut outside = String::new();
     if let Some(ranges) = &ranges {
@@ -112,22 +100,64 @@ pub(super) fn write(name: &str, portable: &Portable, weights: &Weights) -> Strin
          for k = 1:{rows}\n    \
          mine = find(row(:) == k);\n    \
          r = {input}(mine, :);\n    \
-         change = {change};\n    \
-         hidden = tanh(change * hidden_weights((k - 1) * {channels} + (1:{channels}), :) + hidden_biases(k, :));\n    \
-         {output}(mine, :) = hidden * output_weights((k - 1) * {hidden} + (1:{hidden}), :) + output_biases(k, :);\n\
+         v = {change};\n\
+         {steps}    \
+         {output}(mine, :) = v;\n\
          {outside}\
          end\n\
          end\n",
-        hidden = portable.hidden,
+        steps = steps(portable),
     )
 }
 
-fn name_of(matrix: &'static str, portable: &Portable) -> &'static str {
-    if matrix == CENTRE {
-        portable.meaning.centre()
-    } else {
-        matrix
+/// Statements from the changes `v` of the readings to the outputs, for row `k`.
+fn steps(portable: &Portable) -> String {
+    let mut text = String::new();
+    let mut inputs = portable.channels;
+    for (layer, names) in portable.layers().iter().zip(names(portable.layers())) {
+        let block = |place: usize| format!("{}((k - 1) * {inputs} + (1:{inputs}), :)", names.tables[place]);
+        let constants = |place: usize| format!("{}(k, :)", names.tables[place]);
+        text += &match layer {
+            Layer::Affine(_) => format!("    v = v * {} + {};\n", block(0), constants(1)),
+            Layer::Tanh => "    v = tanh(v);\n".to_owned(),
+            Layer::Gaussians { centres } => format!(
+                "    centres = {};\n    \
+                 gaussians = zeros(numel(mine), {count});\n    \
+                 for g = 1:{count}\n        \
+                 gaussians(:, g) = exp(-sum((v - centres(:, g)') .^ 2, 2));\n    \
+                 end\n    \
+                 v = gaussians;\n",
+                block(0),
+                count = centres.ncols(),
+            ),
+            Layer::Rules {
+                memberships,
+                consequents,
+            } => rules(
+                memberships,
+                consequents,
+                [block(0), constants(1), block(2), constants(3)],
+            ),
+        };
+        inputs = layer.outputs(inputs);
     }
+    text
+}
+
+fn rules<T>(memberships: &AffineLayer<T>, consequents: &AffineLayer<T>, tables: [String; 4]) -> String {
+    let [slopes, offsets, gains, constants] = tables;
+    let rules = memberships.outputs();
+    format!(
+        "    logarithms = v * {slopes} + {offsets};\n    \
+         strengths = exp(logarithms - max(logarithms, [], 2));\n    \
+         strengths = strengths ./ sum(strengths, 2);\n    \
+         of_rules = v * {gains} + {constants};\n    \
+         v = zeros(numel(mine), {outputs});\n    \
+         for g = 1:{rules}\n        \
+         v = v + strengths(:, g) .* of_rules(:, (g - 1) * {outputs} + (1:{outputs}));\n    \
+         end\n",
+        outputs = consequents.outputs() / rules,
+    )
 }
 
 fn push_matrix(text: &mut String, name: &str, columns: usize, values: impl Iterator<Item = f64>) {
@@ -149,43 +179,54 @@ fn push_matrix(text: &mut String, name: &str, columns: usize, values: impl Itera
 /// # Errors
 /// The name of the first that is missing, or has another number of values than `portable` needs.
 pub(super) fn read_weights(text: &str, portable: &Portable) -> Result<Weights, String> {
-    let mut of_networks = vec![[const { Vec::new() }; MATRICES.len()]; portable.networks.len()];
-    for (index, (name, of)) in MATRICES.iter().enumerate() {
-        let name = name_of(name, portable);
-        let missing = || format!("the matrix {name} is missing or damaged");
-        let rest = text.split(&format!("\n{name} = [")).nth(1).ok_or_else(missing)?;
-        let inside = rest
-            .split("];")
-            .next()
-            .ok_or_else(missing)?
-            .replace("...", " ")
-            .replace(';', " ");
+    Weights::of_tables(portable, Arithmetic::DOUBLE, |table| {
+        let missing = || format!("the matrix {} is missing or damaged", table.name);
+        let rest = text
+            .split(&format!("\n{} = [", table.name))
+            .nth(1)
+            .ok_or_else(missing)?;
+        let inside = rest.split("];").next().ok_or_else(missing)?;
+        let inside = inside.replace("...", " ").replace(';', " ");
         let values = inside
             .split_whitespace()
             .map(|number| number.parse::<f64>().map_err(|_| missing()));
-        let values: Vec<f64> = values.collect::<Result<_, _>>()?;
-        let expected = Weights::of(portable, Arithmetic::DOUBLE);
-        let sizes: usize = expected.networks.iter().map(|network| of(network).len()).sum();
-        if values.len() != sizes {
-            return Err(missing());
-        }
-        let size = (values.len() / of_networks.len()).max(1);
-        for (network, values) in of_networks.iter_mut().zip(values.chunks(size)) {
-            network[index] = values.to_vec();
-        }
-    }
-    let networks = of_networks.into_iter().map(
-        |[centre, hidden_weights, hidden_biases, output_weights, output_biases]| RoundedNetwork {
-            centre,
-            hidden_weights,
-            hidden_biases,
-            output_weights,
-            output_biases,
-        },
-    );
-    Ok(Weights {
-        quantity: portable.quantity,
-        arithmetic: Arithmetic::DOUBLE,
-        networks: networks.collect(),
+        values.collect()
     })
+}
+
+/// Writes the function and reads its matrices back.
+///
+/// # Errors
+/// It cannot be written or read back.
+pub(super) fn export(draft: &mut Draft<'_>) -> Result<Vec<BundleCheck>, BundleError> {
+    let (function, file) = (format!("{}_decode", draft.name), format!("{}_decode.m", draft.name));
+    let damaged = |reason| BundleError::read_back(&file, reason);
+    let bytes = draft.write(&file, write(&function, draft.portable, draft.weights))?;
+    let text = String::from_utf8(bytes).map_err(|error| damaged(error.to_string()))?;
+    let read = read_weights(&text, draft.portable).map_err(damaged)?;
+    let deviation = draft.deviation_of(&read);
+    Ok(vec![BundleCheck::of(
+        "MATLAB matrices, read back and evaluated",
+        deviation,
+    )])
+}
+
+/// How to call it, for the README.
+pub(super) fn call(call: &Call<'_>) -> String {
+    let portable = call.portable;
+    let (takes_row, channels, outputs) = (portable.takes_row(), portable.channels, portable.outputs);
+    let meaning = &portable.meaning;
+    let (input, output) = (meaning.readings(), meaning.outputs());
+    let name = call.name;
+    let row = if takes_row { ", row" } else { "" };
+    format!(
+        "    [{output}, readings_outside] = {name}_decode({input}{row})\n\n\
+         in MATLAB (from R2016b) or GNU Octave. {input} is samples x {channels}, {output} samples x \
+         {outputs}{row_text}.",
+        row_text = if takes_row {
+            ";\nrow has the row of each sample, from 1"
+        } else {
+            ""
+        },
+    )
 }

@@ -1,20 +1,27 @@
-//! Bundles: trained networks as other programs read them (feature `bundle`).
+//! Bundles: decoders as other programs read them (feature `bundle`).
 //!
-//! A network file, of a simulated sensor or of own data, is folded once into a description without any scaling (`portable`:
-//! readings to outputs, in the units of the user), which each format then writes: an ONNX graph, C99 in floating point or in whole numbers, a MATLAB function,
-//! NumPy arrays. What was written is read back and evaluated, and compared with the network computed with twice the
-//! digits (`exact`). Only a bundle that agrees is put in its place.
+//! A decoder describes what it computes as a chain of a few kinds of layers, which is folded once into layers without any
+//! scaling (`portable`: readings to outputs, in the units of the user). Each format then writes these layers, and knows no
+//! decoders: an ONNX graph, C99 in floating point or (networks only) in whole numbers, a MATLAB function, NumPy arrays.
+//! What was written is read back and evaluated, and compared with the decoder computed with twice the digits (`exact`).
+//! Only a bundle that agrees is put in its place.
 
 mod c99;
 mod choice;
+mod decoder_choice;
+mod draft;
 mod error;
 mod exact;
-mod exported_network;
+mod exported_decoder;
 mod exporting;
+mod fitted;
 mod fixed_point;
 mod folder;
+mod folding;
 mod golden;
 mod identifier;
+mod iteration;
+mod json;
 mod matlab;
 mod meaning;
 mod numpy;
@@ -22,6 +29,7 @@ mod onnx;
 mod portable;
 mod readme;
 mod report;
+mod tables;
 mod taking;
 mod tolerance;
 mod twofold;
@@ -33,9 +41,11 @@ mod tests;
 
 pub use self::{
     choice::{BundleFormat, BundlePrecision, ChoiceError},
+    decoder_choice::BundleDecoder,
     error::BundleError,
-    exported_network::ExportedNetwork,
+    exported_decoder::ExportedDecoder,
     exporting::export_bundle,
+    fitted::{FittedDecoder, fitted},
     fixed_point::FixedPointError,
     portable::FoldError,
     report::{BundleCheck, BundleReport, VectorCounts},

@@ -1,16 +1,17 @@
-use ndarray::Array2;
 use thiserror::Error;
 
-use super::{exported_network::ExportedNetwork, meaning::Meaning, twofold::Twofold};
-use crate::export::format_number;
-use crate::network::{DecouplingNetwork, InputScaling, Quantity};
+use super::{exported_decoder::ExportedDecoder, folding::FoldedMap, meaning::Meaning};
+use crate::{
+    decoupling::{Layer, RowProblemDescription},
+    export::format_number,
+    network::Quantity,
+};
 
-/// Everything that a network computes, from readings (in ohm, or as the user has them) to outputs (in mm, or in the units of
-/// the targets), with all scaling folded into its weights. Every writer starts from it.
+/// Everything that a decoder computes, from readings (in ohm, or as the user has them) to outputs (in mm, or in the units of
+/// the targets), with all scaling folded into its layers. Every writer starts from it, and knows layers but no decoders.
 ///
-/// A hidden node adds up `weight · x + bias`, where x is the change of a reading r from a value R₀ in the middle of its
-/// channel. The change is computed from the difference r − R₀, so that a number of few digits loses nothing where
-/// readings differ little:
+/// The first layer takes the change x of each reading r from a value R₀ in the middle of its channel. The change is computed
+/// from the difference r − R₀, so that a number of few digits loses nothing where readings differ little:
 ///
 /// | quantity | change x |
 /// |---|---|
@@ -19,34 +20,26 @@ use crate::network::{DecouplingNetwork, InputScaling, Quantity};
 /// | logarithm | ln(1 + (r − R₀)/R₀) |
 #[derive(Clone, Debug)]
 pub(super) struct Portable {
+    /// Name of the decoder.
+    pub(super) name: &'static str,
+    /// Word for it in sentences, and the name of its file of weights: network or decoder.
+    pub(super) decoder: &'static str,
     pub(super) quantity: Quantity,
     /// Meaning of readings and outputs.
     pub(super) meaning: Meaning,
     /// Number of readings of a row, M4 of an array.
     pub(super) channels: usize,
-    pub(super) hidden: usize,
     /// Number of outputs, 3·M2 of an array.
     pub(super) outputs: usize,
-    /// One for all row-wires, or one for each, from the first.
-    pub(super) networks: Vec<PortableNetwork>,
+    /// One for all row-wires, or one for each, from the first, all of one shape.
+    pub(super) maps: Vec<FoldedMap>,
+    /// Iteration on the equations of the sensor that begins at the answers of the maps.
+    pub(super) equations: Option<RowProblemDescription>,
+    /// Readings in training of all row-wires, or of each where the row is an argument.
+    pub(super) ranges: Vec<Option<ChannelRanges>>,
     /// Range to which deviations of each output are relative: the widest of any in training for the coordinates of an array,
     /// and its own for a target of own data, as units differ.
     pub(super) scales: Vec<f64>,
-}
-
-/// One network of a [`Portable`].
-#[derive(Clone, Debug)]
-pub(super) struct PortableNetwork {
-    /// R₀ of each channel, exact in single precision.
-    pub(super) centre: Vec<f64>,
-    /// Channels × hidden nodes.
-    pub(super) hidden_weights: Array2<Twofold>,
-    pub(super) hidden_biases: Vec<Twofold>,
-    /// Hidden nodes × outputs; zero for outputs that were constant in training.
-    pub(super) output_weights: Array2<Twofold>,
-    pub(super) output_biases: Vec<Twofold>,
-    /// Readings in training.
-    pub(super) range: Option<ChannelRanges>,
 }
 
 /// Readings of each channel in training.
@@ -58,7 +51,7 @@ pub(super) struct ChannelRanges {
     pub(super) limits: Vec<(f64, f64)>,
 }
 
-/// Errors of folding the scaling of networks into their weights.
+/// Errors of folding the scaling of decoders into their layers.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 #[non_exhaustive]
 pub enum FoldError {
@@ -76,41 +69,80 @@ pub enum FoldError {
 }
 
 impl Portable {
-    /// Folds the scaling of the networks of `exported` into their weights.
+    /// Folds the scaling of the decoder of `exported` into its layers.
     ///
     /// # Errors
-    /// A folded weight is not a finite number, or the networks read different quantities.
-    pub(super) fn of(exported: ExportedNetwork<'_>) -> Result<Self, FoldError> {
-        let networks = exported.networks().values();
-        let first = &networks[0];
-        let quantity = first.inputs().quantity();
-        if networks.iter().any(|network| network.inputs().quantity() != quantity) {
+    /// A folded weight is not a finite number, or the maps read different quantities.
+    pub(super) fn of(exported: &ExportedDecoder<'_>) -> Result<Self, FoldError> {
+        let description = exported.description();
+        let quantity = description.maps[0].quantity;
+        if description.maps.iter().any(|map| map.quantity != quantity) {
             return Err(FoldError::Quantities);
         }
-        let folded: Vec<_> = networks.iter().map(PortableNetwork::of).collect();
-        if let Some(index) = folded.iter().position(|network| !network.is_finite(quantity)) {
+        let mut maps: Vec<_> = description.maps.iter().map(FoldedMap::of).collect();
+        if let Some(index) = maps.iter().position(|map| !is_finite(map, quantity)) {
             return Err(FoldError::NotFinite { network: index + 1 });
         }
-        let outputs = first.outputs().channels();
+        FoldedMap::widen(&mut maps);
+        let channels = maps[0].centre.len();
+        let outputs = maps[0]
+            .layers
+            .iter()
+            .fold(channels, |width, layer| layer.outputs(width));
         let meaning = exported.meaning();
+        let targets = exported.target_extremes();
         let scales = match &meaning {
-            Meaning::Array(_) => vec![scale(networks, 0..outputs); outputs],
-            Meaning::Own { .. } => (0..outputs).map(|output| scale(networks, output..output + 1)).collect(),
+            Meaning::Array(_) => vec![scale(targets, 0..outputs); outputs],
+            Meaning::Own { .. } => (0..outputs).map(|output| scale(targets, output..output + 1)).collect(),
         };
+        let ranges = exported.reading_ranges().iter().map(|range| {
+            range.as_ref().map(|range| ChannelRanges {
+                extremes: (0..range.channels()).map(|channel| range.extremes(channel)).collect(),
+                limits: (0..range.channels())
+                    .map(|channel| range.limits(quantity, channel))
+                    .collect(),
+            })
+        });
         Ok(Self {
+            name: exported.kind().name(),
+            decoder: exported.kind().noun(),
+            ranges: ranges.collect(),
+            equations: description.equations.clone(),
             meaning,
             quantity,
-            channels: first.inputs().channels(),
-            hidden: first.mlp().shape().hidden,
+            channels,
             outputs,
-            networks: folded,
+            maps,
             scales,
         })
     }
 
-    /// Returns `true` if the networks are those of known rows, so that the row is an argument.
+    /// Returns `true` if there is a decoder for each known row, so that the row is an argument.
     pub(super) fn takes_row(&self) -> bool {
-        self.networks.len() > 1
+        self.rows() > 1
+    }
+
+    /// Number of row-wires that are told apart; 1 if the row is no argument.
+    pub(super) fn rows(&self) -> usize {
+        self.ranges.len()
+    }
+
+    /// The layers of the first map, which have the shapes of all.
+    pub(super) fn layers(&self) -> &[Layer<super::twofold::Twofold>] {
+        &self.maps[0].layers
+    }
+
+    /// Number of values that the widest layer gives.
+    pub(super) fn widest(&self) -> usize {
+        let mut inputs = self.channels;
+        let widths = self.layers().iter().map(|layer| {
+            inputs = layer.outputs(inputs);
+            inputs
+        });
+        // Outputs are not added up any more.
+        let mut widths: Vec<usize> = widths.collect();
+        widths.pop();
+        widths.into_iter().max().unwrap_or(0)
     }
 
     /// Widest range of a coordinate of an array in training; `None` for own data.
@@ -129,118 +161,32 @@ impl Portable {
         }
     }
 
-    /// The ranges of all networks in training, if all are known.
-    pub(super) fn ranges(&self) -> Option<Vec<&ChannelRanges>> {
-        self.networks.iter().map(|network| network.range.as_ref()).collect()
+    /// A way to have a decoder that amplifies less.
+    pub(super) fn smaller_weights(&self) -> &'static str {
+        match (&self.meaning, self.decoder) {
+            (Meaning::Own { .. }, decoder) if decoder != "network" => "take another decoder",
+            (meaning, _) => meaning.smaller_weights(),
+        }
+    }
+
+    /// The ranges of the readings of all rows in training, if all are known.
+    pub(super) fn known_ranges(&self) -> Option<Vec<&ChannelRanges>> {
+        self.ranges.iter().map(Option::as_ref).collect()
     }
 }
 
-/// Widest range in training among these outputs.
-fn scale(networks: &[DecouplingNetwork], outputs: std::ops::Range<usize>) -> f64 {
-    let extremes = networks
-        .iter()
-        .flat_map(|network| outputs.clone().map(|output| network.outputs().extremes(output)));
-    let (width, largest) = extremes.fold((0.0_f64, 0.0_f64), |(width, largest), (low, high)| {
+/// Widest range in training among these outputs of all rows.
+fn scale(targets: &[Vec<(f64, f64)>], outputs: std::ops::Range<usize>) -> f64 {
+    let extremes = targets.iter().flat_map(|row| row[outputs.clone()].iter());
+    let (width, largest) = extremes.fold((0.0_f64, 0.0_f64), |(width, largest), &(low, high)| {
         (width.max(high - low), largest.max(low.abs()).max(high.abs()))
     });
     // Outputs that did not vary are constants, and deviations are relative to these.
     [width, largest].into_iter().find(|&scale| scale > 0.0).unwrap_or(1.0)
 }
 
-impl PortableNetwork {
-    fn of(network: &DecouplingNetwork) -> Self {
-        let (inputs, mlp) = (network.inputs(), network.mlp());
-        let (quantity, shape) = (inputs.quantity(), mlp.shape());
-        let (middles, _) = inputs.affine();
-        let matrix = scaling_matrix(inputs.scaling());
-        // Rounded to single precision, so that r − R₀ is the same number in both; the biases take up the rest.
-        let centre: Vec<f64> = middles
-            .iter()
-            .map(|&value| f64::from(quantity.resistance_ohm(value) as f32))
-            .collect();
-        let (w, v) = (mlp.hidden_layer(), mlp.output_layer());
-        let of_value = Array2::from_shape_fn((inputs.channels(), shape.hidden), |(channel, node)| {
-            let products = (0..shape.inputs).map(|k| matrix[[k, channel]] * Twofold::from(w[[k, node]]));
-            products.fold(Twofold::ZERO, |sum, product| sum + product)
-        });
-        let hidden_biases = (0..shape.hidden).map(|node| {
-            let rests = centre.iter().zip(&middles).enumerate();
-            rests.fold(
-                Twofold::from(w[[shape.inputs, node]]),
-                |bias, (channel, (&ohm, &value))| {
-                    bias + of_value[[channel, node]] * (value_of(quantity, ohm) - Twofold::from(value))
-                },
-            )
-        });
-        let hidden_biases = hidden_biases.collect();
-        let per_change = |channel: usize| match quantity {
-            Quantity::Conductance => Twofold::from(1.0) / Twofold::from(centre[channel]),
-            Quantity::Resistance | Quantity::LogResistance | Quantity::Raw => Twofold::from(1.0),
-        };
-        let hidden_weights = Array2::from_shape_fn(of_value.dim(), |(channel, node)| {
-            of_value[[channel, node]] * per_change(channel)
-        });
-        let ranges = network.outputs().middles_and_half_widths();
-        let mut output_weights = Array2::from_elem((shape.hidden, ranges.len()), Twofold::ZERO);
-        let mut output_biases: Vec<_> = ranges.iter().map(|range| Twofold::from(range.0)).collect();
-        for (output, &coordinate) in network.outputs().varying().iter().enumerate() {
-            let half_width = Twofold::from(ranges[coordinate].1);
-            for node in 0..shape.hidden {
-                output_weights[[node, coordinate]] = Twofold::from(v[[node, output]]) * half_width;
-            }
-            let bias = Twofold::from(v[[shape.hidden, output]]) * half_width;
-            output_biases[coordinate] = output_biases[coordinate] + bias;
-        }
-        let range = inputs.range().map(|range| ChannelRanges {
-            extremes: (0..range.channels()).map(|channel| range.extremes(channel)).collect(),
-            limits: (0..range.channels())
-                .map(|channel| range.limits(quantity, channel))
-                .collect(),
-        });
-        Self {
-            centre,
-            hidden_weights,
-            hidden_biases,
-            output_weights,
-            output_biases,
-            range,
-        }
-    }
-
-    /// Largest size of an output, whatever the activations.
-    pub(super) fn reach(&self, output: usize) -> f64 {
-        let weights = self.output_weights.column(output);
-        let of_weights: f64 = weights.iter().map(|weight| weight.to_f64().abs()).sum();
-        self.output_biases[output].to_f64().abs() + of_weights
-    }
-
-    fn is_finite(&self, quantity: Quantity) -> bool {
-        let weights = self.hidden_weights.iter().chain(&self.hidden_biases);
-        let mut all = weights.chain(&self.output_weights).chain(&self.output_biases);
-        // Single precision has a smaller range.
-        all.all(|weight| (weight.to_f64() as f32).is_finite()) && self.centre.iter().all(|&ohm| quantity.accepts(ohm))
-    }
-}
-
-/// The matrix (inputs × channels) by which centred values are multiplied.
-fn scaling_matrix(scaling: &InputScaling) -> Array2<Twofold> {
-    match scaling {
-        InputScaling::Whitening(whitening) => whitening.matrix().mapv(Twofold::from),
-        InputScaling::MinMax(minmax) => {
-            let (varying, ranges) = (minmax.varying(), minmax.middles_and_half_widths());
-            let mut matrix = Array2::from_elem((varying.len(), minmax.channels()), Twofold::ZERO);
-            for (input, &channel) in varying.iter().enumerate() {
-                matrix[[input, channel]] = Twofold::from(1.0) / Twofold::from(ranges[channel].1);
-            }
-            matrix
-        }
-    }
-}
-
-fn value_of(quantity: Quantity, ohm: f64) -> Twofold {
-    match quantity {
-        Quantity::Resistance | Quantity::Raw => Twofold::from(ohm),
-        Quantity::Conductance => Twofold::from(1.0) / Twofold::from(ohm),
-        Quantity::LogResistance => Twofold::from(ohm).ln(),
-    }
+fn is_finite(map: &FoldedMap, quantity: Quantity) -> bool {
+    // Single precision has a smaller range.
+    let mut all = map.layers.iter().flat_map(Layer::values);
+    all.all(|weight| (weight.to_f64() as f32).is_finite()) && map.centre.iter().all(|&ohm| quantity.accepts(ohm))
 }

@@ -1,14 +1,7 @@
 use std::fmt::Write;
 
-use super::{
-    c99,
-    choice::{BundleFormat, BundlePrecision},
-    fixed_point::FixedNetworks,
-    meaning::Meaning,
-    portable::Portable,
-    report::BundleReport,
-};
-use crate::{export::format_number, network::Quantity};
+use super::{draft::Call, fixed_point::FixedNetworks, meaning::Meaning, portable::Portable, report::BundleReport};
+use crate::export::format_number;
 
 /// Writes the README of a bundle: how to call it, and what it is worth.
 pub(super) fn readme(name: &str, portable: &Portable, fixed: Option<&FixedNetworks>, report: &BundleReport) -> String {
@@ -18,7 +11,8 @@ pub(super) fn readme(name: &str, portable: &Portable, fixed: Option<&FixedNetwor
         Meaning::Own { .. } => "own data".to_owned(),
     };
     let mut text = format!(
-        "Network of {subject}, exported by {program} as {format}, {precision}.\n\n",
+        "{decoder} of {subject}, exported by {program} as {format}, {precision}.\n\n",
+        decoder = portable.name,
         program = crate::export::document::PROGRAM,
         format = report.format,
         precision = report.precision,
@@ -41,12 +35,19 @@ pub(super) fn readme(name: &str, portable: &Portable, fixed: Option<&FixedNetwor
     if portable.takes_row() {
         let _ = write!(
             text,
-            " There is one network for each row, from 1 to {}.",
-            portable.networks.len()
+            " There is one {} for each row, from 1 to {}.",
+            portable.decoder,
+            portable.rows()
         );
     }
     text += "\n\nHow to call it\n\n";
-    text += &call(name, portable, fixed, report);
+    let call = Call {
+        name,
+        portable,
+        fixed,
+        precision: report.precision,
+    };
+    text += &(report.format.writer().call)(&call);
     text += "\n\nWhat it is worth\n\n";
     for check in &report.checks {
         let _ = writeln!(
@@ -74,116 +75,11 @@ pub(super) fn readme(name: &str, portable: &Portable, fixed: Option<&FixedNetwor
         Meaning::Own { .. } => "names and units",
     };
     text + &format!(
-        "\ngolden.csv has readings in double precision with the {output}s that the network gives to them, for a test of your\n\
+        "\ngolden.csv has readings in double precision with the {output}s that the {decoder} gives to them, for a test of your\n\
          own: convert the readings as you would your own.\n\
-         metadata.json has {subject}, the errors of the network, the range of the readings in training,\n\
+         metadata.json has {subject}, the errors of the {decoder}, the range of the readings in training,\n\
          the seed and the version of the program.\n",
-        output = meaning.output()
+        output = meaning.output(),
+        decoder = portable.decoder,
     )
-}
-
-fn call(name: &str, portable: &Portable, fixed: Option<&FixedNetworks>, report: &BundleReport) -> String {
-    let takes_row = portable.takes_row();
-    let (channels, outputs, upper) = (portable.channels, portable.outputs, name.to_uppercase());
-    let meaning = &portable.meaning;
-    let (input, output) = (meaning.readings(), meaning.outputs());
-    match report.format {
-        BundleFormat::Onnx => {
-            let kind = if report.precision == BundlePrecision::Single {
-                "float32"
-            } else {
-                "float64"
-            };
-            let row = if takes_row {
-                ", \"row\": np.array([1], np.int64)"
-            } else {
-                ""
-            };
-            format!(
-                "    import numpy as np\n    import onnxruntime\n    \
-                 session = onnxruntime.InferenceSession(\"network.onnx\")\n    \
-                 readings = np.loadtxt(\"golden.csv\", delimiter=\",\", skiprows=1, ndmin=2)[:1, {first}:{end}]\n    \
-                 inputs = {{\"{input}\": readings.astype(np.{kind}){row}}}\n    \
-                 {output} = session.run([\"{output}\"], inputs)[0]\n\n\
-                 {input} is batch x {channels}, {output} batch x {outputs}; where a reading is not a finite \
-                 number{above}{row_text},\nthe {one}s are NaN. A second output, readings_outside, counts the readings \
-                 of each line beyond the range\nseen in training.",
-                above = if portable.quantity == Quantity::Raw {
-                    ""
-                } else {
-                    " above 0"
-                },
-                one = meaning.output(),
-                first = usize::from(takes_row),
-                end = channels + usize::from(takes_row),
-                row_text = if takes_row { ", or the row does not exist" } else { "" },
-            )
-        }
-        BundleFormat::C99 => {
-            let row = if takes_row { "1, " } else { "" };
-            let (reading, readings, coordinate, coordinates) = match (fixed, report.precision) {
-                (Some(fixed), _) => (
-                    "int32_t",
-                    c99::readings(portable, fixed),
-                    "int32_t",
-                    c99::outputs(portable),
-                ),
-                (None, BundlePrecision::Single) => ("float", input, "float", output),
-                (None, _) => ("double", input, "double", output),
-            };
-            let range = if portable.ranges().is_some() {
-                format!(
-                    "\nint outside = {name}_is_out_of_range({row}{readings}); counts the readings beyond the range seen in \
-                     training."
-                )
-            } else {
-                String::new()
-            };
-            let library = if fixed.is_some() { "" } else { " -lm" };
-            let units = match (fixed, meaning) {
-                (Some(_), Meaning::Own { .. }) => format!(
-                    "\nReadings and targets are whole numbers of the units {upper}_READING_UNITS and {upper}_TARGET_UNITS \
-                     in the header:\nround(reading / unit) goes in, and unit * number comes out."
-                ),
-                _ => String::new(),
-            };
-            format!(
-                "    #include \"{name}_decode.h\"\n    \
-                 {reading} {readings}[{upper}_CHANNELS];\n    \
-                 {coordinate} {coordinates}[{upper}_OUTPUTS];\n    \
-                 int status = {name}_decode({row}{readings}, {coordinates});\n\n\
-                 The status is {upper}_OK, or tells what is wrong. Compile {name}_decode.c with your program{libm}. The\n\
-                 self-test compares the golden vectors:\n\n    \
-                 cc -std=c99 -O2 {name}_decode.c {name}_selftest.c -lm -o selftest && ./selftest\n{units}{range}",
-                libm = if library.is_empty() { "" } else { ", and link with -lm" },
-            )
-        }
-        BundleFormat::Matlab => {
-            let row = if takes_row { ", row" } else { "" };
-            format!(
-                "    [{output}, readings_outside] = {name}_decode({input}{row})\n\n\
-                 in MATLAB (from R2016b) or GNU Octave. {input} is samples x {channels}, {output} samples x \
-                 {outputs}{row_text}.",
-                row_text = if takes_row {
-                    ";\nrow has the row of each sample, from 1"
-                } else {
-                    ""
-                },
-            )
-        }
-        BundleFormat::NumPy => {
-            let row = if takes_row { ", row" } else { "" };
-            format!(
-                "    from decode import decode\n    \
-                 {output}, readings_outside = decode({input}{row})\n\n\
-                 {input} is samples x {channels}, {output} samples x {outputs}{row_text}.",
-                row_text = if takes_row {
-                    ";\nrow has the row of each sample, from 1"
-                } else {
-                    ""
-                },
-            )
-        }
-        BundleFormat::Json => String::new(),
-    }
 }

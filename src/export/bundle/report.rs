@@ -2,6 +2,7 @@ use std::path::PathBuf;
 
 use super::{
     choice::{BundleFormat, BundlePrecision},
+    error::BundleError,
     taking::ReadingRounding,
     vectors::Deviation,
 };
@@ -65,6 +66,26 @@ impl BundleCheck {
             deviation: deviation.total,
             of_arithmetic: deviation.of_arithmetic,
         }
+    }
+
+    /// Checks the deviations.
+    ///
+    /// # Errors
+    /// One is above its limit, or not a number.
+    pub(super) fn admit(&self, limits: Deviation) -> Result<(), BundleError> {
+        for (deviation, limit) in [
+            (self.of_arithmetic, limits.of_arithmetic),
+            (self.deviation, limits.total),
+        ] {
+            if deviation.is_nan() || deviation > limit {
+                return Err(BundleError::Deviation {
+                    evaluator: self.evaluator.to_owned(),
+                    deviation,
+                    limit,
+                });
+            }
+        }
+        Ok(())
     }
 }
 

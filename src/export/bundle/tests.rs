@@ -1,5 +1,7 @@
 //! Bundles of small networks of every kind against the networks themselves.
 
+mod decoders;
+
 use std::fs;
 
 use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
@@ -8,7 +10,7 @@ use super::{
     BundleError, BundleFormat, BundlePrecision, FoldError, c99,
     exact::decode_exactly,
     export_bundle,
-    exported_network::ExportedNetwork,
+    exported_decoder::ExportedDecoder,
     fixed_point::{FixedNetworks, HiddenWidth},
     matlab,
     meaning::Meaning,
@@ -20,6 +22,7 @@ use super::{
     weights::{Arithmetic, Weights},
 };
 use crate::{
+    decoupling::Layer,
     evaluation::Channel,
     evaluation::{Run, SimulatedSettings},
     export::NetworkFile,
@@ -49,7 +52,7 @@ fn trained_settings(rows: Rows, quantity: Quantity, scaling: ScalingChoice, nois
 fn run_of(settings: SimulatedSettings) -> NetworkFile {
     let mut run = Run::prepare(settings).unwrap();
     while run.step().is_none() {}
-    NetworkFile::from_run(&run).unwrap()
+    NetworkFile::from_run(&run, None).unwrap()
 }
 
 /// Networks of every quantity, shared and of known rows, with names.
@@ -73,8 +76,8 @@ fn networks() -> Vec<(String, NetworkFile)> {
 #[test]
 fn the_exact_answers_and_the_folded_weights_are_those_of_decode() {
     for (name, file) in networks() {
-        let portable = Portable::of((&file).into()).unwrap();
-        let vectors = Vectors::of((&file).into(), &portable, Taking::Single).unwrap();
+        let portable = Portable::of(&(&file).into()).unwrap();
+        let vectors = Vectors::of(&mut (&file).into(), &portable, Taking::Single).unwrap();
         assert!(
             vectors.program_deviation < 1e-11,
             "{name}: {}",
@@ -82,12 +85,12 @@ fn the_exact_answers_and_the_folded_weights_are_those_of_decode() {
         );
         for (arithmetic, limit) in [
             (Arithmetic::DOUBLE, 1e-12),
-            (Arithmetic::MIXED, 2e-5),
-            (Arithmetic::SINGLE, 2e-3),
+            (Arithmetic::single(1), 2e-5),
+            (Arithmetic::single(0), 2e-3),
         ] {
             let weights = Weights::of(&portable, arithmetic);
             let deviation = vectors
-                .deviation(|vector| weights.decode(vector.network, &vector.taken))
+                .deviation(|vector| weights.decode(vector.row, &vector.taken))
                 .of_arithmetic;
             assert!(deviation < limit, "{name}, {arithmetic:?}: {deviation}");
         }
@@ -98,10 +101,10 @@ fn the_exact_answers_and_the_folded_weights_are_those_of_decode() {
 #[test]
 fn coordinates_that_did_not_vary_come_out_exactly() {
     for (name, file) in networks() {
-        let portable = Portable::of((&file).into()).unwrap();
-        let vectors = Vectors::of((&file).into(), &portable, Taking::Double).unwrap();
+        let portable = Portable::of(&(&file).into()).unwrap();
+        let vectors = Vectors::of(&mut (&file).into(), &portable, Taking::Double).unwrap();
         for vector in vectors.all() {
-            let outputs = file.network.at(vector.network).outputs();
+            let outputs = file.network.at(vector.row).outputs();
             for coordinate in 0..portable.outputs {
                 let (low, high) = outputs.extremes(coordinate);
                 assert!(low < high || vector.answers[coordinate] == low, "{name}: {coordinate}");
@@ -113,13 +116,13 @@ fn coordinates_that_did_not_vary_come_out_exactly() {
 #[test]
 fn graphs_answer_as_the_network_count_readings_outside_and_refuse_what_is_invalid() {
     for (name, file) in networks() {
-        let portable = Portable::of((&file).into()).unwrap();
+        let portable = Portable::of(&(&file).into()).unwrap();
         for (precision, arithmetic, taking, limit) in [
             (BundlePrecision::Double, Arithmetic::DOUBLE, Taking::Double, 1e-12),
-            (BundlePrecision::Single, Arithmetic::MIXED, Taking::Single, 2e-5),
+            (BundlePrecision::Single, Arithmetic::single(1), Taking::Single, 2e-5),
         ] {
-            let vectors = Vectors::of((&file).into(), &portable, taking).unwrap();
-            let metadata = ExportedNetwork::from(&file).metadata(&portable, precision);
+            let vectors = Vectors::of(&mut (&file).into(), &portable, taking).unwrap();
+            let metadata = ExportedDecoder::from(&file).metadata(&portable, precision);
             let bytes = onnx::write(&portable, &Weights::of(&portable, arithmetic), &metadata, &[]);
             let graph = onnx::OnnxGraph::read(&bytes).unwrap();
             let mut answers = graph.decode(vectors.all()).unwrap().answers.into_iter();
@@ -130,13 +133,13 @@ fn graphs_answer_as_the_network_count_readings_outside_and_refuse_what_is_invali
             odd[0].readings[2] = -1.0;
             odd[1].readings[2] = f64::INFINITY;
             odd[2].readings[2] *= 100.0;
-            odd[3].network = 7;
+            odd[3].row = 7;
             let answers = graph.decode(&odd).unwrap();
             let are_valid: Vec<_> = (answers.answers.iter())
                 .map(|row| row.iter().all(|mm| !mm.is_nan()))
                 .collect();
             assert_eq!(are_valid, [false, false, true, !portable.takes_row()], "{name}");
-            let inputs = file.network.at(odd[2].network).inputs();
+            let inputs = file.network.at(odd[2].row).inputs();
             let outside = inputs
                 .range()
                 .unwrap()
@@ -150,11 +153,15 @@ fn graphs_answer_as_the_network_count_readings_outside_and_refuse_what_is_invali
 #[test]
 fn weights_for_numpy_and_matlab_come_back_bit_for_bit() {
     for (name, file) in networks() {
-        let portable = Portable::of((&file).into()).unwrap();
-        for arithmetic in [Arithmetic::DOUBLE, Arithmetic::MIXED, Arithmetic::SINGLE] {
+        let portable = Portable::of(&(&file).into()).unwrap();
+        for arithmetic in [Arithmetic::DOUBLE, Arithmetic::single(1), Arithmetic::single(0)] {
             let weights = Weights::of(&portable, arithmetic);
             let bytes = numpy::write_weights(&portable, &weights);
-            assert_eq!(numpy::read_weights(&bytes, &portable).unwrap(), weights, "{name}");
+            assert_eq!(
+                numpy::read_weights(&bytes, &portable, arithmetic).unwrap(),
+                weights,
+                "{name}"
+            );
         }
         let weights = Weights::of(&portable, Arithmetic::DOUBLE);
         let text = matlab::write("decode", &portable, &weights);
@@ -189,7 +196,7 @@ fn whole_numbers_stay_within_their_bound_inside_the_range_and_saturate_beyond_it
     let mut rng = ChaCha8Rng::seed_from_u64(0);
     let arrays = networks()
         .into_iter()
-        .map(|(name, file)| (name, Portable::of((&file).into()).unwrap()));
+        .map(|(name, file)| (name, Portable::of(&(&file).into()).unwrap()));
     let mut all: Vec<(String, Portable)> = arrays.collect();
     let own = all.iter().filter(|(_, array)| array.quantity == Quantity::Resistance);
     let own: Vec<_> = own
@@ -200,9 +207,8 @@ fn whole_numbers_stay_within_their_bound_inside_the_range_and_saturate_beyond_it
         let fixed = FixedNetworks::of(&portable).unwrap();
         let bound_mm = fixed.bounds.iter().fold(0.0_f64, |largest, &bound| largest.max(bound));
         assert!(bound_mm < 0.02, "{name}: {bound_mm}");
-        for index in 0..portable.networks.len() {
-            let network = &portable.networks[index];
-            let limits = &network.range.as_ref().unwrap().limits;
+        for (index, map) in portable.maps.iter().enumerate() {
+            let limits = &portable.ranges[index].as_ref().unwrap().limits;
             let mut largest_mm = 0.0_f64;
             for _ in 0..300 {
                 let drawn = limits
@@ -210,7 +216,7 @@ fn whole_numbers_stay_within_their_bound_inside_the_range_and_saturate_beyond_it
                     .map(|&(low, high)| rng.random_range(low..high))
                     .enumerate();
                 let readings: Vec<f64> = drawn.map(|(channel, ohm)| fixed.representable(channel, ohm)).collect();
-                let exact = decode_exactly(&portable, network, &readings).answers;
+                let exact = decode_exactly(&portable, map, &readings).answers;
                 let ours = fixed.decode(index, &readings).unwrap();
                 for (nm, mm) in ours.iter().zip(exact) {
                     largest_mm = largest_mm.max((f64::from(*nm) * 1e-6 - mm).abs());
@@ -237,7 +243,7 @@ fn whole_numbers_stay_within_their_bound_inside_the_range_and_saturate_beyond_it
 #[test]
 fn networks_whose_products_cancel_have_wider_hidden_weights() {
     let file = trained(Rows::All, Quantity::LogResistance, ScalingChoice::Whitening, 1e-5);
-    let fixed = FixedNetworks::of(&Portable::of((&file).into()).unwrap()).unwrap();
+    let fixed = FixedNetworks::of(&Portable::of(&(&file).into()).unwrap()).unwrap();
     assert_eq!(fixed.hidden_width, HiddenWidth::TwentyFour);
 }
 
@@ -348,16 +354,16 @@ fn single_precision_is_judged_by_the_readings_that_a_caller_has() {
     let mut refused = 0;
     for (index, noise) in [0.0, 1e-6, 1e-4, 1e-2].into_iter().enumerate() {
         let file = trained(Rows::Known, Quantity::Conductance, ScalingChoice::Whitening, noise);
-        let portable = Portable::of((&file).into()).unwrap();
-        let vectors = Vectors::of((&file).into(), &portable, Taking::Single).unwrap();
-        let weights = Weights::of(&portable, Arithmetic::MIXED);
+        let portable = Portable::of(&(&file).into()).unwrap();
+        let vectors = Vectors::of(&mut (&file).into(), &portable, Taking::Single).unwrap();
+        let weights = Weights::of(&portable, Arithmetic::single(1));
         let mut largest = 0.0_f64;
         for vector in vectors.all() {
             let readings = ndarray::ArrayView2::from_shape((1, vector.readings.len()), &vector.readings).unwrap();
             assert!(vector.readings.iter().any(|&ohm| f64::from(ohm as f32) != ohm));
-            let truth = file.network.at(vector.network).decouple(readings);
+            let truth = file.network.at(vector.row).decouple(readings);
             let rounded: Vec<f64> = vector.readings.iter().map(|&ohm| f64::from(ohm as f32)).collect();
-            let answers = weights.decode(vector.network, &rounded);
+            let answers = weights.decode(vector.row, &rounded);
             for ((answer, truth), scale) in answers.iter().zip(&truth).zip(&portable.scales) {
                 largest = largest.max((answer - truth).abs() / scale);
             }
@@ -470,21 +476,21 @@ fn answers_in_c(folder: &std::path::Path, name: &str, readings: &[Vec<f64>]) -> 
 fn c_answers_extreme_readings_with_numbers_or_not_at_all() {
     let folder = tempfile::tempdir().unwrap();
     let file = trained(Rows::All, Quantity::Resistance, ScalingChoice::MinMax, 1e-3);
-    let mut own = own_data(&Portable::of((&file).into()).unwrap());
+    let mut own = own_data(&Portable::of(&(&file).into()).unwrap());
     // Limits beyond the largest number of single precision.
-    for limits in &mut own.networks[0].range.as_mut().unwrap().limits {
+    for limits in &mut own.ranges[0].as_mut().unwrap().limits {
         *limits = (-3.9e38, 3.9e38);
     }
-    let vectors = Vectors::of((&file).into(), &own, Taking::Single).unwrap();
+    let vectors = Vectors::of(&mut (&file).into(), &own, Taking::Single).unwrap();
     // Weights that take such readings beyond it.
-    own.networks[0]
-        .hidden_weights
-        .mapv_inplace(|weight| weight * Twofold::from(1e3));
+    if let Layer::Affine(hidden) = &mut own.maps[0].layers[0] {
+        hidden.weights.mapv_inplace(|weight| weight * Twofold::from(1e3));
+    }
     let limits = Deviation {
         total: 1.0,
         of_arithmetic: 1.0,
     };
-    let weights = Weights::of(&own, Arithmetic::SINGLE);
+    let weights = Weights::of(&own, Arithmetic::single(0));
     for (name, text) in c99::write_floating("odd", &own, &weights, vectors.golden(), limits, &[]) {
         assert!(!text.contains("inf"), "{name}");
         fs::write(folder.path().join(name), text).unwrap();

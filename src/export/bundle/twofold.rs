@@ -38,9 +38,36 @@ impl Twofold {
     /// Natural logarithm, by one Newton step on eʸ = x from the logarithm in double precision.
     pub(super) fn ln(self) -> Self {
         let near = libm::log(self.high);
-        let excess = self * exp(-Self::from(near)) - Self::from(1.0);
+        let excess = self * (-Self::from(near)).exp() - Self::from(1.0);
         // ln(1 + e) = e − e²/2 + …, and |e| is some 1e-16.
         Self::from(near) + excess - excess * excess * Self::from(0.5)
+    }
+
+    /// e to this power, up to some 700; 0 where that is below the smallest normal number.
+    pub(super) fn exp(self) -> Self {
+        /// r is divided by 2⁶ and the power squared as often.
+        const HALVINGS: i32 = 6;
+        if self.high < -745.0 {
+            return Self::ZERO;
+        }
+        let doublings = (self.high / LN_2.high).round();
+        let r = (self - LN_2 * Self::from(doublings)) * Self::from(0.5_f64.powi(HALVINGS));
+        let (mut term, mut less_one) = (r, r);
+        // |r| < 0.0055: the term after these is below 1e-33.
+        for n in 2..=12 {
+            term = term * r / Self::from(f64::from(n));
+            less_one = less_one + term;
+        }
+        // (1 + e)² − 1 = 2e + e², which loses fewer digits than squaring 1 + e.
+        for _ in 0..HALVINGS {
+            less_one = less_one * Self::from(2.0) + less_one * less_one;
+        }
+        let power = less_one + Self::from(1.0);
+        let scale = 2.0_f64.powi(doublings as i32);
+        Self {
+            high: power.high * scale,
+            low: power.low * scale,
+        }
     }
 
     /// Hyperbolic tangent, with the error of one in double precision (some 1e-16).
@@ -48,30 +75,6 @@ impl Twofold {
         let near = libm::tanh(self.high);
         let slope = (1.0 - near) * (1.0 + near);
         Self::of_ordered(near, self.low * slope)
-    }
-}
-
-/// e to the power of x, for |x| up to some 700.
-fn exp(x: Twofold) -> Twofold {
-    /// r is divided by 2⁶ and the power squared as often.
-    const HALVINGS: i32 = 6;
-    let doublings = (x.high / LN_2.high).round();
-    let r = (x - LN_2 * Twofold::from(doublings)) * Twofold::from(0.5_f64.powi(HALVINGS));
-    let (mut term, mut less_one) = (r, r);
-    // |r| < 0.0055: the term after these is below 1e-33.
-    for n in 2..=12 {
-        term = term * r / Twofold::from(f64::from(n));
-        less_one = less_one + term;
-    }
-    // (1 + e)² − 1 = 2e + e², which loses fewer digits than squaring 1 + e.
-    for _ in 0..HALVINGS {
-        less_one = less_one * Twofold::from(2.0) + less_one * less_one;
-    }
-    let power = less_one + Twofold::from(1.0);
-    let scale = 2.0_f64.powi(doublings as i32);
-    Twofold {
-        high: power.high * scale,
-        low: power.low * scale,
     }
 }
 

@@ -1,16 +1,18 @@
 use super::{
     error::BundleError,
     exact::{Growth, decode_exactly},
-    exported_network::ExportedNetwork,
+    exported_decoder::{Drawn, ExportedDecoder},
     meaning::Meaning,
     portable::Portable,
+    report::VectorCounts,
     taking::{ReadingRounding, Taking},
 };
+use crate::{decoupling::RowProblemDescription, evaluation::RunError};
 
-/// Readings with the answers that the network gives to them.
+/// Readings with the answers that the decoder gives to them.
 #[derive(Clone, Debug)]
 pub(super) struct Vectors {
-    /// The golden vectors first: of each network the smallest, middle and largest readings of its training range, and a
+    /// The golden vectors first: of each row the smallest, middle and largest readings of its training range, and a
     /// few of those drawn.
     all: Vec<Vector>,
     golden: usize,
@@ -29,8 +31,8 @@ pub(super) struct Vectors {
 /// Readings of a row with the answer.
 #[derive(Clone, Debug)]
 pub(super) struct Vector {
-    /// Index of the network, and so of the row-wire where that is an argument.
-    pub(super) network: usize,
+    /// Index of the row-wire where that is an argument, and 0 otherwise.
+    pub(super) row: usize,
     /// As a caller has them, in double precision.
     pub(super) readings: Vec<f64>,
     /// The readings in the form that the bundle takes.
@@ -44,9 +46,9 @@ pub(super) struct Vector {
 /// Largest differences of an evaluation, relative to the scales of the outputs. NaN if an answer is NaN.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Deviation {
-    /// From the answers of the network to the readings that a caller has.
+    /// From the answers of the decoder to the readings that a caller has.
     pub(super) total: f64,
-    /// From the answers of the network to the readings as taken: by the arithmetic alone.
+    /// From the answers of the decoder to the readings as taken: by the arithmetic alone.
     pub(super) of_arithmetic: f64,
 }
 
@@ -56,19 +58,27 @@ impl Vectors {
     /// # Errors
     /// No readings could be drawn, or the bundle cannot take one of them.
     pub(super) fn of(
-        exported: ExportedNetwork<'_>,
+        exported: &mut ExportedDecoder<'_>,
         portable: &Portable,
         taking: Taking<'_>,
     ) -> Result<Self, BundleError> {
         let mut readings = Vec::new();
-        for (index, network) in portable.networks.iter().enumerate() {
-            let Some(range) = &network.range else { continue };
+        let ranges = portable
+            .ranges
+            .iter()
+            .enumerate()
+            .filter(|_| portable.equations.is_none());
+        for (index, range) in ranges {
+            let Some(range) = range else { continue };
             for place in [0.0, 0.5, 1.0] {
                 let between = |&(low, high): &(f64, f64)| if place == 1.0 { high } else { low + place * (high - low) };
                 readings.push((index, range.extremes.iter().map(between).collect::<Vec<_>>()));
             }
         }
         let (golden, drawn) = exported.draw(portable)?;
+        if let Some(equations) = &portable.equations {
+            readings.extend(of_extremes(equations, portable.takes_row())?);
+        }
         let mut vectors = Self {
             all: Vec::new(),
             golden: readings.len() + golden,
@@ -92,30 +102,36 @@ impl Vectors {
             let errors: Vec<f64> = channels
                 .map(|(channel, &reading)| taking.error(channel, reading))
                 .collect();
-            let network = &portable.networks[index];
-            let exact = decode_exactly(portable, network, &readings);
+            let of_program = exported.decode(index, &readings)?;
+            if portable.equations.is_some() {
+                // Equations are their own exact answer, to within what counts as their solution.
+                vectors.all.push(Vector {
+                    row: index,
+                    taken,
+                    answers_to_taken: of_program.clone(),
+                    answers: of_program,
+                    readings,
+                });
+                continue;
+            }
+            let map = &portable.maps[index];
+            let exact = decode_exactly(portable, map, &readings);
             let of_taken = if taken == readings {
                 exact.clone()
             } else {
-                decode_exactly(portable, network, &taken)
+                decode_exactly(portable, map, &taken)
             };
-            vectors.growth = vectors.growth.largest(of_taken.growth);
-            let bound = exact.change_by(portable, network, &readings, &errors);
-            if let Some(range) = &network.range {
+            vectors.growth = vectors.growth.largest(&of_taken.growth);
+            let bound = exact.change_by(portable, map, &readings, &errors);
+            if let Some(range) = &portable.ranges[index] {
                 let errors: Vec<f64> = (range.limits.iter().enumerate())
                     .map(|(channel, &(low, high))| taking.error(channel, 0.5 * (high - low)))
                     .collect();
-                let bound = exact.change_by(portable, network, &readings, &errors);
+                let bound = exact.change_by(portable, map, &readings, &errors);
                 vectors.centred_bound = larger(vectors.centred_bound, bound);
             } else {
                 vectors.centred_bound = f64::INFINITY;
             }
-            let row = ndarray::ArrayView2::from_shape((1, readings.len()), &readings);
-            let of_program = exported
-                .networks()
-                .at(index)
-                .decouple(row.expect("one row of readings"));
-            let of_program = of_program.into_raw_vec_and_offset().0;
             vectors.rounding = ReadingRounding {
                 largest: larger(
                     vectors.rounding.largest,
@@ -128,12 +144,22 @@ impl Vectors {
                 relative(&of_program, &exact.answers, &vectors.scales),
             );
             vectors.all.push(Vector {
-                network: index,
+                row: index,
                 readings,
                 taken,
                 answers: exact.answers,
                 answers_to_taken: of_taken.answers,
             });
+        }
+        if portable
+            .equations
+            .as_ref()
+            .is_some_and(|equations| equations.seeks_solution)
+        {
+            let (decoder, open, rows) = (exported.kind(), exported.take_open_rows(), vectors.all.len());
+            if open > 0 {
+                return Err(BundleError::OpenRows { decoder, open, rows });
+            }
         }
         Ok(vectors)
     }
@@ -141,7 +167,7 @@ impl Vectors {
     /// Leaves out the vectors with a reading that counts as outside the range of training.
     pub(super) fn inside(mut self, portable: &Portable) -> Self {
         let is_inside = |vector: &Vector| {
-            portable.networks[vector.network].range.as_ref().is_none_or(|range| {
+            portable.ranges[vector.row].as_ref().is_none_or(|range| {
                 let mut readings = vector.readings.iter().zip(&range.limits);
                 readings.all(|(ohm, (low, high))| (low..=high).contains(&ohm))
             })
@@ -168,9 +194,17 @@ impl Vectors {
                 .to_owned()
         } else {
             format!(
-                "give --precision f64, or {} for a network that amplifies less",
-                portable.meaning.smaller_weights()
+                "give --precision f64, or {} for one that amplifies less",
+                portable.smaller_weights()
             )
+        }
+    }
+
+    /// Numbers of vectors.
+    pub(super) fn counts(&self) -> VectorCounts {
+        VectorCounts {
+            verified: self.all.len(),
+            golden: self.golden,
         }
     }
 
@@ -196,6 +230,22 @@ impl Vectors {
             }
         })
     }
+}
+
+/// Readings of every row-wire at rest and fully pressed.
+fn of_extremes(equations: &RowProblemDescription, takes_row: bool) -> Result<Drawn, BundleError> {
+    let model = &equations.model;
+    let mut readings = Drawn::new();
+    for (index, &row) in equations.rows.iter().enumerate() {
+        // The unknowns end with z, the stroke of which is that of all nodes.
+        for pressed_mm in equations.ranges.last().map_or([0.0, 0.0], |&(low, high)| [low, high]) {
+            let displacements = vec![glam::DVec3::Z * pressed_mm; model.scale.nodes_per_row()];
+            let of_row = model.row_resistances(row, &displacements);
+            let of_row = of_row.map_err(|error| Box::new(RunError::from(error)))?;
+            readings.push((if takes_row { index } else { 0 }, of_row));
+        }
+    }
+    Ok(readings)
 }
 
 /// Largest difference of `answers` from those `expected`, each relative to its scale. NaN if an answer is NaN.

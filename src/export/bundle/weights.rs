@@ -1,5 +1,10 @@
-use super::portable::{Portable, PortableNetwork};
-use crate::network::Quantity;
+use ndarray::ArrayView1;
+
+use super::{folding::FoldedMap, portable::Portable};
+use crate::{
+    decoupling::{AffineLayer, Layer},
+    network::Quantity,
+};
 
 /// Digits of a floating-point number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -11,9 +16,9 @@ pub(super) enum Digits {
 /// Digits in which a bundle of floating-point numbers decodes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Arithmetic {
-    /// Of the changes of the readings and the sums of the hidden nodes.
-    pub(super) hidden: Digits,
-    /// Of the readings, and of everything after the hidden sums.
+    /// Number of first layers that are computed in double precision, with the changes of the readings.
+    pub(super) wide_layers: usize,
+    /// Of the readings, and of everything after these layers.
     pub(super) rest: Digits,
 }
 
@@ -22,19 +27,14 @@ pub(super) struct Arithmetic {
 pub(super) struct Weights {
     pub(super) quantity: Quantity,
     pub(super) arithmetic: Arithmetic,
-    pub(super) networks: Vec<RoundedNetwork>,
+    pub(super) maps: Vec<RoundedMap>,
 }
 
-/// The weights of one network, row by row.
+/// The numbers of one map.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct RoundedNetwork {
+pub(super) struct RoundedMap {
     pub(super) centre: Vec<f64>,
-    /// Channels × hidden nodes.
-    pub(super) hidden_weights: Vec<f64>,
-    pub(super) hidden_biases: Vec<f64>,
-    /// Hidden nodes × outputs.
-    pub(super) output_weights: Vec<f64>,
-    pub(super) output_biases: Vec<f64>,
+    pub(super) layers: Vec<Layer<f64>>,
 }
 
 impl Digits {
@@ -58,56 +58,64 @@ impl Digits {
 
 impl Arithmetic {
     pub(super) const DOUBLE: Self = Self {
-        hidden: Digits::Double,
+        wide_layers: 0,
         rest: Digits::Double,
     };
-    pub(super) const SINGLE: Self = Self {
-        hidden: Digits::Single,
-        rest: Digits::Single,
-    };
-    /// Single precision, with the hidden sums in double.
-    pub(super) const MIXED: Self = Self {
-        hidden: Digits::Double,
-        rest: Digits::Single,
-    };
+
+    /// Single precision, with this number of first layers in double.
+    pub(super) fn single(wide_layers: usize) -> Self {
+        Self {
+            wide_layers,
+            rest: Digits::Single,
+        }
+    }
+
+    /// Digits of a layer, by its index; those of the changes are those of the first.
+    pub(super) fn of_layer(self, index: usize) -> Digits {
+        if index < self.wide_layers {
+            Digits::Double
+        } else {
+            self.rest
+        }
+    }
 }
 
 impl Weights {
     /// Rounds the weights of `portable`.
     pub(super) fn of(portable: &Portable, arithmetic: Arithmetic) -> Self {
-        let Arithmetic { hidden, rest } = arithmetic;
-        let network = |network: &PortableNetwork| RoundedNetwork {
-            centre: network.centre.clone(),
-            hidden_weights: network
-                .hidden_weights
-                .iter()
-                .map(|w| hidden.round(w.to_f64()))
-                .collect(),
-            hidden_biases: network.hidden_biases.iter().map(|w| hidden.round(w.to_f64())).collect(),
-            output_weights: network.output_weights.iter().map(|w| rest.round(w.to_f64())).collect(),
-            output_biases: network.output_biases.iter().map(|w| rest.round(w.to_f64())).collect(),
+        let map = |map: &FoldedMap| {
+            let layers = map.layers.iter().enumerate().map(|(index, layer)| {
+                let digits = arithmetic.of_layer(index);
+                let mut values = layer.values().map(|value| digits.round(value.to_f64()));
+                layer.with_values(&mut values).expect("as many values as the layer has")
+            });
+            RoundedMap {
+                centre: map.centre.clone(),
+                layers: layers.collect(),
+            }
         };
         Self {
             quantity: portable.quantity,
             arithmetic,
-            networks: portable.networks.iter().map(network).collect(),
+            maps: portable.maps.iter().map(map).collect(),
         }
     }
 
     /// Decodes a row in the arithmetic of the bundle.
-    pub(super) fn decode(&self, network: usize, readings: &[f64]) -> Vec<f64> {
-        let Arithmetic { hidden: digits, rest } = self.arithmetic;
-        let network = &self.networks[network];
-        let readings = readings.iter().zip(&network.centre);
-        let changes: Vec<_> = readings
-            .map(|(&ohm, &centre)| change(self.quantity, digits, rest.round(ohm), centre))
-            .collect();
-        let sums = affine(digits, &changes, &network.hidden_weights, &network.hidden_biases);
-        let activations: Vec<_> = sums
-            .iter()
-            .map(|&sum| rest.round(libm::tanh(rest.round(sum))))
-            .collect();
-        affine(rest, &activations, &network.output_weights, &network.output_biases)
+    pub(super) fn decode(&self, map: usize, readings: &[f64]) -> Vec<f64> {
+        let (arithmetic, map) = (self.arithmetic, &self.maps[map]);
+        let readings = readings.iter().zip(&map.centre);
+        let changes = readings.map(|(&ohm, &centre)| {
+            let ohm = arithmetic.rest.round(ohm);
+            change(self.quantity, arithmetic.of_layer(0), ohm, centre)
+        });
+        let mut values: Vec<f64> = changes.collect();
+        for (index, layer) in map.layers.iter().enumerate() {
+            let digits = arithmetic.of_layer(index);
+            values.iter_mut().for_each(|value| *value = digits.round(*value));
+            values = apply(layer, digits, values);
+        }
+        values.into_iter().map(|value| arithmetic.rest.round(value)).collect()
     }
 }
 
@@ -120,11 +128,51 @@ fn change(quantity: Quantity, digits: Digits, ohm: f64, centre: f64) -> f64 {
     }
 }
 
-/// values · weights + biases, where the weights are stored row by row.
-fn affine(digits: Digits, values: &[f64], weights: &[f64], biases: &[f64]) -> Vec<f64> {
-    let mut sums = biases.to_vec();
-    // Without biases there are no weights either.
-    for (value, row) in values.iter().zip(weights.chunks_exact(biases.len().max(1))) {
+fn apply(layer: &Layer<f64>, digits: Digits, values: Vec<f64>) -> Vec<f64> {
+    match layer {
+        Layer::Affine(affine) => sums(digits, &values, affine),
+        Layer::Tanh => values
+            .into_iter()
+            .map(|value| digits.round(libm::tanh(value)))
+            .collect(),
+        Layer::Gaussians { centres } => {
+            let gaussian = |centre: ArrayView1<'_, f64>| {
+                let square = values.iter().zip(centre).fold(0.0, |sum, (value, centre)| {
+                    let apart = digits.round(value - centre);
+                    digits.round(sum + digits.round(apart * apart))
+                });
+                digits.round(libm::exp(-square))
+            };
+            centres.columns().into_iter().map(gaussian).collect()
+        }
+        Layer::Rules {
+            memberships,
+            consequents,
+        } => {
+            let logarithms = sums(digits, &values, memberships);
+            let largest = logarithms.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+            let strengths: Vec<f64> = logarithms
+                .iter()
+                .map(|logarithm| digits.round(libm::exp(digits.round(logarithm - largest))))
+                .collect();
+            let total = strengths.iter().fold(0.0, |sum, strength| digits.round(sum + strength));
+            let of_rules = sums(digits, &values, consequents);
+            let mut blended = vec![0.0; consequents.outputs() / strengths.len()];
+            for (strength, answers) in strengths.iter().zip(of_rules.chunks_exact(blended.len().max(1))) {
+                let share = digits.round(strength / total);
+                for (sum, answer) in blended.iter_mut().zip(answers) {
+                    *sum = digits.round(*sum + digits.round(share * answer));
+                }
+            }
+            blended
+        }
+    }
+}
+
+/// values · weights + biases.
+fn sums(digits: Digits, values: &[f64], affine: &AffineLayer<f64>) -> Vec<f64> {
+    let mut sums = affine.biases.clone();
+    for (value, row) in values.iter().zip(affine.weights.rows()) {
         for (sum, weight) in sums.iter_mut().zip(row) {
             *sum = digits.round(*sum + digits.round(value * weight));
         }

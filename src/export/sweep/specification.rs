@@ -32,7 +32,7 @@ pub(crate) fn sweep_specification(experiment: &Experiment, plan: Option<&Plan>) 
         return Err(SpecificationGap::CrossValidation);
     }
     if let Some(settings) = experiment.base.simulated() {
-        train_command(&settings).map_err(SpecificationGap::Setting)?;
+        train_command(&settings.into(), None).map_err(SpecificationGap::Setting)?;
     }
     let mut train = train_options(&experiment.base, &[DecoderKind::Network]);
     let mut axes = Map::new();

@@ -1,6 +1,11 @@
 use std::io::{self, Write};
 
-use crate::{dataset::clean_name::inert, export::format_number};
+use serde::ser::{Serialize, SerializeMap as _, SerializeSeq as _, Serializer};
+
+use crate::{
+    dataset::clean_name::inert,
+    export::{format_decimals, format_number},
+};
 
 /// Contents of a table, independent of the form in which it is written.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -20,6 +25,8 @@ pub struct TableColumn {
     pub heading: String,
     /// Unit of its numbers; empty where they have none.
     pub unit: &'static str,
+    /// Definition of its numbers, shown as a tooltip; empty where the heading says it.
+    pub meaning: &'static str,
 }
 
 impl TableColumn {
@@ -29,7 +36,13 @@ impl TableColumn {
             field: field.into(),
             heading: heading.into(),
             unit,
+            meaning: "",
         }
+    }
+
+    /// With this definition.
+    pub fn meaning(self, meaning: &'static str) -> Self {
+        Self { meaning, ..self }
     }
 
     /// A column of a table that is only written for programs: its heading is the name of the field.
@@ -57,15 +70,24 @@ pub enum Cell {
     Count(u64),
     /// A number; `None` where there is none.
     Number(Option<f64>),
+    /// A number that readers see with this many decimals, as those of R²; `None` where there is none.
+    Decimals(Option<f64>, usize),
 }
 
 impl Cell {
-    /// Returns the cell for readers: numbers with three significant digits, a dash where there is none.
+    /// A coefficient of determination, with four decimals for readers: near 1 its distance from 1 matters.
+    pub fn r2(value: impl Into<Option<f64>>) -> Self {
+        Self::Decimals(value.into(), 4)
+    }
+
+    /// Returns the cell for readers: numbers with three significant digits, or with their decimals; a dash where there is
+    /// none.
     pub fn rounded(&self) -> String {
         match self {
             Self::Text(text) => text.clone(),
             Self::Count(count) => count.to_string(),
             Self::Number(number) => format_number(*number),
+            Self::Decimals(number, decimals) => format_decimals(*number, *decimals),
         }
     }
 
@@ -73,7 +95,7 @@ impl Cell {
     pub(super) fn for_spreadsheet(&self) -> String {
         match self {
             Self::Text(text) => inert(text),
-            Self::Count(_) | Self::Number(_) => self.exact(),
+            Self::Count(_) | Self::Number(_) | Self::Decimals(..) => self.exact(),
         }
     }
 
@@ -82,8 +104,10 @@ impl Cell {
         match self {
             Self::Text(text) => text.clone(),
             Self::Count(count) => count.to_string(),
-            Self::Number(Some(number)) if number.is_finite() => format!("{number:?}"),
-            Self::Number(_) => String::new(),
+            Self::Number(number) | Self::Decimals(number, _) => {
+                let number = number.filter(|number| number.is_finite());
+                number.map_or_else(String::new, |number| format!("{number:?}"))
+            }
         }
     }
 }
@@ -119,6 +143,17 @@ impl From<Option<f64>> for Cell {
 }
 
 impl Table {
+    /// A table for readers, with these headings.
+    pub fn of_headings<H: Into<String>>(
+        headings: impl IntoIterator<Item = H>,
+        rows: impl IntoIterator<Item = Vec<Cell>>,
+    ) -> Self {
+        Self {
+            columns: headings.into_iter().map(TableColumn::field).collect(),
+            rows: rows.into_iter().collect(),
+        }
+    }
+
     /// Returns true if the column has nothing but numbers.
     pub fn is_numeric(&self, column: usize) -> bool {
         let mut cells = self.rows.iter().filter_map(|row| row.get(column));
@@ -148,6 +183,48 @@ impl Table {
             writeln!(writer, "{}", cells.collect::<Vec<_>>().join(","))?;
         }
         Ok(())
+    }
+}
+
+/// JSON: an array of the rows, each an object whose keys are the fields of the columns. Numbers keep every digit; where there
+/// is none the value is `null`.
+impl Serialize for Table {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let mut rows = serializer.serialize_seq(Some(self.rows.len()))?;
+        for cells in &self.rows {
+            rows.serialize_element(&Row {
+                columns: &self.columns,
+                cells,
+            })?;
+        }
+        rows.end()
+    }
+}
+
+struct Row<'a> {
+    columns: &'a [TableColumn],
+    cells: &'a [Cell],
+}
+
+impl Serialize for Row<'_> {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let mut fields = serializer.serialize_map(Some(self.cells.len()))?;
+        for (column, cell) in self.columns.iter().zip(self.cells) {
+            fields.serialize_entry(&column.field, cell)?;
+        }
+        fields.end()
+    }
+}
+
+impl Serialize for Cell {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        match self {
+            Self::Text(text) => serializer.serialize_str(text),
+            Self::Count(count) => serializer.serialize_u64(*count),
+            Self::Number(number) | Self::Decimals(number, _) => {
+                number.filter(|number| number.is_finite()).serialize(serializer)
+            }
+        }
     }
 }
 
@@ -182,6 +259,25 @@ mod tests {
             assert_eq!(&record[0], awkward);
             assert_eq!(record[1].parse::<f64>().unwrap().to_bits(), number.to_bits());
         }
+    }
+
+    #[test]
+    fn json_is_an_array_of_objects_by_field_in_the_order_of_the_columns() {
+        let table = Table {
+            columns: vec![
+                TableColumn::new("name", "Name", ""),
+                TableColumn::new("z_percent", "Z", "%"),
+                TableColumn::new("r2", "R²", ""),
+                TableColumn::new("epochs", "epochs", ""),
+            ],
+            rows: vec![
+                vec!["a \"b\"".into(), (0.1 + 0.2).into(), Cell::r2(0.99999), 3_usize.into()],
+                vec!["=1".into(), f64::NAN.into(), Cell::r2(None), 0_usize.into()],
+            ],
+        };
+        let expected = "[{\"name\":\"a \\\"b\\\"\",\"z_percent\":0.30000000000000004,\"r2\":0.99999,\"epochs\":3},\
+                        {\"name\":\"=1\",\"z_percent\":null,\"r2\":null,\"epochs\":0}]";
+        assert_eq!(serde_json::to_string(&table).unwrap(), expected);
     }
 
     #[test]

@@ -22,7 +22,9 @@ pub(super) fn latex(table: &Table) -> String {
     text += "\\midrule\n";
     for row in &table.rows {
         let cells = row.iter().enumerate().map(|(column, cell)| match cell {
-            Cell::Number(number) if table.is_numeric(column) && !number.is_some_and(f64::is_finite) => {
+            Cell::Number(number) | Cell::Decimals(number, _)
+                if table.is_numeric(column) && !number.is_some_and(f64::is_finite) =>
+            {
                 format!("{{{}}}", cell.rounded())
             }
             _ => escaped(&cell.rounded()),

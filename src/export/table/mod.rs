@@ -1,6 +1,5 @@
 //! Tables: described once, and written as CSV for other programs or as text for papers and spreadsheets.
 
-mod aligned;
 mod description;
 mod latex;
 mod text;

@@ -1,6 +1,6 @@
 use std::fmt;
 
-use super::{Cell, Table, latex::latex};
+use super::{Cell, Table, TableColumn, latex::latex};
 use crate::dataset::clean_name::inert;
 
 /// Form in which a table is copied into other documents.
@@ -12,11 +12,13 @@ pub enum TableForm {
     Latex,
     /// Columns separated by tabs, numbers with every digit: for spreadsheets.
     TabSeparated,
+    /// An array of objects by the names of the fields, numbers with every digit: for programs.
+    Json,
 }
 
 impl TableForm {
     /// All forms, in the order offered to the user.
-    pub const ALL: [Self; 3] = [Self::Markdown, Self::Latex, Self::TabSeparated];
+    pub const ALL: [Self; 4] = [Self::Markdown, Self::Latex, Self::TabSeparated, Self::Json];
 }
 
 impl fmt::Display for TableForm {
@@ -25,6 +27,7 @@ impl fmt::Display for TableForm {
             Self::Markdown => "Markdown",
             Self::Latex => "LaTeX",
             Self::TabSeparated => "tab-separated",
+            Self::Json => "JSON",
         })
     }
 }
@@ -36,7 +39,42 @@ impl Table {
             TableForm::Markdown => self.markdown(),
             TableForm::Latex => latex(self),
             TableForm::TabSeparated => self.tab_separated(),
+            TableForm::Json => self.json(),
         }
+    }
+
+    /// Returns the table for a terminal: numbers rounded for readers, columns apart by two spaces. Figures are aligned on the
+    /// right, also those with a unit or an interval; other texts on the left.
+    pub fn aligned(&self) -> String {
+        let headings: Vec<String> = self.columns.iter().map(TableColumn::title).collect();
+        let rows = self.rows.iter().map(|row| row.iter().map(Cell::rounded).collect());
+        let lines: Vec<Vec<String>> = std::iter::once(headings).chain(rows).collect();
+        let width = |column: usize| {
+            let cells = lines.iter().filter_map(|line| line.get(column));
+            cells.map(|cell| cell.chars().count()).max().unwrap_or(0)
+        };
+        let widths: Vec<usize> = (0..self.columns.len()).map(width).collect();
+        let is_figure =
+            |text: &String| text.is_empty() || text.starts_with(|c: char| c.is_ascii_digit() || "-–".contains(c));
+        let is_right = |column: usize| lines[1..].iter().filter_map(|line| line.get(column)).all(is_figure);
+        let right: Vec<bool> = (0..self.columns.len()).map(is_right).collect();
+        let line = |cells: &Vec<String>| {
+            let padded = cells.iter().zip(&widths).zip(&right).map(|((cell, width), is_right)| {
+                if *is_right {
+                    format!("{cell:>width$}")
+                } else {
+                    format!("{cell:<width$}")
+                }
+            });
+            padded.collect::<Vec<_>>().join("  ").trim_end().to_owned() + "\n"
+        };
+        lines.iter().map(line).collect()
+    }
+
+    fn json(&self) -> String {
+        // Of texts and finite numbers, which always can be written.
+        let json = serde_json::to_string_pretty(self);
+        json.unwrap_or_default() + "\n"
     }
 
     fn markdown(&self) -> String {
@@ -88,7 +126,7 @@ fn escaped(text: &str) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::{super::TableColumn, *};
+    use super::*;
 
     fn table() -> Table {
         Table {
@@ -124,6 +162,29 @@ mod tests {
         assert_eq!(lines[1], ["a|b_c 10×6_3×18 *", "0.3333333333333333", "1000"]);
         assert_eq!(lines[3], ["none", "", "20"]);
         assert_eq!(lines.len(), 4);
+    }
+
+    #[test]
+    fn a_terminal_gets_columns_as_wide_as_their_widest_cell() {
+        let mut table = table();
+        table.rows.truncate(2);
+        table.rows[0][0] = "a".into();
+        table.rows[1][0] = "long name".into();
+        let expected = "Decoder       Z (%)  epochs\n\
+                        a             0.333    1000\n\
+                        long name  -6.13e-5       7\n";
+        assert_eq!(table.aligned(), expected);
+        let times = Table::of_headings(
+            ["decoder", "training", "note"],
+            [
+                vec!["ridge".into(), "3 ms".into(), "".into()],
+                vec!["network".into(), "12.3 s".into(), "*".into()],
+            ],
+        );
+        let expected = "decoder  training  note\n\
+                        ridge        3 ms\n\
+                        network    12.3 s  *\n";
+        assert_eq!(times.aligned(), expected);
     }
 
     #[test]

@@ -28,6 +28,13 @@ pub(super) fn compare_exports<'a>(view: &'a CompareView, shared: &'a Shared) -> 
         Ok(move || Figure::from(figure.clone()))
     };
     exports.extend(picture_exports("Surfaces", "compared-surfaces".to_owned(), surfaces));
+    for (place, letter) in PLACES.into_iter().enumerate() {
+        if let Some(regression) = view.regression(place) {
+            let stem = format!("regression-{}", letter.to_lowercase());
+            let regression = Ok(move || Figure::from(regression.clone()));
+            exports.extend(picture_exports(&format!("Regression of {letter}"), stem, regression));
+        }
+    }
     let losses = losses(runs).ok_or_else(nothing);
     let losses = losses.map(|losses| move || Figure::from(losses.clone()));
     exports.extend(picture_exports("Loss chart", "compared-loss".to_owned(), losses));

@@ -1,14 +1,16 @@
-use std::{fmt, sync::Arc};
+use std::{fmt, path::Path, sync::Arc};
 
 use ndarray::Array2;
 
 use crate::{
     app::{
         job::{Job, Wake},
-        shared::{Effect, Matter, Notice, RightCard, RunList},
-        test_view::{Frame, TestView},
+        shared::{Effect, RightCard, RunList},
+        test_view::{Frame, Positions, RecordedTest, TargetCharts, TestSet, TestView},
     },
     export::NetworkFile,
+    figure::surface::Surface,
+    import::Recorded,
 };
 
 /// The Compare view.
@@ -33,8 +35,12 @@ pub struct CompareView {
 pub struct Place {
     /// The run in it.
     id: Option<u64>,
-    /// Surfaces of the run, once they are prepared.
+    /// Test set of the run and the answers of its network, once they are there.
     pub compared: Option<Compared>,
+    /// Reason for which they cannot be had.
+    pub problem: Option<String>,
+    /// Target of a recording whose regression is shown.
+    pub target: usize,
     /// Job that prepares them.
     job: Option<Job<Result<Box<Compared>, String>>>,
 }
@@ -43,37 +49,107 @@ pub struct Place {
 #[derive(Clone, Debug)]
 pub struct Compared {
     /// Its test set.
-    pub test: TestView,
-    /// Coordinates that its network decodes: samples × 3·M2.
-    pub decoupled_mm: Arc<Array2<f64>>,
-    /// The snapshot on show: actual, decoupled, difference.
-    pub frames: [Frame; 3],
+    pub test: TestSet,
+    /// Answers of its network: samples × targets.
+    pub answers: Arc<Array2<f64>>,
+    /// What is drawn of them.
+    pub drawn: Drawn,
 }
 
-/// Reason for which a run on a recording has no surfaces here.
-const NO_SURFACES: &str = "Surfaces of recordings are shown in the Train view.";
+/// What is drawn of a test set.
+#[derive(Clone, Debug)]
+pub enum Drawn {
+    /// Nodes of an array at the snapshot on show: actual, decoupled, difference.
+    Frames(Box<[Frame; 3]>),
+    /// Surfaces through the targets of a recording at the sample on show: actual, decoded, difference.
+    Surfaces(Box<[Surface; 3]>),
+    /// Regression of each target of a recording, whose targets have no surface.
+    Regression(Arc<TargetCharts>),
+}
+
+impl Place {
+    /// Returns true if a surface is drawn in it.
+    pub(super) fn has_surface(&self) -> bool {
+        let compared = self.compared.as_ref();
+        compared.is_some_and(|compared| !matches!(compared.drawn, Drawn::Regression(_)))
+    }
+}
 
 impl Compared {
-    fn new(file: &NetworkFile) -> Result<Self, String> {
-        let settings = file.settings.simulated().ok_or(NO_SURFACES)?;
-        let test = TestView::draw(&settings).map_err(|error| error.to_string())?;
-        let decoupled_mm = Arc::new(file.network.decouple(&test.set));
-        let mut compared = Self {
-            test,
-            decoupled_mm,
-            frames: Default::default(),
+    /// Draws the test set of a run again, or reads it from the files of its recording; `None` once cancelled.
+    fn new(file: &NetworkFile, is_cancelled: &dyn Fn() -> bool) -> Result<Option<Self>, String> {
+        let test = match (file.settings.simulated(), &file.recorded) {
+            (Some(settings), _) => TestSet::Array(TestView::draw(&settings).map_err(|error| error.to_string())?),
+            (None, Some(recorded)) => match recorded_test(file, recorded, is_cancelled)? {
+                Some(test) => TestSet::Recording(test),
+                None => return Ok(None),
+            },
+            (None, None) => return Err("This run has no test samples.".to_owned()),
         };
-        compared.show(0);
-        Ok(compared)
+        let answers = Arc::new(file.network.decouple(test.set()));
+        let drawn = drawn(&test, &answers, 0);
+        Ok(Some(Self { test, answers, drawn }))
     }
 
-    /// Makes the frames of `snapshot`, or of the last one if there are fewer.
+    /// Draws `snapshot`, or the last one if there are fewer.
     fn show(&mut self, snapshot: usize) {
-        let snapshot = self.test.nearest_snapshot(snapshot);
-        let actual = self.test.frame(self.test.set.targets(), snapshot);
-        let decoupled = self.test.frame(self.decoupled_mm.view(), snapshot);
-        let error = actual.error_of(&decoupled);
-        self.frames = [actual, decoupled, error];
+        if !matches!(self.drawn, Drawn::Regression(_)) {
+            self.drawn = drawn(&self.test, &self.answers, snapshot);
+        }
+    }
+}
+
+/// Reads the test samples with which the network was tested again.
+fn recorded_test(
+    file: &NetworkFile,
+    recorded: &Recorded,
+    is_cancelled: &dyn Fn() -> bool,
+) -> Result<Option<RecordedTest>, String> {
+    if let [missing, ..] = recorded.missing()[..] {
+        return Err(format!(
+            "The recording '{}' is not there any more, so its test samples cannot be shown. Put the file back to see them; \
+             errors, loss and settings are kept with the run.",
+            missing.display()
+        ));
+    }
+    let sets = file.setup().sets(Path::new(""), is_cancelled, &mut |_| ());
+    let Some(sets) = sets.map_err(|error| error.to_string())? else {
+        return Ok(None);
+    };
+    let is_same = sets
+        .recorded()
+        .is_some_and(|now| now.samples_crc32 == recorded.samples_crc32);
+    if !is_same {
+        let data = recorded.plan.import.data.display();
+        return Err(format!(
+            "'{data}' has other samples than when this network was trained, so they are not shown. Use the file of that \
+             time, or train again."
+        ));
+    }
+    let test = RecordedTest::new(Arc::clone(&sets.sets.test), Arc::new(file.problem.clone()));
+    Ok(Some(test))
+}
+
+/// Draws `snapshot` of a test set, or the last one if there are fewer.
+fn drawn(test: &TestSet, answers: &Array2<f64>, snapshot: usize) -> Drawn {
+    match test {
+        TestSet::Array(test) => {
+            let snapshot = test.nearest_snapshot(snapshot);
+            let actual = test.frame(test.set.targets(), snapshot);
+            let decoupled = test.frame(answers.view(), snapshot);
+            let error = actual.error_of(&decoupled);
+            Drawn::Frames(Box::new([actual, decoupled, error]))
+        }
+        TestSet::Recording(test) => match &test.positions {
+            Positions::Surface(through) => {
+                let sample = snapshot.min(test.set.samples().saturating_sub(1));
+                let actual = test.set.targets().row(sample).to_vec();
+                let decoded = answers.row(sample).to_vec();
+                let range = through.range_of(&test.ranges);
+                Drawn::Surfaces(Box::new(through.surfaces(&actual, &decoded, range)))
+            }
+            Positions::None | Positions::NoSurface(_) => Drawn::Regression(Arc::new(test.charts(answers))),
+        },
     }
 }
 
@@ -101,9 +177,10 @@ impl CompareView {
 
     /// Returns the number of snapshots of the larger of the two test sets.
     pub(super) fn snapshots(&self) -> usize {
-        let compared = self.places.iter().filter_map(|place| place.compared.as_ref());
-        compared
-            .map(|compared| compared.test.snapshots.len())
+        let drawn = self.places.iter().filter(|place| place.has_surface());
+        drawn
+            .filter_map(|place| place.compared.as_ref())
+            .map(|compared| compared.test.snapshots())
             .max()
             .unwrap_or(0)
     }
@@ -127,7 +204,7 @@ impl CompareView {
     }
 
     /// Prepares what is to be drawn in the two places on threads, and takes what they have prepared.
-    pub(super) fn follow(&mut self, runs: &RunList, effects: &mut Vec<Effect>) {
+    pub(super) fn follow(&mut self, runs: &RunList) {
         for (number, place) in self.places.iter_mut().enumerate() {
             let run = runs.pinned(number);
             if place.id != run.map(|run| run.id) {
@@ -147,25 +224,23 @@ impl CompareView {
                     }
                     place.compared = Some(*compared);
                 }
-                Err(reason) => {
-                    effects.extend([
-                        Effect::PinRun(number, None),
-                        Effect::Tell(Matter::Comparison, Notice::Failed(reason)),
-                    ]);
-                }
+                Err(reason) => place.problem = Some(reason),
             }
         }
     }
 }
 
-/// Draws the test set of a run and what its network makes of it, in the background.
+/// Prepares the test set of a run and the answers of its network in the background.
 fn prepare(file: &Arc<NetworkFile>, wake: &Wake) -> Job<Result<Box<Compared>, String>> {
     let mut job = Job::new("compared run", Arc::clone(wake));
     let file = Arc::clone(file);
     job.start(
-        move |_| Compared::new(&file).map(Box::new),
-        |prepared| {
-            prepared.unwrap_or_else(|error| Err(format!("The surfaces of this run could not be prepared: {error}")))
+        move |report| Compared::new(&file, &|| report.is_cancelled()),
+        |prepared| match prepared {
+            Ok(Ok(Some(compared))) => Ok(Box::new(compared)),
+            Ok(Ok(None)) => Err("The test samples were not read to the end.".to_owned()),
+            Ok(Err(reason)) => Err(reason),
+            Err(error) => Err(format!("The test samples of this run could not be prepared: {error}")),
         },
     );
     job

@@ -1,20 +1,24 @@
 use eframe::egui::{Align, Layout, Rect, RichText, Sense, Ui, Vec2};
 
-use super::{CompareView, Compared, exports::compare_exports, figures_table::figures_ui, list::run_list_ui};
+use super::{
+    CompareView, Compared, exports::compare_exports, figures_table::figures_ui, list::run_list_ui, state::Drawn,
+};
 use crate::{
     app::{
-        plotting::titled_plots_ui,
+        plotting::{Pointer, plots_ui, titled_plots_ui},
         shared::{
             Effect, Export, Look, PLACES, RightCard, RunList, Shared, View, colour_scale_ui, follow_surface,
-            view_mode_ui,
+            target_choice_ui, view_mode_ui,
         },
         surface_view::{ColourBar, SurfaceView},
+        test_view::TestSet,
         theme::{Theme, semibold, space, type_size},
-        widgets::{card_ui, placeholder_ui, scrolled_ui, section_heading_ui, segmented_ui, snapshot_ui},
+        widgets::{card_ui, note_ui, placeholder_ui, scrolled_ui, section_heading_ui, segmented_ui, snapshot_ui},
     },
     figure::{
         PlotFigure, compared_losses_figure,
         surface::{Surface, SurfaceFigure},
+        target_regression_figure,
     },
 };
 
@@ -27,12 +31,12 @@ impl View for CompareView {
         self.opened_with = Some(0);
     }
 
-    fn take_news(&mut self, shared: &Shared, effects: &mut Vec<Effect>) {
-        self.follow(&shared.runs, effects);
+    fn take_news(&mut self, shared: &Shared, _effects: &mut Vec<Effect>) {
+        self.follow(&shared.runs);
     }
 
     fn tools_ui(&mut self, ui: &mut Ui, _shared: &Shared, _effects: &mut Vec<Effect>) {
-        if let Some(snapshot) = snapshot_ui(ui, self.snapshot, self.snapshots()) {
+        if let Some(snapshot) = snapshot_ui(ui, "snapshot", self.snapshot, self.snapshots()) {
             self.show_snapshot(snapshot);
         }
     }
@@ -58,7 +62,7 @@ impl View for CompareView {
         let figure = self.figure(shared);
         let mut surfaces = figure.surfaces.iter();
         for place in 0..2 {
-            let surface = self.places[place].compared.as_ref().and_then(|_| surfaces.next());
+            let surface = self.places[place].has_surface().then(|| surfaces.next()).flatten();
             let left = cards.left() + (width + gap) * place as f32;
             let card = Rect::from_min_size([left, cards.top()].into(), Vec2::new(width, cards.height()));
             card_ui(ui, card, |ui| self.side_ui(ui, shared, place, surface, effects));
@@ -85,18 +89,54 @@ impl View for CompareView {
 }
 
 impl CompareView {
+    /// Decoded against actual values of the target on show in this place, if it has no surface.
+    pub(super) fn regression(&self, place: usize) -> Option<PlotFigure> {
+        let place = &self.places[place];
+        let Compared { test, answers, drawn } = place.compared.as_ref()?;
+        let (Drawn::Regression(charts), Some(test)) = (drawn, test.recording()) else {
+            return None;
+        };
+        let target = place.target.min(charts.lines.len().checked_sub(1)?);
+        let channel = test.problem.targets.get(target)?;
+        let pair = |sample| (test.set.targets()[[sample, target]], answers[[sample, target]]);
+        Some(target_regression_figure(
+            (test.set.samples(), &pair),
+            &charts.lines[target],
+            &channel.name,
+            channel.unit.as_deref(),
+        ))
+    }
+
     /// The surfaces of the runs that are prepared, with one scale.
     pub(super) fn figure(&self, shared: &Shared) -> SurfaceFigure {
         let look = shared.look;
         let surface = |place: usize| {
-            let Compared { test, frames, .. } = self.places[place].compared.as_ref()?;
-            let [_, decoupled, error] = frames;
+            let Compared { test, drawn, .. } = self.places[place].compared.as_ref()?;
             let name = shared.runs.pinned(place).map_or("", |run| &run.name);
             let (letter, style) = (PLACES[place], look.style());
-            Some(match self.card {
-                RightCard::Decoupled => test.heights(format!("{letter}: {name}, decoupled"), decoupled, style),
-                RightCard::Error => test.errors(format!("{letter}: {name}, error"), error, style),
-            })
+            match (drawn, test) {
+                (Drawn::Frames(frames), TestSet::Array(test)) => {
+                    let [_, decoupled, error] = &**frames;
+                    Some(match self.card {
+                        RightCard::Decoupled => test.heights(format!("{letter}: {name}, decoupled"), decoupled, style),
+                        RightCard::Error => test.errors(format!("{letter}: {name}, error"), error, style),
+                    })
+                }
+                (Drawn::Surfaces(surfaces), _) => {
+                    let [_, decoded, error] = &**surfaces;
+                    let (surface, what) = match self.card {
+                        RightCard::Decoupled => (decoded, "decoded"),
+                        RightCard::Error => (error, "error"),
+                    };
+                    Some(Surface {
+                        title: format!("{letter}: {name}, {what}"),
+                        mode: look.mode,
+                        colours: look.colours,
+                        ..surface.clone()
+                    })
+                }
+                _ => None,
+            }
         };
         SurfaceFigure {
             surfaces: (0..self.places.len()).filter_map(surface).collect(),
@@ -143,12 +183,33 @@ impl CompareView {
                 }
             });
         });
-        match surface {
-            Some(surface) => surface_ui(ui, place, surface, look, &mut self.node, effects),
-            None if runs.workspace.pinned[place].is_some() => placeholder_ui(ui, "Its surfaces are being prepared."),
-            None => {
+        let regression = self.regression(place);
+        let of_place = &mut self.places[place];
+        match (surface, regression, &of_place.problem) {
+            (Some(surface), ..) => surface_ui(ui, place, surface, look, &mut self.node, effects),
+            (None, Some(regression), _) => {
+                let test = of_place
+                    .compared
+                    .as_ref()
+                    .and_then(|compared| compared.test.recording());
+                if let Some(test) = test {
+                    let id = ["target of A", "target of B"][place];
+                    target_choice_ui(ui, id, &test.problem.targets, &mut of_place.target);
+                }
+                plots_ui(
+                    ui,
+                    ["Regression of A", "Regression of B"][place],
+                    &regression,
+                    Pointer::Moves,
+                );
+            }
+            (None, None, Some(problem)) => {
+                note_ui(ui, problem);
+            }
+            _ if runs.workspace.pinned[place].is_some() => placeholder_ui(ui, "Its test samples are being prepared."),
+            _ => {
                 let text = match runs.workspace.runs.len() {
-                    0 => "Two finished trainings stand here side by side.".to_owned(),
+                    0 => "Two finished trainings appear here side by side.".to_owned(),
                     1 => "Train a second network to compare it with the first.".to_owned(),
                     _ => format!("Press {} next to a run in the list to show it here.", PLACES[place]),
                 };

@@ -235,18 +235,16 @@ fn run_buttons_ui(ui: &mut Ui, experiments: &mut ExperimentsView, effects: &mut 
 fn progress_ui(ui: &mut Ui, running: &Running) {
     ui.add_space(space(1));
     let share = running.done as f32 / running.trials.max(1) as f32;
-    progress_bar_ui(ui, "Experiment", share);
+    let text = format!(
+        "{}: {} of {} trials",
+        running.topic.name(),
+        running.done,
+        running.trials
+    );
+    progress_bar_ui(ui, "Experiment", share, &text);
     let left = match running.time_left {
         Some(time) => format!("about {} left", format_duration(time)),
         None => "estimating the time left".to_owned(),
     };
-    dim_ui(
-        ui,
-        &format!(
-            "{}: {} of {} trials, {left}",
-            running.topic.name(),
-            running.done,
-            running.trials
-        ),
-    );
+    dim_ui(ui, &left);
 }

@@ -7,9 +7,9 @@ use crate::{
     app::{
         shared::{Effect, Shared},
         theme::Theme,
-        widgets::{ColumnWidth, TableCell, TableClick, TableColumn, TableRow, scrolled_table_ui},
+        widgets::{ColumnWidth, TableCell, TableClick, TableColumn, TableRow, TableView},
     },
-    export::ExperimentColumnKind,
+    export::{ExperimentColumn, ExperimentColumnKind},
 };
 
 /// Lays out the table over the available space; it scrolls where it is larger.
@@ -17,15 +17,16 @@ pub fn table_ui(ui: &mut Ui, outcome: &Outcome, look: &mut ExperimentLook, share
     let palette = &Theme::of(ui).palette;
     let axes = outcome.results.experiment.axes().count();
     let headings = &outcome.table.columns;
-    let columns: Vec<TableColumn<'_>> = headings
-        .iter()
-        .enumerate()
-        .map(|(column, of_table)| TableColumn {
-            heading: of_table.heading,
-            is_figure: column >= axes,
-            width: ColumnWidth::of_longest(outcome.table.rows.iter().map(|row| row[column].as_str())),
-        })
-        .collect();
+    let column = |(place, of_table): (usize, &ExperimentColumn)| {
+        let texts = outcome.table.rows.iter().map(|row| row[place].as_str());
+        let column = if place < axes {
+            TableColumn::text(of_table.heading)
+        } else {
+            TableColumn::figure(of_table.heading)
+        };
+        column.width(ColumnWidth::of_longest(texts))
+    };
+    let columns: Vec<TableColumn<'_>> = headings.iter().enumerate().map(column).collect();
     let values = &outcome.table.values;
     let figure = |cell: usize, column: usize| (values[cell].get(column).copied().flatten(), "");
     let order = look.sort.order(outcome.table.rows.len(), figure);
@@ -39,37 +40,35 @@ pub fn table_ui(ui: &mut Ui, outcome: &Outcome, look: &mut ExperimentLook, share
             .zip(texts)
             .enumerate()
             .map(|(column, (of_table, text))| {
-                let heading = of_table.heading;
                 let is_median = of_table.kind == ExperimentColumnKind::Ranking;
                 let is_beaten = loses && of_table.kind == ExperimentColumnKind::Linear;
-                TableCell {
-                    text: text.clone(),
-                    colour: match of_table.kind {
-                        ExperimentColumnKind::Ranking => palette.accent,
-                        ExperimentColumnKind::Published => palette.dim,
-                        _ if is_beaten => palette.warning,
-                        _ => palette.text,
-                    },
-                    is_strong: is_median || column < axes,
-                    label: (column >= axes).then(|| format!("{name}, {heading}: {text}")),
-                    meaning: if is_beaten {
-                        "The linear baseline is more accurate here than the network."
-                    } else {
-                        ""
-                    },
-                }
+                let colour = match of_table.kind {
+                    ExperimentColumnKind::Ranking => palette.accent,
+                    ExperimentColumnKind::Published => palette.dim,
+                    _ if is_beaten => palette.warning,
+                    _ => palette.text,
+                };
+                let meaning = if is_beaten {
+                    "The linear baseline is more accurate here than the network."
+                } else {
+                    ""
+                };
+                TableCell::new(text)
+                    .colour(colour)
+                    .strong(is_median || column < axes)
+                    .meaning(meaning)
             });
-        TableRow {
-            label: format!("Cell {name}"),
-            is_marked: look.marked == Some(number),
-            meaning: "",
-            dot: None,
-            cells: cells.collect(),
-        }
+        TableRow::new(cells)
+            .labelled(format!("Cell {name}"))
+            .named(name)
+            .selected(look.marked == Some(number))
     };
-    match scrolled_table_ui(ui, "experiment table", &columns, Some(look.sort), order.len(), row) {
+    let table = TableView::new("experiment table", &columns)
+        .sorted(look.sort)
+        .clickable();
+    match table.show(ui, order.len(), row) {
         Some(TableClick::Sort(sort)) => look.sort = sort,
-        Some(TableClick::Mark(place)) => look.marked = Some(order[place]),
+        Some(TableClick::Select(place)) => look.marked = Some(order[place]),
         Some(TableClick::Open(place)) => {
             look.marked = Some(order[place]);
             open_cell(shared, outcome, order[place], effects);

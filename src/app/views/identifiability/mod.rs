@@ -1,9 +1,11 @@
-//! The Identifiability view: what the readings of an array can tell at all, before anything is trained. A thread of its
-//! own computes it anew as the geometry changes.
+//! The Identifiability view: what the readings determine. For a simulated array its model answers at once, as the geometry
+//! changes; for a recording `recording` measures it by cross-validation when asked.
 
 mod analysis;
+mod array_view;
 mod facts;
 mod form;
+mod recording;
 mod state;
 mod view;
 mod worker;

@@ -1,6 +1,6 @@
 use std::sync::Arc;
 
-use super::{Analysis, Question, worker::IdentifiabilityWorker};
+use super::{Analysis, Question, recording::RecordingStudy, worker::IdentifiabilityWorker};
 use crate::{
     app::job::Wake,
     evaluation::SimulatedSettings,
@@ -26,6 +26,8 @@ pub struct IdentifiabilityView {
     /// The node under the pointer, marked on both pictures.
     pub(super) node: Option<usize>,
     pub(super) worker: IdentifiabilityWorker,
+    /// Analysis of a recording.
+    pub(super) study: RecordingStudy,
 }
 
 impl IdentifiabilityView {
@@ -39,6 +41,7 @@ impl IdentifiabilityView {
             axis: 2,
             followed: None,
             node: None,
+            study: RecordingStudy::new(Arc::clone(&wake)),
             worker: IdentifiabilityWorker::new(wake),
         }
     }

@@ -57,14 +57,15 @@ fn warnings_ui(ui: &mut Ui, frame: &LiveFrame) {
     }
 }
 
-fn stream_ui(ui: &mut Ui, view: &LiveView) {
+/// Rate, latency and losses of the stream.
+pub fn stream_ui(ui: &mut Ui, view: &LiveView) {
     let counts = &view.shown.counts;
     let rate = if counts.is_waiting {
         "waiting".to_owned()
     } else {
         format!("{:.0} frames a second", counts.frames_per_second)
     };
-    fact_ui(ui, "Rate", "Frames decoded in a second, lately.", &rate);
+    fact_ui(ui, "Rate", "Frames per second (recent).", &rate);
     let latency = counts.latency.map_or_else(
         || format_number(None),
         |[median, high]| format!("p50 {}, p99 {}", format_duration(median), format_duration(high)),

@@ -19,8 +19,9 @@ pub fn form_ui(ui: &mut Ui, view: &mut LiveView, shared: &Shared, effects: &mut 
         let network = view.network.network(&shared.runs).map(|(_, file)| file.clone());
         let settings = network.as_ref().and_then(|file| file.settings.simulated());
         let motion = view.source.motion;
+        let has_sensor = view.has_sensor(shared);
         view.source
-            .form_ui(ui, settings.as_ref(), view.running.is_some(), effects);
+            .form_ui(ui, (settings.as_ref(), has_sensor), view.running.is_some(), effects);
         if view.source.motion != motion {
             view.command(Command::Move(view.source.motion));
         }

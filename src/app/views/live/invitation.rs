@@ -26,7 +26,7 @@ pub fn invitation_ui(ui: &mut Ui, view: &mut LiveView, shared: &Shared, effects:
             if is_free && ui.add(primary_button("Train a network now")).clicked() {
                 effects.extend([Effect::ShowTraining, Effect::Train]);
             }
-        } else if view.source.kind == SourceKind::Simulated {
+        } else if view.source.kind == SourceKind::Simulated && view.has_sensor(shared) {
             if ui.add(primary_button("Start the simulated source")).clicked() {
                 view.start(shared, effects);
             }
@@ -67,14 +67,15 @@ fn words(view: &LiveView, shared: &Shared) -> (String, String) {
         return ("No network yet".to_owned(), text.to_owned());
     };
     let text = match view.source.kind {
-        SourceKind::Simulated => format!(
+        SourceKind::Simulated if view.has_sensor(shared) => format!(
             "An indenter wanders over a simulated array and the network '{name}' decodes its readings, without any \
              hardware. To decode your own, choose a replay, a serial port or a TCP address on the left."
         ),
         _ => match view.obstacle(shared) {
             Some(obstacle) => obstacle,
-            None => format!("The network '{name}' decodes its frames as they come."),
+            None if view.has_sensor(shared) => format!("The network '{name}' decodes its frames as they come."),
+            None => format!("The network '{name}' decodes its samples as they come, by the names of their columns."),
         },
     };
-    ("See what the sensor feels".to_owned(), text)
+    ("Decode live readings".to_owned(), text)
 }

@@ -140,12 +140,12 @@ impl SourceForm {
         true
     }
 
-    /// Shows the form; `settings` are those of the network, if one is chosen. What begins with the source can be changed
-    /// only while none is running.
+    /// Shows the form; `settings` are those of the network, if one of an array is chosen, and `has_sensor` is false for one
+    /// of a recording. What begins with the source can be changed only while none is running.
     pub fn form_ui(
         &mut self,
         ui: &mut Ui,
-        settings: Option<&SimulatedSettings>,
+        (settings, has_sensor): (Option<&SimulatedSettings>, bool),
         is_running: bool,
         effects: &mut Vec<Effect>,
     ) {
@@ -156,7 +156,8 @@ impl SourceForm {
                 (SourceKind::Serial, "Serial"),
                 (SourceKind::Tcp, "TCP"),
             ];
-            self.kind = segmented_ui(ui, "Source", &kinds, self.kind, false).unwrap_or(self.kind);
+            let kinds = if has_sensor { &kinds[..] } else { &kinds[1..] };
+            self.kind = segmented_ui(ui, "Source", kinds, self.kind, false).unwrap_or(self.kind);
             ui.add_space(space(1));
             match self.kind {
                 SourceKind::Simulated => {
@@ -164,23 +165,23 @@ impl SourceForm {
                     let rate = &mut self.frames_per_second;
                     quantity_ui(ui, "Frames a second", hint, rate, 0.1..=10_000.0, "Hz");
                 }
-                SourceKind::Replay => self.file_ui(ui, effects),
+                SourceKind::Replay => self.file_ui(ui, has_sensor, effects),
                 SourceKind::Serial => {
                     let hint = "Name of the port: /dev/ttyUSB0, /dev/ttyACM0, COM3.";
                     text_ui(ui, "Port", hint, &mut self.port);
                     let hint = "Bits a second, as the device sends: 8 data bits, no parity, 1 stop bit.";
                     count_ui(ui, "Baud", hint, &mut self.baud, 1..=100_000_000);
-                    dim_ui(ui, LINES);
+                    dim_ui(ui, if has_sensor { LINES } else { INPUT_LINES });
                 }
                 SourceKind::Tcp => {
                     let hint = "Host and port of the sender, as HOST:PORT.";
                     text_ui(ui, "Address", hint, &mut self.address);
-                    dim_ui(ui, LINES);
+                    dim_ui(ui, if has_sensor { LINES } else { INPUT_LINES });
                 }
             }
             self.noise_ui(ui, settings);
         });
-        if self.kind == SourceKind::Simulated {
+        if self.kind == SourceKind::Simulated && has_sensor {
             let motions = [
                 (Motion::Wandering, "Wander"),
                 (Motion::Held, "Hold"),
@@ -210,9 +211,12 @@ impl SourceForm {
         }
     }
 
-    fn file_ui(&mut self, ui: &mut Ui, effects: &mut Vec<Effect>) {
-        let hint = "CSV of frames: a recording made here, or lines of resistances in ohm as the terminal command decode \
-                    reads them.";
+    fn file_ui(&mut self, ui: &mut Ui, has_sensor: bool, effects: &mut Vec<Effect>) {
+        let hint = if has_sensor {
+            "CSV of frames: a recording made here, or lines of resistances in ohm as the terminal command decode reads them."
+        } else {
+            "File with the inputs of the network under their names, such as the recording that it was trained on."
+        };
         text_ui(ui, "Frames", hint, &mut self.path);
         let file = LiveFile::Frames;
         if ui
@@ -224,12 +228,22 @@ impl SourceForm {
             self.chosen = Some(chosen);
             effects.push(Effect::ChooseFile(file.choose(send)));
         }
-        dim_ui(ui, "Frames without a column time_s come 50 times a second.");
+        dim_ui(
+            ui,
+            if has_sensor {
+                "Frames without a column time_s come 50 times a second."
+            } else {
+                "Samples come 50 times a second."
+            },
+        );
     }
 }
 
 const LINES: &str = "Lines of CSV: the number of the row-wire and its resistances in ohm, or a whole snapshot in one \
                      line, row by row.";
+
+const INPUT_LINES: &str = "Lines of CSV: the inputs of the network in their order, after the number of the row-wire if there is a \
+                           network for each, or under their names in a header.";
 
 fn text_ui(ui: &mut Ui, name: &str, hint: &str, text: &mut String) {
     let label = ui.label(name).on_hover_text(hint);

@@ -22,6 +22,10 @@ use crate::{
     live::ZeroGains,
 };
 
+/// Reason for which a network of a recording has no simulated source.
+const NOTHING_TO_SIMULATE: &str = "A network of a recording decodes a file, a serial port or a TCP address: there is no sensor \
+                                   model to simulate. Choose one of them as the source.";
+
 /// The Live view.
 #[derive(Debug)]
 pub struct LiveView {
@@ -92,10 +96,20 @@ impl LiveView {
             .network
             .network(&shared.runs)
             .ok_or("Train a network, or open a network file.")?;
-        let settings = network
-            .settings
-            .simulated()
-            .ok_or("Choose a network of a simulated array.")?;
+        let Some(settings) = network.settings.simulated() else {
+            if self.source.kind == SourceKind::Simulated {
+                return Err(NOTHING_TO_SIMULATE.to_owned());
+            }
+            let plan = LivePlan {
+                network: Arc::clone(network),
+                settings: None,
+                source: self.source.plan(None, at_s)?,
+                noise: 0.0,
+                zero: None,
+                recordings: PathBuf::new(),
+            };
+            return Ok((name.to_owned(), plan));
+        };
         let scale = settings.source.sensor.scale;
         let read = settings.source.scene.rows.read(scale.rows()).unwrap_or_default();
         let fault = self
@@ -111,9 +125,15 @@ impl LiveView {
                 .filter(|zero| zero.is_sound(read.len(), scale.columns())),
             recordings: folder(shared).join("recordings"),
             network: Arc::clone(network),
-            settings,
+            settings: Some(settings),
         };
         Ok((name.to_owned(), plan))
+    }
+
+    /// Returns true if the network is that of an array, whose sensor model simulates, re-zeroes and finds faults.
+    pub(super) fn has_sensor(&self, shared: &Shared) -> bool {
+        let network = self.network.network(&shared.runs);
+        network.is_none_or(|(_, file)| file.settings.source.simulation().is_some())
     }
 
     /// Reason for which decoding cannot begin, with what to do.
@@ -213,7 +233,9 @@ impl LiveView {
     /// Returns true if the frames that come can be recorded.
     pub(super) fn can_record(&self) -> bool {
         let is_replay = |running: &Running| matches!(running.source, SourcePlan::Replay { .. });
-        self.running.as_ref().is_some_and(|running| !is_replay(running))
+        // Frames of an array are recorded; samples of other sensors have columns of their own.
+        let is_array = self.shown.targets.is_none();
+        is_array && self.running.as_ref().is_some_and(|running| !is_replay(running))
     }
 
     /// Begins a recording, or ends it.

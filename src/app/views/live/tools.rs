@@ -26,6 +26,9 @@ pub fn tools_ui(ui: &mut Ui, view: &mut LiveView, shared: &Shared, effects: &mut
         view.start(shared, effects);
     }
     ui.add_space(space(2));
+    if !view.has_sensor(shared) {
+        return;
+    }
     record_ui(ui, view);
     let zero = ui.add_enabled(is_running, ghost_button("Re-zero"));
     let hint = glossary::UNLOADED_STATE.hint;
@@ -47,7 +50,7 @@ fn record_ui(ui: &mut Ui, view: &LiveView) {
     }
     let button = ui.add_enabled(view.can_record(), button);
     let why_not = if view.running.is_some() {
-        "This is a recording already."
+        "A replay cannot be recorded."
     } else {
         "Start a source first."
     };
@@ -73,7 +76,7 @@ pub fn offer_actions(view: &mut LiveView, offers: &mut Offers<'_>, shared: &Shar
     if offers.offer_keys("Start or end recording", Modifiers::COMMAND, Key::R, view.can_record()) {
         view.toggle_recording();
     }
-    if offers.offer("Re-zero", is_running) {
+    if offers.offer("Re-zero", is_running && view.has_sensor(shared)) {
         view.re_zero();
     }
     let replay = view.shown.replay;

@@ -10,6 +10,7 @@ use super::{
     invitation::invitation_ui,
     readings_card::readings_ui,
     replay_bar::{REPLAY_BAR_HEIGHT, replay_bar_ui},
+    targets_card::targets_ui,
     tools,
 };
 use crate::{
@@ -77,7 +78,7 @@ impl View for LiveView {
 /// Surfaces above, readings and figures below, and where a recording is replayed its bar at the bottom.
 fn live_ui(ui: &mut Ui, view: &mut LiveView, shared: &Shared, effects: &mut Vec<Effect>) {
     let whole = ui.available_rect_before_wrap();
-    if view.shown.frame.is_none() {
+    if !view.shown.has_answer() {
         card_ui(ui, whole, |ui| invitation_ui(ui, view, shared, effects));
         ui.allocate_rect(whole, Sense::hover());
         return;
@@ -88,6 +89,11 @@ fn live_ui(ui: &mut Ui, view: &mut LiveView, shared: &Shared, effects: &mut Vec<
         let (rest, bar) = whole.split_top_bottom_at_y(whole.bottom() - REPLAY_BAR_HEIGHT);
         card_ui(ui, bar, |ui| replay_bar_ui(ui, view));
         cards = rest.with_max_y(rest.bottom() - gap);
+    }
+    if view.shown.targets.is_some() {
+        targets_ui(ui, cards, view, shared, effects);
+        ui.allocate_rect(whole, Sense::hover());
+        return;
     }
     let lower_height = (0.46 * cards.height()).clamp(space(60), space(100));
     let (upper, lower) = cards.split_top_bottom_at_y(cards.bottom() - lower_height);
@@ -114,12 +120,14 @@ fn status_ui(ui: &mut Ui, view: &LiveView) {
             format!("Stopped after {}", counted(counts.decoded, "frame")),
         ),
         (None, _) => (palette.dim, "Ready: press Start".to_owned()),
-        (Some(_), None) => (palette.accent, "Waiting for the first frame".to_owned()),
+        (Some(_), _) if !view.shown.has_answer() => (palette.accent, "Waiting for the first frame".to_owned()),
         (Some(_), _) if counts.is_waiting => (palette.warning, "No frame for two seconds".to_owned()),
         (Some(_), Some(Watched::Named(diagnosis))) => (palette.warning, format!("Fault: {}", diagnosis.wire)),
         (Some(_), Some(Watched::Unexplained)) => (palette.warning, "The readings contradict Eq. (2)".to_owned()),
-        (Some(running), Some(_)) => match (&running.source, view.shown.replay) {
-            (SourcePlan::Replay { .. }, Some(replay)) if !replay.is_playing => (palette.dim, "Replay held".to_owned()),
+        (Some(running), _) => match (&running.source, view.shown.replay) {
+            (SourcePlan::Replay { .. }, Some(replay)) if !replay.is_playing => {
+                (palette.dim, "Replay paused".to_owned())
+            }
             (SourcePlan::Replay { .. }, _) => (palette.good, "Replaying".to_owned()),
             _ => (palette.good, "Live".to_owned()),
         },

@@ -19,13 +19,18 @@ use crate::{
 pub fn choices_ui(ui: &mut Ui, level: &TradeOffLevel, look: &mut TradeOffLook, can_load: bool) -> Option<usize> {
     let [fastest, most_accurate] = level.answers(&look.limits);
     section_heading_ui(ui, "Recommended decoders");
-    let hint = "Finds the decoder with the shortest time for a frame among those whose Z error is at most this, in \
-                percent.";
+    let hint = if level.noise.is_some() {
+        "Finds the decoder with the shortest time for a frame among those whose Z error is at most this, in percent."
+    } else {
+        "Finds the decoder with the shortest time among those whose mean absolute error is at most this, in percent of the \
+         range of the targets."
+    };
     quantity_ui(ui, "Fastest under", hint, &mut look.limits.percent, 1e-15..=1e6, "%");
     let none = "No measured decoder is this accurate.";
     answer_ui(ui, &mut look.marked, level, "Fastest", fastest, none);
     ui.add_space(space(1));
-    let hint = "Finds the decoder with the smallest Z error among those that decode a frame within this time, in µs.";
+    let hint = "Finds the decoder with the smallest error among those that decode a frame, or a sample of a recording, \
+                within this time, in µs.";
     quantity_ui(
         ui,
         "Most accurate under",
@@ -90,7 +95,7 @@ fn marked_ui(ui: &mut Ui, point: &TradeOffPoint, can_load: bool) -> bool {
         ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
             let load = ui.add_enabled(can_load, ghost_button("Load into Train view"));
             is_loaded = load
-                .on_hover_text("Uses its sensor, scene and network settings for the next training.")
+                .on_hover_text("Uses its source and network settings for the next training.")
                 .on_disabled_hover_text("A training is running in the Train view: its settings cannot be changed now")
                 .clicked();
             ui.with_layout(Layout::left_to_right(Align::Center), |ui| {

@@ -9,7 +9,7 @@ use crate::{
 
 const POINTS: FileWords = FileWords {
     kind: "points",
-    description: "Every point at every noise level with every digit, as CSV.",
+    description: "Every point, of an array at every noise level, with every digit, as CSV.",
     extensions: &["csv"],
 };
 
@@ -23,7 +23,7 @@ pub(super) fn trade_off_exports(view: &TradeOffView) -> Vec<Export<'_>> {
             .levels
             .get(view.look.level)
             .filter(|level| !level.points.is_empty());
-        level.ok_or_else(|| "No point is measured at this noise level yet.".to_owned())
+        level.ok_or_else(|| "No point is measured here yet.".to_owned())
     });
     let charts = level
         .clone()

@@ -1,5 +1,5 @@
-//! The Trade-off view: every way of decoding measured on this machine, its error against its time, at several levels of
-//! noise. A thread of its own measures while the window stays free.
+//! The Trade-off view: every decoder measured on this machine, its error against its time, on a recording or on a simulated
+//! array at several levels of noise. A thread of its own measures while the window stays free.
 
 mod chart;
 mod choices;
@@ -13,6 +13,6 @@ mod table;
 mod view;
 mod worker;
 
-pub use form::{Thoroughness, TradeOffForm, TradeOffFormError, WhichPresets};
-pub use plan::TradeOffPlan;
+pub use form::{Thoroughness, TradeOffForm, WhichPresets};
+pub use plan::{PlannedLevel, PlannedRun, TradeOffPlan};
 pub use state::{TradeOffEnding, TradeOffLook, TradeOffOutcome, TradeOffView};

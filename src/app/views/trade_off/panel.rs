@@ -3,7 +3,7 @@ use eframe::egui::{TextEdit, Ui, vec2};
 use super::{Thoroughness, TradeOffForm, TradeOffView, WhichPresets, names::noise_name};
 use crate::{
     app::{
-        shared::{Effect, Shared},
+        shared::{Effect, Shared, SourceKind},
         theme::space,
         widgets::{
             dim_ui, fields::count_ui, ghost_button, note_ui, primary_button, progress_bar_ui, scrolled_ui,
@@ -13,27 +13,32 @@ use crate::{
     dataset::LARGEST_SAMPLES,
     decoupling::{DecoderKind, Precision},
     evaluation::Preset,
-    training::StoppingRules,
+    training::{Method, StoppingRules},
 };
 
 /// Shows the form: lists, presets, decoders, Measure and Cancel.
 pub fn form_ui(ui: &mut Ui, trade: &mut TradeOffView, shared: &Shared, effects: &mut Vec<Effect>) {
     scrolled_ui(ui, "trade form", |ui| {
         section_heading_ui(ui, "Measurement");
-        let draft = &shared.draft;
-        let text = format!(
-            "{} in the scene of the Train view, seed {}.",
-            draft.source.sensor.scale, draft.seed
-        );
-        dim_ui(ui, &text);
-        ui.add_enabled_ui(trade.running.is_none(), |ui| fields_ui(ui, &mut trade.form));
+        if let Ok(setup) = shared.setup() {
+            let of = match shared.source {
+                SourceKind::Array => "in the scene of the Train view",
+                SourceKind::Recording => "with its split and settings of the Train view",
+            };
+            dim_ui(
+                ui,
+                &format!("{} {of}, seed {}.", setup.source_name(), setup.settings().seed),
+            );
+        }
+        let source = shared.source;
+        ui.add_enabled_ui(trade.running.is_none(), |ui| fields_ui(ui, &mut trade.form, source));
         ui.add_space(space(1));
-        match trade.plan(draft) {
+        match trade.plan(shared) {
             Ok(plan) => {
                 dim_ui(ui, &format!("{} points", plan.points()));
             }
             Err(problem) => {
-                note_ui(ui, &problem.to_string());
+                note_ui(ui, &problem);
             }
         }
         buttons_ui(ui, trade, shared, effects);
@@ -42,53 +47,73 @@ pub fn form_ui(ui: &mut Ui, trade: &mut TradeOffView, shared: &Shared, effects: 
     });
 }
 
-fn fields_ui(ui: &mut Ui, form: &mut TradeOffForm) {
-    let hint = "Noise of each reading (standard deviation), relative to the reading. Separate several levels with \
-                commas.";
-    list_ui(ui, "Noise levels", hint, &mut form.noises);
+fn fields_ui(ui: &mut Ui, form: &mut TradeOffForm, source: SourceKind) {
+    if source == SourceKind::Array {
+        let hint = "Noise of each reading (standard deviation), relative to the reading. Separate several levels with \
+                    commas.";
+        list_ui(ui, "Noise levels", hint, &mut form.noises);
+    }
     let hint = "Numbers of hidden nodes of the networks, separated by commas.";
     list_ui(ui, "Hidden nodes", hint, &mut form.hidden);
-    section_heading_ui(ui, "Presets");
-    let presets = [
-        (WhichPresets::Both, "Both"),
-        (WhichPresets::Only(Preset::Paper), "Paper"),
-        (WhichPresets::Only(Preset::Best), "Best"),
-    ];
-    form.presets = segmented_ui(ui, "Presets", &presets, form.presets, true).unwrap_or(form.presets);
+    match source {
+        SourceKind::Array => {
+            section_heading_ui(ui, "Presets");
+            let presets = [
+                (WhichPresets::Both, "Both"),
+                (WhichPresets::Only(Preset::Paper), "Paper"),
+                (WhichPresets::Only(Preset::Best), "Best"),
+            ];
+            form.presets = segmented_ui(ui, "Presets", &presets, form.presets, true).unwrap_or(form.presets);
+        }
+        SourceKind::Recording => {
+            section_heading_ui(ui, "Training methods");
+            for (method, is_chosen) in Method::all().iter().zip(&mut form.methods) {
+                ui.checkbox(is_chosen, method.name())
+                    .on_hover_text(method.description());
+            }
+        }
+    }
     section_heading_ui(ui, "Decoders");
     for (kind, is_chosen) in DecoderKind::ALL.into_iter().zip(&mut form.decoders) {
-        ui.checkbox(is_chosen, kind.name(Precision::Double))
-            .on_hover_text(kind.meaning());
+        if source == SourceKind::Array || !kind.needs_sensor() {
+            ui.checkbox(is_chosen, kind.name(Precision::Double))
+                .on_hover_text(kind.meaning());
+        }
     }
     section_heading_ui(ui, "Training");
-    let options = [
-        (Thoroughness::Quick, "Quick look"),
-        (Thoroughness::Full, "Full presets"),
-    ];
+    training_ui(ui, form, source);
+}
+
+fn training_ui(ui: &mut Ui, form: &mut TradeOffForm, source: SourceKind) {
+    let full = match source {
+        SourceKind::Array => "Full presets",
+        SourceKind::Recording => "As in Train view",
+    };
+    let options = [(Thoroughness::Quick, "Quick look"), (Thoroughness::Full, full)];
     let picked = segmented_ui(ui, "Training length", &options, form.thoroughness, true);
     form.thoroughness = picked.unwrap_or(form.thoroughness);
     match form.thoroughness {
         Thoroughness::Quick => {
-            let hint = "Largest number of training samples per network; a preset with fewer keeps its own number.";
-            count_ui(ui, "Maximum samples", hint, &mut form.samples, 1..=LARGEST_SAMPLES);
+            if source == SourceKind::Array {
+                let hint = "Largest number of training samples per network; a preset with fewer keeps its own number.";
+                count_ui(ui, "Maximum samples", hint, &mut form.samples, 1..=LARGEST_SAMPLES);
+            }
             let hint = "Largest number of epochs per training.";
-            count_ui(
-                ui,
-                "Maximum epochs",
-                hint,
-                &mut form.epochs,
-                1..=StoppingRules::MOST_EPOCHS,
-            );
+            let epochs = 1..=StoppingRules::MOST_EPOCHS;
+            count_ui(ui, "Maximum epochs", hint, &mut form.epochs, epochs);
         }
         Thoroughness::Full => {
-            dim_ui(
-                ui,
-                "Samples and epochs as in the presets: the best networks, at some minutes each.",
-            );
+            let text = match source {
+                SourceKind::Array => "Samples and epochs as in the presets: the best networks, at some minutes each.",
+                SourceKind::Recording => "As many epochs as in the Train view.",
+            };
+            dim_ui(ui, text);
         }
     }
-    let hint = "Number of samples on which the errors are measured.";
-    count_ui(ui, "Test samples", hint, &mut form.test_samples, 1..=LARGEST_SAMPLES);
+    if source == SourceKind::Array {
+        let hint = "Number of samples on which the errors are measured.";
+        count_ui(ui, "Test samples", hint, &mut form.test_samples, 1..=LARGEST_SAMPLES);
+    }
 }
 
 fn list_ui(ui: &mut Ui, name: &str, hint: &str, text: &mut String) {
@@ -136,10 +161,11 @@ fn progress_ui(ui: &mut Ui, trade: &TradeOffView, shared: &Shared) {
     };
     ui.add_space(space(1));
     let (done, all) = outcome.points();
-    progress_bar_ui(ui, "Measurement", done as f32 / all.max(1) as f32);
     let level = outcome.levels.iter().rposition(|level| !level.points.is_empty());
-    let noise = noise_name(outcome.plan.noises[level.unwrap_or(0)]);
-    dim_ui(ui, &format!("{done} of {all} points, at noise {noise}"));
+    let noise = outcome.levels.get(level.unwrap_or(0)).and_then(|level| level.noise);
+    let noise = noise.map_or_else(String::new, |noise| format!(", at noise {}", noise_name(noise)));
+    let text = format!("{done} of {all} points{noise}");
+    progress_bar_ui(ui, "Measurement", done as f32 / all.max(1) as f32, &text);
     if !trade.is_quiet(shared) {
         note_ui(
             ui,

@@ -1,63 +1,55 @@
-use crate::{
-    decoupling::DecoderKind,
-    evaluation::{Preset, SimulatedSettings},
-    scene::{Noise, Scene},
-};
+use crate::{decoupling::DecoderKind, evaluation::Preset, import::Setup, training::Method};
 
 /// A measurement as it is run.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TradeOffPlan {
-    /// Sensor, scene and seed.
-    pub base: SimulatedSettings,
-    /// Relative errors of a reading.
-    pub noises: Vec<f64>,
-    /// Presets on which the settings of the networks are based.
-    pub presets: Vec<Preset>,
-    /// Hidden nodes.
+    /// Levels, one after the other: those of noise of a simulated array, or a single one of a recording.
+    pub levels: Vec<PlannedLevel>,
+    /// Numbers of hidden nodes of the networks.
     pub hidden: Vec<usize>,
-    /// Ways of decoding.
+}
+
+/// Runs of a level.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PlannedLevel {
+    /// Relative error of a reading, if it is simulated.
+    pub noise: Option<f64>,
+    /// Runs by which its decoders are fitted.
+    pub runs: Vec<PlannedRun>,
+}
+
+/// A run by which decoders are fitted.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PlannedRun {
+    /// Preset from which its settings were derived, if they were.
+    pub preset: Option<Preset>,
+    /// Setup, but for the hidden nodes.
+    pub setup: Setup,
+    /// Decoders to be measured.
     pub decoders: Vec<DecoderKind>,
-    /// The most training samples and epochs, if not those of the presets.
-    pub at_most: Option<(usize, usize)>,
-    /// Number of samples on which the errors are measured.
-    pub test_samples: usize,
 }
 
 impl TradeOffPlan {
-    /// The settings of a preset at a level of noise, in the sensor and the scene of [`Self::base`]. Which rows are read,
-    /// and what networks are given of the readings, is the preset's.
-    pub fn settings(&self, preset: Preset, noise: f64) -> SimulatedSettings {
-        let noise = Noise {
-            relative: noise,
-            ..self.base.source.scene.noise
-        };
-        let mut settings = preset.settings_in(noise);
-        settings.source.sensor = self.base.source.sensor;
-        settings.seed = self.base.seed;
-        settings.source.scene = Scene {
-            rows: settings.source.scene.rows,
-            noise,
-            ..self.base.source.scene
-        };
-        settings.source.test_samples = self.test_samples;
-        if let Some((samples, epochs)) = self.at_most {
-            settings.source.samples = settings.source.samples.min(samples);
-            settings.source.validation_samples = settings
-                .source
-                .validation_samples
-                .min(settings.source.samples.div_ceil(5));
-            settings.training.stopping.epochs = settings.training.stopping.epochs.min(epochs);
-        }
-        settings
-    }
-
     /// Returns the number of points.
     pub fn points(&self) -> usize {
         let of_decoder = |kind: &DecoderKind| {
             let networks = if kind.needs_network() { self.hidden.len() } else { 1 };
             networks * kind.precisions().len()
         };
-        let of_preset: usize = self.decoders.iter().map(of_decoder).sum();
-        self.noises.len() * self.presets.len() * of_preset
+        let runs = self.levels.iter().flat_map(|level| &level.runs);
+        runs.flat_map(|run| &run.decoders).map(of_decoder).sum()
+    }
+
+    /// Name of the source.
+    pub fn source_name(&self) -> String {
+        let run = self.levels.iter().flat_map(|level| &level.runs).next();
+        run.map_or(String::new(), |run| run.setup.source_name())
+    }
+
+    /// Training methods of its networks on a recording; empty for an array, whose presets have theirs.
+    pub fn methods(&self) -> Vec<Method> {
+        let runs = self.levels.iter().flat_map(|level| &level.runs);
+        let recorded = runs.filter(|run| run.setup.plan().is_some());
+        recorded.map(|run| run.setup.settings().training.method).collect()
     }
 }

@@ -1,7 +1,8 @@
 use std::time::{Duration, Instant};
 
 use super::{
-    TradeOffForm, TradeOffFormError, TradeOffPlan,
+    TradeOffForm, TradeOffPlan,
+    plan::PlannedLevel,
     worker::{self, TradeOffEvent},
 };
 use crate::{
@@ -9,7 +10,8 @@ use crate::{
         job::{Job, Wake},
         shared::{Effect, Matter, Shared, View as _},
     },
-    evaluation::{SimulatedSettings, TradeOffLevel, TradeOffLimits, TradeOffPoint},
+    evaluation::{RunSettings, TradeOffLevel, TradeOffLimits, TradeOffPoint},
+    import::Setup,
 };
 
 /// The Trade-off view.
@@ -58,8 +60,12 @@ pub enum TradeOffEnding {
 pub struct TradeOffOutcome {
     /// Plan that is measured.
     pub plan: TradeOffPlan,
-    /// One for each level of noise.
+    /// One for each level of noise, or a single one of a recording.
     pub levels: Vec<TradeOffLevel>,
+    /// Decoders that cannot be used, each with its level and the reason.
+    pub refused: Vec<(usize, String)>,
+    /// Unit that is decoded at a time, such as "a sample", once it is known.
+    pub decoded: Option<String>,
     /// Ending of the measurement, once it has ended.
     pub ending: Option<TradeOffEnding>,
     /// Time it took, once it has ended.
@@ -67,10 +73,27 @@ pub struct TradeOffOutcome {
 }
 
 impl TradeOffOutcome {
-    /// Points measured and points asked for.
+    /// Points measured or refused, and points asked for.
     pub fn points(&self) -> (usize, usize) {
-        let done = self.levels.iter().map(|level| level.points.len()).sum();
-        (done, self.plan.points())
+        let measured: usize = self.levels.iter().map(|level| level.points.len()).sum();
+        (measured + self.refused.len(), self.plan.points())
+    }
+
+    /// Setup with which a point of a level was measured, to be trained.
+    pub fn setup_of(&self, level: usize, point: usize) -> Option<Setup> {
+        let point = self.levels.get(level)?.points.get(point)?;
+        let is_of = |setup: &Setup| {
+            let hidden = point.settings.hidden;
+            RunSettings {
+                hidden,
+                ..*setup.settings()
+            } == point.settings
+        };
+        let run = self.plan.levels.get(level)?.runs.iter();
+        let run = run
+            .filter(|run| run.preset == point.preset)
+            .find(|run| is_of(&run.setup))?;
+        Some(run.setup.with_settings(point.settings))
     }
 }
 
@@ -93,12 +116,12 @@ impl TradeOffView {
 
     /// Returns true if the form can be measured now.
     pub(super) fn can_measure(&self, shared: &Shared) -> bool {
-        self.running.is_none() && self.is_quiet(shared) && self.plan(&shared.draft).is_ok()
+        self.running.is_none() && self.is_quiet(shared) && self.plan(shared).is_ok()
     }
 
     /// Measures what the form says.
     pub(super) fn measure(&mut self, shared: &Shared, effects: &mut Vec<Effect>) {
-        let Ok(plan) = self.plan(&shared.draft) else { return };
+        let Ok(plan) = self.plan(shared) else { return };
         effects.push(Effect::Settle(Matter::TradeOff));
         self.begin(plan.clone());
         worker::measure(&mut self.job, plan);
@@ -110,25 +133,27 @@ impl TradeOffView {
         self.end(Instant::now());
     }
 
-    /// Returns the plan to be measured in the scene of these settings.
+    /// Returns the plan to be measured on the source of the Train view.
     ///
     /// # Errors
-    /// If the form is not a possible measurement.
-    pub fn plan(&self, base: &SimulatedSettings) -> Result<TradeOffPlan, TradeOffFormError> {
-        self.form.plan(base)
+    /// If the recording is incomplete or the form is not a possible measurement, with what to do.
+    pub fn plan(&self, shared: &Shared) -> Result<TradeOffPlan, String> {
+        self.form.plan(&shared.setup()?).map_err(|error| error.to_string())
     }
 
     /// Makes room for the points of `plan`.
     fn begin(&mut self, plan: TradeOffPlan) {
-        let level = |&noise: &f64| TradeOffLevel {
-            noise: Some(noise),
+        let level = |planned: &PlannedLevel| TradeOffLevel {
+            noise: planned.noise,
             points: Vec::new(),
         };
-        self.look.level = self.look.level.min(plan.noises.len() - 1);
+        self.look.level = self.look.level.min(plan.levels.len().saturating_sub(1));
         self.look.marked = None;
         self.running = Some(TradeOffRunning { begun: Instant::now() });
         self.outcome = Some(TradeOffOutcome {
-            levels: plan.noises.iter().map(level).collect(),
+            levels: plan.levels.iter().map(level).collect(),
+            refused: Vec::new(),
+            decoded: None,
             plan,
             ending: None,
             took: None,

@@ -5,8 +5,8 @@ use eframe::egui::Ui;
 use crate::{
     app::{
         plotting::hue_colour,
-        theme::{Theme, space},
-        widgets::{ColumnWidth, TableCell, TableClick, TableColumn, TableRow, scrolled_table_ui},
+        theme::Theme,
+        widgets::{ColumnWidth, TableCell, TableClick, TableColumn, TableRow, TableView},
     },
     evaluation::{TradeOffCost, TradeOffLevel, TradeOffPoint},
     export::format_number,
@@ -24,13 +24,14 @@ enum Figure {
 
 impl Figure {
     const ALL: [Self; 4] = [Self::Error, Self::ToLimit, Self::Frame, Self::Training];
-    const WIDTH: f32 = space(18);
 
-    fn heading(self) -> &'static str {
+    /// Heading; `has_nodes` is false for the targets of a recording.
+    fn heading(self, has_nodes: bool) -> &'static str {
         match self {
-            Self::Error => "Z %",
+            Self::Error if has_nodes => "Z %",
+            Self::Error => "% of range",
             Self::ToLimit => "× limit",
-            Self::Frame => "a frame",
+            Self::Frame => "decoding",
             Self::Training => "training",
         }
     }
@@ -67,17 +68,11 @@ pub fn table_ui(ui: &mut Ui, level: &TradeOffLevel, marked: &mut Option<usize>) 
     let figures: Vec<Figure> = figures
         .filter(|figure| has_limit || *figure != Figure::ToLimit)
         .collect();
-    let names = TableColumn {
-        heading: "",
-        is_figure: false,
-        width: ColumnWidth::Rest,
-    };
-    let columns = figures.iter().map(|figure| TableColumn {
-        heading: figure.heading(),
-        is_figure: true,
-        width: ColumnWidth::Points(Figure::WIDTH),
-    });
-    let columns: Vec<TableColumn<'_>> = [names].into_iter().chain(columns).collect();
+    let names = TableColumn::text("").width(ColumnWidth::Rest);
+    let headings = figures
+        .iter()
+        .map(|figure| TableColumn::figure(figure.heading(level.noise.is_some())));
+    let columns: Vec<TableColumn<'_>> = std::iter::once(names).chain(headings).collect();
     let frame_us = |number: usize| level.points[number].report.cost.frame_us;
     let mut order: Vec<usize> = (0..level.points.len()).collect();
     order.sort_by(|&a, &b| frame_us(a).total_cmp(&frame_us(b)));
@@ -88,30 +83,27 @@ pub fn table_ui(ui: &mut Ui, level: &TradeOffLevel, marked: &mut Option<usize>) 
         let is_chosen = on_fronts.contains(&true);
         let text = if is_chosen { palette.text } else { palette.dim };
         let name = point_name(point);
-        let name_cell = TableCell {
-            is_strong: is_chosen,
-            ..TableCell::plain(name.replace(" preset", ""), text)
-        };
+        let name_cell = TableCell::new(name.replace(" preset", ""))
+            .colour(text)
+            .strong(is_chosen);
         let texts: Vec<String> = figures.iter().map(|figure| figure.text(point)).collect();
         let label = format!("{name}: {}", texts.join(", "));
         let cells = figures.iter().zip(texts).map(|(figure, cell)| {
             // A cost is strong where nothing else costs as little for as small an error.
             let is_strong = figure.cost().is_some_and(|cost| on_fronts[cost]);
-            TableCell {
-                is_strong,
-                ..TableCell::plain(cell, if is_strong { palette.accent } else { text })
-            }
+            let colour = if is_strong { palette.accent } else { text };
+            TableCell::new(cell).colour(colour).strong(is_strong)
         });
-        TableRow {
-            label,
-            is_marked: *marked == Some(number),
-            meaning: MEANING,
-            dot: Some(hue_colour(point.report.kind.colour().into(), palette)),
-            cells: [name_cell].into_iter().chain(cells).collect(),
-        }
+        TableRow::new(std::iter::once(name_cell).chain(cells))
+            .labelled(label)
+            .selected(*marked == Some(number))
+            .meaning(MEANING)
+            .dot(hue_colour(point.report.kind.colour().into(), palette))
     };
-    let click = scrolled_table_ui(ui, "trade table", &columns, None, order.len(), row);
-    if let Some(TableClick::Mark(place) | TableClick::Open(place)) = click {
+    let click = TableView::new("trade table", &columns)
+        .clickable()
+        .show(ui, order.len(), row);
+    if let Some(TableClick::Select(place) | TableClick::Open(place)) = click {
         *marked = Some(order[place]);
     }
 }

@@ -9,9 +9,9 @@ use super::{
 use crate::{
     app::{
         plotting::legend_ui,
-        shared::{Effect, Export, Matter, Notice, Offers, Shared, Unfinished, View},
+        shared::{Effect, Export, Matter, Notice, Offers, Shared, SourceKind, Unfinished, View, sentence},
         theme::{Theme, semibold, space, type_size},
-        widgets::{card_ui, dim_ui, invitation_ui, placeholder_ui, scrolled_ui, segmented_ui, state_ui},
+        widgets::{card_ui, dim_ui, invitation_ui, note_ui, placeholder_ui, scrolled_ui, segmented_ui, state_ui},
     },
     export::format_duration,
     figure::trade_off_figure,
@@ -26,7 +26,17 @@ impl View for TradeOffView {
     fn take_news(&mut self, _shared: &Shared, effects: &mut Vec<Effect>) {
         while let Some(event) = self.job.next_event() {
             match event {
+                TradeOffEvent::Decodes(unit) => {
+                    if let Some(outcome) = &mut self.outcome {
+                        outcome.decoded = Some(unit);
+                    }
+                }
                 TradeOffEvent::Measured(level, point) => self.record(level, *point),
+                TradeOffEvent::Refused(level, reason) => {
+                    if let Some(outcome) = &mut self.outcome {
+                        outcome.refused.push((level, reason));
+                    }
+                }
                 TradeOffEvent::Ended(result) => {
                     self.end(Instant::now());
                     effects.extend(
@@ -93,11 +103,22 @@ fn trade_ui(ui: &mut Ui, trade: &mut TradeOffView, shared: &Shared, effects: &mu
     let can_load = !shared.phase.is_busy();
     let whole = ui.available_rect_before_wrap();
     let (Some(outcome), Some(level)) = (&trade.outcome, trade.shown()) else {
-        let text = "The error, the time for a frame and the training time of every decoder at several noise levels, measured \
-                    on this machine.";
+        let text = match (shared.source, shared.setup()) {
+            (SourceKind::Array, _) => {
+                "The error, the time for a frame and the training time of every decoder at several noise levels, measured \
+                 on this machine."
+                    .to_owned()
+            }
+            (SourceKind::Recording, Ok(_)) => {
+                "The error, the decoding time and the training time of every decoder on the test samples of the recording, \
+                 measured on this machine."
+                    .to_owned()
+            }
+            (SourceKind::Recording, Err(obstacle)) => obstacle,
+        };
         let mut is_wanted = false;
         card_ui(ui, whole, |ui| {
-            is_wanted = invitation_ui(ui, text, "Measure now", trade.can_measure(shared));
+            is_wanted = invitation_ui(ui, &text, "Measure now", trade.can_measure(shared));
         });
         if is_wanted {
             trade.measure(shared, effects);
@@ -125,6 +146,11 @@ fn trade_ui(ui: &mut Ui, trade: &mut TradeOffView, shared: &Shared, effects: &mu
     let choices_width = (0.4 * lower.width()).clamp(space(76), space(105));
     let (left, right) = lower.split_left_right_at_x(lower.right() - choices_width);
     card_ui(ui, left.with_max_x(left.max.x - gap), |ui| {
+        let mut refused = outcome.refused.iter().filter(|(of, _)| *of == look.level).peekable();
+        if refused.peek().is_some() {
+            let reasons = Vec::from_iter(refused.map(|(_, reason)| sentence(reason)));
+            note_ui(ui, &reasons.join("\n"));
+        }
         table_ui(ui, level, &mut look.marked);
     });
     card_ui(ui, right, |ui| {
@@ -133,10 +159,10 @@ fn trade_ui(ui: &mut Ui, trade: &mut TradeOffView, shared: &Shared, effects: &mu
         });
     });
     ui.allocate_rect(whole, Sense::hover());
-    let settings = loaded.and_then(|point| level.points.get(point)?.settings.simulated());
+    let setup = loaded.and_then(|point| outcome.setup_of(trade.look.level, point));
     trade.look = look;
-    if let Some(settings) = settings {
-        effects.extend([Effect::Configure(Box::new(settings)), Effect::ShowTraining]);
+    if let Some(setup) = setup {
+        effects.extend([Effect::TakeSetup(Box::new(setup)), Effect::ShowTraining]);
     }
 }
 
@@ -150,9 +176,13 @@ fn head_ui(ui: &mut Ui, outcome: &TradeOffOutcome, look: &mut TradeOffLook) {
     });
 }
 
-/// Few levels stand side by side, many in a list.
+/// Few levels are next to each other, many in a list; a recording has only one, without a name.
 fn level_ui(ui: &mut Ui, outcome: &TradeOffOutcome, look: &mut TradeOffLook) {
-    let names: Vec<String> = outcome.plan.noises.iter().map(|&noise| noise_name(noise)).collect();
+    let noises = outcome.levels.iter().filter_map(|level| level.noise);
+    let names: Vec<String> = noises.map(noise_name).collect();
+    if names.is_empty() {
+        return;
+    }
     let picked = if names.len() <= 5 {
         let options: Vec<_> = names
             .iter()
@@ -181,10 +211,15 @@ fn level_ui(ui: &mut Ui, outcome: &TradeOffOutcome, look: &mut TradeOffLook) {
 /// Returns the hint shown while a noise level has no points.
 fn waiting(is_running: bool) -> &'static str {
     if is_running {
-        "Points at this noise level appear here as they are measured."
+        "The points appear here as they are measured."
     } else {
-        "The measurement ended before this noise level."
+        "The measurement ended before the first point."
     }
+}
+
+/// Returns true for a simulated array.
+fn has_noise(outcome: &TradeOffOutcome) -> bool {
+    outcome.levels.iter().any(|level| level.noise.is_some())
 }
 
 /// Shows the state of the measurement in the line at the bottom.
@@ -210,7 +245,9 @@ fn status_ui(ui: &mut Ui, trade: &TradeOffView) {
     ui.horizontal_centered(|ui| {
         state_ui(ui, colour, &text);
         if let Some(outcome) = &trade.outcome {
-            let text = format!("{}, one thread, median of many", outcome.plan.base.source.sensor.scale);
+            let unit = outcome.decoded.as_deref().filter(|_| !has_noise(outcome));
+            let unit = unit.map_or_else(String::new, |unit| format!(", times of {unit}"));
+            let text = format!("{}, one thread, median of many{unit}", outcome.plan.source_name());
             ui.label(RichText::new(text).size(type_size().note).color(palette.dim));
         }
     });

@@ -1,8 +1,8 @@
-use eframe::egui::{Key, Modifiers, Ui, UiBuilder};
+use eframe::egui::{ComboBox, Key, Modifiers, Ui, UiBuilder};
 
 use super::{
     bottom_tab::BottomTab,
-    chart::chart_figure,
+    chart::{Chart, chart},
     inspect::{Along, bar_nodes_ui, section_bar_ui, take_pointed},
     press::readings_ui,
     scrub::{self, scrub_bar_ui},
@@ -10,23 +10,14 @@ use super::{
 };
 use crate::{
     app::{
-        plotting::{Pointer, legend_behind_ui, legend_ui, plots_ui},
-        shared::{Effect, Offers, Phase, Shared},
-        theme::space,
+        plotting::{Pointer, cells_ui, legend_behind_ui, legend_ui, plots_ui},
+        shared::{Effect, Offers, Phase, Shared, SourceKind},
+        theme::{Theme, space},
         widgets::{invitation_ui, tabs_ui},
     },
-    figure::ErrorBins,
+    evaluation::Channel,
+    figure::{ErrorBins, PlotFigure},
 };
-
-const TABS: [(BottomTab, &str); 7] = [
-    (BottomTab::Loss, "Loss"),
-    (BottomTab::TrainingState, "Training state"),
-    (BottomTab::ErrorHistogram, "Histogram"),
-    (BottomTab::Regression, "Regression"),
-    (BottomTab::Nodes, "Nodes"),
-    (BottomTab::Section, "Section"),
-    (BottomTab::Readings, "Readings"),
-];
 
 /// Width of the list of nodes beside the histogram.
 const LIST_WIDTH: f32 = space(57);
@@ -34,15 +25,13 @@ const LIST_WIDTH: f32 = space(57);
 /// Width of a card below which the longest name of a tab is cut.
 const NARROW: f32 = space(106);
 
-/// The tabs with their names.
-fn tabs(is_narrow: bool, has_readings: bool) -> Vec<(BottomTab, &'static str)> {
-    let tabs = TABS
-        .into_iter()
-        .filter(|(tab, _)| has_readings || *tab != BottomTab::Readings);
+/// The tabs with their names, shorter where the card is narrow.
+fn tabs(shared: &Shared, is_narrow: bool, has_readings: bool) -> Vec<(BottomTab, &'static str)> {
     let short = |(tab, name)| match tab {
         BottomTab::TrainingState if is_narrow => (tab, "State"),
         _ => (tab, name),
     };
+    let tabs = BottomTab::offered(shared, has_readings).into_iter();
     tabs.map(short).collect()
 }
 
@@ -54,22 +43,29 @@ pub fn charts_card_ui(
     has_readings: bool,
     effects: &mut Vec<Effect>,
 ) {
-    if view.tab == BottomTab::Readings && !has_readings {
+    let tabs = tabs(shared, ui.available_width() < NARROW, has_readings);
+    if !tabs.iter().any(|(tab, _)| *tab == view.tab) {
         view.tab = BottomTab::default();
     }
-    let figure = chart_figure(view, shared);
-    let before = (view.tab, view.has_error_bars);
-    let has_choice = view.tab == BottomTab::Nodes && shared.result().is_some();
+    let chart = chart(view, shared);
+    let keys = match &chart {
+        Some(Chart::Plots(figure)) => &figure.keys[..],
+        _ => &[],
+    };
+    let before = (view.tab, view.has_error_bars, view.target);
+    let has_choice = has_choice(view, shared);
     let has_room = ui.horizontal(|ui| {
-        let tabs = tabs(ui.available_width() < NARROW, has_readings);
         view.tab = tabs_ui(ui, "Charts", &tabs, view.tab).unwrap_or(view.tab);
         // The choice takes the legend's place.
-        !has_choice && figure.as_ref().is_none_or(|figure| legend_behind_ui(ui, &figure.keys))
+        !has_choice && legend_behind_ui(ui, keys)
     });
     let has_room = if has_choice {
         ui.horizontal(|ui| {
-            error_bars_ui(ui, &mut view.has_error_bars);
-            figure.as_ref().is_none_or(|figure| legend_behind_ui(ui, &figure.keys))
+            match shared.recorded_test() {
+                None => error_bars_ui(ui, &mut view.has_error_bars),
+                Some(test) => view.target = target_ui(ui, &test.problem.targets, view.target_of(test)),
+            }
+            legend_behind_ui(ui, keys)
         })
     } else {
         has_room
@@ -77,48 +73,72 @@ pub fn charts_card_ui(
     if let (BottomTab::Section, Some(test)) = (view.tab, shared.test()) {
         section_bar_ui(ui, &mut view.section, test);
     }
-    match figure {
-        Some(figure) => {
-            if !has_room.inner {
-                legend_ui(ui, &figure.keys);
-            }
-            let past = shared.shown_run().map(|run| &run.past);
-            let past = past.filter(|past| before.0 == BottomTab::Loss && past.epochs().len() > 1);
-            let mut plots = ui.available_rect_before_wrap();
-            if past.is_some() {
-                plots.max.y -= scrub::HEIGHT;
-            }
-            let has_list = before.0 == BottomTab::ErrorHistogram && view.lights.bar.is_some();
-            let list = plots.split_left_right_at_x(plots.right() - LIST_WIDTH).1;
-            if has_list {
-                plots.max.x = list.left() - space(3);
-            }
-            let lights = (view.lights.node, view.lights.bar);
-            // Each tab is zoomed by itself.
-            ui.scope_builder(UiBuilder::new().max_rect(plots), |ui| {
-                let drawn = plots_ui(ui, before.0.file_word(), &figure, Pointer::Moves);
-                take_pointed(view, before.0, &drawn, shared);
-            });
-            if has_list {
-                ui.scope_builder(UiBuilder::new().max_rect(list), |ui| bar_nodes_ui(ui, view, shared));
-            }
-            if (view.lights.node, view.lights.bar) != lights {
-                ui.request_repaint();
-            }
-            if let Some(past) = past {
-                scrub_bar_ui(ui, &mut view.scrub, past);
+    if !has_room.inner && !keys.is_empty() {
+        legend_ui(ui, keys);
+    }
+    match &chart {
+        Some(Chart::Plots(figure)) => plots_of_view_ui(ui, before.0, figure, view, shared),
+        Some(Chart::Map(map)) => {
+            let marked = (&[][..], &[][..], Theme::of(ui).palette.warning);
+            if let Some(([row, column], response)) = cells_ui(ui, "Error over the position", map, marked) {
+                response.on_hover_text_at_pointer(&map.notes[[row, column]]);
             }
         }
         None if view.tab == BottomTab::Readings => readings_of_view_ui(ui, view, shared),
         None => {
             let is_possible = !shared.phase.is_busy() && shared.phase != Phase::Died;
-            if invitation_ui(ui, hint_of_empty_chart(view.tab), "Train now", is_possible) {
+            let hint = hint_of_empty_chart(view.tab, shared.source);
+            if invitation_ui(ui, hint, "Train now", is_possible) {
                 effects.push(Effect::Train);
             }
         }
     }
-    if (view.tab, view.has_error_bars) != before {
+    if (view.tab, view.has_error_bars, view.target) != before {
         ui.request_repaint();
+    }
+}
+
+/// Returns true if the chart on show offers a choice: error bars, or the target of a recording that has several.
+fn has_choice(view: &TrainView, shared: &Shared) -> bool {
+    let of_target = || {
+        let test = shared.recorded_test();
+        test.is_some_and(|test| test.set.outputs() > 1)
+    };
+    shared.result().is_some()
+        && match view.tab {
+            BottomTab::Nodes => true,
+            BottomTab::ErrorHistogram | BottomTab::Regression => of_target(),
+            _ => false,
+        }
+}
+
+/// The plots of the chart `tab`, what belongs below or beside them, and what the pointer does there.
+fn plots_of_view_ui(ui: &mut Ui, tab: BottomTab, figure: &PlotFigure, view: &mut TrainView, shared: &Shared) {
+    let past = shared.shown_run().map(|run| &run.past);
+    let past = past.filter(|past| tab == BottomTab::Loss && past.epochs().len() > 1);
+    let mut plots = ui.available_rect_before_wrap();
+    if past.is_some() {
+        plots.max.y -= scrub::HEIGHT;
+    }
+    let has_list = tab == BottomTab::ErrorHistogram && view.lights.bar.is_some();
+    let list = plots.split_left_right_at_x(plots.right() - LIST_WIDTH).1;
+    if has_list {
+        plots.max.x = list.left() - space(3);
+    }
+    let lights = (view.lights.node, view.lights.bar);
+    // Each tab is zoomed by itself.
+    ui.scope_builder(UiBuilder::new().max_rect(plots), |ui| {
+        let drawn = plots_ui(ui, tab.file_word(), figure, Pointer::Moves);
+        take_pointed(view, tab, &drawn, shared);
+    });
+    if has_list {
+        ui.scope_builder(UiBuilder::new().max_rect(list), |ui| bar_nodes_ui(ui, view, shared));
+    }
+    if (view.lights.node, view.lights.bar) != lights {
+        ui.request_repaint();
+    }
+    if let Some(past) = past {
+        scrub_bar_ui(ui, &mut view.scrub, past);
     }
 }
 
@@ -143,16 +163,15 @@ pub fn readings_of_view_ui(ui: &mut Ui, view: &mut TrainView, shared: &Shared) {
 impl TrainView {
     /// Offers each chart, and the steps through what one of them shows.
     pub(super) fn offer_charts(&mut self, offers: &mut Offers<'_>, shared: &Shared) {
-        for (tab, name) in TABS {
-            // Readings have a card of their own where there is room.
-            if tab != BottomTab::Readings && offers.offer(format!("Chart: {name}"), tab != self.tab) {
+        // Readings have a card of their own where there is room.
+        for (tab, name) in BottomTab::offered(shared, false) {
+            if offers.offer(format!("Chart: {name}"), tab != self.tab) {
                 self.tab = tab;
             }
         }
-        let Some(test) = shared.test() else { return };
         let steps = [(-1, "Previous", Key::OpenBracket), (1, "Next", Key::CloseBracket)];
-        match self.tab {
-            BottomTab::Section => {
+        match (self.tab, shared.test()) {
+            (BottomTab::Section, Some(test)) => {
                 for (by, word, key) in steps {
                     let is_possible = self.section.can_step(by, test);
                     if offers.offer_keys(format!("{word} section"), Modifiers::NONE, key, is_possible) {
@@ -167,7 +186,7 @@ impl TrainView {
                     self.section.along = other;
                 }
             }
-            BottomTab::ErrorHistogram => {
+            (BottomTab::ErrorHistogram, _) => {
                 let bar = self.lights.bar.unwrap_or(ErrorBins::COUNT / 2);
                 for (by, word, key) in steps {
                     let next = bar.checked_add_signed(by).filter(|bar| *bar < ErrorBins::COUNT);
@@ -193,15 +212,41 @@ fn error_bars_ui(ui: &mut Ui, has_bars: &mut bool) {
     ui.checkbox(has_bars, "Error bars").on_hover_text(hint);
 }
 
+/// The choice of the target whose values the chart shows; returns the one chosen.
+fn target_ui(ui: &mut Ui, targets: &[Channel], mut target: usize) -> usize {
+    let label = ui.label("Target");
+    let selected = targets.get(target).map_or_else(String::new, Channel::title);
+    let combo = ComboBox::from_id_salt("target of the charts").selected_text(selected);
+    let picked = combo.show_ui(ui, |ui| {
+        for (index, of) in targets.iter().enumerate() {
+            ui.selectable_value(&mut target, index, of.title());
+        }
+    });
+    picked.response.labelled_by(label.id);
+    target
+}
+
 /// Returns the hint shown in an empty chart.
-fn hint_of_empty_chart(tab: BottomTab) -> &'static str {
-    match tab {
-        BottomTab::Loss => "The error of each epoch appears here while the network trains.",
-        BottomTab::TrainingState => {
+fn hint_of_empty_chart(tab: BottomTab, source: SourceKind) -> &'static str {
+    match (tab, source) {
+        (BottomTab::Loss, _) => "The error of each epoch appears here while the network trains.",
+        (BottomTab::TrainingState, _) => {
             "The gradient and the method's own quantities appear here while the network trains."
         }
-        BottomTab::ErrorHistogram => "The distribution of the z errors in the test set appears here.",
-        BottomTab::Regression => "Decoupled against actual z of every node in the test set appears here.",
-        BottomTab::Nodes | BottomTab::Section | BottomTab::Readings => "",
+        (BottomTab::ErrorHistogram, SourceKind::Array) => {
+            "The distribution of the z errors in the test set appears here."
+        }
+        (BottomTab::ErrorHistogram, SourceKind::Recording) => {
+            "The distribution of the errors of each target in the test set appears here."
+        }
+        (BottomTab::Regression, SourceKind::Array) => {
+            "Decoupled against actual z of every node in the test set appears here."
+        }
+        (BottomTab::Regression, SourceKind::Recording) => {
+            "Decoded against actual values of each target in the test set appear here."
+        }
+        (BottomTab::Sample | BottomTab::ErrorMap | BottomTab::Nodes | BottomTab::Section | BottomTab::Readings, _) => {
+            ""
+        }
     }
 }

@@ -5,27 +5,31 @@ use ndarray::Array2;
 use crate::{
     app::{
         shared::{RunResult, Shared},
-        test_view::{Frame, TestView},
+        test_view::{Frame, Positions, RecordedTest, TestView},
     },
     dataset::Dataset,
     evaluation::node_rms_mm,
-    figure::z_pairs_mm,
+    figure::{TargetSurface, surface::Surface, target_pairs, z_pairs_mm},
 };
 
-/// Drawings of the test set on show. They are made anew only when that, the result or the snapshot changes.
+/// Drawings of the test set on show. They are made only when that, the result, the snapshot or the target changes.
 #[derive(Debug, Default)]
 pub struct Drawn {
     /// The snapshot on show.
     pub frames: Frames,
     /// Drops of its readings below those at rest, in percent: rows read × M4.
     pub drops_percent: Option<Array2<f64>>,
+    /// Surfaces of a sample of a recording, where one goes through its targets: actual, decoded, and their difference.
+    pub target_surfaces: Option<[Surface; 3]>,
     of: Option<Of>,
     snapshot: usize,
+    /// The target of [`Self::pairs`]; none of the nodes of an array.
+    target: Option<usize>,
     spread_mm: OnceCell<Vec<f64>>,
-    pairs_mm: OnceCell<Vec<(f64, f64)>>,
+    pairs: OnceCell<Vec<(f64, f64)>>,
 }
 
-/// The snapshot being drawn.
+/// The snapshot being drawn. Of a recording the height of a node is the value of its target, in its unit.
 #[derive(Clone, Debug, Default)]
 pub struct Frames {
     /// As it is.
@@ -38,62 +42,131 @@ pub struct Frames {
 #[derive(Debug)]
 struct Of {
     test: Arc<Dataset>,
-    decoupled_mm: Option<Arc<Array2<f64>>>,
+    answers: Option<Arc<Array2<f64>>>,
 }
 
 impl Of {
-    fn is(&self, test: &TestView, decoupled_mm: Option<&Arc<Array2<f64>>>) -> bool {
-        let is_same_result = match (&self.decoupled_mm, decoupled_mm) {
+    fn is(&self, test: &Arc<Dataset>, answers: Option<&Arc<Array2<f64>>>) -> bool {
+        let is_same_result = match (&self.answers, answers) {
             (Some(one), Some(other)) => Arc::ptr_eq(one, other),
             (one, other) => one.is_none() && other.is_none(),
         };
-        is_same_result && Arc::ptr_eq(&self.test, &test.set)
+        is_same_result && Arc::ptr_eq(&self.test, test)
     }
 }
 
 impl Drawn {
     /// Follows the test set on show and the network's `result` on it, at the snapshot nearest to the one wished for.
-    /// Returns that one.
-    pub(super) fn follow(&mut self, shared: &Shared, result: Option<&RunResult>, snapshot: usize) -> usize {
-        let Some(test) = shared.test() else { return snapshot };
-        let snapshot = test.nearest_snapshot(snapshot);
-        let decoupled_mm = result.map(|result| &result.answers);
-        let is_same = self.of.as_ref().is_some_and(|of| of.is(test, decoupled_mm));
-        if is_same && self.snapshot == snapshot {
-            return snapshot;
+    /// `target` is the one whose values a recording's charts show. Returns the snapshot.
+    pub(super) fn follow(
+        &mut self,
+        shared: &Shared,
+        result: Option<&RunResult>,
+        snapshot: usize,
+        target: usize,
+    ) -> usize {
+        match (shared.test(), shared.recorded_test()) {
+            (Some(test), _) => self.follow_array(test, result, snapshot),
+            (None, Some(test)) => self.follow_recording(test, result, snapshot, target),
+            (None, None) => {
+                *self = Self::default();
+                snapshot
+            }
         }
-        let is_same_test = self.of.as_ref().is_some_and(|of| Arc::ptr_eq(&of.test, &test.set));
-        // The surface of what is actual stays while the network learns.
-        let actual = (is_same_test && self.snapshot == snapshot).then(|| std::mem::take(&mut self.frames.actual));
+    }
+
+    /// Forgets what is of another test set, result or snapshot. Returns true if nothing is left to be drawn.
+    fn is_drawn(&mut self, test: &Arc<Dataset>, result: Option<&RunResult>, snapshot: usize) -> bool {
+        let answers = result.map(|result| &result.answers);
+        let is_same = self.of.as_ref().is_some_and(|of| of.is(test, answers));
+        if is_same && self.snapshot == snapshot {
+            return true;
+        }
         if !is_same {
+            let is_same_test = self.of.as_ref().is_some_and(|of| Arc::ptr_eq(&of.test, test));
+            // The surface of what is actual stays while the network learns.
+            let actual = if is_same_test && self.snapshot == snapshot {
+                std::mem::take(&mut self.frames.actual)
+            } else {
+                Frame::default()
+            };
             *self = Self {
                 of: Some(Of {
-                    test: Arc::clone(&test.set),
-                    decoupled_mm: decoupled_mm.cloned(),
+                    test: Arc::clone(test),
+                    answers: answers.cloned(),
                 }),
+                frames: Frames {
+                    actual,
+                    decoupled: None,
+                },
                 ..Self::default()
             };
+        } else {
+            self.frames = Frames::default();
         }
         self.snapshot = snapshot;
+        false
+    }
+
+    fn follow_array(&mut self, test: &TestView, result: Option<&RunResult>, snapshot: usize) -> usize {
+        let snapshot = test.nearest_snapshot(snapshot);
+        if self.is_drawn(&test.set, result, snapshot) {
+            return snapshot;
+        }
         self.drops_percent = test.drops_percent(&test.readings_ohm(snapshot));
-        let actual = actual.unwrap_or_else(|| test.frame(test.set.targets(), snapshot));
-        let decoupled = result.map(|result| match &result.frame {
-            Some((of, frame)) if *of == snapshot => frame.clone(),
-            _ => test.frame(result.answers.view(), snapshot),
+        if self.frames.actual.nodes_mm.is_empty() {
+            self.frames.actual = test.frame(test.set.targets(), snapshot);
+        }
+        let actual = &self.frames.actual;
+        self.frames.decoupled = result.map(|result| {
+            let decoupled = match &result.frame {
+                Some((of, frame)) if *of == snapshot => frame.clone(),
+                _ => test.frame(result.answers.view(), snapshot),
+            };
+            let error = actual.error_of(&decoupled);
+            (decoupled, error)
+        });
+        snapshot
+    }
+
+    fn follow_recording(
+        &mut self,
+        test: &RecordedTest,
+        result: Option<&RunResult>,
+        sample: usize,
+        target: usize,
+    ) -> usize {
+        let sample = sample.min(test.set.samples().saturating_sub(1));
+        let is_drawn = self.is_drawn(&test.set, result, sample);
+        if self.target != Some(target) {
+            (self.target, self.pairs) = (Some(target), OnceCell::new());
+        }
+        if let (false, Positions::Surface(through)) = (is_drawn, &test.positions) {
+            self.draw_targets(test, through, result);
+        }
+        sample
+    }
+
+    /// Draws the surfaces through the targets of the sample on show.
+    fn draw_targets(&mut self, test: &RecordedTest, through: &TargetSurface, result: Option<&RunResult>) {
+        let actual = test.set.targets().row(self.snapshot).to_vec();
+        let decoded = result.map(|result| result.answers.row(self.snapshot).to_vec());
+        let range = through.range_of(&test.ranges);
+        let surfaces = through.surfaces(&actual, decoded.as_ref().unwrap_or(&actual), range);
+        let [actual, found, error] = surfaces.each_ref().map(|surface| Frame {
+            nodes_mm: Arc::clone(&surface.nodes),
+            grid_mm: Arc::clone(&surface.values),
         });
         self.frames = Frames {
-            decoupled: decoupled.map(|decoupled| {
-                let error = actual.error_of(&decoupled);
-                (decoupled, error)
-            }),
             actual,
+            decoupled: decoded.map(|_| (found, error)),
         };
-        snapshot
+        self.target_surfaces = Some(surfaces);
     }
 
     fn result(&self) -> Option<(&Dataset, &Array2<f64>)> {
         let of = self.of.as_ref()?;
-        Some((&of.test, of.decoupled_mm.as_ref()?))
+        Some((&of.test, of.answers.as_ref()?))
     }
 
     /// Returns the root mean square error of each node, once there is a result: [`node_rms_mm`].
@@ -102,10 +175,14 @@ impl Drawn {
         Some(self.spread_mm.get_or_init(|| node_rms_mm(test, decoupled_mm)))
     }
 
-    /// Actual and decoupled z of the nodes of the test set, in millimetres, once there is a result.
-    pub fn pairs_mm(&self) -> Option<&[(f64, f64)]> {
-        let (test, decoupled_mm) = self.result()?;
-        Some(self.pairs_mm.get_or_init(|| z_pairs_mm(test, decoupled_mm)))
+    /// Actual and decoded values of the test set, once there is a result: z of the nodes of an array in millimetres, or the
+    /// values of the target on show in its unit.
+    pub fn pairs(&self) -> Option<&[(f64, f64)]> {
+        let (test, answers) = self.result()?;
+        Some(self.pairs.get_or_init(|| match self.target {
+            None => z_pairs_mm(test, answers),
+            Some(target) => target_pairs(test, answers, target),
+        }))
     }
 }
 
@@ -155,33 +232,29 @@ mod tests {
             baselines: *run.baselines().unwrap(),
         }));
         let mut drawn = Drawn::default();
-        drawn.follow(&shared, shared.result(), 0);
-        assert!(drawn.pairs_mm().is_none() && drawn.frames.decoupled.is_none());
+        drawn.follow(&shared, shared.result(), 0, 0);
+        assert!(drawn.pairs().is_none() && drawn.frames.decoupled.is_none());
 
         shared.run.as_mut().unwrap().result = Some(result(&run));
-        assert_eq!(drawn.follow(&shared, shared.result(), 0), 0);
+        assert_eq!(drawn.follow(&shared, shared.result(), 0, 0), 0);
         let first = z_pairs_mm(run.test(), &run.decouple_test());
-        assert_eq!(drawn.pairs_mm(), Some(&first[..]));
-        let (pairs, spread) = (drawn.pairs_mm().unwrap().as_ptr(), drawn.spread_mm().unwrap().as_ptr());
+        assert_eq!(drawn.pairs(), Some(&first[..]));
+        let (pairs, spread) = (drawn.pairs().unwrap().as_ptr(), drawn.spread_mm().unwrap().as_ptr());
         let actual = drawn.frames.actual.nodes_mm.clone();
         assert_eq!(
-            drawn.follow(&shared, shared.result(), 1_000_000),
+            drawn.follow(&shared, shared.result(), 1_000_000, 0),
             3,
             "the last of four snapshots"
         );
         assert_ne!(drawn.frames.actual.nodes_mm, actual);
-        assert_eq!(
-            drawn.pairs_mm().unwrap().as_ptr(),
-            pairs,
-            "not made again for a snapshot"
-        );
+        assert_eq!(drawn.pairs().unwrap().as_ptr(), pairs, "not made again for a snapshot");
         assert_eq!(drawn.spread_mm().unwrap().as_ptr(), spread);
 
         run.step();
         shared.run.as_mut().unwrap().result = Some(result(&run));
-        drawn.follow(&shared, shared.result(), 3);
+        drawn.follow(&shared, shared.result(), 3, 0);
         let next = z_pairs_mm(run.test(), &run.decouple_test());
         assert_ne!(next, first);
-        assert_eq!(drawn.pairs_mm(), Some(&next[..]));
+        assert_eq!(drawn.pairs(), Some(&next[..]));
     }
 }

@@ -1,12 +1,18 @@
 //! Exports of the training on show.
 
-use super::{chart::chart_figure, state::TrainView, surfaces::surface_figure};
+use super::{
+    bottom_tab::has_target_surface,
+    chart::{all_targets_figure, chart},
+    state::TrainView,
+    surfaces::surface_figure,
+};
 use crate::{
     app::shared::{
         Ask, Contents, Effect, Export, ExportGroup, FileTask, FileWords, NetworkSource, Phase, Purpose, RunResult,
-        RunView, Shared, copy_exports, error_table_export, file_stem, loss_export, network_exports, picture_exports,
+        RunView, Shared, SourceKind, copy_exports, csv_export, error_table_export, file_stem, loss_export,
+        network_exports, picture_exports,
     },
-    evaluation::{DecoderReport, TestErrors},
+    evaluation::DecoderReport,
     export::{decoder_table, error_table},
     figure::{Figure, surface::ViewMode},
 };
@@ -23,6 +29,12 @@ const OPENED: FileWords = FileWords {
     description: "Opens a training saved here or by train --checkpoint in a terminal, with its settings and its \
                   history, and pauses it. A resumed training gives bit-identical results.",
     ..CHECKPOINT
+};
+
+const DECODERS: FileWords = FileWords {
+    kind: "decoder table",
+    description: "Errors and times of the measured decoders with every digit, as CSV.",
+    extensions: &["csv"],
 };
 
 /// Task of saving the checkpoint of `run`.
@@ -56,15 +68,16 @@ pub(super) fn train_exports<'a>(view: &'a TrainView, shared: &'a Shared) -> Vec<
             .map_or_else(|_| String::new(), |run| file_stem(what, &run.setup))
     };
     let mut exports = networks(view, &shown);
-    let what = match shared.look.mode {
-        ViewMode::ThreeD => "surfaces",
-        ViewMode::Top => "surfaces-top",
+    let (name, what) = match shared.look.mode {
+        _ if shared.source == SourceKind::Recording && !has_target_surface(shared) => ("Sample", "sample"),
+        ViewMode::ThreeD => ("Surfaces", "surfaces"),
+        ViewMode::Top => ("Surfaces", "surfaces-top"),
     };
-    let surfaces = run.clone().map(|_| || Figure::from(surface_figure(view, shared)));
-    exports.extend(picture_exports("Surfaces", stem(what), surfaces));
+    let surfaces = run.clone().map(|_| || upper_figure(view, shared));
+    exports.extend(picture_exports(name, stem(what), surfaces));
     let chart = run.clone().and_then(|_| {
-        let figure = chart_figure(view, shared).ok_or("This chart has nothing to show yet.")?;
-        Ok(move || Figure::from(figure.clone()))
+        let figure = Figure::from(chart(view, shared).ok_or("This chart has nothing to show yet.")?);
+        Ok(move || figure.clone())
     });
     exports.extend(picture_exports("Chart", stem(view.tab.file_word()), chart));
     let errors = shown.clone().map(|(run, latest)| {
@@ -81,8 +94,14 @@ pub(super) fn train_exports<'a>(view: &'a TrainView, shared: &'a Shared) -> Vec<
         if reports.is_empty() {
             return Err("No decoder is measured yet: unfold “More decoders”.".to_owned());
         }
-        Ok(move || decoder_table(&reports, run.baselines.reference.as_ref().and_then(TestErrors::nodes)))
+        Ok(move || decoder_table(&run.problem, &reports, run.baselines.reference.as_ref()))
     });
+    exports.push(csv_export(
+        "Decoder table",
+        DECODERS,
+        stem("decoders"),
+        decoders.clone(),
+    ));
     exports.extend(copy_exports("Decoder table", decoders));
     let standing = run.and_then(|run| match shared.phase {
         Phase::Paused | Phase::Ended(_) => Ok(run),
@@ -97,6 +116,15 @@ pub(super) fn train_exports<'a>(view: &'a TrainView, shared: &'a Shared) -> Vec<
         ask: standing.map(|run| -> Ask<'a> { Box::new(|| Effect::ChooseFile(checkpoint_task(run))) }),
     });
     exports
+}
+
+/// What is drawn above the charts: the surfaces, or all targets of a sample.
+fn upper_figure(view: &TrainView, shared: &Shared) -> Figure {
+    let surfaces = surface_figure(view, shared);
+    match all_targets_figure(view, shared) {
+        Some(targets) if surfaces.surfaces.is_empty() => targets.into(),
+        _ => surfaces.into(),
+    }
 }
 
 /// The best network, and before it that of a past epoch while it is on show.

@@ -6,17 +6,18 @@ use super::{
     bottom_tab::BottomTab,
     decoders::{DecoderMeasuring, DecodersState},
     drawn::{Drawn, Frames},
-    inspect::{Lighting, SectionChoice},
+    inspect::{Lighting, SectionChoice, TestPlace, drawn_nodes},
     paper_figure::PaperFigure,
     press::PressState,
+    recording::RecordingEditor,
     scrub::ScrubState,
 };
 use crate::{
     app::{
         job::Wake,
         shared::{Effect, Look, RightCard, RunResult, RunView, Shared},
+        test_view::RecordedTest,
     },
-    evaluation::NodeAddress,
     import::Setup,
     training::StopReason,
 };
@@ -24,8 +25,10 @@ use crate::{
 /// The Train view.
 #[derive(Debug)]
 pub struct TrainView {
-    /// Snapshot of the test set.
+    /// Snapshot of the test set: a frame of an array, a sample of a recording.
     pub snapshot: usize,
+    /// Target of a recording whose values the charts show.
+    pub(super) target: usize,
     /// The snapshot that the worker was told of.
     pub(super) watched: usize,
     /// Surface shown on the right-hand card.
@@ -44,6 +47,8 @@ pub struct TrainView {
     pub press: PressState,
     /// The past epoch on show.
     pub scrub: ScrubState,
+    /// Recording that is trained on.
+    pub(in crate::app) recording: RecordingEditor,
     /// Results of other decoders on the test set.
     pub decoders: DecodersState,
     pub(super) measuring: DecoderMeasuring,
@@ -54,6 +59,7 @@ impl TrainView {
     pub fn new(wake: Wake) -> Self {
         Self {
             snapshot: 0,
+            target: 0,
             watched: 0,
             right: RightCard::default(),
             tab: BottomTab::default(),
@@ -63,6 +69,7 @@ impl TrainView {
             drawn: Drawn::default(),
             press: PressState::new(&wake),
             scrub: ScrubState::new(Arc::clone(&wake)),
+            recording: RecordingEditor::new(&wake),
             decoders: DecodersState::default(),
             measuring: DecoderMeasuring::new(wake),
         }
@@ -72,9 +79,10 @@ impl TrainView {
     pub(super) fn follow(&mut self, shared: &Shared) {
         self.scrub.follow(shared);
         let result = result_of(&self.scrub, shared);
-        self.snapshot = self.drawn.follow(shared, result, self.snapshot);
+        let target = shared.recorded_test().map_or(0, |test| self.target_of(test));
+        self.snapshot = self.drawn.follow(shared, result, self.snapshot, target);
         self.press.follow(shared, result);
-        let nodes = self.frames().actual.nodes_mm.len();
+        let nodes = drawn_nodes(shared, self.frames().actual.nodes_mm.len());
         self.lights.node = self.lights.node.filter(|&node| node < nodes);
     }
 
@@ -102,15 +110,27 @@ impl TrainView {
         self.press.let_go();
     }
 
+    /// Number of snapshots of the test set on show: frames of an array, samples of a recording.
+    pub(super) fn snapshots(shared: &Shared) -> usize {
+        let of_recording = || shared.recorded_test().map(|test| test.set.samples());
+        let of_array = shared.test().map(|test| test.snapshots.len());
+        of_array.or_else(of_recording).unwrap_or(0)
+    }
+
+    /// Target of `test` whose values the charts show: the one chosen, or the last.
+    pub(super) fn target_of(&self, test: &RecordedTest) -> usize {
+        self.target.min(test.set.outputs().saturating_sub(1))
+    }
+
     /// Returns the root mean square error of each node, where error bars are on and there is a result.
     pub fn error_bars_mm(&self) -> Option<&[f64]> {
         self.has_error_bars.then(|| self.drawn.spread_mm()).flatten()
     }
 
-    /// Goes to this node and marks it.
-    pub(super) fn go_to(&mut self, address: NodeAddress, shared: &Shared) {
-        self.show_snapshot(address.snapshot);
-        self.lights.node = shared.test().and_then(|test| test.node(address));
+    /// Goes to this value of the test set and marks its node.
+    pub(super) fn go_to(&mut self, place: TestPlace) {
+        self.show_snapshot(place.snapshot);
+        self.lights.node = place.node;
     }
 
     /// Looks at a figure of the paper, and trains what it shows unless that is there.

@@ -1,18 +1,21 @@
+use std::ops::RangeInclusive;
+
 use eframe::egui::{Align, Layout, Rect, RichText, Ui, Vec2};
 use glam::DVec2;
 
 use super::{
-    bottom_tab::BottomTab,
+    bottom_tab::{BottomTab, has_target_surface},
     drawn::Frames,
-    inspect::lit_nodes,
+    inspect::{lit_nodes, target_of_node},
     press::{Hand, Shown},
+    sample_card::sample_card_ui,
     state::TrainView,
 };
 use crate::{
     app::{
-        shared::{Effect, RightCard, Shared, colour_scale_ui, follow_surface, view_mode_ui},
+        shared::{Effect, Look, RightCard, Shared, SourceKind, colour_scale_ui, follow_surface, view_mode_ui},
         surface_view::{ColourBar, SurfaceView},
-        test_view::TestView,
+        test_view::{HeightScale, TestView},
         theme::{Theme, semibold, space, type_size},
         widgets::{Landmark, card_ui, dim_ui, explained_options_ui, ghost_button, placeholder_ui, segmented_ui},
     },
@@ -31,8 +34,12 @@ const HANDS: [(Hand, &str, &str); 2] = [
     (Hand::Turn, "Turn", "Drag to turn the surface; the wheel zooms."),
 ];
 
-/// Both surfaces side by side, and the scale of their colours.
+/// Both surfaces side by side, and the scale of their colours; where a recording has none, all targets of the sample.
 pub fn surfaces_ui(ui: &mut Ui, rect: Rect, view: &mut TrainView, shared: &Shared, effects: &mut Vec<Effect>) {
+    if shared.source == SourceKind::Recording && !has_target_surface(shared) {
+        card_ui(ui, rect, |ui| sample_card_ui(ui, view, shared));
+        return;
+    }
     let gap = space(2);
     let (cards, scales) = rect.split_left_right_at_x(rect.right() - ColourBar::WIDTH);
     let width = 0.5 * (cards.width() - gap);
@@ -53,22 +60,61 @@ pub fn surfaces_ui(ui: &mut Ui, rect: Rect, view: &mut TrainView, shared: &Share
 /// The surfaces of the snapshot on show: the actual one, and once there is a network what its card shows.
 pub fn surface_figure(view: &TrainView, shared: &Shared) -> SurfaceFigure {
     let (frames, style) = (view.frames(), shared.look.style());
-    let surfaces = shared.test().into_iter().flat_map(|test| {
-        let actual = test.heights("Actual", &frames.actual, style);
+    let of_array = |test: &TestView| {
         let beside = frames.decoupled.as_ref().map(|(decoupled, error)| match view.right {
             RightCard::Decoupled => test.heights("Decoupled", decoupled, style),
             RightCard::Error => test.errors("Error", error, style),
         });
-        std::iter::once(actual).chain(beside)
-    });
+        let actual = test.heights("Actual", &frames.actual, style);
+        std::iter::once(actual).chain(beside).collect()
+    };
     SurfaceFigure {
-        surfaces: surfaces.collect(),
+        surfaces: shared
+            .test()
+            .map_or_else(|| target_surfaces(view, shared.look), of_array),
         camera: shared.look.camera,
         marked_node: view.lights.node,
         lit_nodes: lit_nodes(view, shared),
         section: section(view, shared),
     }
     .with_common_scales()
+}
+
+/// The surfaces through the targets of a recording.
+fn target_surfaces(view: &TrainView, look: Look) -> Vec<Surface> {
+    let Some([actual, decoded, error]) = &view.drawn.target_surfaces else {
+        return Vec::new();
+    };
+    let beside = match view.right {
+        RightCard::Decoupled => decoded,
+        RightCard::Error => error,
+    };
+    let has_result = view.drawn.frames.decoupled.is_some();
+    let shown = std::iter::once(actual).chain(has_result.then_some(beside));
+    let looking = |surface: &Surface| Surface {
+        mode: look.mode,
+        colours: look.colours,
+        range: match look.heights {
+            HeightScale::Fitted if !surface.quantity.is_diverging() => {
+                range_of_nodes(surface).unwrap_or_else(|| surface.range.clone())
+            }
+            _ => surface.range.clone(),
+        },
+        ..surface.clone()
+    };
+    shown.map(looking).collect()
+}
+
+/// Smallest and largest value at the nodes.
+fn range_of_nodes(surface: &Surface) -> Option<RangeInclusive<f64>> {
+    let values = || {
+        surface
+            .nodes
+            .iter()
+            .map(|node| node.z)
+            .filter(|value| value.is_finite())
+    };
+    Some(values().reduce(f64::min)?..=values().reduce(f64::max)?)
 }
 
 /// The line of the section, while that is on show.
@@ -135,8 +181,11 @@ fn actual_card_ui(
         );
         ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
             view_mode_ui(ui, shared.look, effects);
-            let picked = explained_options_ui(ui, "Pointer on the surface", &HANDS, view.press.hand, false);
-            view.press.hand = picked.unwrap_or(view.press.hand);
+            // Only what has a sensor model can be pressed.
+            if shared.source == SourceKind::Array {
+                let picked = explained_options_ui(ui, "Pointer on the surface", &HANDS, view.press.hand, false);
+                view.press.hand = picked.unwrap_or(view.press.hand);
+            }
         });
     });
     if let Some(surface) = figure.surfaces.first() {
@@ -156,7 +205,11 @@ fn right_card_ui(
         let time = view.press.shown().and_then(Shown::network_time);
         title_ui(ui, "Network", time.as_deref().unwrap_or_default(), space(36));
         ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
-            let options = [(RightCard::Decoupled, "Decoupled"), (RightCard::Error, "Error")];
+            let decoded = match shared.source {
+                SourceKind::Array => "Decoupled",
+                SourceKind::Recording => "Decoded",
+            };
+            let options = [(RightCard::Decoupled, decoded), (RightCard::Error, "Error")];
             let picked = segmented_ui(ui, "Network card", &options, view.right, false);
             view.right = picked.unwrap_or(view.right);
         });
@@ -182,10 +235,7 @@ fn surface_ui(
     shared: &Shared,
     effects: &mut Vec<Effect>,
 ) {
-    let (Some(test), look) = (shared.test(), shared.look) else {
-        return;
-    };
-    let theme = Theme::of(ui);
+    let (array, look, theme) = (shared.test(), shared.look, Theme::of(ui));
     let surface_view = SurfaceView {
         label: &format!("{} surface", surface.title),
         surface,
@@ -194,15 +244,17 @@ fn surface_ui(
         section: figure.section.as_ref(),
         theme,
     };
-    let is_touched = role == Role::Actual && view.press.hand == Hand::Press;
+    let is_touched = role == Role::Actual && view.press.hand == Hand::Press && array.is_some();
     let shown = if is_touched {
         surface_view.show_touched(ui, look.camera)
     } else {
         surface_view.show(ui, look.camera)
     };
     if role == Role::Actual {
-        view.press.take_target(&shown, surface);
         Landmark::ActualSurface.stands_at(ui, shown.response.rect);
+    }
+    if let (Role::Actual, Some(test)) = (role, array) {
+        view.press.take_target(&shown, surface);
         let painter = ui.painter();
         view.press
             .outline_ui(painter, &theme.palette, shown.response.hover_pos(), test.stroke_mm);
@@ -210,9 +262,10 @@ fn surface_ui(
     follow_surface(&shown, look, &mut view.lights.node, effects);
     // What is pressed is cut too.
     let is_chosen = shown.response.clicked() || (is_touched && shown.response.is_pointer_button_down_on());
-    if let (true, true, Some(at), Some(sight)) = (
+    if let (true, true, Some(test), Some(at), Some(sight)) = (
         view.tab == BottomTab::Section,
         is_chosen,
+        array,
         shown.response.interact_pointer_pos(),
         shown.sight,
     ) && let Some(place) = surface.pick(&sight.ray(DVec2::new(f64::from(at.x), f64::from(at.y))))
@@ -220,30 +273,62 @@ fn surface_ui(
         view.section.choose_at(place.truncate(), test);
         ui.ctx().request_repaint();
     }
-    shown.node_tooltip_ui(|ui, node| node_values_ui(ui, view.frames(), test, node));
+    shown.node_tooltip_ui(|ui, node| {
+        if let Some(words) = NodeWords::of(shared, node) {
+            node_values_ui(ui, view.frames(), &words, node);
+        }
+    });
+}
+
+/// Words about a node and its value.
+struct NodeWords {
+    name: String,
+    /// Name of the actual value, and of the one found.
+    values: [&'static str; 2],
+    /// With a space before it; empty for none.
+    unit: String,
+}
+
+impl NodeWords {
+    fn of(shared: &Shared, node: usize) -> Option<Self> {
+        if let Some(test) = shared.test() {
+            let per_row = test.sensor.scale.nodes_per_row();
+            let row = test.rows.get(node / per_row).map_or(0, |row| row + 1);
+            return Some(Self {
+                name: format!("Row {row}, node {}", node % per_row + 1),
+                values: ["z", "decoupled"],
+                unit: " mm".to_owned(),
+            });
+        }
+        let test = shared.recorded_test()?;
+        let target = test.problem.targets.get(target_of_node(test, node)?)?;
+        Some(Self {
+            name: target.name.clone(),
+            values: ["actual", "decoded"],
+            unit: target.unit.as_ref().map_or_else(String::new, |unit| format!(" {unit}")),
+        })
+    }
 }
 
 /// The node under the pointer and its values, in two lines that hide little.
-fn node_values_ui(ui: &mut Ui, frames: &Frames, test: &TestView, node: usize) {
+fn node_values_ui(ui: &mut Ui, frames: &Frames, words: &NodeWords, node: usize) {
     let Some(actual) = frames.actual.nodes_mm.get(node) else {
         return;
     };
     ui.spacing_mut().item_spacing.y = 0.0;
-    let per_row = test.sensor.scale.nodes_per_row();
     ui.horizontal(|ui| {
-        let row = test.rows.get(node / per_row).map_or(0, |row| row + 1);
-        let name = format!("Row {row}, node {}", node % per_row + 1);
-        ui.label(RichText::new(name).font(semibold(type_size().note)));
+        ui.label(RichText::new(&words.name).font(semibold(type_size().note)));
         let [x, y] = [actual.x, actual.y].map(format_number);
         let place = RichText::new(format!("x {x}, y {y} mm")).size(type_size().note);
         ui.label(place.color(Theme::of(ui).palette.dim));
     });
-    let mut text = format!("z {} mm", format_number(actual.z));
+    let ([name, found], unit) = (words.values, &words.unit);
+    let mut text = format!("{name} {}{unit}", format_number(actual.z));
     if let Some((decoupled, error)) = &frames.decoupled
         && let (Some(decoupled), Some(error)) = (decoupled.nodes_mm.get(node), error.nodes_mm.get(node))
     {
         let [decoupled, error] = [decoupled.z, error.z].map(format_number);
-        text += &format!(", decoupled {decoupled} mm, error {error} mm");
+        text += &format!(", {found} {decoupled}{unit}, error {error}{unit}");
     }
     ui.label(RichText::new(text).size(type_size().note));
 }

@@ -1,3 +1,5 @@
+use std::path::PathBuf;
+
 use eframe::egui::{Context, Key, Modifiers, Ui};
 
 use super::{
@@ -9,7 +11,10 @@ use super::{
 };
 use crate::{
     app::{
-        shared::{Columns, Effect, Export, Offers, Phase, RunWish, Shared, Unfinished, View, run_buttons_ui},
+        shared::{
+            Columns, Effect, Export, FileInUse, Matter, Notice, Offers, Phase, RunWish, Shared, SourceKind, Unfinished,
+            View, run_buttons_ui,
+        },
         theme::space,
         widgets::snapshot_ui,
     },
@@ -21,8 +26,23 @@ impl View for TrainView {
         "Train"
     }
 
-    fn take_news(&mut self, shared: &Shared, _effects: &mut Vec<Effect>) {
+    fn take_news(&mut self, shared: &Shared, effects: &mut Vec<Effect>) {
+        self.recording.take_news(shared, effects);
         self.measuring.follow(shared, &mut self.decoders);
+    }
+
+    fn take_files(&mut self, paths: &[PathBuf], shared: &Shared, effects: &mut Vec<Effect>) -> bool {
+        if shared.phase.is_busy() {
+            let text = "A training is running: stop it before you open other files.";
+            effects.push(Effect::Tell(Matter::Recording, Notice::Failed(text.to_owned())));
+        } else {
+            self.recording.open(paths.to_vec());
+        }
+        true
+    }
+
+    fn files_in_use(&self) -> Vec<FileInUse> {
+        self.recording.files_in_use()
     }
 
     fn unfinished(&self, shared: &Shared) -> Vec<Unfinished> {
@@ -57,22 +77,22 @@ impl View for TrainView {
         if offers.offer_keys("Stop training", Modifiers::COMMAND, Key::Period, phase.is_busy()) {
             effects.push(Effect::Stop);
         }
-        if offers.offer("Press the middle of the surface", shared.test().is_some())
+        if offers.offer("Open files", !phase.is_busy()) {
+            effects.push(Effect::ChooseFile(self.recording.open_task()));
+        }
+        if shared.source == SourceKind::Array
+            && offers.offer("Press the middle of the surface", shared.test().is_some())
             && let Some(test) = shared.test()
         {
             self.press.press_middle(test);
         }
-        let snapshots = shared.test().map_or(0, |test| test.snapshots.len());
-        let has_next = self.snapshot + 1 < snapshots;
-        if offers.offer_keys("Next test snapshot", Modifiers::NONE, Key::PageDown, has_next) {
+        let what = snapshot_word(shared.source);
+        let has_next = self.snapshot + 1 < Self::snapshots(shared);
+        if offers.offer_keys(format!("Next test {what}"), Modifiers::NONE, Key::PageDown, has_next) {
             self.show_snapshot(self.snapshot + 1);
         }
-        if offers.offer_keys(
-            "Previous test snapshot",
-            Modifiers::NONE,
-            Key::PageUp,
-            self.snapshot > 0,
-        ) {
+        let name = format!("Previous test {what}");
+        if offers.offer_keys(name, Modifiers::NONE, Key::PageUp, self.snapshot > 0) {
             self.show_snapshot(self.snapshot - 1);
         }
         self.offer_charts(offers, shared);
@@ -94,7 +114,10 @@ impl View for TrainView {
 
     fn tools_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) {
         let can_train = shared.phase != Phase::Died;
-        let hint = "draws the sets and trains the network";
+        let hint = match shared.source {
+            SourceKind::Array => "draws the sets and trains the network",
+            SourceKind::Recording => "reads the recording and trains the network",
+        };
         let wish = run_buttons_ui(ui, shared.phase, (can_train, shared.can_continue()), hint);
         effects.extend(wish.map(|wish| match wish {
             RunWish::Train => Effect::Train,
@@ -104,18 +127,20 @@ impl View for TrainView {
             RunWish::Stop => Effect::Stop,
         }));
         ui.add_space(space(4));
-        let snapshots = shared.test().map_or(0, |test| test.snapshots.len());
-        if let Some(snapshot) = snapshot_ui(ui, self.snapshot, snapshots) {
+        let what = snapshot_word(shared.source);
+        if let Some(snapshot) = snapshot_ui(ui, what, self.snapshot, Self::snapshots(shared)) {
             self.show_snapshot(snapshot);
         }
     }
 
     fn exports<'a>(&'a self, shared: &'a Shared) -> Vec<Export<'a>> {
-        train_exports(self, shared)
+        let mut exports = train_exports(self, shared);
+        exports.extend(self.recording.exports(shared));
+        exports
     }
 
     fn form_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) {
-        if let Some(figure) = configuration_ui(ui, shared, effects) {
+        if let Some(figure) = configuration_ui(ui, &mut self.recording, shared, effects) {
             self.show_paper_figure(figure, shared, effects);
         }
     }
@@ -126,12 +151,23 @@ impl View for TrainView {
     }
 
     fn body_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) {
+        if self.recording.is_on_show(shared) {
+            return self.recording.columns_ui(ui, shared, effects);
+        }
         self.follow(shared);
         if self.watched != self.snapshot {
             self.watched = self.snapshot;
             effects.push(Effect::Watch(self.snapshot));
         }
         workbench_ui(ui, self, shared, effects);
+    }
+}
+
+/// The word for what the test set consists of.
+fn snapshot_word(source: SourceKind) -> &'static str {
+    match source {
+        SourceKind::Array => "snapshot",
+        SourceKind::Recording => "sample",
     }
 }
 
@@ -145,7 +181,13 @@ fn unfinished_training(shared: &Shared) -> Option<Unfinished> {
     };
     let run = shared.run.as_ref();
     match shared.phase {
-        Phase::Preparing => Some(training("its samples are being drawn".to_owned(), None)),
+        Phase::Preparing => {
+            let progress = match shared.source {
+                SourceKind::Array => "its samples are being drawn",
+                SourceKind::Recording => "its files are being read",
+            };
+            Some(training(progress.to_owned(), None))
+        }
         Phase::Training | Phase::Paused => {
             let run = run.filter(|run| !run.is_saved)?;
             let epochs = run.settings().training.stopping.epochs;

@@ -8,7 +8,7 @@ use super::{
     surfaces::surfaces_ui,
 };
 use crate::app::{
-    shared::{Effect, Shared},
+    shared::{Effect, Shared, SourceKind},
     theme::space,
     widgets::card_ui,
 };
@@ -35,7 +35,7 @@ impl WorkbenchLayout {
     }
 }
 
-/// The middle of the window: both surfaces above, the charts below.
+/// The middle of the window: both surfaces above, the charts below, and beside them the readings of an array.
 pub fn workbench_ui(ui: &mut Ui, view: &mut TrainView, shared: &Shared, effects: &mut Vec<Effect>) {
     let layout = WorkbenchLayout::of_width(ui.ctx().content_rect().width());
     let whole = ui.available_rect_before_wrap();
@@ -47,7 +47,9 @@ pub fn workbench_ui(ui: &mut Ui, view: &mut TrainView, shared: &Shared, effects:
     let lower_height = (share * whole.height()).clamp(least, space(75));
     let (upper, lower) = whole.split_top_bottom_at_y(whole.bottom() - lower_height);
     surfaces_ui(ui, upper.with_max_y(upper.max.y - gap), view, shared, effects);
+    let has_sensor = shared.source == SourceKind::Array;
     let (charts, has_readings) = match layout {
+        WorkbenchLayout::ReportBeside if !has_sensor => (lower, false),
         WorkbenchLayout::ReportBeside => {
             let width = (0.4 * lower.width()).floor();
             let (charts, readings) = lower.split_left_right_at_x(lower.right() - width);
@@ -61,7 +63,7 @@ pub fn workbench_ui(ui: &mut Ui, view: &mut TrainView, shared: &Shared, effects:
             let width = (0.45 * lower.width()).clamp(space(82), space(96));
             let (charts, report) = lower.split_left_right_at_x(lower.right() - width);
             card_ui(ui, report, |ui| report_ui(ui, view, shared, effects));
-            (charts.with_max_x(charts.max.x - gap), true)
+            (charts.with_max_x(charts.max.x - gap), has_sensor)
         }
     };
     card_ui(ui, charts, |ui| {

@@ -32,7 +32,7 @@ pub(super) fn header<'a>(
 }
 
 /// Name of the readings, with their unit where they share one.
-pub(in crate::export::bundle) fn readings(portable: &Portable, networks: &FixedNetworks) -> &'static str {
+pub(super) fn readings(portable: &Portable, networks: &FixedNetworks) -> &'static str {
     match (&portable.meaning, networks.readings.first_decimals()) {
         (Meaning::Own { .. }, _) => portable.meaning.readings(),
         (Meaning::Array(_), 9) => "resistances_nanoohm",
@@ -43,7 +43,7 @@ pub(in crate::export::bundle) fn readings(portable: &Portable, networks: &FixedN
 }
 
 /// Name of the outputs, with their unit where they share one.
-pub(in crate::export::bundle) fn outputs(portable: &Portable) -> &'static str {
+pub(super) fn outputs(portable: &Portable) -> &'static str {
     match portable.meaning {
         Meaning::Array(_) => "coordinates_nm",
         Meaning::Own { .. } => portable.meaning.outputs(),
@@ -100,10 +100,10 @@ pub(super) fn source(header: &Header<'_>, networks: &FixedNetworks) -> String {
     let mut text = format!(
         "#include \"{name}_decode.h\"\n\n#define HIDDEN {hidden}\n\n",
         name = header.name,
-        hidden = header.portable.hidden
+        hidden = networks.hidden
     );
     let sizes = [
-        ("HIDDEN", header.portable.hidden),
+        ("HIDDEN", networks.hidden),
         ("CHANNELS", header.portable.channels),
         ("OUTPUTS", header.portable.outputs),
     ];

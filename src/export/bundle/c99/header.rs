@@ -107,7 +107,7 @@ impl Header<'_> {
             text += "#include <stdint.h>\n\n";
         }
         if portable.takes_row() {
-            let _ = writeln!(text, "#define {upper}_ROWS {}", portable.networks.len());
+            let _ = writeln!(text, "#define {upper}_ROWS {}", portable.rows());
         }
         let (channels, outputs, definitions) = (portable.channels, portable.outputs, self.definitions);
         let _ = write!(
@@ -117,20 +117,31 @@ impl Header<'_> {
              {definitions}\
              #ifdef __cplusplus\nextern \"C\" {{\n#endif\n\n\
              /* What the functions return. */\n\
-             enum {{\n    {upper}_OK = 0,\n    {upper}_NO_SUCH_ROW = -1,\n    {upper}_BAD_READING = -2\n}};\n\n"
+             enum {{\n    {upper}_OK = 0,\n    {upper}_NO_SUCH_ROW = -1,\n    {upper}_BAD_READING = -2{not_explained}\n}};\n\n",
+            not_explained = match &portable.equations {
+                Some(equations) if equations.seeks_solution => format!(",\n    {upper}_NOT_EXPLAINED = 1"),
+                _ => String::new(),
+            },
         );
         let row = if portable.takes_row() {
-            format!(" Rows are counted from 1 to {}.", portable.networks.len())
+            format!(" Rows are counted from 1 to {}.", portable.rows())
         } else {
             String::new()
         };
         let _ = write!(
             text,
             "/* Decodes {one}.{row} Returns {upper}_OK, or leaves the {coordinates} as they are and returns\n   \
-             what is wrong.{overflow} */\n{};\n\n",
+             what is wrong.{overflow}{not_explained} */\n{};\n\n",
             self.decode_signature(),
             one = portable.meaning.sample(),
             coordinates = portable.meaning.output().to_owned() + "s",
+            not_explained = match &portable.equations {
+                Some(equations) if equations.seeks_solution => format!(
+                    "\n   {upper}_NOT_EXPLAINED: the coordinates are the best found, but the readings have noise or come from\n   \
+                     another sensor."
+                ),
+                _ => String::new(),
+            },
             overflow = match self.reading {
                 "int32_t" => String::new(),
                 _ => format!(
@@ -138,12 +149,13 @@ impl Header<'_> {
                 ),
             },
         );
-        if portable.ranges().is_some() {
+        if portable.known_ranges().is_some() {
             let _ = write!(
                 text,
                 "/* Returns the number of readings beyond the range seen in training by more than a tenth of it, where the\n   \
-                 network only guesses: 0 if there are none. Negative if the row is wrong. */\n{};\n\n",
-                self.range_signature()
+                 {decoder} only guesses: 0 if there are none. Negative if the row is wrong. */\n{};\n\n",
+                self.range_signature(),
+                decoder = portable.decoder,
             );
         }
         text + "#ifdef __cplusplus\n}\n#endif\n\n#endif\n"
@@ -156,7 +168,7 @@ pub(super) fn push_out_of_range(
     header: &Header<'_>,
     limits: impl Iterator<Item = (String, String)> + Clone,
 ) {
-    let (rows, channels) = (header.portable.networks.len(), header.portable.channels);
+    let (rows, channels) = (header.portable.rows(), header.portable.channels);
     let sizes = format!("[{rows}][{}_CHANNELS]", header.upper());
     let shape = [rows, channels];
     let reading = header.reading;

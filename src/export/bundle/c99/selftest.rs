@@ -44,7 +44,7 @@ impl SelfTest<'_> {
             count = vectors.len(),
         );
         if portable.takes_row() {
-            let rows = vectors.iter().map(|vector| vector.network + 1);
+            let rows = vectors.iter().map(|vector| vector.row + 1);
             push_array(&mut text, "static const int rows[VECTORS]", &[vectors.len()], rows);
         }
         self.push_tables(&mut text);
@@ -128,7 +128,7 @@ impl SelfTest<'_> {
         } else {
             String::new()
         };
-        let outside = if portable.ranges().is_some() {
+        let outside = if portable.known_ranges().is_some() {
             format!(
                 "        if ({name}_is_out_of_range({row}taken) < 0) {{\n            \
                  puts(\"the range of a golden vector is not known\");\n            \

@@ -11,6 +11,7 @@ mod logarithm;
 mod quantise;
 mod scaled;
 mod tangent;
+mod two_layers;
 mod units;
 
 use thiserror::Error;
@@ -27,6 +28,9 @@ pub(super) use self::{
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
 pub enum FixedPointError {
+    /// Another decoder than a network.
+    #[error("fixed16 is for networks only: give --precision f64 or f32")]
+    NoNetwork,
     /// The file does not tell the range of the readings.
     #[error(
         "fixed16 needs the range of the readings in training, which the network file does not have: train again, or give --precision f32"

@@ -4,12 +4,10 @@ use super::{
     logarithm::LogTable,
     scaled::ScaledRow,
     tangent::TangentTable,
+    two_layers::TwoLayers,
     units::Units,
 };
-use crate::{
-    export::bundle::portable::{Portable, PortableNetwork},
-    network::Quantity,
-};
+use crate::{export::bundle::portable::Portable, network::Quantity};
 
 /// Part of the range of the outputs below which the bound on the error should be.
 pub(in crate::export::bundle) const USUAL_BOUND: f64 = 0.01;
@@ -24,6 +22,8 @@ pub(in crate::export::bundle) struct FixedNetworks {
     pub(in crate::export::bundle) quantity: Quantity,
     pub(in crate::export::bundle) readings: Units,
     pub(in crate::export::bundle) outputs: Units,
+    /// Number of hidden nodes.
+    pub(in crate::export::bundle) hidden: usize,
     pub(in crate::export::bundle) hidden_width: HiddenWidth,
     pub(in crate::export::bundle) networks: Vec<FixedNetwork>,
     pub(in crate::export::bundle) tangent: TangentTable,
@@ -74,19 +74,23 @@ impl FixedNetworks {
         Err(FixedPointError::Coarse {
             bound: wide.relative_bound,
             scale: portable.meaning.scale(),
-            cure: portable.meaning.smaller_weights(),
+            cure: portable.smaller_weights(),
         })
     }
 
     fn with_width(portable: &Portable, hidden_width: HiddenWidth) -> Result<Self, FixedPointError> {
-        let ranges = portable.ranges().ok_or(FixedPointError::NoRange)?;
-        let (readings, outputs) = (Units::of_readings(portable, &ranges)?, Units::of_outputs(portable));
+        let layered = TwoLayers::of(portable).ok_or(FixedPointError::NoNetwork)?;
+        let ranges = portable.known_ranges().ok_or(FixedPointError::NoRange)?;
+        let (readings, outputs) = (
+            Units::of_readings(portable, &ranges)?,
+            Units::of_outputs(portable, &layered),
+        );
         let (tangent, logarithm) = (TangentTable::new(), LogTable::new());
         let tangent_error = tangent.error();
         let mut networks = Vec::new();
         let mut bounds = vec![0.0_f64; portable.outputs];
-        for (network, range) in portable.networks.iter().zip(ranges) {
-            let changes: Vec<_> = (range.limits.iter().zip(&network.centre).enumerate())
+        for (network, range) in layered.iter().zip(ranges) {
+            let changes: Vec<_> = (range.limits.iter().zip(network.centre).enumerate())
                 .map(|(channel, (&limits, &centre))| {
                     Change::of(portable.quantity, readings.per_one(channel), limits, centre)
                 })
@@ -102,7 +106,7 @@ impl FixedNetworks {
             let of_network = fixed.round(network, &changes, &outputs, hidden_width, tangent_error);
             let of_network = of_network.map_err(|what| FixedPointError::Range {
                 what,
-                cure: portable.meaning.smaller_weights(),
+                cure: portable.smaller_weights(),
             })?;
             for (index, (bound, in_units)) in bounds.iter_mut().zip(of_network).enumerate() {
                 *bound = bound.max(in_units * outputs.unit(index));
@@ -118,6 +122,7 @@ impl FixedNetworks {
             quantity: portable.quantity,
             readings,
             outputs,
+            hidden: layered.first().map_or(0, |network| network.hidden_biases.len()),
             hidden_width,
             networks,
             tangent,
@@ -168,7 +173,7 @@ impl FixedNetwork {
     /// the name of the number that does not fit.
     fn round(
         &mut self,
-        network: &PortableNetwork,
+        network: &TwoLayers<'_>,
         changes: &[Change],
         units: &Units,
         width: HiddenWidth,
@@ -195,7 +200,7 @@ impl FixedNetwork {
     /// Adds a hidden node. Returns the bound on the error that it passes on to the tangent's result.
     fn push_node(
         &mut self,
-        network: &PortableNetwork,
+        network: &TwoLayers<'_>,
         changes: &[Change],
         width: HiddenWidth,
         node: usize,
@@ -229,7 +234,7 @@ impl FixedNetwork {
     /// Adds an output with so many units in 1. Returns the bound on its error in units, unless a weight is too large.
     fn push_output(
         &mut self,
-        network: &PortableNetwork,
+        network: &TwoLayers<'_>,
         output: usize,
         per_one: f64,
         activation_errors: &[f64],

@@ -1,4 +1,4 @@
-use super::FixedPointError;
+use super::{FixedPointError, two_layers::TwoLayers};
 use crate::export::bundle::{
     meaning::Meaning,
     portable::{ChannelRanges, Portable},
@@ -43,12 +43,12 @@ impl Units {
     }
 
     /// Units of the outputs: nanometres for an array.
-    pub(super) fn of_outputs(portable: &Portable) -> Self {
+    pub(super) fn of_outputs(portable: &Portable, networks: &[TwoLayers<'_>]) -> Self {
         let decimals = match portable.meaning {
             Meaning::Array(_) => vec![6; portable.outputs],
             Meaning::Own { .. } => (0..portable.outputs)
                 .map(|output| {
-                    let reaches = portable.networks.iter().map(|network| network.reach(output));
+                    let reaches = networks.iter().map(|network| network.reach(output));
                     let reach = reaches.fold(0.0, f64::max);
                     most_decimals(portable.scales[output], OUTPUT_UNITS).min(most_decimals(reach, LARGEST_OUTPUT))
                 })

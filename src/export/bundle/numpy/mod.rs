@@ -1,48 +1,35 @@
-//! Bundles for NumPy: weights as `network.npz`, and a `decode.py` that uses them.
+//! Bundles for NumPy: weights as `network.npz` (of other decoders `decoder.npz`), and a `decode.py` that uses them.
 
+mod iteration;
 mod npz;
 
 use self::npz::NamedArray;
 use super::{
+    draft::{Call, Draft},
+    error::BundleError,
     meaning::Meaning,
     portable::Portable,
-    weights::{Arithmetic, Digits, RoundedNetwork, Weights},
+    report::BundleCheck,
+    tables::{Table, names},
+    weights::{Arithmetic, Digits, Weights},
 };
-use crate::network::Quantity;
+use crate::{decoupling::Layer, network::Quantity};
 
-/// Writes the weights and the limits of the readings. Every array has the networks of the rows along its first axis.
+/// Writes the weights and the limits of the readings. Every array has the maps of the rows along its first axis.
 pub(super) fn write_weights(portable: &Portable, weights: &Weights) -> Vec<u8> {
-    let Arithmetic { hidden, rest } = weights.arithmetic;
-    let (channels, outputs) = (portable.channels, portable.outputs);
-    let array = |name: &str, digits, shape: &[usize], of: &dyn Fn(&RoundedNetwork) -> Vec<f64>| NamedArray {
-        name: name.to_owned(),
-        digits,
-        shape: [&[weights.networks.len()], shape].concat(),
-        values: weights.networks.iter().flat_map(of).collect(),
+    let of_table = |table: Table| NamedArray {
+        name: table.name,
+        digits: table.digits,
+        shape: [&[weights.maps.len()], &table.shape[..]].concat(),
+        values: table.values,
     };
-    let mut arrays = vec![
-        array(portable.meaning.centre(), hidden, &[channels], &|network| {
-            network.centre.clone()
-        }),
-        array("hidden_weights", hidden, &[channels, portable.hidden], &|network| {
-            network.hidden_weights.clone()
-        }),
-        array("hidden_biases", hidden, &[portable.hidden], &|network| {
-            network.hidden_biases.clone()
-        }),
-        array("output_weights", rest, &[portable.hidden, outputs], &|network| {
-            network.output_weights.clone()
-        }),
-        array("output_biases", rest, &[outputs], &|network| {
-            network.output_biases.clone()
-        }),
-    ];
-    if let Some(ranges) = portable.ranges() {
+    let mut arrays: Vec<_> = weights.tables(portable).into_iter().map(of_table).collect();
+    if let Some(ranges) = portable.known_ranges() {
         let limit = |name: &str, pick: fn(&(f64, f64)) -> f64| NamedArray {
             name: name.to_owned(),
             // Rounded as readings are, so that none within the limits is outside.
-            digits: rest,
-            shape: vec![ranges.len(), channels],
+            digits: weights.arithmetic.rest,
+            shape: vec![ranges.len(), portable.channels],
             values: ranges.iter().flat_map(|range| range.limits.iter().map(pick)).collect(),
         };
         let [lowest, highest] = portable.meaning.limits();
@@ -52,48 +39,26 @@ pub(super) fn write_weights(portable: &Portable, weights: &Weights) -> Vec<u8> {
     npz::write(&arrays)
 }
 
-/// Reads the weights back.
+/// Reads the weights back, which are in this arithmetic.
 ///
 /// # Errors
 /// A description of the damage.
-pub(super) fn read_weights(bytes: &[u8], portable: &Portable) -> Result<Weights, String> {
+pub(super) fn read_weights(bytes: &[u8], portable: &Portable, arithmetic: Arithmetic) -> Result<Weights, String> {
     let arrays = npz::read(bytes)?;
-    let array = |name: &str| {
-        let found = arrays.iter().find(|array| array.name == name);
-        found.ok_or_else(|| format!("there is no array '{name}'"))
-    };
-    let of_network = |name: &str, index: usize| {
-        let array = array(name)?;
-        let size: usize = array.shape.iter().skip(1).product();
-        let values = array.values.get(index * size..).and_then(|rest| rest.get(..size));
-        values
-            .map(<[f64]>::to_vec)
-            .ok_or_else(|| format!("'{name}' is too short"))
-    };
-    let centre_name = portable.meaning.centre();
-    let centre = array(centre_name)?;
-    let networks = (0..centre.shape[0]).map(|index| {
-        Ok(RoundedNetwork {
-            centre: of_network(centre_name, index)?,
-            hidden_weights: of_network("hidden_weights", index)?,
-            hidden_biases: of_network("hidden_biases", index)?,
-            output_weights: of_network("output_weights", index)?,
-            output_biases: of_network("output_biases", index)?,
-        })
-    });
-    Ok(Weights {
-        quantity: portable.quantity,
-        arithmetic: Arithmetic {
-            hidden: centre.digits,
-            rest: array("output_weights")?.digits,
-        },
-        networks: networks.collect::<Result<_, String>>()?,
+    Weights::of_tables(portable, arithmetic, |table| {
+        let found = arrays.iter().find(|array| array.name == table.name);
+        let array = found.ok_or_else(|| format!("there is no array '{}'", table.name))?;
+        if array.digits == table.digits && array.shape[1..] == table.shape {
+            Ok(array.values.clone())
+        } else {
+            Err(format!("'{}' has another shape or precision", table.name))
+        }
     })
 }
 
 /// Writes the program.
 pub(super) fn write_program(portable: &Portable, arithmetic: Arithmetic) -> String {
-    let rows = portable.networks.len();
+    let rows = portable.rows();
     let (argument, row) = if portable.takes_row() {
         let check = format!(
             "    row = np.broadcast_to(np.asarray(row), len(r))\n    if not np.isin(row, np.arange(1, {rows} + 1)).all():\n        \
@@ -109,16 +74,7 @@ pub(super) fn write_program(portable: &Portable, arithmetic: Arithmetic) -> Stri
         ""
     };
     let meaning = &portable.meaning;
-    let (input, output, centre) = (
-        meaning.readings(),
-        meaning.outputs(),
-        format!("w[\"{}\"]", meaning.centre()),
-    );
-    let change = match portable.quantity {
-        Quantity::Resistance | Quantity::Raw => format!("x - {centre}"),
-        Quantity::Conductance => format!("({centre} - x) / x"),
-        Quantity::LogResistance => format!("np.log1p((x - {centre}) / {centre})"),
-    };
+    let (input, output) = (meaning.readings(), meaning.outputs());
     let is_reading = match portable.quantity {
         Quantity::Raw => "np.isfinite(r)",
         _ => "(r > 0) & np.isfinite(r)",
@@ -127,10 +83,10 @@ pub(super) fn write_program(portable: &Portable, arithmetic: Arithmetic) -> Stri
         Digits::Single => "np.float32",
         Digits::Double => "np.float64",
     };
-    let (outside, counted) = if portable.ranges().is_some() {
+    let (outside, counted) = if portable.known_ranges().is_some() {
         (
             format!(
-                "        outside[mine] = ((r[mine] < w[\"{lowest}\"]) | (r[mine] > w[\"{highest}\"])).sum(axis=1)\n",
+                "        outside[mine] = ((r[mine] < MAPS[\"{lowest}\"][index]) | (r[mine] > MAPS[\"{highest}\"][index])).sum(axis=1)\n",
                 lowest = meaning.limits()[0],
                 highest = meaning.limits()[1],
             ),
@@ -150,17 +106,44 @@ pub(super) fn write_program(portable: &Portable, arithmetic: Arithmetic) -> Stri
             format!("the targets (samples x {outputs})"),
         ),
     };
+    let seeks_solution = portable
+        .equations
+        .as_ref()
+        .is_some_and(|equations| equations.seeks_solution);
+    let [counter, counting, warning] = if seeks_solution {
+        [
+            "    unexplained = 0\n",
+            "            unexplained += misfit > EXPLAINED\n",
+            "    if unexplained:\n        \
+             warnings.warn(f\"{unexplained} of {len(r)} samples have noise or come from another sensor\")\n",
+        ]
+    } else {
+        [""; 3]
+    };
+    let answer = match &portable.equations {
+        None => format!("        {output}[mine] = decode_by(index, r[mine])\n"),
+        Some(_) => format!(
+            "        for sample in np.flatnonzero(mine):\n            \
+             misfit, {output}[sample] = solve(index, r[sample])\n{counting}"
+        ),
+    };
     let legend: String = meaning.legend().iter().map(|line| format!("# {line}\n")).collect();
     format!(
         r#""""{purpose}; see README.txt."""
 {legend}import pathlib
-
+{warnings}
 import numpy as np
 
-NETWORKS = dict(np.load(pathlib.Path(__file__).with_name("network.npz")))
+MAPS = dict(np.load(pathlib.Path(__file__).with_name("{noun}.npz")))
 
 
-def decode({input}{argument}):
+def decode_by(index, r):
+    """Answers readings by the map with this index."""
+    w = {{name: array[index] for name, array in MAPS.items() if name not in {not_of_maps}}}
+    x = r.astype(w["{centre}"].dtype)
+{steps}    return v.astype(r.dtype)
+
+{solver}def decode({input}{argument}):
     """Returns {answers}, and
     {counted}.
 
@@ -170,18 +153,103 @@ def decode({input}{argument}):
     if not ({is_reading}).all():
         raise ValueError("{input}: give finite numbers{above}")
 {row}    {output}, outside = np.empty((len(r), {outputs}), r.dtype), np.zeros(len(r), int)
-    for index in range({rows}):
-        mine, w = row == index + 1, {{name: array[index] for name, array in NETWORKS.items()}}
-        x = r[mine].astype({centre}.dtype)
-        sums = ({change}) @ w["hidden_weights"] + w["hidden_biases"]
-        {output}[mine] = np.tanh(sums.astype(r.dtype)) @ w["output_weights"] + w["output_biases"]
-{outside}    return {output}, outside
+{counter}    for index in range({rows}):
+        mine = row == index + 1
+{answer}{outside}{warning}    return {output}, outside
 "#,
         channels = portable.channels,
+        noun = portable.decoder,
+        centre = meaning.centre(),
+        not_of_maps = format_args!("(\"{}\", \"{}\")", meaning.limits()[0], meaning.limits()[1]),
+        steps = steps(portable, arithmetic),
+        warnings = if seeks_solution { "import warnings\n" } else { "" },
+        solver = portable.equations.as_ref().map_or_else(
+            || "\n".to_owned(),
+            |equations| format!("\n{}", iteration::source(equations))
+        ),
         above = if portable.quantity == Quantity::Raw {
             ""
         } else {
             " above 0"
+        },
+    )
+}
+
+/// Statements from the readings `x` to the answers `v`.
+fn steps(portable: &Portable, arithmetic: Arithmetic) -> String {
+    let centre = format!("w[\"{}\"]", portable.meaning.centre());
+    let change = match portable.quantity {
+        Quantity::Resistance | Quantity::Raw => format!("x - {centre}"),
+        Quantity::Conductance => format!("({centre} - x) / x"),
+        Quantity::LogResistance => format!("np.log1p((x - {centre}) / {centre})"),
+    };
+    let mut text = format!("    v = {change}\n");
+    for (index, (layer, names)) in portable.layers().iter().zip(names(portable.layers())).enumerate() {
+        if index > 0 && index == arithmetic.wide_layers {
+            text += "    v = v.astype(r.dtype)\n";
+        }
+        let table = |place: usize| format!("w[\"{}\"]", names.tables[place]);
+        text += &match layer {
+            Layer::Affine(_) => format!("    v = v @ {} + {}\n", table(0), table(1)),
+            Layer::Tanh => "    v = np.tanh(v)\n".to_owned(),
+            Layer::Gaussians { .. } => {
+                format!("    v = np.exp(-((v[:, :, None] - {}) ** 2).sum(axis=1))\n", table(0))
+            }
+            Layer::Rules { memberships, .. } => format!(
+                "    logarithms = v @ {} + {}\n    \
+                 strengths = np.exp(logarithms - logarithms.max(axis=1, keepdims=True))\n    \
+                 strengths /= strengths.sum(axis=1, keepdims=True)\n    \
+                 of_rules = (v @ {} + {}).reshape(len(v), {}, -1)\n    \
+                 v = (strengths[:, :, None] * of_rules).sum(axis=1)\n",
+                table(0),
+                table(1),
+                table(2),
+                table(3),
+                memberships.outputs(),
+            ),
+        };
+    }
+    text
+}
+
+/// Writes weights and program, and reads the weights back.
+///
+/// # Errors
+/// They cannot be written or read back.
+pub(super) fn export(draft: &mut Draft<'_>) -> Result<Vec<BundleCheck>, BundleError> {
+    let (portable, arithmetic) = (draft.portable, draft.weights.arithmetic);
+    let file = format!("{}.npz", portable.decoder);
+    let bytes = draft.write(&file, write_weights(portable, draft.weights))?;
+    draft.write("decode.py", write_program(portable, arithmetic))?;
+    let read = read_weights(&bytes, portable, arithmetic);
+    let read = read.map_err(|reason| BundleError::read_back(&file, reason))?;
+    let deviation = draft.deviation_of(&read);
+    Ok(vec![BundleCheck::of(
+        "NumPy weights, read back and evaluated",
+        deviation,
+    )])
+}
+
+/// How to call it, for the README.
+pub(super) fn call(call: &Call<'_>) -> String {
+    let portable = call.portable;
+    let (takes_row, channels, outputs) = (portable.takes_row(), portable.channels, portable.outputs);
+    let meaning = &portable.meaning;
+    let (input, output) = (meaning.readings(), meaning.outputs());
+    let row = if takes_row { ", row" } else { "" };
+    format!(
+        "    from decode import decode\n    \
+         {output}, readings_outside = decode({input}{row})\n\n\
+         {input} is samples x {channels}, {output} samples x {outputs}{row_text}.{explained}",
+        row_text = if takes_row {
+            ";\nrow has the row of each sample, from 1"
+        } else {
+            ""
+        },
+        explained = if call.tells_unexplained() {
+            "\nIt warns of samples that no deformation explains to 1e-10, as with noise."
+        } else {
+            ""
         },
     )
 }

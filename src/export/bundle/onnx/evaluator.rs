@@ -1,7 +1,7 @@
 use std::collections::HashMap;
 
 use super::{
-    operations::{affine_product, binary, cast, gather, reduce_sum, select, unary},
+    operations::{affine_product, binary, cast, gather, only_axis, reduce_sum, reshape, select, softmax, unary},
     schema::{Graph, Node},
     tensor::Tensor,
 };
@@ -45,7 +45,7 @@ fn apply<'a>(node: &Node, input: impl Fn(usize) -> Result<&'a Tensor, String>) -
         "Add" | "Sub" | "Mul" | "Div" | "Greater" | "GreaterOrEqual" | "Less" | "LessOrEqual" | "Equal" | "And" => {
             binary(&node.op_type, input(0)?, input(1)?)
         }
-        "Neg" | "Log" | "Tanh" | "Not" | "Abs" => unary(&node.op_type, input(0)?),
+        "Neg" | "Log" | "Exp" | "Tanh" | "Not" | "Abs" => unary(&node.op_type, input(0)?),
         "Where" => select(input(0)?, input(1)?, input(2)?),
         "Cast" => cast(input(0)?, attribute("to")?),
         "Gather" => gather(input(0)?, input(1)?),
@@ -54,7 +54,8 @@ fn apply<'a>(node: &Node, input: impl Fn(usize) -> Result<&'a Tensor, String>) -
         "Unsqueeze" => {
             let tensor = input(0)?;
             let mut shape = tensor.shape.clone();
-            shape.insert(1.min(shape.len()), 1);
+            let axis = only_axis(input(1)?)?;
+            shape.insert(axis.min(shape.len()), 1);
             Ok(Tensor {
                 shape,
                 ..tensor.clone()
@@ -72,6 +73,8 @@ fn apply<'a>(node: &Node, input: impl Fn(usize) -> Result<&'a Tensor, String>) -
                 ..tensor.clone()
             })
         }
+        "Softmax" => softmax(input(0)?),
+        "Reshape" => reshape(input(0)?, input(1)?),
         other => Err(format!("the operation {other} is not known")),
     }
 }

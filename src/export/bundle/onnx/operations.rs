@@ -17,6 +17,7 @@ pub(super) fn unary(operation: &str, tensor: &Tensor) -> Outcome {
                 "Neg" => Some(-value),
                 "Abs" => Some(value.abs()),
                 "Log" => Some(libm::log(value)),
+                "Exp" => Some(libm::exp(value)),
                 "Tanh" => Some(libm::tanh(value)),
                 _ => None,
             };
@@ -164,14 +165,70 @@ pub(super) fn affine_product(left: &Tensor, right: &Tensor) -> Outcome {
 
 /// Sums over the second axis, which is kept with size 1 or dropped.
 pub(super) fn reduce_sum(tensor: &Tensor, is_kept: bool) -> Outcome {
-    let (&[rows, columns], Values::Int(values)) = (&tensor.shape[..], &tensor.values) else {
-        return Err("only rows of whole numbers are added up".to_owned());
+    let [rows, columns, ref rest @ ..] = tensor.shape[..] else {
+        return Err("there is no second axis".to_owned());
     };
-    let sums = (0..rows)
-        .map(|row| values[row * columns..][..columns].iter().sum())
-        .collect();
-    let shape = if is_kept { vec![rows, 1] } else { vec![rows] };
-    Ok(Tensor::int(shape, sums))
+    let inner: usize = rest.iter().product();
+    let places = |row: usize, place: usize| (0..columns).map(move |column| (row * columns + column) * inner + place);
+    let sums = (0..rows).flat_map(|row| (0..inner).map(move |place| (row, place)));
+    let values = match &tensor.values {
+        Values::Int(values) => Values::Int(sums.map(|(r, p)| places(r, p).map(|at| values[at]).sum()).collect()),
+        Values::Real(digits, values) => {
+            let sum = |(r, p)| places(r, p).fold(0.0, |sum, at| digits.round(sum + values[at]));
+            Values::Real(*digits, sums.map(sum).collect())
+        }
+        Values::Bool(_) => return Err("conditions have no sum".to_owned()),
+    };
+    let kept: &[usize] = if is_kept { &[1] } else { &[] };
+    Ok(Tensor {
+        shape: [&[rows], kept, rest].concat(),
+        values,
+    })
+}
+
+/// Exponentials in proportion to their sum, along the last axis.
+pub(super) fn softmax(tensor: &Tensor) -> Outcome {
+    let (Values::Real(digits, values), Some(&size)) = (&tensor.values, tensor.shape.last()) else {
+        return Err("it does not fit its elements".to_owned());
+    };
+    let mut shares = Vec::with_capacity(values.len());
+    for row in values.chunks_exact(size.max(1)) {
+        let largest = row.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        let powers = row
+            .iter()
+            .map(|value| digits.round(libm::exp(digits.round(value - largest))));
+        let powers: Vec<f64> = powers.collect();
+        let total = powers.iter().fold(0.0, |sum, power| digits.round(sum + power));
+        shares.extend(powers.iter().map(|power| digits.round(power / total)));
+    }
+    Ok(Tensor::real(*digits, tensor.shape.clone(), shares))
+}
+
+/// Gives the elements another shape, in which 0 stands for the size as it was.
+pub(super) fn reshape(tensor: &Tensor, sizes: &Tensor) -> Outcome {
+    let Values::Int(sizes) = &sizes.values else {
+        return Err("the shape is not one".to_owned());
+    };
+    let size = |(axis, &size): (usize, &i64)| match size {
+        0 => tensor.shape.get(axis).copied().unwrap_or(0),
+        _ => usize::try_from(size).unwrap_or(0),
+    };
+    let shape: Vec<usize> = sizes.iter().enumerate().map(size).collect();
+    if shape.iter().product::<usize>() != tensor.len() {
+        return Err("the shape has another number of elements".to_owned());
+    }
+    Ok(Tensor {
+        shape,
+        values: tensor.values.clone(),
+    })
+}
+
+/// The only one of a list of axes.
+pub(super) fn only_axis(axes: &Tensor) -> Result<usize, String> {
+    match &axes.values {
+        Values::Int(axes) if axes.len() == 1 => usize::try_from(axes[0]).map_err(|error| error.to_string()),
+        _ => Err("there is not one axis".to_owned()),
+    }
 }
 
 /// Common shape, and for each of its elements the indices into the tensors.

@@ -6,12 +6,14 @@ use super::{
     tensor::{Tensor, element_type},
 };
 use crate::{
+    decoupling::Layer,
     evaluation::Channel,
     export::bundle::{
-        exported_network::Metadata,
+        exported_decoder::Metadata,
         meaning::{Meaning, comment},
         portable::Portable,
-        weights::{Digits, RoundedNetwork, Weights},
+        tables::{Table, names},
+        weights::{Arithmetic, Digits, Weights},
     },
     network::Quantity,
 };
@@ -32,9 +34,9 @@ pub(in crate::export::bundle) fn write(
         value: value.as_str().map_or_else(|| value.to_string(), str::to_owned),
     });
     let row = if portable.takes_row() {
-        "the network of the row 'row' (from 1)"
+        format!("the {} of the row 'row' (from 1)", portable.decoder)
     } else {
-        "the network"
+        format!("the {}", portable.decoder)
     };
     let about = match portable.meaning {
         Meaning::Array(_) => format!(
@@ -65,27 +67,12 @@ fn graph(portable: &Portable, weights: &Weights) -> Graph {
     let mut builder = GraphBuilder::default();
     let digits = weights.arithmetic.rest;
     let is_valid = add_validity(&mut builder, portable, digits);
-    let hidden = add_hidden_sums(&mut builder, portable, weights);
-    let hidden = if weights.arithmetic.hidden == digits {
-        hidden
+    let answers = add_layers(&mut builder, portable, weights);
+    let answers = if weights.arithmetic.wide_layers == portable.layers().len() {
+        builder.cast(&answers, digits, "rounded_outputs")
     } else {
-        builder.cast(&hidden, digits, "rounded_hidden_sums")
+        answers
     };
-    let activations = builder.node("Tanh", &[&hidden], "activations");
-    let columns = |network: &RoundedNetwork| network.output_weights.clone();
-    let shape = [portable.hidden, portable.outputs];
-    let output_weights = add_table(&mut builder, "output_weights", weights, digits, &shape, columns);
-    let products = add_product(&mut builder, portable, &activations, &output_weights, "output_products");
-    let biases = |network: &RoundedNetwork| network.output_biases.clone();
-    let biases = add_table(
-        &mut builder,
-        "output_biases",
-        weights,
-        digits,
-        &[portable.outputs],
-        biases,
-    );
-    let answers = builder.node("Add", &[&products, &biases], "answers");
     let meaning = &portable.meaning;
     builder.node("Where", &[&is_valid, &answers, "not_a_number"], meaning.outputs());
     let names = |array: &str, own: &str, channels: Vec<Channel>| {
@@ -117,7 +104,7 @@ fn graph(portable: &Portable, weights: &Weights) -> Graph {
         names("Readings in ohm", "Readings", meaning.inputs()),
     )];
     if portable.takes_row() {
-        let text = format!("Row of each reading, from 1 to {}", portable.networks.len());
+        let text = format!("Row of each reading, from 1 to {}", portable.rows());
         inputs.push(value("row", INT64, None, text));
     }
     Graph {
@@ -153,7 +140,7 @@ fn add_validity(builder: &mut GraphBuilder, portable: &Portable, digits: Digits)
         return are_valid;
     }
     let first = builder.constant("first_row", &Tensor::int([], vec![1]));
-    let last = builder.constant("last_row", &Tensor::int([], vec![portable.networks.len() as i64]));
+    let last = builder.constant("last_row", &Tensor::int([], vec![portable.rows() as i64]));
     let not_below = builder.node("GreaterOrEqual", &["row", &first], "is_row_from_first");
     let not_above = builder.node("LessOrEqual", &["row", &last], "is_row_to_last");
     let is_row = builder.node("And", &[&not_below, &not_above], "is_row");
@@ -163,41 +150,85 @@ fn add_validity(builder: &mut GraphBuilder, portable: &Portable, digits: Digits)
     builder.node("And", &[&are_valid, &is_row], "is_valid")
 }
 
-fn add_hidden_sums(builder: &mut GraphBuilder, portable: &Portable, weights: &Weights) -> String {
-    let digits = weights.arithmetic.hidden;
-    let readings = if digits == weights.arithmetic.rest {
+/// Adds the changes of the readings and all layers; returns the name of the last values.
+fn add_layers(builder: &mut GraphBuilder, portable: &Portable, weights: &Weights) -> String {
+    let tables = weights.tables(portable);
+    let mut tables = tables.iter();
+    let mut table = |builder: &mut GraphBuilder| {
+        let table = tables.next().expect("a table for each name");
+        add_table(builder, portable, table)
+    };
+    let centre = table(builder);
+    let mut values = add_changes(builder, portable, weights.arithmetic, &centre);
+    for (index, (layer, names)) in portable.layers().iter().zip(names(portable.layers())).enumerate() {
+        let digits = weights.arithmetic.of_layer(index);
+        if index > 0 && index == weights.arithmetic.wide_layers {
+            values = builder.cast(&values, digits, &format!("rounded_{values}"));
+        }
+        let all: Vec<String> = names.tables.iter().map(|_| table(builder)).collect();
+        let result = names.result;
+        values = match layer {
+            Layer::Affine(_) => add_affine(builder, portable, &values, [&all[0], &all[1]], &result),
+            Layer::Tanh => builder.node("Tanh", &[&values], &result),
+            Layer::Gaussians { .. } => {
+                let third = builder.constant("third_axis", &Tensor::int([1], vec![2]));
+                let apart = builder.node("Unsqueeze", &[&values, &third], "inputs_of_gaussians");
+                let apart = builder.node("Sub", &[&apart, &all[0]], "apart");
+                let squares = builder.node("Mul", &[&apart, &apart], "squares");
+                let sums = builder.sum(&squares, "second_axis", false, "squared_distances");
+                let negative = builder.node("Neg", &[&sums], "logarithms_of_gaussians");
+                builder.node("Exp", &[&negative], &result)
+            }
+            Layer::Rules { memberships, .. } => {
+                let tables = [&all[0], &all[1]].map(String::as_str);
+                let logarithms = add_affine(builder, portable, &values, tables, "membership_logarithms");
+                let strengths = builder.node("Softmax", &[&logarithms], "strengths");
+                let strengths = builder.node("Unsqueeze", &[&strengths, "second_axis"], "strengths_of_rules");
+                let tables = [&all[2], &all[3]].map(String::as_str);
+                let of_rules = add_affine(builder, portable, &values, tables, "consequents");
+                let rules = memberships.outputs() as i64;
+                let shape = Tensor::int([3], vec![0, rules, portable.outputs as i64]);
+                let shape = builder.constant("shape_of_consequents", &shape);
+                let of_rules = builder.node("Reshape", &[&of_rules, &shape], "consequents_of_rules");
+                let blended = builder.node("MatMul", &[&strengths, &of_rules], "blended_rules");
+                builder.node("Squeeze", &[&blended, "second_axis"], &result)
+            }
+        };
+    }
+    values
+}
+
+/// Adds the sums of weighted values and biases.
+fn add_affine(
+    builder: &mut GraphBuilder,
+    portable: &Portable,
+    values: &str,
+    [weights, biases]: [&str; 2],
+    result: &str,
+) -> String {
+    let products = add_product(builder, portable, values, weights, &format!("products_for_{result}"));
+    builder.node("Add", &[&products, biases], result)
+}
+
+fn add_changes(builder: &mut GraphBuilder, portable: &Portable, arithmetic: Arithmetic, centre: &str) -> String {
+    let digits = arithmetic.of_layer(0);
+    let readings = if digits == arithmetic.rest {
         portable.meaning.readings().to_owned()
     } else {
         builder.cast(portable.meaning.readings(), digits, "readings_in_double")
     };
-    let centre = |network: &RoundedNetwork| network.centre.clone();
-    let centre = add_table(
-        builder,
-        portable.meaning.centre(),
-        weights,
-        digits,
-        &[portable.channels],
-        centre,
-    );
-    let changes = match portable.quantity {
-        Quantity::Resistance | Quantity::Raw => builder.node("Sub", &[&readings, &centre], "changes"),
+    match portable.quantity {
+        Quantity::Resistance | Quantity::Raw => builder.node("Sub", &[&readings, centre], "changes"),
         Quantity::Conductance => {
-            let difference = builder.node("Sub", &[&centre, &readings], "differences_ohm");
+            let difference = builder.node("Sub", &[centre, &readings], "differences_ohm");
             builder.node("Div", &[&difference, &readings], "changes")
         }
         Quantity::LogResistance => {
-            let difference = builder.node("Sub", &[&readings, &centre], "differences_ohm");
-            let relative = builder.node("Div", &[&difference, &centre], "relative_changes");
+            let difference = builder.node("Sub", &[&readings, centre], "differences_ohm");
+            let relative = builder.node("Div", &[&difference, centre], "relative_changes");
             add_log_of_one_more(builder, &relative, digits)
         }
-    };
-    let columns = |network: &RoundedNetwork| network.hidden_weights.clone();
-    let shape = [portable.channels, portable.hidden];
-    let hidden_weights = add_table(builder, "hidden_weights", weights, digits, &shape, columns);
-    let products = add_product(builder, portable, &changes, &hidden_weights, "hidden_products");
-    let biases = |network: &RoundedNetwork| network.hidden_biases.clone();
-    let biases = add_table(builder, "hidden_biases", weights, digits, &[portable.hidden], biases);
-    builder.node("Add", &[&products, &biases], "hidden_sums")
+    }
 }
 
 /// Adds ln(1 + x) = x · ln w / (w − 1), where w is the rounded 1 + x: the errors of w in both cancel (W. Kahan, in the
@@ -213,22 +244,15 @@ fn add_log_of_one_more(builder: &mut GraphBuilder, x: &str, digits: Digits) -> S
     builder.node("Where", &[&is_tiny, x, &quotient], "changes")
 }
 
-/// Adds a constant for one network, or the part of a table of all rows.
-fn add_table(
-    builder: &mut GraphBuilder,
-    name: &str,
-    weights: &Weights,
-    digits: Digits,
-    shape: &[usize],
-    of: impl Fn(&RoundedNetwork) -> Vec<f64>,
-) -> String {
-    let values: Vec<f64> = weights.networks.iter().flat_map(of).collect();
-    if let [_] = weights.networks[..] {
-        return builder.constant(name, &Tensor::real(digits, shape, values));
+/// Adds a constant for one map, or the part of a table of all rows.
+fn add_table(builder: &mut GraphBuilder, portable: &Portable, table: &Table) -> String {
+    let tensor = |shape: &[usize]| Tensor::real(table.digits, shape, table.values.clone());
+    if !portable.takes_row() {
+        return builder.constant(&table.name, &tensor(&table.shape));
     }
-    let shape = [&[weights.networks.len()], shape].concat();
-    let table = builder.constant(&format!("{name}_of_rows"), &Tensor::real(digits, shape, values));
-    builder.node("Gather", &[&table, "row_index"], name)
+    let shape = [&[portable.maps.len()], &table.shape[..]].concat();
+    let all = builder.constant(&format!("{}_of_rows", table.name), &tensor(&shape));
+    builder.node("Gather", &[&all, "row_index"], &table.name)
 }
 
 /// Adds the product of values (batch × n) with a matrix (n × m), or with the matrix of each one's row.
@@ -243,7 +267,9 @@ fn add_product(builder: &mut GraphBuilder, portable: &Portable, values: &str, ma
 
 /// Adds the number of readings outside the limits, if these are known.
 fn add_readings_outside(builder: &mut GraphBuilder, portable: &Portable, digits: Digits) -> bool {
-    let Some(ranges) = portable.ranges() else { return false };
+    let Some(ranges) = portable.known_ranges() else {
+        return false;
+    };
     let mut limit = |name: &str, pick: fn(&(f64, f64)) -> f64| {
         let values = ranges.iter().flat_map(|range| range.limits.iter().map(pick));
         let values = values.map(|value| digits.round(value)).collect();

@@ -5,8 +5,8 @@ use crate::{
     app::{
         theme::{Theme, semibold, space, type_size},
         widgets::{
-            ColumnWidth, SortBy, TableCell, TableClick, TableColumn, TableRow, dim_ui, ghost_button, note_ui,
-            placeholder_ui, progress_bar_ui, scrolled_table_ui,
+            ColumnWidth, SortBy, TableCell, TableClick, TableColumn, TableRow, TableView, dim_ui, ghost_button,
+            note_ui, placeholder_ui, progress_bar_ui,
         },
     },
     sensor::counted,
@@ -44,16 +44,11 @@ pub(in crate::app::views::experiments) fn folder_card_ui(ui: &mut Ui, folder: &m
 
 fn trials_ui(ui: &mut Ui, table: &SweepTable, sort: &mut SortBy) {
     let (finished, trials) = (table.finished(), table.trials);
-    let how_far = if finished == trials {
-        format!("All {} finished.", counted(trials, "trial"))
-    } else {
-        format!(
-            "{finished} of {} finished; new ones appear here by themselves.",
-            counted(trials, "trial")
-        )
-    };
-    dim_ui(ui, &how_far);
-    progress_bar_ui(ui, "Sweep folder", finished as f32 / trials.max(1) as f32);
+    let how_far = format!("{finished} of {} finished", counted(trials, "trial"));
+    progress_bar_ui(ui, "Sweep folder", finished as f32 / trials.max(1) as f32, &how_far);
+    if finished < trials {
+        dim_ui(ui, "New trials appear here by themselves.");
+    }
     ui.add_space(space(1));
     for problem in table.problems.iter().take(MOST_PROBLEMS) {
         note_ui(ui, problem);
@@ -70,18 +65,20 @@ fn trials_ui(ui: &mut Ui, table: &SweepTable, sort: &mut SortBy) {
     });
 }
 
-fn table_ui(ui: &mut Ui, table: &SweepTable, sort: &mut SortBy) {
+fn table_ui<'a>(ui: &mut Ui, table: &'a SweepTable, sort: &mut SortBy) {
     let palette = &Theme::of(ui).palette;
-    let columns: Vec<TableColumn<'_>> = table
-        .headings
-        .iter()
-        .enumerate()
-        .map(|(column, heading)| TableColumn {
-            heading,
-            is_figure: table.rows.iter().any(|row| row[column].value.is_some()),
-            width: ColumnWidth::of_longest(table.rows.iter().map(|row| row[column].text.as_str())),
-        })
-        .collect();
+    let column = |(place, heading): (usize, &'a String)| {
+        let is_figure = table.rows.iter().any(|row| row[place].value.is_some());
+        let column = if is_figure {
+            TableColumn::figure(heading)
+        } else {
+            TableColumn::text(heading)
+        };
+        column.width(ColumnWidth::of_longest(
+            table.rows.iter().map(|row| row[place].text.as_str()),
+        ))
+    };
+    let columns: Vec<TableColumn<'_>> = table.headings.iter().enumerate().map(column).collect();
     let cell = |row: usize, column: usize| {
         let cell = &table.rows[row][column];
         (cell.value, cell.text.as_str())
@@ -93,32 +90,20 @@ fn table_ui(ui: &mut Ui, table: &SweepTable, sort: &mut SortBy) {
             .map(|(cell, option)| format!("{option} {}", cell.text))
             .collect();
         let name = options.join(", ");
-        TableRow {
-            label: format!("Trial {name}"),
-            is_marked: false,
-            meaning: "",
-            dot: None,
-            cells: cells
-                .iter()
-                .enumerate()
-                .map(|(column, cell)| TableCell {
-                    text: cell.text.clone(),
-                    colour: if column == table.options {
-                        palette.accent
-                    } else {
-                        palette.text
-                    },
-                    is_strong: column <= table.options,
-                    label: (column >= table.options)
-                        .then(|| format!("{name}, {}: {}", table.headings[column], cell.text)),
-                    meaning: "",
-                })
-                .collect(),
-        }
+        let cells = cells.iter().enumerate().map(|(column, cell)| {
+            let colour = if column == table.options {
+                palette.accent
+            } else {
+                palette.text
+            };
+            TableCell::new(&cell.text)
+                .colour(colour)
+                .strong(column <= table.options)
+        });
+        TableRow::new(cells).labelled(format!("Trial {name}")).named(name)
     };
-    if let Some(TableClick::Sort(chosen)) =
-        scrolled_table_ui(ui, "sweep folder", &columns, Some(*sort), order.len(), row)
-    {
+    let view = TableView::new("sweep folder", &columns).sorted(*sort);
+    if let Some(TableClick::Sort(chosen)) = view.show(ui, order.len(), row) {
         *sort = chosen;
     }
 }

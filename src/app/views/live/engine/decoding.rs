@@ -283,7 +283,7 @@ mod tests {
         settings.training.stopping.epochs = 10;
         let mut run = Run::prepare(settings).unwrap();
         while run.step().is_none() {}
-        Arc::new(NetworkFile::from_run(&run).unwrap())
+        Arc::new(NetworkFile::from_run(&run, None).unwrap())
     }
 
     #[test]
@@ -291,7 +291,7 @@ mod tests {
         let network = network();
         let scene = Scene {
             noise: Noise::relative(1e-3),
-            ..network.settings.source.scene
+            ..network.settings.simulated().unwrap().source.scene
         };
         let mut decoding = Decoding::new(Arc::clone(&network), &scene, None).unwrap();
         let mut source = Simulated::new(&decoding.sensor, &scene, Seed(1), 50.0).unwrap();

@@ -10,6 +10,7 @@ use super::{
     stream::StreamFrames,
 };
 use crate::{
+    evaluation::SimulatedSettings,
     scene::{Deformation, Noise, Rows, Scene},
     sensor::SensorModel,
 };
@@ -36,9 +37,9 @@ pub(super) enum Next {
 }
 
 impl LivePlan {
-    /// The network's scene with the noise of the readings.
-    pub(super) fn scene(&self) -> Scene {
-        let scene = self.settings.source.scene;
+    /// The scene of `settings` with the noise of the readings.
+    pub(super) fn scene(&self, settings: &SimulatedSettings) -> Scene {
+        let scene = settings.source.scene;
         Scene {
             noise: Noise {
                 relative: self.noise,
@@ -52,12 +53,12 @@ impl LivePlan {
 impl FrameSource {
     /// Opens the source of `plan`; `None` if it is no longer wanted.
     pub(super) fn open(
-        plan: &LivePlan,
+        (plan, settings): (&LivePlan, &SimulatedSettings),
         read: &[usize],
         tally: &mut Tally,
         is_wanted: &dyn Fn() -> bool,
     ) -> Result<Option<Self>, String> {
-        let (sensor, scene): (SensorModel, Scene) = (plan.settings.source.sensor, plan.scene());
+        let (sensor, scene): (SensorModel, Scene) = (settings.source.sensor, plan.scene(settings));
         // The rows of a frame are told apart also where the network is not told them.
         let rows = match scene.rows {
             Rows::All => Rows::Known,

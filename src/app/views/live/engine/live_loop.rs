@@ -4,8 +4,9 @@ use std::{
 };
 
 use super::{
-    message::{Command, LiveEvent, LivePlan},
+    message::{Command, LiveEvent, LivePlan, LiveShown},
     session::Session,
+    target_session::TargetSession,
 };
 use crate::app::job::Report;
 
@@ -16,6 +17,31 @@ const BETWEEN_LOOKS: Duration = Duration::from_millis(20);
 /// Longest wait for a command of a source that stands still.
 const LONGEST_WAIT: Duration = Duration::from_secs(60);
 
+/// A source under way and what decodes it.
+pub(super) trait LiveSession {
+    /// When the next frame is due, of a source that keeps time: `None` while it stands still.
+    fn due(&self, now: Instant) -> Option<Instant>;
+
+    /// Returns `true` for a source that comes by itself, and so may fall silent.
+    fn is_stream(&self) -> bool;
+
+    /// Returns `true` if something has come that the window does not know.
+    fn has_news(&self) -> bool;
+
+    /// Takes what the source has, waiting for a stream at most until `latest`. Returns the end of the source once it
+    /// comes.
+    fn take_next(&mut self, latest: Instant, send: &dyn Fn(LiveEvent)) -> Option<Result<(), String>>;
+
+    /// Obeys a command.
+    fn obey(&mut self, command: Command, send: &dyn Fn(LiveEvent)) -> Result<(), String>;
+
+    /// Ends the recording, if there is one.
+    fn end_recording(&mut self, reason: Option<String>, send: &dyn Fn(LiveEvent));
+
+    /// The last frame with an answer, and how decoding stands, to be shown now.
+    fn show(&mut self) -> LiveShown;
+}
+
 /// Decodes what `plan` says until its source ends, the sender of the commands is gone, or the work is cancelled.
 ///
 /// # Errors
@@ -25,33 +51,40 @@ pub fn run(plan: LivePlan, commands: &Receiver<Command>, report: &Report<LiveEve
     let source = plan.source.looked_up();
     send(LiveEvent::Source(source.clone()));
     let plan = LivePlan { source, ..plan };
-    let Some(mut session) = Session::open(plan, &|| !report.is_cancelled())? else {
-        return Ok(());
+    let is_wanted = || !report.is_cancelled();
+    let session: Option<Box<dyn LiveSession>> = match plan.settings {
+        Some(settings) => Session::open(plan, &settings, &is_wanted)?.map(|session| Box::new(session) as _),
+        None => TargetSession::open(&plan, &is_wanted)?.map(|session| Box::new(session) as _),
     };
-    let end = decode(&mut session, commands, report);
+    let Some(mut session) = session else { return Ok(()) };
+    let end = decode(&mut *session, commands, report);
     session.end_recording(None, &send);
     // What came last stays in view.
-    show(&mut session, report);
+    show(&mut *session, report);
     end
 }
 
-fn decode(session: &mut Session, commands: &Receiver<Command>, report: &Report<LiveEvent>) -> Result<(), String> {
+fn decode(
+    session: &mut dyn LiveSession,
+    commands: &Receiver<Command>,
+    report: &Report<LiveEvent>,
+) -> Result<(), String> {
     let send = |event| report.send(event);
     let mut is_drawn = true;
     let mut shown = Instant::now().checked_sub(BETWEEN_SHOWN);
     while !report.is_cancelled() {
         let now = Instant::now();
         let may_show_at = shown.map_or(now, |shown| shown + BETWEEN_SHOWN);
-        if session.has_news && is_drawn && may_show_at <= now {
+        if session.has_news() && is_drawn && may_show_at <= now {
             show(session, report);
             (is_drawn, shown) = (false, Some(now));
         }
-        let mut until = session.source().due(now).unwrap_or(now + LONGEST_WAIT);
-        if session.has_news && is_drawn {
+        let mut until = session.due(now).unwrap_or(now + LONGEST_WAIT);
+        if session.has_news() && is_drawn {
             until = until.min(may_show_at);
         }
         // A stream waits for its lines instead.
-        let command = if until <= now || session.source().is_stream() {
+        let command = if until <= now || session.is_stream() {
             commands.try_recv().map_err(|error| match error {
                 TryRecvError::Empty => RecvTimeoutError::Timeout,
                 TryRecvError::Disconnected => RecvTimeoutError::Disconnected,
@@ -73,7 +106,6 @@ fn decode(session: &mut Session, commands: &Receiver<Command>, report: &Report<L
     Ok(())
 }
 
-fn show(session: &mut Session, report: &Report<LiveEvent>) {
-    session.has_news = false;
-    report.progress(LiveEvent::Shown(Box::new(session.shown())), |_, _| {});
+fn show(session: &mut dyn LiveSession, report: &Report<LiveEvent>) {
+    report.progress(LiveEvent::Shown(Box::new(session.show())), |_, _| {});
 }

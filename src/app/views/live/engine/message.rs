@@ -9,8 +9,9 @@ use ndarray::Array2;
 
 use crate::{
     app::test_view::Frame,
-    evaluation::SimulatedSettings,
+    evaluation::{Problem, SimulatedSettings},
     export::NetworkFile,
+    figure::TargetSurface,
     live::{Diagnosis, Motion, Source, ZeroGains},
     scene::Fault,
     sensor::SensorModel,
@@ -22,8 +23,8 @@ use crate::{
 pub struct LivePlan {
     /// The network.
     pub network: Arc<NetworkFile>,
-    /// Settings of the network, with its sensor and scene.
-    pub settings: SimulatedSettings,
+    /// Settings of the network with its sensor and scene; `None` of a recording.
+    pub settings: Option<SimulatedSettings>,
     /// Source of the frames.
     pub source: SourcePlan,
     /// Noise of a reading, relative to it (standard deviation); a simulated source has it, and faults are judged by it.
@@ -132,14 +133,47 @@ pub struct Recorded {
 /// State of decoding.
 #[derive(Clone, Debug, Default)]
 pub struct LiveShown {
-    /// The last frame with an answer; `None` before the first.
+    /// The last frame of an array with an answer; `None` before the first.
     pub frame: Option<LiveFrame>,
+    /// The last sample with an answer, of a network of a recording; `None` before the first.
+    pub targets: Option<LiveTargets>,
     /// Number of frames and their times.
     pub counts: Counts,
     /// Frames and seconds of the recording under way.
     pub recording: Option<(u64, f64)>,
     /// Place in the recording that is replayed.
     pub replay: Option<ReplayState>,
+}
+
+impl LiveShown {
+    /// Returns true once there is something to be drawn.
+    pub fn has_answer(&self) -> bool {
+        self.frame.is_some() || self.targets.is_some()
+    }
+}
+
+/// Latest answers of a network of a recording.
+#[derive(Clone, Debug)]
+pub struct LiveTargets {
+    /// Description of the targets.
+    pub problem: Arc<Problem>,
+    /// Surface through the targets, if they have positions that one goes through.
+    pub surface: Option<Arc<TargetSurface>>,
+    /// Smallest and largest value of each target so far.
+    pub ranges: Vec<(f64, f64)>,
+    /// Times in seconds and values of the targets, the latest last.
+    pub history: Vec<(f64, Arc<[f64]>)>,
+    /// Readings outside the range seen in training; `None` if that is not known.
+    pub readings_outside: Option<usize>,
+    /// Targets far outside the range seen in training.
+    pub targets_outside: usize,
+}
+
+impl LiveTargets {
+    /// The latest values.
+    pub fn values(&self) -> &[f64] {
+        self.history.last().map_or(&[], |(_, values)| values)
+    }
 }
 
 /// One decoded frame, ready to be drawn.

@@ -16,7 +16,9 @@ mod replay_file;
 mod session;
 mod simulated;
 mod stream;
+mod target_session;
+mod target_source;
 mod watch;
 
 pub use live_loop::run;
-pub use message::{Command, LiveEvent, LiveFrame, LivePlan, LiveShown, Recorded, SourcePlan, Watched};
+pub use message::{Command, LiveEvent, LiveFrame, LivePlan, LiveShown, LiveTargets, Recorded, SourcePlan, Watched};

@@ -5,6 +5,7 @@ use crate::{
         glossary,
         theme::{Theme, space, type_size},
         widgets::{
+            dim_ui,
             fields::{capitalised, count_ui, usually},
             note_ui, segmented_ui, slider_ui, text_ui,
         },
@@ -47,34 +48,27 @@ pub fn array_choice_ui(ui: &mut Ui, scale: &mut ArrayScale) {
     ui.add_space(space(1));
 }
 
-/// The number of hidden nodes, with what the paper's rules suggest; changes `draft`.
-pub fn hidden_choice_ui(ui: &mut Ui, draft: &mut SimulatedSettings) {
+/// The number of hidden nodes, with the rules of thumb for these numbers of inputs and outputs; changes `hidden`.
+pub fn hidden_choice_ui(ui: &mut Ui, hidden: &mut usize, channels: Option<(usize, usize)>) {
     let usual = SimulatedSettings::default().hidden;
-    count_ui(
-        ui,
-        "Hidden nodes",
-        glossary::HIDDEN_NODES.hint,
-        &mut draft.hidden,
-        usually(usual, 1..=LARGEST_HIDDEN),
-    );
-    let scale = draft.source.sensor.scale;
-    let suggestions = HiddenSuggestions::new(scale.columns(), scale.coordinates_per_row());
+    let limits = usually(usual, 1..=LARGEST_HIDDEN);
+    count_ui(ui, "Hidden nodes", glossary::HIDDEN_NODES.hint, hidden, limits);
+    let Some((n, m)) = channels else {
+        hidden_slider_ui(ui, hidden, &[]);
+        return;
+    };
+    let suggestions = HiddenSuggestions::new(n, m);
     let (low, high) = (*suggestions.square_root.start(), *suggestions.square_root.end());
-    hidden_slider_ui(ui, &mut draft.hidden, [suggestions.logarithm, low, high]);
-    let dim = Theme::of(ui).palette.dim;
-    let (n, m) = (scale.columns(), scale.coordinates_per_row());
+    hidden_slider_ui(ui, hidden, &[suggestions.logarithm, low, high]);
     let text = format!("Rules of thumb: {}, or {low} to {high}", suggestions.logarithm);
-    ui.label(RichText::new(text).size(type_size().note).color(dim))
-        .on_hover_text(format!(
-            "Rules of the paper for n = {n} inputs and m = {m} outputs: log₂ n (Eq. 13), or √(n + m) + a with a from \
-             1 to 10 (Eq. 12). A starting point, not a limit."
-        ));
-    workload_ui(ui, draft);
-    ui.add_space(space(1));
+    dim_ui(ui, &text).on_hover_text(format!(
+        "Rules of the paper for n = {n} inputs and m = {m} outputs: log₂ n (Eq. 13), or √(n + m) + a with a from 1 to 10 \
+         (Eq. 12). A starting point, not a limit."
+    ));
 }
 
 /// Memory and time of a training that takes much of either.
-fn workload_ui(ui: &mut Ui, draft: &SimulatedSettings) {
+pub fn workload_ui(ui: &mut Ui, draft: &SimulatedSettings) {
     if let Ok(workload) = Workload::of(draft)
         && workload.is_large()
     {
@@ -82,10 +76,11 @@ fn workload_ui(ui: &mut Ui, draft: &SimulatedSettings) {
         let text = capitalised(&describe_workload(&workload));
         ui.label(RichText::new(text).size(type_size().note).color(warning));
     }
+    ui.add_space(space(1));
 }
 
 /// A slider for small networks, with small marks at the suggestions.
-fn hidden_slider_ui(ui: &mut Ui, hidden: &mut usize, suggestions: [usize; 3]) {
+fn hidden_slider_ui(ui: &mut Ui, hidden: &mut usize, suggestions: &[usize]) {
     const MOST: usize = 64;
     let slider = Slider::new(hidden, 1..=MOST).clamping(eframe::egui::SliderClamping::Never);
     let width = ui.available_width();
@@ -95,7 +90,7 @@ fn hidden_slider_ui(ui: &mut Ui, hidden: &mut usize, suggestions: [usize; 3]) {
     }
     let rail = response.rect.x_range().shrink(0.4 * response.rect.height());
     let stroke = Stroke::new(1.5, Theme::of(ui).palette.warning);
-    for suggestion in suggestions.into_iter().filter(|suggestion| *suggestion <= MOST) {
+    for &suggestion in suggestions.iter().filter(|suggestion| **suggestion <= MOST) {
         let share = (suggestion - 1) as f32 / (MOST - 1) as f32;
         let (x, bottom) = (rail.min + share * rail.span(), response.rect.bottom() + space(1));
         ui.painter().vline(x, bottom - space(1)..=bottom, stroke);

@@ -2,10 +2,11 @@
 
 use crate::{
     app::widgets::fields::input_text,
-    evaluation::SimulatedSettings,
-    network::{Quantity, ScalingChoice},
+    evaluation::{RunSettings, SimulatedSettings},
+    network::{InputChoice, Quantity, ScalingChoice},
     scene::{Loading, Movement, Rows},
     sensor::{Geometry, counted},
+    training::TrainingSettings,
 };
 
 /// Loading, rows, axes and noise.
@@ -49,14 +50,14 @@ pub(super) fn of_geometry(geometry: &Geometry) -> String {
 }
 
 /// Quantity and scaling of the inputs.
-pub(super) fn of_inputs(draft: &SimulatedSettings) -> String {
-    let quantity = match draft.inputs.quantity {
+pub(super) fn of_inputs(inputs: &InputChoice) -> String {
+    let quantity = match inputs.quantity {
         Quantity::Raw => "readings",
         Quantity::Resistance => "resistance",
         Quantity::Conductance => "conductance",
         Quantity::LogResistance => "log-resistance",
     };
-    let scaling = match draft.inputs.scaling {
+    let scaling = match inputs.scaling {
         ScalingChoice::MinMax => "min-max",
         ScalingChoice::Whitening => "whitening",
     };
@@ -64,15 +65,15 @@ pub(super) fn of_inputs(draft: &SimulatedSettings) -> String {
 }
 
 /// The rule that ends every training.
-pub(super) fn of_stopping(draft: &SimulatedSettings) -> String {
-    counted(draft.training.stopping.epochs, "epoch")
+pub(super) fn of_stopping(training: &TrainingSettings) -> String {
+    counted(training.stopping.epochs, "epoch")
 }
 
 /// The first of the method's own settings, and the number of starts.
-pub(super) fn of_method(draft: &SimulatedSettings) -> String {
-    let mut method = draft.training.method;
+pub(super) fn of_method<S>(settings: &RunSettings<S>) -> String {
+    let mut method = settings.training.method;
     let first = method.settings().into_iter().next();
     let first = first.map(|setting| format!("{} {}, ", setting.name, input_text(*setting.value)));
-    let starts = counted(draft.starts, "start");
+    let starts = counted(settings.starts, "start");
     format!("{}{starts}", first.unwrap_or_default())
 }

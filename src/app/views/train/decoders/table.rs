@@ -7,7 +7,7 @@ use crate::{
         shared::Phase,
         theme::Theme,
         theme::space,
-        widgets::{Column, Row, dim_ui, focus_ring_ui, note_ui, table_ui},
+        widgets::{TableColumn, TableRow, TableView, dim_ui, focus_ring_ui, note_ui},
     },
     decoupling::DecoderKind,
     evaluation::{DecoderReport, Errors},
@@ -16,24 +16,16 @@ use crate::{
 
 const TIMES_LIMIT: &str = "× limit";
 
-const COLUMNS: [Column; 4] = [
-    Column {
-        heading: "Z %",
-        meaning: glossary::Z_PERCENT.hint,
-    },
-    Column {
-        heading: TIMES_LIMIT,
-        meaning: "Mean |error| of z divided by that of the Bayesian reference, the limit for decoders of a \
-                  row's own readings in this scene.",
-    },
-    Column {
-        heading: "residual",
-        meaning: glossary::RESIDUAL.hint,
-    },
-    Column {
-        heading: "µs",
-        meaning: "Time to decode a frame (all rows, read at one moment) on one thread, in µs: the median of many.",
-    },
+const COLUMNS: [TableColumn<'_>; 5] = [
+    TableColumn::text(""),
+    TableColumn::figure("Z %").meaning(glossary::Z_PERCENT.hint),
+    TableColumn::figure(TIMES_LIMIT).meaning(
+        "Mean |error| of z divided by that of the Bayesian reference, the limit for decoders of a row's own readings in \
+         this scene.",
+    ),
+    TableColumn::figure("residual").meaning(glossary::RESIDUAL.hint),
+    TableColumn::figure("µs")
+        .meaning("Time to decode a frame (all rows, read at one moment) on one thread, in µs: the median of many."),
 ];
 
 /// The other decoders on the same test set, folded away until the user asks for them.
@@ -64,36 +56,34 @@ fn measured_ui(ui: &mut Ui, measured: &[DecoderResult], reference: Option<&Error
     let palette = Theme::of(ui).palette;
     // Without noise there is no limit but rounding, and nothing to be compared with it.
     let limit = reference.filter(|limit| !limit.is_rounding());
-    let columns: Vec<Column> = COLUMNS
+    let columns: Vec<TableColumn<'_>> = COLUMNS
         .into_iter()
-        .filter(|column| limit.is_some() || column.heading != TIMES_LIMIT)
+        .filter(|column| limit.is_some() || column.heading() != TIMES_LIMIT)
         .collect();
-    let rows = measured.iter().map(|result| Row {
-        name: result.kind.name(result.precision),
-        meaning: result.kind.meaning(),
-        cells: match &result.report {
-            None => vec!["…".to_owned(); columns.len()],
-            Some(Err(_)) => vec![format_number(None); columns.len()],
+    let figures_count = columns.len() - 1;
+    let rows = measured.iter().map(|result| {
+        let cells = match &result.report {
+            None => vec!["…".to_owned(); figures_count],
+            Some(Err(_)) => vec![format_number(None); figures_count],
             Some(Ok(report)) => figures(report, limit),
-        },
-        colour: if result.kind == DecoderKind::Network {
+        };
+        let colour = if result.kind == DecoderKind::Network {
             palette.accent
         } else {
             palette.text
-        },
-        is_strong: false,
-        mark: "",
+        };
+        TableRow::figures(result.kind.name(result.precision), cells)
+            .meaning(result.kind.meaning())
+            .colour(colour)
     });
-    let of_limit = limit.map(|limit| Row {
-        name: "limit",
-        meaning: glossary::REFERENCE.hint,
-        cells: [limit.z_percent, Some(1.0), None, None].map(format_number).to_vec(),
-        colour: palette.dim,
-        is_strong: false,
-        mark: "",
+    let of_limit = limit.map(|limit| {
+        let cells = [limit.z_percent, Some(1.0), None, None].map(format_number);
+        TableRow::figures("limit", cells)
+            .meaning(glossary::REFERENCE.hint)
+            .colour(palette.dim)
     });
-    let rows: Vec<Row> = rows.chain(of_limit).collect();
-    ui.scope(|ui| table_ui(ui, &columns, &rows));
+    let rows = rows.chain(of_limit).collect();
+    TableView::new("decoders", &columns).show_all(ui, rows);
     for result in measured {
         let name = result.kind.name(result.precision);
         match &result.report {
@@ -110,7 +100,7 @@ fn measured_ui(ui: &mut Ui, measured: &[DecoderResult], reference: Option<&Error
     }
 }
 
-/// In the order of [`COLUMNS`], without the ratio where there is no limit.
+/// In the order of [`COLUMNS`] without the names, and without the ratio where there is no limit.
 fn figures(report: &DecoderReport, limit: Option<&Errors>) -> Vec<String> {
     let nodes = report.errors.nodes();
     let ratio = limit.map(|limit| nodes.and_then(|errors| errors.times(limit)));

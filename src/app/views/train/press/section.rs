@@ -14,8 +14,8 @@ use crate::{
         test_view::TestView,
         theme::{Theme, space},
         widgets::{
-            Column, Row, dim_ui, explained_options_ui, note_ui, number_ui, refusal_ui, section_heading_ui, slider_ui,
-            table_ui, usually,
+            TableColumn, TableRow, TableView, dim_ui, explained_options_ui, note_ui, number_ui, refusal_ui,
+            section_heading_ui, slider_ui, usually,
         },
     },
     decoupling::{DecoderKind, Precision},
@@ -40,19 +40,12 @@ const TOOLS: [(Tool, &str, &str); 5] = [
     (Tool::OneNode, "Node", "Moves a single node: drag it up or down."),
 ];
 
-const COLUMNS: [Column; 3] = [
-    Column {
-        heading: "mean mm",
-        meaning: "Mean |error| of z over the nodes of the pressed surface, in millimetres",
-    },
-    Column {
-        heading: "worst mm",
-        meaning: "Largest |error| of z, in millimetres",
-    },
-    Column {
-        heading: "µs",
-        meaning: "Time to decode this frame (all rows) on one thread, in µs: the shortest of several.",
-    },
+const COLUMNS: [TableColumn<'_>; 4] = [
+    TableColumn::text(""),
+    TableColumn::figure("mean mm").meaning("Mean |error| of z over the nodes of the pressed surface, in millimetres"),
+    TableColumn::figure("worst mm").meaning("Largest |error| of z, in millimetres"),
+    TableColumn::figure("µs")
+        .meaning("Time to decode this frame (all rows) on one thread, in µs: the shortest of several."),
 ];
 
 /// The finger, and the answers of all decoders to it.
@@ -164,19 +157,17 @@ fn answers_ui(ui: &mut Ui, shown: &Shown, compared: &[Compared]) {
         .filter_map(answered)
         .chain(network.map(|answer| answer.mean_mm));
     let best_mm = means.fold(f64::INFINITY, f64::min);
-    let row = |kind: DecoderKind, cells: Vec<String>, mean_mm: Option<f64>, colour| Row {
-        name: kind.name(Precision::Double),
-        meaning: kind.meaning(),
-        cells,
-        colour,
-        is_strong: mean_mm == Some(best_mm),
-        mark: "",
+    let row = |kind: DecoderKind, cells: Vec<String>, mean_mm: Option<f64>, colour| {
+        TableRow::figures(kind.name(Precision::Double), cells)
+            .meaning(kind.meaning())
+            .colour(colour)
+            .strong(mean_mm == Some(best_mm))
     };
     let of_network = shown.answer.as_ref().map(|answer| {
         let (cells, mean_mm) = cells_of(Some(answer));
         row(DecoderKind::Network, cells, mean_mm, palette.accent)
     });
-    let mut rows: Vec<Row> = of_network.into_iter().collect();
+    let mut rows: Vec<TableRow<'_>> = of_network.into_iter().collect();
     rows.extend(compared.iter().map(|compared| {
         let (cells, mean_mm) = cells_of(compared.answer.as_ref());
         // Answers to what was pressed a moment ago are pale.
@@ -184,7 +175,7 @@ fn answers_ui(ui: &mut Ui, shown: &Shown, compared: &[Compared]) {
         row(compared.kind, cells, mean_mm, colour)
     }));
     if !rows.is_empty() {
-        ui.scope(|ui| table_ui(ui, &COLUMNS, &rows));
+        TableView::new("answers", &COLUMNS).show_all(ui, rows);
     }
     let failed = compared.iter().filter_map(|compared| match &compared.answer {
         Some(Err(reason)) => Some((compared.kind, reason)),

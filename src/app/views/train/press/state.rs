@@ -13,7 +13,7 @@ use super::{
 use crate::{
     app::{
         job::{Job, JobError, Wake},
-        shared::{RunResult, Shared},
+        shared::{RunResult, Shared, SourceKind},
         surface_view::SurfaceViewResponse,
         test_view::TestView,
         views::train::drawn::Frames,
@@ -145,6 +145,12 @@ impl PressState {
     /// Answers what is pressed; `result` is that of the network on show.
     pub fn follow(&mut self, shared: &Shared, result: Option<&RunResult>) {
         self.ready.take_news();
+        if shared.source == SourceKind::Recording {
+            // There is no sensor model to press.
+            self.let_go();
+            (self.target, self.is_wanted) = (None, false);
+            return;
+        }
         let has_network = shared.shown_run().is_some() && result.is_some();
         if (self.is_wanted || self.is_pressing()) && !has_network {
             self.ready.ask(shared);

@@ -5,21 +5,19 @@ use eframe::egui::{Align, Layout, RichText, Ui, WidgetInfo, accesskit::Role};
 use super::{conditioning::conditioning_ui, spread::spread_ui};
 use crate::{
     app::{
-        glossary::{self, Term},
-        shared::{Effect, Phase, RunResult, RunView, Shared, SourceKind},
-        theme::{Theme, semibold, space, type_size},
-        views::train::{decoders::decoders_ui, exports::open_task, press::press_section_ui, state::TrainView},
-        widgets::{
-            Column, Landmark, Row, TableWidths, captioned_table_ui, dim_ui, ghost_button, note_ui, scrolled_ui,
-            section_heading_ui, table_ui,
+        glossary,
+        shared::{Effect, Phase, RunResult, RunView, Shared, SourceKind, error_table_ui},
+        theme::{space, type_size},
+        views::train::{
+            decoders::decoders_ui, exports::open_task, inspect::TestPlace, press::press_section_ui, state::TrainView,
         },
+        widgets::{Landmark, dim_ui, ghost_button, note_ui, scrolled_ui, section_heading_ui},
     },
-    decoupling::DecoderKind,
     evaluation::{
-        Baselines, ErrorBlock, ErrorMeasure, ErrorRow, ErrorTable, Errors, NodeAddress, ReferenceNote, Scores,
-        SimulatedSettings, TestErrors, error_remarks,
+        Baselines, ErrorTable, Errors, NodeAddress, ReferenceNote, Scores, SimulatedSettings, TestErrors, error_remarks,
     },
     export::{format_duration, format_number},
+    figure::trade_words::frame_time,
     training::StopReason,
 };
 
@@ -45,13 +43,13 @@ pub fn report_ui(ui: &mut Ui, view: &mut TrainView, shared: &Shared, effects: &m
             if let Some(note) = ReferenceNote::of(baselines) {
                 note_ui(ui, &note.to_string());
             }
-            if let Some(worst) = worst_node_ui(ui, result) {
-                view.go_to(worst, shared);
+            if let (Some(worst), Some(test)) = (worst_node_ui(ui, result), run.test.array()) {
+                view.go_to(TestPlace::of_node(worst, test));
             }
             let limit = baselines.reference.as_ref().and_then(TestErrors::nodes);
             decoders_ui(ui, &mut view.decoders, shared.phase, limit);
             effective_parameters_ui(ui, run, result);
-            spread_ui(ui, &run.starts);
+            spread_ui(ui, &run.problem, &run.starts);
         } else {
             expectation_ui(ui, shared);
         }
@@ -105,104 +103,6 @@ fn expectation_ui(ui: &mut Ui, shared: &Shared) {
 
 /// The name of the network's row.
 const NETWORK: &str = "network";
-
-/// Measures of error that the table shows: all but the worst node, which is shown below.
-fn is_in_table(measure: ErrorMeasure) -> bool {
-    measure != ErrorMeasure::WorstMm
-}
-
-fn heading(measure: ErrorMeasure) -> Column {
-    let term = match measure {
-        ErrorMeasure::ZPercent => Some(glossary::Z_PERCENT),
-        ErrorMeasure::XPercent => Some(glossary::X_PERCENT),
-        ErrorMeasure::YPercent => Some(glossary::Y_PERCENT),
-        ErrorMeasure::ZMm => Some(glossary::Z_MM),
-        ErrorMeasure::ZStrokePercent => Some(glossary::STROKE_PERCENT),
-        _ => None,
-    };
-    let heading = match measure {
-        ErrorMeasure::RangePercent => "% of range",
-        measure => measure.heading().0,
-    };
-    Column {
-        heading: term.map_or(heading, |term| term.name),
-        meaning: term.map_or(measure.definition(), |term| term.hint),
-    }
-}
-
-fn error_table_ui(ui: &mut Ui, table: &ErrorTable) {
-    let palette = Theme::of(ui).palette;
-    let shown = Vec::from_iter((0..table.measures.len()).filter(|&place| is_in_table(table.measures[place])));
-    let columns = Vec::from_iter(shown.iter().map(|&place| heading(table.measures[place])));
-    // The error by which the network is judged.
-    let judged = table
-        .measures
-        .iter()
-        .position(|measure| matches!(measure, ErrorMeasure::ZMm | ErrorMeasure::Rmse));
-    let rows_of = |block: &ErrorBlock| -> Vec<Row> {
-        let judged = |row: &ErrorRow| judged.and_then(|place| row.errors.get(place).copied().flatten());
-        let of_network = block.rows.iter().find(|row| row.name == NETWORK).and_then(judged);
-        let row = |row: &ErrorRow| Row {
-            name: row.name,
-            meaning: row_meaning(row.name),
-            cells: shown.iter().map(|&place| format_number(row.errors[place])).collect(),
-            colour: match row.name {
-                NETWORK => palette.accent,
-                "published" | "reference" => palette.dim,
-                _ => palette.text,
-            },
-            is_strong: row.name == NETWORK,
-            mark: if beats(row.name, judged(row), of_network) {
-                BETTER
-            } else {
-                ""
-            },
-        };
-        block.rows.iter().map(row).collect()
-    };
-    let blocks = Vec::from_iter(table.blocks.iter().map(|block| (block, rows_of(block))));
-    let widths = TableWidths::fitting(ui, &columns, &Vec::from_iter(blocks.iter().flat_map(|(_, rows)| rows)));
-    for (block, rows) in &blocks {
-        match &block.target {
-            None => {
-                ui.scope(|ui| table_ui(ui, &columns, rows));
-            }
-            Some(target) => {
-                ui.add_space(space(1));
-                ui.label(RichText::new(target.title()).font(semibold(type_size().body)));
-                ui.scope(|ui| captioned_table_ui(ui, &target.title(), &columns, rows, &widths));
-                ui.add_space(space(2));
-            }
-        }
-    }
-}
-
-/// Definition of a row of the error table.
-fn row_meaning(name: &str) -> &'static str {
-    match name {
-        "training mean" => DecoderKind::Mean.meaning(),
-        "linear map" => glossary::LINEAR_MAP.hint,
-        "ridge" => DecoderKind::Ridge.meaning(),
-        NETWORK => {
-            "The network with the lowest validation error so far; with the lowest training error if nothing is held out"
-        }
-        "reference" => glossary::REFERENCE.hint,
-        "published" => glossary::PUBLISHED.hint,
-        _ => "",
-    }
-}
-
-/// Meaning of the mark at a baseline.
-const BETTER: &str = "Better than the network.";
-
-/// Returns true for a baseline with a smaller error than the network.
-fn beats(name: &str, error: Option<f64>, of_network: Option<f64>) -> bool {
-    let is_baseline = ["training mean", "linear map", "ridge"].contains(&name);
-    is_baseline
-        && error
-            .zip(of_network)
-            .is_some_and(|(baseline, network)| baseline < network)
-}
 
 /// Reports where the network loses and what would help, or by how much it wins; nothing while it is being trained.
 fn verdict_ui(ui: &mut Ui, shared: &Shared, run: &RunView, result: &RunResult) {
@@ -321,22 +221,18 @@ fn cost_ui(ui: &mut Ui, run: &RunView, result: &RunResult) {
     }
     rows.push(("Best epoch", result.best_epoch.to_string()));
     if let Some(time) = result.frame_time {
-        rows.push(("Decoding a snapshot", format_short_time(time)));
+        let decoding = if run.problem.has_nodes {
+            "Decoding a snapshot"
+        } else {
+            "Decoding a sample"
+        };
+        rows.push((decoding, frame_time(1e6 * time.as_secs_f64())));
     }
     for (name, value) in rows {
         ui.horizontal(|ui| {
             ui.label(name);
             ui.with_layout(Layout::right_to_left(Align::Center), |ui| ui.label(value));
         });
-    }
-}
-
-/// As [`format_duration`], with microseconds below a millisecond.
-fn format_short_time(time: Duration) -> String {
-    if time < Duration::from_millis(1) {
-        format!("{} µs", format_number(1e6 * time.as_secs_f64()))
-    } else {
-        format_duration(time)
     }
 }
 

@@ -1,0 +1,178 @@
+use ndarray::Array2;
+use thiserror::Error;
+
+use super::RowProblemDescription;
+use crate::network::Quantity;
+
+/// What a decoder computes, in plain numbers and few kinds of steps, for programs that decode without this one.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Description {
+    /// From readings to targets: one map for all row-wires, or one for each.
+    pub maps: Vec<LayeredMap>,
+    /// Iteration on the equations of the sensor that begins at the answers of the maps.
+    pub equations: Option<RowProblemDescription>,
+}
+
+/// A map from the readings of a row to its targets, layer by layer.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LayeredMap {
+    /// Quantity computed from each reading.
+    pub quantity: Quantity,
+    /// Value of the quantity that is subtracted in each channel.
+    pub centre: Vec<f64>,
+    /// Layers, the first of which takes the centred values and the last of which gives the targets.
+    pub layers: Vec<Layer<f64>>,
+}
+
+/// A step from values to values.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Layer<T> {
+    /// Sums of weighted values.
+    Affine(AffineLayer<T>),
+    /// Hyperbolic tangent of each value.
+    Tanh,
+    /// Gaussians exp(−‖x − c‖²) around centres c.
+    Gaussians {
+        /// Inputs × Gaussians.
+        centres: Array2<T>,
+    },
+    /// Fuzzy rules: affine consequents, blended by normalised memberships.
+    Rules {
+        /// Logarithms of the memberships (up to a common term), one for each rule.
+        memberships: AffineLayer<T>,
+        /// Outputs of each rule, rule by rule.
+        consequents: AffineLayer<T>,
+    },
+}
+
+/// Sums of weighted values with a constant: values · weights + biases.
+#[derive(Clone, Debug, PartialEq)]
+pub struct AffineLayer<T> {
+    /// Inputs × outputs.
+    pub weights: Array2<T>,
+    /// Constant of each output.
+    pub biases: Vec<T>,
+}
+
+/// Reason for which a decoder cannot be described.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
+#[non_exhaustive]
+pub enum NotDescribed {
+    /// The decoder uses the noise of the readings and the prior of the scene.
+    #[error(
+        "the readings of the scene have noise, for which this decoder computes a posterior by expectation propagation, too long a program for a bundle: take another decoder, or settings without noise"
+    )]
+    Posterior,
+    /// There are not more equations than unknowns.
+    #[error(
+        "a row has {readings} readings for {unknowns} unknown displacements, too few for the equations to have one solution: take another decoder"
+    )]
+    Undetermined {
+        /// Readings of a row.
+        readings: usize,
+        /// Unknowns of a row.
+        unknowns: usize,
+    },
+    /// The decoder has no description.
+    #[error("this decoder has no form for other programs: take another decoder")]
+    Unknown,
+}
+
+impl Description {
+    /// Describes a decoder that consists of maps alone.
+    pub(super) fn of_maps(maps: Vec<LayeredMap>) -> Self {
+        Self { maps, equations: None }
+    }
+}
+
+impl<T> AffineLayer<T> {
+    /// Number of outputs.
+    pub fn outputs(&self) -> usize {
+        self.biases.len()
+    }
+}
+
+impl AffineLayer<f64> {
+    /// A layer without constants.
+    pub(super) fn linear(weights: Array2<f64>) -> Self {
+        Self {
+            biases: vec![0.0; weights.ncols()],
+            weights,
+        }
+    }
+
+    /// Changes of the targets with these indices, added to the constants of all targets.
+    pub(super) fn of_varying(changes: &Array2<f64>, varying: &[usize], constants: &[f64]) -> Self {
+        let mut weights = Array2::zeros((changes.nrows(), constants.len()));
+        for (column, &target) in changes.columns().into_iter().zip(varying) {
+            weights.column_mut(target).assign(&column);
+        }
+        Self {
+            weights,
+            biases: constants.to_vec(),
+        }
+    }
+}
+
+impl<T> Layer<T> {
+    /// Values of all tables: weights row by row before biases, memberships before consequents.
+    pub fn values(&self) -> Box<dyn Iterator<Item = &T> + '_> {
+        match self {
+            Self::Affine(affine) => Box::new(affine.values()),
+            Self::Tanh => Box::new(std::iter::empty()),
+            Self::Gaussians { centres } => Box::new(centres.iter()),
+            Self::Rules {
+                memberships,
+                consequents,
+            } => Box::new(memberships.values().chain(consequents.values())),
+        }
+    }
+
+    /// A layer of the same shape with other values, in the order of [`Self::values`]; `None` if there are too few.
+    pub fn with_values<U>(&self, values: &mut impl Iterator<Item = U>) -> Option<Layer<U>> {
+        Some(match self {
+            Self::Affine(affine) => Layer::Affine(affine.with_values(values)?),
+            Self::Tanh => Layer::Tanh,
+            Self::Gaussians { centres } => Layer::Gaussians {
+                centres: array(centres.dim(), values)?,
+            },
+            Self::Rules {
+                memberships,
+                consequents,
+            } => Layer::Rules {
+                memberships: memberships.with_values(values)?,
+                consequents: consequents.with_values(values)?,
+            },
+        })
+    }
+
+    /// Number of outputs for this number of inputs.
+    pub fn outputs(&self, inputs: usize) -> usize {
+        match self {
+            Self::Affine(affine) => affine.outputs(),
+            Self::Tanh => inputs,
+            Self::Gaussians { centres } => centres.ncols(),
+            Self::Rules {
+                memberships,
+                consequents,
+            } => consequents.outputs() / memberships.outputs().max(1),
+        }
+    }
+}
+
+impl<T> AffineLayer<T> {
+    fn values(&self) -> impl Iterator<Item = &T> {
+        self.weights.iter().chain(&self.biases)
+    }
+
+    fn with_values<U>(&self, values: &mut impl Iterator<Item = U>) -> Option<AffineLayer<U>> {
+        let weights = array(self.weights.dim(), values)?;
+        let biases: Vec<U> = values.take(self.biases.len()).collect();
+        (biases.len() == self.biases.len()).then_some(AffineLayer { weights, biases })
+    }
+}
+
+/// An array of the next values, row by row.
+fn array<U>((rows, columns): (usize, usize), values: &mut impl Iterator<Item = U>) -> Option<Array2<U>> {
+    Array2::from_shape_vec((rows, columns), values.take(rows * columns).collect()).ok()
+}

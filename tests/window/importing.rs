@@ -1,0 +1,509 @@
+//! Recordings as the source of a training: dropped, imported, trained on, saved, missing and found again.
+
+use std::{fmt::Write as _, fs, path::Path};
+
+use decoupler::{
+    app::{Notice, Phase, SourceKind},
+    export::{NetworkFile, RecipeFile},
+    network::ScalingChoice,
+    scene::RowModel,
+};
+use eframe::egui::{self, accesskit::Role, vec2};
+use egui_kittest::kittest::{By, NodeT as _, Queryable as _};
+
+use crate::{
+    driver::Driver,
+    recordings::{opened, opened_text, plan, recording, settings, trained, written},
+};
+
+#[track_caller]
+fn assert_meanings(driver: &Driver, meanings: &[(&str, &str)]) {
+    for (column, meaning) in meanings {
+        let value = driver.get(&format!("Meaning of {column}")).accesskit_node().value();
+        assert_eq!(value.as_deref(), Some(*meaning), "{column}");
+    }
+}
+
+/// Clicks the button that types a path, and gives it this one.
+fn type_path(driver: &mut Driver, button: &str, path: &Path) {
+    driver.open_form(button);
+    driver.type_into("File", &path.display().to_string());
+    driver.click_button("Open");
+    driver.settle();
+}
+
+#[test]
+fn a_dropped_file_is_trained_on_by_one_click_as_by_the_library() {
+    let (mut driver, path, _folder) = opened(120);
+    assert_eq!(
+        (driver.shown(), driver.state().source),
+        ("Train", SourceKind::Recording)
+    );
+    let meanings = [
+        ("time", "time"),
+        ("u1", "input"),
+        ("u2", "input"),
+        ("x", "target"),
+        ("y", "target"),
+    ];
+    assert_meanings(&driver, &meanings);
+    assert!(driver.has("Training: 96") && driver.has("Test: 24"));
+    driver.limit_epochs("5");
+    // From here on one click is enough.
+    driver.train_recording();
+    let run = trained(&plan(&path));
+    assert_eq!(driver.state().run.as_ref().unwrap().settings(), &settings());
+    assert_eq!(Some(&driver.state().result().unwrap().errors), run.errors().as_ref());
+    // The results take the place of the columns, which come back by a button.
+    assert!(!driver.has("Meaning of u1"));
+    driver.click_button("Columns…");
+    assert!(driver.has("Meaning of u1"));
+    driver.click_button("Show results");
+    assert!(!driver.has("Meaning of u1"));
+}
+
+#[test]
+fn from_the_first_start_a_dropped_file_is_an_onnx_network_after_three_clicks() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = written(&folder, "press.csv", &recording(60));
+    let mut driver = Driver::open_first(vec2(1440.0, 900.0));
+    driver.drop_files(&[&path]);
+    driver.wait("the plan", |driver| driver.state().setup().is_ok());
+    driver.train_recording();
+    driver.click_button("Export");
+    driver.click_button("ONNX, float32");
+    let onnx = folder.path().join("press.onnx");
+    driver.type_into("File", &onnx.display().to_string());
+    driver.click_button("Save");
+    driver.wait("the file", |driver| driver.notice().is_some());
+    assert!(onnx.is_file(), "{:?}", driver.notice());
+}
+
+#[test]
+fn the_sample_recording_is_trained_on_after_three_clicks() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut driver = Driver::open_keeping(&folder.path().join("runs"));
+    driver.click_button("Recording");
+    driver.click_button("Open the sample recording");
+    driver.wait("the samples", |driver| driver.says("Test: "));
+    driver.settle();
+    let meanings = [
+        ("press", "group"),
+        ("b1", "input"),
+        ("b7", "input"),
+        ("force", "target"),
+        ("x", "target"),
+    ];
+    assert_meanings(&driver, &meanings);
+    assert!(driver.has("7 inputs, 3 targets, 600 samples"), "{:#?}", driver.texts());
+    driver.limit_epochs("30");
+    driver.train_recording();
+    let errors = &driver.state().result().unwrap().errors;
+    let force = &errors.targets().unwrap()[0];
+    assert!(force.r2.is_some_and(|r2| r2 > 0.9), "{force:?}");
+}
+
+#[test]
+fn the_source_chooses_the_form_and_keeps_the_settings_of_the_other() {
+    let mut driver = Driver::open();
+    driver.enter("Hidden nodes", "9");
+    driver.click_button("Recording");
+    assert!(!driver.has("Array scale") && driver.has("Drop recordings here"));
+    assert_eq!(driver.state().settings().hidden, 12);
+    driver.click("▶ Train");
+    assert!(
+        matches!(driver.notice(), Some(Notice::Failed(reason)) if reason.contains("Open a recording first")),
+        "{:?}",
+        driver.notice()
+    );
+    driver.enter("Hidden nodes", "5");
+    driver.unfold_to("Network inputs", "Whitening");
+    driver.click_button("Whitening");
+    driver.settle();
+    let chosen = driver.state().settings();
+    assert_eq!((chosen.hidden, chosen.inputs.scaling), (5, ScalingChoice::Whitening));
+    driver.click_button("Simulated array");
+    driver.settle();
+    assert_eq!(driver.state().settings().hidden, 9);
+    assert!(driver.has("Array scale") && !driver.has("Drop recordings here"));
+}
+
+#[test]
+fn a_network_file_brings_back_its_settings_its_recording_and_its_run() {
+    let (mut driver, path, folder) = opened(60);
+    driver.enter("Hidden nodes", "4");
+    driver.limit_epochs("3");
+    driver.train_recording();
+    let saved = folder.path().join("network.json");
+    driver.save("Network file, JSON", &saved);
+    let file = NetworkFile::load(&saved).unwrap();
+
+    let mut other = Driver::open();
+    other.drop_files(&[&saved]);
+    other.wait("the import", |driver| driver.state().setup().ok() == Some(file.setup()));
+    other.wait("the run", |driver| driver.state().runs.workspace.runs.len() == 1);
+    assert_eq!(*other.state().runs.workspace.runs[0].file, file);
+    assert!(other.has("Hidden nodes") && other.state().settings().hidden == 4);
+    // Once more it is no other run.
+    other.drop_files(&[&saved]);
+    other.wait("the end", |driver| !driver.says("Reading "));
+    other.settle();
+    assert_eq!(other.state().runs.workspace.runs.len(), 1);
+
+    // Its recording has gone elsewhere.
+    let moved = folder.path().join("elsewhere.csv");
+    fs::rename(&path, &moved).unwrap();
+    let mut without = Driver::open();
+    without.drop_files(&[&saved]);
+    without.wait("what is missing", |driver| driver.has("press.csv is missing."));
+    without.settle();
+    assert_eq!(without.state().settings().hidden, 4);
+    assert!(without.state().setup().unwrap_err().contains("press.csv is missing"));
+    type_path(&mut without, "Type the path of press.csv", &moved);
+    without.wait("the samples", |driver| driver.has("Training: 48"));
+    assert!(!without.says("is missing") && !without.says("other contents"));
+    assert_eq!(without.state().setup().unwrap().plan().unwrap().import.data, moved);
+}
+
+#[test]
+fn a_recording_that_was_changed_is_said_to_be_another() {
+    let (mut driver, path, folder) = opened(60);
+    driver.limit_epochs("2");
+    driver.train_recording();
+    let [network, checkpoint] = ["network.json", "half.checkpoint"].map(|name| folder.path().join(name));
+    driver.save("Network file, JSON", &network);
+    driver.save("Checkpoint, resumable", &checkpoint);
+    fs::remove_file(&path).unwrap();
+    let changed = written(&folder, "changed.csv", &recording(50));
+
+    let mut other = Driver::open();
+    other.drop_files(&[&network]);
+    other.wait("what is missing", |driver| driver.has("press.csv is missing."));
+    type_path(&mut other, "Type the path of press.csv", &changed);
+    other.wait("the samples", |driver| driver.has("Training: 40"));
+    assert!(other.has("changed.csv has other contents than when the run was saved."));
+
+    // A training cannot be resumed on other samples.
+    let mut resumed = Driver::open();
+    resumed.drop_files(&[&checkpoint]);
+    resumed.wait("what is missing", |driver| driver.has("press.csv is missing."));
+    type_path(&mut resumed, "Type the path of press.csv", &changed);
+    resumed.wait("the reason", |driver| {
+        driver.says("changed.csv has other contents than when the training was saved")
+    });
+    assert!(resumed.has("press.csv is missing.") && resumed.state().run.is_none());
+    // With the right file it goes on where it was; that one lies elsewhere.
+    let found = written(&folder, "found.csv", &recording(60));
+    type_path(&mut resumed, "Type the path of press.csv", &found);
+    resumed.wait("the training", |driver| driver.state().result().is_some());
+    resumed.settle();
+    assert_eq!(resumed.state().result().unwrap().epochs_run, 2);
+    assert_eq!(
+        resumed.state().run.as_ref().unwrap().setup.plan().unwrap().import.data,
+        found
+    );
+}
+
+#[test]
+fn a_checkpoint_goes_on_as_if_it_had_never_stopped() {
+    let (mut driver, path, folder) = opened(60);
+    driver.limit_epochs("3");
+    driver.train_recording();
+    let saved = folder.path().join("half.checkpoint");
+    driver.save("Checkpoint, resumable", &saved);
+    let mut other = Driver::open();
+    other.drop_files(&[&saved]);
+    other.wait("the training", |driver| driver.state().result().is_some());
+    other.wait("its recording", |driver| driver.state().can_continue());
+    other.settle();
+    assert!(!other.has("Meaning of u1"), "the results are on show");
+    other.limit_epochs("2");
+    other.click_button("Continue");
+    other.wait("the end", |driver| {
+        let result = driver.state().result();
+        result.is_some_and(|result| result.is_standing && result.epochs_run == 5)
+    });
+    let run = trained(&plan(&path));
+    assert_eq!(Some(&other.state().result().unwrap().errors), run.errors().as_ref());
+}
+
+#[test]
+fn files_dropped_while_a_training_runs_change_nothing() {
+    let (mut driver, path, folder) = opened(60);
+    let other = written(&folder, "other.csv", &recording(40));
+    driver.limit_epochs("1000000");
+    driver.click("▶ Train");
+    driver.wait("an epoch", |driver| driver.state().result().is_some());
+    driver.drop_files(&[&other]);
+    driver.wait("the refusal", |driver| {
+        driver.says("A training is running: stop it before you open other files.")
+    });
+    assert_eq!(driver.state().phase, Phase::Training);
+    driver.click("■ Stop");
+    driver.wait("the end", |driver| matches!(driver.state().phase, Phase::Ended(_)));
+    driver.settle();
+    assert_eq!(driver.state().setup().unwrap().plan().unwrap().import.data, path);
+    assert!(!driver.says("other.csv"));
+}
+
+#[test]
+fn the_window_says_what_dropping_a_file_does() {
+    let mut driver = Driver::open();
+    for (name, expected) in [
+        ("press.csv", "Drop to open as a recording"),
+        ("net.json", "Drop to open the recipe, network or checkpoint"),
+        ("half.CHECKPOINT", "Drop to open the recipe, network or checkpoint"),
+    ] {
+        let hovered = egui::HoveredFile {
+            path: Some(name.into()),
+            ..egui::HoveredFile::default()
+        };
+        driver.harness().input_mut().hovered_files = vec![hovered];
+        driver.harness().step();
+        assert!(driver.has(expected), "{name}: {:#?}", driver.texts());
+    }
+    driver.harness().input_mut().hovered_files.clear();
+    driver.harness().step();
+    assert!(!driver.says("Drop to open"));
+}
+
+#[test]
+fn the_recording_is_open_again_at_the_next_start() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("window.json");
+    let path = written(&folder, "press.csv", &recording(60));
+    let mut driver = Driver::open_remembering(&file);
+    driver.open_recordings(&[&path]);
+    driver.mean("y", "unused");
+    driver.enter("Hidden nodes", "7");
+    let setup = driver.state().setup().unwrap();
+    drop(driver);
+
+    let mut next = Driver::open_remembering(&file);
+    next.wait("the samples", |driver| driver.says("Test: "));
+    assert_eq!(next.state().setup().unwrap(), setup);
+    drop(next);
+
+    fs::rename(&path, folder.path().join("moved.csv")).unwrap();
+    let mut without = Driver::open_remembering(&file);
+    without.wait("what is missing", |driver| driver.has("press.csv is missing."));
+    without.click_button("Clear");
+    without.settle();
+    assert!(without.has("Drop recordings here"));
+    drop(without);
+    let mut cleared = Driver::open_remembering(&file);
+    cleared.settle();
+    assert!(cleared.has("Drop recordings here"), "{:#?}", cleared.texts());
+}
+
+#[test]
+fn undoing_brings_a_meaning_back() {
+    let (mut driver, _path, _folder) = opened(40);
+    driver.settle();
+    // Changes within a second count as one.
+    let later = |driver: &mut Driver| {
+        let time = driver.harness().input().time.unwrap_or_default() + 5.0;
+        driver.harness().input_mut().time = Some(time);
+        driver.harness().run_steps(3);
+    };
+    later(&mut driver);
+    driver.mean("y", "unused");
+    later(&mut driver);
+    assert_eq!(driver.state().setup().unwrap().plan().unwrap().import.targets, ["x"]);
+    driver.press_with(egui::Modifiers::COMMAND, egui::Key::Z);
+    driver.wait("the meaning", |driver| {
+        let value = driver.get("Meaning of y").accesskit_node().value();
+        value.as_deref() == Some("target")
+    });
+    driver.settle();
+    assert_eq!(
+        driver.state().setup().unwrap().plan().unwrap().import.targets,
+        ["x", "y"]
+    );
+}
+
+#[test]
+fn row_wires_offer_a_network_for_each_and_without_them_there_is_one() {
+    let mut text = "row,u,v,force (N)\n".to_owned();
+    for row in 0..60 {
+        let (u, v) = (f64::from(row % 7), f64::from(row % 5));
+        writeln!(text, "{},{u},{v},{}", row % 3 + 1, u + 2.0 * v).unwrap();
+    }
+    let (mut driver, _path, _folder) = opened_text(&text);
+    driver.mean("row", "row-wire");
+    driver.unfold_to("Network inputs", "Known");
+    driver.click_button("Known");
+    driver.settle();
+    assert_eq!(driver.state().settings().source.row_model(), RowModel::Each);
+    driver.mean("row", "unused");
+    driver.settle();
+    assert_eq!(driver.state().settings().source.row_model(), RowModel::Shared);
+    assert!(!driver.has("Known"));
+}
+
+#[test]
+fn the_method_decides_what_is_held_out_until_the_user_does() {
+    let (mut driver, _path, _folder) = opened(60);
+    let held_out = |driver: &Driver| {
+        driver
+            .state()
+            .setup()
+            .unwrap()
+            .plan()
+            .unwrap()
+            .division
+            .validation_fraction
+    };
+    assert_eq!(held_out(&driver), 0.0);
+    crate::configuring::choose_method(&mut driver, "Levenberg-Marquardt");
+    driver.settle();
+    assert_eq!(held_out(&driver), 0.2);
+    driver.unfold_to("Samples", "Validation share");
+    driver.enter("Validation share", "30");
+    driver.enter("Hidden nodes", "3");
+    driver.settle();
+    assert_eq!(held_out(&driver), 0.3);
+}
+
+#[test]
+fn two_files_are_joined_by_time_and_filtered() {
+    let folder = tempfile::tempdir().unwrap();
+    let (mut sensor, mut states) = (String::new(), String::new());
+    for row in 0..80 {
+        let t = 1000.0 + 0.05 * f64::from(row);
+        let (x, z) = (f64::from(row % 20), f64::from(row % 4));
+        writeln!(
+            sensor,
+            "{t:.3},{:.3},{:.3},{:.3}",
+            0.5 * x,
+            x * x / 20.0,
+            f64::from(row % 7)
+        )
+        .unwrap();
+        // The last rows have no partner.
+        if row < 70 {
+            writeln!(states, "{:.3},{x},{z}", t + 0.004).unwrap();
+        }
+    }
+    let sensor = written(&folder, "sensor.csv", &sensor);
+    let states = written(&folder, "states.csv", &states);
+    let mut driver = Driver::open();
+    // In any order: the readings are found by the name of their file.
+    driver.open_recordings(&[&states, &sensor]);
+    let meanings = [
+        ("c1", "time"),
+        ("c2", "input"),
+        ("states.c1", "time"),
+        ("states.c2", "target"),
+        ("states.c3", "target"),
+    ];
+    assert_meanings(&driver, &meanings);
+    assert!(
+        driver.says("10 rows without partner, 0 of its rows unused"),
+        "{:#?}",
+        driver.texts()
+    );
+    driver.mean("states.c3", "unused");
+    driver.unfold_to("Filter", "Only rows with");
+    // The field is not left when what is typed so far cannot be understood.
+    driver.type_into("Only rows with", "s");
+    driver.settle();
+    driver.harness().event(egui::Event::Text("tates.c3 < 3".to_owned()));
+    driver.settle();
+    driver.press(egui::Key::Enter);
+    driver.wait("the filtered samples", |driver| driver.says("states.c3<3 is not met"));
+    driver.wait("the samples", |driver| driver.has("Test: 11"));
+    assert!(driver.has("Training: 42"), "53 of 70 rows are left");
+
+    // The import is saved as a recipe, which the terminal reads too, and opened again.
+    let recipe = folder.path().join("recipe.json");
+    driver.save("Recipe of the import, JSON", &recipe);
+    let plan = RecipeFile::load(&recipe).unwrap();
+    assert_eq!(plan.import.targets, ["states.c2"]);
+    assert_eq!(plan.import.conditions[0].to_string(), "states.c3<3");
+    let mut other = Driver::open();
+    other.open_recordings(&[&recipe]);
+    assert!(other.has("Training: 42") && other.has("Test: 11"));
+    assert_meanings(&other, &[("states.c3", "unused")]);
+}
+
+#[test]
+fn bad_cells_are_listed_by_line_and_column_and_can_be_called_missing() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = written(
+        &folder,
+        "bad.csv",
+        "u,v,force (N)\n1,5,2\n2,n.d.,3\n3,7,5\n4,8,6\n5,9,9\n",
+    );
+    let mut driver = Driver::open();
+    driver.drop_files(&[&path]);
+    driver.wait("the columns", |driver| driver.has("Meaning of v"));
+    driver.settle();
+    assert!(
+        driver.says("line 3, column 2: 'n.d.' is no number"),
+        "{:#?}",
+        driver.texts()
+    );
+    // A column of which a cell cannot be read is not used unasked.
+    driver.wait("the samples", |driver| driver.has("Training: 4"));
+    driver.mean("v", "input");
+    driver.wait("the reason", |driver| driver.says("is not a finite number"));
+    assert!(
+        !driver.says("--missing"),
+        "the window names no argument of the terminal"
+    );
+    driver.unfold_to("Filter", "Missing cells");
+    driver.enter("Missing cells", "n.d.");
+    driver.wait("the rest", |driver| {
+        driver.has("Training: 3") && driver.says("v is missing")
+    });
+    // The table of columns is opened by another thread than counts the samples.
+    driver.wait("the missing cell", |driver| driver.has("Missing in v: 1"));
+}
+
+#[test]
+fn a_random_split_is_said_to_be_optimistic() {
+    let (mut driver, _path, _folder) = opened(40);
+    assert!(!driver.says("A random split is optimistic"));
+    driver.unfold_to("Samples", "random");
+    driver.click_button("random");
+    driver.settle();
+    assert!(driver.says("A random split is optimistic"));
+    let group = By::new().role(Role::Button).label("group");
+    assert!(
+        driver.harness().query(group).is_none(),
+        "without groups there is no such split"
+    );
+}
+
+#[test]
+fn a_column_of_groups_divides_the_samples_by_them() {
+    let mut text = "session,u,v,force (N)\n".to_owned();
+    for row in 0..50 {
+        let (u, v) = (f64::from(row % 7), f64::from(row % 5));
+        writeln!(text, "s{},{u},{v},{}", row / 10, u + 2.0 * v).unwrap();
+    }
+    let (mut driver, _path, _folder) = opened_text(&text);
+    assert!(driver.says("group, 20 % test"), "{:#?}", driver.texts());
+    assert!(driver.has("Training: 40") && driver.has("Test: 10"), "whole sessions");
+    // Another group takes its place, and without one the samples are divided in time.
+    driver.mean("u", "group");
+    assert_meanings(&driver, &[("session", "unused")]);
+    driver.mean("u", "input");
+    assert!(driver.says("time, 20 % test"));
+}
+
+#[test]
+fn everything_lies_within_narrow_windows_too() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = written(&folder, "press.csv", &recording(40));
+    for size in [vec2(1440.0, 900.0), vec2(1024.0, 700.0), vec2(960.0, 640.0)] {
+        let mut driver = Driver::open_sized(size);
+        driver.open_recordings(&[&path]);
+        driver.settle();
+        for (text, place) in driver.places() {
+            let is_beside = place.left() < -0.5 || place.right() > size.x + 0.5;
+            assert!(!is_beside, "at {size}, {text} is at {place:?}");
+        }
+    }
+}

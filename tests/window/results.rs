@@ -1,0 +1,214 @@
+//! Results of a training on a recording in the Train view: surfaces, charts, tables, and the same for an array where both
+//! have them.
+
+use std::{fs, path::Path};
+
+use decoupler::app::{BottomTab, SourceKind};
+use eframe::egui::{Vec2, vec2};
+use egui_kittest::kittest::NodeT as _;
+
+use crate::{
+    driver::Driver,
+    sources::{BOTH, Opened, network_figures, probe, run_of, skin, skin_with_positions, trained_small},
+};
+
+/// Positions of the taxels of a grid in an order of their own.
+const GRID: &str = "target,x,y\nd6,4,10\nd1,0,0\nd2,0,5\nd4,4,0\nd3,0,10\nd5,4,5\n";
+
+/// What a surface tells assistive technology: the range of its nodes.
+#[track_caller]
+fn range(driver: &Driver, surface: &str) -> String {
+    let label = format!("{surface} surface");
+    driver.get(&label).accesskit_node().value().unwrap_or_default()
+}
+
+/// A window in which the recording that `make` writes was trained on.
+fn trained_on(make: impl Fn(&Path) -> decoupler::import::Setup) -> Opened {
+    let folder = tempfile::tempdir().unwrap();
+    let setup = make(folder.path());
+    let mut driver = Driver::open();
+    driver.take_recording(&setup);
+    driver.train();
+    driver.wait_for_hold();
+    Opened { driver, setup, folder }
+}
+
+#[test]
+fn a_training_shows_the_errors_of_the_library() {
+    for source in BOTH {
+        let Opened { mut driver, setup, .. } = trained_small(source);
+        driver.assert_shows(&network_figures(&run_of(&setup)));
+        for tab in ["Training state", "Histogram", "Regression", "Loss"] {
+            driver.click(tab);
+            driver.settle();
+        }
+        let has_sensor = source == SourceKind::Array;
+        for of_array in ["Nodes", "Section", "Press", "Under your finger"] {
+            let is_there = driver.says(of_array) || driver.says(&of_array.to_uppercase());
+            assert_eq!(is_there, has_sensor, "{of_array} for {source:?}");
+        }
+    }
+}
+
+#[test]
+fn targets_with_positions_are_shown_as_surfaces() {
+    let Opened { mut driver, folder, .. } = trained_on(|folder| skin_with_positions(folder, GRID));
+    // The first of the last 12 samples: d1 is the lowest and d6 the highest, or the other way round.
+    let of_sample = |row: f64| {
+        let (u, v) = ((0.37 * row).sin(), (0.23 * row).cos());
+        let ends = [1.0 + 0.2 * v, 1.0 + 0.5 * u + 0.2 * v];
+        (ends[0].min(ends[1]), ends[0].max(ends[1]))
+    };
+    let shown = |driver: &Driver| {
+        let text = range(driver, "Actual");
+        let numbers = text.strip_prefix("value ").unwrap().strip_suffix(" mm").unwrap();
+        let (low, high) = numbers.split_once(" to ").unwrap();
+        (low.parse::<f64>().unwrap(), high.parse::<f64>().unwrap())
+    };
+    let is_near = |one: (f64, f64), other: (f64, f64)| (one.0 - other.0).abs() < 5e-3 && (one.1 - other.1).abs() < 5e-3;
+    assert!(is_near(shown(&driver), of_sample(48.0)), "{:?}", shown(&driver));
+    assert!(range(&driver, "Decoded").starts_with("value "), "the network's");
+    driver.enter("Test sample", "5");
+    driver.settle();
+    assert!(is_near(shown(&driver), of_sample(52.0)), "{:?}", shown(&driver));
+    driver.click("Next sample");
+    driver.settle();
+    assert!(is_near(shown(&driver), of_sample(53.0)), "{:?}", shown(&driver));
+    driver.click_button("Error");
+    driver.settle();
+    assert!(range(&driver, "Error").starts_with("error ") && driver.has("Colour scale of error (mm)"));
+    assert!(driver.has("Colour scale of value (mm)"));
+    let picture = folder.path().join("surfaces.svg");
+    driver.save("Surfaces, SVG", &picture);
+    assert!(fs::read_to_string(&picture).unwrap().contains("value (mm)"));
+    driver.click("Sample");
+    driver.settle();
+    assert!(
+        driver.says("percent of the range of each target"),
+        "all targets are there too"
+    );
+}
+
+#[test]
+fn scattered_positions_have_surfaces_and_those_on_a_line_say_why_there_are_none() {
+    // A hexagon around d6.
+    let hexagon = "target,x,y\nd1,5,0\nd2,2.5,4.33\nd3,-2.5,4.33\nd4,-5,0\nd5,-2.5,-4.33\nd6,0,0\n";
+    let Opened { mut driver, folder, .. } = trained_on(|folder| skin_with_positions(folder, hexagon));
+    assert!(range(&driver, "Decoded").starts_with("value "));
+    driver.click("Top view");
+    driver.settle();
+    let picture = folder.path().join("surfaces.svg");
+    driver.save("Surfaces, SVG", &picture);
+    let svg = fs::read_to_string(&picture).unwrap();
+    assert!(svg.contains("Between the nodes: thin-plate spline"));
+
+    let oblique = "target,x,y\nd1,0,0\nd2,3,1\nd3,6,2\n";
+    let Opened { driver, .. } = trained_on(|folder| skin_with_positions(folder, oblique));
+    assert!(!driver.has("Actual surface"));
+    assert!(driver.says("No surface goes through the positions of the targets: all nodes are on one line"));
+    assert!(
+        driver.says("percent of the range of each target"),
+        "all targets take their place"
+    );
+}
+
+#[test]
+fn without_positions_all_targets_of_the_sample_are_shown_and_errors_over_a_position() {
+    let Opened { mut driver, .. } = trained_on(probe);
+    assert!(driver.has("Test sample 1") && driver.says("value (mm)"));
+    driver.click("Error map");
+    driver.settle();
+    assert!(driver.has("Error over the position"));
+    driver.click("Regression");
+    driver.settle();
+    assert!(driver.says("decoded x (mm) against actual x (mm)"));
+    driver.click("Target");
+    driver.click_button("y (mm)");
+    driver.settle();
+    assert!(driver.says("decoded y (mm) against actual y (mm)"));
+    driver.click("Histogram");
+    driver.settle();
+    assert!(driver.says("error of y (mm), decoded − actual"));
+    // Forces have no map.
+    let Opened { driver, .. } = trained_on(skin);
+    assert!(!driver.has("Error map"));
+}
+
+/// Moves the pointer over a place until `holds`; returns where.
+#[track_caller]
+fn hover(driver: &mut Driver, place: eframe::egui::Rect, holds: impl Fn(&Driver) -> bool) -> eframe::egui::Pos2 {
+    const STEPS: usize = 60;
+    for step in 0..STEPS * STEPS {
+        let share = vec2((step % STEPS) as f32, (step / STEPS) as f32) / STEPS as f32;
+        let at = place.lerp_inside(share);
+        driver.harness().hover_at(at);
+        driver.harness().run_steps(2);
+        if holds(driver) {
+            return at;
+        }
+    }
+    panic!("nothing is found there");
+}
+
+#[test]
+fn a_target_lit_on_a_surface_is_lit_in_the_sample_and_a_bar_leads_to_its_samples() {
+    let Opened { mut driver, .. } = trained_on(|folder| skin_with_positions(folder, GRID));
+    driver.click("Sample");
+    driver.settle();
+    let surface = driver.get("Actual surface").rect();
+    hover(&mut driver, surface, |driver| {
+        driver.views().train.lights.node.is_some()
+    });
+    // The tooltip names a target and its values.
+    assert!(
+        driver
+            .texts()
+            .iter()
+            .any(|text| text.starts_with("actual ") && text.contains(", decoded ")),
+        "{:#?}",
+        driver.texts()
+    );
+    driver.harness().remove_cursor();
+    driver.click("Histogram");
+    driver.settle();
+    assert_eq!(driver.views().train.tab, BottomTab::ErrorHistogram);
+    driver.act("Next bar of the histogram");
+    driver.act("Previous bar of the histogram");
+    let listed = |driver: &Driver| driver.texts().into_iter().find(|text| text.starts_with("Sample "));
+    for _ in 0..20 {
+        if listed(&driver).is_some() {
+            break;
+        }
+        driver.act("Next bar of the histogram");
+    }
+    let label = listed(&driver).unwrap();
+    let number: usize = label["Sample ".len()..label.find(':').unwrap()].parse().unwrap();
+    driver.click(&label);
+    driver.settle();
+    assert_eq!(driver.views().train.snapshot + 1, number, "{label}");
+}
+
+#[test]
+fn results_of_a_recording_lie_within_narrow_windows_too() {
+    const SIZES: [Vec2; 3] = [vec2(1440.0, 900.0), vec2(1024.0, 700.0), vec2(960.0, 640.0)];
+    for size in SIZES {
+        for make in [probe, |folder: &Path| skin_with_positions(folder, GRID)] {
+            let folder = tempfile::tempdir().unwrap();
+            let mut driver = Driver::open_sized(size);
+            driver.take_recording(&make(folder.path()));
+            driver.train();
+            driver.settle();
+            for tab in ["Histogram", "Regression"] {
+                driver.click(tab);
+                driver.settle();
+                for (text, place) in driver.places() {
+                    let is_beside = place.left() < -0.5 || place.right() > size.x + 0.5;
+                    assert!(!is_beside, "at {size}, {text} is at {place:?}");
+                }
+            }
+            let places = driver.places();
+            let (text, place) = places.iter().find(|(text, _)| text.starts_with("Fitted line")).unwrap();
+            assert!(place.height() < 40.0, "at {size}, '{text}' is at {place:?}");
+        }
+    }
+}

@@ -1,0 +1,201 @@
+//! The same small training on a simulated array and on a recording, for tests of what the Train view does for both.
+
+use std::{fmt::Write as _, fs, path::Path, sync::Arc};
+
+use decoupler::{
+    app::{Effect, Phase, SourceKind},
+    dataset::Division,
+    evaluation::{ErrorMeasure, Measured, Run, RunSettings},
+    export::format_number,
+    import::{Plan, Recipe, Setup},
+    scene::RowModel,
+};
+use tempfile::TempDir;
+
+use crate::driver::{Driver, small};
+
+/// Both kinds of source.
+pub(crate) const BOTH: [SourceKind; 2] = [SourceKind::Array, SourceKind::Recording];
+
+/// A window on a small source, and the setup that it trains with.
+pub(crate) struct Opened {
+    pub(crate) driver: Driver,
+    pub(crate) setup: Setup,
+    /// Of the recording, and for what is written.
+    pub(crate) folder: TempDir,
+}
+
+/// Opens a window whose next training is small: 15 epochs with 6 hidden nodes.
+pub(crate) fn open_small(source: SourceKind) -> Opened {
+    let folder = tempfile::tempdir().unwrap();
+    let mut driver = Driver::open();
+    let setup = match source {
+        SourceKind::Array => {
+            driver.configure_small();
+            small().into()
+        }
+        SourceKind::Recording => {
+            let setup = probe(folder.path());
+            driver.take_recording(&setup);
+            setup
+        }
+    };
+    Opened { driver, setup, folder }
+}
+
+/// As [`open_small`], trained to the end.
+pub(crate) fn trained_small(source: SourceKind) -> Opened {
+    let mut opened = open_small(source);
+    opened.driver.train();
+    opened.driver.wait_for_hold();
+    opened
+}
+
+/// Settings of a small training on a recording.
+pub(crate) fn small_settings() -> RunSettings {
+    let mut settings = RunSettings::from(Measured { rows: RowModel::Shared });
+    settings.hidden = 6;
+    settings.training = small().training;
+    settings
+}
+
+/// A recording of two readings and the position of a probe, written into `folder`.
+pub(crate) fn probe(folder: &Path) -> Setup {
+    let mut text = "time (s),u1 (V),u2 (V),x (mm),y (mm)\n".to_owned();
+    for row in 0..120 {
+        let t = f64::from(row);
+        let (x, y) = (10.0 + 5.0 * (0.37 * t).sin(), 4.0 * (0.23 * t).cos());
+        let (u1, u2) = (0.2 * x + 0.05 * y + 0.01 * x * y / 40.0, 0.3 * y - 0.02 * x);
+        writeln!(text, "{},{u1:.6},{u2:.6},{x:.6},{y:.6}", 0.1 * t).unwrap();
+    }
+    setup(folder, "probe.csv", &text, &["x", "y"])
+}
+
+/// A recording of two readings of a press on 2 × 3 taxels, and of the force.
+pub(crate) fn skin(folder: &Path) -> Setup {
+    let mut text = "time (s),u1 (V),u2 (V),d1 (mm),d2 (mm),d3 (mm),d4 (mm),d5 (mm),d6 (mm),force (N)\n".to_owned();
+    for row in 0..60 {
+        let t = f64::from(row);
+        let (u, v) = ((0.37 * t).sin(), (0.23 * t).cos());
+        write!(text, "{},{u:.6},{v:.6}", 0.1 * t).unwrap();
+        for taxel in 0..6 {
+            write!(text, ",{:.6}", 1.0 + 0.1 * f64::from(taxel) * u + 0.2 * v).unwrap();
+        }
+        writeln!(text, ",{:.6}", 10.0 * u).unwrap();
+    }
+    let targets = ["d1", "d2", "d3", "d4", "d5", "d6", "force"];
+    setup(folder, "skin.csv", &text, &targets)
+}
+
+/// As [`skin`], with positions of the taxels from a file of this text.
+pub(crate) fn skin_with_positions(folder: &Path, positions: &str) -> Setup {
+    let without = skin(folder);
+    let path = folder.join("taxels.csv");
+    fs::write(&path, positions).unwrap();
+    let mut plan = without.plan().unwrap().clone();
+    plan.import.positions = Some(path);
+    Setup::recording(*without.settings(), plan)
+}
+
+fn setup(folder: &Path, name: &str, text: &str, targets: &[&str]) -> Setup {
+    let path = folder.join(name);
+    fs::write(&path, text).unwrap();
+    let names = |names: &[&str]| names.iter().map(|name| (*name).to_owned()).collect();
+    let plan = Plan {
+        import: Recipe {
+            data: path,
+            inputs: names(&["u1", "u2"]),
+            targets: names(targets),
+            time: Some("time".to_owned()),
+            ..Recipe::default()
+        },
+        division: Division::default(),
+        ..Plan::default()
+    };
+    Setup::recording(small_settings(), plan)
+}
+
+/// A run of the library by itself, which has begun.
+pub(crate) fn begun(setup: &Setup) -> Run {
+    let sets = setup.sets(Path::new(""), &|| false, &mut |_| ()).unwrap().unwrap();
+    sets.run(setup, &|| false).unwrap().unwrap()
+}
+
+/// The same, trained to the end.
+pub(crate) fn run_of(setup: &Setup) -> Run {
+    let mut run = begun(setup);
+    while run.step().is_none() {}
+    run
+}
+
+/// As `setup`, with another number of epochs.
+pub(crate) fn with_epochs(setup: &Setup, epochs: usize) -> Setup {
+    let mut settings = *setup.settings();
+    settings.training.stopping.epochs = epochs;
+    setup.with_settings(settings)
+}
+
+/// Figures of the network in the error table, in the window's words: `network, Z %: 2.28`, `x (mm), network, RMSE: 0.01`.
+pub(crate) fn network_figures(run: &Run) -> Vec<String> {
+    let (problem, scores) = (run.problem(), run.scores().unwrap());
+    let table = decoupler::evaluation::ErrorTable::of_scores(problem, &scores, None);
+    let mut figures = Vec::new();
+    for block in &table.blocks {
+        let caption = block
+            .target
+            .as_ref()
+            .map_or_else(String::new, |target| format!("{}, ", target.title()));
+        let row = block.rows.iter().find(|row| row.name == "network").unwrap();
+        for (measure, error) in table.measures.iter().zip(&row.errors) {
+            let heading = match measure {
+                ErrorMeasure::ZPercent => "Z %",
+                ErrorMeasure::ZMm => "mm",
+                ErrorMeasure::Rmse => "RMSE",
+                ErrorMeasure::Mae => "MAE",
+                ErrorMeasure::RangePercent => "% of range",
+                _ => continue,
+            };
+            figures.push(format!("{caption}network, {heading}: {}", format_number(*error)));
+        }
+    }
+    figures
+}
+
+impl Opened {
+    /// Changes the settings of the next training.
+    #[track_caller]
+    pub(crate) fn change(&mut self, change: impl FnOnce(&mut RunSettings)) {
+        let mut settings = *self.setup.settings();
+        change(&mut settings);
+        self.setup = self.setup.with_settings(settings);
+        self.driver
+            .window_mut()
+            .apply(Effect::TakeSetup(Box::new(self.setup.clone())));
+        self.driver.harness().run_steps(2);
+        assert_eq!(self.driver.state().setup().as_ref(), Ok(&self.setup));
+    }
+}
+
+impl Driver {
+    /// Makes this recording the source of the next training, and waits until the window can read it.
+    #[track_caller]
+    pub(crate) fn take_recording(&mut self, setup: &Setup) {
+        let plan = Arc::new(setup.plan().unwrap().clone());
+        for effect in [Effect::Import(Ok(plan)), Effect::TakeSetup(Box::new(setup.clone()))] {
+            self.window_mut().apply(effect);
+        }
+        self.harness().run_steps(2);
+        self.wait("the recording", |driver| driver.state().recording.plan.is_ok());
+        assert_eq!(self.state().setup().as_ref(), Ok(setup));
+        assert_eq!(self.state().phase, Phase::Idle);
+    }
+
+    /// Asserts that the window shows all of these texts.
+    #[track_caller]
+    pub(crate) fn assert_shows(&self, texts: &[String]) {
+        let shown = self.texts();
+        for text in texts {
+            assert!(shown.contains(text), "'{text}' is not among {shown:#?}");
+        }
+    }
+}
