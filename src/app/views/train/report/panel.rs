@@ -7,7 +7,7 @@ use crate::{
     app::{
         glossary,
         shared::{Effect, Phase, RunResult, RunView, Shared, SourceKind, error_table_ui, sentence},
-        theme::{Theme, space, type_size},
+        theme::{space, type_size},
         views::train::{
             decoders::decoders_ui, exports::open_task, inspect::TestPlace, press::press_section_ui, recording::bias,
             state::TrainView,
