@@ -67,7 +67,9 @@ pub use crate::evaluation::format::{format_decimals, format_duration, format_num
 pub use atomic::{AtomicFile, WriteError, atomic_write, check_writable};
 pub use checkpoint_file::CheckpointFile;
 pub use document::{DocumentError, DocumentKind};
-pub use experiment_tables::{ExperimentTable, cells_table, trials_table, write_experiment_markdown};
+pub use experiment_tables::{
+    ExperimentColumn, ExperimentColumnKind, ExperimentTable, cells_table, trials_table, write_experiment_markdown,
+};
 pub use experiment_words::{describe_conditions, describe_failures, describe_worse_than_mean};
 pub use network_file::NetworkFile;
 pub use recipe_file::{RecipeFile, RecipeSource};
@@ -88,7 +90,7 @@ pub(crate) use sweep::sweep_specification;
 #[cfg(feature = "cli")]
 pub(crate) use sweep::{
     PlanAxis, SweepFolderError, SweepPlan, SweepTableFormat, Trial, TrialId, TrialOptions, decoders_in_order,
-    train_options,
+    recording_options, train_options,
 };
 #[cfg(feature = "gui")]
 pub(crate) use sweep::{SweepFiles, SweepRow};

@@ -52,11 +52,8 @@ pub use condition::Condition;
 pub use cure::Cure;
 pub use dialect::{Decimal, Dialect, DialectChoice, DialectError, Encoding, Separator};
 pub use error::{ImportError, TableError};
-<<<<<<< HEAD
 pub use format::Format;
-=======
 pub use input_lines::{InputLine, InputLineError, InputLines};
->>>>>>> w-other
 pub use inputs::{InputColumns, InputError, InputTable};
 pub use inspected::InspectedFile;
 pub use inspection::{ColumnKind, ColumnSummary, Inspection, TimeSummary};
@@ -69,6 +66,8 @@ pub use recipe::{Joined, Recipe};
 pub use recorded::{FileChecksum, Recorded, file_crc32};
 pub use recording::{Dropped, FileReport, JoinReport, Recording};
 pub use setup::{Recordings, Setup, SetupError, SetupSets};
+#[cfg(feature = "cli")]
+pub(crate) use stored_path::stored;
 pub use suggestion::{suggested_plan, suggested_plan_in_order};
 pub use table::{Excess, Table};
 pub use watch::{Progress, Watch};

@@ -6,7 +6,7 @@ use super::{
     Cure, ImportError, Joined, Recipe, Recording, Watch,
     stored_path::{restored, stored},
 };
-use crate::dataset::{Dataset, Division, Seed, Split, SplitBy, Stream};
+use crate::dataset::{Dataset, Division, Seed, Split, SplitBy};
 
 /// Files, the meanings of their columns, and the division of their samples: all that a run on measured samples needs to be
 /// repeated.
@@ -53,6 +53,22 @@ impl Plan {
     /// # Errors
     /// If the files cannot be imported or the samples not be divided.
     pub fn sets(&self, folder: &Path, seed: Seed, watch: Watch<'_>) -> Result<PlannedSets, ImportError> {
+        let (recording, test_recording) = self.recordings(folder, watch)?;
+        let (split, test) = self.divide(&recording, test_recording.as_ref(), seed)?;
+        Ok(PlannedSets {
+            recording,
+            test_recording,
+            split,
+            test,
+        })
+    }
+
+    /// Imports the files, relative to `folder`: all samples but those of the test files, and those of the test files, if there
+    /// are any.
+    ///
+    /// # Errors
+    /// If the files cannot be imported.
+    pub fn recordings(&self, folder: &Path, watch: Watch<'_>) -> Result<(Recording, Option<Recording>), ImportError> {
         let recording = self.recording(folder, watch)?;
         let test_recording = match &self.test {
             None => None,
@@ -61,13 +77,7 @@ impl Plan {
                 Some(self.import.of_test(files)?.import(folder, watch)?)
             }
         };
-        let (split, test) = self.divide(&recording, test_recording.as_ref(), seed)?;
-        Ok(PlannedSets {
-            recording,
-            test_recording,
-            split,
-            test,
-        })
+        Ok((recording, test_recording))
     }
 
     /// Refuses rows for the test that are trained on. A file joined to both may be the same: its times tell its rows apart.
@@ -89,19 +99,8 @@ impl Plan {
         test_recording: Option<&Recording>,
         seed: Seed,
     ) -> Result<(Split, Dataset), ImportError> {
-        let set = &recording.set;
-        let mut rng = seed.rng(Stream::Split);
-        Ok(match test_recording {
-            None => {
-                let parts = self.division.divide(set, &mut rng)?;
-                (parts.split(set), parts.test_set(set))
-            }
-            Some(recording) => {
-                let parts = self.division.divide_for_training(set, &mut rng)?;
-                let read = set.row_wires_read().unwrap_or_default();
-                (parts.split(set), recording.set.clone().among_rows(read)?)
-            }
-        })
+        let test = test_recording.map(|recording| &recording.set);
+        Ok(self.division.sets(&recording.set, test, seed)?)
     }
 
     /// Imports the samples without those of the test files.
@@ -159,6 +158,12 @@ impl Plan {
     #[must_use]
     pub fn within(&self, folder: &Path) -> Self {
         self.with_paths(|path| folder.join(path))
+    }
+
+    /// This plan with the names of its files in the place of their paths.
+    #[must_use]
+    pub fn named(&self) -> Self {
+        self.with_paths(|path| path.file_name().map_or_else(|| path.clone(), PathBuf::from))
     }
 
     pub(super) fn with_paths(&self, of: impl Fn(&PathBuf) -> PathBuf) -> Self {

@@ -1,10 +1,13 @@
-use std::{ops::ControlFlow, path::Path};
+use std::{ops::ControlFlow, path::Path, sync::Arc};
 
 use thiserror::Error;
 
 use super::{ImportError, Plan, PlannedSets, Progress, Recorded, Recording};
 use crate::{
-    evaluation::{Run, RunError, RunSets, RunSettings, SimulatedSettings, Source},
+    evaluation::{
+        Run, RunError, RunSets, RunSettings, SimulatedSettings, Source,
+        experiments::{ExperimentRecording, RecordedSamples, TrialSamples},
+    },
     training::TrainerState,
 };
 
@@ -137,14 +140,7 @@ impl Setup {
             let sets = settings.checked_sets_unless(is_cancelled)?;
             return Ok(sets.map(|sets| SetupSets { sets, recordings: None }));
         };
-        let watch = &mut |progress| {
-            on_progress(progress);
-            if is_cancelled() {
-                ControlFlow::Break(())
-            } else {
-                ControlFlow::Continue(())
-            }
-        };
+        let watch = &mut watch(is_cancelled, on_progress);
         let planned = match plan.sets(folder, self.settings.seed, watch) {
             Err(_) if is_cancelled() => return Ok(None),
             planned => planned?,
@@ -165,6 +161,59 @@ impl Setup {
                 test: test_recording,
             }),
         }))
+    }
+}
+
+impl Setup {
+    /// Returns the recording for an experiment; `None` for a simulated array.
+    pub fn experiment_recording(&self) -> Option<ExperimentRecording> {
+        let plan = self.plan.as_ref()?;
+        Some(ExperimentRecording {
+            name: self.source_name(),
+            has_groups: plan.import.group.is_some(),
+            has_test_files: plan.test.is_some(),
+            division: plan.division,
+        })
+    }
+
+    /// Reads the samples for the trials of an experiment; those of a simulated array are drawn by each trial. Folder,
+    /// cancelling and progress are those of [`Self::sets`].
+    ///
+    /// # Errors
+    /// If the files cannot be read.
+    pub fn trial_samples(
+        &self,
+        folder: &Path,
+        is_cancelled: &dyn Fn() -> bool,
+        on_progress: &mut dyn FnMut(Progress),
+    ) -> Result<Option<TrialSamples>, SetupError> {
+        let Some(plan) = &self.plan else {
+            return Ok(Some(TrialSamples::Drawn));
+        };
+        let (recording, test) = match plan.recordings(folder, &mut watch(is_cancelled, on_progress)) {
+            Err(_) if is_cancelled() => return Ok(None),
+            read => read?,
+        };
+        Ok(Some(TrialSamples::Recorded(RecordedSamples {
+            problem: Arc::new(recording.problem()),
+            set: Arc::new(recording.set),
+            test: test.map(|test| Arc::new(test.set)),
+        })))
+    }
+}
+
+/// Passes on the progress of reading, and ends it once `is_cancelled`.
+fn watch(
+    is_cancelled: &dyn Fn() -> bool,
+    on_progress: &mut dyn FnMut(Progress),
+) -> impl FnMut(Progress) -> ControlFlow<()> {
+    move |progress| {
+        on_progress(progress);
+        if is_cancelled() {
+            ControlFlow::Break(())
+        } else {
+            ControlFlow::Continue(())
+        }
     }
 }
 

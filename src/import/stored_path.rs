@@ -4,7 +4,7 @@ use std::path::{Component, Path, PathBuf};
 
 /// Path of a recording to be stored in a file in `folder`: relative to the folder; the name alone for a recording in the
 /// user's home if the folder lies elsewhere, so that no file names the home of its author.
-pub(super) fn stored(path: &Path, folder: &Path) -> PathBuf {
+pub(crate) fn stored(path: &Path, folder: &Path) -> PathBuf {
     let absolute = |path: &Path| std::path::absolute(path).map_or_else(|_| path.to_owned(), |path| normal(&path));
     relative(&absolute(path), &absolute(folder), std::env::home_dir().as_deref())
 }

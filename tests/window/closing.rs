@@ -218,11 +218,11 @@ fn an_experiment_and_a_trade_off_are_not_ended_unasked() {
 fn a_cross_validation_and_findings_are_not_ended_unasked() {
     let (mut driver, _path, _folder) = opened(160);
     driver.limit_epochs("100000");
-    driver.click("Cross-validation");
+    driver.click_button("Identifiability");
     driver.click_button("Cross-validate");
     ask(&mut driver);
     assert!(
-        driver.has("Own data: Cross-validation") && driver.has("5 folds"),
+        driver.has("Identifiability: Cross-validation") && driver.has("5 folds"),
         "{:#?}",
         driver.texts()
     );
@@ -230,12 +230,10 @@ fn a_cross_validation_and_findings_are_not_ended_unasked() {
     driver.click_button("Stay");
     driver.click("■ Stop");
     driver.settle();
-    driver.click("Findings");
-    driver.settle();
-    driver.click_button("Measure what the readings tell");
+    driver.click_button("Analyse readings");
     ask(&mut driver);
     assert!(
-        driver.has("Own data: Findings") && driver.has("will be discarded"),
+        driver.has("Identifiability: Analysis") && driver.has("will be discarded"),
         "{:#?}",
         driver.texts()
     );

@@ -12,7 +12,7 @@ use crate::{
     decoupling::DecoderKind,
     evaluation::{
         CrossValidation, Preset, Run, SimulatedSettings, TradeOffLevel, TradeOffLimits,
-        experiments::{Axis, Experiment, ExperimentResults, PaperTable, run_experiments},
+        experiments::{Axis, Experiment, ExperimentResults, PaperTable, TrialSamples, run_experiments},
         measure_trade_off,
     },
     figure::{
@@ -130,7 +130,14 @@ fn results(mut experiment: Experiment) -> ExperimentResults {
     let mut results = ExperimentResults::new(experiment.clone());
     let threads = std::num::NonZero::<usize>::MIN;
     let record = |finished: crate::evaluation::experiments::Finished| results.record(finished.cell, finished.outcome);
-    run_experiments(std::slice::from_ref(&experiment), threads, || false, record).unwrap();
+    run_experiments(
+        std::slice::from_ref(&experiment),
+        &TrialSamples::Drawn,
+        threads,
+        || false,
+        record,
+    )
+    .unwrap();
     results
 }
 

@@ -63,7 +63,13 @@ pub fn charts_card_ui(
             match shared.recorded_test() {
                 None => error_bars_ui(ui, &mut view.has_error_bars),
                 Some(test) => {
-                    target_choice_ui(ui, "Target", "target of the charts", &test.problem.targets, &mut view.target);
+                    target_choice_ui(
+                        ui,
+                        "Target",
+                        "target of the charts",
+                        &test.problem.targets,
+                        &mut view.target,
+                    );
                 }
             }
             legend_behind_ui(ui, keys)

@@ -12,9 +12,7 @@ use crate::{
             decoders::decoders_ui, exports::open_task, inspect::TestPlace, press::press_section_ui, recording::bias,
             state::TrainView,
         },
-        widgets::{
-            Landmark, dim_ui, fields::capitalised, ghost_button, note_ui, scrolled_ui, section_heading_ui,
-        },
+        widgets::{Landmark, dim_ui, fields::capitalised, ghost_button, note_ui, scrolled_ui, section_heading_ui},
     },
     dataset::SplitBy,
     evaluation::{
@@ -131,7 +129,10 @@ fn verdict_on_targets_ui(ui: &mut Ui, run: &RunView, result: &RunResult) {
         note_ui(ui, &sentence(remark));
     }
     let (network, ridge) = (result.errors.targets(), run.baselines.linear.targets());
-    let ratios = network.iter().zip(ridge).map(|(network, ridge)| ridge.rmse / network.rmse);
+    let ratios = network
+        .iter()
+        .zip(ridge)
+        .map(|(network, ridge)| ridge.rmse / network.rmse);
     let ratios = Vec::from_iter(ratios.filter(|ratio| ratio.is_finite()));
     let extreme = |pick: fn(f64, f64) -> f64| ratios.iter().copied().reduce(pick).map(format_number);
     if let (true, Some(low), Some(high)) = (flaw.is_none(), extreme(f64::min), extreme(f64::max))
