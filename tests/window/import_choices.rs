@@ -17,7 +17,7 @@ fn saved_plan(driver: &mut Driver, folder: &TempDir) -> Plan {
     let path = folder.path().join("saved recipe.json");
     // A file of that name is asked about.
     let _ = fs::remove_file(&path);
-    driver.save("Recipe of the import, JSON", &path);
+    driver.save("Recipe, JSON", &path);
     RecipeFile::load_recording(&path).unwrap()
 }
 

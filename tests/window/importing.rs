@@ -366,6 +366,22 @@ fn the_method_decides_what_is_held_out_until_the_user_does() {
 }
 
 #[test]
+fn the_recipe_of_an_array_brings_it_back() {
+    let folder = tempfile::tempdir().unwrap();
+    let recipe = folder.path().join("recipe.json");
+    let mut driver = Driver::open();
+    driver.configure_small();
+    driver.save("Recipe, JSON", &recipe);
+    let source = driver.state().draft.source;
+    let mut other = Driver::open();
+    other.click_button("Recording");
+    other.drop_files(&[&recipe]);
+    other.wait("the array", |driver| driver.state().draft.source == source);
+    other.settle();
+    assert_eq!(other.state().source, SourceKind::Array);
+}
+
+#[test]
 fn two_files_are_joined_by_time_and_filtered() {
     let folder = tempfile::tempdir().unwrap();
     let (mut sensor, mut states) = (String::new(), String::new());
@@ -417,7 +433,7 @@ fn two_files_are_joined_by_time_and_filtered() {
 
     // The import is saved as a recipe, which the terminal reads too, and opened again.
     let recipe = folder.path().join("recipe.json");
-    driver.save("Recipe of the import, JSON", &recipe);
+    driver.save("Recipe, JSON", &recipe);
     let plan = RecipeFile::load_recording(&recipe).unwrap();
     assert_eq!(plan.import.targets, ["states.c2"]);
     assert_eq!(plan.import.conditions[0].to_string(), "states.c3<3");

@@ -6,6 +6,7 @@ use super::{
     TrainView,
     configuration::configuration_ui,
     exports::{checkpoint_task, train_exports},
+    recording::recipe_export,
     report,
     workbench::{WorkbenchLayout, workbench_ui},
 };
@@ -135,7 +136,7 @@ impl View for TrainView {
 
     fn exports<'a>(&'a self, shared: &'a Shared) -> Vec<Export<'a>> {
         let mut exports = train_exports(self, shared);
-        exports.extend(self.recording.exports(shared));
+        exports.push(recipe_export(shared));
         exports
     }
 

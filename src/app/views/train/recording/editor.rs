@@ -18,7 +18,7 @@ use crate::{
         shared::{Effect, FileInUse, FileTask, FileWords, Matter, Notice, Purpose, RecordingDraft, Shared, SourceKind},
         training_worker::RunId,
     },
-    evaluation::{Measured, RunSettings},
+    evaluation::{Measured, RunSettings, SimulatedSettings},
     export::NetworkFile,
     import::{Meaning, Plan, Setup},
     scene::RowModel,
@@ -253,6 +253,14 @@ impl RecordingEditor {
                 }
             }
             Opened::Recipe(draft) => self.show_import(*draft, effects),
+            Opened::Simulation(source) => {
+                let settings = SimulatedSettings {
+                    source: *source,
+                    ..shared.draft
+                };
+                effects.push(Effect::ChooseSource(SourceKind::Array));
+                effects.push(Effect::Configure(Box::new(settings)));
+            }
             Opened::Import(draft, reopened) => {
                 self.close_all();
                 self.draft = Some(*draft);

@@ -23,4 +23,5 @@ mod renaming;
 mod sample;
 
 pub use editor::RecordingEditor;
+pub use exports::recipe_export;
 pub(super) use remarks::bias;

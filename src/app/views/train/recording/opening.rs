@@ -14,7 +14,8 @@ use super::{
 };
 use crate::{
     app::job::{Job, JobError, Report, Wake},
-    export::{CheckpointFile, DocumentKind, NetworkFile, RecipeFile},
+    evaluation::Simulation,
+    export::{CheckpointFile, DocumentKind, NetworkFile, RecipeFile, RecipeSource},
     import::{
         InspectedFile, Joined, Plan, Progress, Recipe, Watch, holds_positions, suggested_plan, suggested_plan_in_order,
     },
@@ -53,8 +54,10 @@ pub(super) enum Opened {
     Recordings(Box<Draft>),
     /// A file with positions of targets, for the recordings that are open.
     Positions(PathBuf),
-    /// Import of a recipe.
+    /// Import of the recipe of a recording.
     Recipe(Box<Draft>),
+    /// Recipe of a simulated array.
+    Simulation(Box<Simulation>),
     /// Import of a plan.
     Import(Box<Draft>, Box<Reopened>),
     /// Import of a plan of which files are missing.
@@ -273,7 +276,10 @@ fn reopen(mut reopened: Reopened, watch: Watch<'_>) -> Result<Opened, String> {
 fn open_document(kind: DocumentKind, path: &Path, watch: Watch<'_>) -> Result<Opened, String> {
     match kind {
         DocumentKind::Recipe => {
-            let plan = RecipeFile::load_recording(path).map_err(|error| error.to_string())?;
+            let plan = match RecipeFile::load(path).map_err(|error| error.to_string())? {
+                RecipeSource::Recording(plan) => plan,
+                RecipeSource::Simulated(simulation) => return Ok(Opened::Simulation(Box::new(simulation))),
+            };
             match reopen(Reopened::from(plan), watch)? {
                 Opened::Import(draft, _) => Ok(Opened::Recipe(draft)),
                 opened => Ok(opened),
