@@ -76,7 +76,7 @@ fn a_table_ends_with_the_librarys_own_numbers_and_verdicts() {
     let mut compared = 0;
     for row in &table.rows {
         for (heading, text) in table.columns.iter().map(|column| column.heading).zip(row).skip(1) {
-            if !TIMES.contains(heading) {
+            if !TIMES.contains(&heading) {
                 let shown = format!("{}, {heading}: {text}", row[0]);
                 assert!(driver.has(&shown), "{shown} is not among {:#?}", driver.texts());
                 compared += 1;

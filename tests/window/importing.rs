@@ -418,7 +418,7 @@ fn two_files_are_joined_by_time_and_filtered() {
     // The import is saved as a recipe, which the terminal reads too, and opened again.
     let recipe = folder.path().join("recipe.json");
     driver.save("Recipe of the import, JSON", &recipe);
-    let plan = RecipeFile::load(&recipe).unwrap();
+    let plan = RecipeFile::load_recording(&recipe).unwrap();
     assert_eq!(plan.import.targets, ["states.c2"]);
     assert_eq!(plan.import.conditions[0].to_string(), "states.c3<3");
     let mut other = Driver::open();
