@@ -2,6 +2,7 @@
 //! that a view may ask for.
 
 mod colour_scale;
+mod decoder_exports;
 mod effect;
 mod error_table;
 mod export;
@@ -26,6 +27,7 @@ mod view;
 
 pub use super::training_worker::RunResult;
 pub use colour_scale::colour_scale_ui;
+pub use decoder_exports::decoder_tasks;
 pub use effect::Effect;
 pub use error_table::error_table_ui;
 pub use export::{

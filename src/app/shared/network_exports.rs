@@ -28,7 +28,7 @@ pub enum NetworkSource {
 
 impl NetworkSource {
     /// The file that `contents` makes of the network and its record.
-    fn task(
+    pub(super) fn task(
         &self,
         words: FileWords,
         what: &str,
@@ -92,7 +92,7 @@ pub fn network_exports<'a>(
 }
 
 /// Every form of a network with its precisions.
-fn bundles() -> impl Iterator<Item = (BundleFormat, BundlePrecision)> {
+pub(super) fn bundles() -> impl Iterator<Item = (BundleFormat, BundlePrecision)> {
     BundleFormat::ALL.into_iter().flat_map(|format| {
         let precisions = format.precisions().iter();
         precisions.map(move |&precision| (format, precision))
@@ -121,12 +121,12 @@ fn bundle_export<'a>(
 fn bundle_contents(export: impl Fn(&Path) -> Result<BundleReport, BundleError> + Send + Sync + 'static) -> Contents {
     Contents::telling(move |path| {
         export(path)
-            .map(|report| told(&report))
+            .map(|report| said_of(&report))
             .map_err(|error| error.to_string())
     })
 }
 
-fn bundle_name(format: BundleFormat) -> &'static str {
+pub(super) fn bundle_name(format: BundleFormat) -> &'static str {
     match format {
         BundleFormat::Onnx => "ONNX",
         BundleFormat::C99 => "C99",
@@ -181,8 +181,8 @@ fn bundle_task(source: &NetworkSource, format: BundleFormat, precision: BundlePr
     })
 }
 
-/// Sentence that tells of a bundle that was written.
-fn told(report: &BundleReport) -> String {
+/// Returns a sentence about a bundle that was written.
+pub(super) fn said_of(report: &BundleReport) -> String {
     let deviation = match report.output_range_mm {
         Some(range_mm) => format!("{} mm", format_number(report.deviation() * range_mm)),
         None => format!("{:.1e} of the range of a target", report.deviation()),

@@ -117,6 +117,12 @@ impl<'a> TableRow<'a> {
         self
     }
 
+    /// With a cell of controls behind the others, added by `controls`.
+    pub fn controls(mut self, controls: impl FnOnce(&mut Ui) + 'a) -> Self {
+        self.cells.push(TableCell::controls(controls));
+        self
+    }
+
     /// With a dot before the first text.
     pub fn dot(mut self, dot: impl Into<Option<Color32>>) -> Self {
         if let Some(first) = self.cells.first_mut() {

@@ -1,14 +1,16 @@
-use eframe::egui::{CollapsingHeader, Ui};
+use std::cell::RefCell;
+
+use eframe::egui::{Button, CollapsingHeader, Ui, Vec2, WidgetInfo, accesskit::Role, containers::menu::MenuButton};
 
 use super::{DecoderResult, DecodersState};
 use crate::{
     app::{
         glossary,
-        shared::{Phase, target_choice_ui},
+        shared::{FileTask, NetworkSource, Phase, decoder_tasks, target_choice_ui},
         theme::{Theme, space},
-        widgets::{TableColumn, TableRow, TableView, dim_ui, focus_ring_ui, note_ui},
+        widgets::{ColumnWidth, TableColumn, TableRow, TableView, dim_ui, focus_ring_ui, note_ui},
     },
-    decoupling::DecoderKind,
+    decoupling::{DecoderKind, Precision},
     evaluation::{DecoderReport, ErrorMeasure, Errors, Problem},
     export::format_number,
 };
@@ -89,20 +91,23 @@ impl Figure {
 }
 
 /// The other decoders on the same test set, folded away until the user asks for them, beside the errors `limit` of the
-/// Bayesian reference. `target` is the one whose errors are shown of a recording.
+/// Bayesian reference. `target` is the one whose errors are shown of a recording. Each decoder can be exported as one of
+/// `source`; returns the file asked for.
 pub fn decoders_ui(
     ui: &mut Ui,
     decoders: &mut DecodersState,
     phase: Phase,
     (problem, limit): (&Problem, Option<&Errors>),
     target: &mut usize,
-) {
+    source: Option<&NetworkSource>,
+) -> Option<FileTask> {
+    let mut asked = None;
     ui.add_space(space(1));
     let header = CollapsingHeader::new("More decoders")
         .open(Some(decoders.is_open))
         .show(ui, |ui| {
             if let Some(measured) = &decoders.measured {
-                measured_ui(ui, measured, (problem, limit), target);
+                asked = measured_ui(ui, measured, (problem, limit), target, source);
             } else {
                 let text = match phase {
                     Phase::Died => "The network was lost with the training thread: train again.",
@@ -121,6 +126,7 @@ pub fn decoders_ui(
     if header.header_response.on_hover_text(hint).clicked() {
         decoders.is_open = !decoders.is_open;
     }
+    asked
 }
 
 fn measured_ui(
@@ -128,7 +134,8 @@ fn measured_ui(
     measured: &[DecoderResult],
     (problem, limit): (&Problem, Option<&Errors>),
     target: &mut usize,
-) {
+    source: Option<&NetworkSource>,
+) -> Option<FileTask> {
     let palette = Theme::of(ui).palette;
     // Without noise there is no limit but rounding, and nothing to be compared with it.
     let limit = limit.filter(|limit| !limit.is_rounding());
@@ -139,7 +146,9 @@ fn measured_ui(
     let figures = Figure::of(problem, limit.is_some());
     let columns: Vec<TableColumn<'_>> = std::iter::once(TableColumn::text(""))
         .chain(figures.iter().map(|figure| figure.column()))
+        .chain([TableColumn::text("").width(ColumnWidth::Points(space(7)))])
         .collect();
+    let asked = RefCell::new(None);
     let rows = measured.iter().map(|result| {
         let cells = figures.iter().map(|figure| match &result.report {
             None => "…".to_owned(),
@@ -151,9 +160,20 @@ fn measured_ui(
         } else {
             palette.text
         };
-        TableRow::figures(result.kind.name(result.precision), cells)
+        let row = TableRow::figures(result.kind.name(result.precision), cells)
             .meaning(result.kind.meaning())
-            .colour(colour)
+            .colour(colour);
+        // The menu has both precisions.
+        let source = source.filter(|_| result.precision == Precision::Double && matches!(result.report, Some(Ok(_))));
+        match source {
+            None => row,
+            Some(source) => row.controls(|ui| {
+                let task = export_menu_ui(ui, result.kind, source);
+                if task.is_some() {
+                    asked.replace(task);
+                }
+            }),
+        }
     });
     let of_limit = limit.map(|limit| {
         let cells = figures.iter().map(|figure| format_number(figure.of_limit(limit)));
@@ -177,6 +197,24 @@ fn measured_ui(
             None => {}
         }
     }
+    asked.into_inner()
+}
+
+/// The menu of the formats in which a decoder can be exported; returns the file asked for.
+fn export_menu_ui(ui: &mut Ui, kind: DecoderKind, source: &NetworkSource) -> Option<FileTask> {
+    let mut asked = None;
+    let (button, _) = MenuButton::from_button(Button::new("…").min_size(Vec2::splat(space(5)))).ui(ui, |ui| {
+        for (form, task) in decoder_tasks(source, kind) {
+            let button = ui.button(&form).on_hover_text(task.words.description);
+            if button.clicked() {
+                asked = Some(task);
+            }
+        }
+    });
+    let name = format!("Export {}…", kind.name(Precision::Double));
+    button.widget_info(|| WidgetInfo::labeled(Role::Button, true, &name));
+    button.on_hover_text(name);
+    asked
 }
 
 #[cfg(test)]
@@ -185,7 +223,6 @@ mod tests {
 
     use super::*;
     use crate::{
-        decoupling::Precision,
         evaluation::{DecoderSet, Preset, Simulation, Source},
         scene::{Noise, NoisySets},
     };
@@ -200,7 +237,7 @@ mod tests {
     fn shown(mut decoders: DecodersState) -> Harness<'static> {
         let problem = Simulation::default().problem();
         Harness::new_ui(move |ui| {
-            decoders_ui(ui, &mut decoders, Phase::Idle, (&problem, None), &mut 0);
+            decoders_ui(ui, &mut decoders, Phase::Idle, (&problem, None), &mut 0, None);
         })
     }
 

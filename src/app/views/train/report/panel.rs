@@ -6,7 +6,7 @@ use super::{conditioning::conditioning_ui, spread::spread_ui};
 use crate::{
     app::{
         glossary,
-        shared::{Effect, Phase, RunResult, RunView, Shared, SourceKind, error_table_ui, sentence},
+        shared::{Effect, NetworkSource, Phase, RunResult, RunView, Shared, SourceKind, error_table_ui, sentence},
         theme::{space, type_size},
         views::train::{
             decoders::decoders_ui, exports::open_task, inspect::TestPlace, press::press_section_ui, recording::bias,
@@ -50,7 +50,11 @@ pub fn report_ui(ui: &mut Ui, view: &mut TrainView, shared: &Shared, effects: &m
             }
             let limit = baselines.reference.as_ref().and_then(TestErrors::nodes);
             let measured = (&*run.problem, limit);
-            decoders_ui(ui, &mut view.decoders, shared.phase, measured, &mut view.target);
+            let is_open = view.decoders.is_open;
+            let source = is_open.then(|| NetworkSource::Training(run.id, Box::new(run.setup.clone())));
+            let (decoders, target) = (&mut view.decoders, &mut view.target);
+            let asked = decoders_ui(ui, decoders, shared.phase, measured, target, source.as_ref());
+            effects.extend(asked.map(Effect::ChooseFile));
             effective_parameters_ui(ui, run, result);
             spread_ui(ui, &run.problem, &run.starts);
         } else {
