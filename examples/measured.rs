@@ -28,18 +28,21 @@ fn main() -> Result<(), Box<dyn Error>> {
         unit: FoldUnit::Snapshot,
     };
     if let Some(validated) = folds.run(&settings, &set, 0, || false)? {
-        for row in validated.target_table(&set) {
-            let errors = row.targets.iter().map(|target| format!("{:.4}", target.rmse));
-            println!("{:<14} RMSE {}", row.name, Vec::from_iter(errors).join("  "));
+        let scores = validated.scores(&set);
+        let rows = [
+            ("training mean", scores.baselines.mean),
+            ("ridge", scores.baselines.linear),
+            ("network", scores.network),
+        ];
+        for (name, errors) in rows {
+            let errors = errors.targets().iter().map(|target| format!("{:.4}", target.rmse));
+            println!("{name:<14} RMSE {}", Vec::from_iter(errors).join("  "));
         }
     }
     let test = set.select(&Vec::from_iter(500..600));
     let split = hold_out(set.select(&Vec::from_iter(0..500)), 5, &mut Seed(0).rng(Stream::Split));
     let mut run = Run::on_sets(settings, split, test)?;
     while run.step().is_none() {}
-    println!(
-        "one network, last 100 moments: R² {:?}",
-        run.target_table()[2].targets[0].r2
-    );
+    println!("one network, last 100 moments: R² {:?}", run.errors().targets()[0].r2);
     Ok(())
 }

@@ -35,9 +35,12 @@ fn main() -> Result<(), Box<dyn Error>> {
     settings.training.stopping.epochs = 60;
     let mut run = Run::prepare(settings)?;
     while run.step().is_none() {}
-    let file = NetworkFile::from_run(&run)?;
+    let file = NetworkFile::from_run(&run, None)?;
     file.save(&folder.join("network.json"))?;
-    println!("network.json: Z {:.3} %", file.errors.z_percent.unwrap_or(f64::NAN));
+    println!(
+        "network.json: Z {:.3} %",
+        file.scores.network.percent().unwrap_or(f64::NAN)
+    );
 
     let columns = settings.source.sensor.scale.columns();
     let (sensor, scene) = (&settings.source.sensor, &settings.source.scene);

@@ -1,7 +1,7 @@
 //! Trains a network for a simulated array and prints what it is worth: `cargo run --release --example train`.
 #![expect(clippy::print_stdout, reason = "an example's result is what it prints")]
 
-use decoupler::evaluation::{Run, RunError, SimulatedSettings, error_rows};
+use decoupler::evaluation::{ErrorTable, Run, RunError, SimulatedSettings};
 
 fn main() -> Result<(), RunError> {
     let mut settings = SimulatedSettings::default();
@@ -13,10 +13,11 @@ fn main() -> Result<(), RunError> {
             break reason;
         }
     };
-    let scores = run.node_scores().expect("the run is simulated");
+    let scores = run.scores().expect("the baselines are measured");
+    let table = ErrorTable::of_scores(run.problem(), &scores, settings.published().as_ref());
     println!("{} epochs: {reason}", run.leader().latest().epoch);
-    for row in error_rows(&scores.network, &scores.baselines, settings.published().as_ref()) {
-        println!("{:<14} Z {:.3} %", row.name, row.z_percent.unwrap_or(f64::NAN));
+    for row in table.blocks.iter().flat_map(|block| &block.rows) {
+        println!("{:<14} Z {:.3} %", row.name, row.errors[0].unwrap_or(f64::NAN));
     }
     Ok(())
 }

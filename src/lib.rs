@@ -69,8 +69,8 @@
 //! settings.training.stopping.epochs = 20; // cut short.
 //! let mut run = Run::prepare(settings)?;
 //! while run.step().is_none() {}
-//! let scores = run.node_scores().expect("the run is simulated");
-//! assert!(scores.network.z_mm < scores.baselines.mean.z_mm);
+//! let scores = run.scores().expect("the baselines are measured");
+//! assert!(scores.network.percent() < scores.baselines.mean.percent());
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!

@@ -41,7 +41,7 @@ fn train(method: Method, seed: u64) -> Outcome {
             run.stop();
         }
     }
-    let errors = run.node_scores().expect("the run is simulated").network;
+    let errors = *run.errors().nodes().expect("the run is simulated");
     Outcome {
         epochs: run.leader().latest().epoch as f64,
         seconds: run.leader().elapsed().as_secs_f64(),

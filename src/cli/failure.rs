@@ -11,9 +11,7 @@ use super::{interruption, specification_error::SpecificationError};
 use crate::{
     dataset::{ReadError, SimulationError, SplitBy, system_cause},
     evaluation::{RunError, experiments::ExperimentError},
-    export::{
-        DocumentError, SweepFolderError, WriteError, bundle::BundleError, figures::PictureError, report::ReportError,
-    },
+    export::{DocumentError, SweepFolderError, WriteError, bundle::BundleError, figures::PictureError},
     import::{Cure, ImportError, InputError, SetupError},
     live::{LineError, Source, SourceError},
     scene::Rows,
@@ -107,8 +105,6 @@ pub(super) enum Failure {
     Sensor(SensorError),
     #[error("cannot make the folder '{}': {}", .path.display(), system_cause(.source))]
     MakeFolder { path: PathBuf, source: io::Error },
-    #[error(transparent)]
-    Report(#[from] ReportError),
     #[error(transparent)]
     Write(#[from] WriteError),
     #[error("{}", joined(.0))]

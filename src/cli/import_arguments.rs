@@ -315,13 +315,13 @@ impl ImportArguments {
 
     /// As [`Self::plan`], with these columns as the targets.
     pub(super) fn plan_of(&self, inputs: &[String], targets: &[String]) -> Result<Plan, Failure> {
-        let mut plan = match &self.recipe {
+        let plan = match &self.recipe {
             Some(path) => {
                 if !inputs.is_empty() {
                     let message = "--inputs: the recipe names the inputs; leave it out, or give --data";
                     return Err(Failure::Arguments(message.to_owned()));
                 }
-                RecipeFile::load(path)?
+                RecipeFile::load_recording(path)?
             }
             None => {
                 let mut plan = Plan {
@@ -334,6 +334,11 @@ impl ImportArguments {
                 plan
             }
         };
+        self.divided(plan)
+    }
+
+    /// Returns `plan` with the given split, shares and test files.
+    pub(super) fn divided(&self, mut plan: Plan) -> Result<Plan, Failure> {
         let Division {
             by,
             test_fraction,

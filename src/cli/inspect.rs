@@ -11,7 +11,6 @@ use super::{
     findings::StudyArguments,
     import_arguments::ImportArguments,
     output::{print, print_object},
-    recording_report::format_words,
     samples::with_bar,
 };
 use crate::{
@@ -58,7 +57,7 @@ impl Inspect {
         if self.json {
             return print_object(&Report {
                 file: data,
-                format: format_words(&table.format),
+                format: table.format.to_string(),
                 dialect: table.dialect(),
                 inspection: &inspection,
             });
@@ -71,7 +70,7 @@ impl Inspect {
                 counted(inspection.rows, "row"),
                 counted(inspection.columns.len(), "column")
             )?;
-            writeln!(out, "{}\n", format_words(&table.format))?;
+            writeln!(out, "{}\n", table.format)?;
             write!(out, "{}", columns_table(&inspection.columns).aligned())?;
             if let Some(time) = &inspection.time {
                 write_time(time, out)?;

@@ -36,7 +36,6 @@ mod reproduce;
 mod reproduce_report;
 mod samples;
 mod scene_arguments;
-mod shell;
 mod simulate;
 mod specification_error;
 mod spread_plot;

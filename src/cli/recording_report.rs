@@ -12,7 +12,7 @@ use crate::{
     dataset::Dataset,
     evaluation::{Channel, RunSets, TargetPosition},
     export::{describe_positions, format_number},
-    import::{Dropped, FileReport, Format, JoinReport, Recording, Recordings},
+    import::{Dropped, FileReport, JoinReport, Recording, Recordings},
     sensor::counted,
 };
 
@@ -108,20 +108,10 @@ pub(super) fn import_warnings(recordings: &Recordings) -> Vec<String> {
     all.flat_map(|recording| recording.warnings.iter().cloned()).collect()
 }
 
-/// Describes the format of a file and its layout.
-pub(super) fn format_words(format: &Format) -> String {
-    match format {
-        Format::Text(dialect) => format!("text: {dialect}"),
-        Format::Npy => "NumPy array".to_owned(),
-        Format::Npz => "archive of NumPy arrays".to_owned(),
-        Format::Matlab => "MATLAB file".to_owned(),
-    }
-}
-
 pub(super) fn files<'a>(recordings: impl Iterator<Item = &'a Recording>) -> Vec<FileFound> {
     let found = |report: &FileReport| FileFound {
         path: report.path.clone(),
-        format: format_words(&report.format),
+        format: report.format.to_string(),
         rows: report.rows,
         columns: report.columns,
         join: report.join,

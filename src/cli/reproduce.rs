@@ -18,7 +18,9 @@ use crate::{
     dataset::{FoldUnit, Seed},
     evaluation::{
         MOST_STARTS,
-        experiments::{Axis, Experiment, ExperimentResults, PaperTable, run_experiments, verdicts, worker_threads},
+        experiments::{
+            Axis, Experiment, ExperimentResults, PaperTable, TrialSamples, run_experiments, verdicts, worker_threads,
+        },
     },
     export::{
         atomic_write, cells_table, check_writable, describe_conditions,
@@ -125,6 +127,7 @@ impl Reproduce {
         let mut done = 0;
         run_experiments(
             &experiments,
+            &TrialSamples::Drawn,
             worker_threads(false),
             || graceful.is_end_requested(),
             |finished| {

@@ -1,4 +1,5 @@
 use std::{
+    collections::BTreeSet,
     io::{self, Write},
     time::Duration,
 };
@@ -10,14 +11,15 @@ use super::{
     output::{print, print_object},
 };
 use crate::{
+    dataset::Seed,
     evaluation::{
         CrossValidation,
-        experiments::{CellSummary, ExperimentResults, PaperTable, Verdict},
+        experiments::{CellSummary, ExperimentResults, Figure, PaperTable, SummaryErrors, Verdict},
     },
     export::{
         Cell, ExperimentTable, Table, describe_conditions, describe_failures, describe_worse_than_mean, format_duration,
     },
-    sensor::Geometry,
+    sensor::{ArrayScale, Geometry},
 };
 
 /// A reproduced table of the paper.
@@ -43,11 +45,70 @@ struct TableReport<'a> {
     seeds: usize,
     cross_validation: Option<CrossValidation>,
     is_complete: bool,
-    cells: Vec<CellSummary>,
+    cells: Vec<CellReport>,
     failures: Vec<String>,
     /// Cells with networks that are worse than the training mean.
     remarks: Vec<String>,
     verdicts: &'a [Verdict],
+}
+
+/// Figures of a cell of an array.
+#[derive(Serialize)]
+struct CellReport {
+    array: ArrayScale,
+    hidden: usize,
+    samples: usize,
+    method: &'static str,
+    epochs: usize,
+    starts: usize,
+    seed: Seed,
+    trials: usize,
+    expected_trials: usize,
+    z_percent: Figure,
+    x_percent: Figure,
+    y_percent: Figure,
+    z_mm: Figure,
+    mean_z_percent: Option<f64>,
+    linear_z_percent: Option<f64>,
+    bound_z_percent: Option<f64>,
+    epochs_run: Option<f64>,
+    training_seconds: Option<f64>,
+    epoch_ms: Option<f64>,
+}
+
+impl CellReport {
+    /// `None` for a recording, which no table of the paper has.
+    fn of(summary: CellSummary) -> Option<Self> {
+        let SummaryErrors::Nodes {
+            x_percent,
+            y_percent,
+            z_mm,
+        } = summary.errors
+        else {
+            return None;
+        };
+        Some(Self {
+            array: summary.array?,
+            hidden: summary.hidden,
+            samples: summary.samples?,
+            method: summary.method,
+            epochs: summary.epochs,
+            starts: summary.starts,
+            seed: summary.seed,
+            trials: summary.trials,
+            expected_trials: summary.expected_trials,
+            z_percent: summary.percent,
+            x_percent,
+            y_percent,
+            z_mm,
+            mean_z_percent: summary.mean_percent,
+            linear_z_percent: summary.linear_percent,
+            bound_z_percent: summary.bound_percent,
+            epochs_run: summary.epochs_run,
+            training_seconds: summary.training_seconds,
+            epoch_ms: summary.epoch_ms,
+        })
+    }
 }
 
 /// Prints one JSON object.
@@ -65,7 +126,7 @@ pub(super) fn print_json(reproduced: &[Reproduced], took: Duration) -> Result<()
             seeds: results.experiment.seeds,
             cross_validation: results.experiment.cross_validation,
             is_complete: results.is_complete(),
-            cells: results.summaries(),
+            cells: results.summaries().into_iter().filter_map(CellReport::of).collect(),
             failures: describe_failures(results),
             remarks: describe_worse_than_mean(results),
             verdicts,
@@ -85,6 +146,7 @@ pub(super) fn print_text(reproduced: &[Reproduced], took: Duration) -> Result<()
 }
 
 fn write_text(reproduced: &[Reproduced], took: Duration, out: &mut impl Write) -> io::Result<()> {
+    let mut notes = BTreeSet::new();
     for Reproduced {
         table,
         results,
@@ -98,11 +160,13 @@ fn write_text(reproduced: &[Reproduced], took: Duration, out: &mut impl Write) -
             describe_conditions(&results.experiment)
         )?;
         let table = ExperimentTable::new(results);
+        let headings = table.columns.iter().map(|column| column.heading);
         let rows = table
             .rows
-            .into_iter()
-            .map(|row| row.into_iter().map(Cell::from).collect());
-        writeln!(out, "{}", Table::of_headings(table.headings, rows).aligned())?;
+            .iter()
+            .map(|row| row.iter().map(|text| Cell::from(text.as_str())).collect());
+        writeln!(out, "{}", Table::of_headings(headings, rows).aligned())?;
+        notes.insert(table.note);
         for Verdict {
             claim,
             standing,
@@ -119,7 +183,9 @@ fn write_text(reproduced: &[Reproduced], took: Duration, out: &mut impl Write) -
         }
         writeln!(out)?;
     }
-    writeln!(out, "{}", ExperimentTable::NOTE)?;
+    for note in notes {
+        writeln!(out, "{note}")?;
+    }
     writeln!(out, "{}", Geometry::ASSUMPTION)?;
     writeln!(out, "Took {}", format_duration(took))
 }

@@ -13,14 +13,16 @@ use super::{
     interruption::Graceful,
     output::progress_bar,
     samples::{announce, following, sets},
-    shell::quoted,
     train_report::Trained,
     training_arguments::TrainingArguments,
 };
 use crate::{
     decoupling::DecoderKind,
     evaluation::{DecoderReport, DecoderSet, Run, RunError, Source},
-    export::{CheckpointFile, NetworkFile, SensorFile, check_writable, format_number, is_same, report::RunReport},
+    export::{
+        CheckpointFile, NetworkFile, SensorFile, check_writable, format_number, is_same,
+        report::{RunReport, quoted},
+    },
     import::{Setup, SetupError, SetupSets},
     training::TrainingSettings,
 };
@@ -94,6 +96,7 @@ impl Train {
                 file: &file,
                 flaw: flaw.as_ref(),
                 decoders: &decoders,
+                test: run.test(),
             };
             report.save(path)
         });

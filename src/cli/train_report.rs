@@ -346,7 +346,16 @@ impl<'a> Trained<'a> {
         if self.decoders.is_empty() {
             return Ok(());
         }
-        write!(out, "\n{}", decoder_table(self.decoders, reference).aligned())?;
+        write!(
+            out,
+            "\n{}",
+            decoder_table(
+                &self.file.problem,
+                self.decoders,
+                self.file.scores.baselines.reference.as_ref()
+            )
+            .aligned()
+        )?;
         for report in self.decoders {
             let name = report.kind.name(report.precision);
             for remark in &report.remarks {

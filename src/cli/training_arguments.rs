@@ -312,7 +312,7 @@ mod tests {
             let settings = parsed(&line.split_whitespace().collect::<Vec<_>>().join(" "))
                 .settings()
                 .unwrap();
-            let command = train_command(&settings).unwrap();
+            let command = train_command(&settings.into(), None).unwrap();
             let command = command.strip_prefix("decoupler ").unwrap();
             assert_eq!(parsed(command).settings().unwrap(), settings, "{command}");
         }

@@ -2,7 +2,7 @@ use rand::Rng;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-use super::{Dataset, Split, SplitBy};
+use super::{Dataset, DatasetError, Seed, Split, SplitBy, Stream};
 
 /// Division of a measured set into training, validation and test samples.
 ///
@@ -52,6 +52,9 @@ pub enum DivisionError {
         /// Name of the unit of division: sample or group.
         unit: &'static str,
     },
+    /// The test samples are of other row-wires.
+    #[error(transparent)]
+    Rows(#[from] DatasetError),
 }
 
 impl Default for Division {
@@ -95,6 +98,26 @@ impl Division {
         Ok(self.parts(self.by.ordered_units(set, rng), Vec::new()))
     }
 
+    /// Divides `set` for a run with this seed, and returns its training, validation and test samples: those of `test` if it is
+    /// given.
+    ///
+    /// # Errors
+    /// If a share is out of range, the set is a single unit, or `test` has other row-wires.
+    pub fn sets(&self, set: &Dataset, test: Option<&Dataset>, seed: Seed) -> Result<(Split, Dataset), DivisionError> {
+        let mut rng = seed.rng(Stream::Split);
+        Ok(match test {
+            None => {
+                let parts = self.divide(set, &mut rng)?;
+                (parts.split(set), parts.test_set(set))
+            }
+            Some(test) => {
+                let parts = self.divide_for_training(set, &mut rng)?;
+                let read = set.row_wires_read().unwrap_or_default();
+                (parts.split(set), test.clone().among_rows(read)?)
+            }
+        })
+    }
+
     fn parts(&self, mut units: Vec<Vec<usize>>, test: Vec<usize>) -> Parts {
         let validation = if units.len() > 1 && self.validation_fraction > 0.0 {
             take_last(&mut units, self.validation_fraction)
@@ -108,7 +131,11 @@ impl Division {
         }
     }
 
-    fn check(&self) -> Result<(), DivisionError> {
+    /// Checks the shares.
+    ///
+    /// # Errors
+    /// If a share is out of range.
+    pub fn check(&self) -> Result<(), DivisionError> {
         let fractions = [
             ("test", self.test_fraction, f64::MIN_POSITIVE, "above 0"),
             ("validation", self.validation_fraction, 0.0, "0"),

@@ -1,3 +1,4 @@
+#[cfg(feature = "files")]
 use std::time::Duration;
 
 /// Text in place of a missing number.
@@ -46,6 +47,7 @@ pub fn format_r2(value: impl Into<Option<f64>>) -> String {
 }
 
 /// Formats a number as [`format_number`] does, with a percent sign.
+#[cfg(feature = "files")]
 pub fn format_percent(value: impl Into<Option<f64>>) -> String {
     match format_number(value) {
         text if text == NO_NUMBER => text,
@@ -54,6 +56,7 @@ pub fn format_percent(value: impl Into<Option<f64>>) -> String {
 }
 
 /// Formats a duration: `0.23 ms`, `340 ms`, `12.3 s`, `4 min 5 s`, `1 h 2 min`.
+#[cfg(feature = "files")]
 pub fn format_duration(duration: Duration) -> String {
     let seconds = duration.as_secs_f64();
     let whole = seconds.round() as u64;
@@ -72,7 +75,7 @@ pub fn capitalised(text: &str) -> String {
     first.chain(letters).collect()
 }
 
-#[cfg(test)]
+#[cfg(all(test, feature = "files"))]
 mod tests {
     use super::*;
 

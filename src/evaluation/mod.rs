@@ -11,7 +11,6 @@ mod decoder_set;
 mod errors;
 pub mod experiments;
 mod fine_tuning;
-#[cfg(feature = "files")]
 pub(crate) mod format;
 mod frame_time;
 mod further_samples;

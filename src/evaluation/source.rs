@@ -21,7 +21,7 @@ pub enum Source {
 
 /// A simulated sensor, its scene, and the numbers of samples to draw.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[serde(deny_unknown_fields, default)]
 pub struct Simulation {
     /// Model of the sensor.
     pub sensor: SensorModel,

@@ -141,7 +141,8 @@ impl ErrorMeasure {
         }
     }
 
-    fn of_target(self, errors: &TargetErrors) -> Option<f64> {
+    /// Returns this measure of the errors of a target; `None` for measures of nodes, and where it is undefined.
+    pub fn of_target(self, errors: &TargetErrors) -> Option<f64> {
         match self {
             Self::Rmse => Some(errors.rmse),
             Self::Mae => Some(errors.mae),

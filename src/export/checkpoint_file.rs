@@ -87,11 +87,7 @@ impl CheckpointFile {
         let Some(sets) = setup.sets(Path::new(""), is_cancelled, on_progress)? else {
             return Ok(None);
         };
-        if let (Some(saved), Some(found)) = (&self.recorded, sets.recorded())
-            && saved.samples_crc32 != found.samples_crc32
-        {
-            return Err(SetupError::OtherSamples(saved.plan.import.data.display().to_string()));
-        }
+        sets.check_saved(self.recorded.as_ref())?;
         let run = sets.clone().resume(&setup, self.starts, is_cancelled)?;
         Ok(run.map(|run| (run.with_wall_time(self.wall_time), sets)))
     }

@@ -27,7 +27,7 @@ pub enum DocumentKind {
     Network,
     /// A training to be resumed: [`super::CheckpointFile`].
     Checkpoint,
-    /// A recipe by which measured samples are made of files: [`super::RecipeFile`].
+    /// The source of the samples of a run: [`super::RecipeFile`].
     Recipe,
     /// A sensor model: [`super::SensorFile`].
     Sensor,
@@ -236,6 +236,9 @@ pub enum DocumentError {
         "a {0} of recorded samples names the recording: give the plan that reads it, or save the networks with serde"
     )]
     NoPlan(DocumentKind),
+    /// A recording is needed.
+    #[error("'{}' is the recipe of a simulated array: give that of a recording", .0.display())]
+    SimulatedRecipe(PathBuf),
     /// The run has values that could not be read back.
     #[error("'{}' is not saved: {flaw}; train again with other settings", .path.display())]
     Unsound {

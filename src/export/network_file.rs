@@ -1,4 +1,4 @@
-use std::path::Path;
+use std::{path::Path, sync::Arc};
 
 use serde::{Deserialize, Serialize};
 use serde_json::value::to_raw_value;
@@ -11,8 +11,9 @@ use super::{
     unfinished::folder_of,
 };
 use crate::{
+    dataset::Dataset,
     evaluation::{ErrorTable, PastNetwork, Problem, Run, RunSettings, Scores},
-    import::{Recorded, Setup},
+    import::{InputLines, Recorded, Setup, SetupError},
     network::Networks,
 };
 
@@ -89,10 +90,33 @@ impl NetworkFile {
         Ok(file)
     }
 
+    /// Returns a parser of lines with the inputs of the network of a recording.
+    pub fn input_lines(&self) -> InputLines {
+        let recorded = self.recorded.as_ref();
+        let row_wire = recorded.and_then(|recorded| recorded.plan.import.row_wire.clone());
+        let has_rows = self.network.only().is_none();
+        let row_wires = self.row_wires.clone().filter(|_| has_rows);
+        InputLines::new(self.problem.inputs.clone(), row_wire, row_wires)
+    }
+
     /// Setup of the run.
     pub fn setup(&self) -> Setup {
         let plan = self.recorded.as_ref().map(|recorded| recorded.plan.clone());
         Setup::of(self.settings, plan).expect("a file of a recording has its plan, as reading and writing check")
+    }
+
+    /// Returns the test set of the run, drawn or read again, as a report of it needs.
+    ///
+    /// # Errors
+    /// The recording is missing or has changed, or the settings are impossible.
+    pub fn test_set(&self) -> Result<Arc<Dataset>, SetupError> {
+        if let Some(settings) = self.settings.simulated() {
+            return Ok(Arc::new(settings.draw_test()?));
+        }
+        let sets = self.setup().sets(Path::new(""), &|| false, &mut |_| ())?;
+        let sets = sets.expect("nothing cancels it");
+        sets.check_saved(self.recorded.as_ref())?;
+        Ok(sets.sets.test)
     }
 
     /// Name of the source: the array scale, or the stem of the first recording.

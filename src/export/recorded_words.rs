@@ -1,23 +1,22 @@
 use super::{NetworkFile, format_number};
 use crate::{
-    evaluation::{Channel, TargetPosition},
     evaluation::{
-        TargetErrors,
+        Channel, TargetErrors, TargetPosition,
         recorded::{Determination, Findings, Standing, TargetFindings, Undetermined},
     },
     training::Method,
 };
 
-/// Warns of targets that the readings do not tell, or hardly, by what was measured of each.
-pub fn describe_standings(targets: &[Channel], told: &[Result<Determination, Undetermined>]) -> Vec<String> {
-    let of = |(target, told): (&Channel, &Result<Determination, Undetermined>)| match told {
+/// Warns of targets that the readings explain little of or that could not be judged; `measured` has an entry for each target.
+pub fn describe_standings(targets: &[Channel], measured: &[Result<Determination, Undetermined>]) -> Vec<String> {
+    let of = |(target, measured): (&Channel, &Result<Determination, Undetermined>)| match measured {
         Err(cause) => Some(format!("{}: {cause}", target.name)),
-        Ok(told) => (told.standing() != Standing::Told).then(|| told.sentence(&target.name)),
+        Ok(measured) => (measured.standing() != Standing::Told).then(|| measured.sentence(&target.name)),
     };
-    targets.iter().zip(told).filter_map(of).collect()
+    targets.iter().zip(measured).filter_map(of).collect()
 }
 
-/// Says how many targets have positions, and whether these are a grid or scattered; `None` if none has one.
+/// Describes the positions of targets: their number, and the grid if they are one; `None` if no target has a position.
 pub fn describe_positions(positions: &[TargetPosition]) -> Option<String> {
     let count = match positions.len() {
         0 => return None,
@@ -30,7 +29,7 @@ pub fn describe_positions(positions: &[TargetPosition]) -> Option<String> {
     })
 }
 
-/// Says how well the readings tell a target, by the better of network and ridge.
+/// Describes how much of a target the readings explain, by the better of network and ridge.
 pub fn describe_target(name: &str, found: &TargetFindings) -> String {
     match found.best() {
         Some((_, best)) if found.network.is_some() => best.sentence(name),
@@ -43,7 +42,8 @@ pub fn describe_target(name: &str, found: &TargetFindings) -> String {
     }
 }
 
-/// Warns of channels that tell less than they should, and of targets for which a network is no better than ridge.
+/// Warns of channels that carry less information than they should, and of targets for which a network is no better than
+/// ridge.
 pub fn describe_warnings(inputs: &[Channel], targets: &[Channel], findings: &Findings) -> Vec<String> {
     let name = |channel: usize| inputs[channel].name.clone();
     let mut warnings: Vec<String> = findings.remarks.iter().map(|remark| remark.sentence(name)).collect();
@@ -62,7 +62,7 @@ pub fn describe_worse_than_ridge(file: &NetworkFile) -> Vec<String> {
         .targets
         .iter()
         .zip(errors)
-        // Of a target that is constant in the test samples nothing can be judged.
+        // R² is undefined for a target that is constant in the test samples.
         .filter(|(_, (network, ridge))| network.r2.is_some() && network.rmse > ridge.rmse);
     let cure = match file.settings.training.method {
         Method::BayesianRegularization(_) => "record more samples, or use fewer hidden nodes",

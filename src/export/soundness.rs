@@ -4,7 +4,7 @@ use glam::DVec3;
 
 use super::NetworkFile;
 use crate::{
-    evaluation::{Problem, RunSettings, Scores, SimulatedSettings, StartRecord, TestErrors},
+    evaluation::{Problem, RunSettings, Scores, SimulatedSettings, StartRecord, TargetPosition, TestErrors},
     import::Recorded,
     network::{DecouplingNetwork, Networks},
 };
@@ -50,11 +50,15 @@ pub(super) fn flaw(file: &NetworkFile) -> Option<String> {
         (baselines.reference.as_ref())
             .and_then(|reference| unmeasured("scores.baselines.reference", reference, problem)),
     ];
-    let problem_flaw = simulated
-        .filter(|settings| *problem != settings.source.problem())
-        .map(|_| "problem: it is not that of the array".to_owned());
+    let is_placed = |position: &TargetPosition| position.target < problem.targets.len();
+    let problem_flaw = match simulated {
+        Some(settings) if *problem != settings.source.problem() => Some("problem: it is not that of the array"),
+        None if problem.has_nodes => Some("problem: the targets of a recording are not nodes"),
+        None if !problem.positions.iter().all(is_placed) => Some("problem.positions: a target does not exist"),
+        _ => None,
+    };
     settings_flaw(settings, recorded.as_ref())
-        .or(problem_flaw)
+        .or(problem_flaw.map(str::to_owned))
         .or_else(|| flaws.into_iter().flatten().next())
 }
 
@@ -173,6 +177,7 @@ fn place_flaw(networks: &Networks, settings: &SimulatedSettings) -> Option<Strin
 fn unmeasured(place: &str, errors: &TestErrors, problem: &Problem) -> Option<String> {
     match errors {
         TestErrors::Nodes(_) if !problem.has_nodes => return Some(format!("{place}: the targets are not nodes")),
+        TestErrors::Targets(_) if problem.has_nodes => return Some(format!("{place}: the targets are nodes")),
         TestErrors::Targets(targets) if targets.len() != problem.targets.len() => {
             let (found, expected) = (targets.len(), problem.targets.len());
             return Some(format!("{place}: {found} of them for {expected} targets"));

@@ -2,7 +2,10 @@ use std::io::{self, Write};
 
 use super::{Cell, Table, TableColumn};
 use crate::{
-    evaluation::{Channel, DecoderReport, ErrorBlock, ErrorRow, ErrorTable, Errors},
+    evaluation::{
+        Channel, DecoderReport, ErrorBlock, ErrorMeasure, ErrorRow, ErrorTable, Errors, Problem, TargetErrors,
+        TestErrors,
+    },
     training::EpochRecord,
 };
 
@@ -10,10 +13,7 @@ use crate::{
 pub fn error_table(table: &ErrorTable) -> Table {
     let has_targets = table.blocks.iter().any(|block| block.target.is_some());
     let target = has_targets.then(|| TableColumn::new("target", "Target", ""));
-    let measures = table.measures.iter().map(|measure| {
-        let (heading, unit) = measure.heading();
-        TableColumn::new(measure.field(), heading, unit)
-    });
+    let measures = table.measures.iter().copied().map(error_column);
     let row = |block: &ErrorBlock, row: &ErrorRow| -> Vec<Cell> {
         let target = has_targets.then(|| block.target.as_ref().map_or(String::new(), Channel::title).into());
         let errors = row.errors.iter().copied().map(Cell::from);
@@ -33,8 +33,17 @@ pub fn error_table(table: &ErrorTable) -> Table {
     }
 }
 
-/// The table of decoders beside the Bayesian reference, if that is more than rounding.
-pub fn decoder_table(reports: &[DecoderReport], reference: Option<&Errors>) -> Table {
+/// Returns the table of measured decoders: for an array a row for each, and the Bayesian `reference` if it is more than
+/// rounding; for a recording a row for each decoder and target.
+pub fn decoder_table(problem: &Problem, reports: &[DecoderReport], reference: Option<&TestErrors>) -> Table {
+    if problem.has_nodes {
+        array_decoder_table(reports, reference.and_then(TestErrors::nodes))
+    } else {
+        recording_decoder_table(problem, reports)
+    }
+}
+
+fn array_decoder_table(reports: &[DecoderReport], reference: Option<&Errors>) -> Table {
     let reference = reference.filter(|reference| !reference.is_rounding());
     let row = |report: &DecoderReport| {
         let nodes = report.errors.nodes();
@@ -75,6 +84,36 @@ pub fn decoder_table(reports: &[DecoderReport], reference: Option<&Errors>) -> T
     table
 }
 
+fn recording_decoder_table(problem: &Problem, reports: &[DecoderReport]) -> Table {
+    let measures = [ErrorMeasure::Rmse, ErrorMeasure::R2, ErrorMeasure::RangePercent];
+    let row = |report: &DecoderReport, target: &Channel, errors: &TargetErrors| {
+        let names = [report.kind.name(report.precision).into(), target.title().into()];
+        let errors = measures.map(|measure| measure.of_target(errors).into());
+        let times = [report.cost.frame_us.into(), report.cost.fit_seconds.into()];
+        Vec::from_iter(names.into_iter().chain(errors).chain(times))
+    };
+    let rows = reports.iter().flat_map(|report| {
+        let targets = problem.targets.iter().zip(report.errors.targets());
+        targets.map(move |(target, errors)| row(report, target, errors))
+    });
+    let names =
+        [("decoder", "Decoder"), ("target", "Target")].map(|(field, heading)| TableColumn::new(field, heading, ""));
+    let times = [
+        TableColumn::new("frame_us", "a frame", "µs"),
+        TableColumn::new("fit_seconds", "fit", "s"),
+    ];
+    let errors = measures.map(error_column);
+    Table {
+        columns: names.into_iter().chain(errors).chain(times).collect(),
+        rows: rows.collect(),
+    }
+}
+
+fn error_column(measure: ErrorMeasure) -> TableColumn {
+    let (heading, unit) = measure.heading();
+    TableColumn::new(measure.field(), heading, unit)
+}
+
 /// Writes the errors of every epoch as CSV, in the manner of [`Table::write_csv`].
 ///
 /// # Errors
@@ -112,7 +151,6 @@ fn write_optional(value: Option<f64>, writer: &mut dyn Write) -> io::Result<()> 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::evaluation::Problem;
 
     #[test]
     fn an_error_table_has_gaps_where_the_paper_is_silent() {

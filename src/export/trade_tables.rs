@@ -5,15 +5,14 @@ use crate::{
     figure::trade_words::point_name,
 };
 
-/// Every point of every level, with all its figures: for programs.
+/// Returns every point of every level, with all its figures: for programs.
 pub fn trade_off_points(levels: &[TradeOffLevel]) -> Table {
-    const FIELDS: [&str; 17] = [
+    const FIELDS: [&str; 16] = [
         "noise",
         "preset",
         "decoder",
         "precision",
         "hidden",
-        "method",
         "samples",
         "epochs",
         "z_percent",
@@ -45,9 +44,6 @@ pub fn trade_off_points(levels: &[TradeOffLevel]) -> Table {
                 report.kind.to_string().into(),
                 precision.into(),
                 count(hidden),
-                point
-                    .method()
-                    .map_or(Cell::Number(None), |method| method.short_name().into()),
                 count(point.settings.source.simulation().map(|simulation| simulation.samples)),
                 count(hidden.map(|_| point.settings.training.stopping.epochs)),
                 report.errors.percent().into(),
@@ -63,24 +59,15 @@ pub fn trade_off_points(levels: &[TradeOffLevel]) -> Table {
         };
         points.map(row).collect::<Vec<_>>()
     };
-    let mut table = Table {
+    let table = Table {
         columns: FIELDS.map(TableColumn::field).to_vec(),
         rows: levels.iter().flat_map(of_level).collect(),
     };
-    if levels.iter().all(|level| level.noise.is_none()) {
-        let of_arrays = ["noise", "preset", "samples", "z_mm", "residual"];
-        for field in of_arrays.into_iter().chain(["reference_z_percent", "reference_z_mm"]) {
-            table.remove_column(field);
-        }
-        let percent = table.columns.iter_mut().find(|column| column.field == "z_percent");
-        percent
-            .into_iter()
-            .for_each(|column| *column = TableColumn::field("percent_of_range"));
-    }
-    table
+    let mut points = levels.iter().flat_map(|level| &level.points);
+    for_source(table, points.all(is_of_array))
 }
 
-/// The points of one level, fastest first: for readers.
+/// Returns the points of one level, fastest first: for readers.
 pub fn trade_off_summary(level: &TradeOffLevel) -> Table {
     let row = |point: &TradeOffPoint| {
         vec![
@@ -105,16 +92,94 @@ pub fn trade_off_summary(level: &TradeOffLevel) -> Table {
         ],
         rows: points.into_iter().map(row).collect(),
     };
-    if level.noise.is_none() {
-        table.remove_column("z_mm");
-        let percent = table.columns.iter_mut().find(|column| column.field == "z_percent");
-        percent
-            .into_iter()
-            .for_each(|column| *column = TableColumn::new("percent_of_range", "MAE", "% of range"));
-    }
     // Without noise there is no limit to compare with.
     if level.points.iter().all(|point| point.to_reference().is_none()) {
         table.remove_column("times_reference");
     }
+    for_source(table, level.points.iter().all(is_of_array))
+}
+
+fn is_of_array(point: &TradeOffPoint) -> bool {
+    point.settings.source.simulation().is_some()
+}
+
+/// Returns the table of an array, or for a recording the same table without columns that need a sensor model.
+fn for_source(mut table: Table, is_array: bool) -> Table {
+    const OF_ARRAYS: [&str; 7] = [
+        "noise",
+        "preset",
+        "samples",
+        "z_mm",
+        "residual",
+        "reference_z_percent",
+        "reference_z_mm",
+    ];
+    if is_array {
+        return table;
+    }
+    OF_ARRAYS.iter().for_each(|field| table.remove_column(field));
+    for column in table.columns.iter_mut().filter(|column| column.field == "z_percent") {
+        *column = match column.heading.as_str() {
+            "Z" => TableColumn::new("percent_of_range", "MAE", "% of range"),
+            _ => TableColumn::field("percent_of_range"),
+        };
+    }
     table
+}
+
+#[cfg(test)]
+mod tests {
+    use ndarray::Array2;
+
+    use super::*;
+    use crate::{
+        dataset::{Dataset, Split},
+        decoupling::DecoderKind,
+        evaluation::{Measured, RunSets, RunSettings, measure_trade_off},
+        scene::RowModel,
+    };
+
+    #[test]
+    fn points_of_a_recording_have_no_columns_of_a_sensor_model() {
+        let set = |from: usize| {
+            let readings = Array2::from_shape_fn((40, 2), |(row, channel)| {
+                ((from + row) as f64 * [0.3, 0.7][channel]).sin()
+            });
+            let targets = Array2::from_shape_fn((40, 1), |(row, _)| readings[[row, 0]] * readings[[row, 1]]);
+            Dataset::new(readings, targets, None, (0..40).collect()).unwrap()
+        };
+        let split = Split {
+            training: set(0),
+            validation: None,
+        };
+        let mut settings = RunSettings::from(Measured { rows: RowModel::Shared });
+        settings.training.stopping.epochs = 3;
+        let mut points = Vec::new();
+        let keep = |_, point: Result<TradeOffPoint, _>| points.push(point.unwrap());
+        let kinds = [DecoderKind::Ridge, DecoderKind::Network];
+        measure_trade_off(&settings, &RunSets::new(split, set(40)), &[2], &kinds, || false, keep).unwrap();
+        let level = TradeOffLevel { noise: None, points };
+        let fields = |table: &Table| Vec::from_iter(table.columns.iter().map(|column| column.field.clone()));
+        let summary = trade_off_summary(&level);
+        assert_eq!(
+            fields(&summary),
+            ["decoder", "percent_of_range", "frame_us", "training_s"]
+        );
+        assert_eq!(summary.columns[1].title(), "MAE (% of range)");
+        let table = trade_off_points(&[level]);
+        let expected = [
+            "decoder",
+            "precision",
+            "hidden",
+            "epochs",
+            "percent_of_range",
+            "frame_us",
+            "training_s",
+            "on_decoding_front",
+            "on_training_front",
+        ];
+        assert_eq!(fields(&table), expected);
+        assert_eq!(table.rows.len(), 3, "ridge, and the network in two precisions");
+        assert!(table.rows.iter().all(|row| row.len() == expected.len()));
+    }
 }

@@ -5,7 +5,7 @@ use crate::{
     training::{MachineMemory, MemorySource},
 };
 
-/// Tells how much memory and time a run will take on this machine. The first time its speed is measured, which takes
+/// Describes the memory and time that a run will take on this machine. The first call measures its speed, which takes
 /// some 20 ms.
 pub fn describe_workload(workload: &Workload) -> String {
     let gigabytes = |bytes: u64| format!("{:.1} GB", bytes as f64 * 1e-9);

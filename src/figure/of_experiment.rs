@@ -12,16 +12,19 @@ use super::{
 };
 use crate::{
     evaluation::{
-        Errors,
-        experiments::{Axis, CellResults, CellSummary, Experiment, ExperimentResults, Figure as Measured, Trial},
+        TestErrors,
+        experiments::{
+            Axis, CellResults, CellSummary, Experiment, ExperimentResults, Figure as Measured, SummaryErrors, Trial,
+        },
         format::format_percent,
     },
     figure::Figure,
     network::HiddenSuggestions,
 };
 
-/// The results so far of an experiment: a heat map of the median Z error over two axes, the errors of every repeat of a
-/// cross-validation (the paper's Fig. 5), or else the Z error along the axis beside the published one.
+/// The results so far of an experiment: a heat map of the median error over two axes, the errors of every repeat of a
+/// cross-validation (the paper's Fig. 5), or else the error along the axis next to the published one, with R² along the axis
+/// for a recording.
 pub fn experiment_figure(results: &ExperimentResults) -> Figure {
     let summaries = results.summaries();
     if let Some(rows) = &results.experiment.second_axis {
@@ -30,6 +33,22 @@ pub fn experiment_figure(results: &ExperimentResults) -> Figure {
         repeats(results, &summaries).into()
     } else {
         along_the_axis(results, &summaries).into()
+    }
+}
+
+/// Name of the error in percent by which cells are ranked.
+fn error_name(results: &ExperimentResults) -> &'static str {
+    match results.experiment.recording {
+        None => "Z error",
+        Some(_) => "mean absolute error",
+    }
+}
+
+/// Name of the axis of that error.
+fn error_axis(results: &ExperimentResults) -> &'static str {
+    match results.experiment.recording {
+        None => "Z error (%)",
+        Some(_) => "mean absolute error (% of range)",
     }
 }
 
@@ -44,10 +63,10 @@ fn heat_map(results: &ExperimentResults, summaries: &[CellSummary], rows: &Axis)
     let mut notes = Array2::from_elem(shape, String::new());
     for (cell, summary) in results.cells.iter().zip(summaries) {
         let at = [cell.cell.row, cell.cell.column];
-        let Measured { median, min, max, .. } = summary.z_percent;
+        let Measured { median, min, max, .. } = summary.percent;
         values[at] = median.unwrap_or(f64::NAN);
         let name = results.cell_labels(cell).join(", ");
-        notes[at] = format!("{name}: median Z error {}", format_percent(median));
+        notes[at] = format!("{name}: median {} {}", error_name(results), format_percent(median));
         if let Some((least, largest)) = min.zip(max) {
             notes[at] += &format!("\n{} to {}", format_percent(least), format_percent(largest));
         }
@@ -60,7 +79,7 @@ fn heat_map(results: &ExperimentResults, summaries: &[CellSummary], rows: &Axis)
         rows: labels(rows),
         values,
         notes,
-        value_axis: PlotAxis::logarithmic("median Z error (%)"),
+        value_axis: PlotAxis::logarithmic(format!("median {}", error_axis(results))),
     }
 }
 
@@ -92,14 +111,14 @@ fn along_the_axis(results: &ExperimentResults, summaries: &[CellSummary]) -> Plo
         false => Look::marker(hue, marker),
     };
     let ours = cells.iter().filter_map(|(x, cell)| {
-        let Measured { median, min, max, .. } = cell.z_percent;
+        let Measured { median, min, max, .. } = cell.percent;
         Some(PlotPoint {
             bar: min.zip(max).map(|(least, largest)| [least, largest]),
             ..PlotPoint::from([*x, median?])
         })
     });
     let bound = if is_number {
-        points(|cell| cell.bound_z_percent)
+        points(|cell| cell.bound_percent)
     } else {
         Vec::new()
     };
@@ -109,12 +128,15 @@ fn along_the_axis(results: &ExperimentResults, summaries: &[CellSummary]) -> Plo
     };
     let mut series = vec![
         Series::new(
-            "linear map",
+            match results.experiment.recording {
+                None => "linear map",
+                Some(_) => "ridge",
+            },
             reference(Hue::Grey, Marker::Ring),
-            points(|cell| cell.linear_z_percent),
+            points(|cell| cell.linear_percent),
         ),
         Series::new("bound of the hidden nodes", reference(Hue::Green, Marker::Ring), bound),
-        Series::new("published", published, points(|cell| cell.z_percent.published)),
+        Series::new("published", published, points(|cell| cell.percent.published)),
         Series {
             points: ours.collect(),
             ..Series::new(
@@ -137,11 +159,11 @@ fn along_the_axis(results: &ExperimentResults, summaries: &[CellSummary]) -> Plo
         .rev()
         .map(|series| Key::new(&series.name, series.look))
         .collect();
-    let mut plot = Plot::new(x, PlotAxis::linear("Z error (%)").including([0.0, 1.0]), series);
-    if is_number {
+    let r2 = r2_plot(x.clone(), &cells, joined(Look::marker(Hue::Blue, Marker::Disc)));
+    let mut plot = Plot::new(x, PlotAxis::linear(error_axis(results)).including([0.0, 1.0]), series);
+    if let Some(problem) = results.problem.as_ref().filter(|_| is_number) {
         // The suggestions of Eq. (12) and (13).
-        let scale = results.experiment.base.source.sensor.scale;
-        let suggested = HiddenSuggestions::new(scale.columns(), scale.coordinates_per_row());
+        let suggested = HiddenSuggestions::new(problem.inputs.len(), problem.targets.len());
         let (fewest, most) = (
             *suggested.square_root.start() as f64,
             *suggested.square_root.end() as f64,
@@ -159,14 +181,31 @@ fn along_the_axis(results: &ExperimentResults, summaries: &[CellSummary]) -> Plo
         });
     }
     PlotFigure {
-        plots: vec![plot],
+        plots: std::iter::once(plot).chain(r2).collect(),
         keys,
         notes: Vec::new(),
     }
 }
 
+/// R² of the networks along the axis; `None` for the nodes of an array.
+fn r2_plot(x: PlotAxis, cells: &[(f64, &CellSummary)], look: Look) -> Option<Plot> {
+    let points = cells.iter().map(|(x, cell)| match &cell.errors {
+        SummaryErrors::Nodes { .. } => None,
+        SummaryErrors::Targets { r2 } => Some(r2.median.map(|median| PlotPoint {
+            bar: r2.min.zip(r2.max).map(|(least, largest)| [least, largest]),
+            ..PlotPoint::from([*x, median])
+        })),
+    });
+    let points: Vec<_> = points.collect::<Option<_>>()?;
+    let series = Series {
+        points: points.into_iter().flatten().collect(),
+        ..Series::new("R²", look, [])
+    };
+    Some(Plot::new(x, PlotAxis::linear("R²").including([1.0]), vec![series]))
+}
+
 type PublishedError = fn(&CellSummary) -> Option<f64>;
-type TrialError = fn(&Errors) -> Option<f64>;
+type TrialError = fn(&TestErrors) -> Option<f64>;
 
 /// The errors of every trial, one plot each for Z, X and Y.
 fn repeats(results: &ExperimentResults, summaries: &[CellSummary]) -> PlotFigure {
@@ -177,19 +216,19 @@ fn repeats(results: &ExperimentResults, summaries: &[CellSummary]) -> PlotFigure
     let errors: [(PlotAxis, PublishedError, TrialError); 3] = [
         (
             linear("Z error (%)"),
-            |cell| cell.z_percent.published,
-            |errors| errors.z_percent,
+            |cell| cell.percent.published,
+            TestErrors::percent,
         ),
         (
             linear("X error (%)"),
-            |cell| cell.x_percent.published,
-            |errors| errors.x_percent,
+            |cell| node_figures(cell)[0]?.published,
+            |errors| errors.nodes()?.x_percent,
         ),
         // Y is constant, so its error is of the size of rounding for some and not for others.
         (
             PlotAxis::logarithmic("Y error (%)"),
-            |cell| cell.y_percent.published,
-            |errors| errors.y_percent,
+            |cell| node_figures(cell)[1]?.published,
+            |errors| errors.nodes()?.y_percent,
         ),
     ];
     let trials = results.cells.iter().map(|cell| cell.expected).max().unwrap_or(1);
@@ -221,7 +260,7 @@ fn repeats(results: &ExperimentResults, summaries: &[CellSummary]) -> PlotFigure
     let published = Key::new("published", Look::line(Hue::Ink, LineStyle::Dashed));
     let is_published = plots.iter().any(|plot| !plot.lines.is_empty());
     let keys = keys.chain(is_published.then_some(published)).collect();
-    let is_zero = |cell: &CellSummary| cell.y_percent.median == Some(0.0);
+    let is_zero = |cell: &CellSummary| node_figures(cell)[1].is_some_and(|y| y.median == Some(0.0));
     let note = "Y is constant: its error is 0 and lies below the axis.";
     PlotFigure {
         plots: plots.into(),
@@ -236,7 +275,7 @@ fn repeats(results: &ExperimentResults, summaries: &[CellSummary]) -> PlotFigure
 }
 
 /// An error of each trial of a cell against its number, from 1 and counted through all seeds: Fig. 5.
-fn trial_points(experiment: &Experiment, cell: &CellResults, error: fn(&Errors) -> Option<f64>) -> Vec<[f64; 2]> {
+fn trial_points(experiment: &Experiment, cell: &CellResults, error: TrialError) -> Vec<[f64; 2]> {
     let repeats = experiment.cross_validation.map_or(1, |validation| validation.repeats);
     let number = |trial: &Trial| {
         let seeds_before = trial.seed.0.wrapping_sub(cell.cell.settings.seed.0) as f64;
@@ -246,6 +285,16 @@ fn trial_points(experiment: &Experiment, cell: &CellResults, error: fn(&Errors) 
     points
         .filter_map(|trial| Some([number(trial), error(&trial.errors)?]))
         .collect()
+}
+
+/// Errors in x and y; `None` for a recording.
+fn node_figures(cell: &CellSummary) -> [Option<&Measured>; 2] {
+    match &cell.errors {
+        SummaryErrors::Nodes {
+            x_percent, y_percent, ..
+        } => [Some(x_percent), Some(y_percent)],
+        SummaryErrors::Targets { .. } => [None, None],
+    }
 }
 
 /// Name of what the trials of a cross-validation are counted by.
@@ -265,7 +314,7 @@ mod tests {
         dataset::{FoldUnit, Seed},
         evaluation::{
             CrossValidation,
-            experiments::{Finished, PaperTable, run_experiments},
+            experiments::{Finished, PaperTable, TrialSamples, run_experiments},
         },
     };
 
@@ -284,12 +333,20 @@ mod tests {
         let mut results = ExperimentResults::new(experiment.clone());
         let mut finished = Vec::new();
         let keep = |trial: Finished| finished.push(trial);
-        run_experiments(std::slice::from_ref(&experiment), NonZero::<usize>::MIN, || false, keep).unwrap();
+        let one = NonZero::<usize>::MIN;
+        run_experiments(
+            std::slice::from_ref(&experiment),
+            &TrialSamples::Drawn,
+            one,
+            || false,
+            keep,
+        )
+        .unwrap();
         // The fourth trial is the second seed's first.
         for trial in finished.into_iter().rev().take(3) {
             results.record(trial.cell, trial.outcome);
         }
-        let points = trial_points(&experiment, &results.cells[0], |errors| errors.z_percent);
+        let points = trial_points(&experiment, &results.cells[0], TestErrors::percent);
         assert_eq!(points.iter().map(|point| point[0]).collect::<Vec<_>>(), [4.0, 5.0, 6.0]);
     }
 

@@ -50,7 +50,7 @@ pub enum Encoding {
     Utf16Be,
 }
 
-/// Layout of a file of text, as found or as told.
+/// Layout of a file of text, as found or as given.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct Dialect {
     /// Encoding of the text.

@@ -2,7 +2,7 @@ use std::{io, path::PathBuf};
 
 use thiserror::Error;
 
-use super::{Cure, InputError, PositionsError};
+use super::{Cure, Format, InputError, PositionsError};
 use crate::dataset::{DatasetError, DivisionError, system_cause};
 
 /// Error of an import. Lines and columns are counted from 1.
@@ -179,7 +179,7 @@ pub enum TableError {
     #[error("it has no rows; choose a file with a table of numbers")]
     Empty,
     /// The file holds other data than text.
-    #[error("it is not text: line {line} holds a zero byte; give CSV, .npy, .npz or .mat")]
+    #[error("it is not text: line {line} holds a zero byte; give {}", Format::NAMES)]
     Binary {
         /// Line of the first zero byte.
         line: u64,

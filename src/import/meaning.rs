@@ -5,7 +5,7 @@ use std::fmt;
 pub enum Meaning {
     /// The sensor gives it.
     Input,
-    /// It is to be told from the inputs.
+    /// Target, predicted from the inputs.
     Target,
     /// Time of the row.
     Time,

@@ -2,7 +2,10 @@
 //!
 //! [`read_table`] reads one file and [`Inspection`] looks at its columns. A [`Recipe`] says which files are joined and what
 //! their columns mean, and gives a [`Recording`]: samples with names, units and times, and what was left out and why. A
-//! [`Plan`] adds how the samples are divided for training and test; [`suggested_plan`] guesses one from the files.
+//! [`Plan`] adds how the samples are divided for training and test; [`suggested_plan`] guesses one from the files. A [`Setup`]
+//! is a plan or a simulated array with the settings of a run: everything that gives its samples again.
+//!
+//! [`Format`] lists the kinds of files. A further one is an entry there and a module that reads its arrays.
 
 mod arrays;
 mod column;
@@ -13,6 +16,7 @@ mod detection;
 mod dialect;
 mod element;
 mod error;
+mod format;
 mod gather;
 mod importing;
 mod input_lines;
@@ -37,6 +41,7 @@ mod recording;
 mod rows;
 mod selection;
 mod setup;
+mod stored_path;
 mod suggestion;
 mod table;
 mod utf16;
@@ -47,6 +52,7 @@ pub use condition::Condition;
 pub use cure::Cure;
 pub use dialect::{Decimal, Dialect, DialectChoice, DialectError, Encoding, Separator};
 pub use error::{ImportError, TableError};
+pub use format::Format;
 pub use input_lines::{InputLine, InputLineError, InputLines};
 pub use inputs::{InputColumns, InputError, InputTable};
 pub use inspected::InspectedFile;
@@ -60,6 +66,8 @@ pub use recipe::{Joined, Recipe};
 pub use recorded::{FileChecksum, Recorded, file_crc32};
 pub use recording::{Dropped, FileReport, JoinReport, Recording};
 pub use setup::{Recordings, Setup, SetupError, SetupSets};
+#[cfg(feature = "cli")]
+pub(crate) use stored_path::stored;
 pub use suggestion::{suggested_plan, suggested_plan_in_order};
-pub use table::{Excess, Format, Table};
+pub use table::{Excess, Table};
 pub use watch::{Progress, Watch};

@@ -2,8 +2,11 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
-use super::{Cure, ImportError, Joined, Recipe, Recording, Watch};
-use crate::dataset::{Dataset, Division, Seed, Split, SplitBy, Stream};
+use super::{
+    Cure, ImportError, Joined, Recipe, Recording, Watch,
+    stored_path::{restored, stored},
+};
+use crate::dataset::{Dataset, Division, Seed, Split, SplitBy};
 
 /// Files, the meanings of their columns, and the division of their samples: all that a run on measured samples needs to be
 /// repeated.
@@ -50,6 +53,22 @@ impl Plan {
     /// # Errors
     /// If the files cannot be imported or the samples not be divided.
     pub fn sets(&self, folder: &Path, seed: Seed, watch: Watch<'_>) -> Result<PlannedSets, ImportError> {
+        let (recording, test_recording) = self.recordings(folder, watch)?;
+        let (split, test) = self.divide(&recording, test_recording.as_ref(), seed)?;
+        Ok(PlannedSets {
+            recording,
+            test_recording,
+            split,
+            test,
+        })
+    }
+
+    /// Imports the files, relative to `folder`: all samples but those of the test files, and those of the test files, if there
+    /// are any.
+    ///
+    /// # Errors
+    /// If the files cannot be imported.
+    pub fn recordings(&self, folder: &Path, watch: Watch<'_>) -> Result<(Recording, Option<Recording>), ImportError> {
         let recording = self.recording(folder, watch)?;
         let test_recording = match &self.test {
             None => None,
@@ -58,13 +77,7 @@ impl Plan {
                 Some(self.import.of_test(files)?.import(folder, watch)?)
             }
         };
-        let (split, test) = self.divide(&recording, test_recording.as_ref(), seed)?;
-        Ok(PlannedSets {
-            recording,
-            test_recording,
-            split,
-            test,
-        })
+        Ok((recording, test_recording))
     }
 
     /// Refuses rows for the test that are trained on. A file joined to both may be the same: its times tell its rows apart.
@@ -86,19 +99,8 @@ impl Plan {
         test_recording: Option<&Recording>,
         seed: Seed,
     ) -> Result<(Split, Dataset), ImportError> {
-        let set = &recording.set;
-        let mut rng = seed.rng(Stream::Split);
-        Ok(match test_recording {
-            None => {
-                let parts = self.division.divide(set, &mut rng)?;
-                (parts.split(set), parts.test_set(set))
-            }
-            Some(recording) => {
-                let parts = self.division.divide_for_training(set, &mut rng)?;
-                let read = set.row_wires_read().unwrap_or_default();
-                (parts.split(set), recording.set.clone().among_rows(read)?)
-            }
-        })
+        let test = test_recording.map(|recording| &recording.set);
+        Ok(self.division.sets(&recording.set, test, seed)?)
     }
 
     /// Imports the samples without those of the test files.
@@ -112,16 +114,24 @@ impl Plan {
         self.import.import(folder, watch)
     }
 
-    /// This plan with paths that do not depend on the working folder: relative to `folder` where they lead below it, else
-    /// absolute.
+    /// This plan, whose paths are relative to the working folder, with paths for a file in `folder`: relative to that
+    /// folder; the name alone for a recording in the user's home if the folder lies elsewhere.
     #[must_use]
     pub fn relative_to(&self, folder: &Path) -> Self {
-        let folder = std::path::absolute(folder).unwrap_or_else(|_| folder.to_owned());
-        let relative = |path: &PathBuf| {
-            let absolute = std::path::absolute(path).unwrap_or_else(|_| path.clone());
-            absolute.strip_prefix(&folder).map(Path::to_owned).unwrap_or(absolute)
-        };
-        self.with_paths(relative)
+        self.with_paths(|path| stored(path, folder))
+    }
+
+    /// This plan, read from a file in `folder`, with paths relative to the working folder. A recording that is not where it
+    /// was may lie next to the file.
+    #[must_use]
+    pub fn restored(&self, folder: &Path) -> Self {
+        self.with_paths(|path| restored(path, folder))
+    }
+
+    /// Returns `true` if the test samples are random ones of the recording: errors on them are optimistic where neighbouring
+    /// rows are similar.
+    pub fn is_optimistic(&self) -> bool {
+        self.division.by == SplitBy::Random && self.test.is_none()
     }
 
     /// All files that it reads.
@@ -148,6 +158,12 @@ impl Plan {
     #[must_use]
     pub fn within(&self, folder: &Path) -> Self {
         self.with_paths(|path| folder.join(path))
+    }
+
+    /// This plan with the names of its files in the place of their paths.
+    #[must_use]
+    pub fn named(&self) -> Self {
+        self.with_paths(|path| path.file_name().map_or_else(|| path.clone(), PathBuf::from))
     }
 
     pub(super) fn with_paths(&self, of: impl Fn(&PathBuf) -> PathBuf) -> Self {

@@ -1,15 +1,14 @@
 use std::{
     fs::File,
-    io::{BufReader, Read, Seek},
+    io::{Read, Seek},
     path::Path,
 };
 
 use super::{
-    DialectChoice, Format, ImportError, Table, TableError, Watch, arrays, csv_table, csv_table::Reading, matlab, npz,
-    numpy, watch::Watched,
+    DialectChoice, Format, ImportError, Table, TableError, Watch, arrays, csv_table, csv_table::Reading, watch::Watched,
 };
 
-/// Reads the table in the file at `path`: `.npy`, `.npz` and `.mat` by their contents, all others as text.
+/// Reads the table in the file at `path`: arrays by the beginning of the file, all others as text.
 ///
 /// # Errors
 /// If the file cannot be read or holds no table, or `watch` breaks.
@@ -54,28 +53,13 @@ fn read_file(
         // A pipe cannot be looked into and read again.
         return csv_table::read(path, Watched::new(file, None, watch), reading);
     }
-    (&file).take(10).read_to_end(&mut start)?;
+    (&file).take(Format::BEGINNING).read_to_end(&mut start)?;
     file.rewind()?;
-    let is_mat = path
-        .extension()
-        .is_some_and(|ending| ending.eq_ignore_ascii_case("mat"));
-    match &start[..] {
-        [0x93, b'N', b'U', b'M', b'P', b'Y', ..] => {
-            let array = numpy::read("", BufReader::new(Watched::new(file, size, watch)));
-            let array = array.map_err(|error| match error {
-                TableError::Array { reason, .. } => TableError::array("NumPy array", reason),
-                error => error,
-            })?;
-            arrays::table(path, vec![array], Format::Npy, Vec::new(), reading)
+    match Format::of_arrays(path, &start) {
+        Some((format, read_arrays)) => {
+            let (found, left_out) = read_arrays(file, size, watch)?;
+            arrays::table(path, found, format, left_out, reading)
         }
-        [b'P', b'K', 3 | 5, ..] => {
-            let (found, left_out) = npz::read(BufReader::new(file), watch)?;
-            arrays::table(path, found, Format::Npz, left_out, reading)
-        }
-        _ if is_mat || start.starts_with(b"MATLAB") => {
-            let (found, left_out) = matlab::read(BufReader::new(Watched::new(file, size, watch)))?;
-            arrays::table(path, found, Format::Matlab, left_out, reading)
-        }
-        _ => csv_table::read(path, Watched::new(file, size, watch), reading),
+        None => csv_table::read(path, Watched::new(file, size, watch), reading),
     }
 }

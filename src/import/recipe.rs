@@ -19,9 +19,9 @@ pub struct Recipe {
     /// Layout of files of text, where it should not be found.
     #[serde(default)]
     pub dialect: DialectChoice,
-    /// Columns that the sensor gives.
+    /// Readings of the sensor.
     pub inputs: Vec<String>,
-    /// Columns to be told from them.
+    /// Columns to be predicted from them.
     pub targets: Vec<String>,
     /// Column of the time of `data`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -35,7 +35,7 @@ pub struct Recipe {
     /// Conditions that the rows used meet, all of them.
     #[serde(default, rename = "where", skip_serializing_if = "Vec::is_empty")]
     pub conditions: Vec<Condition>,
-    /// Cells that mean missing, beside empty ones.
+    /// Cells that mean missing, as well as empty ones.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub missing: Vec<Missing>,
     /// Units of columns, where the header does not give them.

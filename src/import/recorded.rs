@@ -1,12 +1,15 @@
 use std::{
     fs::File,
     io::{self, Read as _},
-    path::{Component, Path, PathBuf},
+    path::{Path, PathBuf},
 };
 
 use serde::{Deserialize, Serialize};
 
-use super::{ImportError, Plan, PlannedSets};
+use super::{
+    ImportError, Plan, PlannedSets,
+    stored_path::{restored, stored},
+};
 use crate::dataset::Dataset;
 
 /// Origin of recorded samples: the plan that reads them, and checksums by which its files and samples are recognised.
@@ -59,21 +62,14 @@ impl Recorded {
     /// that the folder is not in, so that no file names the home of its author.
     #[must_use]
     pub fn relative_to(&self, folder: &Path) -> Self {
-        let folder = std::path::absolute(folder).unwrap_or_else(|_| folder.to_owned());
-        self.with_paths(|path| relative(path, &folder, std::env::home_dir().as_deref()))
+        self.with_paths(|path| stored(path, folder))
     }
 
     /// Returns it with the paths of a file in `folder`: a recording that is missing where it was may lie next to the file.
     #[must_use]
     pub fn within(&self, folder: &Path) -> Self {
-        self.with_paths(|path| {
-            let stored = normal(&folder.join(path));
-            let beside = path.file_name().map(|name| folder.join(name));
-            match beside {
-                Some(beside) if !stored.exists() && beside.exists() => beside,
-                _ => stored,
-            }
-        })
+        let folder = std::path::absolute(folder).unwrap_or_else(|_| folder.to_owned());
+        self.with_paths(|path| restored(path, &folder))
     }
 
     /// Returns it with another path of a recording.
@@ -123,64 +119,4 @@ fn samples_crc32(sets: [&Dataset; 2]) -> String {
         values.iter().for_each(|value| hasher.update(&value.to_le_bytes()));
     }
     format!("{:08x}", hasher.finalize())
-}
-
-/// Path of a file as seen from `folder`, both absolute; the name alone if the way leads into or out of `home` or has no common
-/// beginning.
-fn relative(path: &Path, folder: &Path, home: Option<&Path>) -> PathBuf {
-    let name = || path.file_name().map_or_else(|| path.to_owned(), PathBuf::from);
-    if home.is_some_and(|home| path.starts_with(home) && !folder.starts_with(home)) {
-        return name();
-    }
-    let (of_path, of_folder) = (Vec::from_iter(path.components()), Vec::from_iter(folder.components()));
-    let shared = of_path
-        .iter()
-        .zip(&of_folder)
-        .take_while(|(one, other)| one == other)
-        .count();
-    if shared == 0 {
-        return name();
-    }
-    let up = of_folder[shared..].iter().map(|_| Component::ParentDir);
-    up.chain(of_path[shared..].iter().copied()).collect()
-}
-
-/// Removes `..` by the names before it.
-fn normal(path: &Path) -> PathBuf {
-    let mut normal = PathBuf::new();
-    for component in path.components() {
-        match component {
-            Component::CurDir => {}
-            Component::ParentDir if matches!(normal.components().next_back(), Some(Component::Normal(_))) => {
-                normal.pop();
-            }
-            component => normal.push(component),
-        }
-    }
-    normal
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn no_stored_path_names_the_home_of_its_author() {
-        let home = Some(Path::new("/home/ada"));
-        for (path, folder, expected) in [
-            ("/home/ada/data/press.csv", "/home/ada/data", "press.csv"),
-            (
-                "/home/ada/data/press.csv",
-                "/home/ada/nets/best",
-                "../../data/press.csv",
-            ),
-            ("/home/ada/data/press.csv", "/media/stick", "press.csv"),
-            ("/data/press.csv", "/home/ada", "../../data/press.csv"),
-            ("/data/a/press.csv", "/data/b", "../a/press.csv"),
-        ] {
-            let found = relative(Path::new(path), Path::new(folder), home);
-            assert_eq!(found, Path::new(expected), "{path} from {folder}");
-        }
-        assert_eq!(normal(Path::new("/a/b/../c/./d")), Path::new("/a/c/d"));
-    }
 }

@@ -1,10 +1,13 @@
-use std::{ops::ControlFlow, path::Path};
+use std::{ops::ControlFlow, path::Path, sync::Arc};
 
 use thiserror::Error;
 
 use super::{ImportError, Plan, PlannedSets, Progress, Recorded, Recording};
 use crate::{
-    evaluation::{Run, RunError, RunSets, RunSettings, SimulatedSettings, Source},
+    evaluation::{
+        Run, RunError, RunSets, RunSettings, SimulatedSettings, Source,
+        experiments::{ExperimentRecording, RecordedSamples, TrialSamples},
+    },
     training::TrainerState,
 };
 
@@ -137,14 +140,7 @@ impl Setup {
             let sets = settings.checked_sets_unless(is_cancelled)?;
             return Ok(sets.map(|sets| SetupSets { sets, recordings: None }));
         };
-        let watch = &mut |progress| {
-            on_progress(progress);
-            if is_cancelled() {
-                ControlFlow::Break(())
-            } else {
-                ControlFlow::Continue(())
-            }
-        };
+        let watch = &mut watch(is_cancelled, on_progress);
         let planned = match plan.sets(folder, self.settings.seed, watch) {
             Err(_) if is_cancelled() => return Ok(None),
             planned => planned?,
@@ -168,6 +164,59 @@ impl Setup {
     }
 }
 
+impl Setup {
+    /// Returns the recording for an experiment; `None` for a simulated array.
+    pub fn experiment_recording(&self) -> Option<ExperimentRecording> {
+        let plan = self.plan.as_ref()?;
+        Some(ExperimentRecording {
+            name: self.source_name(),
+            has_groups: plan.import.group.is_some(),
+            has_test_files: plan.test.is_some(),
+            division: plan.division,
+        })
+    }
+
+    /// Reads the samples for the trials of an experiment; those of a simulated array are drawn by each trial. Folder,
+    /// cancelling and progress are those of [`Self::sets`].
+    ///
+    /// # Errors
+    /// If the files cannot be read.
+    pub fn trial_samples(
+        &self,
+        folder: &Path,
+        is_cancelled: &dyn Fn() -> bool,
+        on_progress: &mut dyn FnMut(Progress),
+    ) -> Result<Option<TrialSamples>, SetupError> {
+        let Some(plan) = &self.plan else {
+            return Ok(Some(TrialSamples::Drawn));
+        };
+        let (recording, test) = match plan.recordings(folder, &mut watch(is_cancelled, on_progress)) {
+            Err(_) if is_cancelled() => return Ok(None),
+            read => read?,
+        };
+        Ok(Some(TrialSamples::Recorded(RecordedSamples {
+            problem: Arc::new(recording.problem()),
+            set: Arc::new(recording.set),
+            test: test.map(|test| Arc::new(test.set)),
+        })))
+    }
+}
+
+/// Passes on the progress of reading, and ends it once `is_cancelled`.
+fn watch(
+    is_cancelled: &dyn Fn() -> bool,
+    on_progress: &mut dyn FnMut(Progress),
+) -> impl FnMut(Progress) -> ControlFlow<()> {
+    move |progress| {
+        on_progress(progress);
+        if is_cancelled() {
+            ControlFlow::Break(())
+        } else {
+            ControlFlow::Continue(())
+        }
+    }
+}
+
 impl SetupSets {
     /// Prepares a run of `setup` on these sets; returns `None` once `is_cancelled`.
     ///
@@ -188,6 +237,19 @@ impl SetupSets {
         is_cancelled: &dyn Fn() -> bool,
     ) -> Result<Option<Run>, RunError> {
         Run::resume_unless(setup.settings, states, self.sets, is_cancelled)
+    }
+
+    /// Compares recorded samples with those that were `saved` with a run.
+    ///
+    /// # Errors
+    /// [`SetupError::OtherSamples`] if the recording has changed.
+    pub fn check_saved(&self, saved: Option<&Recorded>) -> Result<(), SetupError> {
+        match (saved, self.recorded()) {
+            (Some(saved), Some(found)) if saved.samples_crc32 != found.samples_crc32 => {
+                Err(SetupError::OtherSamples(saved.plan.import.data.display().to_string()))
+            }
+            _ => Ok(()),
+        }
     }
 
     /// Origin of recorded samples, to be saved with the run; `None` for a simulated array.

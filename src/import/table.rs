@@ -1,6 +1,6 @@
 use std::path::Path;
 
-use super::{Column, Dialect};
+use super::{Column, Dialect, Format};
 use crate::dataset::clean_name::clean_name;
 
 /// A file as columns of equal lengths.
@@ -21,19 +21,6 @@ pub struct Table {
     /// Rows that end before the last column; the cells they lack are missing.
     pub too_short: Excess,
     pub(super) lines: Lines,
-}
-
-/// Kind of a file.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Format {
-    /// Text in this layout.
-    Text(Dialect),
-    /// A `.npy` file.
-    Npy,
-    /// A `.npz` archive.
-    Npz,
-    /// A `.mat` file of versions 5 to 7.
-    Matlab,
 }
 
 /// Rows of an unusual length.

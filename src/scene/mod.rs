@@ -30,20 +30,17 @@ use crate::sensor::{ArrayScale, Geometry, SensorModel, short};
 
 /// Rows read, movement, loading and noise of the readings. The default is the paper's.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[serde(deny_unknown_fields, default)]
 pub struct Scene {
     /// Row-wires read, and whether a decoder knows which one it reads.
-    #[serde(default)]
     pub rows: Rows,
     /// Movement of the nodes.
-    #[serde(default)]
     pub movement: Movement,
     /// Loading of the surface.
     pub loading: Loading,
     /// The largest compression as a fraction of the height, in (0, 1).
     pub largest_compression: f64,
     /// Noise of the readings.
-    #[serde(default)]
     pub noise: Noise,
 }
 

@@ -14,7 +14,7 @@ use super::{
 /// assumption: the layout, of 330 scanned, under which the model comes closest to the paper's Tables 1 and 3.
 /// Row-wires run along y, column-wires along x, z points up from the column-wires.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[serde(deny_unknown_fields, default)]
 pub struct Geometry {
     /// Distance of the undeformed row-wires above the column-wires.
     pub height_mm: f64,

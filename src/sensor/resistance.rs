@@ -14,7 +14,7 @@ pub const DEFAULT_RESISTIVITY_OHM_PER_MM: f64 = 100.0;
 
 /// The resistance model of one array: Eq. (1)-(2) of the paper and its derivatives.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[serde(deny_unknown_fields, default)]
 pub struct SensorModel {
     /// Number of wires and nodes.
     pub scale: ArrayScale,
@@ -22,6 +22,13 @@ pub struct SensorModel {
     pub geometry: Geometry,
     /// g, resistance per millimetre of rubber.
     pub resistivity_ohm_per_mm: f64,
+}
+
+impl Default for SensorModel {
+    /// The paper's main array, 10×10_5×30.
+    fn default() -> Self {
+        Self::new(ArrayScale::default())
+    }
 }
 
 /// Error of the resistance model.

@@ -4,7 +4,8 @@ use decoupler::{
     dataset::{Dataset, FoldUnit, PerRow, Split},
     decoupling::{DecoderKind, Precision},
     evaluation::{
-        CrossValidation, DecoderSet, Measured, Run, RunError, RunSettings, SimulatedSettings, Source, TargetErrors,
+        CrossValidation, DecoderSet, ErrorTable, Measured, Run, RunError, RunSettings, SimulatedSettings, Source,
+        TargetErrors,
     },
     export::{CheckpointFile, NetworkFile},
     network::{InputChoice, Quantity, ScalingChoice},
@@ -55,13 +56,16 @@ fn trained(settings: RunSettings, set: &Dataset, first_test: usize) -> Run {
 fn a_network_learns_what_a_linear_map_cannot() {
     let run = trained(settings(RowModel::Shared), &recording(600, &[0], 0), 500);
     assert!(matches!(run.settings().source, Source::Measured(_)));
-    let table = run.target_table();
-    assert_eq!(
-        table.iter().map(|row| row.name).collect::<Vec<_>>(),
-        ["training mean", "ridge", "network"]
-    );
+    let scores = run.scores().unwrap();
+    let table = ErrorTable::of_scores(run.problem(), &scores, None);
+    for block in &table.blocks {
+        let names = Vec::from_iter(block.rows.iter().map(|row| row.name));
+        assert_eq!(names, ["training mean", "ridge", "network"]);
+    }
+    let baselines = &scores.baselines;
     for target in 0..2 {
-        let [mean, linear, network] = [0, 1, 2].map(|row| table[row].targets[target].rmse);
+        let errors = [&baselines.mean, &baselines.linear, &scores.network];
+        let [mean, linear, network] = errors.map(|errors| errors.targets()[target].rmse);
         // Uniform targets on [−1, 1] deviate by 1/√3.
         assert!((mean - 1.0 / 3.0_f64.sqrt()).abs() < 0.1, "{mean}");
         assert!(
@@ -69,12 +73,10 @@ fn a_network_learns_what_a_linear_map_cannot() {
             "{target}: {mean} {linear} {network}"
         );
     }
-    assert!(table[2].targets.iter().all(|target| target.r2.unwrap() > 0.999));
-    assert_eq!(
-        (run.baselines(), run.node_scores()),
-        (None, None),
-        "there are no nodes to judge"
-    );
+    let targets = scores.network.targets();
+    assert!(targets.iter().all(|target| target.r2.unwrap() > 0.999));
+    assert_eq!(scores.nodes(), None, "there are no nodes to judge");
+    assert_eq!(baselines.reference, None, "there is no model of the sensor");
 }
 
 #[test]
@@ -83,7 +85,7 @@ fn networks_of_known_rows_go_by_the_samples_own_row_wire() {
     let set = recording(1200, &[7, 2, 4], 1);
     let [shared, each] = [RowModel::Shared, RowModel::Each].map(|rows| trained(settings(rows), &set, 1050));
     assert_eq!((shared.network().values().len(), each.network().values().len()), (1, 3));
-    let rmse = |run: &Run| run.target_table()[2].targets[0].rmse;
+    let rmse = |run: &Run| run.errors().targets()[0].rmse;
     assert!(rmse(&each) < 0.5 * rmse(&shared), "{} {}", rmse(&each), rmse(&shared));
     // The same samples in another order give the same answers.
     let test = each.test();
@@ -98,7 +100,7 @@ fn the_table_is_measured_on_the_answers() {
     let run = trained(settings(RowModel::Each), &recording(400, &[1, 3], 2), 300);
     let answers = run.network().decouple(run.test());
     let expected = TargetErrors::measure(run.test().targets(), answers.view());
-    assert_eq!(run.target_table()[2].targets, expected);
+    assert_eq!(run.errors().targets(), expected);
 }
 
 #[test]
@@ -123,8 +125,7 @@ fn every_fold_is_answered_by_networks_that_have_not_seen_it() {
             .run(&settings(RowModel::Shared), &set, 0, || false)
             .unwrap()
             .unwrap();
-        let table = validated.target_table(&set);
-        table[2].targets[0].r2.unwrap()
+        validated.scores(&set).network.targets()[0].r2.unwrap()
     };
     let [by_sample, by_group] = [FoldUnit::Sample, FoldUnit::Snapshot].map(r2);
     assert!(by_sample > 0.99, "samples of a test group are trained on: {by_sample}");
@@ -143,17 +144,15 @@ fn every_decoder_of_readings_alone_is_measured_and_the_sensors_are_not() {
     let (split, test) = split(&set, 500);
     let decoders = DecoderSet::on_set(settings, split.training, Some(run.network()));
     for kind in DecoderKind::ALL {
-        let report = decoders.measure_targets(kind, Precision::Double, &test).unwrap();
+        let report = decoders.measure(kind, Precision::Double, &test).unwrap();
         assert_eq!(report.is_none(), kind.needs_sensor(), "{kind}");
-        assert_eq!(
-            decoders.measure(kind, Precision::Double, &test).unwrap(),
-            None,
-            "{kind} has no nodes"
-        );
+        let is_offered = DecoderSet::kinds(&settings.source).any(|(offered, _)| offered == kind);
+        assert_eq!(is_offered, report.is_some(), "{kind}");
         if let Some(report) = report {
-            assert!(report.targets.iter().all(|target| target.rmse.is_finite()), "{kind}");
-            let is_better = report.targets[0].rmse < 0.4;
-            assert_eq!(is_better, kind != DecoderKind::Mean, "{kind}: {:?}", report.targets);
+            let targets = report.errors.targets();
+            assert!(targets.iter().all(|target| target.rmse.is_finite()), "{kind}");
+            assert_eq!(targets[0].rmse < 0.4, kind != DecoderKind::Mean, "{kind}: {targets:?}");
+            assert_eq!(report.residual, None, "there is no model of the sensor");
         }
     }
 }
@@ -227,16 +226,16 @@ fn a_test_set_that_lacks_a_row_says_which_rows_there_are() {
     let test = recording(50, &[1], 9).among_rows(&[0, 1]).unwrap();
     let mut run = Run::on_sets(settings(RowModel::Each), split, test).unwrap();
     while run.step().is_none() {}
-    assert!(run.target_table()[2].targets[0].rmse < 0.05);
+    assert!(run.errors().targets()[0].rmse < 0.05);
 }
 
 #[test]
-fn files_of_simulated_sensors_refuse_measured_runs() {
+fn files_refuse_samples_that_nothing_says_where_to_read() {
     let run = trained(settings(RowModel::Shared), &recording(60, &[0], 10), 50);
-    let message = NetworkFile::from_run(&run).unwrap_err().to_string();
-    assert!(message.contains("save its networks with serde"), "{message}");
-    let message = CheckpointFile::from_run(&run).unwrap_err().to_string();
-    assert!(message.contains("resume it on the same sets"), "{message}");
+    let message = NetworkFile::from_run(&run, None).unwrap_err().to_string();
+    assert!(message.contains("give the plan"), "{message}");
+    let message = CheckpointFile::from_run(&run, None).unwrap_err().to_string();
+    assert!(message.contains("give the plan"), "{message}");
     // The networks themselves are written by serde.
     let text = serde_json::to_string(&run.network()).unwrap();
     let read: PerRow<_> = serde_json::from_str(&text).unwrap();

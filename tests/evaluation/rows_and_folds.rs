@@ -4,7 +4,7 @@ use decoupler::{
     dataset::{Dataset, FoldUnit, Seed, Stream},
     evaluation::{
         CrossValidation, Errors, SimulatedSettings, Simulation,
-        experiments::{Axis, Experiment, ExperimentError, ExperimentResults, run_experiments},
+        experiments::{Axis, Experiment, ExperimentError, ExperimentResults, TrialSamples, run_experiments},
         reference_errors,
     },
     scene::{Noise, NoisySets, Rows, Scene},
@@ -31,8 +31,13 @@ fn small(rows: Rows) -> SimulatedSettings {
 }
 
 fn experiment(rows: Rows, folds: usize, unit: FoldUnit) -> Experiment {
+    experiment_on(small(rows), folds, unit)
+}
+
+fn experiment_on(settings: SimulatedSettings, folds: usize, unit: FoldUnit) -> Experiment {
     Experiment {
-        base: small(rows),
+        base: settings.into(),
+        recording: None,
         axis: Axis::Hidden(vec![2]),
         second_axis: None,
         seeds: 1,
@@ -48,6 +53,7 @@ fn finished(experiment: Experiment) -> ExperimentResults {
     let mut results = ExperimentResults::new(experiment.clone());
     run_experiments(
         &[experiment],
+        &TrialSamples::Drawn,
         1.try_into().unwrap(),
         || false,
         |finished| {
@@ -98,13 +104,13 @@ fn a_fold_without_samples_of_a_known_row_is_named() {
 #[test]
 fn cross_validation_by_samples_works_for_one_row_and_for_known_rows() {
     for rows in [Rows::One(2), Rows::Known] {
-        let mut experiment = experiment(rows, 3, FoldUnit::Sample);
+        let mut settings = small(rows);
         // Enough that no fold lacks a row.
-        experiment.base.source.samples = 240;
-        let results = finished(experiment);
+        settings.source.samples = 240;
+        let results = finished(experiment_on(settings, 3, FoldUnit::Sample));
         assert_eq!(results.cells[0].failures, []);
-        let errors = results.cells[0].trials[0].errors;
-        assert!(errors.z_percent.unwrap() < 50.0, "{rows}: {errors:?}");
+        let errors = &results.cells[0].trials[0].errors;
+        assert!(errors.percent().unwrap() < 50.0, "{rows}: {errors:?}");
     }
 }
 
@@ -156,12 +162,13 @@ fn the_worst_node_is_named_by_its_row_wire() {
 #[test]
 fn folds_are_tested_with_the_noise_of_the_test_set() {
     let z_mm = |sets, relative| {
-        let mut experiment = experiment(Rows::All, 4, FoldUnit::Snapshot);
-        experiment.base.source.scene.noise = Noise {
+        let mut settings = small(Rows::All);
+        settings.source.scene.noise = Noise {
             sets,
             ..Noise::relative(relative)
         };
-        finished(experiment).cells[0].trials[0].errors.z_mm
+        let results = finished(experiment_on(settings, 4, FoldUnit::Snapshot));
+        results.cells[0].trials[0].errors.nodes().unwrap().z_mm
     };
     let clean = z_mm(NoisySets::Both, 0.0);
     assert!(z_mm(NoisySets::Test, 0.2) > 1.1 * clean);

@@ -85,7 +85,7 @@ fn the_start_of_lowest_validation_error_leads() {
                 .map(|network| network.mlp())
                 .eq(run.trainers()[number].best())
         );
-        assert_eq!(run.node_scores().unwrap().network.z_percent, starts[number].z_percent);
+        assert_eq!(run.errors().percent(), starts[number].z_percent);
         assert_eq!(run.stop_reason(), run.leader().stop_reason());
     }
 }

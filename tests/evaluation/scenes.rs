@@ -1,4 +1,4 @@
-//! Scenes from settings to answers: known rows, single rows, noise, sideways movement; and files of older programs.
+//! Scenes from settings to answers: known rows, single rows, noise, sideways movement.
 
 use std::path::Path;
 
@@ -9,8 +9,9 @@ use decoupler::{
         DecoderSet, Outlook, Preset, Run, SimulatedSettings, Simulation, TradeOffPoint, fastest_under,
         measure_trade_off, most_accurate_under,
     },
-    export::{CheckpointFile, NetworkFile},
-    scene::{Loading, Movement, Noise, Rows, Scene},
+    export::NetworkFile,
+    import::Setup,
+    scene::{Loading, Movement, Noise, Rows},
     sensor::SensorModel,
 };
 
@@ -40,14 +41,14 @@ fn trained(settings: SimulatedSettings) -> Run {
 fn z_percent(run: &Run, kind: DecoderKind, precision: Precision) -> f64 {
     let set = DecoderSet::new(&run.settings().simulated().unwrap(), Some(run.network())).unwrap();
     let report = set.measure(kind, precision, run.test()).unwrap().unwrap();
-    report.errors.z_percent.unwrap()
+    report.errors.percent().unwrap()
 }
 
 #[test]
 fn knowing_the_row_makes_small_networks_accurate_and_newton_makes_them_exact() {
     let run = trained(small());
     assert_eq!(run.network().values().len(), 3);
-    let errors = run.node_scores().unwrap().network;
+    let errors = *run.errors().nodes().unwrap();
     assert!(errors.z_percent.unwrap() < 0.05, "{errors:?}");
     assert_eq!(errors.x_percent, Some(0.0), "what does not vary is known");
     let z = |kind, precision| z_percent(&run, kind, precision);
@@ -85,7 +86,11 @@ fn rows_that_are_not_known_are_found_out() {
         .measure(DecoderKind::Newton, Precision::Double, &test)
         .unwrap()
         .unwrap();
-    assert_eq!(report.errors.x_percent, Some(0.0), "every row is the right one");
+    assert_eq!(
+        report.errors.nodes().unwrap().x_percent,
+        Some(0.0),
+        "every row is the right one"
+    );
     assert!(
         set.decoder(DecoderKind::Polish, Precision::Double).unwrap().is_none(),
         "it has no network"
@@ -135,36 +140,15 @@ fn known_rows_go_on_from_saved_states_with_the_same_bits() {
     }
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("network.json");
-    let file = NetworkFile::from_run(&whole).unwrap();
+    let file = NetworkFile::from_run(&whole, None).unwrap();
     file.save(&path).unwrap();
     assert_eq!(NetworkFile::load(&path).unwrap(), file);
     let mut other = file;
-    other.settings.source.scene.rows = Rows::All;
+    let mut settings = other.settings.simulated().unwrap();
+    settings.source.scene.rows = Rows::All;
+    other.settings = settings.into();
     let message = other.save(&path).unwrap_err().to_string();
     assert!(message.contains("3 of them"), "{message}");
-}
-
-#[test]
-fn files_of_older_programs_still_load() {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures");
-    let file = NetworkFile::load(&folder.join("network_version_1.json")).unwrap();
-    assert_eq!(file.settings.source.scene, Scene::default());
-    assert_eq!(file.baselines.reference, None);
-    // The samples follow from the settings, and no deformation has changed since.
-    let run = CheckpointFile::load(&folder.join("checkpoint_version_1.json"))
-        .unwrap()
-        .resume()
-        .unwrap();
-    assert_eq!(run.settings().simulated().unwrap(), file.settings);
-    let (resumed, read) = (run.network(), file.network);
-    assert_eq!(
-        (resumed.at(0).mlp(), resumed.at(0).outputs()),
-        (read.at(0).mlp(), read.at(0).outputs())
-    );
-    // The last digits of the readings have: the forward model of older programs rounded more.
-    let [ours, theirs] = [run.node_scores().unwrap().network, file.errors];
-    assert!((ours.z_mm / theirs.z_mm - 1.0).abs() < 1e-10);
-    assert!((ours.worst_mm / theirs.worst_mm - 1.0).abs() < 1e-10);
 }
 
 /// With noise no decoder beats the reference, and the one that knows noise and prior comes close to it. Of a smooth field
@@ -186,7 +170,7 @@ fn with_noise_newton_comes_close_to_the_reference() {
         settings.source.scene.loading = loading;
         settings.training.stopping.epochs = 20;
         let run = trained(settings);
-        let limit = run.baselines().unwrap().reference.unwrap().z_percent.unwrap();
+        let limit = run.baselines().unwrap().reference.as_ref().unwrap().percent().unwrap();
         for kind in [DecoderKind::Newton, DecoderKind::Polish] {
             let ratio = z_percent(&run, kind, Precision::Double) / limit;
             let most = if loading == Loading::RandomNodes { 1.1 } else { 1.4 };
@@ -219,8 +203,10 @@ fn a_trade_has_a_point_for_every_choice() {
     };
     settings.training.stopping.epochs = 3;
     let mut points: Vec<TradeOffPoint> = Vec::new();
-    let keep = |point| points.push(point);
-    assert!(measure_trade_off(Preset::Best, &settings, &[2, 3], &DecoderKind::ALL, || false, keep).unwrap());
+    let keep = |_, point: Result<_, _>| points.push(point.unwrap());
+    let sets = Setup::from(settings).sets(Path::new(""), &|| false, &mut |_| ());
+    let sets = sets.unwrap().unwrap().sets;
+    assert!(measure_trade_off(&settings.into(), &sets, &[2, 3], &DecoderKind::ALL, || false, keep).unwrap());
     // Five without a network; network in two precisions and polish, each with two numbers of hidden nodes.
     assert_eq!(points.len(), 5 + 2 * 3);
     assert_eq!(points.iter().filter(|point| point.hidden() == Some(3)).count(), 3);
@@ -234,7 +220,7 @@ fn a_trade_has_a_point_for_every_choice() {
             .all(|point| fastest.report.cost.frame_us <= point.report.cost.frame_us)
     );
     let mut none = 0;
-    let count = |_| none += 1;
-    assert!(!measure_trade_off(Preset::Best, &settings, &[2], &DecoderKind::ALL, || true, count).unwrap());
+    let count = |_, _: Result<_, _>| none += 1;
+    assert!(!measure_trade_off(&settings.into(), &sets, &[2], &DecoderKind::ALL, || true, count).unwrap());
     assert_eq!(none, 0);
 }

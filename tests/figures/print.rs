@@ -2,12 +2,13 @@
 
 use decoupler::{
     decoupling::{DecoderKind, Precision},
-    evaluation::{Preset, TradeOffLevel, TradeOffLimits, measure_trade_off},
+    evaluation::{Preset, TradeOffLevel, TradeOffLimits, TradeOffPoint, measure_trade_off},
     export::figures::{Picture, PictureFormat},
     figure::{
         Figure, HeatMap, Hue, Key, Look, Marker, Plot, PlotAxis, PlotFigure, SequentialMap, Series, node_figure,
         trade_off_figure,
     },
+    import::Setup,
 };
 use glam::DVec3;
 use image::GenericImageView as _;
@@ -223,9 +224,16 @@ fn the_trade_off_tells_32_from_64_bits_and_hollow_marks_mean_nothing_else() {
         settings.source.sensor.scale = "4x4_2x12".parse().unwrap();
         (settings.source.samples, settings.source.validation_samples) = (100, 20);
         (settings.source.test_samples, settings.training.stopping.epochs) = (20, 2);
-        let on_point = |point| points.push(point);
+        let on_point = |_, point: Result<_, _>| {
+            points.push(TradeOffPoint {
+                preset: Some(preset),
+                ..point.unwrap()
+            });
+        };
         let kinds = [DecoderKind::Ridge, DecoderKind::Network];
-        measure_trade_off(preset, &settings, &[3], &kinds, || false, on_point).unwrap();
+        let sets = Setup::from(settings).sets("".as_ref(), &|| false, &mut |_| ());
+        let sets = sets.unwrap().unwrap().sets;
+        measure_trade_off(&settings.into(), &sets, &[3], &kinds, || false, on_point).unwrap();
     }
     let is_single = |single: bool| {
         let of_bits = points
@@ -240,7 +248,10 @@ fn the_trade_off_tells_32_from_64_bits_and_hollow_marks_mean_nothing_else() {
         percent: 0.0,
         microseconds: 0.0,
     };
-    let level = TradeOffLevel { noise: 0.0, points };
+    let level = TradeOffLevel {
+        noise: Some(0.0),
+        points,
+    };
     let figure = trade_off_figure(&level, &limits);
     for plot in &figure.plots {
         let marked = plot.series.iter().filter(|series| series.look.marker.is_some());

@@ -46,7 +46,7 @@ fn place() -> (TempDir, PathBuf) {
 
 fn saved(epochs: usize) -> (TempDir, PathBuf, Vec<u8>) {
     let (folder, path) = place();
-    CheckpointFile::from_run(&stepped(settings(Method::default()), epochs))
+    CheckpointFile::from_run(&stepped(settings(Method::default()), epochs), None)
         .unwrap()
         .save(&path)
         .unwrap();
@@ -71,14 +71,14 @@ fn a_run_from_a_file_goes_on_with_the_same_bits() {
     let (_folder, path) = place();
     for method in Method::all() {
         let whole = stepped(settings(method), 9);
-        CheckpointFile::from_run(&stepped(settings(method), 4))
+        CheckpointFile::from_run(&stepped(settings(method), 4), None)
             .unwrap()
             .save(&path)
             .unwrap();
         let file = CheckpointFile::load(&path).unwrap();
         let mut run = file.resume().unwrap();
         while run.step().is_none() {}
-        let mut files = [&run, &whole].map(|run| NetworkFile::from_run(run).unwrap());
+        let mut files = [&run, &whole].map(|run| NetworkFile::from_run(run, None).unwrap());
         files.iter_mut().for_each(|file| file.training.seconds = 0.0);
         assert_eq!(files[0], files[1], "{method}");
     }
@@ -99,7 +99,7 @@ fn the_time_by_the_clock_is_that_of_all_sessions_or_unknown() {
             },
             4,
         );
-        let mut file = CheckpointFile::from_run(&run).unwrap();
+        let mut file = CheckpointFile::from_run(&run, None).unwrap();
         assert!(file.wall_time == run.wall_time() && file.wall_time > Some(Duration::ZERO));
         file.wall_time = saved;
         file.save(&path).unwrap();
@@ -124,7 +124,7 @@ fn a_training_that_diverged_can_be_saved_and_goes_on_with_another_method() {
     *diverging.settings()[0].value = 1e3;
     let mut run = stepped(settings(diverging), 9);
     assert_eq!(run.stop_reason(), Some(StopReason::Diverged));
-    CheckpointFile::from_run(&run).unwrap().save(&path).unwrap();
+    CheckpointFile::from_run(&run, None).unwrap().save(&path).unwrap();
     let mut read = CheckpointFile::load(&path).unwrap().resume().unwrap();
     let text = |run: &Run| -> Vec<_> {
         let text = |record: &EpochRecord| format!("{record:?}");
@@ -135,7 +135,7 @@ fn a_training_that_diverged_can_be_saved_and_goes_on_with_another_method() {
     let before = run.leader().best_mse();
     for run in [&mut read, &mut run] {
         run.continue_with(Method::default()).unwrap();
-        CheckpointFile::from_run(run).unwrap().save(&path).unwrap();
+        CheckpointFile::from_run(run, None).unwrap().save(&path).unwrap();
         *run = CheckpointFile::load(&path).unwrap().resume().unwrap();
         while run.step().is_none() {}
     }
@@ -205,8 +205,13 @@ fn other_files_and_versions_are_named() {
         ("deep nesting", "[".repeat(100_000), "not a checkpoint"),
         (
             "a newer version",
-            text.replacen("\"version\":3", "\"version\":4", 1),
-            "reads versions 1 to 3: install a newer",
+            text.replacen("\"version\":4", "\"version\":5", 1),
+            "has version 5 of the format, written by decoupler",
+        ),
+        (
+            "an older version",
+            text.replacen("\"version\":4", "\"version\":3", 1),
+            "which reads version 4: open it with the program that wrote it",
         ),
         (
             "a newer version with other fields",
@@ -215,8 +220,8 @@ fn other_files_and_versions_are_named() {
         ),
         (
             "no version of ours",
-            text.replacen("\"version\":3", "\"version\":0", 1),
-            "no version 0",
+            text.replacen("\"version\":4", "\"version\":0", 1),
+            "has version 0",
         ),
         (
             "something lost within",
@@ -228,7 +233,7 @@ fn other_files_and_versions_are_named() {
         let message = refusal(text.as_bytes());
         assert!(message.contains(expected), "{sentence}: {message}");
     }
-    NetworkFile::from_run(&stepped(settings(Method::default()), 1))
+    NetworkFile::from_run(&stepped(settings(Method::default()), 1), None)
         .unwrap()
         .save(&path)
         .unwrap();
@@ -245,7 +250,7 @@ fn impossible_contents_are_refused() {
     let run = stepped(settings(Method::default()), 2);
     let (_folder, path) = place();
     let refused = |edit: Edit| {
-        let mut file = CheckpointFile::from_run(&run).unwrap();
+        let mut file = CheckpointFile::from_run(&run, None).unwrap();
         edit(&mut file);
         file.save(&path).unwrap();
         match CheckpointFile::load(&path) {
@@ -258,7 +263,11 @@ fn impossible_contents_are_refused() {
         (|file| file.settings.hidden = 3, "another number of hidden nodes"),
         (|file| file.settings.seed = Seed(1), "on these samples it is"),
         (
-            |file| file.settings.source.sensor.scale = "2x3_2x9".parse().unwrap(),
+            |file| {
+                let mut settings = file.settings.simulated().unwrap();
+                settings.source.sensor.scale = "2x3_2x9".parse().unwrap();
+                file.settings = settings.into();
+            },
             "the samples have",
         ),
         (

@@ -6,3 +6,4 @@
 mod checkpoint_file;
 mod network_file;
 mod run_folder;
+mod versions;

@@ -4,7 +4,7 @@ use std::{fs, path::PathBuf};
 
 use decoupler::{
     dataset::Seed,
-    evaluation::{Run, SimulatedSettings, Simulation},
+    evaluation::{Run, SimulatedSettings, Simulation, TestErrors},
     export::{DocumentError, NetworkFile},
     sensor::SensorModel,
 };
@@ -28,7 +28,7 @@ fn trained() -> NetworkFile {
     settings.training.stopping.epochs = 8;
     let mut run = Run::prepare(settings).unwrap();
     while run.step().is_none() {}
-    NetworkFile::from_run(&run).unwrap()
+    NetworkFile::from_run(&run, None).unwrap()
 }
 
 fn place() -> (TempDir, PathBuf) {
@@ -56,7 +56,7 @@ fn a_training_in_progress_can_be_saved() {
     let (_folder, path) = place();
     let mut run = Run::prepare(SimulatedSettings::default()).unwrap();
     for epochs in 0..2 {
-        let file = NetworkFile::from_run(&run).unwrap();
+        let file = NetworkFile::from_run(&run, None).unwrap();
         assert_eq!(
             (file.training.stop_reason, file.training.history.len()),
             (None, epochs + 1)
@@ -76,10 +76,13 @@ fn infinite_errors_of_an_epoch_are_kept_and_infinite_results_are_refused() {
     file.save(&path).unwrap();
     assert_eq!(NetworkFile::load(&path).unwrap(), file);
     let before = fs::read(&path).unwrap();
-    file.errors.worst_mm = f64::NAN;
+    let TestErrors::Nodes(errors) = &mut file.scores.network else {
+        panic!("the targets are nodes")
+    };
+    errors.worst_mm = f64::NAN;
     let error = file.save(&path).unwrap_err();
     assert!(matches!(error, DocumentError::Unsound { .. }));
-    assert!(error.to_string().contains("errors.worst_mm"), "{error}");
+    assert!(error.to_string().contains("scores.network.worst_mm"), "{error}");
     assert_eq!(fs::read(&path).unwrap(), before, "the old file stays");
 }
 
@@ -143,12 +146,12 @@ fn impossible_contents_are_named() {
         (
             "another number of hidden nodes",
             replaced("\"hidden\":5", "\"hidden\":6"),
-            "with 6 hidden nodes",
+            "it has 5 hidden nodes, but the settings need 6",
         ),
         (
             "another array",
             replaced("10×6_3×18", "10×8_4×24"),
-            "reads 18 resistances, but array 10×8_4×24",
+            "problem: it is not that of the array",
         ),
         (
             "no array",
@@ -250,24 +253,24 @@ fn other_files_and_versions_are_named() {
         ),
         (
             "a newer version",
-            replaced("\"version\":3", "\"version\":4"),
-            "install a newer one",
+            replaced("\"version\":4", "\"version\":5"),
+            "has version 5 of the format, written by decoupler 0.1.0",
         ),
         (
             "a newer version with other fields",
             "{\"format\":\"decoupler network\",\"version\":9,\"w\":0}".to_owned(),
             "version 9",
         ),
-        ("no version", replaced("\"version\":3,", ""), "unknown field `crc32`"),
+        ("no version", replaced("\"version\":4,", ""), "has version null"),
         (
             "an impossible version",
-            replaced("\"version\":3", "\"version\":0"),
-            "unknown field `crc32`",
+            replaced("\"version\":4", "\"version\":0"),
+            "has version 0",
         ),
         (
             "an old version",
-            replaced("\"version\":3", "\"version\":2"),
-            "unknown field `crc32`",
+            replaced("\"version\":4", "\"version\":3"),
+            "which reads version 4: open it with the program that wrote it",
         ),
         ("something after the end", format!("{text}x"), "line 2 column 1"),
     ];

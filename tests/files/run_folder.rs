@@ -23,7 +23,7 @@ fn trained(hidden: usize) -> Arc<NetworkFile> {
     settings.training.stopping.epochs = 4;
     let mut run = Run::prepare(settings).unwrap();
     while run.step().is_none() {}
-    Arc::new(NetworkFile::from_run(&run).unwrap())
+    Arc::new(NetworkFile::from_run(&run, None).unwrap())
 }
 
 /// Opens a folder in which nothing is damaged.
@@ -235,46 +235,6 @@ fn other_files_are_left_alone_and_any_number_leaves_room_for_the_next() {
     let again = open(folder.path());
     assert_eq!(again.runs().runs.len(), 3);
     assert_eq!(again.runs().runs[2].id, u64::MAX);
-}
-
-#[test]
-fn the_list_of_earlier_versions_is_taken_over_once_and_stays_as_it_is() {
-    let folder = tempfile::tempdir().unwrap();
-    let (old, path) = (folder.path().join("workspace.json"), folder.path().join("runs"));
-    let fixture = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures/network_version_1.json");
-    let network = fs::read_to_string(fixture).unwrap();
-    let run = |id: u64, name: &str, network: &str| format!(r#"{{"id":{id},"name":"{name}","network":{network}}}"#);
-    let list = |runs: &[String], pinned: &str| {
-        let runs = runs.join(",");
-        format!(
-            r#"{{"format":"decoupler workspace","version":1,"program":"decoupler 0.1.0","runs":[{runs}],"pinned":{pinned}}}"#
-        )
-    };
-    let runs = [run(7, "first", &network), run(u64::MAX, "second", &network)];
-    let text = list(&runs, &format!("[{},null]", u64::MAX));
-    fs::write(&old, &text).unwrap();
-    let mut kept = open(&path);
-    assert_eq!(names(kept.runs()), ["first", "second"]);
-    let [first, second] = [0, 1].map(|index| kept.runs().runs[index].id);
-    assert_eq!(kept.runs().pinned, [Some(second), None]);
-    assert_eq!(fs::read_to_string(&old).unwrap(), text);
-    kept.remove(first).unwrap();
-    assert_eq!(names(open(&path).runs()), ["second"], "only once");
-
-    fs::remove_dir_all(&path).unwrap();
-    let damaged = list(&[run(1, "broken", "{}"), run(2, "whole", &network)], "[1,2]");
-    let cases = [(&text[..text.len() - 9], 0), ("[]", 0), (&damaged, 1)];
-    for (text, runs) in cases {
-        fs::write(&old, text).unwrap();
-        let (kept, problems) = RunFolder::open(&path).unwrap();
-        assert_eq!(kept.runs().runs.len(), runs);
-        assert!(
-            problems.len() == 1 && problems[0].contains("workspace.json"),
-            "{problems:?}"
-        );
-        assert_eq!(fs::read_to_string(&old).unwrap(), text);
-        fs::remove_dir_all(&path).unwrap();
-    }
 }
 
 #[test]

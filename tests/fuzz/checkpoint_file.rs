@@ -14,7 +14,7 @@ fn damage_is_noticed_and_impossible_states_are_refused() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("run.checkpoint");
     for run in trained() {
-        let file = CheckpointFile::from_run(&run).unwrap();
+        let file = CheckpointFile::from_run(&run, None).unwrap();
         file.save(&path).unwrap();
         let valid = fs::read(&path).unwrap();
         for_each_seed(200, |rng| {
@@ -32,7 +32,7 @@ fn damage_is_noticed_and_impossible_states_are_refused() {
                 && let Ok(mut resumed) = read.resume()
             {
                 resumed.step();
-                assert!(resumed.node_scores().is_some());
+                assert!(resumed.scores().is_some());
             }
         });
     }
@@ -42,7 +42,7 @@ fn damage_is_noticed_and_impossible_states_are_refused() {
 fn any_input() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("run.checkpoint");
-    let small = trained().map(|run| run.settings().simulated().unwrap().source);
+    let small = trained().map(|run| run.settings().source);
     replay!(|bytes: &[u8]| {
         for bytes in [Some(bytes.to_vec()), resealed(bytes)].into_iter().flatten() {
             fs::write(&path, bytes).unwrap();
@@ -51,7 +51,7 @@ fn any_input() {
                 Ok(file) if small.contains(&file.settings.source) => {
                     if let Ok(mut resumed) = file.resume() {
                         resumed.step();
-                        assert!(resumed.node_scores().is_some());
+                        assert!(resumed.scores().is_some());
                     }
                 }
                 Ok(_) => {}

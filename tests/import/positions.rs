@@ -139,7 +139,7 @@ fn a_recipe_keeps_the_file_relative_to_its_folder() {
     for name in ["skin.csv", "taxels.csv", "recipe.json"] {
         fs::rename(folder.path().join(name), moved.path().join(name)).unwrap();
     }
-    let loaded = RecipeFile::load(&moved.path().join("recipe.json")).unwrap();
+    let loaded = RecipeFile::load_recording(&moved.path().join("recipe.json")).unwrap();
     let again = loaded
         .recording(Path::new(""), &mut |_| ControlFlow::Continue(()))
         .unwrap();

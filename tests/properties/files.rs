@@ -46,7 +46,7 @@ fn small(epochs: usize) -> SimulatedSettings {
 static TRAINED: LazyLock<NetworkFile> = LazyLock::new(|| {
     let mut run = Run::prepare(small(1)).unwrap();
     while run.step().is_none() {}
-    NetworkFile::from_run(&run).unwrap()
+    NetworkFile::from_run(&run, None).unwrap()
 });
 
 proptest! {
@@ -106,7 +106,7 @@ proptest! {
         }
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("run.checkpoint");
-        CheckpointFile::from_run(&whole).unwrap().save(&path).unwrap();
+        CheckpointFile::from_run(&whole, None).unwrap().save(&path).unwrap();
         let mut read = CheckpointFile::load(&path).unwrap().resume().unwrap();
         prop_assert_eq!(read.states(), whole.states());
         for _ in 0..after {

@@ -93,17 +93,18 @@ fn judge_decoder(seen: &Measured, settings: &SimulatedSettings, kind: DecoderKin
         Ok(report) => report.expect("there is such a decoder"),
         Err(error) => return refused(&error),
     };
+    let errors = *report.errors.nodes().expect("the targets are nodes");
     let found = z_mm(test, &answers);
     let times = found / seen.mean_mm;
     let remark = remark(&report, times, seen.flaw.as_ref(), seen.outlook.as_ref());
     let or_flagged = |what: String| remark.as_ref().map_or_else(|| wrong(what), flagged);
-    if !found.is_finite() || !report.errors.z_mm.is_finite() {
+    if !found.is_finite() || !errors.z_mm.is_finite() {
         return or_flagged(format!("{kind}: the error is {found}, without a reason"));
     }
-    if !agree(found, report.errors.z_mm, 1e-9) {
+    if !agree(found, errors.z_mm, 1e-9) {
         return wrong(format!(
             "{kind}: the error is {found:e} mm, told is {:e} mm",
-            report.errors.z_mm
+            errors.z_mm
         ));
     }
     if found > by_chance(answers.len() / 3) * seen.mean_mm {
@@ -114,8 +115,8 @@ fn judge_decoder(seen: &Measured, settings: &SimulatedSettings, kind: DecoderKin
     let scene = settings.source.scene;
     let is_exact = kind == DecoderKind::Newton && scene.noise.in_test().is_none() && scene.rows != Rows::All;
     let stroke_mm = settings.source.stroke_mm();
-    if is_exact && report.errors.worst_mm > 1e-4 * stroke_mm {
-        let share = report.errors.worst_mm / stroke_mm;
+    if is_exact && errors.worst_mm > 1e-4 * stroke_mm {
+        let share = errors.worst_mm / stroke_mm;
         return or_flagged(format!(
             "{kind}: a row is off by {share:.1e} of the stroke without noise, and nothing says so"
         ));
@@ -126,7 +127,7 @@ fn judge_decoder(seen: &Measured, settings: &SimulatedSettings, kind: DecoderKin
 /// The reference is no worse than the mean, nobody beats it, and it claims no certainty that nobody has.
 fn judge_reference(seen: &Measured, settings: &SimulatedSettings) -> Verdict {
     let scene = settings.source.scene;
-    let told = seen.run.baselines().and_then(|baselines| baselines.reference);
+    let told = seen.run.baselines().and_then(|baselines| baselines.nodes()?.reference);
     let unseen = seen
         .outlook
         .as_ref()
@@ -179,7 +180,7 @@ fn judge_reference(seen: &Measured, settings: &SimulatedSettings) -> Verdict {
 fn judge_limit(seen: &Measured, settings: &SimulatedSettings) -> Verdict {
     let scene = settings.source.scene;
     let nodes = seen.run.test().samples() * settings.source.sensor.scale.nodes_per_row();
-    let told = seen.run.baselines().and_then(|baselines| baselines.reference);
+    let told = seen.run.baselines().and_then(|baselines| baselines.nodes()?.reference);
     let Some(reference) = told.filter(|_| scene.loading == Loading::RandomNodes && nodes >= 300) else {
         return Verdict::Right;
     };
@@ -187,8 +188,9 @@ fn judge_limit(seen: &Measured, settings: &SimulatedSettings) -> Verdict {
         let Ok(Some(report)) = seen.set.measure(kind, Precision::Double, seen.run.test()) else {
             continue;
         };
-        if report.errors.z_mm < 0.85 * reference.z_mm {
-            let share = report.errors.z_mm / reference.z_mm;
+        let z_mm = report.errors.nodes().map_or(f64::NAN, |errors| errors.z_mm);
+        if z_mm < 0.85 * reference.z_mm {
+            let share = z_mm / reference.z_mm;
             return wrong(format!(
                 "{kind} has {share:.2} times the reference, which calls itself the limit"
             ));

@@ -65,7 +65,7 @@ fn judge_network(damage: Damage, place: f64) -> Verdict {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("network.json");
     let run = trained();
-    let mut file = NetworkFile::from_run(&run).unwrap();
+    let mut file = NetworkFile::from_run(&run, None).unwrap();
     // Places in the file are the same however long it took.
     file.training.seconds = 0.0;
     file.save(&path).unwrap();
@@ -75,7 +75,7 @@ fn judge_network(damage: Damage, place: f64) -> Verdict {
         Ok(read) => {
             if read.network.decouple(run.test()) != run.decouple_test() {
                 wrong("a damaged network is read and answers otherwise")
-            } else if read.settings != small() || read.errors != run.node_scores().unwrap().network {
+            } else if read.settings != small().into() || read.scores.network != run.errors() {
                 wrong("a damaged network is read with other settings or errors")
             } else {
                 Verdict::Right
@@ -92,7 +92,7 @@ fn judge_checkpoint(damage: Damage, place: f64) -> Verdict {
     for _ in 0..4 {
         run.step();
     }
-    CheckpointFile::from_run(&run).unwrap().save(&path).unwrap();
+    CheckpointFile::from_run(&run, None).unwrap().save(&path).unwrap();
     rewrite(&path, damage, place);
     let resumed = match CheckpointFile::load(&path) {
         Err(error) => return refused_in(folder.path(), &error),

@@ -4,7 +4,7 @@ use std::{fs, path::Path, time::Instant};
 
 use decoupler::{
     app::{Effect, Phase},
-    export::{CheckpointFile, MeasuredCheckpointFile},
+    export::CheckpointFile,
     training::StopReason,
 };
 use eframe::egui::{Key, ViewportCommand, ViewportEvent, ViewportId};
@@ -13,7 +13,7 @@ use egui_kittest::kittest::Queryable as _;
 use crate::{
     configuring::choose_method,
     driver::{Driver, PATIENCE},
-    recordings::{cells, opened},
+    recordings::opened,
     training::{endless, start_endless},
 };
 
@@ -172,63 +172,24 @@ fn ask(driver: &mut Driver) {
     assert!(driver.has(QUESTION), "{:#?}", driver.texts());
 }
 
-/// Begins a training on own data that goes on for as long as one looks.
-fn start_endless_on_own_data(driver: &mut Driver) {
-    choose_method(driver, "Momentum, Eq. (11)");
+#[test]
+fn a_training_on_a_recording_is_saved_at_closing() {
+    let (mut driver, _path, folder) = opened(60);
+    choose_method(&mut driver, "Momentum, Eq. (11)");
     driver.limit_epochs("1000000");
     driver.click("▶ Train");
-    driver.wait("an epoch", |driver| !cells(driver).is_empty());
-}
-
-#[test]
-fn two_trainings_are_both_asked_about_and_both_saved() {
-    let (mut driver, _path, folder) = opened(60);
-    start_endless_on_own_data(&mut driver);
-    driver.click_button("Train");
-    start_endless(&mut driver);
+    driver.wait_for_epochs(3);
     ask(&mut driver);
-    assert!(driver.has("Train: Training") && driver.has("Own data: Training"));
-    let savable = driver
-        .harness()
-        .query_all_by_label("can be saved as a checkpoint")
-        .count();
-    assert_eq!(savable, 2);
     driver.click_button(SAVE);
-    let [one, other] = ["one.checkpoint", "other.checkpoint"].map(|name| folder.path().join(name));
-    let mut give = |path: &Path| {
-        driver.harness().run_steps(5);
-        driver.type_into("File", &path.display().to_string());
-        driver.click_button("Save");
-    };
-    give(&one);
-    // Neither takes the file of the other.
-    give(&one);
-    give(&other);
-    wait_for_closing(&mut driver);
-    drop(driver);
-    assert_eq!(CheckpointFile::load(&one).unwrap().settings, endless().into());
-    let file = MeasuredCheckpointFile::load(&other).unwrap();
-    assert_eq!(file.settings.training.stopping.epochs, 1_000_000);
-}
-
-#[test]
-fn a_training_that_ends_leaves_the_other_to_be_saved() {
-    let (mut driver, _path, folder) = opened(60);
-    start_endless_on_own_data(&mut driver);
-    driver.click_button("Train");
-    start_endless(&mut driver);
-    ask(&mut driver);
-    let before = [SAVE, DISCARD, "Stay"].map(|label| driver.get(label).rect());
-    driver.window_mut().apply(Effect::Stop);
-    driver.wait("the end of one", |driver| driver.says("has ended"));
-    assert_eq!([SAVE, DISCARD, "Stay"].map(|label| driver.get(label).rect()), before);
-    driver.click_button(SAVE);
-    driver.harness().run_steps(5);
     let path = folder.path().join("kept.checkpoint");
+    driver.harness().run_steps(5);
     driver.type_into("File", &path.display().to_string());
     driver.click_button("Save");
     wait_for_closing(&mut driver);
-    assert!(MeasuredCheckpointFile::load(&path).is_ok());
+    drop(driver);
+    let file = CheckpointFile::load(&path).unwrap();
+    assert_eq!(file.settings.training.stopping.epochs, 1_000_000);
+    assert!(file.resume().unwrap().leader().latest().epoch >= 3);
 }
 
 #[test]
@@ -257,11 +218,11 @@ fn an_experiment_and_a_trade_off_are_not_ended_unasked() {
 fn a_cross_validation_and_findings_are_not_ended_unasked() {
     let (mut driver, _path, _folder) = opened(160);
     driver.limit_epochs("100000");
-    driver.click("Cross-validation");
+    driver.click_button("Identifiability");
     driver.click_button("Cross-validate");
     ask(&mut driver);
     assert!(
-        driver.has("Own data: Cross-validation") && driver.has("5 folds"),
+        driver.has("Identifiability: Cross-validation") && driver.has("5 folds"),
         "{:#?}",
         driver.texts()
     );
@@ -269,12 +230,10 @@ fn a_cross_validation_and_findings_are_not_ended_unasked() {
     driver.click_button("Stay");
     driver.click("■ Stop");
     driver.settle();
-    driver.click("Findings");
-    driver.settle();
-    driver.click_button("Measure what the readings tell");
+    driver.click_button("Analyse readings");
     ask(&mut driver);
     assert!(
-        driver.has("Own data: Findings") && driver.has("will be discarded"),
+        driver.has("Identifiability: Analysis") && driver.has("will be discarded"),
         "{:#?}",
         driver.texts()
     );

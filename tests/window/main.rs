@@ -3,6 +3,7 @@
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 mod accessibility;
+mod closing;
 mod comparing;
 mod configuring;
 mod continuing;
@@ -18,6 +19,7 @@ mod importing;
 mod live;
 mod looking;
 mod newcomer;
+mod overwriting;
 mod pictures;
 mod pressing;
 mod rasterise;

@@ -2,7 +2,7 @@
 
 use std::{fs, path::Path};
 
-use decoupler::export::{MeasuredNetworkFile, RecipeFile};
+use decoupler::export::{NetworkFile, RecipeFile};
 use eframe::egui::{Event, Key};
 
 use crate::{
@@ -95,14 +95,14 @@ fn a_network_kept_in_the_list_is_not_overwritten() {
     let mut driver = Driver::open_keeping(&folder.path().join("runs"));
     driver.open_recordings(&[&path]);
     driver.limit_epochs("2");
-    driver.train_own_data();
-    let kept = folder.path().join("own-data");
+    driver.train_recording();
+    let kept = folder.path().join("runs");
     driver.wait("the network", |_| kept.is_dir() && !names(&kept).is_empty());
     driver.settle();
     let kept = kept.join(&names(&kept)[0]);
     ask(&mut driver, RECIPE, &kept);
     driver.wait("the refusal", |driver| driver.says("is in use"));
-    assert!(MeasuredNetworkFile::load(&kept).is_ok());
+    assert!(NetworkFile::load(&kept).is_ok());
 }
 
 #[test]

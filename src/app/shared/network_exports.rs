@@ -213,15 +213,21 @@ fn report_task(source: &NetworkSource, decoders: Vec<DecoderReport>) -> FileTask
     };
     source.task(REPORT, "report", move |file, run| {
         let flaw = run.and_then(Run::flaw);
+        let test = run.map(|run| Arc::clone(run.test()));
         let (name, decoders) = (name.clone(), decoders.clone());
         Contents::new(move |path: &Path| {
-            RunReport {
+            let test = match &test {
+                Some(test) => Arc::clone(test),
+                None => file.test_set().map_err(|error| error.to_string())?,
+            };
+            let report = RunReport {
                 name: name.as_deref(),
                 file: &file,
                 flaw: flaw.as_ref(),
                 decoders: &decoders,
-            }
-            .save(path)
+                test: &test,
+            };
+            report.save(path).map_err(|error| error.to_string())
         })
     })
 }

@@ -6,7 +6,6 @@ mod handle;
 mod message;
 mod training_loop;
 
-pub use continuation::{continue_run, furthest_epoch};
 pub use handle::Worker;
 pub use message::{Began, Event, Inspection, Progress, Request, RunId, RunResult, TrainedRun, append_epochs};
 pub use training_loop::LOST;

@@ -1,15 +1,10 @@
-use std::{
-    fs,
-    io::Write,
-    num::NonZero,
-    path::{Path, PathBuf},
-    time::Instant,
-};
+use std::{fs, io::Write, num::NonZero, path::PathBuf, time::Instant};
 
 use clap::Args;
 use serde::Serialize;
 
 use super::{
+    arguments::SweepArguments,
     filling::{Filled, fill},
     job_script::Engine,
     shard::Shard,
@@ -32,7 +27,13 @@ use crate::{
 ///
 ///   {"train": {"array": "10x6_3x18"}, "axes": {"hidden": [6, 8, 10], "seed": [0, 1, 2]}}
 ///
-/// trains nine networks and keeps what train --json prints of each in a file of the folder. Running it again trains only
+/// trains nine networks. A specification of a recording has the options --data, --inputs, --targets, … or --recipe in
+/// "train", with paths relative to its folder, or the recipe itself in "recording". Without a specification the same is given
+/// as arguments, with values separated by commas:
+///
+///   decoupler sweep --data press.csv --inputs c1..c4 --targets fz --hidden 4,8,12 --method lm,br --seeds 3 --out results
+///
+/// It keeps what train --json prints of each trial in a file of the folder. Running it again trains only
 /// what is missing, and any number of programs may fill one folder together. Ctrl-C and SIGTERM save the trainings at
 /// work, which are resumed with bit-identical results. The same trial gives the same bits on machines with the same vector
 /// instructions; on others the last digits may differ.
@@ -42,10 +43,12 @@ pub(in crate::cli) struct Sweep {
     #[arg(
         long,
         value_name = "FILE",
-        required_unless_present = "merge",
+        required_unless_present_any = ["merge", "axes"],
         conflicts_with = "merge"
     )]
     spec: Option<PathBuf>,
+    #[command(flatten)]
+    given: SweepArguments,
     /// Folder for the results, created if missing; with --merge the table, as CSV or JSON by the ending
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
@@ -90,8 +93,13 @@ struct FilledReport {
 impl Sweep {
     pub(in crate::cli) fn run(self) -> Result<(), Failure> {
         match (&self.spec, self.engine) {
-            (None, _) => self.merge(),
-            (Some(specification), None) => self.fill(specification),
+            (None, _) if !self.merge.is_empty() => self.merge(),
+            (None, Some(_)) => {
+                let message = "--engine: jobs need a specification; write one and give it with --spec";
+                Err(Failure::Arguments(message.to_owned()))
+            }
+            (None, None) => self.fill(&self.given.trials()?),
+            (Some(specification), None) => self.fill(&Trials::read(specification)?),
             (Some(specification), Some(engine)) => {
                 let trials = Trials::read(specification)?.count();
                 let jobs = self.jobs.unwrap_or(Engine::MOST_JOBS).min(trials);
@@ -101,15 +109,14 @@ impl Sweep {
         }
     }
 
-    fn fill(&self, specification: &Path) -> Result<(), Failure> {
+    fn fill(&self, trials: &Trials) -> Result<(), Failure> {
         let begun = Instant::now();
-        let trials = Trials::read(specification)?;
         let folder = &self.out;
         fs::create_dir_all(folder).map_err(|source| Failure::MakeFolder {
             path: folder.clone(),
             source,
         })?;
-        trials.plan().save_in(folder)?;
+        trials.save_plan(folder)?;
         let positions: Vec<_> = self.shard.unwrap_or_default().positions(trials.count()).collect();
         let of_shard = positions.len();
         let bar = progress_bar(self.json, of_shard, "{bar:30} {pos} of {len} trials, {elapsed} elapsed");
@@ -118,7 +125,7 @@ impl Sweep {
             .threads
             .and_then(NonZero::new)
             .unwrap_or_else(|| worker_threads(false));
-        let filled = fill(folder, &trials, positions, threads, &bar, &stop);
+        let filled = fill(folder, trials, positions, threads, &bar, &stop);
         bar.finish_and_clear();
         let Filled {
             present,

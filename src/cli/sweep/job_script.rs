@@ -5,7 +5,7 @@ use std::{
 
 use clap::ValueEnum;
 
-use crate::cli::{failure::Failure, shell::quoted};
+use crate::{cli::failure::Failure, export::report::quoted};
 
 /// Programs that distribute jobs over machines.
 #[derive(Clone, Copy, ValueEnum)]

@@ -2,6 +2,7 @@
 //! is named by their hash and written whole or not at all, and whoever trains it holds a lock: so any number of programs,
 //! on any machines that see the folder, may fill it together, end at any moment and be started again.
 
+mod arguments;
 mod claim;
 mod command;
 mod filling;

@@ -8,7 +8,10 @@ use serde::Deserialize;
 use serde_json::Value;
 
 use super::{train_options::TrainOptions, unique_keys::UniqueKeys};
-use crate::cli::specification_error::{MOST_TRIALS, SpecificationError};
+use crate::{
+    cli::specification_error::{MOST_TRIALS, SpecificationError},
+    import::Plan,
+};
 
 /// Largest file of a specification, in bytes.
 const LARGEST_BYTES: u64 = 1 << 24;
@@ -20,6 +23,8 @@ pub(super) struct Specification {
     pub(super) shared: Vec<String>,
     /// Axes in the order of the file.
     pub(super) axes: Vec<Axis>,
+    /// Recording that all trials share; its paths are absolute.
+    pub(super) recording: Option<Plan>,
 }
 
 /// An option and the values that it takes.
@@ -40,6 +45,9 @@ struct Layout {
     #[serde(default)]
     train: UniqueKeys,
     axes: UniqueKeys,
+    /// Recording with paths relative to the folder of the specification.
+    #[serde(default)]
+    recording: Option<Plan>,
 }
 
 impl Specification {
@@ -57,6 +65,7 @@ impl Specification {
             path: path.to_owned(),
             shared: Vec::new(),
             axes: Vec::new(),
+            recording: layout.recording.map(|plan| plan.within(folder(path)).absolute()),
         };
         for (option, value) in &layout.train.0 {
             let words = specification.words(option, value, &format!("train.{option}"), train)?;
@@ -68,6 +77,29 @@ impl Specification {
                 return Err(specification.error(format!("axes.{option}"), message));
             }
             let axis = specification.axis(option, values, train)?;
+            specification.axes.push(axis);
+        }
+        specification.count()?;
+        Ok(specification)
+    }
+
+    /// Specification from the arguments of the terminal: each axis has values separated by commas.
+    pub(super) fn of_arguments(
+        recording: Option<Plan>,
+        shared: Vec<String>,
+        axes: Vec<(&str, &Vec<String>)>,
+        train: &mut TrainOptions,
+    ) -> Result<Self, SpecificationError> {
+        let mut specification = Self {
+            path: PathBuf::from("the arguments"),
+            shared,
+            axes: Vec::new(),
+            recording: recording.map(|plan| plan.absolute()),
+        };
+        for (option, values) in axes {
+            let value = |text: &String| text.parse().map_or_else(|_| Value::from(&**text), Value::Number);
+            let values = values.iter().map(value);
+            let axis = specification.axis(option, &values.collect(), train)?;
             specification.axes.push(axis);
         }
         specification.count()?;
@@ -100,8 +132,18 @@ impl Specification {
         place: &str,
         train: &mut TrainOptions,
     ) -> Result<Vec<String>, SpecificationError> {
+        let value = if TrainOptions::is_path(option) {
+            &located(value, folder(&self.path))
+        } else {
+            value
+        };
         let words = train.words(option, value);
-        let accepted = words.and_then(|words| train.parse(&words).map(|_| words));
+        let accepted = words.and_then(|words| {
+            if train.stands_alone(option) {
+                train.parse(&words)?;
+            }
+            Ok(words)
+        });
         accepted.map_err(|message| self.error(place.to_owned(), message))
     }
 
@@ -133,6 +175,19 @@ impl Specification {
             place,
             message,
         }
+    }
+}
+
+fn folder(path: &Path) -> &Path {
+    path.parent().unwrap_or(Path::new(""))
+}
+
+/// Paths of a value, relative to `folder`.
+fn located(value: &Value, folder: &Path) -> Value {
+    match value {
+        Value::String(path) => Value::from(folder.join(path).to_string_lossy()),
+        Value::Array(values) => values.iter().map(|value| located(value, folder)).collect(),
+        other => other.clone(),
     }
 }
 

@@ -1,19 +1,67 @@
 use clap::{ArgAction, Args, Command, FromArgMatches};
 use serde_json::Value;
 
-use crate::cli::{parse_error::one_line, training_arguments::TrainingArguments};
+use crate::cli::{
+    failure::Failure, import_arguments::ImportArguments, parse_error::one_line, training_arguments::TrainingArguments,
+};
+use crate::{
+    decoupling::DecoderKind,
+    import::{Plan, Setup},
+};
 
 /// Options of `train` that name its files and its output; a sweep has its own.
-const OF_ONE_RUN: [&str; 5] = ["checkpoint", "resume", "checkpoint-interval", "out", "json"];
+const OF_ONE_RUN: [&str; 7] = [
+    "checkpoint",
+    "resume",
+    "checkpoint-interval",
+    "out",
+    "json",
+    "save-recipe",
+    "folds",
+];
+
+/// Options whose values are paths.
+const PATHS: [&str; 6] = ["data", "join", "positions", "recipe", "test-data", "test-join"];
+
+/// Arguments that determine the result of a trial.
+pub(super) struct TrialArguments {
+    pub(super) training: TrainingArguments,
+    import: ImportArguments,
+}
+
+impl TrialArguments {
+    /// Setup of the trial, on samples of `recording` if it is given; paths are absolute.
+    pub(super) fn setup(&self, recording: Option<&Plan>) -> Result<Setup, Failure> {
+        let columns = self.training.scene.columns();
+        let plan = match recording {
+            Some(_) if self.import.is_given() || !columns.is_empty() => {
+                let message = "the specification has a recording; leave --data, --recipe and --inputs out";
+                return Err(Failure::Arguments(message.to_owned()));
+            }
+            Some(recording) => Some(self.import.divided(recording.clone())?),
+            None => self.import.given(columns)?,
+        };
+        let holds_out =
+            self.import.holds_out() || recording.is_some_and(|plan| plan.division.validation_fraction > 0.0);
+        self.training.setup(plan.map(|plan| plan.absolute()), holds_out)
+    }
+
+    /// Decoders to measure: those given, by default all of a simulated array and none of a recording.
+    pub(super) fn decoders(&self, setup: &Setup) -> Vec<DecoderKind> {
+        match setup.plan() {
+            None => self.training.scene.decoders(),
+            Some(_) => self.training.scene.decoder.clone(),
+        }
+    }
+}
 
 /// The parser of the options of `train` that determine its result.
 pub(super) struct TrainOptions(Command);
 
 impl TrainOptions {
     pub(super) fn new() -> Self {
-        Self(TrainingArguments::augment_args(
-            Command::new("train").disable_help_flag(true),
-        ))
+        let command = Command::new("train").disable_help_flag(true);
+        Self(ImportArguments::augment_args(TrainingArguments::augment_args(command)))
     }
 
     /// Writes an option with the value from a specification as arguments of the terminal. Each is one word, so that no
@@ -23,6 +71,9 @@ impl TrainOptions {
     /// A message about an unknown option, or a value that is neither a number, a text nor a list of them.
     pub(super) fn words(&self, option: &str, value: &Value) -> Result<Vec<String>, String> {
         let mut arguments = self.0.get_arguments();
+        if OF_ONE_RUN.contains(&option) {
+            return Err("a sweep keeps its results and checkpoints itself; leave this option out".to_owned());
+        }
         let Some(argument) = arguments.find(|argument| argument.get_long() == Some(option)) else {
             return Err(self.unknown(option));
         };
@@ -48,31 +99,44 @@ impl TrainOptions {
     }
 
     fn unknown(&self, option: &str) -> String {
-        if OF_ONE_RUN.contains(&option) {
-            return "a sweep keeps its results and checkpoints itself; leave this option out".to_owned();
-        }
         let names: Vec<_> = self
             .0
             .get_arguments()
             .filter_map(|argument| argument.get_long())
+            .filter(|name| !OF_ONE_RUN.contains(name))
             .collect();
         format!("train has no such option; it has {}", names.join(", "))
+    }
+
+    /// Returns `true` if the option can be understood without others.
+    pub(super) fn stands_alone(&self, option: &str) -> bool {
+        let of_import = ImportArguments::augment_args(Command::new("import"));
+        let is_division = ["split", "test-fraction", "validation-fraction"].contains(&option);
+        let mut names = of_import.get_arguments().filter_map(|argument| argument.get_long());
+        is_division || !names.any(|name| name == option)
+    }
+
+    /// Returns `true` if the values of the option are paths.
+    pub(super) fn is_path(option: &str) -> bool {
+        PATHS.contains(&option)
     }
 
     /// Parses arguments of [`Self::words`] as `train` does.
     ///
     /// # Errors
     /// The message of `train` in one line.
-    pub(super) fn parse<'a>(
-        &mut self,
-        words: impl IntoIterator<Item = &'a String>,
-    ) -> Result<TrainingArguments, String> {
+    pub(super) fn parse<'a>(&mut self, words: impl IntoIterator<Item = &'a String>) -> Result<TrialArguments, String> {
         let line = std::iter::once("train").chain(words.into_iter().map(String::as_str));
         let mut matches = self
             .0
             .try_get_matches_from_mut(line)
             .map_err(|error| one_line(&error))?;
-        TrainingArguments::from_arg_matches_mut(&mut matches).map_err(|error| one_line(&error))
+        let training = TrainingArguments::from_arg_matches_mut(&mut matches);
+        let import = ImportArguments::from_arg_matches_mut(&mut matches);
+        Ok(TrialArguments {
+            training: training.map_err(|error| one_line(&error))?,
+            import: import.map_err(|error| one_line(&error))?,
+        })
     }
 }
 
@@ -88,7 +152,7 @@ mod tests {
             _ => train.words(option, value).unwrap(),
         });
         let words: Vec<String> = words.collect();
-        train.parse(&words).unwrap()
+        train.parse(&words).unwrap().training
     }
 
     /// Every option of `train`, so that none can be forgotten here when `train` has a new one.
@@ -123,25 +187,25 @@ mod tests {
         ];
         let mut train = TrainOptions::new();
         let defaults = {
-            let arguments = train.parse(&[]).unwrap();
-            train_options(&arguments.settings().unwrap(), &arguments.scene.decoders())
+            let arguments = train.parse(&[]).unwrap().training;
+            train_options(&arguments.settings().unwrap().into(), &arguments.scene.decoders())
         };
         for (option, value, with) in cases {
             let words: Vec<_> = [format!("--{option}={value}"), with.to_owned()].into();
             let words: Vec<_> = words.into_iter().filter(|word| !word.is_empty()).collect();
-            let arguments = train.parse(&words).unwrap();
+            let arguments = train.parse(&words).unwrap().training;
             let (settings, decoders) = (
                 arguments.settings().unwrap(),
                 decoders_in_order(&arguments.scene.decoders()),
             );
-            let options = train_options(&settings, &decoders);
+            let options = train_options(&settings.into(), &decoders);
             assert_ne!(options, defaults, "{option}");
             let back = read_back(&options);
             assert_eq!(back.settings().unwrap(), settings, "{option}");
             assert_eq!(decoders_in_order(&back.scene.decoders()), decoders, "{option}");
         }
-        let offered: Vec<_> = train
-            .0
+        let training = TrainingArguments::augment_args(Command::new("train"));
+        let offered: Vec<_> = training
             .get_arguments()
             .filter_map(|argument| argument.get_long())
             .collect();

@@ -1,4 +1,9 @@
-use std::time::{Duration, Instant};
+use std::{
+    path::Path,
+    time::{Duration, Instant},
+};
+
+use serde_json::Value;
 
 use super::{claim::Claim, trials::PlannedTrial};
 use crate::{
@@ -7,7 +12,7 @@ use crate::{
     },
     evaluation::{Run, Workload},
     export::{CheckpointFile, NetworkFile, Trial},
-    import::{Setup, SetupSets},
+    import::SetupSets,
 };
 
 /// Time between two checkpoints of a trial: what a killed program loses at most.
@@ -22,18 +27,28 @@ pub(super) fn train(
     is_stopped: impl Fn() -> bool,
 ) -> Result<Option<Trial>, Failure> {
     let begun = Instant::now();
-    let mut workload = Workload::of(&trial.settings)?;
-    workload.bytes = workload.bytes.saturating_mul(beside as u64);
-    workload.check_memory()?;
+    if let Some(settings) = trial.setup.simulated() {
+        let mut workload = Workload::of(&settings)?;
+        workload.bytes = workload.bytes.saturating_mul(beside as u64);
+        workload.check_memory()?;
+    }
     let (mut run, sets, before) = match resumed(trial, claim) {
         Some(resumed) => resumed,
         None => {
-            let setup = Setup::from(trial.settings);
-            let sets = sets(&setup, true)?;
-            let run = sets.run(&setup, &|| false)?.expect("nothing cancels it");
+            let sets = sets(&trial.setup, true)?;
+            let run = sets.run(&trial.setup, &|| false)?.expect("nothing cancels it");
             (run, sets, Duration::ZERO)
         }
     };
+    let files = sets.recorded().map_or(&[][..], |recorded| &recorded.files);
+    let mut read = files.iter().zip(&trial.crc32);
+    if let Some((changed, _)) = read.find(|(read, planned)| read.crc32 != **planned) {
+        let message = format!(
+            "'{}' has changed since the sweep began; begin it again",
+            changed.path.display()
+        );
+        return Err(Failure::Arguments(message));
+    }
     let mut checkpointing = Checkpointing::every(CHECKPOINT_INTERVAL, claim.checkpoint(), sets.recorded());
     while run.stop_reason().is_none() {
         if is_stopped() {
@@ -53,16 +68,34 @@ pub(super) fn train(
         decoders: &decoders,
         optimism: &[],
     };
-    let report = serde_json::to_value(trained.report()?).expect("a report has only text keys");
+    let mut report = serde_json::to_value(trained.report()?).expect("a report has only text keys");
+    if sets.recorded().is_some() {
+        make_comparable(&mut report);
+    }
     let seconds = (before + begun.elapsed()).as_secs_f64();
     Ok(Some(Trial::new(trial.options.clone(), report, seconds)))
+}
+
+/// Makes reports on a recording the same on all machines: times are named apart, and files have names but no folders.
+fn make_comparable(report: &mut Value) {
+    let Value::Object(fields) = report else { return };
+    if let Some(seconds) = fields.remove("seconds") {
+        fields.insert("training_seconds".to_owned(), seconds);
+    }
+    let files = fields.get_mut("files").and_then(Value::as_array_mut);
+    for path in files.into_iter().flatten().filter_map(|file| file.get_mut("path")) {
+        let name = path.as_str().and_then(|path| Path::new(path).file_name());
+        if let Some(name) = name.map(|name| Value::from(name.to_string_lossy())) {
+            *path = name;
+        }
+    }
 }
 
 /// The run saved in the checkpoint of `claim`, with the time that it had taken. A checkpoint that is damaged or does not
 /// belong to the trial is no worse than none.
 fn resumed(trial: &PlannedTrial, claim: &Claim) -> Option<(Run, SetupSets, Duration)> {
     let file = CheckpointFile::load(&claim.checkpoint()).ok()?;
-    if file.settings != trial.settings.into() {
+    if file.settings != *trial.setup.settings() {
         return None;
     }
     let before = file.wall_time.unwrap_or_default();

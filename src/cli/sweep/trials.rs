@@ -1,23 +1,35 @@
-use std::{collections::HashMap, path::Path};
+use std::{
+    collections::HashMap,
+    path::{Path, PathBuf},
+    sync::{Mutex, PoisonError},
+};
 
 use super::{specification::Specification, train_options::TrainOptions};
 use crate::{
-    cli::{failure::Failure, specification_error::SpecificationError, training_arguments::TrainingArguments},
+    cli::{failure::Failure, specification_error::SpecificationError},
     decoupling::DecoderKind,
-    evaluation::{SimulatedSettings, Workload},
-    export::{PlanAxis, SweepPlan, Trial, TrialId, TrialOptions, decoders_in_order, train_options},
+    evaluation::Workload,
+    export::{
+        PlanAxis, SweepPlan, Trial, TrialId, TrialOptions, WriteError, decoders_in_order, recording_options,
+        train_options,
+    },
+    import::{FileChecksum, ImportError, Plan, Setup, file_crc32, stored},
 };
 
 /// All trials of a specification, each of which `train` accepts and none of which is there twice.
 pub(super) struct Trials {
     specification: Specification,
     plan: SweepPlan,
+    /// CRC-32 of the files of recordings, as hexadecimal digits.
+    checksums: Mutex<HashMap<PathBuf, String>>,
 }
 
 /// A trial to be trained.
 pub(super) struct PlannedTrial {
     pub(super) id: TrialId,
-    pub(super) settings: SimulatedSettings,
+    pub(super) setup: Setup,
+    /// CRC-32 of the files of the recording, in the order of the plan.
+    pub(super) crc32: Vec<String>,
     pub(super) decoders: Vec<DecoderKind>,
     pub(super) options: TrialOptions,
 }
@@ -27,6 +39,11 @@ impl Trials {
     pub(super) fn read(path: &Path) -> Result<Self, SpecificationError> {
         let mut train = TrainOptions::new();
         let specification = Specification::read(path, &mut train)?;
+        Self::of(specification, &mut train)
+    }
+
+    /// Plans the trials of `specification`.
+    pub(super) fn of(specification: Specification, train: &mut TrainOptions) -> Result<Self, SpecificationError> {
         let axes = specification.axes.iter().map(|axis| PlanAxis {
             option: axis.option.clone(),
             values: axis.values.iter().map(|value| value.value.clone()).collect(),
@@ -35,12 +52,14 @@ impl Trials {
             plan: SweepPlan {
                 axes: axes.collect(),
                 trials: Vec::new(),
+                recordings: Vec::new(),
             },
+            checksums: Mutex::default(),
             specification,
         };
         let mut positions = HashMap::new();
         for position in 0..trials.specification.count()? {
-            let trial = trials.parsed(position, &mut train);
+            let trial = trials.parsed(position, train);
             let trial = trial.map_err(|failure| trials.error(position, failure.to_string()))?;
             if let Some(first) = positions.insert(trial.id, position) {
                 let first = trials.describe(first);
@@ -54,18 +73,60 @@ impl Trials {
 
     fn parsed(&self, position: usize, train: &mut TrainOptions) -> Result<PlannedTrial, Failure> {
         let words = self.specification.words_at(position);
-        let arguments: TrainingArguments = train.parse(words).map_err(Failure::Arguments)?;
-        let settings = arguments.settings()?;
-        // The array has the rows of the scene.
-        Workload::of(&settings)?;
-        let decoders = decoders_in_order(&arguments.scene.decoders());
-        let options = train_options(&settings, &decoders);
+        let arguments = train.parse(words).map_err(Failure::Arguments)?;
+        let setup = arguments.setup(self.specification.recording.as_ref())?;
+        if let Some(settings) = setup.simulated() {
+            // The array has the rows of the scene.
+            Workload::of(&settings)?;
+        }
+        let decoders = decoders_in_order(&arguments.decoders(&setup));
+        let mut options = train_options(setup.settings(), &decoders);
+        let crc32 = setup.plan().map_or(Ok(Vec::new()), |plan| self.crc32(plan))?;
+        options.extend(
+            setup
+                .plan()
+                .map(|plan| recording_options(plan, &crc32))
+                .unwrap_or_default(),
+        );
         Ok(PlannedTrial {
             id: Trial::id_of(&options),
-            settings,
+            setup,
+            crc32,
             decoders,
             options,
         })
+    }
+
+    /// Checksums of the files of `plan`, each read once.
+    fn crc32(&self, plan: &Plan) -> Result<Vec<String>, ImportError> {
+        let mut checksums = self.checksums.lock().unwrap_or_else(PoisonError::into_inner);
+        let of_file = |path: &PathBuf| match checksums.get(path) {
+            Some(crc32) => Ok(crc32.clone()),
+            None => {
+                let crc32 = file_crc32(path).map_err(|source| ImportError::Read {
+                    path: path.clone(),
+                    source,
+                })?;
+                checksums.insert(path.clone(), crc32.clone());
+                Ok(crc32)
+            }
+        };
+        plan.files().map(of_file).collect()
+    }
+
+    /// Writes the plan of the sweep to `folder`.
+    pub(super) fn save_plan(&self, folder: &Path) -> Result<(), WriteError> {
+        let checksums = self.checksums.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut recordings = Vec::from_iter(checksums.iter().map(|(path, crc32)| FileChecksum {
+            path: stored(path, folder),
+            crc32: crc32.clone(),
+        }));
+        recordings.sort_by(|one, other| one.path.cmp(&other.path));
+        let plan = SweepPlan {
+            recordings,
+            ..self.plan.clone()
+        };
+        plan.save_in(folder)
     }
 
     /// The trial at `position`.
@@ -99,7 +160,10 @@ mod tests {
     use super::*;
     use crate::{
         dataset::Seed,
-        evaluation::experiments::{Axis, Experiment, PaperTable},
+        evaluation::{
+            RunSettings,
+            experiments::{Axis, Experiment, PaperTable},
+        },
         export::sweep_specification,
         scene::Noise,
         training::Method,
@@ -109,8 +173,10 @@ mod tests {
     #[test]
     fn an_experiment_of_the_window_is_specified_trial_by_trial() {
         let mut template = PaperTable::HiddenNodes.experiment();
-        template.base.source.scene.noise = Noise::relative(1e-3);
-        template.base.seed = Seed(7);
+        let mut base = template.base.simulated().unwrap();
+        base.source.scene.noise = Noise::relative(1e-3);
+        base.seed = Seed(7);
+        template.base = base.into();
         let experiments = [
             (Axis::Hidden(vec![3, 5]), Some(Axis::Samples(vec![40, 60]))),
             (
@@ -129,22 +195,21 @@ mod tests {
             };
             let folder = tempfile::tempdir().unwrap();
             let path = folder.path().join("sweep.json");
-            fs::write(&path, sweep_specification(&experiment).unwrap().to_string()).unwrap();
+            fs::write(&path, sweep_specification(&experiment, None).unwrap().to_string()).unwrap();
             let trials = Trials::read(&path).unwrap();
             let mut train = TrainOptions::new();
-            let specified = (0..trials.count()).map(|position| trials.get(position, &mut train).unwrap().settings);
+            let specified = (0..trials.count()).map(|position| trials.get(position, &mut train).unwrap().setup);
             let specified: Vec<_> = specified.collect();
             let run: Vec<_> = experiment
                 .cells()
                 .into_iter()
                 .flat_map(|cell| {
                     let seeds = experiment.seeds_of(&cell.settings);
-                    seeds.map(move |seed| SimulatedSettings { seed, ..cell.settings })
+                    seeds.map(move |seed| Setup::of(RunSettings { seed, ..cell.settings }, None).unwrap())
                 })
                 .collect();
-            let texts = |settings: &[SimulatedSettings]| -> BTreeSet<String> {
-                settings.iter().map(|settings| format!("{settings:?}")).collect()
-            };
+            let texts =
+                |setups: &[Setup]| -> BTreeSet<String> { setups.iter().map(|setup| format!("{setup:?}")).collect() };
             assert_eq!(specified.len(), run.len());
             assert_eq!(texts(&specified), texts(&run), "{:?}", experiment.axis);
         }
@@ -152,11 +217,13 @@ mod tests {
 
     #[test]
     fn experiments_that_the_terminal_cannot_sweep_say_why() {
-        let folds = sweep_specification(&PaperTable::CrossValidation.experiment());
+        let folds = sweep_specification(&PaperTable::CrossValidation.experiment(), None);
         assert!(folds.unwrap_err().to_string().contains("no cross-validation"));
         let mut squeezed = PaperTable::HiddenNodes.experiment();
-        squeezed.base.source.scene.largest_compression = 0.3;
-        let message = sweep_specification(&squeezed).unwrap_err().to_string();
+        let mut base = squeezed.base.simulated().unwrap();
+        base.source.scene.largest_compression = 0.3;
+        squeezed.base = base.into();
+        let message = sweep_specification(&squeezed, None).unwrap_err().to_string();
         assert!(message.contains("the largest compression"), "{message}");
     }
 }

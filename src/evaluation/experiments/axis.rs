@@ -1,8 +1,13 @@
-use std::mem::discriminant;
-
 use serde::{Deserialize, Serialize};
 
-use crate::{dataset::Seed, evaluation::SimulatedSettings, sensor::ArrayScale, training::Method};
+use super::Cell;
+use crate::{
+    dataset::{Seed, SplitBy},
+    evaluation::{Simulation, Source},
+    network::{Quantity, ScalingChoice},
+    sensor::ArrayScale,
+    training::Method,
+};
 
 /// A setting that an experiment varies, with its values.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -14,33 +19,128 @@ pub enum Axis {
     Array(Vec<ArrayScale>),
     /// Numbers of training samples; in a cross-validation, of all samples.
     Samples(Vec<usize>),
+    /// Relative noise of the resistances.
+    Noise(Vec<f64>),
+    /// Quantities computed from the resistances.
+    Inputs(Vec<Quantity>),
+    /// Scalings of the inputs.
+    Scaling(Vec<ScalingChoice>),
     /// Training methods with their settings.
     Method(Vec<Method>),
     /// Largest numbers of epochs.
     Epochs(Vec<usize>),
+    /// Numbers of starts.
+    Starts(Vec<usize>),
+    /// Rules by which a recording is divided.
+    Split(Vec<SplitBy>),
     /// Seeds of the run.
     Seed(Vec<Seed>),
 }
 
+/// Setting that an axis varies.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum AxisKind {
+    /// Number of hidden nodes.
+    Hidden,
+    /// Array scale.
+    Array,
+    /// Number of training samples.
+    Samples,
+    /// Relative noise of the resistances.
+    Noise,
+    /// Quantity computed from the resistances.
+    Inputs,
+    /// Scaling of the inputs.
+    Scaling,
+    /// Training method.
+    Method,
+    /// Largest number of epochs.
+    Epochs,
+    /// Number of starts.
+    Starts,
+    /// Rule by which a recording is divided.
+    Split,
+    /// Seed.
+    Seed,
+}
+
+impl AxisKind {
+    /// All settings, in the order offered.
+    pub const ALL: [Self; 11] = [
+        Self::Hidden,
+        Self::Array,
+        Self::Samples,
+        Self::Noise,
+        Self::Inputs,
+        Self::Scaling,
+        Self::Method,
+        Self::Epochs,
+        Self::Starts,
+        Self::Split,
+        Self::Seed,
+    ];
+
+    /// Returns the settings that runs on `source` have, in the order offered.
+    pub fn of_source(source: &Source) -> impl Iterator<Item = Self> + use<> {
+        let is_simulated = source.simulation().is_some();
+        Self::ALL.into_iter().filter(move |kind| match kind {
+            Self::Array | Self::Samples | Self::Noise | Self::Inputs => is_simulated,
+            Self::Split => !is_simulated,
+            Self::Hidden | Self::Scaling | Self::Method | Self::Epochs | Self::Starts | Self::Seed => true,
+        })
+    }
+
+    /// Name of the setting.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Hidden => "hidden nodes",
+            Self::Array => "array",
+            Self::Samples => "samples",
+            Self::Noise => "noise",
+            Self::Inputs => "inputs",
+            Self::Scaling => "scaling",
+            Self::Method => "method",
+            Self::Epochs => "epochs",
+            Self::Starts => "starts",
+            Self::Split => "split",
+            Self::Seed => "seed",
+        }
+    }
+}
+
 impl Axis {
+    /// Setting that it varies.
+    pub fn kind(&self) -> AxisKind {
+        match self {
+            Self::Hidden(_) => AxisKind::Hidden,
+            Self::Array(_) => AxisKind::Array,
+            Self::Samples(_) => AxisKind::Samples,
+            Self::Noise(_) => AxisKind::Noise,
+            Self::Inputs(_) => AxisKind::Inputs,
+            Self::Scaling(_) => AxisKind::Scaling,
+            Self::Method(_) => AxisKind::Method,
+            Self::Epochs(_) => AxisKind::Epochs,
+            Self::Starts(_) => AxisKind::Starts,
+            Self::Split(_) => AxisKind::Split,
+            Self::Seed(_) => AxisKind::Seed,
+        }
+    }
+
     /// Returns the name of the setting.
     pub fn name(&self) -> &'static str {
-        match self {
-            Self::Hidden(_) => "hidden nodes",
-            Self::Array(_) => "array",
-            Self::Samples(_) => "samples",
-            Self::Method(_) => "method",
-            Self::Epochs(_) => "epochs",
-            Self::Seed(_) => "seed",
-        }
+        self.kind().name()
     }
 
     /// Number of values.
     pub fn len(&self) -> usize {
         match self {
-            Self::Hidden(values) | Self::Samples(values) | Self::Epochs(values) => values.len(),
+            Self::Hidden(values) | Self::Samples(values) | Self::Epochs(values) | Self::Starts(values) => values.len(),
             Self::Array(values) => values.len(),
+            Self::Noise(values) => values.len(),
+            Self::Inputs(values) => values.len(),
+            Self::Scaling(values) => values.len(),
             Self::Method(values) => values.len(),
+            Self::Split(values) => values.len(),
             Self::Seed(values) => values.len(),
         }
     }
@@ -50,35 +150,62 @@ impl Axis {
         self.len() == 0
     }
 
-    /// Returns `true` if both vary the same setting.
-    pub(super) fn is_same_kind(&self, other: &Self) -> bool {
-        discriminant(self) == discriminant(other)
-    }
-
     /// Returns value `index` as text.
     ///
     /// # Panics
     /// If `index` is out of range.
     pub fn label(&self, index: usize) -> String {
         match self {
-            Self::Hidden(values) | Self::Samples(values) | Self::Epochs(values) => values[index].to_string(),
+            Self::Hidden(values) | Self::Samples(values) | Self::Epochs(values) | Self::Starts(values) => {
+                values[index].to_string()
+            }
             Self::Array(values) => values[index].to_string(),
+            Self::Noise(values) => values[index].to_string(),
+            Self::Inputs(values) => values[index].to_string(),
+            Self::Scaling(values) => values[index].to_string(),
             Self::Method(values) => values[index].short_name().to_owned(),
+            Self::Split(values) => values[index].to_string(),
             Self::Seed(values) => values[index].to_string(),
         }
     }
 
-    /// Writes value `index` to `settings`.
+    /// Writes value `index` to `cell`. A share for validation that follows from the method follows from the new one.
     ///
     /// # Panics
     /// If `index` is out of range.
-    pub fn apply(&self, index: usize, settings: &mut SimulatedSettings) {
+    pub(super) fn apply(&self, index: usize, cell: &mut Cell) {
+        let Cell { settings, division, .. } = cell;
+        let simulate = |source: &mut Source, change: &dyn Fn(&mut Simulation)| {
+            if let Source::Simulated(simulation) = source {
+                change(simulation);
+            }
+        };
         match self {
             Self::Hidden(values) => settings.hidden = values[index],
-            Self::Array(values) => settings.source.sensor.scale = values[index],
-            Self::Samples(values) => settings.source.samples = values[index],
-            Self::Method(values) => settings.training.method = values[index],
+            Self::Array(values) => simulate(&mut settings.source, &|source| source.sensor.scale = values[index]),
+            Self::Samples(values) => simulate(&mut settings.source, &|source| source.samples = values[index]),
+            Self::Noise(values) => simulate(&mut settings.source, &|source| {
+                source.scene.noise.relative = values[index];
+            }),
+            Self::Inputs(values) => settings.inputs.quantity = values[index],
+            Self::Scaling(values) => settings.inputs.scaling = values[index],
+            Self::Method(values) => {
+                let usual = settings.validation_fraction();
+                settings.training.method = values[index];
+                if let Some(division) = division
+                    .as_mut()
+                    .filter(|division| division.validation_fraction == usual)
+                {
+                    division.validation_fraction = settings.validation_fraction();
+                }
+            }
             Self::Epochs(values) => settings.training.stopping.epochs = values[index],
+            Self::Starts(values) => settings.starts = values[index],
+            Self::Split(values) => {
+                if let Some(division) = division {
+                    division.by = values[index];
+                }
+            }
             Self::Seed(values) => settings.seed = values[index],
         }
     }

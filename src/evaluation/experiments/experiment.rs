@@ -1,10 +1,10 @@
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-use super::Axis;
+use super::{Axis, AxisKind};
 use crate::{
-    dataset::{FoldUnit, FoldsError, Seed},
-    evaluation::{CountError, CrossValidation, PublishedErrors, SimulatedSettings},
+    dataset::{Division, DivisionError, FoldUnit, FoldsError, Seed, SplitBy},
+    evaluation::{CountError, CrossValidation, PublishedErrors, RunSettings, SimulatedSettings, Source},
     scene::SceneError,
     sensor::ArrayScale,
     training::{SettingError, StoppingRules},
@@ -15,7 +15,9 @@ use crate::{
 #[serde(deny_unknown_fields)]
 pub struct Experiment {
     /// Settings shared by all cells; their seed is the first of [`Self::seeds`].
-    pub base: SimulatedSettings,
+    pub base: RunSettings,
+    /// Recording that is divided; `None` for a simulated array.
+    pub recording: Option<ExperimentRecording>,
     /// First varied setting.
     pub axis: Axis,
     /// Second varied setting, if there is one.
@@ -26,6 +28,20 @@ pub struct Experiment {
     pub cross_validation: Option<CrossValidation>,
 }
 
+/// Recording of an experiment.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ExperimentRecording {
+    /// Name in titles.
+    pub name: String,
+    /// `true` if a column assigns its samples to groups.
+    pub has_groups: bool,
+    /// `true` if the test samples have files of their own.
+    pub has_test_files: bool,
+    /// Division of its samples, where no axis varies it.
+    pub division: Division,
+}
+
 /// A cell of the grid.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Cell {
@@ -34,7 +50,9 @@ pub struct Cell {
     /// Index of its value on the second axis; 0 if there is none.
     pub row: usize,
     /// Settings of the cell, with the first seed.
-    pub settings: SimulatedSettings,
+    pub settings: RunSettings,
+    /// Division of the recording, if the samples are recorded.
+    pub division: Option<Division>,
     /// Errors that the paper reports for the cell, if there are any.
     pub published: Option<PublishedErrors>,
 }
@@ -61,6 +79,26 @@ pub enum ExperimentError {
     /// The folds cannot be filled.
     #[error(transparent)]
     Folds(#[from] FoldsError),
+    /// Runs on such a source have no such setting.
+    #[error("{of} have no setting '{axis}': vary another one")]
+    NoSetting {
+        /// Name of the setting.
+        axis: &'static str,
+        /// Source of the samples.
+        of: &'static str,
+    },
+    /// The settings are those of another source than the samples.
+    #[error("settings and samples are not of one source: one is simulated and one recorded")]
+    OtherSamples,
+    /// A recording cannot be divided so.
+    #[error(transparent)]
+    Division(#[from] DivisionError),
+    /// A recording without groups is divided by group.
+    #[error("split group: the recording has no column of groups; choose one, or leave this split out")]
+    NoGroups,
+    /// A recording is cross-validated.
+    #[error("a recording is divided for each seed: give seeds instead of a cross-validation")]
+    CrossValidation,
     /// There are too many trainings.
     #[error("{0} trainings: give fewer values, seeds or repeats, so that there are at most {MOST_TRAININGS}")]
     TooMany(usize),
@@ -84,23 +122,28 @@ impl Experiment {
     }
 
     fn cell(&self, row: usize, column: usize) -> Cell {
-        let mut settings = self.base;
-        self.axis.apply(column, &mut settings);
+        let mut cell = Cell {
+            column,
+            row,
+            settings: self.base,
+            division: self.recording.as_ref().map(|recording| recording.division),
+            published: None,
+        };
+        self.axis.apply(column, &mut cell);
         if let Some(axis) = &self.second_axis {
-            axis.apply(row, &mut settings);
+            axis.apply(row, &mut cell);
         }
+        cell.published = self.published(&cell.settings);
+        cell
+    }
+
+    fn published(&self, settings: &RunSettings) -> Option<PublishedErrors> {
+        let settings = settings.simulated().filter(SimulatedSettings::is_papers_scene)?;
         let published = match self.cross_validation {
             None => PublishedErrors::of,
             Some(_) => PublishedErrors::of_cross_validation,
         };
-        let published = published(settings.source.sensor.scale, settings.hidden, settings.source.samples);
-        let published = published.filter(|_| settings.is_papers_scene());
-        Cell {
-            column,
-            row,
-            settings,
-            published,
-        }
+        published(settings.source.sensor.scale, settings.hidden, settings.source.samples)
     }
 
     /// Returns the axes, one or two.
@@ -109,7 +152,7 @@ impl Experiment {
     }
 
     /// Returns the seeds of the cell with these settings.
-    pub(crate) fn seeds_of(&self, settings: &SimulatedSettings) -> impl Iterator<Item = Seed> + use<> {
+    pub(crate) fn seeds_of(&self, settings: &RunSettings) -> impl Iterator<Item = Seed> + use<> {
         let seeds = if self.axes().any(|axis| matches!(axis, Axis::Seed(_))) {
             1
         } else {
@@ -142,7 +185,7 @@ impl Experiment {
         if self
             .second_axis
             .as_ref()
-            .is_some_and(|second| second.is_same_kind(&self.axis))
+            .is_some_and(|second| second.kind() == self.axis.kind())
         {
             return Err(ExperimentError::SameAxes(self.axis.name()));
         }
@@ -160,15 +203,32 @@ impl Experiment {
         if trainings > MOST_TRAININGS {
             return Err(ExperimentError::TooMany(trainings));
         }
-        for cell in self.cells() {
-            self.check_cell(&cell.settings)?;
+        self.check_source()?;
+        self.cells().iter().try_for_each(|cell| self.check_cell(cell))
+    }
+
+    /// Checks that source and axes belong together.
+    fn check_source(&self) -> Result<(), ExperimentError> {
+        let of = match (self.base.source, &self.recording) {
+            (Source::Simulated(_), None) => "simulated arrays",
+            (Source::Measured(_), Some(_)) => "recordings",
+            _ => return Err(ExperimentError::OtherSamples),
+        };
+        for axis in self.axes() {
+            if !AxisKind::of_source(&self.base.source).any(|kind| kind == axis.kind()) {
+                return Err(ExperimentError::NoSetting { axis: axis.name(), of });
+            }
         }
         Ok(())
     }
 
-    fn check_cell(&self, settings: &SimulatedSettings) -> Result<(), ExperimentError> {
+    fn check_cell(&self, cell: &Cell) -> Result<(), ExperimentError> {
+        cell.settings.training.check()?;
+        let Some(settings) = cell.settings.simulated() else {
+            return self.check_recorded_cell(cell);
+        };
         settings.check_counts()?;
-        settings.training.check()?;
+        settings.source.scene.check()?;
         let Some(CrossValidation { folds, unit, .. }) = self.cross_validation else {
             return Ok(());
         };
@@ -184,6 +244,20 @@ impl Experiment {
             let unit = unit.name();
             Err(FoldsError { folds, units, unit }.into())
         }
+    }
+
+    fn check_recorded_cell(&self, cell: &Cell) -> Result<(), ExperimentError> {
+        cell.settings.check_network()?;
+        if self.cross_validation.is_some() {
+            return Err(ExperimentError::CrossValidation);
+        }
+        if let Some((recording, division)) = self.recording.as_ref().zip(cell.division) {
+            division.check()?;
+            if division.by == SplitBy::Group && !recording.has_groups {
+                return Err(ExperimentError::NoGroups);
+            }
+        }
+        Ok(())
     }
 }
 
@@ -236,7 +310,8 @@ impl PaperTable {
             base.training.stopping.max_fail = StoppingRules::MOST_EPOCHS;
             base.starts = starts;
             Experiment {
-                base,
+                base: base.into(),
+                recording: None,
                 axis,
                 second_axis: None,
                 seeds: 5,
@@ -287,7 +362,8 @@ mod tests {
         assert_eq!(cells.len(), 6);
         for (index, cell) in cells.iter().enumerate() {
             assert_eq!((cell.row, cell.column), (index / 3, index % 3));
-            assert_eq!(cell.settings.source.sensor.scale, ArrayScale::PRESETS[cell.column]);
+            let simulation = cell.settings.simulated().unwrap().source;
+            assert_eq!(simulation.sensor.scale, ArrayScale::PRESETS[cell.column]);
             assert_eq!(cell.settings.training.method, Method::all()[cell.row]);
         }
     }

@@ -1,28 +1,30 @@
-//! The paper's experiments, and experiments over any other settings.
+//! The paper's experiments, and experiments over any other settings, on a simulated array or on a recording.
 //!
 //! An [`Experiment`] is a grid of cells; each cell is run several times (seeds, repeats of a cross-validation) by
-//! independent jobs. [`run_experiments`] runs them on all cores and passes on each [`Trial`] as it finishes;
+//! independent jobs, each on its own [`TrialSamples`]. [`run_experiments`] runs them on all cores and passes on each [`Trial`] as it finishes;
 //! [`ExperimentResults`] collects them and is complete at any time for what is finished; [`verdicts`] judges which of
 //! the paper's claims they support.
 
 mod axis;
 mod bottleneck;
+mod cell_errors;
 mod experiment;
 mod growth;
-mod measured;
 mod results;
 mod runner;
+mod samples;
 mod summary;
 mod time_left;
 mod trial;
 mod verdict;
 
-pub use axis::Axis;
+pub use axis::{Axis, AxisKind};
 pub use bottleneck::Bottleneck;
-pub use experiment::{Cell, Experiment, ExperimentError, PaperTable};
+pub use experiment::{Cell, Experiment, ExperimentError, ExperimentRecording, PaperTable};
 pub use growth::Growth;
 pub use results::{CellResults, ExperimentResults};
 pub use runner::{Finished, run_experiments, worker_threads};
-pub use summary::{CellSummary, Figure};
+pub use samples::{RecordedSamples, TrialSamples};
+pub use summary::{CellSummary, Figure, SummaryErrors};
 pub use trial::{Trial, TrialFailure};
 pub use verdict::{Standing, Verdict, verdicts};

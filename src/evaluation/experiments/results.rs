@@ -1,11 +1,15 @@
+use std::sync::Arc;
+
 use super::{Cell, Experiment, Trial, TrialFailure};
-use crate::evaluation::Spread;
+use crate::evaluation::{Problem, Spread};
 
 /// Results of an experiment so far.
 #[derive(Clone, Debug)]
 pub struct ExperimentResults {
     /// Experiment to which the results belong.
     pub experiment: Experiment,
+    /// Description of the readings and targets; `None` until a recording is read.
+    pub problem: Option<Arc<Problem>>,
     /// Results of the cells, row by row in the order of [`Experiment::cells`].
     pub cells: Vec<CellResults>,
 }
@@ -34,6 +38,11 @@ impl ExperimentResults {
         });
         Self {
             cells: cells.collect(),
+            problem: experiment
+                .base
+                .source
+                .simulation()
+                .map(|simulation| Arc::new(simulation.problem())),
             experiment,
         }
     }
@@ -84,9 +93,9 @@ impl CellResults {
         Spread::of(self.trials.iter().filter_map(figure))
     }
 
-    /// Summarises AveZerr over the trials, in percent.
-    pub fn z_percent(&self) -> Option<Spread> {
-        self.spread(|trial| trial.errors.z_percent)
+    /// Summarises [`TestErrors::percent`](crate::evaluation::TestErrors::percent) over the trials.
+    pub fn percent(&self) -> Option<Spread> {
+        self.spread(|trial| trial.errors.percent())
     }
 
     /// Time of the fastest epoch, the one least disturbed by other work on the machine.
@@ -95,12 +104,12 @@ impl CellResults {
             .map(|spread| spread.smallest)
     }
 
-    /// Returns the trial with the median AveZerr (the lower of two), as representative of the cell.
+    /// Returns the trial with the median error in percent (the lower of two), as representative of the cell.
     pub fn median_trial(&self) -> Option<&Trial> {
         let with_errors = self
             .trials
             .iter()
-            .filter_map(|trial| Some((trial, trial.errors.z_percent?)));
+            .filter_map(|trial| Some((trial, trial.errors.percent()?)));
         let mut trials: Vec<_> = with_errors.collect();
         trials.sort_by(|(_, one), (_, other)| one.total_cmp(other));
         let middle = trials.len().checked_sub(1)? / 2;
@@ -113,11 +122,11 @@ pub(super) mod tests {
     use super::*;
     use crate::{
         dataset::Seed,
-        evaluation::{Baselines, Errors, NodeAddress, experiments::PaperTable},
+        evaluation::{Baselines, Errors, NodeAddress, TestErrors, experiments::PaperTable},
     };
 
-    fn errors(z_percent: f64) -> Errors {
-        Errors {
+    fn errors(z_percent: f64) -> TestErrors {
+        TestErrors::Nodes(Errors {
             z_percent: Some(z_percent),
             x_percent: Some(0.1),
             y_percent: Some(1e-12),
@@ -125,7 +134,7 @@ pub(super) mod tests {
             z_full_scale_percent: 5.0 * z_percent,
             worst_mm: 0.5,
             worst_node: NodeAddress::default(),
-        }
+        })
     }
 
     /// A trial with these errors; the linear map has 1.6 %, an epoch takes a second.
@@ -140,7 +149,7 @@ pub(super) mod tests {
                 reference: None,
                 no_reference: None,
             },
-            bottleneck: errors(0.0),
+            bottleneck: Some(errors(0.0)),
             networks: 1,
             epochs: 10,
             seconds: 10.0,
@@ -164,7 +173,7 @@ pub(super) mod tests {
         assert_eq!(backwards.cells[2].trials, trials);
         assert_eq!(forwards.cells[2].median_trial().unwrap().seed, Seed(2));
         assert!(!forwards.cells[2].is_complete());
-        let z = forwards.cells[2].summary().z_percent;
+        let z = forwards.cells[2].summary().percent;
         assert_eq!(
             [z.published, z.min, z.median, z.max],
             [Some(2.37), Some(1.0), Some(2.5), Some(9.0)]

@@ -12,10 +12,13 @@ use std::{
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
 use super::{
-    Experiment, ExperimentError, Trial, TrialFailure,
+    Cell, Experiment, ExperimentError, Trial, TrialFailure, TrialSamples,
     time_left::{TimeLeft, work},
 };
-use crate::evaluation::{CrossValidation, SimulatedSettings};
+use crate::{
+    dataset::Seed,
+    evaluation::{CrossValidation, SimulatedSettings},
+};
 
 /// A finished trial.
 #[derive(Clone, Debug)]
@@ -41,7 +44,7 @@ pub fn worker_threads(leave_one_core: bool) -> NonZero<usize> {
     NonZero::new(threads).unwrap_or(NonZero::<usize>::MIN)
 }
 
-/// Runs all trials of `experiments` on `threads` threads, one trial per thread, and passes each to `on_finished` on the
+/// Runs all trials of `experiments` on `samples` and on `threads` threads, one trial per thread, and passes each to `on_finished` on the
 /// calling thread as soon as it finishes.
 ///
 /// Returns when all are done or, once `is_cancelled`, when the epochs in progress are; `is_cancelled` is called before
@@ -54,12 +57,18 @@ pub fn worker_threads(leave_one_core: bool) -> NonZero<usize> {
 /// If any experiment cannot be run; then none is.
 pub fn run_experiments(
     experiments: &[Experiment],
+    samples: &TrialSamples,
     threads: NonZero<usize>,
     is_cancelled: impl Fn() -> bool + Sync,
     mut on_finished: impl FnMut(Finished),
 ) -> Result<(), ExperimentError> {
-    experiments.iter().try_for_each(Experiment::check)?;
-    let Queue { jobs, mut time_left } = Queue::new(experiments, threads);
+    for experiment in experiments {
+        experiment.check()?;
+        if experiment.recording.is_some() != matches!(samples, TrialSamples::Recorded(_)) {
+            return Err(ExperimentError::OtherSamples);
+        }
+    }
+    let Queue { jobs, mut time_left } = Queue::new(experiments, samples, threads);
     let threads = threads.get().min(jobs.len());
     // One pool of a single thread per worker: parallel code within a training stays on its thread, so that other
     // trainings do not affect its times.
@@ -79,7 +88,9 @@ pub fn run_experiments(
             let work_off = move || {
                 while let Some(job) = jobs.get(next.fetch_add(1, Ordering::Relaxed)) {
                     let begun = Instant::now();
-                    let Some(outcome) = job.run(is_cancelled) else { break };
+                    let Some(outcome) = job.run(samples, is_cancelled) else {
+                        break;
+                    };
                     // The receiver is gone only if the calling thread panicked.
                     if sender.send((job, outcome, begun.elapsed())).is_err() {
                         break;
@@ -120,8 +131,9 @@ struct Job {
     cell: usize,
     /// Index of the cell among the cells of all experiments.
     time_cell: usize,
-    /// Settings of the cell, with the seed of the trial.
-    settings: SimulatedSettings,
+    /// Settings of the cell.
+    of_cell: Cell,
+    seed: Seed,
     cross_validation: Option<CrossValidation>,
     repeat: usize,
     work: f64,
@@ -132,12 +144,12 @@ struct Job {
 impl Queue {
     /// Orders the jobs: first one trial of every cell, so that the outline of each table appears early, then the
     /// second, and so on; in each round the longest first, so that no core is idle for long at the end.
-    fn new(experiments: &[Experiment], threads: NonZero<usize>) -> Self {
+    fn new(experiments: &[Experiment], samples: &TrialSamples, threads: NonZero<usize>) -> Self {
         let mut jobs: Vec<Job> = Vec::new();
         let mut cells = Vec::new();
         for (number, experiment) in experiments.iter().enumerate() {
             for (cell_number, cell) in experiment.cells().iter().enumerate() {
-                let work = work(experiment, cell);
+                let work = work(experiment, cell, samples);
                 let seeds = experiment.seeds_of(&cell.settings);
                 let trials = seeds.flat_map(|seed| (0..experiment.repeats()).map(move |repeat| (seed, repeat)));
                 let before = jobs.len();
@@ -145,7 +157,8 @@ impl Queue {
                     experiment: number,
                     cell: cell_number,
                     time_cell: cells.len(),
-                    settings: SimulatedSettings { seed, ..cell.settings },
+                    of_cell: *cell,
+                    seed,
                     cross_validation: experiment.cross_validation,
                     repeat,
                     work,
@@ -162,17 +175,28 @@ impl Queue {
 
 impl Job {
     /// Runs the trial; returns `None` if cancelled.
-    fn run(&self, is_cancelled: impl Fn() -> bool) -> Option<Result<Trial, TrialFailure>> {
+    fn run(&self, samples: &TrialSamples, is_cancelled: impl Fn() -> bool) -> Option<Result<Trial, TrialFailure>> {
         if is_cancelled() {
             return None;
         }
         let trial = match self.cross_validation {
-            None => Trial::on_drawn_sets(self.settings, is_cancelled),
-            Some(validation) => Trial::by_cross_validation(self.settings, validation, self.repeat, is_cancelled),
+            None => Trial::on_sets(&self.of_cell, self.seed, samples, is_cancelled),
+            Some(validation) => {
+                let settings = self
+                    .of_cell
+                    .settings
+                    .simulated()
+                    .expect("only arrays are cross-validated");
+                let settings = SimulatedSettings {
+                    seed: self.seed,
+                    ..settings
+                };
+                Trial::by_cross_validation(settings, validation, self.repeat, is_cancelled)
+            }
         };
         trial.transpose().map(|trial| {
             trial.map_err(|reason| TrialFailure {
-                seed: self.settings.seed,
+                seed: self.seed,
                 repeat: self.repeat,
                 reason,
             })

@@ -1,21 +1,23 @@
 use serde::Serialize;
 
-use super::{CellResults, ExperimentResults};
+use super::{CellResults, ExperimentResults, Trial};
 use crate::{
-    dataset::Seed,
-    evaluation::{PublishedErrors, Spread},
+    dataset::{Seed, SplitBy},
+    evaluation::{Errors, PublishedErrors, Spread, TargetErrors},
     sensor::ArrayScale,
 };
 
 /// Figures of a cell for tables and files: medians unless stated otherwise, `None` where there is no such figure (yet).
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct CellSummary {
-    /// Array scale.
-    pub array: ArrayScale,
+    /// Array scale; `None` for a recording.
+    pub array: Option<ArrayScale>,
     /// Number of hidden nodes.
     pub hidden: usize,
-    /// Number of training samples; in a cross-validation, of all samples.
-    pub samples: usize,
+    /// Number of training samples; in a cross-validation, of all samples. `None` for a recording.
+    pub samples: Option<usize>,
+    /// Rule by which a recording is divided.
+    pub split: Option<SplitBy>,
     /// Short name of the training method.
     pub method: &'static str,
     /// Largest number of epochs.
@@ -28,26 +30,42 @@ pub struct CellSummary {
     pub trials: usize,
     /// Number of trials planned.
     pub expected_trials: usize,
-    /// AveZerr, in percent.
-    pub z_percent: Figure,
-    /// AveXerr, in percent.
-    pub x_percent: Figure,
-    /// AveYerr, in percent.
-    pub y_percent: Figure,
-    /// Mean |decoupled z − z|, in millimetres.
-    pub z_mm: Figure,
-    /// AveZerr of always answering the mean of the training set.
-    pub mean_z_percent: Option<f64>,
-    /// AveZerr of the best affine map on resistance.
-    pub linear_z_percent: Option<f64>,
-    /// AveZerr of the best answer possible with so few hidden nodes.
-    pub bound_z_percent: Option<f64>,
+    /// Error of the network in percent, by which cells are ranked: see
+    /// [`TestErrors::percent`](crate::evaluation::TestErrors::percent).
+    pub percent: Figure,
+    /// Further errors on the nodes of an array, or on the targets of a recording.
+    pub errors: SummaryErrors,
+    /// Error in percent of always answering the mean of the training set.
+    pub mean_percent: Option<f64>,
+    /// Error in percent of the linear baseline.
+    pub linear_percent: Option<f64>,
+    /// Error in percent of the best answer possible with so few hidden nodes.
+    pub bound_percent: Option<f64>,
     /// Mean number of epochs per start.
     pub epochs_run: Option<f64>,
     /// Training time of a network, over all its starts.
     pub training_seconds: Option<f64>,
     /// Time of the fastest epoch, the one least disturbed by other work on the machine.
     pub epoch_ms: Option<f64>,
+}
+
+/// Errors of a cell beside the one by which it is ranked.
+#[derive(Clone, Debug, PartialEq)]
+pub enum SummaryErrors {
+    /// Errors on the nodes of an array.
+    Nodes {
+        /// AveXerr, in percent.
+        x_percent: Figure,
+        /// AveYerr, in percent.
+        y_percent: Figure,
+        /// Mean |decoupled z − z|, in millimetres.
+        z_mm: Figure,
+    },
+    /// Errors on the targets of a recording.
+    Targets {
+        /// Coefficient of determination R², the mean over the targets that vary.
+        r2: Figure,
+    },
 }
 
 /// A measured figure beside the published one.
@@ -76,39 +94,52 @@ impl CellResults {
     /// Returns the figures of this cell.
     pub fn summary(&self) -> CellSummary {
         let settings = &self.cell.settings;
-        let median = |figure: fn(&super::Trial) -> Option<f64>| self.spread(figure).map(|spread| spread.median);
+        let median = |figure: fn(&Trial) -> Option<f64>| self.spread(figure).map(|spread| spread.median);
         let starts = settings.starts;
         let epochs_run = self.spread(|trial| Some(trial.epochs as f64 / (trial.networks * starts).max(1) as f64));
+        let simulation = settings.source.simulation();
         CellSummary {
-            array: settings.source.sensor.scale,
+            array: simulation.map(|source| source.sensor.scale),
             hidden: settings.hidden,
-            samples: settings.source.samples,
+            samples: simulation.map(|source| source.samples),
+            split: self.cell.division.map(|division| division.by),
             method: settings.training.method.short_name(),
             epochs: settings.training.stopping.epochs,
             starts,
             seed: settings.seed,
             trials: self.trials.len(),
             expected_trials: self.expected,
-            z_percent: self.figure(|published| published.z_percent, |trial| trial.errors.z_percent),
-            x_percent: self.figure(|published| published.x_percent, |trial| trial.errors.x_percent),
-            y_percent: self.figure(|published| published.y_percent, |trial| trial.errors.y_percent),
-            z_mm: Figure {
-                published: None,
-                ..self.figure(|published| published.z_percent, |trial| Some(trial.errors.z_mm))
+            percent: self.figure(|published| Some(published.z_percent), |trial| trial.errors.percent()),
+            errors: match simulation {
+                Some(_) => self.node_errors(),
+                None => SummaryErrors::Targets {
+                    r2: self.figure(|_| None, |trial| TargetErrors::over_all(trial.errors.targets())?.r2),
+                },
             },
-            mean_z_percent: median(|trial| trial.baselines.mean.z_percent),
-            linear_z_percent: median(|trial| trial.baselines.linear.z_percent),
-            bound_z_percent: median(|trial| trial.bottleneck.z_percent).map(without_rounding),
+            mean_percent: median(|trial| trial.baselines.mean.percent()),
+            linear_percent: median(|trial| trial.baselines.linear.percent()),
+            bound_percent: median(|trial| trial.bottleneck.as_ref()?.percent()).map(without_rounding),
             epochs_run: epochs_run.map(|spread| spread.median),
             training_seconds: median(|trial| Some(trial.seconds_per_network())),
             epoch_ms: self.least_epoch_seconds().map(|seconds| 1e3 * seconds),
         }
     }
 
-    fn figure(&self, published: fn(&PublishedErrors) -> f64, measured: fn(&super::Trial) -> Option<f64>) -> Figure {
+    fn node_errors(&self) -> SummaryErrors {
+        fn nodes(trial: &Trial) -> Option<&Errors> {
+            trial.errors.nodes()
+        }
+        SummaryErrors::Nodes {
+            x_percent: self.figure(|published| Some(published.x_percent), |trial| nodes(trial)?.x_percent),
+            y_percent: self.figure(|published| Some(published.y_percent), |trial| nodes(trial)?.y_percent),
+            z_mm: self.figure(|_| None, |trial| Some(nodes(trial)?.z_mm)),
+        }
+    }
+
+    fn figure(&self, published: fn(&PublishedErrors) -> Option<f64>, measured: fn(&Trial) -> Option<f64>) -> Figure {
         let spread: Option<Spread> = self.spread(measured);
         Figure {
-            published: self.cell.published.as_ref().map(published),
+            published: self.cell.published.as_ref().and_then(published),
             median: spread.map(|spread| spread.median),
             min: spread.map(|spread| spread.smallest),
             max: spread.map(|spread| spread.largest),

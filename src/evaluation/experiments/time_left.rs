@@ -1,6 +1,6 @@
 use std::time::Duration;
 
-use super::{Cell, Experiment};
+use super::{Cell, Experiment, TrialSamples};
 use crate::training::Method;
 
 /// Estimates the remaining time from the finished jobs. Jobs of a cell with finished jobs count as their mean; other
@@ -60,12 +60,20 @@ impl TimeLeft {
 }
 
 /// Approximate number of multiplications in one job of `cell`, if it runs all of its epochs.
-pub(super) fn work(experiment: &Experiment, cell: &Cell) -> f64 {
+pub(super) fn work(experiment: &Experiment, cell: &Cell, samples: &TrialSamples) -> f64 {
     let settings = &cell.settings;
-    let scale = settings.source.sensor.scale;
-    let (n1, h) = ((scale.columns() + 1) as f64, settings.hidden as f64);
-    let outputs = scale.coordinates_per_row() as f64;
-    let samples = settings.source.samples as f64;
+    let (inputs, outputs, samples) = match (settings.source.simulation(), samples) {
+        (Some(source), _) => {
+            let scale = source.sensor.scale;
+            (scale.columns(), scale.coordinates_per_row(), source.samples)
+        }
+        (None, TrialSamples::Recorded(recorded)) => {
+            (recorded.set.channels(), recorded.set.outputs(), recorded.set.samples())
+        }
+        (None, TrialSamples::Drawn) => (1, 1, 1),
+    };
+    let (n1, h) = ((inputs + 1) as f64, settings.hidden as f64);
+    let (outputs, samples) = (outputs as f64, samples as f64);
     // Forward and backward passes, and the test and validation sets.
     let passes = 4.0 * samples * h * (n1 + outputs);
     let second_order = samples * (h * n1).powi(2) / 4.0 + 0.5 * (h * n1).powi(3);

@@ -2,10 +2,13 @@ use ndarray::Array2;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-use super::Bottleneck;
+use super::{Bottleneck, Cell, TrialSamples};
 use crate::{
     dataset::{Dataset, Seed},
-    evaluation::{Baselines, CrossValidated, CrossValidation, Effort, Errors, Run, RunError, SimulatedSettings},
+    evaluation::{
+        Baselines, CrossValidated, CrossValidation, Effort, Run, RunError, RunSettings, SimulatedSettings, TestErrors,
+    },
+    scene::RowModel,
     training::TrainerState,
 };
 
@@ -19,11 +22,12 @@ pub struct Trial {
     pub repeat: usize,
     /// Errors on the test set; in a cross-validation, on all samples, each decoupled by the network that had not seen
     /// it.
-    pub errors: Errors,
+    pub errors: TestErrors,
     /// Errors of the baselines on the same samples.
-    pub baselines: Baselines<Errors>,
-    /// Errors, on the same samples, of the best answer possible with so few hidden nodes: see [`Bottleneck`].
-    pub bottleneck: Errors,
+    pub baselines: Baselines,
+    /// Errors, on the same samples, of the best answer possible with so few hidden nodes: see [`Bottleneck`]. `None` for a
+    /// recording with a network for each row-wire.
+    pub bottleneck: Option<TestErrors>,
     /// Number of networks trained: 1, or one per fold.
     pub networks: usize,
     /// Number of epochs, over all starts and folds.
@@ -55,25 +59,34 @@ impl Trial {
         self.seconds / self.networks.max(1) as f64
     }
 
-    /// Trains and tests on sets drawn with the seed of `settings`. Returns `None` if cancelled.
-    pub(super) fn on_drawn_sets(
-        settings: SimulatedSettings,
+    /// Trains and tests with this seed on the sets of `cell`. Returns `None` if cancelled.
+    pub(super) fn on_sets(
+        cell: &Cell,
+        seed: Seed,
+        samples: &TrialSamples,
         is_cancelled: impl Fn() -> bool,
     ) -> Result<Option<Self>, RunError> {
-        let (split, test) = settings.draw_held()?;
-        let bottleneck = Bottleneck::fit(split.training.targets(), settings.hidden)?;
-        let reconstructed = bottleneck.reconstruct(test.targets());
-        let bottleneck = Errors::measure(&test, &reconstructed, settings.source.stroke_mm());
-        let mut run = Run::prepare(settings)?;
+        let settings = RunSettings { seed, ..cell.settings };
+        let Some(sets) = samples.sets(cell, seed, &is_cancelled)? else {
+            return Ok(None);
+        };
+        let has_bound = settings.source.simulation().is_some() || settings.source.row_model() == RowModel::Shared;
+        let bottleneck = if has_bound {
+            let bottleneck = Bottleneck::fit(sets.split.training.targets(), settings.hidden)?;
+            let reconstructed = bottleneck.reconstruct(sets.test.targets());
+            Some(TestErrors::measure(&settings.source, &sets.test, &reconstructed))
+        } else {
+            None
+        };
+        let Some(mut run) = Run::on_unless(settings, sets, &is_cancelled)? else {
+            return Ok(None);
+        };
         let Some(effort) = Effort::train(&mut run, &is_cancelled) else {
             return Ok(None);
         };
-        let scores = run
-            .scores()
-            .and_then(|scores| scores.nodes())
-            .expect("the run is simulated");
+        let scores = run.scores().expect("a run that is not of a fold has baselines");
         Ok(Some(Self {
-            seed: settings.seed,
+            seed,
             repeat: 0,
             errors: scores.network,
             baselines: scores.baselines,
@@ -100,7 +113,8 @@ impl Trial {
             return Ok(None);
         };
         let bottleneck = bottleneck_answers(&set, &validated, settings.hidden)?;
-        let errors = |decoupled_mm| Errors::measure(&set, decoupled_mm, settings.source.stroke_mm());
+        let source = settings.source.into();
+        let errors = |decoupled_mm| TestErrors::measure(&source, &set, decoupled_mm);
         Ok(Some(Self {
             seed: settings.seed,
             repeat,
@@ -111,7 +125,7 @@ impl Trial {
                 reference: None,
                 no_reference: None,
             },
-            bottleneck: errors(&bottleneck),
+            bottleneck: Some(errors(&bottleneck)),
             networks: validated.folds.count(),
             epochs: validated.effort.epochs,
             seconds: validated.effort.seconds,

@@ -4,8 +4,8 @@ use serde::Serialize;
 
 use super::{
     Axis, CellResults, ExperimentResults, Growth,
+    cell_errors::{CellErrors, sorted_by},
     growth::GrowthLaw,
-    measured::{Measured, sorted_by},
 };
 use crate::evaluation::format::format_number;
 
@@ -47,7 +47,7 @@ impl fmt::Display for Standing {
 
 /// Judges the claims that this experiment can test by its finished trials.
 pub fn verdicts(results: &ExperimentResults) -> Vec<Verdict> {
-    let measured = Measured::all(results);
+    let measured = CellErrors::all(results);
     let mut verdicts = Vec::new();
     verdicts.extend(published_is_met(&measured));
     if results.experiment.second_axis.is_none() {
@@ -68,10 +68,14 @@ pub fn verdicts(results: &ExperimentResults) -> Vec<Verdict> {
                 ));
                 verdicts.push(time_does_not_explode(results, "nodes of a row", nodes));
             }
-            Axis::Method(_) | Axis::Epochs(_) | Axis::Seed(_) => {}
+            _ => {}
         }
     }
-    verdicts.push(linear_map_is_beaten(&measured));
+    let linear = match results.experiment.recording {
+        None => "The network beats the linear map",
+        Some(_) => "The network beats ridge regression",
+    };
+    verdicts.push(linear_is_beaten(linear, &measured));
     verdicts
 }
 
@@ -79,7 +83,7 @@ fn missing(claim: &'static str) -> Verdict {
     Verdict {
         claim,
         standing: Standing::Undecided,
-        finding: "Too few results to tell.".to_owned(),
+        finding: "Too few results.".to_owned(),
     }
 }
 
@@ -102,9 +106,9 @@ fn standing_of(cases: impl IntoIterator<Item = Option<bool>>) -> Standing {
 /// Says in which cells the error is below a figure, above it, or within the spread of the trials.
 fn judge_cells(
     claim: &'static str,
-    cells: &[(&Measured, f64)],
+    cells: &[(&CellErrors, f64)],
     [below, above]: [&str; 2],
-    note: impl Fn(&Measured, f64) -> String,
+    note: impl Fn(&CellErrors, f64) -> String,
 ) -> Verdict {
     let standings: Vec<Option<bool>> = cells
         .iter()
@@ -115,15 +119,19 @@ fn judge_cells(
             .iter()
             .zip(&standings)
             .filter(|(_, standing)| **standing == wanted);
-        let each = |((cell, figure), _): (&(&Measured, f64), _)| {
-            let against = format!("{} against {}", format_number(cell.z.median), format_number(*figure));
+        let each = |((cell, figure), _): (&(&CellErrors, f64), _)| {
+            let against = format!(
+                "{} against {}",
+                format_number(cell.percent.median),
+                format_number(*figure)
+            );
             format!("{} ({against}{})", cell.label, note(cell, *figure))
         };
         those.map(each).collect::<Vec<_>>().join(", ")
     };
     let open = format!(
         "not decided with fewer than {} trials or within their spread at",
-        Measured::FEWEST_TRIALS
+        CellErrors::FEWEST_TRIALS
     );
     let parts = [
         (below, list(Some(true))),
@@ -142,13 +150,13 @@ fn judge_cells(
     }
 }
 
-fn published_is_met(measured: &[Measured]) -> Option<Verdict> {
+fn published_is_met(measured: &[CellErrors]) -> Option<Verdict> {
     let cells: Vec<_> = measured
         .iter()
         .filter_map(|cell| Some((cell, cell.published?)))
         .collect();
-    let note = |cell: &Measured, published: f64| {
-        if cell.z.median <= published {
+    let note = |cell: &CellErrors, published: f64| {
+        if cell.percent.median <= published {
             return String::new();
         }
         let bound = cell.bound.filter(|bound| *bound > 0.5 * published);
@@ -157,7 +165,7 @@ fn published_is_met(measured: &[Measured]) -> Option<Verdict> {
         });
         format!(
             ", {} % more{bound}",
-            format_number(100.0 * (cell.z.median / published - 1.0))
+            format_number(100.0 * (cell.percent.median / published - 1.0))
         )
     };
     let claim = "The published Z error is reached";
@@ -172,16 +180,16 @@ fn sentence(text: &str) -> String {
 }
 
 /// Looks for the least error among `cells`, which are sorted by number of hidden nodes.
-fn optimum_exists(cells: Vec<Measured>) -> Verdict {
+fn optimum_exists(cells: Vec<CellErrors>) -> Verdict {
     let claim = "There is an optimal number of hidden nodes";
     let best = cells
         .iter()
         .enumerate()
-        .min_by(|one, other| one.1.z.median.total_cmp(&other.1.z.median));
+        .min_by(|one, other| one.1.percent.median.total_cmp(&other.1.percent.median));
     let (Some((place, best)), Some(last), true) = (best, cells.last(), cells.len() >= 3) else {
         return missing(claim);
     };
-    let is_lower = |others: &[Measured]| others.iter().any(|other| best.compare(other) == Some(Ordering::Less));
+    let is_lower = |others: &[CellErrors]| others.iter().any(|other| best.compare(other) == Some(Ordering::Less));
     let is_lowest = || {
         let others = cells.iter().enumerate().filter(|(other, _)| *other != place);
         others
@@ -201,7 +209,7 @@ fn optimum_exists(cells: Vec<Measured>) -> Verdict {
         Standing::Undecided
     };
     let ends = [&cells[0], last].into_iter().filter(|end| end.column != best.column);
-    let ends: Vec<_> = ends.map(Measured::figures).collect();
+    let ends: Vec<_> = ends.map(CellErrors::figures).collect();
     let open = match standing {
         Standing::Undecided => "; not decided with so few trials or so wide a spread",
         _ => "",
@@ -219,13 +227,13 @@ fn optimum_exists(cells: Vec<Measured>) -> Verdict {
 }
 
 /// Checks that the errors rise along `measured`, beyond the spread of the trials.
-fn in_order(claim: &'static str, measured: Vec<Measured>) -> Verdict {
+fn in_order(claim: &'static str, measured: Vec<CellErrors>) -> Verdict {
     if measured.len() < 2 {
         return missing(claim);
     }
     let pairs = measured.windows(2);
     let standing = standing_of(pairs.map(|pair| Some(pair[0].compare(&pair[1])?.is_lt())));
-    let figures: Vec<_> = measured.iter().map(Measured::figures).collect();
+    let figures: Vec<_> = measured.iter().map(CellErrors::figures).collect();
     Verdict {
         claim,
         standing,
@@ -273,8 +281,7 @@ fn time_does_not_explode(results: &ExperimentResults, what: &str, size: impl Fn(
     }
 }
 
-fn linear_map_is_beaten(measured: &[Measured]) -> Verdict {
-    let claim = "The network beats the linear map";
+fn linear_is_beaten(claim: &'static str, measured: &[CellErrors]) -> Verdict {
     let cells: Vec<_> = measured.iter().filter_map(|cell| Some((cell, cell.linear?))).collect();
     if cells.is_empty() {
         return missing(claim);

@@ -52,7 +52,7 @@ fn trained_settings(rows: Rows, quantity: Quantity, scaling: ScalingChoice, nois
 fn run_of(settings: SimulatedSettings) -> NetworkFile {
     let mut run = Run::prepare(settings).unwrap();
     while run.step().is_none() {}
-    NetworkFile::from_run(&run).unwrap()
+    NetworkFile::from_run(&run, None).unwrap()
 }
 
 /// Networks of every quantity, shared and of known rows, with names.

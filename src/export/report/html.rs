@@ -21,7 +21,7 @@ impl Html {
         self.text += "</section>\n";
     }
 
-    /// Adds a table. The row of this name stands out.
+    /// Adds a table. Rows with the name `own` in the first or second column are highlighted.
     pub fn table(&mut self, table: &Table, own: &str) {
         self.text += "<div class=\"scrolled\"><table>\n<thead><tr>";
         for column in &table.columns {
@@ -32,7 +32,7 @@ impl Html {
             let cells: Vec<String> = row.iter().map(|cell| cell.rounded()).collect();
             self.row(
                 &cells,
-                if cells.first().is_some_and(|name| name == own) {
+                if cells.iter().take(2).any(|name| name == own) {
                     "own"
                 } else {
                     ""

@@ -9,5 +9,7 @@ mod settings;
 #[cfg(test)]
 mod tests;
 
+#[cfg(feature = "cli")]
+pub(crate) use command::quoted;
 pub use command::{CommandGap, train_command};
-pub use contents::{ReportError, RunReport};
+pub use contents::RunReport;

@@ -1,9 +1,11 @@
 //! The settings of a run in words.
 
 use crate::{
-    evaluation::SimulatedSettings,
+    dataset::Dataset,
+    evaluation::{Channel, SimulatedSettings},
     export::{NetworkFile, format_number},
-    scene::{Loading, Movement, Noise, NoisySets},
+    import::{Plan, Recorded},
+    scene::{Loading, Movement, Noise, NoisySets, RowModel},
     sensor::counted,
 };
 
@@ -11,7 +13,6 @@ use crate::{
 pub(super) fn settings_facts(file: &NetworkFile, settings: &SimulatedSettings) -> Vec<(&'static str, String)> {
     let SimulatedSettings { source, inputs, .. } = settings;
     let (geometry, scene) = (&source.sensor.geometry, &source.scene);
-    let rules = file.settings.training.stopping;
     let mut facts = vec![
         ("Array", source.sensor.scale.to_string()),
         ("Height", format!("{} mm", geometry.height_mm)),
@@ -57,6 +58,82 @@ pub(super) fn settings_facts(file: &NetworkFile, settings: &SimulatedSettings) -
         ),
         ("Noise", noise_words(&scene.noise)),
         ("Inputs", format!("{} ({})", inputs.quantity, inputs.scaling)),
+    ];
+    facts.extend(training_facts(file));
+    facts.push((
+        "Samples",
+        format!(
+            "{} for training, {} for validation, {} for test, each rounded up to whole snapshots",
+            source.samples, source.validation_samples, source.test_samples
+        ),
+    ));
+    facts.push(("Seed", file.settings.seed.to_string()));
+    facts
+}
+
+/// Names and values of the settings of a run on a recording.
+pub(super) fn recording_facts(file: &NetworkFile, recorded: &Recorded, test: &Dataset) -> Vec<(&'static str, String)> {
+    let Plan {
+        import,
+        test: tests,
+        division,
+    } = &recorded.plan;
+    let names = |channels: &[Channel]| Vec::from_iter(channels.iter().map(Channel::title)).join(", ");
+    let mut facts = vec![("Recording", import.data.display().to_string())];
+    for joined in &import.join {
+        facts.push(("Joined file", joined.file.display().to_string()));
+    }
+    if let Some(time) = &import.time {
+        facts.push(("Time", time.clone()));
+    }
+    if let Some(group) = &import.group {
+        facts.push(("Group", group.clone()));
+    }
+    for condition in &import.conditions {
+        facts.push(("Rows used", condition.to_string()));
+    }
+    facts.extend([
+        ("Readings", names(&file.problem.inputs)),
+        ("Targets", names(&file.problem.targets)),
+    ]);
+    let samples = counted(test.samples(), "test sample");
+    facts.push((
+        "Split",
+        match tests {
+            Some(tests) => format!("{samples} of {}", tests.data.display()),
+            None => format!(
+                "by {}, {} % for the test: {samples}",
+                division.by,
+                format_number(100.0 * division.test_fraction)
+            ),
+        },
+    ));
+    facts.push((
+        "Validation",
+        match division.validation_fraction {
+            0.0 => "nothing held out".to_owned(),
+            fraction => format!("{} % of the other samples", format_number(100.0 * fraction)),
+        },
+    ));
+    let inputs = file.settings.inputs;
+    facts.push(("Inputs", format!("{} ({})", inputs.quantity, inputs.scaling)));
+    facts.push((
+        "Row-wires",
+        match (&file.row_wires, file.settings.source.row_model()) {
+            (None, _) => "not known".to_owned(),
+            (Some(rows), RowModel::Each) => format!("{}, a network for each", rows.len()),
+            (Some(rows), RowModel::Shared) => format!("{}, one network for all", rows.len()),
+        },
+    ));
+    facts.extend(training_facts(file));
+    facts.push(("Seed", file.settings.seed.to_string()));
+    facts
+}
+
+/// Names and values of the settings of the network and its training.
+fn training_facts(file: &NetworkFile) -> Vec<(&'static str, String)> {
+    let rules = file.settings.training.stopping;
+    let mut facts = vec![
         ("Hidden nodes", file.settings.hidden.to_string()),
         ("Weights", file.network.weights().to_string()),
     ];
@@ -79,14 +156,6 @@ pub(super) fn settings_facts(file: &NetworkFile, settings: &SimulatedSettings) -
                 counted(rules.max_fail, "validation failure")
             ),
         ),
-        (
-            "Samples",
-            format!(
-                "{} for training, {} for validation, {} for test, each rounded up to whole snapshots",
-                source.samples, source.validation_samples, source.test_samples
-            ),
-        ),
-        ("Seed", file.settings.seed.to_string()),
     ]);
     facts
 }

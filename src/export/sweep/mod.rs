@@ -36,7 +36,11 @@ pub(crate) use self::{
     trial_id::TrialId,
 };
 #[cfg(feature = "cli")]
-pub(crate) use self::{plan_file::PlanAxis, table::SweepTableFormat, train_options::decoders_in_order};
+pub(crate) use self::{
+    plan_file::PlanAxis,
+    table::SweepTableFormat,
+    train_options::{decoders_in_order, recording_options},
+};
 
 /// Trial and plan files of a folder.
 #[derive(Debug, PartialEq, Eq)]

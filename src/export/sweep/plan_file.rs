@@ -4,7 +4,10 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use super::{TrialId, load, save_new};
-use crate::export::{DocumentError, DocumentKind, WriteError, document::PROGRAM};
+use crate::{
+    export::{DocumentError, DocumentKind, WriteError, document::PROGRAM},
+    import::FileChecksum,
+};
 
 const KIND: DocumentKind = DocumentKind::SweepPlan;
 /// Beginning of the name of a plan file.
@@ -18,6 +21,9 @@ pub(crate) struct SweepPlan {
     pub(crate) axes: Vec<PlanAxis>,
     /// Trials by position.
     pub(crate) trials: Vec<TrialId>,
+    /// Files of recordings, with paths relative to the folder; none for simulated arrays.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub(crate) recordings: Vec<FileChecksum>,
 }
 
 /// An option that varies.
@@ -107,6 +113,7 @@ mod tests {
                 axis("set", serde_json::json!(["mu=1", ["mu=2", "mu-decrease=0.5"], "mu=3"])),
             ],
             trials: Vec::new(),
+            recordings: Vec::new(),
         };
         let positions = [0, 1, 5].map(|position| plan.describe(position));
         assert_eq!(

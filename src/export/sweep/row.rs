@@ -6,7 +6,7 @@ use serde_json::{Map, Value};
 use super::{Trial, TrialId, TrialOptions};
 
 /// Fields of a report that are times: they differ from run to run, and nothing is compared by them.
-const TIMES: [&str; 3] = ["epoch_ms", "frame_us", "fit_seconds"];
+const TIMES: [&str; 4] = ["epoch_ms", "frame_us", "fit_seconds", "training_seconds"];
 
 /// A trial in a table: what it was, what came out, and how long it took.
 #[derive(Clone, Debug, Serialize)]

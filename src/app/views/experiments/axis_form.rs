@@ -1,28 +1,14 @@
+use std::{fmt::Display, str::FromStr};
+
 use thiserror::Error;
 
 use crate::{
-    dataset::Seed,
-    evaluation::experiments::Axis,
+    dataset::{Seed, SplitBy},
+    evaluation::experiments::{Axis, AxisKind},
+    network::{Quantity, ScalingChoice},
     sensor::{ArrayScale, ArrayScaleError},
     training::Method,
 };
-
-/// Setting that an axis can vary.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum AxisKind {
-    /// Hidden nodes.
-    Hidden,
-    /// Array scales.
-    Array,
-    /// Training samples.
-    Samples,
-    /// Training methods.
-    Method,
-    /// Most epochs.
-    Epochs,
-    /// Seeds.
-    Seed,
-}
 
 /// An axis as the user types it.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -38,18 +24,28 @@ pub struct AxisForm {
 #[non_exhaustive]
 pub enum ListError {
     /// Not a number.
-    #[error("{name}: '{text}' is not a whole number; write a list such as {example}")]
+    #[error("{name}: '{text}' is not {of}; write a list such as {example}")]
     Number {
         /// The axis.
         name: &'static str,
         /// Text that was typed.
         text: String,
+        /// Numbers that the axis has.
+        of: &'static str,
         /// A list that is understood.
         example: &'static str,
     },
     /// Not an array scale.
     #[error(transparent)]
     Array(#[from] ArrayScaleError),
+    /// Not one of the words of the axis.
+    #[error("{name}: {message}")]
+    Word {
+        /// The axis.
+        name: &'static str,
+        /// What is wrong, and the words there are.
+        message: String,
+    },
     /// Not a method.
     #[error("'{text}' is not a method: write {known}")]
     Method {
@@ -60,39 +56,37 @@ pub enum ListError {
     },
 }
 
-impl AxisKind {
-    /// In the order offered.
-    pub const ALL: [Self; 6] = [
-        Self::Hidden,
-        Self::Array,
-        Self::Samples,
-        Self::Method,
-        Self::Epochs,
-        Self::Seed,
-    ];
-
-    /// Its name as a label.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Hidden => "Hidden nodes",
-            Self::Array => "Array scales",
-            Self::Samples => "Samples",
-            Self::Method => "Methods",
-            Self::Epochs => "Epochs",
-            Self::Seed => "Seeds",
-        }
+/// Name of a setting as a label.
+pub fn axis_label(kind: AxisKind) -> &'static str {
+    match kind {
+        AxisKind::Hidden => "Hidden nodes",
+        AxisKind::Array => "Array scales",
+        AxisKind::Samples => "Samples",
+        AxisKind::Noise => "Noise",
+        AxisKind::Inputs => "Inputs",
+        AxisKind::Scaling => "Scaling",
+        AxisKind::Method => "Methods",
+        AxisKind::Epochs => "Epochs",
+        AxisKind::Starts => "Starts",
+        AxisKind::Split => "Split",
+        AxisKind::Seed => "Seeds",
     }
+}
 
-    /// Values to begin with.
-    pub fn example(self) -> &'static str {
-        match self {
-            Self::Hidden => "6, 8, 10, 12",
-            Self::Array => "10×6_3×18, 10×8_4×24, 10×10_5×30",
-            Self::Samples => "100, 300, 1000",
-            Self::Method => "lm, scg, rp",
-            Self::Epochs => "30, 100, 300",
-            Self::Seed => "0, 1, 2",
-        }
+/// Values of a setting to begin with.
+pub fn axis_example(kind: AxisKind) -> &'static str {
+    match kind {
+        AxisKind::Hidden => "6, 8, 10, 12",
+        AxisKind::Array => "10×6_3×18, 10×8_4×24, 10×10_5×30",
+        AxisKind::Samples => "100, 300, 1000",
+        AxisKind::Noise => "0, 0.001, 0.01",
+        AxisKind::Inputs => "resistance, conductance, log",
+        AxisKind::Scaling => "minmax, whiten",
+        AxisKind::Method => "lm, scg, rp",
+        AxisKind::Epochs => "30, 100, 300",
+        AxisKind::Starts => "1, 3, 10",
+        AxisKind::Split => "time, random",
+        AxisKind::Seed => "0, 1, 2",
     }
 }
 
@@ -101,23 +95,15 @@ impl AxisForm {
     pub fn new(kind: AxisKind) -> Self {
         Self {
             kind,
-            values: kind.example().to_owned(),
+            values: axis_example(kind).to_owned(),
         }
     }
 
     /// The values of `axis` as one would type them.
     pub fn of(axis: &Axis) -> Self {
-        let kind = match axis {
-            Axis::Hidden(_) => AxisKind::Hidden,
-            Axis::Array(_) => AxisKind::Array,
-            Axis::Samples(_) => AxisKind::Samples,
-            Axis::Method(_) => AxisKind::Method,
-            Axis::Epochs(_) => AxisKind::Epochs,
-            Axis::Seed(_) => AxisKind::Seed,
-        };
         let values: Vec<String> = (0..axis.len()).map(|index| axis.label(index)).collect();
         Self {
-            kind,
+            kind: axis.kind(),
             values: values.join(", "),
         }
     }
@@ -131,6 +117,11 @@ impl AxisForm {
             AxisKind::Hidden => Axis::Hidden(self.numbers()?),
             AxisKind::Array => Axis::Array(self.words().map(str::parse).collect::<Result<Vec<ArrayScale>, _>>()?),
             AxisKind::Samples => Axis::Samples(self.numbers()?),
+            AxisKind::Noise => Axis::Noise(self.parsed("a number")?),
+            AxisKind::Inputs => Axis::Inputs(self.chosen::<Quantity>()?),
+            AxisKind::Scaling => Axis::Scaling(self.chosen::<ScalingChoice>()?),
+            AxisKind::Starts => Axis::Starts(self.numbers()?),
+            AxisKind::Split => Axis::Split(self.chosen::<SplitBy>()?),
             AxisKind::Method => Axis::Method(self.words().map(method).collect::<Result<_, _>>()?),
             AxisKind::Epochs => Axis::Epochs(self.numbers()?),
             AxisKind::Seed => Axis::Seed(self.numbers()?.into_iter().map(Seed).collect()),
@@ -142,12 +133,27 @@ impl AxisForm {
         self.values.split(is_between).filter(|word| !word.is_empty())
     }
 
-    fn numbers<N: std::str::FromStr>(&self) -> Result<Vec<N>, ListError> {
+    fn numbers<N: FromStr>(&self) -> Result<Vec<N>, ListError> {
+        self.parsed("a whole number")
+    }
+
+    fn chosen<C: FromStr<Err: Display>>(&self) -> Result<Vec<C>, ListError> {
+        let choice = |word: &str| {
+            word.parse().map_err(|error: C::Err| ListError::Word {
+                name: axis_label(self.kind),
+                message: error.to_string(),
+            })
+        };
+        self.words().map(choice).collect()
+    }
+
+    fn parsed<N: FromStr>(&self, of: &'static str) -> Result<Vec<N>, ListError> {
         let number = |word: &str| {
             word.parse().map_err(|_| ListError::Number {
-                name: self.kind.name(),
+                name: axis_label(self.kind),
+                of,
                 text: word.to_owned(),
-                example: self.kind.example(),
+                example: axis_example(self.kind),
             })
         };
         self.words().map(number).collect()
@@ -172,7 +178,7 @@ mod tests {
         for kind in AxisKind::ALL {
             let form = AxisForm::new(kind);
             let axis = form.parse().unwrap();
-            assert!(axis.len() >= 3, "{kind:?}");
+            assert!(axis.len() >= 2, "{kind:?}");
             assert_eq!(AxisForm::of(&axis), form);
         }
     }
@@ -198,6 +204,12 @@ mod tests {
             ),
             (AxisKind::Samples, "-5", "Samples: '-5'"),
             (AxisKind::Array, "10x6", "'10x6' is not an array scale"),
+            (AxisKind::Noise, "0.1 a", "Noise: 'a' is not a number"),
+            (
+                AxisKind::Split,
+                "time daily",
+                "Split: 'daily' is not a split: give time",
+            ),
             (AxisKind::Method, "lm magic", "'magic' is not a method: write lm"),
         ];
         for (kind, values, expected) in cases {

@@ -1,13 +1,19 @@
 use thiserror::Error;
 
-use super::{AxisForm, AxisKind, ListError, Topic};
-use crate::evaluation::experiments::{Experiment, ExperimentError, PaperTable};
+use super::{AxisForm, ListError, Topic};
+use crate::{
+    evaluation::experiments::{Axis, AxisKind, Experiment, ExperimentError, PaperTable},
+    import::{Plan, Setup},
+    training::Method,
+};
 
 /// An experiment as the user sets it up.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Form {
     /// Everything but the axes, which are typed.
     pub template: Experiment,
+    /// Plan by which a recording is read; `None` for a simulated array.
+    pub plan: Option<Plan>,
     /// One axis, or two of a sweep.
     pub axes: Vec<AxisForm>,
 }
@@ -39,6 +45,7 @@ impl Form {
                 Self {
                     axes: vec![AxisForm::of(&template.axis)],
                     template,
+                    plan: None,
                 }
             }
             Topic::Sweep => {
@@ -48,10 +55,48 @@ impl Form {
                 template.seeds = 1;
                 Self {
                     template,
-                    axes: vec![AxisForm::new(AxisKind::Hidden), AxisForm::new(AxisKind::Samples)],
+                    plan: None,
+                    axes: [AxisKind::Hidden, AxisKind::Samples].map(AxisForm::new).into(),
                 }
             }
         }
+    }
+
+    /// Setup of the base.
+    pub fn setup(&self) -> Option<Setup> {
+        Setup::of(self.template.base, self.plan.clone())
+    }
+
+    /// Takes `setup` as the base. An axis that its source does not have gives way to another.
+    pub fn take(&mut self, setup: &Setup) {
+        self.template.base = *setup.settings();
+        self.template.recording = setup.experiment_recording();
+        self.plan = setup.plan().cloned();
+        let offered: Vec<AxisKind> = self.offered().collect();
+        for place in 0..self.axes.len() {
+            let is_free = |kind: &&AxisKind| self.axes.iter().all(|axis| axis.kind != **kind);
+            if !offered.contains(&self.axes[place].kind)
+                && let Some(&kind) = offered.iter().find(is_free)
+            {
+                self.axes[place] = AxisForm::new(kind);
+            }
+        }
+    }
+
+    /// Settings that an axis can vary.
+    pub fn offered(&self) -> impl Iterator<Item = AxisKind> + use<> {
+        AxisKind::of_source(&self.template.base.source)
+    }
+
+    /// Gives methods on a recording the settings that suit recordings.
+    fn suited(&self, axis: Axis) -> Axis {
+        let Axis::Method(mut methods) = axis else { return axis };
+        if self.plan.is_some() {
+            let recorded = Method::recorded_regularization();
+            let is_same = |method: &&mut Method| method.short_name() == recorded.short_name();
+            methods.iter_mut().filter(is_same).for_each(|method| *method = recorded);
+        }
+        Axis::Method(methods)
     }
 
     /// The experiment, sound as far as can be known before it is run.
@@ -61,7 +106,7 @@ impl Form {
     pub fn experiment(&self) -> Result<Experiment, FormError> {
         let mut axes = Vec::new();
         for axis in &self.axes {
-            axes.push(axis.parse()?);
+            axes.push(self.suited(axis.parse()?));
         }
         let cells = axes
             .iter()

@@ -16,6 +16,6 @@ mod verdict_list;
 mod view;
 mod worker;
 
-pub use axis_form::{AxisForm, AxisKind, ListError};
+pub use axis_form::{AxisForm, ListError};
 pub use form::Form;
 pub use state::{Ending, ExperimentLook, ExperimentsView, Outcome, Running, Topic};

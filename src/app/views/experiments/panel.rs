@@ -1,6 +1,10 @@
 use eframe::egui::{Button, ComboBox, TextEdit, Ui, vec2};
 
-use super::{AxisForm, AxisKind, ExperimentsView, Form, Running, Topic, sweep_folder::folder_form_ui};
+use super::{
+    AxisForm, ExperimentsView, Form, Running, Topic,
+    axis_form::{axis_example, axis_label},
+    sweep_folder::folder_form_ui,
+};
 use crate::{
     app::{
         shared::{Effect, Shared},
@@ -12,7 +16,10 @@ use crate::{
         },
     },
     dataset::FoldUnit,
-    evaluation::{MOST_STARTS, SimulatedSettings, experiments::PaperTable},
+    evaluation::{
+        MOST_STARTS,
+        experiments::{AxisKind, PaperTable},
+    },
     export::format_duration,
     sensor::counted,
     training::StoppingRules,
@@ -32,7 +39,7 @@ pub fn form_ui(ui: &mut Ui, experiments: &mut ExperimentsView, shared: &Shared, 
         dim_ui(ui, what_it_does(experiments.topic));
         let mut form = experiments.form().clone();
         let is_idle = experiments.running.is_none();
-        ui.add_enabled_ui(is_idle, |ui| fields_ui(ui, experiments.topic, &mut form, &shared.draft));
+        ui.add_enabled_ui(is_idle, |ui| fields_ui(ui, experiments.topic, &mut form, shared));
         match experiments.checked() {
             Ok(trials) => {
                 dim_ui(ui, &size_in_words(&form, *trials));
@@ -87,16 +94,17 @@ fn size_in_words(form: &Form, trials: usize) -> String {
     format!("{} of at most {epochs}", counted(networks, "training"))
 }
 
-fn fields_ui(ui: &mut Ui, topic: Topic, form: &mut Form, draft: &SimulatedSettings) {
+fn fields_ui(ui: &mut Ui, topic: Topic, form: &mut Form, shared: &Shared) {
     section_heading_ui(ui, "Values");
     match topic {
         Topic::Table(_) => form
             .axes
             .iter_mut()
-            .for_each(|axis| list_ui(ui, axis.kind.name(), axis)),
+            .for_each(|axis| list_ui(ui, axis_label(axis.kind), axis)),
         Topic::Sweep => {
+            let offered: Vec<AxisKind> = form.offered().collect();
             for (number, axis) in form.axes.iter_mut().enumerate() {
-                axis_ui(ui, number, axis);
+                axis_ui(ui, number, axis, &offered);
             }
         }
     }
@@ -105,7 +113,7 @@ fn fields_ui(ui: &mut Ui, topic: Topic, form: &mut Form, draft: &SimulatedSettin
     }
     section_heading_ui(ui, "Training");
     if topic == Topic::Sweep {
-        base_ui(ui, form, draft);
+        base_ui(ui, form, shared);
     }
     let template = &mut form.template;
     let hint = "Number of consecutive seeds for each cell, which show the spread of the results.";
@@ -153,20 +161,20 @@ fn list_ui(ui: &mut Ui, name: &str, axis: &mut AxisForm) {
     let edit = TextEdit::multiline(&mut axis.values)
         .desired_rows(1)
         .desired_width(f32::INFINITY)
-        .hint_text(axis.kind.example())
+        .hint_text(axis_example(axis.kind))
         .margin(vec2(space(2), space(1)));
     ui.add(edit).labelled_by(label.id).on_hover_text(hint);
 }
 
-fn axis_ui(ui: &mut Ui, number: usize, axis: &mut AxisForm) {
+fn axis_ui(ui: &mut Ui, number: usize, axis: &mut AxisForm, offered: &[AxisKind]) {
     let (name, values) = [("Across", "Values across"), ("Down", "Values down")][number.min(1)];
     let label = ui.label(name);
     let combo = ComboBox::from_id_salt(("sweep axis", number))
-        .selected_text(axis.kind.name())
+        .selected_text(axis_label(axis.kind))
         .width(ui.available_width());
     let shown = combo.show_ui(ui, |ui| {
-        for kind in AxisKind::ALL {
-            if ui.selectable_label(kind == axis.kind, kind.name()).clicked() && kind != axis.kind {
+        for &kind in offered {
+            if ui.selectable_label(kind == axis.kind, axis_label(kind)).clicked() && kind != axis.kind {
                 *axis = AxisForm::new(kind);
             }
         }
@@ -177,22 +185,28 @@ fn axis_ui(ui: &mut Ui, number: usize, axis: &mut AxisForm) {
 }
 
 /// Shows the settings common to all cells of a sweep, and a button that takes them from the Train view.
-fn base_ui(ui: &mut Ui, form: &mut Form, draft: &SimulatedSettings) {
+fn base_ui(ui: &mut Ui, form: &mut Form, shared: &Shared) {
     let base = &form.template.base;
-    let text = format!(
-        "{}, {}, {}, {}, where no axis says otherwise",
-        base.source.sensor.scale,
-        counted(base.hidden, "hidden node"),
-        counted(base.source.samples, "sample"),
-        base.training.method.name()
-    );
-    dim_ui(ui, &text);
-    let button = ui.add_enabled(base != draft, Button::new("Use the settings of the Train view"));
-    if button
-        .on_hover_text("Copies the sensor, scene, network and training settings from the Train view.")
-        .clicked()
-    {
-        form.template.base = *draft;
+    let mut parts = Vec::from_iter(form.setup().map(|setup| setup.source_name()));
+    parts.push(counted(base.hidden, "hidden node"));
+    let samples = base.source.simulation().map(|source| counted(source.samples, "sample"));
+    parts.extend(samples);
+    parts.push(base.training.method.name().to_owned());
+    dim_ui(ui, &format!("{}, where no axis says otherwise", parts.join(", ")));
+    let setup = shared.setup();
+    let is_other = setup.as_ref().is_ok_and(|setup| form.setup().as_ref() != Some(setup));
+    let button = ui.add_enabled(is_other, Button::new("Use the settings of the Train view"));
+    let button = button
+        .on_hover_text(
+            "Copies the source of the samples, the network and the training settings from the Train view. The axes follow \
+             from the source.",
+        )
+        .on_disabled_hover_text(match &setup {
+            Ok(_) => "These are the settings of the Train view",
+            Err(missing) => missing,
+        });
+    if let (true, Ok(setup)) = (button.clicked(), &setup) {
+        form.take(setup);
     }
 }
 

@@ -33,10 +33,10 @@ pub fn results_card_ui(
     });
     let conditions = RichText::new(describe_conditions(&outcome.results.experiment));
     ui.label(conditions.size(type_size().note).color(dim));
-    let note_height = note_size(ui, ui.available_width()).y + space(1);
+    let note_height = note_size(ui, &outcome.table, ui.available_width()).y + space(1);
     let table = vec2(ui.available_width(), ui.available_height() - note_height);
     ui.allocate_ui(table, |ui| table_ui(ui, outcome, look, shared, effects));
-    let note = RichText::new(ExperimentTable::NOTE).size(type_size().small);
+    let note = RichText::new(outcome.table.note).size(type_size().small);
     ui.label(note.color(dim));
 }
 
@@ -44,15 +44,15 @@ pub fn results_card_ui(
 pub fn results_card_height(ui: &Ui, outcome: &Outcome, width: f32) -> f32 {
     let width = width - MARGINS;
     let conditions = describe_conditions(&outcome.results.experiment);
-    let texts = text_size(ui, conditions, type_size().note, width).y + note_size(ui, width).y;
+    let texts = text_size(ui, conditions, type_size().note, width).y + note_size(ui, &outcome.table, width).y;
     let title = space(7);
     let rows = space(6) * (outcome.table.rows.len() as f32 + 1.0);
     // Gaps between the four.
     (MARGINS + title + texts + rows + space(5)).ceil()
 }
 
-fn note_size(ui: &Ui, width: f32) -> Vec2 {
-    text_size(ui, ExperimentTable::NOTE.to_owned(), type_size().small, width)
+fn note_size(ui: &Ui, table: &ExperimentTable, width: f32) -> Vec2 {
+    text_size(ui, table.note.to_owned(), type_size().small, width)
 }
 
 fn text_size(ui: &Ui, text: String, size: f32, width: f32) -> Vec2 {

@@ -18,11 +18,12 @@ use crate::{
         widgets::SortBy,
     },
     evaluation::{
-        SimulatedSettings,
+        Problem,
         experiments::{CellSummary, Experiment, ExperimentResults, Finished, PaperTable, Trial, Verdict, verdicts},
     },
     export::{ExperimentTable, sweep_specification},
     figure::{Figure, experiment_figure},
+    import::Plan,
     training::EpochRecord,
 };
 
@@ -131,6 +132,8 @@ pub enum Ending {
 pub struct Outcome {
     /// Everything; shared with a file being written.
     pub results: Arc<ExperimentResults>,
+    /// Plan by which its recording is read, if it is on one.
+    pub plan: Option<Plan>,
     /// For reading.
     pub table: ExperimentTable,
     /// For looking at.
@@ -147,7 +150,7 @@ pub struct Outcome {
 }
 
 impl Outcome {
-    fn new(experiment: Experiment) -> Self {
+    fn new(experiment: Experiment, plan: Option<Plan>) -> Self {
         let results = ExperimentResults::new(experiment);
         Self {
             table: ExperimentTable::new(&results),
@@ -155,6 +158,7 @@ impl Outcome {
             summaries: results.summaries(),
             verdicts: Vec::new(),
             results: Arc::new(results),
+            plan,
             ending: None,
             took: None,
             kept_bytes: 0,
@@ -172,8 +176,9 @@ impl Outcome {
     fn record(&mut self, finished: Finished) {
         let results = Arc::make_mut(&mut self.results);
         let settings = results.cells[finished.cell].cell.settings;
+        let problem = results.problem.clone();
         let outcome = finished.outcome.map(|mut trial| {
-            let bytes = bytes_of(&trial, &settings);
+            let bytes = bytes_of(&trial, settings.hidden, problem.as_deref());
             if self.kept_bytes + bytes > MOST_KEPT_BYTES {
                 trial.states = Vec::new();
             } else {
@@ -237,8 +242,8 @@ impl ExperimentsView {
     pub fn edit(&mut self, form: Form) {
         let (checked, preview, specification) = match form.experiment() {
             Ok(experiment) => {
-                let specification = sweep_specification(&experiment).map_err(|gap| gap.to_string());
-                let preview = Outcome::new(experiment);
+                let specification = sweep_specification(&experiment, form.plan.as_ref()).map_err(|gap| gap.to_string());
+                let preview = Outcome::new(experiment, form.plan.clone());
                 (Ok(preview.trials().1), Some(preview), specification)
             }
             Err(error) => {
@@ -262,7 +267,7 @@ impl ExperimentsView {
 
     /// Runs what is looked at.
     pub(super) fn run(&mut self, effects: &mut Vec<Effect>) {
-        let Ok(experiment) = self.form().experiment() else {
+        let (Ok(experiment), Some(setup)) = (self.form().experiment(), self.form().setup()) else {
             return;
         };
         effects.push(Effect::Settle(Matter::Experiments));
@@ -270,8 +275,8 @@ impl ExperimentsView {
             // It would stand in the place of the results.
             self.folder.close();
         }
-        self.begin(experiment.clone());
-        worker::run(&mut self.job, experiment);
+        self.begin(experiment.clone(), setup.plan().cloned());
+        worker::run(&mut self.job, experiment, setup);
     }
 
     /// Ends the one that runs; what is finished stays.
@@ -281,8 +286,8 @@ impl ExperimentsView {
     }
 
     /// Makes room for the results of `experiment`.
-    fn begin(&mut self, experiment: Experiment) {
-        let outcome = Outcome::new(experiment);
+    fn begin(&mut self, experiment: Experiment, plan: Option<Plan>) {
+        let outcome = Outcome::new(experiment, plan);
         self.running = Some(Running {
             topic: self.topic,
             done: 0,
@@ -292,6 +297,14 @@ impl ExperimentsView {
         });
         self.look = ExperimentLook::default();
         self.outcomes.insert(self.topic, outcome);
+    }
+
+    /// Takes the description of a recording that was read for the experiment under way.
+    pub(super) fn describe(&mut self, problem: Arc<Problem>) {
+        let running = self.running.as_ref();
+        if let Some(outcome) = running.and_then(|running| self.outcomes.get_mut(&running.topic)) {
+            Arc::make_mut(&mut outcome.results).problem = Some(problem);
+        }
     }
 
     /// Adds trials that have come to something.
@@ -340,9 +353,10 @@ impl ExperimentsView {
 }
 
 /// About how much memory the finished training of a trial takes.
-fn bytes_of(trial: &Trial, settings: &SimulatedSettings) -> usize {
-    let scale = settings.source.sensor.scale;
-    let weights = settings.hidden * (scale.columns() + 1) + (settings.hidden + 1) * scale.coordinates_per_row();
+fn bytes_of(trial: &Trial, hidden: usize, problem: Option<&Problem>) -> usize {
+    let weights = problem.map_or(0, |problem| {
+        hidden * (problem.inputs.len() + 1) + (hidden + 1) * problem.targets.len()
+    });
     // The present and the best weights, and up to as many numbers of the method's own.
     let of_start = 4 * weights * size_of::<f64>();
     trial.states.len() * of_start + trial.epochs * size_of::<EpochRecord>()

@@ -3,23 +3,26 @@
 use eframe::egui::Ui;
 
 use super::{ExperimentLook, Outcome, open_cell::open_cell};
-use crate::app::{
-    shared::{Effect, Shared},
-    theme::Theme,
-    widgets::{ColumnWidth, TableCell, TableClick, TableColumn, TableRow, TableView},
+use crate::{
+    app::{
+        shared::{Effect, Shared},
+        theme::Theme,
+        widgets::{ColumnWidth, TableCell, TableClick, TableColumn, TableRow, TableView},
+    },
+    export::{ExperimentColumn, ExperimentColumnKind},
 };
 
 /// Lays out the table over the available space; it scrolls where it is larger.
 pub fn table_ui(ui: &mut Ui, outcome: &Outcome, look: &mut ExperimentLook, shared: &Shared, effects: &mut Vec<Effect>) {
     let palette = &Theme::of(ui).palette;
     let axes = outcome.results.experiment.axes().count();
-    let headings = &outcome.table.headings;
-    let column = |(place, heading): (usize, &&'static str)| {
+    let headings = &outcome.table.columns;
+    let column = |(place, of_table): (usize, &ExperimentColumn)| {
         let texts = outcome.table.rows.iter().map(|row| row[place].as_str());
         let column = if place < axes {
-            TableColumn::text(heading)
+            TableColumn::text(of_table.heading)
         } else {
-            TableColumn::figure(heading)
+            TableColumn::figure(of_table.heading)
         };
         column.width(ColumnWidth::of_longest(texts))
     };
@@ -32,25 +35,29 @@ pub fn table_ui(ui: &mut Ui, outcome: &Outcome, look: &mut ExperimentLook, share
         let texts = &outcome.table.rows[number];
         let name = texts[..axes].join(", ");
         let loses = loses_to_linear_map(outcome, number);
-        let cells = headings.iter().zip(texts).enumerate().map(|(column, (heading, text))| {
-            let is_median = heading.starts_with("Z") && heading.ends_with("median");
-            let is_beaten = loses && heading.starts_with("linear");
-            let colour = match *heading {
-                _ if is_median => palette.accent,
-                heading if heading.ends_with("publ.") => palette.dim,
-                _ if is_beaten => palette.warning,
-                _ => palette.text,
-            };
-            let meaning = if is_beaten {
-                "The linear map is more accurate here than the network."
-            } else {
-                ""
-            };
-            TableCell::new(text)
-                .colour(colour)
-                .strong(is_median || column < axes)
-                .meaning(meaning)
-        });
+        let cells = headings
+            .iter()
+            .zip(texts)
+            .enumerate()
+            .map(|(column, (of_table, text))| {
+                let is_median = of_table.kind == ExperimentColumnKind::Ranking;
+                let is_beaten = loses && of_table.kind == ExperimentColumnKind::Linear;
+                let colour = match of_table.kind {
+                    ExperimentColumnKind::Ranking => palette.accent,
+                    ExperimentColumnKind::Published => palette.dim,
+                    _ if is_beaten => palette.warning,
+                    _ => palette.text,
+                };
+                let meaning = if is_beaten {
+                    "The linear baseline is more accurate here than the network."
+                } else {
+                    ""
+                };
+                TableCell::new(text)
+                    .colour(colour)
+                    .strong(is_median || column < axes)
+                    .meaning(meaning)
+            });
         TableRow::new(cells)
             .labelled(format!("Cell {name}"))
             .named(name)
@@ -72,6 +79,6 @@ pub fn table_ui(ui: &mut Ui, outcome: &Outcome, look: &mut ExperimentLook, share
 
 fn loses_to_linear_map(outcome: &Outcome, cell: usize) -> bool {
     let summary = &outcome.summaries[cell];
-    let both = summary.z_percent.median.zip(summary.linear_z_percent);
+    let both = summary.percent.median.zip(summary.linear_percent);
     both.is_some_and(|(network, linear)| network > linear)
 }

@@ -33,6 +33,7 @@ impl View for ExperimentsView {
         let mut finished = Vec::new();
         while let Some(event) = self.job.next_event() {
             match event {
+                ExperimentEvent::Read(problem) => self.describe(problem),
                 ExperimentEvent::Finished(trial) => finished.push(*trial),
                 ExperimentEvent::Ended(result) => {
                     self.record(std::mem::take(&mut finished));

@@ -69,10 +69,9 @@ pub fn table_ui(ui: &mut Ui, level: &TradeOffLevel, marked: &mut Option<usize>) 
         .filter(|figure| has_limit || *figure != Figure::ToLimit)
         .collect();
     let names = TableColumn::text("").width(ColumnWidth::Rest);
-    let has_nodes = level.noise.is_some();
     let headings = figures
         .iter()
-        .map(|figure| TableColumn::figure(figure.heading(has_nodes)));
+        .map(|figure| TableColumn::figure(figure.heading(level.noise.is_some())));
     let columns: Vec<TableColumn<'_>> = std::iter::once(names).chain(headings).collect();
     let frame_us = |number: usize| level.points[number].report.cost.frame_us;
     let mut order: Vec<usize> = (0..level.points.len()).collect();

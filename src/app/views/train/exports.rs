@@ -12,7 +12,7 @@ use crate::{
         RunView, Shared, SourceKind, copy_exports, csv_export, error_table_export, file_stem, loss_export,
         network_exports, picture_exports,
     },
-    evaluation::{DecoderReport, TestErrors},
+    evaluation::DecoderReport,
     export::{decoder_table, error_table},
     figure::{Figure, surface::ViewMode},
 };
@@ -94,7 +94,7 @@ pub(super) fn train_exports<'a>(view: &'a TrainView, shared: &'a Shared) -> Vec<
         if reports.is_empty() {
             return Err("No decoder is measured yet: unfold “More decoders”.".to_owned());
         }
-        Ok(move || decoder_table(&reports, run.baselines.reference.as_ref().and_then(TestErrors::nodes)))
+        Ok(move || decoder_table(&run.problem, &reports, run.baselines.reference.as_ref()))
     });
     exports.push(csv_export(
         "Decoder table",

@@ -25,7 +25,7 @@ impl RecordingEditor {
                 Box::new(move || {
                     let stem = plan.import.data.file_stem().unwrap_or_default().to_string_lossy();
                     let stem = format!("{stem}-recipe");
-                    let contents = Contents::new(move |path| RecipeFile::save(&plan, path));
+                    let contents = Contents::new(move |path| RecipeFile::save(&*plan, path));
                     Effect::ChooseFile(FileTask::save(RECIPE, &stem, contents))
                 })
             });

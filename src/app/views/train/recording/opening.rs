@@ -273,7 +273,7 @@ fn reopen(mut reopened: Reopened, watch: Watch<'_>) -> Result<Opened, String> {
 fn open_document(kind: DocumentKind, path: &Path, watch: Watch<'_>) -> Result<Opened, String> {
     match kind {
         DocumentKind::Recipe => {
-            let plan = RecipeFile::load(path).map_err(|error| error.to_string())?;
+            let plan = RecipeFile::load_recording(path).map_err(|error| error.to_string())?;
             match reopen(Reopened::from(plan), watch)? {
                 Opened::Import(draft, _) => Ok(Opened::Recipe(draft)),
                 opened => Ok(opened),

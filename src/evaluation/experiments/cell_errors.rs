@@ -3,12 +3,13 @@ use std::cmp::Ordering;
 use super::{CellResults, ExperimentResults};
 use crate::evaluation::{Spread, format::format_number};
 
-/// A cell with results.
+/// Errors of the trials of a cell that has some.
 #[derive(Clone, Debug)]
-pub(super) struct Measured {
+pub(super) struct CellErrors {
     pub(super) label: String,
     pub(super) column: usize,
-    pub(super) z: Spread,
+    /// Errors of the network in percent.
+    pub(super) percent: Spread,
     pub(super) published: Option<f64>,
     pub(super) linear: Option<f64>,
     pub(super) bound: Option<f64>,
@@ -16,30 +17,30 @@ pub(super) struct Measured {
     trials: usize,
 }
 
-impl Measured {
+impl CellErrors {
     /// Fewest trials that have a spread. By chance, the ranges of three and three trials are apart in this order once in 20.
     pub(super) const FEWEST_TRIALS: usize = 3;
 
     /// Returns the cells that have results.
     pub(super) fn all(results: &ExperimentResults) -> Vec<Self> {
-        let measure = |cell: &CellResults| {
+        let errors = |cell: &CellResults| {
             let place = cell.cell;
             let median = |spread: Option<Spread>| spread.map(|spread| spread.median);
             Some(Self {
                 label: results.cell_labels(cell).join("/"),
                 column: place.column,
-                z: cell.z_percent()?,
+                percent: cell.percent()?,
                 published: place.published.map(|published| published.z_percent),
-                linear: median(cell.spread(|trial| trial.baselines.linear.z_percent)),
+                linear: median(cell.spread(|trial| trial.baselines.linear.percent())),
                 trials: cell
                     .trials
                     .iter()
-                    .filter(|trial| trial.errors.z_percent.is_some())
+                    .filter(|trial| trial.errors.percent().is_some())
                     .count(),
-                bound: median(cell.spread(|trial| trial.bottleneck.z_percent)),
+                bound: median(cell.spread(|trial| trial.bottleneck.as_ref()?.percent())),
             })
         };
-        results.cells.iter().filter_map(measure).collect()
+        results.cells.iter().filter_map(errors).collect()
     }
 
     /// Compares the errors of all trials with a figure; `None` within their spread, or with too few trials.
@@ -50,11 +51,12 @@ impl Measured {
     /// Compares the errors of all trials with those of another cell; `None` if their ranges overlap, or with too few trials.
     pub(super) fn compare(&self, other: &Self) -> Option<Ordering> {
         let is_enough = other.trials >= Self::FEWEST_TRIALS;
-        self.apart([other.z.smallest, other.z.largest]).filter(|_| is_enough)
+        self.apart([other.percent.smallest, other.percent.largest])
+            .filter(|_| is_enough)
     }
 
     fn apart(&self, [low, high]: [f64; 2]) -> Option<Ordering> {
-        match self.z {
+        match self.percent {
             _ if self.trials < Self::FEWEST_TRIALS => None,
             Spread { largest, .. } if largest < low => Some(Ordering::Less),
             Spread { smallest, .. } if smallest > high => Some(Ordering::Greater),
@@ -62,16 +64,16 @@ impl Measured {
         }
     }
 
-    /// Returns the label and Z errors as text.
+    /// Returns the label and errors as text.
     pub(super) fn figures(&self) -> String {
-        format!("{}: {}", self.label, spread(&self.z))
+        format!("{}: {}", self.label, spread(&self.percent))
     }
 }
 
 /// Sorts cells by a key, ascending.
-pub(super) fn sorted_by<K: Ord>(mut measured: Vec<Measured>, key: impl FnMut(&Measured) -> K) -> Vec<Measured> {
-    measured.sort_by_key(key);
-    measured
+pub(super) fn sorted_by<K: Ord>(mut cells: Vec<CellErrors>, key: impl FnMut(&CellErrors) -> K) -> Vec<CellErrors> {
+    cells.sort_by_key(key);
+    cells
 }
 
 /// Formats the median, and the smallest to largest value where they differ.
