@@ -6,14 +6,14 @@ use super::failure::Failure;
 use crate::{
     dataset::SimulationError,
     export::NetworkFile,
-    import::{InputError, InputLine, InputLineError, InputLines},
+    import::{InputLine, InputLineError, InputLines},
     live::{LineError, LineParser, ParsedLine, Source},
 };
 
 /// Parser of the lines of an array or of a recording.
 pub(super) enum Parser {
     /// Resistances, row by row or in whole snapshots.
-    Array(LineParser),
+    Array(Box<LineParser>),
     /// Columns under the names of the inputs.
     Columns(Box<InputLines>),
 }
@@ -21,15 +21,7 @@ pub(super) enum Parser {
 /// Error in a line.
 pub(super) enum ParseError {
     Array(LineError),
-    /// It has other columns than the network has inputs, so that no later line can be decoded.
-    OtherColumns {
-        line: u64,
-        source: InputError,
-    },
-    Bad {
-        line: u64,
-        reason: String,
-    },
+    Columns { line: u64, source: InputLineError },
 }
 
 impl Parser {
@@ -38,7 +30,7 @@ impl Parser {
         Ok(match file.settings.source.simulation() {
             Some(simulation) => {
                 let parser = LineParser::new(simulation.sensor.scale, simulation.scene.rows, is_complete);
-                Self::Array(parser.map_err(SimulationError::from)?)
+                Self::Array(Box::new(parser.map_err(SimulationError::from)?))
             }
             None => Self::Columns(Box::new(file.input_lines())),
         })
@@ -53,11 +45,7 @@ impl Parser {
                     row_index: Some(row_index),
                     readings_ohm: readings,
                 }),
-                Err(InputLineError::Header(source)) => Err(ParseError::OtherColumns { line, source }),
-                Err(error) => Err(ParseError::Bad {
-                    line,
-                    reason: error.to_string(),
-                }),
+                Err(source) => Err(ParseError::Columns { line, source }),
             },
         }
     }
@@ -75,8 +63,7 @@ impl ParseError {
     pub(super) fn is_final(&self) -> bool {
         match self {
             Self::Array(error) => error.is_final(),
-            Self::OtherColumns { .. } => true,
-            Self::Bad { .. } => false,
+            Self::Columns { source, .. } => source.is_final(),
         }
     }
 
@@ -84,11 +71,7 @@ impl ParseError {
     pub(super) fn failure(self, input: Source) -> Failure {
         match self {
             Self::Array(error) => Failure::Line(input, error),
-            Self::OtherColumns { line, source } => Failure::OtherColumns { input, line, source },
-            error @ Self::Bad { .. } => Failure::NothingDecoded {
-                input,
-                reason: error.to_string(),
-            },
+            Self::Columns { line, source } => Failure::OtherColumns { input, line, source },
         }
     }
 }
@@ -97,8 +80,7 @@ impl fmt::Display for ParseError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Array(error) => error.fmt(f),
-            Self::OtherColumns { line, source } => write!(f, "line {line}: {source}"),
-            Self::Bad { line, reason } => write!(f, "line {line}: {reason}"),
+            Self::Columns { line, source } => write!(f, "line {line}: {source}"),
         }
     }
 }

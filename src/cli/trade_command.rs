@@ -11,11 +11,7 @@ use crate::{
 /// recording that have no network.
 pub(super) fn command(point: &TradeOffPoint, plan: Option<&Plan>, import: &ImportArguments) -> Option<String> {
     match (plan, point.settings.simulated()) {
-        (Some(plan), _) => {
-            point.hidden()?;
-            let setup = Setup::recording(point.settings, plan.clone());
-            train_command(&setup, import.recipe()).ok()
-        }
+        (Some(plan), _) => on_recording(point, plan, import),
         (None, Some(settings)) => Some(on_array(point, &settings)),
         (None, None) => None,
     }
@@ -58,4 +54,10 @@ fn on_array(point: &TradeOffPoint, settings: &SimulatedSettings) -> String {
         command += &format!(" --hidden {hidden}");
     }
     command + &format!(" --decoder {}", point.report.kind)
+}
+
+fn on_recording(point: &TradeOffPoint, plan: &Plan, import: &ImportArguments) -> Option<String> {
+    point.hidden()?;
+    let setup = Setup::recording(point.settings, plan.clone());
+    train_command(&setup, import.recipe()).ok()
 }

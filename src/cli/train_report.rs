@@ -16,7 +16,7 @@ use super::{
 use crate::{
     evaluation::{
         Baselines, Channel, DecoderReport, Errors, Outlook, ReferenceNote, Run, RunError, SimulatedSettings,
-        StartRecord, best_start, error_remarks,
+        StartRecord, TestErrors, best_start, error_remarks,
         recorded::{Determination, Undetermined},
     },
     export::{
@@ -335,8 +335,7 @@ impl<'a> Trained<'a> {
     /// Writes the errors of each decoder and their ratio to the reference.
     fn write_decoders(&self, out: &mut dyn Write) -> io::Result<()> {
         let reference = self.file.scores.baselines.reference.as_ref();
-        let reference = reference.and_then(|errors| errors.nodes());
-        if reference.is_some_and(Errors::is_rounding) {
+        if reference.and_then(TestErrors::nodes).is_some_and(Errors::is_rounding) {
             writeln!(
                 out,
                 "The reference is nothing but rounding: the readings determine the deformation, and no ratio to it is \

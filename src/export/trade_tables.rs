@@ -5,14 +5,15 @@ use crate::{
     figure::trade_words::point_name,
 };
 
-/// Returns every point of every level, with all its figures: for programs.
+/// Every point of every level, with all its figures: for programs.
 pub fn trade_off_points(levels: &[TradeOffLevel]) -> Table {
-    const FIELDS: [&str; 16] = [
+    const FIELDS: [&str; 17] = [
         "noise",
         "preset",
         "decoder",
         "precision",
         "hidden",
+        "method",
         "samples",
         "epochs",
         "z_percent",
@@ -44,6 +45,9 @@ pub fn trade_off_points(levels: &[TradeOffLevel]) -> Table {
                 report.kind.to_string().into(),
                 precision.into(),
                 count(hidden),
+                point
+                    .method()
+                    .map_or(Cell::Number(None), |method| method.short_name().into()),
                 count(point.settings.source.simulation().map(|simulation| simulation.samples)),
                 count(hidden.map(|_| point.settings.training.stopping.epochs)),
                 report.errors.percent().into(),
@@ -59,15 +63,24 @@ pub fn trade_off_points(levels: &[TradeOffLevel]) -> Table {
         };
         points.map(row).collect::<Vec<_>>()
     };
-    let table = Table {
+    let mut table = Table {
         columns: FIELDS.map(TableColumn::field).to_vec(),
         rows: levels.iter().flat_map(of_level).collect(),
     };
-    let mut points = levels.iter().flat_map(|level| &level.points);
-    for_source(table, points.all(is_of_array))
+    if levels.iter().all(|level| level.noise.is_none()) {
+        let of_arrays = ["noise", "preset", "samples", "z_mm", "residual"];
+        for field in of_arrays.into_iter().chain(["reference_z_percent", "reference_z_mm"]) {
+            table.remove_column(field);
+        }
+        let percent = table.columns.iter_mut().find(|column| column.field == "z_percent");
+        percent
+            .into_iter()
+            .for_each(|column| *column = TableColumn::field("percent_of_range"));
+    }
+    table
 }
 
-/// Returns the points of one level, fastest first: for readers.
+/// The points of one level, fastest first: for readers.
 pub fn trade_off_summary(level: &TradeOffLevel) -> Table {
     let row = |point: &TradeOffPoint| {
         vec![
@@ -92,37 +105,16 @@ pub fn trade_off_summary(level: &TradeOffLevel) -> Table {
         ],
         rows: points.into_iter().map(row).collect(),
     };
+    if level.noise.is_none() {
+        table.remove_column("z_mm");
+        let percent = table.columns.iter_mut().find(|column| column.field == "z_percent");
+        percent
+            .into_iter()
+            .for_each(|column| *column = TableColumn::new("percent_of_range", "MAE", "% of range"));
+    }
     // Without noise there is no limit to compare with.
     if level.points.iter().all(|point| point.to_reference().is_none()) {
         table.remove_column("times_reference");
-    }
-    for_source(table, level.points.iter().all(is_of_array))
-}
-
-fn is_of_array(point: &TradeOffPoint) -> bool {
-    point.settings.source.simulation().is_some()
-}
-
-/// Returns the table of an array, or for a recording the same table without columns that need a sensor model.
-fn for_source(mut table: Table, is_array: bool) -> Table {
-    const OF_ARRAYS: [&str; 7] = [
-        "noise",
-        "preset",
-        "samples",
-        "z_mm",
-        "residual",
-        "reference_z_percent",
-        "reference_z_mm",
-    ];
-    if is_array {
-        return table;
-    }
-    OF_ARRAYS.iter().for_each(|field| table.remove_column(field));
-    for column in table.columns.iter_mut().filter(|column| column.field == "z_percent") {
-        *column = match column.heading.as_str() {
-            "Z" => TableColumn::new("percent_of_range", "MAE", "% of range"),
-            _ => TableColumn::field("percent_of_range"),
-        };
     }
     table
 }
@@ -171,6 +163,7 @@ mod tests {
             "decoder",
             "precision",
             "hidden",
+            "method",
             "epochs",
             "percent_of_range",
             "frame_us",

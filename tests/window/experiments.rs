@@ -4,7 +4,10 @@ use std::{fs, num::NonZero};
 
 use decoupler::{
     app::Phase,
-    evaluation::experiments::{Axis, Experiment, ExperimentResults, PaperTable, run_experiments, verdicts},
+    evaluation::{
+        RunSettings,
+        experiments::{Axis, Experiment, ExperimentResults, PaperTable, TrialSamples, run_experiments, verdicts},
+    },
     export::ExperimentTable,
 };
 
@@ -50,6 +53,7 @@ fn by_library(experiment: &Experiment) -> ExperimentResults {
     };
     run_experiments(
         std::slice::from_ref(experiment),
+        &TrialSamples::Drawn,
         NonZero::<usize>::MIN,
         || false,
         record,
@@ -71,8 +75,8 @@ fn a_table_ends_with_the_librarys_own_numbers_and_verdicts() {
     let table = ExperimentTable::new(&results);
     let mut compared = 0;
     for row in &table.rows {
-        for (heading, text) in table.headings.iter().zip(row).skip(1) {
-            if !TIMES.contains(heading) {
+        for (heading, text) in table.columns.iter().map(|column| column.heading).zip(row).skip(1) {
+            if !TIMES.contains(&heading) {
                 let shown = format!("{}, {heading}: {text}", row[0]);
                 assert!(driver.has(&shown), "{shown} is not among {:#?}", driver.texts());
                 compared += 1;
@@ -97,9 +101,9 @@ fn a_table_ends_with_the_librarys_own_numbers_and_verdicts() {
     driver.click("Cell 4");
     driver.click(OPEN);
     wait_for_the_network(&mut driver);
-    assert_eq!(driver.state().draft, experiment.cells()[1].settings);
+    assert_eq!(RunSettings::from(driver.state().draft), experiment.cells()[1].settings);
     assert_eq!(driver.state().run.as_ref().unwrap().history.len(), 1 + 3);
-    let z = results.cells[1].trials[0].errors.z_percent;
+    let z = results.cells[1].trials[0].errors.percent();
     let shown = driver.state().result().unwrap().errors.percent();
     assert_eq!(shown.map(f64::to_bits), z.map(f64::to_bits), "it is the cell's network");
 }
@@ -131,7 +135,7 @@ fn a_cell_of_a_cross_validation_is_trained_where_it_is_opened() {
     let wanted = driver.views().experiments.outcome().unwrap().results.cells[0]
         .cell
         .settings;
-    assert_eq!(state.draft, wanted);
+    assert_eq!(RunSettings::from(state.draft), wanted);
     assert_eq!(state.result().unwrap().epochs_run, 3);
 }
 
@@ -221,7 +225,7 @@ fn a_sweep_is_shown_as_a_map_and_saved() {
     let outcome = driver.views().experiments.outcome().unwrap();
     let results = by_library(&outcome.results.experiment);
     for (cell, z) in results.cells.iter().zip(["2, 50", "3, 50", "2, 100", "3, 100"]) {
-        let percent = decoupler::export::format_percent(cell.z_percent().map(|spread| spread.median));
+        let percent = decoupler::export::format_percent(cell.percent().map(|spread| spread.median));
         let label = format!("{z}: median Z error {percent}");
         assert!(driver.has(&label), "{label} is not among {:#?}", driver.texts());
     }

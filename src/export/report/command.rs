@@ -32,7 +32,9 @@ pub fn train_command(setup: &Setup, recipe: Option<&Path>) -> Result<String, Com
         (Some(settings), _) => {
             check_simulation(&settings)?;
             command.simulation(&settings);
-            SimulatedSettings::default().into()
+            let default = SimulatedSettings::default();
+            command.option("hidden", settings.hidden, default.hidden);
+            default.into()
         }
         (None, Some(plan)) => {
             let default = RunSettings::from(Measured { rows: RowModel::Shared });
@@ -46,6 +48,7 @@ pub fn train_command(setup: &Setup, recipe: Option<&Path>) -> Result<String, Com
                 command.add("rows", "known");
             }
             command.option("scaling", settings.inputs.scaling, default.inputs.scaling);
+            command.add("hidden", settings.hidden);
             default
         }
         (None, None) => return Err(CommandGap(vec!["samples in memory"])),
@@ -171,7 +174,7 @@ impl Command {
             None => default.by,
         };
         // The recipe may have another division.
-        if recipe.is_some() || division.by != by_default {
+        if recipe.is_some() || division.by != by_default || division.by != default.by {
             self.add("split", division.by);
         }
         if plan.test.is_none() && (recipe.is_some() || division.test_fraction != default.test_fraction) {
@@ -235,7 +238,6 @@ impl Command {
 
     /// Adds the options of the network and its training.
     fn training(&mut self, settings: &RunSettings, default: &RunSettings) {
-        self.option("hidden", settings.hidden, default.hidden);
         self.option("starts", settings.starts, default.starts);
         let (mut method, mut usual_method) = (settings.training.method, default.training.method);
         self.option("method", method.short_name(), usual_method.short_name());

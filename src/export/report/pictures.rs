@@ -12,7 +12,7 @@ use crate::{
     figure::{
         Figure, RegressionLine, SequentialMap, TargetSurface, error_histogram_figure, loss_figure, regression_figure,
         surface::{OrbitCamera, Quantity, Surface, SurfaceFigure, ViewMode},
-        target_histogram_figure, target_regression_figure, training_state_figure, z_pairs_mm,
+        target_histogram_figure, target_pairs, target_regression_figure, training_state_figure, z_pairs_mm,
     },
     surface::SurfaceMap,
 };
@@ -62,9 +62,7 @@ fn array_errors(test: &Dataset, decoupled_mm: &Array2<f64>) -> [(String, Figure)
 fn target_errors(file: &NetworkFile, test: &Dataset, answers: &Array2<f64>) -> Vec<(String, Figure)> {
     let targets = file.problem.targets.iter().enumerate().take(MAX_TARGETS);
     let of_target = |(index, target): (usize, &Channel)| {
-        let actual = test.targets();
-        let pairs =
-            Vec::from_iter((0..test.samples()).map(|sample| (actual[[sample, index]], answers[[sample, index]])));
+        let pairs = target_pairs(test, answers, index);
         let line = RegressionLine::of(pairs.iter().copied());
         let (name, unit) = (&target.name, target.unit.as_deref());
         [

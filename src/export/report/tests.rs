@@ -248,7 +248,7 @@ fn the_command_of_a_recording_names_files_columns_and_division() {
     assert_eq!(
         command(&plan, settings, None).unwrap(),
         "decoupler train --data press.csv --join 'my states.csv' --join-time t2 --join-limit 0.5 --inputs c2..c5 --targets \
-         force --time t --group session --where 't>0' --missing -1"
+         force --time t --group session --where 't>0' --missing -1 --split group --hidden 12"
     );
     // The default method has settings of its own for recordings; others hold a part out for validation.
     let mut other = settings;
@@ -257,12 +257,12 @@ fn the_command_of_a_recording_names_files_columns_and_division() {
     plan.division.validation_fraction = 0.0;
     let text = command(&plan, other, None).unwrap();
     assert!(
-        text.ends_with("--split random --validation-fraction 0 --method lm"),
+        text.ends_with("--split random --validation-fraction 0 --hidden 12 --method lm"),
         "{text}"
     );
     assert_eq!(
         command(&plan, settings, Some("recipe.json")).unwrap(),
-        "decoupler train --recipe recipe.json --split random --test-fraction 0.2 --validation-fraction 0"
+        "decoupler train --recipe recipe.json --split random --test-fraction 0.2 --validation-fraction 0 --hidden 12"
     );
     plan.import.join[0].stem = Some("other".to_owned());
     assert!(command(&plan, settings, None).unwrap_err().contains("joined files"));

@@ -94,8 +94,9 @@ impl SweepRow {
 
     fn is_told_by_options(&self, field: &str) -> bool {
         let is_option = self.options.contains_key(&field.replace('_', "-"));
-        // The option is the largest number of epochs, the result the number that were run.
-        (is_option && field != "epochs") || ["scene", "inputs"].contains(&field)
+        // The option is the largest number of epochs, the result the number that were run; of targets the option has the names,
+        // the result the errors.
+        (is_option && !["epochs", "targets"].contains(&field)) || ["scene", "inputs"].contains(&field)
     }
 }
 
@@ -165,12 +166,22 @@ fn sorted(value: &Value) -> String {
     }
 }
 
-/// Visits everything in `value` that is no object, with its place.
+/// Visits everything in `value` that is no object, with its place. Objects of a list are placed by their names, if they have
+/// some.
 fn flatten(value: &Value, place: &str, visit: &mut impl FnMut(&str, &Value)) {
     match value {
         Value::Object(fields) => {
             for (name, value) in fields {
                 flatten(value, &joined(place, name), visit);
+            }
+        }
+        Value::Array(values) if values.iter().any(|value| value["name"].is_string()) => {
+            for value in values {
+                let Value::Object(fields) = value else { continue };
+                let place = joined(place, value["name"].as_str().unwrap_or_default());
+                for (field, value) in fields.iter().filter(|(field, _)| *field != "name") {
+                    flatten(value, &joined(&place, field), visit);
+                }
             }
         }
         value => visit(place, value),
@@ -250,6 +261,27 @@ mod tests {
                 ("time.seconds", "1.5"),
             ]
         );
+    }
+
+    #[test]
+    fn errors_of_targets_are_columns_by_their_names() {
+        let report = json!({
+            "targets": [{"name": "fx", "unit": null, "rmse": 0.5}, {"name": "fz", "unit": "N", "rmse": 0.25}],
+            "baselines": {"ridge": [{"name": "fx", "rmse": 0.75}]},
+        });
+        let cells = row(json!({"targets": ["fx", "fz"]}), report).cells();
+        let of_results = cells.iter().filter(|(column, _)| matches!(column, Column::Result(_)));
+        let of_results: Vec<_> = of_results
+            .map(|(column, text)| (column.heading(), text.as_str()))
+            .collect();
+        let expected = [
+            ("result.baselines.ridge.fx.rmse", "0.75"),
+            ("result.targets.fx.rmse", "0.5"),
+            ("result.targets.fx.unit", ""),
+            ("result.targets.fz.rmse", "0.25"),
+            ("result.targets.fz.unit", "N"),
+        ];
+        assert_eq!(of_results, expected.map(|(heading, text)| (heading.to_owned(), text)));
     }
 
     #[test]

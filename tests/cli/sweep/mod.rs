@@ -5,5 +5,6 @@ mod filling;
 #[cfg(target_os = "linux")]
 mod job_scripts;
 mod merging;
+mod recordings;
 mod specifications;
 mod stopping;

@@ -128,6 +128,10 @@ impl Form {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::{
+        evaluation::{Measured, RunSettings, SimulatedSettings},
+        scene::RowModel,
+    };
 
     #[test]
     fn every_topic_begins_with_what_can_be_run() {
@@ -138,6 +142,41 @@ mod tests {
                 Topic::Sweep => assert_eq!(experiment.cells().len(), 12),
             }
         }
+    }
+
+    #[test]
+    fn a_recording_changes_the_axes_that_it_does_not_have() {
+        let plan = Plan::default();
+        let settings = RunSettings::from(Measured { rows: RowModel::Shared });
+        let setup = Setup::recording(settings, plan);
+        let mut form = Form::new(Topic::Sweep);
+        form.take(&setup);
+        assert_eq!(form.setup(), Some(setup));
+        let kinds: Vec<_> = form.axes.iter().map(|axis| axis.kind).collect();
+        assert_eq!(kinds, [AxisKind::Hidden, AxisKind::Scaling], "samples are of arrays");
+        let experiment = form.experiment().unwrap();
+        assert_eq!(experiment.base, settings);
+        // Bayesian regularisation has the settings that suit recordings, as in the Train view.
+        form.axes[1] = AxisForm {
+            kind: AxisKind::Method,
+            values: "lm br".to_owned(),
+        };
+        let Some(Axis::Method(methods)) = form.experiment().unwrap().second_axis else {
+            panic!("the second axis is of methods");
+        };
+        assert_eq!(methods[1], Method::recorded_regularization());
+        form.axes[1] = AxisForm::new(AxisKind::Split);
+        assert_eq!(form.experiment().unwrap().cells().len(), 8);
+        form.axes[1].values = "group".to_owned();
+        assert!(
+            form.experiment()
+                .unwrap_err()
+                .to_string()
+                .contains("no column of groups")
+        );
+        form.take(&SimulatedSettings::default().into());
+        assert_eq!(form.axes[1].kind, AxisKind::Array);
+        assert_eq!(form.template.recording, None);
     }
 
     #[test]

@@ -23,19 +23,41 @@ pub(super) struct SweepCell {
     pub(super) value: Option<f64>,
 }
 
-/// Results of a trial: heading, and place in its report.
-const RESULTS: [(&str, &str); 4] = [
-    ("Z %", "/errors/z_percent"),
-    ("X %", "/errors/x_percent"),
-    ("linear map Z %", "/baselines/linear/z_percent"),
-    ("epochs", "/epochs"),
+/// Results of a trial: heading, place in its report and, for a list of targets, the field whose mean over the targets counts.
+type Result = (&'static str, &'static str, Option<&'static str>);
+
+/// Results on an array.
+const ON_NODES: [Result; 4] = [
+    ("Z %", "/errors/z_percent", None),
+    ("X %", "/errors/x_percent", None),
+    ("linear map Z %", "/baselines/linear/z_percent", None),
+    ("epochs", "/epochs", None),
 ];
+
+/// Results on a recording; the error is the mean absolute one in percent of the range.
+const ON_TARGETS: [Result; 4] = [
+    ("error %", "/targets", Some("percent_of_range")),
+    ("R²", "/targets", Some("r2")),
+    ("ridge %", "/baselines/ridge", Some("percent_of_range")),
+    ("epochs", "/epochs", None),
+];
+
+fn results_of(merged: &MergedSweep) -> Vec<Result> {
+    let is_recorded = |row: &SweepRow| row.result.get("targets").is_some();
+    let (recorded, simulated): (Vec<_>, Vec<_>) = merged.trials.iter().partition(|row| is_recorded(row));
+    match (recorded.is_empty(), simulated.is_empty()) {
+        (true, _) => ON_NODES.to_vec(),
+        (false, true) => ON_TARGETS.to_vec(),
+        (false, false) => ON_NODES[..3].iter().chain(&ON_TARGETS).copied().collect(),
+    }
+}
 
 impl SweepTable {
     pub(super) fn of(merged: &MergedSweep) -> Self {
         let options = varying(merged);
-        let results = RESULTS.map(|(heading, _)| heading.to_owned());
-        let headings = options.iter().cloned().chain(results).chain(["seconds".to_owned()]);
+        let results = results_of(merged);
+        let of_results = results.iter().map(|(heading, ..)| (*heading).to_owned());
+        let headings = options.iter().cloned().chain(of_results).chain(["seconds".to_owned()]);
         let mut problems = merged.damaged.clone();
         let conflicts = merged.conflicting.iter();
         problems
@@ -43,7 +65,7 @@ impl SweepTable {
         Self {
             headings: headings.collect(),
             options: options.len(),
-            rows: merged.trials.iter().map(|row| cells(row, &options)).collect(),
+            rows: merged.trials.iter().map(|row| cells(row, &options, &results)).collect(),
             trials: merged.trials.len() + merged.missing.len() + merged.conflicting.len(),
             problems,
         }
@@ -67,13 +89,22 @@ fn varying(merged: &MergedSweep) -> Vec<String> {
     options
 }
 
-fn cells(row: &SweepRow, options: &[String]) -> Vec<SweepCell> {
+fn cells(row: &SweepRow, options: &[String], results: &[Result]) -> Vec<SweepCell> {
     let of_options = options.iter().map(|option| SweepCell::of(row.options.get(option)));
-    let of_results = RESULTS
+    let of_results = results
         .iter()
-        .map(|(_, place)| SweepCell::of(row.result.pointer(place)));
+        .map(|(_, place, field)| match (row.result.pointer(place), field) {
+            (Some(Value::Array(targets)), Some(field)) => SweepCell::of(mean(targets, field).as_ref()),
+            (value, _) => SweepCell::of(value),
+        });
     let seconds = SweepCell::of(row.time.get("seconds"));
     of_options.chain(of_results).chain([seconds]).collect()
+}
+
+/// Mean of a field over the targets that have it.
+fn mean(targets: &[Value], field: &str) -> Option<Value> {
+    let values = Vec::from_iter(targets.iter().filter_map(|target| target[field].as_f64()));
+    (!values.is_empty()).then(|| Value::from(values.iter().sum::<f64>() / values.len() as f64))
 }
 
 impl SweepCell {

@@ -1,0 +1,152 @@
+//! Sweeps of recordings.
+
+use std::{fs, path::Path};
+
+use serde_json::{Value, json};
+
+use super::driver::{failure, fill, folder_with, merged, names, run, success};
+
+fn write_recording(path: &Path) {
+    let mut text = "time,a,b,c,fx (N),fz (N)\n".to_owned();
+    for sample in 0..80 {
+        let time = f64::from(sample);
+        let (x, z) = ((0.3 * time).sin(), (0.17 * time).cos());
+        let (a, b, c) = (x + 0.2 * z, z - 0.3 * x * z, (x + z).tanh());
+        text += &format!("{time},{a:.4},{b:.4},{c:.4},{x:.4},{z:.4}\n");
+    }
+    fs::write(path, text).unwrap();
+}
+
+/// Eight trials on `press.csv` in the folder of the specification.
+fn eight() -> Value {
+    json!({
+        "train": {"data": "press.csv", "inputs": ["a..c"], "targets": ["fx", "fz"], "epochs": 8},
+        "axes": {"hidden": [2, 4], "method": ["lm", "br"], "seed": [0, 7]},
+    })
+}
+
+/// Identifiers of the trials of a table.
+fn trials(table: &Value) -> Vec<&str> {
+    let trials = table["trials"].as_array().unwrap().iter();
+    trials.map(|trial| trial["trial"].as_str().unwrap()).collect()
+}
+
+/// Number of trials that both tables have.
+fn shared(one: &Value, other: &Value) -> usize {
+    let others = trials(other);
+    trials(one).into_iter().filter(|trial| others.contains(trial)).count()
+}
+
+#[test]
+fn parts_of_a_sweep_trained_in_other_places_merge_to_the_table_of_one_process() {
+    let folder = folder_with(&eight());
+    let folder = folder.path();
+    write_recording(&folder.join("press.csv"));
+    fill("--out whole", folder);
+    let whole = merged("whole", folder);
+    assert_eq!(trials(&whole).len(), 8);
+    fill("--out first --shard 1/2 --threads 1", folder);
+    let elsewhere = folder.join("elsewhere");
+    fs::create_dir(&elsewhere).unwrap();
+    for file in ["press.csv", "sweep.json"] {
+        fs::copy(folder.join(file), elsewhere.join(file)).unwrap();
+    }
+    fill("--out second --shard 2/2", &elsewhere);
+    assert_eq!(merged("first elsewhere/second", folder), whole);
+    // No file names the folder of the recording.
+    let place = folder.to_str().unwrap();
+    for name in names(&folder.join("whole")) {
+        let text = fs::read_to_string(folder.join("whole").join(&name)).unwrap();
+        assert!(!text.contains(place), "{name}: {text}");
+    }
+    success("sweep --merge whole --out table.csv", folder);
+    let table = fs::read_to_string(folder.join("table.csv")).unwrap();
+    assert!(
+        table.lines().next().unwrap().contains("result.targets.fx.rmse"),
+        "{table}"
+    );
+}
+
+#[test]
+fn a_trial_is_what_train_prints() {
+    let folder = folder_with(&eight());
+    let folder = folder.path();
+    write_recording(&folder.join("press.csv"));
+    fill("--out runs", folder);
+    let table = merged("runs", folder);
+    for trial in table["trials"].as_array().unwrap() {
+        let options = &trial["options"];
+        let (hidden, seed) = (&options["hidden"], &options["seed"]);
+        let method = options["method"].as_str().unwrap();
+        let of_trial = format!("--epochs 8 --hidden {hidden} --method {method} --seed {seed}");
+        let train = format!("train --data press.csv --inputs a..c --targets fx,fz {of_trial} --json");
+        let printed: Value = serde_json::from_str(&success(&train, folder)).unwrap();
+        for field in ["targets", "baselines", "starts", "samples", "warnings"] {
+            assert_eq!(trial["result"][field], printed[field], "{field}, {options}");
+        }
+        assert!(options["crc32"].is_array() && options["data"] == "press.csv");
+        // Bayesian regularisation holds nothing out, as in train.
+        let held_out = if method == "br" { 0.0 } else { 0.2 };
+        assert_eq!(options["validation-fraction"], held_out);
+    }
+}
+
+#[test]
+fn arguments_a_recipe_and_a_recording_in_the_specification_are_the_same_trials() {
+    let folder = folder_with(&eight());
+    let folder = folder.path();
+    write_recording(&folder.join("press.csv"));
+    fill("--out whole", folder);
+    let whole = merged("whole", folder);
+    let data = "--data press.csv --inputs a..c --targets fx,fz";
+    let axes = "--hidden 2,4 --method lm,br --epochs 8 --seeds 2";
+    success(&format!("sweep {data} {axes} --out arguments --json"), folder);
+    let of_arguments = merged("arguments", folder);
+    assert_eq!(trials(&of_arguments).len(), 8);
+    assert_eq!(shared(&of_arguments, &whole), 4, "seed 0 is shared, seed 1 is not");
+    success(
+        &format!("train {data} --epochs 1 --save-recipe press.recipe --json"),
+        folder,
+    );
+    let axes = json!({"hidden": [2, 4], "method": ["lm"], "seed": [0, 7]});
+    let recipe = json!({
+        "train": {"recipe": "press.recipe", "epochs": 8, "validation-fraction": 0.2},
+        "axes": axes,
+    });
+    let recording = json!({
+        "recording": {"import": {"data": "press.csv", "inputs": ["a..c"], "targets": ["fx", "fz"]}},
+        "train": {"epochs": 8},
+        "axes": axes,
+    });
+    for (name, specification) in [("recipe", recipe), ("recording", recording)] {
+        fs::write(folder.join(name).with_extension("json"), specification.to_string()).unwrap();
+        success(&format!("sweep --spec {name}.json --out {name} --json"), folder);
+        let table = merged(name, folder);
+        assert_eq!((trials(&table).len(), shared(&table, &whole)), (4, 4), "{name}");
+    }
+}
+
+#[test]
+fn wrong_sweeps_of_recordings_are_refused() {
+    let folder = folder_with(&eight());
+    let folder = folder.path();
+    let (_, message) = failure("sweep --spec sweep.json --out runs", folder, 2);
+    assert!(message.contains("press.csv"), "{message}");
+    write_recording(&folder.join("press.csv"));
+    let cases = [
+        ("array", json!("10x6_3x18"), "a recording (--data) has no array"),
+        ("folds", json!(3), "a sweep keeps its results"),
+        ("split", json!("group"), "say which column is the group"),
+    ];
+    for (option, value, expected) in cases {
+        let mut specification = eight();
+        specification["train"][option] = value;
+        fs::write(folder.join("wrong.json"), specification.to_string()).unwrap();
+        let output = run("sweep --spec wrong.json --out runs", folder);
+        let message = String::from_utf8(output.stderr).unwrap();
+        assert!(
+            !output.status.success() && message.contains(expected),
+            "{option}: {message}"
+        );
+    }
+}
