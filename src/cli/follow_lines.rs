@@ -32,13 +32,7 @@ impl Parser {
                 let parser = LineParser::new(simulation.sensor.scale, simulation.scene.rows, is_complete);
                 Self::Array(Box::new(parser.map_err(SimulationError::from)?))
             }
-            None => {
-                let recorded = file.recorded.as_ref();
-                let row_wire = recorded.and_then(|recorded| recorded.plan.import.row_wire.clone());
-                let row_wires = file.row_wires.clone().filter(|_| file.network.only().is_none());
-                let inputs = file.problem.inputs.clone();
-                Self::Columns(Box::new(InputLines::new(inputs, row_wire, row_wires)))
-            }
+            None => Self::Columns(Box::new(file.input_lines())),
         })
     }
 

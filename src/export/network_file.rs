@@ -13,7 +13,7 @@ use super::{
 use crate::{
     dataset::Dataset,
     evaluation::{ErrorTable, PastNetwork, Problem, Run, RunSettings, Scores},
-    import::{Recorded, Setup, SetupError},
+    import::{InputLines, Recorded, Setup, SetupError},
     network::Networks,
 };
 
@@ -88,6 +88,15 @@ impl NetworkFile {
         file.network = past.networks.clone();
         file.training = TrainingRecord::until(run, past);
         Ok(file)
+    }
+
+    /// Returns a parser of lines with the inputs of the network of a recording.
+    pub fn input_lines(&self) -> InputLines {
+        let recorded = self.recorded.as_ref();
+        let row_wire = recorded.and_then(|recorded| recorded.plan.import.row_wire.clone());
+        let has_rows = self.network.only().is_none();
+        let row_wires = self.row_wires.clone().filter(|_| has_rows);
+        InputLines::new(self.problem.inputs.clone(), row_wire, row_wires)
     }
 
     /// Setup of the run.

@@ -3,7 +3,7 @@
 use std::{fmt::Write as _, fs, path::Path, sync::Arc};
 
 use decoupler::{
-    app::{BottomTab, Phase},
+    app::{BottomTab, Effect, Phase},
     export::{NetworkFile, format_number},
     figure::surface::ViewMode,
 };
@@ -211,20 +211,21 @@ fn two_windows_see_each_others_runs_names_pins_and_removals() {
 #[test]
 fn any_number_of_a_kept_run_leaves_room_for_the_next() {
     let folder = tempfile::tempdir().unwrap();
-    let fixtures = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures");
-    let network = fs::read_to_string(fixtures.join("network_version_1.json")).unwrap();
-    let old = format!(
-        r#"{{"format":"decoupler workspace","version":1,"program":"decoupler 0.1.0","runs":[{{"id":{},"name":"Old","network":{network}}}],"pinned":[null,null]}}"#,
-        u64::MAX
-    );
-    fs::write(folder.path().join("workspace.json"), old).unwrap();
-    let mut driver = Driver::open_keeping(&folder.path().join(PLACE));
+    let path = folder.path().join(PLACE);
+    let mut driver = Driver::open_keeping(&path);
     driver.configure_small();
-    driver.train();
-    driver.click_button("Compare");
-    driver.wait("both runs", |driver| {
-        driver.has("Old as A") && driver.has(&format!("{FIRST} as A"))
-    });
+    train_and_keep(&mut driver, 1);
+    drop(driver);
+    let mut files = fs::read_dir(&path).unwrap().map(|entry| entry.unwrap().path());
+    let is_run = |file: &std::path::PathBuf| file.display().to_string().contains("run-");
+    let run = files.find(is_run).unwrap();
+    fs::rename(run, path.join(format!("run-{}.json", u64::MAX))).unwrap();
+    let mut driver = Driver::open_keeping(&path);
+    wait_for_file(&mut driver);
+    driver.configure_small();
+    train_and_keep(&mut driver, 2);
+    let ids = Vec::from_iter(driver.state().runs.workspace.runs.iter().map(|run| run.id));
+    assert!(ids.contains(&u64::MAX) && ids[0] != ids[1], "{ids:?}");
 }
 
 #[test]
@@ -357,7 +358,9 @@ fn two_runs_of_a_recording_are_compared_target_by_target() {
         hidden: 3,
         ..*setup.settings()
     };
-    driver.take_recording(&setup.with_settings(other));
+    let other = Box::new(setup.with_settings(other));
+    driver.window_mut().apply(Effect::TakeSetup(other));
+    driver.settle();
     train_and_keep(&mut driver, 2);
     driver.click_button("Compare");
     wait_for_both(&mut driver);

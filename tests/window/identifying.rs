@@ -278,7 +278,11 @@ fn channels_of_a_recording_without_information_are_named() {
 
 #[test]
 fn a_cross_validation_of_a_recording_has_the_errors_of_the_library() {
-    let Opened { mut driver, setup, .. } = open_recording();
+    let Opened {
+        mut driver,
+        setup,
+        folder: _folder,
+    } = open_recording();
     driver.enter("Folds", "3");
     driver.click("Compare with random folds");
     driver.click_button("Cross-validate");

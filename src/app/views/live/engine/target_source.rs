@@ -93,15 +93,13 @@ fn read(file: &NetworkFile, path: &Path, is_wanted: &dyn Fn() -> bool) -> Result
             ControlFlow::Break(())
         }
     };
-    let inputs = &file.problem.inputs;
-    let table = recipe
-        .unwrap_or_default()
-        .read_inputs(path, inputs, file.row_wires.is_some(), watch);
+    let (inputs, has_rows) = (&file.problem.inputs, file.network.only().is_none());
+    let table = recipe.unwrap_or_default().read_inputs(path, inputs, has_rows, watch);
     let table = table.map_err(|error| error.to_string())?;
     let mut samples = Vec::with_capacity(table.readings.len() + table.readings.nrows());
     for (sample, readings) in table.readings.rows().into_iter().enumerate() {
         let row_index = match (&file.row_wires, &table.row_wires) {
-            (None, _) => 0,
+            _ if !has_rows => 0,
             (Some(read), Some(of_samples)) => {
                 let row = of_samples[sample];
                 let index = read.iter().position(|read| *read == row);
@@ -114,7 +112,7 @@ fn read(file: &NetworkFile, path: &Path, is_wanted: &dyn Fn() -> bool) -> Result
                     )
                 })?
             }
-            (Some(_), None) => {
+            _ => {
                 return Err(format!(
                     "'{}' has no column of row-wires, and there is a network for each",
                     path.display()
@@ -134,14 +132,12 @@ impl TargetLines {
         let lines = Lines::spawn(opened, source.keeping(), source.begins_anywhere());
         let mut lines = lines.map_err(|error| format!("no thread could be started: {error}"))?;
         // The latest sample of each row-wire.
-        lines.set_kept(file.row_wires.as_ref().map_or(1, Vec::len));
-        let row_wire = file.recorded.as_ref();
-        let row_wire = row_wire.and_then(|recorded| recorded.plan.import.row_wire.clone());
+        lines.set_kept(file.network.values().len());
         Ok(Self {
             name: source.to_string(),
             begins_anywhere: source.begins_anywhere(),
             lines,
-            parser: InputLines::new(file.problem.inputs.clone(), row_wire, file.row_wires.clone()),
+            parser: file.input_lines(),
             dropped: 0,
             begun: Instant::now(),
         })
