@@ -67,7 +67,7 @@ impl Train {
         }
         let (settings, plan) = (setup.settings(), setup.plan().expect("--folds needs a recording"));
         let recording = with_bar(self.json, |watch| plan.recording(working_folder(), watch))?;
-        self.import.save_recipe(setup.plan())?;
+        self.import.save_recipe(setup)?;
         let set = &recording.set;
         let by = plan.division.by;
         let dealt = Folds::by(set, folds, by, &mut settings.seed.rng(Stream::Split));

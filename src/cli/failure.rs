@@ -12,7 +12,7 @@ use crate::{
     dataset::{ReadError, SimulationError, SplitBy, system_cause},
     evaluation::{RunError, experiments::ExperimentError},
     export::{DocumentError, SweepFolderError, WriteError, bundle::BundleError, figures::PictureError},
-    import::{Cure, ImportError, InputError, SetupError},
+    import::{Cure, ImportError, InputLineError, SetupError},
     live::{LineError, Source, SourceError},
     scene::Rows,
     sensor::{CalibrationError, SensorError},
@@ -97,7 +97,7 @@ pub(super) enum Failure {
     OtherColumns {
         input: Source,
         line: u64,
-        source: InputError,
+        source: InputLineError,
     },
     #[error("{input}: no line could be decoded: {reason}")]
     NothingDecoded { input: Source, reason: String },

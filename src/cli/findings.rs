@@ -63,7 +63,7 @@ impl StudyArguments {
             return Err(Failure::Arguments(message.to_owned()));
         }
         let recording = with_bar(is_json, |watch| plan.recording(working_folder(), watch))?;
-        import.save_recipe(Some(&plan))?;
+        import.save_recipe(&plan)?;
         let mut settings = RunSettings::from(Measured { rows: RowModel::Shared });
         settings.hidden = self.hidden.unwrap_or(settings.hidden);
         settings.seed = self.seed.map_or(settings.seed, Seed);

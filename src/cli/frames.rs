@@ -44,7 +44,7 @@ impl FrameArguments {
             return Err(Failure::Arguments(message.to_owned()));
         };
         let recording = with_bar(is_json, |watch| plan.recording(working_folder(), watch))?;
-        self.import.save_recipe(Some(&plan))?;
+        self.import.save_recipe(&plan)?;
         let (set, lines, scale) = (recording.set, recording.lines, sensor.scale);
         let (argument, targets) = if has_depths {
             ("--depths", scale.nodes_per_row())

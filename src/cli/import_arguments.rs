@@ -5,7 +5,7 @@ use clap::Args;
 use super::{checkpointing::check_same, failure::Failure};
 use crate::{
     dataset::{Division, SplitBy},
-    export::RecipeFile,
+    export::{RecipeFile, RecipeSource},
     import::{
         Condition, Decimal, DialectChoice, Encoding, Joined, Missing, Plan, Recipe, Recorded, Separator, TestFiles,
     },
@@ -76,10 +76,10 @@ pub(super) struct ImportArguments {
     /// Positions of the targets on the skin, for surfaces in the window: a table with the columns target,x,y (mm)
     #[arg(long, value_name = "FILE", requires = "data")]
     positions: Option<PathBuf>,
-    /// Repeat the import that --save-recipe wrote
+    /// Use the simulated array or the recording that --save-recipe wrote
     #[arg(long, value_name = "FILE")]
     recipe: Option<PathBuf>,
-    /// Write a file (JSON) by which --recipe repeats this import and split
+    /// Write a file (JSON) by which --recipe repeats this array, or this recording and its split
     #[arg(long, value_name = "FILE")]
     save_recipe: Option<PathBuf>,
     /// Samples of the test: the last in time, whole groups, or random ones [default: group with --group, else time]
@@ -199,7 +199,6 @@ impl ImportArguments {
     /// Refuses arguments that have no meaning without a recording.
     pub(super) fn check_unused(&self) -> Result<(), Failure> {
         let given = [
-            (self.save_recipe.is_some(), "--save-recipe"),
             (self.split.is_some(), "--split"),
             (self.test_fraction.is_some(), "--test-fraction"),
             (self.validation_fraction.is_some(), "--validation-fraction"),
@@ -308,6 +307,21 @@ impl ImportArguments {
         Ok(None)
     }
 
+    /// The source of the samples: a recording, or the simulated array of a recipe; `None` for the array of the arguments.
+    pub(super) fn source(&self, inputs: &[String]) -> Result<Option<RecipeSource>, Failure> {
+        if let Some(path) = &self.recipe
+            && let simulated @ RecipeSource::Simulated(_) = RecipeFile::load(path)?
+        {
+            self.check_unused()?;
+            return Ok(Some(simulated));
+        }
+        if self.is_given() {
+            return Ok(Some(RecipeSource::Recording(self.plan(inputs)?)));
+        }
+        self.check_unused()?;
+        Ok(None)
+    }
+
     /// The plan that the arguments describe, with paths relative to the working folder; `inputs` are the columns read.
     pub(super) fn plan(&self, inputs: &[String]) -> Result<Plan, Failure> {
         self.plan_of(inputs, &self.targets)
@@ -400,11 +414,11 @@ impl ImportArguments {
         self.recipe.as_deref()
     }
 
-    /// Writes the recipe of `plan`, if that is asked for.
-    pub(super) fn save_recipe(&self, plan: Option<&Plan>) -> Result<(), Failure> {
-        match (&self.save_recipe, plan) {
-            (Some(path), Some(plan)) => Ok(RecipeFile::save(plan, path)?),
-            _ => Ok(()),
+    /// Writes a recipe of `source`, if that is asked for.
+    pub(super) fn save_recipe(&self, source: impl Into<RecipeSource>) -> Result<(), Failure> {
+        match &self.save_recipe {
+            Some(path) => Ok(RecipeFile::save(source, path)?),
+            None => Ok(()),
         }
     }
 }

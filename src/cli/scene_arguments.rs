@@ -7,7 +7,7 @@ use super::{
 };
 use crate::{
     decoupling::DecoderKind,
-    evaluation::{Measured, Preset, RunSettings, SimulatedSettings},
+    evaluation::{Measured, Preset, RunSettings, SimulatedSettings, Simulation},
     network::{Quantity, ScalingChoice},
     scene::{Loading, Movement, Noise, NoisySets, RowModel, Rows},
 };
@@ -68,6 +68,15 @@ impl SceneArguments {
     /// The settings of the preset with the scene and inputs given, at the first noise given.
     pub(super) fn settings(&self) -> Result<SimulatedSettings, Failure> {
         self.settings_at(self.preset.unwrap_or_default(), self.noise.first().copied())
+    }
+
+    /// The settings of the preset on this simulated array, with the scene and inputs given.
+    pub(super) fn settings_on(&self, source: Simulation) -> Result<SimulatedSettings, Failure> {
+        let settings = SimulatedSettings {
+            source,
+            ..self.preset.unwrap_or_default().settings()
+        };
+        self.applied(settings, self.noise.first().copied())
     }
 
     /// The settings of this preset with the scene and inputs given, at this relative noise.

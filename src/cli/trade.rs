@@ -105,7 +105,7 @@ impl Trade {
                         case.setup.sets(working_folder(), &|| false, on_progress)
                     })?;
                     if let Some(read) = &read {
-                        self.import.save_recipe(case.setup.plan())?;
+                        self.import.save_recipe(&case.setup)?;
                         trade_off.source = TradeSource::Recording(Box::new(RecordedSource::new(&sets, read)));
                     }
                     recordings = read;

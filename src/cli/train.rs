@@ -70,7 +70,7 @@ impl Train {
                     return self.cross_validate(&setup, folds);
                 }
                 let sets = sets(&setup, self.json)?;
-                self.import.save_recipe(setup.plan())?;
+                self.import.save_recipe(&setup)?;
                 let run = sets.run(&setup, &|| false)?.expect("nothing cancels it");
                 (run, sets)
             }
@@ -114,8 +114,8 @@ impl Train {
 
     /// Setup of a new run.
     fn setup(&self) -> Result<Setup, Failure> {
-        let plan = self.import.given(self.training.scene.columns())?;
-        let setup = self.training.setup(plan, self.import.holds_out())?;
+        let source = self.import.source(self.training.scene.columns())?;
+        let setup = self.training.setup(source, self.import.holds_out())?;
         match (&self.sensor, setup.simulated()) {
             (Some(path), Some(mut settings)) => {
                 settings.source.sensor = SensorFile::load(path)?;
@@ -163,7 +163,10 @@ impl Train {
                 let message = "--data: the checkpoint is of a simulated array; leave it out to resume";
                 return Err(Failure::Arguments(message.to_owned()));
             }
-            None => self.import.check_unused()?,
+            None => {
+                self.import.check_unused()?;
+                self.import.save_recipe(&saved)?;
+            }
         }
         let training = self.training.resumed(&saved)?;
         if let Some(recorded) = &mut file.recorded {

@@ -12,7 +12,8 @@ use super::{
 use crate::{
     dataset::{LARGEST_SAMPLES, Seed},
     evaluation::{MOST_STARTS, RunSettings, SimulatedSettings, Simulation, Source},
-    import::{Plan, Setup},
+    export::RecipeSource,
+    import::Setup,
     network::LARGEST_HIDDEN,
     sensor::{ArrayScale, SensorModel},
     training::{Method, StoppingRules, TrainingSettings},
@@ -64,10 +65,18 @@ pub(super) struct TrainingArguments {
 }
 
 impl TrainingArguments {
-    /// Settings of a new run.
+    /// Settings of a new run on a simulated array.
     pub(super) fn settings(&self) -> Result<SimulatedSettings, Failure> {
+        self.settings_on(None)
+    }
+
+    /// Settings of a new run on this simulated array, by default that of the preset, with the arguments given.
+    fn settings_on(&self, simulation: Option<Simulation>) -> Result<SimulatedSettings, Failure> {
         self.scene.check_one_noise()?;
-        let default = self.scene.settings()?;
+        let default = match simulation {
+            Some(simulation) => self.scene.settings_on(simulation)?,
+            None => self.scene.settings()?,
+        };
         let source = default.source;
         Ok(SimulatedSettings {
             source: Simulation {
@@ -85,11 +94,13 @@ impl TrainingArguments {
         })
     }
 
-    /// Setup of a new run: on samples of `plan`, or else of a simulated array. `holds_out` is true if the plan states its share
-    /// for validation; otherwise the method determines it.
-    pub(super) fn setup(&self, plan: Option<Plan>, holds_out: bool) -> Result<Setup, Failure> {
-        let Some(mut plan) = plan else {
-            return Ok(self.settings()?.into());
+    /// Setup of a new run on samples of `source`, or else of the array that the arguments describe. `holds_out` is true if the
+    /// share of a recording for validation is stated; otherwise the method determines it.
+    pub(super) fn setup(&self, source: Option<RecipeSource>, holds_out: bool) -> Result<Setup, Failure> {
+        let mut plan = match source {
+            None => return Ok(self.settings()?.into()),
+            Some(RecipeSource::Simulated(simulation)) => return Ok(self.settings_on(Some(simulation))?.into()),
+            Some(RecipeSource::Recording(plan)) => plan,
         };
         let settings = self.recorded(plan.import.row_wire.is_some())?;
         if !holds_out {

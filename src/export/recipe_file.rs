@@ -4,8 +4,8 @@ use serde::{Deserialize, Serialize};
 
 use super::{DocumentError, DocumentKind, WriteError, atomic_write, document::PROGRAM, unfinished::folder_of};
 use crate::{
-    evaluation::{SimulatedSettings, Simulation},
-    import::Plan,
+    evaluation::{SimulatedSettings, Simulation, Source},
+    import::{Plan, Setup},
 };
 
 const KIND: DocumentKind = DocumentKind::Recipe;
@@ -54,6 +54,16 @@ impl From<Simulation> for RecipeSource {
 impl From<&Plan> for RecipeSource {
     fn from(plan: &Plan) -> Self {
         Self::Recording(plan.clone())
+    }
+}
+
+impl From<&Setup> for RecipeSource {
+    fn from(setup: &Setup) -> Self {
+        match (setup.plan(), setup.settings().source) {
+            (Some(plan), _) => plan.into(),
+            (None, Source::Simulated(simulation)) => simulation.into(),
+            (None, Source::Measured(_)) => unreachable!("the setup of a recording has its plan"),
+        }
     }
 }
 

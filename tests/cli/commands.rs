@@ -177,7 +177,7 @@ fn the_table_has_every_row_and_says_why_it_ended() {
         "published",
         "all epochs done",
         "assumed",
-        "worst mm",
+        "worst node (mm)",
     ] {
         assert!(text.contains(words), "{words}: {text}");
     }

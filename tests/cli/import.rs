@@ -457,3 +457,20 @@ fn positions_of_targets_are_told_kept_in_the_recipe_and_refused_by_line() {
         "{message}"
     );
 }
+
+#[test]
+fn a_recipe_of_a_simulated_array_trains_the_same_network() {
+    let folder = tempfile::tempdir().unwrap();
+    let array = "--array 4x3_2x9 --axes xyz --noise 1e-3 --samples 60 --test-samples 20";
+    let train = "train --hidden 3 --epochs 5 --decoder mean --json";
+    let first = json(&format!("{train} {array} --save-recipe array.json"), folder.path());
+    let again = json(&format!("{train} --recipe array.json"), folder.path());
+    assert_eq!((&first["errors"], &first["scene"]), (&again["errors"], &again["scene"]));
+    // Arguments change what the recipe describes.
+    let other = json(&format!("{train} --recipe array.json --samples 80"), folder.path());
+    assert_eq!((&other["samples"], &other["array"]), (&80.into(), &first["array"]));
+    let message = failure("train --recipe array.json --split time", folder.path(), 2);
+    assert!(message.contains("--split needs --data"), "{message}");
+    let message = failure("trade --recipe array.json", folder.path(), 1);
+    assert!(message.contains("is the recipe of a simulated array"), "{message}");
+}

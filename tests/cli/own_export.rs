@@ -28,8 +28,8 @@ fn trained(rows: &str) -> TempDir {
     }
     fs::write(folder.path().join("own.csv"), text).unwrap();
     // A recipe, because the terminal of a test splits arguments at spaces.
-    let recipe = r#"{"format": "decoupler recipe", "version": 1, "program": "a test", "plan": {"import": {"data": "own.csv",
-        "inputs": ["hall, a", "b */ x", "c"], "targets": ["force", "torque"], "row_wire": "row"}}}"#;
+    let recipe = r#"{"format": "decoupler recipe", "version": 1, "program": "a test", "source": {"recording": {"import": {"data": "own.csv",
+        "inputs": ["hall, a", "b */ x", "c"], "targets": ["force", "torque"], "row_wire": "row"}}}}"#;
     fs::write(folder.path().join("recipe.json"), recipe).unwrap();
     let arguments = format!("train --recipe recipe.json {rows} --hidden 4 --epochs 20 --out n.json --json");
     let output = decoupler(&arguments, folder.path());

@@ -50,7 +50,7 @@ fn each_target_and_channel_is_judged_with_an_interval() {
         target(1)["sentence"]
             .as_str()
             .unwrap()
-            .starts_with("the readings do not tell y: R² ")
+            .starts_with("the readings do not determine y (R² ")
     );
     let channel = |index: usize| &report["channels"][index];
     // Without b the error of x is √(0.3² + 0.05²)/0.05 times as large; without a nothing is lost, because d repeats it.
@@ -69,8 +69,8 @@ fn each_target_and_channel_is_judged_with_an_interval() {
     assert!(curve.len() >= 5 && target(0)["outlook"].is_string());
     let text = String::from_utf8(decoupler(&format!("{TELL} --model ridge"), folder.path()).stdout).unwrap();
     for expected in [
-        "The readings tell x: R² 0.99",
-        "do not tell y",
+        "The readings determine x (R² 0.99",
+        "do not determine y",
         "dispensable",
         "samples   ",
     ] {
@@ -117,7 +117,7 @@ fn a_random_split_says_by_how_much_it_flatters() {
         let report = json(&format!("{arguments}{folds}"), folder.path());
         let warnings = report["warnings"].to_string();
         assert!(
-            warnings.contains("a random split would report an RMSE of") && warnings.contains("random flatters by"),
+            warnings.contains("a random split would report an RMSE of") && warnings.contains("split is optimistic by"),
             "{warnings}"
         );
         let interval = &report["targets"][0]["r2_interval"];
@@ -155,7 +155,7 @@ fn a_random_split_is_compared_with_groups_where_there_are_any() {
         let report = json(&format!("train {PRESSES} {split} --epochs 60 --json"), folder.path());
         let warnings = report["warnings"].to_string();
         assert!(
-            warnings.contains("split by group it is") && warnings.contains("random flatters by"),
+            warnings.contains("split by group it is") && warnings.contains("split is optimistic by"),
             "{split}: {warnings}"
         );
     }

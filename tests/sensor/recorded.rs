@@ -61,13 +61,13 @@ fn a_random_split_flatters_where_samples_of_a_group_are_alike() {
         let ratios = [compared.network_ratio(0).unwrap(), compared.ridge_ratio(0).unwrap()];
         assert!(ratios.iter().all(|ratio| *ratio < 0.2), "{by}: {ratios:?}");
         let sentence = compared.sentence(0, "offset");
-        assert!(sentence.contains("random flatters by 9"), "{sentence}");
+        assert!(sentence.contains("split is optimistic by 9"), "{sentence}");
     }
     let independent = set(400, 3, 4, |c, rng| c[0] - 0.5 * c[1] + 0.3 * normal(rng));
     let of_independent = compared(&independent, SplitBy::Random);
     assert_eq!(of_independent.by, SplitBy::Time);
     let sentence = of_independent.sentence(0, "y");
-    assert!(sentence.contains("does not flatter"), "{sentence}");
+    assert!(sentence.contains("is not optimistic"), "{sentence}");
     let dealt = Folds::by(&independent, 5, SplitBy::Random, &mut Seed(0).rng(Stream::Split)).unwrap();
     let validated = CrossValidated::on_folds(&settings(), &independent, dealt, || false)
         .unwrap()

@@ -1,6 +1,6 @@
 //! Finished trainings kept, compared, and found again after a restart; figures of the paper; pictures for print.
 
-use std::{fs, path::Path, sync::Arc};
+use std::{fmt::Write as _, fs, path::Path, sync::Arc};
 
 use decoupler::{
     app::{BottomTab, Phase},
@@ -11,7 +11,7 @@ use eframe::egui::{Event, Key};
 
 use crate::{
     driver::{Driver, small, trained},
-    recordings::{recording, written},
+    sources::{probe, skin_with_positions, with_epochs},
 };
 
 const FIRST: &str = "10×6_3×18 h6 lm";
@@ -348,13 +348,16 @@ fn the_error_card_in_view_is_saved_with_its_own_colours() {
 #[test]
 fn two_runs_of_a_recording_are_compared_target_by_target() {
     let folder = tempfile::tempdir().unwrap();
-    let path = written(&folder, "press.csv", &recording(60));
+    let setup = with_epochs(&probe(folder.path()), 2);
     let runs = folder.path().join(PLACE);
     let mut driver = Driver::open_keeping(&runs);
-    driver.open_recordings(&[&path]);
-    driver.limit_epochs("2");
+    driver.take_recording(&setup);
     train_and_keep(&mut driver, 1);
-    driver.enter("Hidden nodes", "3");
+    let other = decoupler::evaluation::RunSettings {
+        hidden: 3,
+        ..*setup.settings()
+    };
+    driver.take_recording(&setup.with_settings(other));
     train_and_keep(&mut driver, 2);
     driver.click_button("Compare");
     wait_for_both(&mut driver);
@@ -371,16 +374,8 @@ fn two_runs_of_a_recording_are_compared_target_by_target() {
     for (file, letter) in kept.iter().zip(["A", "B"]) {
         let errors = file.scores.network.targets()[1];
         for (name, value) in [("RMSE", errors.rmse), ("R²", errors.r2.unwrap())] {
-            let value = format_number(value);
-            let shown = driver
-                .texts()
-                .into_iter()
-                .find(|text| text.contains(&format!("{name} of y (mm)")));
-            assert!(
-                shown.as_ref().is_some_and(|shown| shown.contains(&value)) || driver.says(&value),
-                "{name} of {letter} {value}: {:#?}",
-                driver.texts()
-            );
+            let cell = format!("{name} of y (mm), {letter}: {}", format_number(value));
+            assert!(driver.has(&cell), "{cell}: {:#?}", driver.texts());
         }
     }
     assert!(
@@ -402,13 +397,37 @@ fn two_runs_of_a_recording_are_compared_target_by_target() {
     drop(driver);
 
     // Without the file the figures stay, and the reason for which there is no chart is shown.
-    fs::remove_file(&path).unwrap();
+    fs::remove_file(&setup.plan().unwrap().import.data).unwrap();
     let mut driver = Driver::open_keeping(&runs);
     wait_for_file(&mut driver);
     driver.click_button("Compare");
     driver.wait("the reason", |driver| driver.says("is not there any more"));
     driver.settle();
-    assert!(driver.says("press.csv") && driver.has(&format!("{name} as A")));
+    assert!(driver.says("probe.csv") && driver.has(&format!("{name} as A")));
     let rmse = format_number(kept[0].scores.network.targets()[0].rmse);
-    assert!(driver.says(&rmse), "{:#?}", driver.texts());
+    assert!(
+        driver.has(&format!("RMSE of x (mm), A: {rmse}")),
+        "{:#?}",
+        driver.texts()
+    );
+}
+
+#[test]
+fn targets_with_positions_are_compared_on_surfaces() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut positions = "target,x,y\n".to_owned();
+    for taxel in 0..6 {
+        writeln!(positions, "d{},{},{}", taxel + 1, 5 * (taxel % 3), 4 * (taxel / 3)).unwrap();
+    }
+    let setup = with_epochs(&skin_with_positions(folder.path(), &positions), 2);
+    let mut driver = Driver::open_keeping(&folder.path().join(PLACE));
+    driver.take_recording(&setup);
+    train_and_keep(&mut driver, 1);
+    driver.click_button("Compare");
+    driver.wait("its surface", |driver| driver.has("Surface of A"));
+    driver.click("Next snapshot");
+    assert_eq!(driver.views().compare.snapshot, 1);
+    driver.click_button("Error");
+    driver.settle();
+    assert!(driver.has("Surface of A") && !driver.says("against actual"));
 }

@@ -11,7 +11,10 @@ use std::{
 use decoupler::app::{DecouplerWindow, Desktop, Notice, Phase, Shared, SourceKind, Views, WindowFile};
 use decoupler::evaluation::{ErrorTable, Run, SimulatedSettings, Simulation};
 use decoupler::export::format_number;
-use eframe::egui::{Context, Key, Modifiers, OutputCommand, Rect, Ui, UiBuilder, Vec2, accesskit::Role, vec2};
+use eframe::egui::{
+    Context, Key, Modifiers, OutputCommand, Rect, Ui, UiBuilder, Vec2, ViewportCommand, ViewportEvent, ViewportId,
+    accesskit::Role, vec2,
+};
 use egui_kittest::{
     Harness, Node,
     kittest::{By, NodeT as _, Queryable as _},
@@ -440,6 +443,17 @@ impl Driver {
                 .test()
                 .is_some_and(|test| test.sensor == wanted.source.sensor)
         });
+    }
+
+    /// Clicks the button of the title bar; returns whether the window closes at once.
+    pub(crate) fn close(&mut self) -> bool {
+        let input = self.harness.input_mut();
+        let events = &mut input.viewports.get_mut(&ViewportId::ROOT).unwrap().events;
+        events.push(ViewportEvent::Close);
+        self.harness.step();
+        let output = self.harness.output();
+        let commands = &output.viewport_output[&ViewportId::ROOT].commands;
+        !commands.contains(&ViewportCommand::CancelClose)
     }
 
     /// Presses Train and waits for the end.

@@ -1,14 +1,25 @@
 //! What readings can tell at all: figures, warnings, and the way back to the Train view.
 
+use std::{fmt::Write as _, fs, ops::ControlFlow, path::Path};
+
 use decoupler::{
-    app::{Analysis, Question},
-    export::format_number,
+    app::{Analysis, Effect, Question, SourceKind},
+    dataset::{Folds, SplitBy, Stream},
+    evaluation::{
+        CrossValidated, RunSettings,
+        recorded::{Findings, FittedModel},
+    },
+    export::{describe_target, format_number},
+    import::Setup,
     sensor::{Identifiability, SensorModel},
 };
 use eframe::egui::{Key, vec2};
 use glam::DVec3;
 
-use crate::driver::Driver;
+use crate::{
+    driver::Driver,
+    sources::{Opened, open_small, probe},
+};
 
 fn open() -> Driver {
     let mut driver = Driver::open();
@@ -172,4 +183,146 @@ fn pattern_and_sensitivity_are_saved_each_with_its_own_colours() {
         [2, 1],
         "an axis and a key, a key from above"
     );
+}
+
+/// A window with a recording, in the view of what its readings determine.
+fn open_recording() -> Opened {
+    let mut opened = open_small(SourceKind::Recording);
+    opened.driver.click_button("Identifiability");
+    opened.driver.settle();
+    opened
+}
+
+/// Analyses the readings by ridge regression alone.
+fn analyse_by_ridge(driver: &mut Driver) {
+    driver.click_button("ridge");
+    driver.click_button("Analyse readings");
+    driver.wait("the analysis", |driver| driver.says("folds by time; analysed in"));
+    driver.settle();
+}
+
+#[test]
+fn what_the_readings_of_a_recording_determine_is_as_the_library_finds() {
+    let Opened {
+        mut driver,
+        setup,
+        folder,
+    } = open_recording();
+    analyse_by_ridge(&mut driver);
+    let plan = setup.plan().unwrap();
+    let recording = plan
+        .recording(Path::new(""), &mut |_| ControlFlow::Continue(()))
+        .unwrap();
+    let (division, model) = ((&plan.division, 5), Some(FittedModel::Ridge));
+    let found = Findings::measure(setup.settings(), &recording.set, division, model, &|_| (), &|| false);
+    let found = found.unwrap().unwrap();
+    let sentence = |text: &str| {
+        let (first, rest) = text.split_at(1);
+        format!("{}{rest}.", first.to_uppercase())
+    };
+    for (name, target) in ["x", "y"].into_iter().zip(&found.targets) {
+        let (determined, more) = (describe_target(name, target), target.curve.sentence(name));
+        driver.assert_shows(&[sentence(&determined), sentence(&more)]);
+    }
+    for (channel, name) in found.importance.iter().zip(["u1 (V)", "u2 (V)"]) {
+        let growth = channel.growth[0].unwrap();
+        let growth = format!("{:.2} ({:.2} to {:.2})", growth.value, growth.low, growth.high);
+        driver.assert_shows(&[format!("{name}, x (mm): {growth}")]);
+    }
+    assert!(driver.says("RMSE of x (mm)"), "the learning curve is drawn");
+    let table = folder.path().join("channels.csv");
+    driver.save("Channel table, CSV", &table);
+    driver.click("Dismiss");
+    let table = fs::read_to_string(table).unwrap();
+    assert!(
+        table.starts_with("channel,target,rmse_ratio,low,high\nu1,x,"),
+        "{table}"
+    );
+    let picture = folder.path().join("curve.svg");
+    driver.save("Learning curve, SVG", &picture);
+    driver.click("Dismiss");
+    assert!(fs::read_to_string(picture).unwrap().contains("</svg>"));
+    // A later change of the settings is reported.
+    assert!(!driver.says("have changed since"));
+    let hidden = setup.settings().hidden + 1;
+    let changed = setup.with_settings(RunSettings {
+        hidden,
+        ..*setup.settings()
+    });
+    driver.window_mut().apply(Effect::TakeSetup(Box::new(changed)));
+    driver.settle();
+    assert!(driver.says("have changed since"), "{:#?}", driver.texts());
+}
+
+#[test]
+fn channels_of_a_recording_without_information_are_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut text = "time (s),u1 (V),u2 (V),u3 (V),x (N)\n".to_owned();
+    for row in 0..80 {
+        let (t, u) = (f64::from(row), f64::from((7 * row) % 13));
+        writeln!(text, "{t},{u},{},2.5,{:.6}", 3.0 * u, 5.0 * u + 0.1 * t.cos()).unwrap();
+    }
+    let setup = probe(folder.path());
+    let mut plan = setup.plan().unwrap().clone();
+    fs::write(&plan.import.data, text).unwrap();
+    plan.import.inputs.push("u3".to_owned());
+    plan.import.targets.pop();
+    let mut driver = Driver::open();
+    driver.take_recording(&Setup::recording(*setup.settings(), plan));
+    driver.click_button("Identifiability");
+    analyse_by_ridge(&mut driver);
+    for expected in ["u3 is 2.5 in every sample", "u2 repeats u1"] {
+        assert!(driver.says(expected), "{expected} is not among {:#?}", driver.texts());
+    }
+}
+
+#[test]
+fn a_cross_validation_of_a_recording_has_the_errors_of_the_library() {
+    let Opened { mut driver, setup, .. } = open_recording();
+    driver.enter("Folds", "3");
+    driver.click("Compare with random folds");
+    driver.click_button("Cross-validate");
+    driver.wait("the folds", |driver| driver.says("3 folds by time"));
+    driver.settle();
+    let plan = setup.plan().unwrap();
+    let recording = plan
+        .recording(Path::new(""), &mut |_| ControlFlow::Continue(()))
+        .unwrap();
+    let (settings, set) = (setup.settings(), &recording.set);
+    let folds = Folds::by(set, 3, SplitBy::Time, &mut settings.seed.rng(Stream::Split)).unwrap();
+    let validated = CrossValidated::on_folds(settings, set, folds, || false);
+    let errors = validated.unwrap().unwrap().scores(set);
+    let shown = driver.texts();
+    for target in errors.network.targets() {
+        let cell = format!("network, RMSE: {}", format_number(target.rmse));
+        assert!(
+            shown.iter().any(|text| text.ends_with(&cell)),
+            "{cell} is not among {shown:#?}"
+        );
+    }
+    assert!(
+        driver.says("The readings") && driver.says("optimistic"),
+        "what they determine, and how optimistic random folds are: {shown:#?}"
+    );
+}
+
+#[test]
+fn an_analysis_of_a_recording_can_be_cancelled_and_closing_asks_about_it() {
+    let mut opened = open_recording();
+    opened.change(|settings| settings.training.stopping.epochs = 100_000);
+    let driver = &mut opened.driver;
+    driver.settle();
+    driver.click_button("Analyse readings");
+    driver.wait("the first part", |driver| driver.says("Cross-validation…"));
+    assert!(!driver.close(), "the analysis is not lost without a question");
+    driver.harness().run_steps(2);
+    assert!(
+        driver.has("Identifiability: Analysis") && driver.says("will be discarded"),
+        "{:#?}",
+        driver.texts()
+    );
+    driver.click_button("Stay");
+    driver.click_button("■ Cancel");
+    driver.settle();
+    assert!(driver.is_enabled("Analyse readings"));
 }

@@ -18,7 +18,7 @@ fn saved_plan(driver: &mut Driver, folder: &TempDir) -> Plan {
     // A file of that name is asked about.
     let _ = fs::remove_file(&path);
     driver.save("Recipe of the import, JSON", &path);
-    RecipeFile::load(&path).unwrap()
+    RecipeFile::load_recording(&path).unwrap()
 }
 
 /// Looks at the files again, with other cells that mean missing.

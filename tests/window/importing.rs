@@ -53,7 +53,7 @@ fn a_dropped_file_is_trained_on_by_one_click_as_by_the_library() {
     driver.train_recording();
     let run = trained(&plan(&path));
     assert_eq!(driver.state().run.as_ref().unwrap().settings(), &settings());
-    assert_eq!(Some(&driver.state().result().unwrap().errors), run.errors().as_ref());
+    assert_eq!(driver.state().result().unwrap().errors, run.errors());
     // The results take the place of the columns, which come back by a button.
     assert!(!driver.has("Meaning of u1"));
     driver.click_button("Columns…");
@@ -99,7 +99,7 @@ fn the_sample_recording_is_trained_on_after_three_clicks() {
     driver.limit_epochs("30");
     driver.train_recording();
     let errors = &driver.state().result().unwrap().errors;
-    let force = &errors.targets().unwrap()[0];
+    let force = &errors.targets()[0];
     assert!(force.r2.is_some_and(|r2| r2 > 0.9), "{force:?}");
 }
 
@@ -224,7 +224,7 @@ fn a_checkpoint_goes_on_as_if_it_had_never_stopped() {
         result.is_some_and(|result| result.is_standing && result.epochs_run == 5)
     });
     let run = trained(&plan(&path));
-    assert_eq!(Some(&other.state().result().unwrap().errors), run.errors().as_ref());
+    assert_eq!(other.state().result().unwrap().errors, run.errors());
 }
 
 #[test]
@@ -418,7 +418,7 @@ fn two_files_are_joined_by_time_and_filtered() {
     // The import is saved as a recipe, which the terminal reads too, and opened again.
     let recipe = folder.path().join("recipe.json");
     driver.save("Recipe of the import, JSON", &recipe);
-    let plan = RecipeFile::load(&recipe).unwrap();
+    let plan = RecipeFile::load_recording(&recipe).unwrap();
     assert_eq!(plan.import.targets, ["states.c2"]);
     assert_eq!(plan.import.conditions[0].to_string(), "states.c3<3");
     let mut other = Driver::open();

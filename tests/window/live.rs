@@ -22,7 +22,11 @@ use eframe::egui::{Key, Modifiers, accesskit::Role, vec2};
 use egui_kittest::kittest::{By, Queryable as _};
 use glam::DVec3;
 
-use crate::{closing::close, driver::Driver, typing::double_click_slider};
+use crate::{
+    driver::Driver,
+    sources::{probe, with_epochs},
+    typing::double_click_slider,
+};
 
 /// The window with a small network in its run list, at the Live view.
 fn open(folder: &Path) -> Driver {
@@ -310,7 +314,7 @@ fn closing_the_window_while_it_records_ends_at_once_and_loses_no_frame() {
             .recording
             .is_some_and(|(frames, _)| frames >= 5)
     });
-    assert!(close(&mut driver));
+    assert!(driver.close());
     let (frames, _) = driver.views().live.shown.recording.unwrap();
     drop(driver);
     let recording = read(&recordings(folder.path())[0]);
@@ -389,4 +393,52 @@ fn everything_keeps_to_a_narrow_window() {
             );
         }
     }
+}
+
+#[test]
+fn a_network_of_a_recording_decodes_a_file_by_the_names_of_its_columns() {
+    let folder = tempfile::tempdir().unwrap();
+    let setup = with_epochs(&probe(folder.path()), 3);
+    let mut driver = Driver::open_keeping(&folder.path().join("runs"));
+    driver.take_recording(&setup);
+    train(&mut driver, 1);
+    driver.click_button("Live");
+    assert!(
+        !driver.has("Re-zero") && !driver.has("● Record"),
+        "they need a sensor model"
+    );
+    assert!(!driver.has("Simulated") && !driver.is_enabled("▶ Start"));
+    driver.click_button("Replay");
+    // The same samples with their columns in another order.
+    let text = fs::read_to_string(&setup.plan().unwrap().import.data).unwrap();
+    let reordered = Vec::from_iter(text.lines().map(|line| {
+        let cells = Vec::from_iter(line.split(','));
+        format!("{},{}", cells[2], cells[1])
+    }));
+    let path = folder.path().join("live.csv");
+    fs::write(&path, reordered.join("\n")).unwrap();
+    driver.type_into("Frames", &path.display().to_string());
+    driver.settle();
+    driver.click("▶ Start");
+    driver.wait("the first sample", |driver| driver.views().live.shown.targets.is_some());
+    let targets = driver.views().live.shown.targets.as_ref().unwrap();
+    let (time_s, values) = &targets.history[0];
+    let first = Vec::from_iter(reordered[1].split(',').map(|cell| cell.parse::<f64>().unwrap()));
+    let mut expected = [0.0; 2];
+    let file = network(&driver, 0);
+    let mut compiled = CompiledNetworks::<f64>::new(&file.network, 1);
+    compiled.decode_row(0, &[first[1], first[0]], &mut expected).unwrap();
+    assert_eq!((*time_s, &values[..]), (0.0, &expected[..]));
+    driver.wait("more of them", |driver| decoded(driver) > 5);
+    for shown in ["Decoded values", "x (mm)", "y (mm)", "Outside training"] {
+        assert!(driver.says(shown), "{shown}: {:#?}", driver.texts());
+    }
+    driver.click("■ Stop");
+    let table = folder.path().join("values.csv");
+    driver.save("Decoded values, CSV", &table);
+    assert!(
+        fs::read_to_string(table)
+            .unwrap()
+            .starts_with("time_s,x (mm),y (mm)\n0.0,")
+    );
 }

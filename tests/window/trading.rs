@@ -3,7 +3,7 @@
 use std::{fs, path::Path};
 
 use decoupler::{
-    app::{PlannedLevel, TradeOffEnding, TradeOffPlan},
+    app::{PlannedLevel, SourceKind, TradeOffEnding, TradeOffPlan},
     evaluation::{Preset, TradeOffPoint, fastest_under, measure_trade_off, most_accurate_under},
     export::format_percent,
 };
@@ -11,7 +11,7 @@ use eframe::egui::vec2;
 
 use crate::{
     driver::Driver,
-    recordings::{opened, settings},
+    sources::{Opened, open_small},
 };
 
 fn open() -> Driver {
@@ -264,7 +264,11 @@ fn charts_and_form_keep_to_a_narrow_window() {
 
 #[test]
 fn decoders_of_a_recording_are_the_librarys_and_a_point_is_loaded() {
-    let (mut driver, _path, folder) = opened(120);
+    let Opened {
+        mut driver,
+        setup,
+        folder,
+    } = open_small(SourceKind::Recording);
     driver.click_button("Trade-off");
     driver.type_into("Hidden nodes", "3");
     for decoder in ["Radial basis", "Fuzzy rules"] {
@@ -317,5 +321,5 @@ fn decoders_of_a_recording_are_the_librarys_and_a_point_is_loaded() {
     assert_eq!(driver.shown(), "Train");
     let loaded = driver.state().recording.settings;
     assert_eq!((loaded.hidden, loaded.training.method.short_name()), (3, "lm"));
-    assert_eq!(loaded.source, settings().source);
+    assert_eq!(loaded.source, setup.settings().source);
 }

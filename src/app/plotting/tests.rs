@@ -11,7 +11,7 @@ use crate::{
     dataset::FoldUnit,
     decoupling::DecoderKind,
     evaluation::{
-        CrossValidation, Preset, Run, SimulatedSettings, TradeOffLevel, TradeOffLimits,
+        CrossValidation, Preset, Run, SimulatedSettings, TradeOffLevel, TradeOffLimits, TradeOffPoint,
         experiments::{Axis, Experiment, ExperimentResults, PaperTable, TrialSamples, run_experiments},
         measure_trade_off,
     },
@@ -202,10 +202,21 @@ fn figures_of_decoders_and_rows_are_the_same_on_screen_and_in_print() {
     let mut points = Vec::new();
     for preset in Preset::ALL {
         let kinds = [DecoderKind::Ridge, DecoderKind::Network, DecoderKind::Newton];
-        let on_point = |point| points.push(point);
-        measure_trade_off(preset, &small(preset), &[3], &kinds, || false, on_point).unwrap();
+        let settings = small(preset);
+        let sets = settings.draw_sets().unwrap();
+        let on_point = |_, point: Result<TradeOffPoint, _>| {
+            let preset = Some(preset);
+            points.push(TradeOffPoint {
+                preset,
+                ..point.unwrap()
+            });
+        };
+        measure_trade_off(&settings.into(), &sets, &[3], &kinds, || false, on_point).unwrap();
     }
-    let level = TradeOffLevel { noise: 0.0, points };
+    let level = TradeOffLevel {
+        noise: Some(0.0),
+        points,
+    };
     let limits = TradeOffLimits {
         percent: 50.0,
         microseconds: 1e9,

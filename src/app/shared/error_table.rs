@@ -32,8 +32,10 @@ fn column(measure: ErrorMeasure) -> TableColumn<'static> {
         ErrorMeasure::RangePercent => "% of range",
         measure => measure.heading().0,
     };
-    let heading = term.map_or(heading, |term| term.name);
-    TableColumn::figure(heading).meaning(term.map_or(measure.definition(), |term| term.hint))
+    match term {
+        Some(term) => TableColumn::figure(term.name).meaning(term.hint),
+        None => TableColumn::figure(heading).meaning(measure.definition()),
+    }
 }
 
 /// Lays out an error table: rows of baselines, network, reference and published figures, for recordings target by target.
@@ -52,7 +54,12 @@ pub fn error_table_ui(ui: &mut Ui, table: &ErrorTable) {
         let judged = |row: &ErrorRow| judged.and_then(|place| row.errors.get(place).copied().flatten());
         let of_network = block.rows.iter().find(|row| row.name == NETWORK).and_then(judged);
         let row = |row: &ErrorRow| {
+            let name = match &block.target {
+                Some(target) => format!("{}, {}", target.title(), row.name),
+                None => row.name.to_owned(),
+            };
             TableRow::figures(row.name, shown.iter().map(|&place| format_number(row.errors[place])))
+                .named(name)
                 .meaning(row_meaning(row.name))
                 .colour(match row.name {
                     NETWORK => palette.accent,

@@ -16,17 +16,15 @@ pub fn snapshot_ui(ui: &mut Ui, what: &str, shown: usize, snapshots: usize) -> O
         picked = Some(shown + 1);
     }
     let mut number = shown + 1;
-    if snapshots == 0 {
-        ui.label("–");
-    } else {
+    let field = (snapshots > 0).then(|| {
         let suffix = format!(" of {snapshots}");
         let field = DragValue::new(&mut number).range(1..=snapshots).suffix(suffix);
-        let field = ui.add(field).on_hover_text("Type a number, or drag.");
-        ui.ctx()
-            .accesskit_node_builder(field.id, |node| node.set_label(title.as_str()));
-        if number != shown + 1 {
-            picked = Some(number - 1);
-        }
+        ui.add(field).on_hover_text("Type a number, or drag.")
+    });
+    if field.is_none() {
+        ui.label("–");
+    } else if number != shown + 1 {
+        picked = Some(number - 1);
     }
     let previous = ui.add_enabled(shown > 0, arrow_button("‹"));
     if name(previous, format!("Previous {what}"))

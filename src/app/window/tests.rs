@@ -94,7 +94,7 @@ fn save_task(window: &DecouplerWindow) -> FileTask {
     };
     let run = window.shared.run.as_ref().unwrap().id;
     FileTask::save_run(words, "network", run, |run| {
-        let file = NetworkFile::from_run(run).map_err(|error| error.to_string())?;
+        let file = run.network_file()?;
         Ok(Contents::new(move |path| file.save(path)))
     })
 }
@@ -189,7 +189,7 @@ fn a_file_asked_for_before_another_training_began_is_refused_not_written_about_t
     window.apply(Effect::Configure(Box::new(other)));
     window.apply(Effect::Train);
     window.wait(|window| {
-        matches!(window.shared.phase, Phase::Ended(_)) && window.shared.run.as_ref().unwrap().settings.hidden == 4
+        matches!(window.shared.phase, Phase::Ended(_)) && window.shared.run.as_ref().unwrap().settings().hidden == 4
     });
     window.answer(task, path.clone());
     window.wait(|window| window.notice().is_some());

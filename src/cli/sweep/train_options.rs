@@ -6,6 +6,7 @@ use crate::cli::{
 };
 use crate::{
     decoupling::DecoderKind,
+    export::RecipeSource,
     import::{Plan, Setup},
 };
 
@@ -33,17 +34,21 @@ impl TrialArguments {
     /// Setup of the trial, on samples of `recording` if it is given; paths are absolute.
     pub(super) fn setup(&self, recording: Option<&Plan>) -> Result<Setup, Failure> {
         let columns = self.training.scene.columns();
-        let plan = match recording {
+        let source = match recording {
             Some(_) if self.import.is_given() || !columns.is_empty() => {
                 let message = "the specification has a recording; leave --data, --recipe and --inputs out";
                 return Err(Failure::Arguments(message.to_owned()));
             }
-            Some(recording) => Some(self.import.divided(recording.clone())?),
-            None => self.import.given(columns)?,
+            Some(recording) => Some(RecipeSource::Recording(self.import.divided(recording.clone())?)),
+            None => self.import.source(columns)?,
         };
         let holds_out =
             self.import.holds_out() || recording.is_some_and(|plan| plan.division.validation_fraction > 0.0);
-        self.training.setup(plan.map(|plan| plan.absolute()), holds_out)
+        let source = source.map(|source| match source {
+            RecipeSource::Recording(plan) => RecipeSource::Recording(plan.absolute()),
+            simulated @ RecipeSource::Simulated(_) => simulated,
+        });
+        self.training.setup(source, holds_out)
     }
 
     /// Decoders to measure: those given, by default all of a simulated array and none of a recording.

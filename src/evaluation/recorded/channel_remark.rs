@@ -2,7 +2,7 @@ use ndarray::{ArrayView1, Axis};
 
 use crate::{dataset::Dataset, sensor::short};
 
-/// Remark on a channel whose readings tell less than they should. Channels are counted from 0.
+/// Remark on a channel that carries less information than it should. Channels are counted from 0.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum ChannelRemark {
@@ -47,7 +47,7 @@ impl ChannelRemark {
     pub fn sentence(&self, name: impl Fn(usize) -> String) -> String {
         match *self {
             Self::Constant { channel, value } => format!(
-                "{} is {} in every sample: it tells nothing; check its wire",
+                "{} is {} in every sample: it carries no information; check its wire",
                 name(channel),
                 short(value)
             ),
@@ -62,10 +62,10 @@ impl ChannelRemark {
                 is_largest,
                 share,
             } => format!(
-                "{} stands at its {} value {} in {:.1} % of the samples: it is saturated there, or its range ends; give it \
+                "{} is at its {} value {} in {:.1} % of the samples: it is saturated there, or its range ends; give it \
                  a wider range",
                 name(channel),
-                if is_largest { "largest" } else { "least" },
+                if is_largest { "largest" } else { "smallest" },
                 short(value),
                 100.0 * share
             ),
@@ -75,7 +75,7 @@ impl ChannelRemark {
 
 /// Finds the constant, duplicated and saturated channels of `set`, channel by channel.
 ///
-/// A channel is saturated if at least 1 % of its samples, and no fewer than 5, have its least (or largest) value, and more
+/// A channel is saturated if at least 1 % of its samples, and no fewer than 5, have its smallest (or largest) value, and more
 /// than three times as many as have any of the three values next to it: the tail of a distribution thins out towards its
 /// end, where a limit piles it up. Channels of fewer than six different values, such as switches, are not judged.
 pub fn channel_remarks(set: &Dataset) -> Vec<ChannelRemark> {
@@ -178,7 +178,7 @@ mod tests {
             "c2 is 4.2 in every sample",
             "c4 repeats c1",
             "c5 repeats c3",
-            "c6 stands at its largest value 1.5 in ",
+            "c6 is at its largest value 1.5 in ",
         ];
         assert_eq!(sentences.len(), expected.len(), "{sentences:?}");
         for (sentence, start) in sentences.iter().zip(expected) {

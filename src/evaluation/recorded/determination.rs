@@ -7,7 +7,7 @@ use super::{
 };
 use crate::dataset::{Dataset, SplitBy};
 
-/// Coefficient of determination R² of held-out answers for one target: how much of it the readings tell.
+/// Coefficient of determination R² of held-out answers for one target: the share of its variance that the readings explain.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Determination {
     /// R² with its interval, which covers R² of the same fitted models on infinitely many other samples of this kind.
@@ -18,7 +18,7 @@ pub struct Determination {
     pub is_heavy_tailed: bool,
 }
 
-/// Degrees to which readings tell a target.
+/// Degrees to which readings determine a target.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Standing {
     /// Neither of the others.
@@ -128,7 +128,7 @@ impl Determination {
         })
     }
 
-    /// Returns the degree to which the readings tell the target.
+    /// Returns the degree to which the readings determine the target.
     pub fn standing(&self) -> Standing {
         if self.r2.value < 0.1 || self.r2.low <= 0.0 {
             Standing::NotTold
@@ -139,12 +139,12 @@ impl Determination {
         }
     }
 
-    /// A sentence on the target of this name, such as "the readings do not tell y: R² 0.04 (0.01 to 0.07)".
+    /// Returns a sentence on the target of this name, such as "the readings explain little of y (R² 0.35, 0.25 to 0.44)".
     pub fn sentence(&self, name: &str) -> String {
         let verb = match self.standing() {
-            Standing::Told => "tell",
-            Standing::HardlyTold => "hardly tell",
-            Standing::NotTold => "do not tell",
+            Standing::Told => "determine",
+            Standing::HardlyTold => "explain little of",
+            Standing::NotTold => "do not determine",
         };
         let few = if self.units < Self::FEW_UNITS {
             format!(
@@ -161,7 +161,8 @@ impl Determination {
         };
         // Decimals that show how far a good R² is from 1.
         let digits = (1.0 - (1.0 - self.r2.value).abs().max(1e-9).log10().floor()).clamp(2.0, 6.0) as usize;
-        format!("the readings {verb} {name}: R² {:.digits$}{few}{tails}", self.r2)
+        let Interval { value, low, high } = self.r2;
+        format!("the readings {verb} {name} (R² {value:.digits$}, {low:.digits$} to {high:.digits$}){few}{tails}")
     }
 }
 
@@ -371,9 +372,9 @@ mod tests {
     #[test]
     fn each_standing_is_said_in_its_words() {
         for (share, words) in [
-            (0.9, "the readings tell y: R² 0."),
-            (0.3, "hardly tell y"),
-            (0.01, "do not tell y"),
+            (0.9, "the readings determine y (R² 0."),
+            (0.3, "explain little of y"),
+            (0.01, "do not determine y"),
         ] {
             let (set, answers) = recording(4000, 0.0, share, 5);
             let sentence = measure(&set, &answers, SplitBy::Time).unwrap().sentence("y");

@@ -171,7 +171,7 @@ impl LearningCurve {
     pub fn sentence(&self, name: &str) -> String {
         let percent = |ratio: f64| 100.0 * (1.0 - ratio);
         match self.doubling {
-            None => format!("too few samples to tell what more would bring for {name}"),
+            None => format!("too few samples to estimate the gain from more for {name}"),
             Some(Doubling { ratio }) if self.gains() => format!(
                 "twice the samples would lower the error of {name} by about {:.0} % ({:.0} to {:.0} %)",
                 percent(ratio.value),

@@ -39,7 +39,7 @@ impl NonlinearGain {
     pub fn remark(&self, name: &str) -> Option<String> {
         (!self.is_supported()).then(|| {
             let better = if self.ratio.high < 1.0 {
-                "hardly better"
+                "little better"
             } else {
                 "no better"
             };
@@ -81,7 +81,7 @@ mod tests {
         assert!(!worse.contains("these data do not support"), "{worse}");
         let hardly = remark(0.996, 0.994, 0.9991).unwrap();
         assert!(
-            hardly.contains("hardly better") && hardly.contains("0.996 (0.994 to 0.999) times ridge's)"),
+            hardly.contains("little better") && hardly.contains("0.996 (0.994 to 0.999) times ridge's)"),
             "{hardly}"
         );
         assert_eq!(remark(0.7, 0.6, 0.8), None);

@@ -4,10 +4,10 @@ use crate::{
 };
 
 /// Held-out errors of the same settings on the same samples, once with folds by group (by time without groups), once with
-/// random folds: the difference is how much a random split flatters.
+/// random folds: the difference is how optimistic a random split is.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SplitComparison {
-    /// Rule of the folds that do not flatter.
+    /// Rule of the folds that are not optimistic.
     pub by: SplitBy,
     /// Errors of the network by that rule, target by target.
     pub network: Vec<TargetErrors>,
@@ -66,7 +66,7 @@ impl SplitComparison {
         }
     }
 
-    /// RMSE of the network on random folds in proportion to that by [`Self::by`]: below 1 where random folds flatter.
+    /// RMSE of the network on random folds in proportion to that by [`Self::by`]: below 1 where random folds are optimistic.
     /// `None` if the latter is 0.
     pub fn network_ratio(&self, target: usize) -> Option<f64> {
         ratio(&self.random_network[target], &self.network[target])
@@ -83,12 +83,12 @@ impl SplitComparison {
         let by = self.by;
         match self.network_ratio(target) {
             Some(ratio) if ratio < 1.0 - Self::WORTH_SAYING => format!(
-                "a random split would report an RMSE of {random:.4} for {name}; split by {by} it is {honest:.4}: random \
-                 flatters by {:.0} %, because neighbouring samples are nearly the same",
+                "a random split would report an RMSE of {random:.4} for {name}; split by {by} it is {honest:.4}: the random \
+                 split is optimistic by {:.0} %, because neighbouring samples are nearly the same",
                 100.0 * (1.0 - ratio)
             ),
             _ => format!(
-                "a random split does not flatter here: RMSE {random:.4} for {name}, and {honest:.4} split by {by}"
+                "a random split is not optimistic here: RMSE {random:.4} for {name}, and {honest:.4} split by {by}"
             ),
         }
     }

@@ -81,7 +81,7 @@ mod tests {
         settings.training.stopping.epochs = 2;
         let mut run = Run::prepare(settings).unwrap();
         while run.step().is_none() {}
-        NetworkFile::from_run(&run).unwrap()
+        NetworkFile::from_run(&run, None).unwrap()
     }
 
     fn wait(woken: &Receiver<()>) {

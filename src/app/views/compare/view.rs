@@ -194,7 +194,7 @@ impl CompareView {
                     .and_then(|compared| compared.test.recording());
                 if let Some(test) = test {
                     let id = ["target of A", "target of B"][place];
-                    target_choice_ui(ui, id, &test.problem.targets, &mut of_place.target);
+                    target_choice_ui(ui, "Target", id, &test.problem.targets, &mut of_place.target);
                 }
                 plots_ui(
                     ui,

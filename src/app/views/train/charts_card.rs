@@ -1,4 +1,4 @@
-use eframe::egui::{ComboBox, Key, Modifiers, Ui, UiBuilder};
+use eframe::egui::{Key, Modifiers, Ui, UiBuilder};
 
 use super::{
     bottom_tab::BottomTab,
@@ -11,11 +11,10 @@ use super::{
 use crate::{
     app::{
         plotting::{Pointer, cells_ui, legend_behind_ui, legend_ui, plots_ui},
-        shared::{Effect, Offers, Phase, Shared, SourceKind},
+        shared::{Effect, Offers, Phase, Shared, SourceKind, target_choice_ui},
         theme::{Theme, space},
         widgets::{invitation_ui, tabs_ui},
     },
-    evaluation::Channel,
     figure::{ErrorBins, PlotFigure},
 };
 
@@ -63,7 +62,15 @@ pub fn charts_card_ui(
         ui.horizontal(|ui| {
             match shared.recorded_test() {
                 None => error_bars_ui(ui, &mut view.has_error_bars),
-                Some(test) => view.target = target_ui(ui, &test.problem.targets, view.target_of(test)),
+                Some(test) => {
+                    target_choice_ui(
+                        ui,
+                        "Target",
+                        "target of the charts",
+                        &test.problem.targets,
+                        &mut view.target,
+                    );
+                }
             }
             legend_behind_ui(ui, keys)
         })
@@ -210,20 +217,6 @@ impl TrainView {
 fn error_bars_ui(ui: &mut Ui, has_bars: &mut bool) {
     let hint = "± the root mean square error of each node over all snapshots of the test set, in mm.";
     ui.checkbox(has_bars, "Error bars").on_hover_text(hint);
-}
-
-/// The choice of the target whose values the chart shows; returns the one chosen.
-fn target_ui(ui: &mut Ui, targets: &[Channel], mut target: usize) -> usize {
-    let label = ui.label("Target");
-    let selected = targets.get(target).map_or_else(String::new, Channel::title);
-    let combo = ComboBox::from_id_salt("target of the charts").selected_text(selected);
-    let picked = combo.show_ui(ui, |ui| {
-        for (index, of) in targets.iter().enumerate() {
-            ui.selectable_value(&mut target, index, of.title());
-        }
-    });
-    picked.response.labelled_by(label.id);
-    target
 }
 
 /// Returns the hint shown in an empty chart.

@@ -192,6 +192,7 @@ mod tests {
     use crate::{
         app::{
             shared::RunView,
+            test_view::TestSet,
             training_worker::{Began, RunId},
         },
         evaluation::{Run, SimulatedSettings},
@@ -200,8 +201,10 @@ mod tests {
     fn result(run: &Run) -> RunResult {
         let decoupled_mm = run.decouple_test();
         RunResult {
-            errors: run.errors_of(&decoupled_mm).unwrap(),
-            decoupled_mm: Arc::new(decoupled_mm),
+            errors: run.errors_of(&decoupled_mm),
+            answers: Arc::new(decoupled_mm),
+            charts: None,
+            remarks: Vec::new(),
             frame: None,
             best_epoch: 0,
             flaw: None,
@@ -226,10 +229,11 @@ mod tests {
         let mut shared = Shared::new(true);
         shared.run = Some(RunView::new(Began {
             id: RunId::new(),
-            settings,
+            setup: settings.into(),
+            problem: Arc::clone(run.problem()),
             weights: 0,
-            test: TestView::of(&settings, Arc::clone(run.test())).unwrap(),
-            baselines: *run.baselines().unwrap(),
+            test: TestSet::of(&run).unwrap(),
+            baselines: run.baselines().unwrap().clone(),
         }));
         let mut drawn = Drawn::default();
         drawn.follow(&shared, shared.result(), 0, 0);

@@ -75,11 +75,6 @@ impl<'a> TableColumn<'a> {
     pub const fn width(self, width: ColumnWidth<'a>) -> Self {
         Self { width, ..self }
     }
-
-    /// Heading of the column.
-    pub const fn heading(&self) -> &'a str {
-        self.heading
-    }
 }
 
 /// An action of the user on a table.

@@ -95,7 +95,7 @@ pub fn curve_ui(ui: &mut Ui, found: &RecordingFindings, target: &mut usize) {
     for (channel, of_target) in found.targets.iter().zip(&found.findings.targets) {
         ui.label(sentence(&of_target.curve.sentence(&channel.name)));
     }
-    target_choice_ui(ui, "learning curve target", &found.targets, target);
+    target_choice_ui(ui, "Target", "learning curve target", &found.targets, target);
     let figure = curve_figure(found, *target);
     legend_ui(ui, &figure.keys);
     ui.allocate_ui(vec2(ui.available_width(), CURVE_HEIGHT), |ui| {

@@ -4,38 +4,105 @@ use super::{DecoderResult, DecodersState};
 use crate::{
     app::{
         glossary,
-        shared::Phase,
-        theme::Theme,
-        theme::space,
+        shared::{Phase, target_choice_ui},
+        theme::{Theme, space},
         widgets::{TableColumn, TableRow, TableView, dim_ui, focus_ring_ui, note_ui},
     },
     decoupling::DecoderKind,
-    evaluation::{DecoderReport, Errors},
+    evaluation::{DecoderReport, ErrorMeasure, Errors, Problem},
     export::format_number,
 };
 
-const TIMES_LIMIT: &str = "× limit";
+/// What is measured of a decoder.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Figure {
+    ZPercent,
+    TimesLimit,
+    Residual,
+    RangePercent,
+    Rmse,
+    R2,
+    FrameTime,
+    FitTime,
+}
 
-const COLUMNS: [TableColumn<'_>; 5] = [
-    TableColumn::text(""),
-    TableColumn::figure("Z %").meaning(glossary::Z_PERCENT.hint),
-    TableColumn::figure(TIMES_LIMIT).meaning(
-        "Mean |error| of z divided by that of the Bayesian reference, the limit for decoders of a row's own readings in \
-         this scene.",
-    ),
-    TableColumn::figure("residual").meaning(glossary::RESIDUAL.hint),
-    TableColumn::figure("µs")
-        .meaning("Time to decode a frame (all rows, read at one moment) on one thread, in µs: the median of many."),
-];
+impl Figure {
+    /// The figures of this problem, from left to right.
+    fn of(problem: &Problem, has_limit: bool) -> Vec<Self> {
+        if !problem.has_nodes {
+            return vec![Self::RangePercent, Self::Rmse, Self::R2, Self::FrameTime, Self::FitTime];
+        }
+        let figures = [Self::ZPercent, Self::TimesLimit, Self::Residual, Self::FrameTime].into_iter();
+        figures
+            .filter(|figure| has_limit || *figure != Self::TimesLimit)
+            .collect()
+    }
 
-/// The other decoders on the same test set, folded away until the user asks for them.
-pub fn decoders_ui(ui: &mut Ui, decoders: &mut DecodersState, phase: Phase, reference: Option<&Errors>) {
+    fn column(self) -> TableColumn<'static> {
+        let (heading, meaning) = match self {
+            Self::ZPercent => ("Z %", glossary::Z_PERCENT.hint),
+            Self::TimesLimit => (
+                "× limit",
+                "Mean |error| of z divided by that of the Bayesian reference, the limit for decoders of a row's own \
+                 readings in this scene.",
+            ),
+            Self::Residual => ("residual", glossary::RESIDUAL.hint),
+            Self::RangePercent => (
+                "% of range",
+                "Mean absolute error in percent of the range, averaged over all targets that vary.",
+            ),
+            Self::Rmse => ("RMSE", ErrorMeasure::Rmse.definition()),
+            Self::R2 => ("R²", ErrorMeasure::R2.definition()),
+            Self::FrameTime => (
+                "µs",
+                "Time to decode a frame (all rows, or one sample of a recording) on one thread, in µs: the median of many.",
+            ),
+            Self::FitTime => (
+                "fit s",
+                "Time to fit the decoder to the training samples in seconds, without the training of a network.",
+            ),
+        };
+        TableColumn::figure(heading).meaning(meaning)
+    }
+
+    fn value(self, report: &DecoderReport, limit: Option<&Errors>, target: usize) -> Option<f64> {
+        let of_target = report.errors.targets().get(target);
+        match self {
+            Self::ZPercent | Self::RangePercent => report.errors.percent(),
+            Self::TimesLimit => report.errors.nodes()?.times(limit?),
+            Self::Residual => report.residual,
+            Self::Rmse => Some(of_target?.rmse),
+            Self::R2 => of_target?.r2,
+            Self::FrameTime => Some(report.cost.frame_us),
+            Self::FitTime => Some(report.cost.fit_seconds),
+        }
+    }
+
+    /// The same of the limit.
+    fn of_limit(self, limit: &Errors) -> Option<f64> {
+        match self {
+            Self::ZPercent => limit.z_percent,
+            Self::TimesLimit => Some(1.0),
+            _ => None,
+        }
+    }
+}
+
+/// The other decoders on the same test set, folded away until the user asks for them, beside the errors `limit` of the
+/// Bayesian reference. `target` is the one whose errors are shown of a recording.
+pub fn decoders_ui(
+    ui: &mut Ui,
+    decoders: &mut DecodersState,
+    phase: Phase,
+    (problem, limit): (&Problem, Option<&Errors>),
+    target: &mut usize,
+) {
     ui.add_space(space(1));
     let header = CollapsingHeader::new("More decoders")
         .open(Some(decoders.is_open))
         .show(ui, |ui| {
             if let Some(measured) = &decoders.measured {
-                measured_ui(ui, measured, reference);
+                measured_ui(ui, measured, (problem, limit), target);
             } else {
                 let text = match phase {
                     Phase::Died => "The network was lost with the training thread: train again.",
@@ -45,28 +112,40 @@ pub fn decoders_ui(ui: &mut Ui, decoders: &mut DecodersState, phase: Phase, refe
             }
         });
     focus_ring_ui(ui, &header.header_response);
-    let hint = "Ridge regression, radial-basis network, Newton on Eq. (2) and others on the same test set: errors, \
-                times, and distance from the limit.";
+    let hint = if problem.has_nodes {
+        "Ridge regression, radial-basis network, Newton on Eq. (2) and others on the same test set: errors, times, and \
+         distance from the limit."
+    } else {
+        "Ridge regression, radial-basis network and others on the same test set: errors and times."
+    };
     if header.header_response.on_hover_text(hint).clicked() {
         decoders.is_open = !decoders.is_open;
     }
 }
 
-fn measured_ui(ui: &mut Ui, measured: &[DecoderResult], reference: Option<&Errors>) {
+fn measured_ui(
+    ui: &mut Ui,
+    measured: &[DecoderResult],
+    (problem, limit): (&Problem, Option<&Errors>),
+    target: &mut usize,
+) {
     let palette = Theme::of(ui).palette;
     // Without noise there is no limit but rounding, and nothing to be compared with it.
-    let limit = reference.filter(|limit| !limit.is_rounding());
-    let columns: Vec<TableColumn<'_>> = COLUMNS
-        .into_iter()
-        .filter(|column| limit.is_some() || column.heading() != TIMES_LIMIT)
+    let limit = limit.filter(|limit| !limit.is_rounding());
+    if !problem.has_nodes {
+        target_choice_ui(ui, "RMSE and R² of", "target of the decoders", &problem.targets, target);
+    }
+    let target = (*target).min(problem.targets.len().saturating_sub(1));
+    let figures = Figure::of(problem, limit.is_some());
+    let columns: Vec<TableColumn<'_>> = std::iter::once(TableColumn::text(""))
+        .chain(figures.iter().map(|figure| figure.column()))
         .collect();
-    let figures_count = columns.len() - 1;
     let rows = measured.iter().map(|result| {
-        let cells = match &result.report {
-            None => vec!["…".to_owned(); figures_count],
-            Some(Err(_)) => vec![format_number(None); figures_count],
-            Some(Ok(report)) => figures(report, limit),
-        };
+        let cells = figures.iter().map(|figure| match &result.report {
+            None => "…".to_owned(),
+            Some(Err(_)) => format_number(None),
+            Some(Ok(report)) => format_number(figure.value(report, limit, target)),
+        });
         let colour = if result.kind == DecoderKind::Network {
             palette.accent
         } else {
@@ -77,7 +156,7 @@ fn measured_ui(ui: &mut Ui, measured: &[DecoderResult], reference: Option<&Error
             .colour(colour)
     });
     let of_limit = limit.map(|limit| {
-        let cells = [limit.z_percent, Some(1.0), None, None].map(format_number);
+        let cells = figures.iter().map(|figure| format_number(figure.of_limit(limit)));
         TableRow::figures("limit", cells)
             .meaning(glossary::REFERENCE.hint)
             .colour(palette.dim)
@@ -100,18 +179,6 @@ fn measured_ui(ui: &mut Ui, measured: &[DecoderResult], reference: Option<&Error
     }
 }
 
-/// In the order of [`COLUMNS`] without the names, and without the ratio where there is no limit.
-fn figures(report: &DecoderReport, limit: Option<&Errors>) -> Vec<String> {
-    let nodes = report.errors.nodes();
-    let ratio = limit.map(|limit| nodes.and_then(|errors| errors.times(limit)));
-    let figures = [Some(report.errors.percent())].into_iter().chain([
-        ratio,
-        nodes.map(|_| report.residual),
-        Some(Some(report.cost.frame_us)),
-    ]);
-    figures.flatten().map(format_number).collect()
-}
-
 #[cfg(test)]
 mod tests {
     use egui_kittest::{Harness, kittest::Queryable as _};
@@ -119,15 +186,22 @@ mod tests {
     use super::*;
     use crate::{
         decoupling::Precision,
-        evaluation::{DecoderSet, Preset},
+        evaluation::{DecoderSet, Preset, Simulation, Source},
         scene::{Noise, NoisySets},
     };
 
     fn unfolded() -> DecodersState {
         DecodersState {
             is_open: true,
-            measured: Some(DecoderResult::pending()),
+            measured: Some(DecoderResult::pending(&Source::Simulated(Simulation::default()))),
         }
+    }
+
+    fn shown(mut decoders: DecodersState) -> Harness<'static> {
+        let problem = Simulation::default().problem();
+        Harness::new_ui(move |ui| {
+            decoders_ui(ui, &mut decoders, Phase::Idle, (&problem, None), &mut 0);
+        })
     }
 
     #[test]
@@ -151,11 +225,11 @@ mod tests {
         let remark = report.remarks[0].to_string();
         assert!(remark.contains("times that of always answering the mean"), "{remark}");
         let mut decoders = unfolded();
-        let place = DecoderResult::pending()
+        let place = DecoderResult::pending(&Source::Simulated(Simulation::default()))
             .iter()
             .position(|result| result.kind == DecoderKind::Ridge);
         decoders.take(place.unwrap(), Ok(report));
-        let harness = Harness::new_ui(move |ui| decoders_ui(ui, &mut decoders, Phase::Idle, None));
+        let harness = shown(decoders);
         harness.get_by_label(&format!("Ridge: {remark}"));
     }
 
@@ -163,7 +237,7 @@ mod tests {
     fn a_decoder_that_fails_says_why_and_the_others_stand() {
         let mut decoders = unfolded();
         decoders.take(0, Err("no resistance at rest".to_owned()));
-        let harness = Harness::new_ui(move |ui| decoders_ui(ui, &mut decoders, Phase::Idle, None));
+        let harness = shown(decoders);
         harness.get_by_label("Training mean: no resistance at rest");
         harness.get_by_label("Training mean, Z %: –");
         harness.get_by_label("Newton, Z %: …");
@@ -183,12 +257,12 @@ mod tests {
             .measure(DecoderKind::Newton, Precision::Double, &test)
             .unwrap()
             .unwrap();
-        let place = DecoderResult::pending()
+        let place = DecoderResult::pending(&Source::Simulated(Simulation::default()))
             .iter()
             .position(|result| result.kind == DecoderKind::Newton)
             .unwrap();
         decoders.take(place, Ok(report));
-        let harness = Harness::new_ui(move |ui| decoders_ui(ui, &mut decoders, Phase::Idle, None));
+        let harness = shown(decoders);
         harness.get_by_label_contains("Newton: 10 of 10 rows are not determined by their readings");
     }
 }

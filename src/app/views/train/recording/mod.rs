@@ -23,3 +23,4 @@ mod renaming;
 mod sample;
 
 pub use editor::RecordingEditor;
+pub(super) use remarks::bias;

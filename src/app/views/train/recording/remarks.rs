@@ -6,7 +6,7 @@ use crate::{
 };
 
 /// Returns a sentence on the bias of test errors by a rule of division.
-pub(super) fn bias(by: SplitBy) -> &'static str {
+pub(in crate::app::views::train) fn bias(by: SplitBy) -> &'static str {
     match by {
         SplitBy::Time => "The last part of the recording is held out for testing.",
         SplitBy::Group => "Whole groups are held out for testing: no press or session is in two sets.",

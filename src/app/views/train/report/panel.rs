@@ -6,13 +6,15 @@ use super::{conditioning::conditioning_ui, spread::spread_ui};
 use crate::{
     app::{
         glossary,
-        shared::{Effect, Phase, RunResult, RunView, Shared, SourceKind, error_table_ui},
+        shared::{Effect, Phase, RunResult, RunView, Shared, SourceKind, error_table_ui, sentence},
         theme::{space, type_size},
         views::train::{
-            decoders::decoders_ui, exports::open_task, inspect::TestPlace, press::press_section_ui, state::TrainView,
+            decoders::decoders_ui, exports::open_task, inspect::TestPlace, press::press_section_ui, recording::bias,
+            state::TrainView,
         },
-        widgets::{Landmark, dim_ui, ghost_button, note_ui, scrolled_ui, section_heading_ui},
+        widgets::{Landmark, dim_ui, fields::capitalised, ghost_button, note_ui, scrolled_ui, section_heading_ui},
     },
+    dataset::SplitBy,
     evaluation::{
         Baselines, ErrorTable, Errors, NodeAddress, ReferenceNote, Scores, SimulatedSettings, TestErrors, error_remarks,
     },
@@ -47,7 +49,8 @@ pub fn report_ui(ui: &mut Ui, view: &mut TrainView, shared: &Shared, effects: &m
                 view.go_to(TestPlace::of_node(worst, test));
             }
             let limit = baselines.reference.as_ref().and_then(TestErrors::nodes);
-            decoders_ui(ui, &mut view.decoders, shared.phase, limit);
+            let measured = (&*run.problem, limit);
+            decoders_ui(ui, &mut view.decoders, shared.phase, measured, &mut view.target);
             effective_parameters_ui(ui, run, result);
             spread_ui(ui, &run.problem, &run.starts);
         } else {
@@ -112,15 +115,35 @@ fn verdict_ui(ui: &mut Ui, shared: &Shared, run: &RunView, result: &RunResult) {
         (Some(settings), Some(errors), Some(baselines)) => {
             verdict_on_nodes_ui(ui, (run, result, reason), &settings, errors, &baselines);
         }
-        _ => {
-            let flaw = result.flaw.as_ref().map(ToString::to_string);
-            for remark in flaw.iter().chain(&result.remarks) {
-                note_ui(ui, &sentence(remark));
-            }
-        }
+        _ => verdict_on_targets_ui(ui, run, result),
     }
     if shared.setup().is_ok_and(|setup| setup != run.asked) {
         dim_ui(ui, "The settings have changed since this training.");
+    }
+}
+
+/// What the errors of a recording do not show, or by how much the network is better than ridge regression.
+fn verdict_on_targets_ui(ui: &mut Ui, run: &RunView, result: &RunResult) {
+    let flaw = result.flaw.as_ref().map(|flaw| capitalised(&flaw.to_string()));
+    for remark in flaw.iter().chain(&result.remarks) {
+        note_ui(ui, &sentence(remark));
+    }
+    let (network, ridge) = (result.errors.targets(), run.baselines.linear.targets());
+    let ratios = network
+        .iter()
+        .zip(ridge)
+        .map(|(network, ridge)| ridge.rmse / network.rmse);
+    let ratios = Vec::from_iter(ratios.filter(|ratio| ratio.is_finite()));
+    let extreme = |pick: fn(f64, f64) -> f64| ratios.iter().copied().reduce(pick).map(format_number);
+    if let (true, Some(low), Some(high)) = (flaw.is_none(), extreme(f64::min), extreme(f64::max))
+        && ratios.iter().all(|ratio| *ratio > 1.0)
+    {
+        let times = if low == high { low } else { format!("{low} to {high}") };
+        dim_ui(ui, &format!("{times} times as accurate as ridge regression."));
+    }
+    let plan = run.setup.plan();
+    if plan.is_some_and(|plan| plan.test.is_none() && plan.division.by == SplitBy::Random) {
+        note_ui(ui, bias(SplitBy::Random));
     }
 }
 
@@ -134,19 +157,19 @@ fn verdict_on_nodes_ui(
     let remarks = error_remarks(settings, &run.scores(result), Some(reason));
     let of_network = remarks.iter().find(|(row, _)| *row == NETWORK);
     let fault = if let Some(flaw) = &result.flaw {
-        Some(sentence(&flaw.to_string()))
+        Some(flaw.to_string())
     } else if let Some((row, remark)) = of_network {
-        Some(sentence(&format!("{row}: {remark}")))
+        Some(format!("{row}: {remark}"))
     } else if errors.z_mm > baselines.linear.z_mm {
         let remedy = reason.remedy(&settings.training.method);
-        Some(sentence(&format!(
+        Some(format!(
             "a linear map of the resistances is better on z than this network: {remedy}"
-        )))
+        ))
     } else {
         None
     };
     if let Some(fault) = fault {
-        note_ui(ui, &fault);
+        note_ui(ui, &sentence(&capitalised(&fault)));
     } else if errors.z_mm > 0.0 {
         let times = format_number(baselines.linear.z_mm / errors.z_mm);
         let to_limit = baselines.reference.and_then(|limit| errors.times(&limit));
@@ -158,13 +181,6 @@ fn verdict_on_nodes_ui(
         };
         dim_ui(ui, &text);
     }
-}
-
-/// The text with a capital and a full stop.
-fn sentence(text: &str) -> String {
-    let mut letters = text.chars();
-    let first = letters.next().into_iter().flat_map(char::to_uppercase);
-    first.chain(letters).chain(['.']).collect()
 }
 
 /// Returns the worst node, if the user wants to see it.
