@@ -13,7 +13,10 @@ use decoupler::{
 
 use eframe::egui::vec2;
 
-use crate::driver::Driver;
+use crate::{
+    driver::Driver,
+    recordings::{opened, plan, trained},
+};
 #[path = "../support/terminal.rs"]
 mod terminal;
 
@@ -338,4 +341,31 @@ fn a_sweep_of_the_window_is_trained_by_the_terminal_and_seen_to_grow() {
     driver.wait("the refusal", |driver| {
         driver.says("give a folder that decoupler sweep has filled")
     });
+}
+
+#[test]
+fn a_sweep_of_a_recording_has_the_runs_of_the_train_view() {
+    let (mut driver, path, _folder) = opened(120);
+    driver.click_button("Experiments");
+    driver.click("Sweep");
+    driver.click("Use the settings of the Train view");
+    driver.settle();
+    assert!(!driver.has("Samples"), "the recording has no number of samples to vary");
+    driver.type_into("Values across", "4 12");
+    driver.type_into("Values down", "minmax whiten");
+    driver.enter("Epochs", "5");
+    run_to_the_end(&mut driver);
+    let results = &driver.views().experiments.outcome().unwrap().results;
+    assert!(results.is_complete() && results.cells.len() == 4);
+    let alone = trained(&plan(&path));
+    let trial = &results.cells[1].trials[0];
+    assert_eq!(trial.errors, alone.errors(), "12 hidden nodes, scaled to [−1, 1]");
+    assert_eq!(trial.baselines, *alone.baselines().unwrap());
+    let percent = decoupler::export::format_percent(trial.errors.percent());
+    let label = format!("12, minmax: median mean absolute error {percent}");
+    assert!(driver.has(&label), "{label} is not among {:#?}", driver.texts());
+    driver.click("Cell 12, minmax");
+    driver.click(OPEN);
+    wait_for_the_network(&mut driver);
+    assert_eq!(driver.state().result().unwrap().errors, alone.errors());
 }
