@@ -80,7 +80,7 @@ impl Driver {
         if driver.has(SKIP) {
             driver.click(SKIP);
         }
-        if driver.shown() == "Train" {
+        if driver.shown() == "Train" && driver.state().source == SourceKind::Array {
             driver.unfold();
         }
         driver

@@ -8,7 +8,7 @@ use crate::{driver::Driver, training::start_endless};
 const UNDO: (Modifiers, Key) = (Modifiers::COMMAND, Key::Z);
 
 /// Lets the time pass after which changes count as two.
-fn pause(driver: &mut Driver) {
+pub(crate) fn pause(driver: &mut Driver) {
     let harness = driver.harness();
     for _ in 0..8 {
         harness.input_mut().time = Some(harness.ctx.input(|input| input.time) + 0.5);

@@ -13,6 +13,7 @@ use egui_kittest::kittest::{By, NodeT as _, Queryable as _};
 
 use crate::{
     driver::Driver,
+    habits::pause,
     recordings::{opened, opened_text, plan, recording, settings, trained, written},
 };
 
@@ -71,7 +72,7 @@ fn from_the_first_start_a_dropped_file_is_an_onnx_network_after_three_clicks() {
     driver.wait("the plan", |driver| driver.state().setup().is_ok());
     driver.train_recording();
     driver.click_button("Export");
-    driver.click_button("ONNX, float32");
+    driver.click_button("ONNX, f32");
     let onnx = folder.path().join("press.onnx");
     driver.type_into("File", &onnx.display().to_string());
     driver.click_button("Save");
@@ -150,7 +151,7 @@ fn a_network_file_brings_back_its_settings_its_recording_and_its_run() {
     other.settle();
     assert_eq!(other.state().runs.workspace.runs.len(), 1);
 
-    // Its recording has gone elsewhere.
+    // Its recording is moved.
     let moved = folder.path().join("elsewhere.csv");
     fs::rename(&path, &moved).unwrap();
     let mut without = Driver::open();
@@ -247,27 +248,6 @@ fn files_dropped_while_a_training_runs_change_nothing() {
 }
 
 #[test]
-fn the_window_says_what_dropping_a_file_does() {
-    let mut driver = Driver::open();
-    for (name, expected) in [
-        ("press.csv", "Drop to open as a recording"),
-        ("net.json", "Drop to open the recipe, network or checkpoint"),
-        ("half.CHECKPOINT", "Drop to open the recipe, network or checkpoint"),
-    ] {
-        let hovered = egui::HoveredFile {
-            path: Some(name.into()),
-            ..egui::HoveredFile::default()
-        };
-        driver.harness().input_mut().hovered_files = vec![hovered];
-        driver.harness().step();
-        assert!(driver.has(expected), "{name}: {:#?}", driver.texts());
-    }
-    driver.harness().input_mut().hovered_files.clear();
-    driver.harness().step();
-    assert!(!driver.says("Drop to open"));
-}
-
-#[test]
 fn the_recording_is_open_again_at_the_next_start() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("window.json");
@@ -301,14 +281,9 @@ fn undoing_brings_a_meaning_back() {
     let (mut driver, _path, _folder) = opened(40);
     driver.settle();
     // Changes within a second count as one.
-    let later = |driver: &mut Driver| {
-        let time = driver.harness().input().time.unwrap_or_default() + 5.0;
-        driver.harness().input_mut().time = Some(time);
-        driver.harness().run_steps(3);
-    };
-    later(&mut driver);
+    pause(&mut driver);
     driver.mean("y", "unused");
-    later(&mut driver);
+    pause(&mut driver);
     assert_eq!(driver.state().setup().unwrap().plan().unwrap().import.targets, ["x"]);
     driver.press_with(egui::Modifiers::COMMAND, egui::Key::Z);
     driver.wait("the meaning", |driver| {

@@ -13,7 +13,8 @@ use decoupler::{
     import::{Plan, Recipe},
     scene::RowModel,
 };
-use eframe::egui;
+use eframe::egui::{self, accesskit::Role};
+use egui_kittest::kittest::{By, Queryable as _};
 use tempfile::TempDir;
 
 use crate::driver::Driver;
@@ -54,7 +55,12 @@ impl Driver {
     #[track_caller]
     pub(crate) fn mean(&mut self, column: &str, meaning: &str) {
         self.click(&format!("Meaning of {column}"));
-        self.click_button(meaning);
+        // The form, on the left, may have a button of the same name.
+        self.settle();
+        let options = self.harness().get_all(By::new().role(Role::Button).label(meaning));
+        let option = options.max_by(|one, other| one.rect().left().total_cmp(&other.rect().left()));
+        option.unwrap().click();
+        self.harness().run_steps(2);
         self.settle();
     }
 

@@ -47,30 +47,46 @@ impl DecouplerWindow {
             StrokeKind::Inside,
         );
         let font = FontId::proportional(type_size().title);
-        let text = self.dropping_in_words(ui);
+        let hovered = ui.input(|input| input.raw.hovered_files.clone());
+        let paths: Vec<PathBuf> = hovered.into_iter().filter_map(|file| file.path).collect();
+        let text = in_words(&paths, self.shared.phase.is_busy(), self.views.has_recording());
         painter.text(whole.center(), Align2::CENTER_CENTER, text, font, palette.text);
     }
+}
 
-    /// Returns a sentence on what dropping the files under the pointer does.
-    fn dropping_in_words(&self, ui: &Ui) -> &'static str {
-        if self.shared.phase.is_busy() {
-            return "A training is running: stop it before you open other files";
-        }
-        // Only their names: reading files would block the window.
-        let is_document = |path: &PathBuf| {
-            let extension = path.extension().map(|extension| extension.to_ascii_lowercase());
-            extension.is_some_and(|extension| extension == "json" || extension == "checkpoint")
-        };
-        let has_document = ui.input(|input| {
-            let mut paths = input.raw.hovered_files.iter().filter_map(|file| file.path.as_ref());
-            paths.any(is_document)
-        });
-        if has_document {
-            "Drop to open the recipe, network or checkpoint"
-        } else if self.views.has_recording() {
-            "Drop to add to the recording"
-        } else {
-            "Drop to open as a recording"
+/// Returns a sentence on what dropping these files does.
+fn in_words(paths: &[PathBuf], is_busy: bool, has_recording: bool) -> &'static str {
+    // Only their names: reading files would block the window.
+    let is_document = |path: &PathBuf| {
+        let extension = path.extension().map(|extension| extension.to_ascii_lowercase());
+        extension.is_some_and(|extension| extension == "json" || extension == "checkpoint")
+    };
+    if is_busy {
+        "A training is running: stop it before you open other files"
+    } else if paths.iter().any(is_document) {
+        "Drop to open the recipe, network or checkpoint"
+    } else if has_recording {
+        "Drop to add to the recording"
+    } else {
+        "Drop to open as a recording"
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_a_drop_does_depends_on_the_file_and_on_what_is_open() {
+        for (name, is_busy, has_recording, beginning) in [
+            ("press.csv", false, false, "Drop to open as a recording"),
+            ("press.csv", false, true, "Drop to add"),
+            ("net.json", false, true, "Drop to open the recipe, network"),
+            ("half.CHECKPOINT", false, false, "Drop to open the recipe, network"),
+            ("press.csv", true, false, "A training is running"),
+        ] {
+            let text = in_words(&[PathBuf::from(name)], is_busy, has_recording);
+            assert!(text.starts_with(beginning), "{name}: {text}");
         }
     }
 }

@@ -76,7 +76,6 @@ pub fn workload_ui(ui: &mut Ui, draft: &SimulatedSettings) {
         let text = capitalised(&describe_workload(&workload));
         ui.label(RichText::new(text).size(type_size().note).color(warning));
     }
-    ui.add_space(space(1));
 }
 
 /// A slider for small networks, with small marks at the suggestions.

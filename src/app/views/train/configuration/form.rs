@@ -154,6 +154,7 @@ fn recording_ui(ui: &mut Ui, recording: &mut RecordingEditor, shared: &Shared, e
 
 /// The method. A paused training can be continued with another one.
 fn method_ui<S>(ui: &mut Ui, settings: &mut RunSettings<S>, phase: Phase) {
+    ui.add_space(space(1));
     ui.add_enabled_ui(!phase.is_busy() || phase == Phase::Paused, |ui| {
         method_choice_ui(ui, &mut settings.training.method);
     });

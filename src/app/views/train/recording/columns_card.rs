@@ -18,7 +18,7 @@ impl RecordingEditor {
     /// Shows the columns of the files with the samples below, or an invitation to open files.
     pub fn columns_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) {
         /// Share of the height that the samples take, and its limits.
-        const SAMPLES: (f32, f32, f32) = (0.26, space(34), space(60));
+        const SAMPLES: (f32, f32, f32) = (0.2, space(28), space(48));
         let whole = ui.available_rect_before_wrap();
         if self.draft.is_none() {
             card_ui(ui, whole, |ui| self.invitation_ui(ui, effects));
@@ -27,7 +27,7 @@ impl RecordingEditor {
             let (columns, samples) = whole.split_top_bottom_at_y(whole.bottom() - height);
             card_ui(ui, columns.with_max_y(columns.bottom() - space(2)), |ui| {
                 ui.horizontal(|ui| {
-                    section_heading_ui(ui, "Columns");
+                    ui.vertical(|ui| section_heading_ui(ui, "Columns"));
                     if shared.shown_run().is_some() {
                         ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
                             if ui.add(ghost_button("Show results")).clicked() {
