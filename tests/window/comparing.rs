@@ -217,7 +217,10 @@ fn any_number_of_a_kept_run_leaves_room_for_the_next() {
     train_and_keep(&mut driver, 1);
     drop(driver);
     let mut files = fs::read_dir(&path).unwrap().map(|entry| entry.unwrap().path());
-    let is_run = |file: &std::path::PathBuf| file.display().to_string().contains("run-");
+    let is_run = |file: &std::path::PathBuf| {
+        let name = file.file_name().unwrap().to_string_lossy();
+        name.starts_with("run-") && !name.ends_with(".name.json")
+    };
     let run = files.find(is_run).unwrap();
     fs::rename(run, path.join(format!("run-{}.json", u64::MAX))).unwrap();
     let mut driver = Driver::open_keeping(&path);
