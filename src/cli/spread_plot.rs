@@ -20,7 +20,7 @@ pub(super) fn write_starts(starts: &[StartRecord], error_name: &str, out: &mut d
         starts.len(),
         best + 1
     )?;
-    let z_percent: Vec<f64> = starts.iter().filter_map(|start| start.z_percent).collect();
+    let z_percent: Vec<f64> = starts.iter().filter_map(StartRecord::percent).collect();
     let rows = [
         (error_name, Spread::of(z_percent.iter().copied())),
         (error, Spread::of(starts.iter().map(StartRecord::deciding_mse))),
@@ -46,7 +46,7 @@ pub(super) fn write_starts(starts: &[StartRecord], error_name: &str, out: &mut d
         }
         writeln!(out)?;
     }
-    match (rows[0].1, starts[best].z_percent) {
+    match (rows[0].1, starts[best].percent()) {
         (Some(spread), Some(kept)) if spread.smallest < spread.largest => {
             let [plot, strip] = plot(&spread, &z_percent, kept);
             writeln!(out, "\n{plot}  box: quartiles of {error_name}, | median")?;
@@ -86,6 +86,7 @@ mod tests {
             train_mse: 1.0,
             validation_mse: Some(validation_mse),
             z_percent: Some(z_percent),
+            percent_of_range: None,
             epochs: 1,
             best_epoch: 1,
             stop_reason: None,

@@ -95,6 +95,9 @@ struct LevelReport<'a> {
     points: Vec<PointReport<'a>>,
     fastest_under: Option<Choice>,
     most_accurate_under: Option<Choice>,
+    /// Decoders of an array that cannot be used, and why.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    refused: Vec<String>,
 }
 
 #[derive(Serialize)]
@@ -243,6 +246,11 @@ impl MeasuredLevel {
             points: points.map(point).collect(),
             fastest_under,
             most_accurate_under,
+            refused: if self.level.noise.is_some() {
+                self.refused.clone()
+            } else {
+                Vec::new()
+            },
         }
     }
 

@@ -137,10 +137,13 @@ impl Run {
     pub fn starts(&self) -> Vec<StartRecord> {
         let record = |trainer: &StartTrainer| {
             let best = trainer.best_records();
+            let errors = self.errors_of(&self.network_of(trainer).decouple(&self.test));
+            let is_array = errors.nodes().is_some();
             StartRecord {
                 train_mse: best.training_mse,
                 validation_mse: best.validation_mse,
-                z_percent: self.errors_of(&self.network_of(trainer).decouple(&self.test)).percent(),
+                z_percent: errors.percent().filter(|_| is_array),
+                percent_of_range: errors.percent().filter(|_| !is_array),
                 epochs: trainer.latest().epoch,
                 best_epoch: trainer.best_epoch(),
                 stop_reason: trainer.stop_reason(),

@@ -10,9 +10,12 @@ pub struct StartRecord {
     pub train_mse: f64,
     /// Validation error (mse, scaled) of the best network, if anything was held out.
     pub validation_mse: Option<f64>,
-    /// [Error in percent](super::TestErrors::percent) of the best network on the test set: AveZerr, or of a recording in
-    /// percent of the range; never used for selection.
+    /// AveZerr of the best network on the test set of an array, in percent; never used for selection.
     pub z_percent: Option<f64>,
+    /// Mean absolute error of the best network on the test set of a recording, in percent of the range; never used for
+    /// selection.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub percent_of_range: Option<f64>,
     /// Number of epochs run.
     pub epochs: usize,
     /// Epoch of the best network.
@@ -22,6 +25,11 @@ pub struct StartRecord {
 }
 
 impl StartRecord {
+    /// Returns the error in percent on the test set: [`TestErrors::percent`](super::TestErrors::percent).
+    pub fn percent(&self) -> Option<f64> {
+        self.z_percent.or(self.percent_of_range)
+    }
+
     /// Returns the error by which the best start is selected: on the validation set, or on the training set if
     /// nothing is held out.
     pub fn deciding_mse(&self) -> f64 {

@@ -97,7 +97,7 @@ fn starts_flaw(file: &NetworkFile) -> Option<String> {
         ));
     }
     let infinite = |start: &StartRecord| {
-        let figures = [Some(start.train_mse), start.validation_mse, start.z_percent];
+        let figures = [Some(start.train_mse), start.validation_mse, start.percent()];
         figures.into_iter().flatten().any(|figure| !figure.is_finite())
     };
     let place = starts.iter().position(infinite)?;

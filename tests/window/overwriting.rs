@@ -11,7 +11,7 @@ use crate::{
     recordings::{opened, recording, written},
 };
 
-const RECIPE: &str = "Recipe of the import, JSON";
+const RECIPE: &str = "Recipe, JSON";
 
 /// Asks for an export with this path, without waiting for an answer.
 #[track_caller]

@@ -118,7 +118,7 @@ fn targets_with_positions_are_shown_as_surfaces_beside_the_other_charts() {
 
     // The recipe keeps the file, and so does the network.
     let recipe = folder.path().join("recipe.json");
-    driver.save("Recipe of the import, JSON", &recipe);
+    driver.save("Recipe, JSON", &recipe);
     assert_eq!(
         RecipeFile::load(&recipe).unwrap().import.positions,
         Some(taxels.clone())

@@ -14,6 +14,7 @@ use crate::{
 };
 
 /// Test set of a run, ready to be drawn.
+#[expect(clippy::large_enum_variant, reason = "there is one a run")]
 #[derive(Clone, Debug)]
 pub enum TestSet {
     /// Nodes of a simulated array.

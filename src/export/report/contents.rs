@@ -241,7 +241,7 @@ impl RunReport<'_> {
                 (number + 1).into(),
                 start.train_mse.into(),
                 start.validation_mse.into(),
-                start.z_percent.into(),
+                start.percent().into(),
                 start.epochs.into(),
                 start.best_epoch.into(),
             ]

@@ -17,7 +17,7 @@ pub fn spread_ui(ui: &mut Ui, problem: &Problem, starts: &[StartRecord]) {
     };
     let palette = Theme::of(ui).palette;
     section_heading_ui(ui, &format!("Spread over {} starts", starts.len()));
-    let percents: Vec<Option<f64>> = starts.iter().map(|start| start.z_percent).collect();
+    let percents: Vec<Option<f64>> = starts.iter().map(StartRecord::percent).collect();
     let spread = Spread::of(percents.iter().copied().flatten());
     let of_test = problem.test_percent_name();
     if let Some(spread) = spread {
