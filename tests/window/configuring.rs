@@ -271,7 +271,7 @@ fn keys_train_and_walk_the_snapshots() {
     driver.press(Key::PageDown);
     driver.press(Key::PageUp);
     assert_eq!(driver.views().train.snapshot, 1);
-    assert!(driver.has("2 of 10"));
+    assert!(driver.says("2 of 10"));
     driver.press_with(Modifiers::COMMAND, Key::Enter);
     driver.wait("the end of the training", |driver| {
         matches!(driver.state().phase, Phase::Ended(_))

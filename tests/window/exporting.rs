@@ -238,7 +238,11 @@ fn every_network_format_is_exported_read_back_and_with_its_deviation() {
 #[test]
 fn tables_are_copied_as_they_are_shown() {
     for source in BOTH {
-        let Opened { mut driver, setup, .. } = trained_small(source);
+        let Opened {
+            mut driver,
+            setup,
+            folder: _folder,
+        } = trained_small(source);
         let figures = network_figures(&run_of(&setup));
         for form in ["Markdown", "LaTeX", "tab-separated"] {
             driver.open_menu();

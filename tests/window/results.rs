@@ -9,7 +9,7 @@ use egui_kittest::kittest::NodeT as _;
 
 use crate::{
     driver::Driver,
-    sources::{BOTH, Opened, network_figures, probe, run_of, skin, skin_with_positions, trained_small},
+    sources::{BOTH, Opened, force, network_figures, probe, run_of, skin_with_positions, trained_small},
 };
 
 /// Positions of the taxels of a grid in an order of their own.
@@ -36,7 +36,11 @@ fn trained_on(make: impl Fn(&Path) -> decoupler::import::Setup) -> Opened {
 #[test]
 fn a_training_shows_the_errors_of_the_library() {
     for source in BOTH {
-        let Opened { mut driver, setup, .. } = trained_small(source);
+        let Opened {
+            mut driver,
+            setup,
+            folder: _folder,
+        } = trained_small(source);
         driver.assert_shows(&network_figures(&run_of(&setup)));
         for tab in ["Training state", "Histogram", "Regression", "Loss"] {
             driver.click(tab);
@@ -103,7 +107,11 @@ fn scattered_positions_have_surfaces_and_those_on_a_line_say_why_there_are_none(
     assert!(svg.contains("Between the nodes: thin-plate spline"));
 
     let oblique = "target,x,y\nd1,0,0\nd2,3,1\nd3,6,2\n";
-    let Opened { driver, .. } = trained_on(|folder| skin_with_positions(folder, oblique));
+    let Opened {
+        driver,
+        folder: _folder,
+        ..
+    } = trained_on(|folder| skin_with_positions(folder, oblique));
     assert!(!driver.has("Actual surface"));
     assert!(driver.says("No surface goes through the positions of the targets: all nodes are on one line"));
     assert!(
@@ -114,7 +122,11 @@ fn scattered_positions_have_surfaces_and_those_on_a_line_say_why_there_are_none(
 
 #[test]
 fn without_positions_all_targets_of_the_sample_are_shown_and_errors_over_a_position() {
-    let Opened { mut driver, .. } = trained_on(probe);
+    let Opened {
+        mut driver,
+        folder: _folder,
+        ..
+    } = trained_on(probe);
     assert!(driver.has("Test sample 1") && driver.says("value (mm)"));
     driver.click("Error map");
     driver.settle();
@@ -129,8 +141,12 @@ fn without_positions_all_targets_of_the_sample_are_shown_and_errors_over_a_posit
     driver.click("Histogram");
     driver.settle();
     assert!(driver.says("error of y (mm), decoded − actual"));
-    // Forces have no map.
-    let Opened { driver, .. } = trained_on(skin);
+    // A force has no map.
+    let Opened {
+        driver,
+        folder: _folder,
+        ..
+    } = trained_on(force);
     assert!(!driver.has("Error map"));
 }
 
@@ -152,7 +168,11 @@ fn hover(driver: &mut Driver, place: eframe::egui::Rect, holds: impl Fn(&Driver)
 
 #[test]
 fn a_target_lit_on_a_surface_is_lit_in_the_sample_and_a_bar_leads_to_its_samples() {
-    let Opened { mut driver, .. } = trained_on(|folder| skin_with_positions(folder, GRID));
+    let Opened {
+        mut driver,
+        folder: _folder,
+        ..
+    } = trained_on(|folder| skin_with_positions(folder, GRID));
     driver.click("Sample");
     driver.settle();
     let surface = driver.get("Actual surface").rect();

@@ -16,7 +16,11 @@ fn pairs(driver: &Driver) -> Vec<(f64, f64)> {
 #[test]
 fn the_network_of_an_epoch_is_that_of_a_training_stopped_there() {
     for source in BOTH {
-        let Opened { mut driver, setup, .. } = trained_small(source);
+        let Opened {
+            mut driver,
+            setup,
+            folder: _folder,
+        } = trained_small(source);
         let of_latest = pairs(&driver);
         let last = driver.epochs();
         assert!(
@@ -55,7 +59,11 @@ fn the_network_of_an_epoch_is_that_of_a_training_stopped_there() {
 #[test]
 fn a_replay_goes_through_the_epochs_and_ends_on_the_latest() {
     for source in BOTH {
-        let Opened { mut driver, setup, .. } = trained_small(source);
+        let Opened {
+            mut driver,
+            setup,
+            folder: _folder,
+        } = trained_small(source);
         driver.click_button("Replay the training");
         assert!(driver.views().train.scrub.is_replaying());
         let mut seen = Vec::new();

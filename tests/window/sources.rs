@@ -72,7 +72,7 @@ pub(crate) fn probe(folder: &Path) -> Setup {
 }
 
 /// A recording of two readings of a press on 2 × 3 taxels, and of the force.
-pub(crate) fn skin(folder: &Path) -> Setup {
+fn skin(folder: &Path) -> Setup {
     let mut text = "time (s),u1 (V),u2 (V),d1 (mm),d2 (mm),d3 (mm),d4 (mm),d5 (mm),d6 (mm),force (N)\n".to_owned();
     for row in 0..60 {
         let t = f64::from(row);
@@ -85,6 +85,14 @@ pub(crate) fn skin(folder: &Path) -> Setup {
     }
     let targets = ["d1", "d2", "d3", "d4", "d5", "d6", "force"];
     setup(folder, "skin.csv", &text, &targets)
+}
+
+/// As [`skin`], of which only the force is decoded.
+pub(crate) fn force(folder: &Path) -> Setup {
+    let skin = skin(folder);
+    let mut plan = skin.plan().unwrap().clone();
+    plan.import.targets = vec!["force".to_owned()];
+    Setup::recording(*skin.settings(), plan)
 }
 
 /// As [`skin`], with positions of the taxels from a file of this text.

@@ -36,8 +36,15 @@ pub fn snapshot_ui(ui: &mut Ui, what: &str, shown: usize, snapshots: usize) -> O
     let dim = Theme::of(ui).palette.dim;
     let font = FontId::proportional(type_size().body);
     let galley = ui.painter().layout_no_wrap(title.clone(), font, dim);
-    if ui.available_width() >= galley.size().x {
-        ui.label(RichText::new(&title).color(dim));
+    let label = (ui.available_width() >= galley.size().x).then(|| ui.label(RichText::new(&title).color(dim)));
+    match (field, label) {
+        (Some(field), Some(label)) => {
+            field.labelled_by(label.id);
+        }
+        (Some(field), None) => {
+            ui.ctx().accesskit_node_builder(field.id, |node| node.set_label(title));
+        }
+        (None, _) => {}
     }
     picked
 }
