@@ -228,7 +228,7 @@ fn a_cross_validation_and_findings_are_not_ended_unasked() {
     );
     assert!(driver.has("will be discarded"));
     driver.click_button("Stay");
-    driver.click("■ Stop");
+    driver.click("■ Cancel");
     driver.settle();
     driver.click_button("Analyse readings");
     ask(&mut driver);

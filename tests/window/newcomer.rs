@@ -100,7 +100,7 @@ fn one_of_a_kind_is_singular() {
 
 #[test]
 fn a_linear_map_that_beats_the_network_is_marked() {
-    const MARK: &str = "Better on z than the network.";
+    const MARK: &str = "Better than the network.";
     let mut driver = Driver::open();
     driver.configure_small();
     driver.enter("Epochs", "1");

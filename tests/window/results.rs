@@ -208,6 +208,14 @@ fn a_target_lit_on_a_surface_is_lit_in_the_sample_and_a_bar_leads_to_its_samples
     assert_eq!(driver.views().train.snapshot + 1, number, "{label}");
 }
 
+/// Returns true for a heading or cell of the error table of a recording.
+fn is_of_error_table(text: &str) -> bool {
+    let is_cell = ["training mean, ", "ridge, ", "network, "]
+        .iter()
+        .any(|name| text.starts_with(name));
+    is_cell || ["RMSE", "MAE", "R²", "worst", "% of range"].contains(&text)
+}
+
 #[test]
 fn results_of_a_recording_lie_within_narrow_windows_too() {
     const SIZES: [Vec2; 3] = [vec2(1440.0, 900.0), vec2(1024.0, 700.0), vec2(960.0, 640.0)];
@@ -222,6 +230,10 @@ fn results_of_a_recording_lie_within_narrow_windows_too() {
                 driver.click(tab);
                 driver.settle();
                 for (text, place) in driver.places() {
+                    // The error table scrolls sideways in a narrow card.
+                    if is_of_error_table(&text) {
+                        continue;
+                    }
                     let is_beside = place.left() < -0.5 || place.right() > size.x + 0.5;
                     assert!(!is_beside, "at {size}, {text} is at {place:?}");
                 }

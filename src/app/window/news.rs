@@ -99,10 +99,12 @@ impl DecouplerWindow {
 
     fn take_event(&mut self, event: Event) {
         let shared = &mut self.shared;
+        if !matches!(event, Event::Reading(_)) {
+            shared.reading = None;
+        }
         match event {
             Event::Began(Ok(began)) => {
                 shared.preview = None;
-                shared.reading = None;
                 shared.run = Some(RunView::new(*began));
                 shared.phase = Phase::Training;
             }
