@@ -38,7 +38,7 @@ enum Command {
     Simulate(Box<Simulate>),
     Reproduce(Reproduce),
     Trade(Box<Trade>),
-    Sweep(Sweep),
+    Sweep(Box<Sweep>),
 }
 
 /// Runs the command that `arguments` (the program's name first) name, and returns the exit status. Without a command

@@ -80,8 +80,6 @@ pub use starts::{StartRecord, best_start};
 pub use table::{ErrorBlock, ErrorMeasure, ErrorRow, ErrorTable};
 pub use target_errors::TargetErrors;
 pub use test_errors::TestErrors;
-#[cfg(any(feature = "cli", feature = "figures"))]
-pub(crate) use trade::pareto_front;
 pub use trade::{TradeOffPoint, fastest_under, measure_trade_off, most_accurate_under};
 pub use trade_level::{TradeOffCost, TradeOffLevel, TradeOffLimits};
 pub use workload::{Workload, WorkloadTime};

@@ -26,7 +26,6 @@ const KIND: DocumentKind = DocumentKind::Recipe;
 pub struct RecipeFile;
 
 /// Source of samples in a recipe.
-#[expect(clippy::large_enum_variant, reason = "there is one a recipe")]
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum RecipeSource {

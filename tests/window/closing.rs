@@ -8,7 +8,6 @@ use decoupler::{
     training::StopReason,
 };
 use eframe::egui::{Key, ViewportCommand, ViewportEvent, ViewportId};
-use egui_kittest::kittest::Queryable as _;
 
 use crate::{
     configuring::choose_method,

@@ -87,7 +87,7 @@ fn several_starts_keep_the_best_and_show_how_all_spread() {
         assert_eq!(shown.history, run.leader().history());
         opened.driver.assert_shows(&network_figures(&run));
         assert!(opened.driver.has("SPREAD OVER 4 STARTS"));
-        let percent = Spread::of(starts.iter().filter_map(|start| start.z_percent)).unwrap();
+        let percent = Spread::of(starts.iter().filter_map(StartRecord::percent)).unwrap();
         let validation = Spread::of(starts.iter().map(StartRecord::deciding_mse)).unwrap();
         assert!(percent.smallest < percent.largest, "the starts differ");
         let deciding = match starts[0].validation_mse {

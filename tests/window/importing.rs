@@ -73,11 +73,11 @@ fn from_the_first_start_a_dropped_file_is_an_onnx_network_after_three_clicks() {
     driver.train_recording();
     driver.click_button("Export");
     driver.click_button("ONNX, f32");
-    let onnx = folder.path().join("press.onnx");
+    let onnx = folder.path().join("network");
     driver.type_into("File", &onnx.display().to_string());
     driver.click_button("Save");
     driver.wait("the file", |driver| driver.notice().is_some());
-    assert!(onnx.is_file(), "{:?}", driver.notice());
+    assert!(onnx.join("network.onnx").is_file(), "{:?}", driver.notice());
 }
 
 #[test]

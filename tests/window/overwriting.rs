@@ -60,7 +60,7 @@ fn a_file_that_exists_is_replaced_only_if_the_user_says_so() {
 fn a_recording_in_use_is_never_overwritten_by_whatever_path() {
     let (mut driver, path, folder) = opened(40);
     let tests = written(&folder, "tests.csv", &recording(20));
-    driver.click("Samples");
+    driver.unfold_to("Samples", "Test file…");
     driver.open_form("Test file…");
     driver.type_into("File", &tests.display().to_string());
     driver.click_button("Open");

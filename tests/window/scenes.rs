@@ -1,9 +1,6 @@
 //! Scenes, inputs and presets in the window, and files written before there were scenes.
 
-use std::{fs, path::Path};
-
 use decoupler::{
-    app::Phase,
     evaluation::{Outlook, Preset, SimulatedSettings, Simulation},
     export::format_number,
     network::{InputChoice, Quantity, ScalingChoice},

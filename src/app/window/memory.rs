@@ -83,7 +83,7 @@ impl DecouplerWindow {
         self.remembered.recording = Some(self.shared.recording.settings);
         match &self.shared.recording.plan {
             Ok(plan) if self.remembered.plan.as_ref() != Some(&**plan) => {
-                self.remembered.plan = Some(Plan::clone(plan))
+                self.remembered.plan = Some(Plan::clone(plan));
             }
             Ok(_) => {}
             // An import that is incomplete now may be completed again.

@@ -96,7 +96,7 @@ fn surface_ui(
         ui.set_min_height(space(7));
         ui.label(RichText::new(&surface.title).font(semibold(type_size().title)));
         ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
-            view_mode_ui(ui, look, effects)
+            view_mode_ui(ui, look, effects);
         });
     });
     let place = ui.available_rect_before_wrap();

@@ -13,6 +13,7 @@ use crate::{
 };
 
 /// A chart below the surfaces.
+#[expect(clippy::large_enum_variant, reason = "there is one on show")]
 pub(super) enum Chart {
     Plots(PlotFigure),
     Map(HeatMap),

@@ -19,13 +19,16 @@ pub struct TableRow<'a> {
     pub(super) cells: Vec<TableCell<'a>>,
 }
 
+/// Adds the controls of a cell.
+type Controls<'a> = Box<dyn FnOnce(&mut Ui) + 'a>;
+
 /// A cell of a table: a text, or controls.
 #[derive(Default)]
 #[must_use = "a cell shows only in a table"]
 pub struct TableCell<'a> {
     pub(super) text: String,
     /// Adds the controls of the cell in place of the text.
-    pub(super) controls: Option<Box<dyn FnOnce(&mut Ui) + 'a>>,
+    pub(super) controls: Option<Controls<'a>>,
     /// None for the colour of texts.
     pub(super) colour: Option<Color32>,
     pub(super) is_strong: bool,

@@ -43,7 +43,7 @@ impl RecordingEditor {
             seed_ui(ui, "Seed", glossary::SEED.hint, &mut settings.seed.0, 0);
         });
         fold_ui(ui, "Filter", &filter_summary(draft), |ui| {
-            reads_again |= filter_ui(ui, draft)
+            reads_again |= filter_ui(ui, draft);
         });
         fold_ui(ui, "Positions", &positions_summary(draft), |ui| {
             positions_ui(ui, positions_task, effects);
