@@ -17,7 +17,7 @@ pub struct TradeOffPoint {
 }
 
 impl TradeOffPoint {
-    /// Returns the [error in percent](TestErrors::percent); infinite if undefined.
+    /// Returns the [error in percent](super::TestErrors::percent); infinite if undefined.
     pub fn percent(&self) -> f64 {
         self.report.errors.percent().unwrap_or(f64::INFINITY)
     }
