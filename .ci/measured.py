@@ -1,4 +1,4 @@
-"""Cross-validates own data of few, noisy samples beside scikit-learn's ridge. Usage: measured.py PROGRAM FOLDER.
+"""Cross-validates recordings of few, noisy samples next to scikit-learn's ridge. Usage: measured.py PROGRAM FOLDER.
 
 R² is over all samples, each answered by a model that has not seen its fold, and averaged over seeds: 20 samples in random
 folds give another R² with every seed, 0.1 apart (standard deviation), so that the mean of fewer seeds would tell nothing of a
@@ -64,7 +64,7 @@ for name, load in [("diabetes", load_diabetes), ("linnerud", load_linnerud)]:
         if means["network"] < limit[target] - MARGIN:
             failures.append(f"{name} y{target + 1}: the network has {means['network']:.3f}, scikit-learn's ridge {limit[target]:.3f}")
         # Where the readings predict nothing, the network can be better than ridge by chance; then that is said.
-        no_better, nothing = f"no better than ridge for y{target + 1} ", f"do not tell y{target + 1}:"
+        no_better, nothing = f"no better than ridge for y{target + 1} ", f"do not determine y{target + 1} "
         hardly = f"hardly better than ridge for y{target + 1} "
         is_said = [any(words in report_said for words in [no_better, hardly, nothing])
                    for report_said in ("\n".join(report["warnings"]) for report in reports)]

@@ -68,6 +68,7 @@ mod tests {
         }
     }
 
+    #[cfg(feature = "files")]
     #[test]
     fn formulas_are_inert_and_numbers_stay_numbers() {
         for text in [

@@ -27,6 +27,7 @@ pub fn format_number(value: impl Into<Option<f64>>) -> String {
 
 /// Formats a number with `decimals` decimals, for figures whose distance from a round value matters, as of R² from 1:
 /// `0.9987`. As [`format_number`] does where it is 10000 or more in magnitude, or none.
+#[cfg(feature = "files")]
 pub fn format_decimals(value: impl Into<Option<f64>>, decimals: usize) -> String {
     match value.into() {
         Some(value) if value.abs() < 1e4 => {
@@ -42,6 +43,7 @@ pub fn format_decimals(value: impl Into<Option<f64>>, decimals: usize) -> String
 }
 
 /// Formats R², the coefficient of determination, with four decimals.
+#[cfg(feature = "files")]
 pub fn format_r2(value: impl Into<Option<f64>>) -> String {
     format_decimals(value, 4)
 }
@@ -69,6 +71,7 @@ pub fn format_duration(duration: Duration) -> String {
 }
 
 /// Returns the text with its first letter as a capital.
+#[cfg(any(feature = "cli", feature = "figures"))]
 pub fn capitalised(text: &str) -> String {
     let mut letters = text.chars();
     let first = letters.next().into_iter().flat_map(char::to_uppercase);
