@@ -263,7 +263,7 @@ def train_on_own_data():
         writer.writerow([*names, "force (N)", "torque (N·m)"])
         writer.writerows(np.column_stack([*readings, force, torque]).tolist())
     recipe = {"data": "readings.csv", "inputs": ["hall, a", *names[1:]], "targets": ["force", "torque"]}
-    document = {"format": "decoupler import", "version": 1, "program": "", "plan": {"import": recipe}}
+    document = {"format": "decoupler recipe", "version": 1, "program": "", "source": {"recording": {"import": recipe}}}
     (HOME / OWN / "recipe.json").write_text(json.dumps(document))
     run(PROGRAM, "train", "--recipe", HOME / OWN / "recipe.json", "--epochs", 40, "--out", HOME / OWN / "network.json", "--json")
 
