@@ -9,7 +9,7 @@ use super::{
 };
 use crate::export::{
     NetworkFile,
-    bundle::{BundleDecoder, BundleError, BundleFormat, BundlePrecision, ExportedDecoder, export_bundle, fitted},
+    bundle::{BundleDecoder, BundleError, BundleFormat, BundlePrecision, ExportedDecoder, export_bundle},
     is_same,
 };
 
@@ -65,10 +65,7 @@ impl Export {
         let decoder = if self.decoder.is_network() {
             ExportedDecoder::from(&file)
         } else {
-            let sets = sets(&file.setup(), self.json)?.sets;
-            let networks = Some(file.network.clone());
-            let fitted = fitted(file.settings, sets.split.training, networks, self.decoder, &sets.test)?;
-            ExportedDecoder::new(&file, fitted)
+            ExportedDecoder::of_run(&file, sets(&file.setup(), self.json)?, self.decoder)?
         };
         let report = export_bundle(decoder, self.format, self.precision, &self.out)?;
         if self.json {

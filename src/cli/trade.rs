@@ -118,7 +118,7 @@ impl Trade {
             ];
             bar.set_message(case.name());
             let settings = case.setup.settings();
-            let on_point = |kind, point: Result<TradeOffPoint, RunError>| match point {
+            let on_point = |kind, point: Result<TradeOffPoint, RunError>, _: Option<&_>| match point {
                 Ok(point) => {
                     let point = TradeOffPoint {
                         preset: case.preset,
@@ -319,7 +319,8 @@ mod tests {
                     return Err(Failure::Arguments("too wide".to_owned()));
                 }
                 let sets = sets(&case.setup, true)?.sets;
-                let keep = |_, point: Result<TradeOffPoint, RunError>| level.level.points.push(point.unwrap());
+                let keep =
+                    |_, point: Result<TradeOffPoint, RunError>, _: Option<&_>| level.level.points.push(point.unwrap());
                 Ok(measure_trade_off(
                     case.setup.settings(),
                     &sets,

@@ -252,6 +252,12 @@ impl<'a> Trained<'a> {
     /// Warnings of the source and of the training.
     fn warnings(&self, determined: &[Result<Determination, Undetermined>]) -> Vec<String> {
         let source = self.file.settings.simulated().map(|settings| settings.source);
+        let NetworkFile {
+            problem,
+            scores,
+            settings,
+            ..
+        } = self.file;
         let outlook = source.and_then(|source| Outlook::of(&source).ok());
         let of_array = outlook.iter().flat_map(|outlook| &outlook.warnings);
         let of_import = self.sets.recordings.as_ref().map(import_warnings);
@@ -261,7 +267,7 @@ impl<'a> Trained<'a> {
             .chain(self.optimism.iter().cloned())
             .chain(self.run.flaw().map(|flaw| flaw.to_string()))
             .chain(describe_standings(&self.file.problem.targets, determined))
-            .chain(describe_worse_than_ridge(self.file))
+            .chain(describe_worse_than_ridge(problem, scores, settings.training.method))
             .collect()
     }
 

@@ -50,7 +50,8 @@ impl TradeOffPoint {
 }
 
 /// Measures every decoder of `decoders` on the test samples of `sets`, networks with each number of `hidden` nodes, and passes
-/// each point to `on_point` as soon as it is measured, or why a decoder cannot be used with these samples. Decoders that solve
+/// each point to `on_point` as soon as it is measured, or why a decoder cannot be used with these samples, together with the
+/// run whose networks the decoder has, if it needs any. Decoders that solve
 /// the equations of a sensor are left out where there is no model of one. Training uses all threads; decoding is timed on one.
 /// Returns `false` if cancelled before the end.
 ///
@@ -62,7 +63,7 @@ pub fn measure_trade_off(
     hidden: &[usize],
     decoders: &[DecoderKind],
     is_cancelled: impl Fn() -> bool,
-    mut on_point: impl FnMut(DecoderKind, Result<TradeOffPoint, RunError>),
+    mut on_point: impl FnMut(DecoderKind, Result<TradeOffPoint, RunError>, Option<&Run>),
 ) -> Result<bool, RunError> {
     let mut set = DecoderSet::on_set(*settings, sets.split.training.clone(), None);
     let reference = match settings.simulated() {
@@ -90,7 +91,7 @@ pub fn measure_trade_off(
                     let fit_seconds = report.cost.fit_seconds;
                     point(*settings, report, fit_seconds)
                 };
-                on_point(kind, measured.map(of_report));
+                on_point(kind, measured.map(of_report), None);
             }
         }
     }
@@ -109,7 +110,8 @@ pub fn measure_trade_off(
         for &kind in &with_network {
             for &precision in kind.precisions() {
                 if let Some(measured) = set.measure(kind, precision, &sets.test).transpose() {
-                    on_point(kind, measured.map(|report| point(settings, report, training_seconds)));
+                    let measured = measured.map(|report| point(settings, report, training_seconds));
+                    on_point(kind, measured, Some(&run));
                 }
             }
         }

@@ -1,7 +1,7 @@
-use super::{NetworkFile, format_number};
+use super::format_number;
 use crate::{
     evaluation::{
-        Channel, TargetErrors, TargetPosition,
+        Channel, Problem, Scores, TargetErrors, TargetPosition,
         recorded::{Determination, Findings, Standing, TargetFindings, Undetermined},
     },
     training::Method,
@@ -54,17 +54,15 @@ pub fn describe_warnings(inputs: &[Channel], targets: &[Channel], findings: &Fin
 }
 
 /// Warns of targets on which the network is worse than ridge, or no better to three digits.
-pub fn describe_worse_than_ridge(file: &NetworkFile) -> Vec<String> {
-    let scores = &file.scores;
+pub fn describe_worse_than_ridge(problem: &Problem, scores: &Scores, method: Method) -> Vec<String> {
     let errors = scores.network.targets().iter().zip(scores.baselines.linear.targets());
-    let worse = file
-        .problem
+    let worse = problem
         .targets
         .iter()
         .zip(errors)
         // R² is undefined for a target that is constant in the test samples.
         .filter(|(_, (network, ridge))| network.r2.is_some() && network.rmse > ridge.rmse);
-    let cure = match file.settings.training.method {
+    let cure = match method {
         Method::BayesianRegularization(_) => "record more samples, or use fewer hidden nodes",
         _ => "record more samples, or use fewer hidden nodes or Bayesian regularisation",
     };

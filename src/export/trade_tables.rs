@@ -147,7 +147,7 @@ mod tests {
         let mut settings = RunSettings::from(Measured { rows: RowModel::Shared });
         settings.training.stopping.epochs = 3;
         let mut points = Vec::new();
-        let keep = |_, point: Result<TradeOffPoint, _>| points.push(point.unwrap());
+        let keep = |_, point: Result<TradeOffPoint, _>, _: Option<&_>| points.push(point.unwrap());
         let kinds = [DecoderKind::Ridge, DecoderKind::Network];
         measure_trade_off(&settings, &RunSets::new(split, set(40)), &[2], &kinds, || false, keep).unwrap();
         let level = TradeOffLevel { noise: None, points };

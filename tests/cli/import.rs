@@ -155,6 +155,22 @@ fn a_checkpoint_resumes_unless_its_samples_have_changed() {
 }
 
 #[test]
+fn a_decoder_is_not_fitted_to_other_samples_than_the_run_had() {
+    let folder = recordings();
+    json(&format!("{TRAIN} --out n.json --json"), folder.path());
+    let export = "export --network n.json --decoder ridge --format numpy --json --out";
+    assert_eq!(json(&format!("{export} first"), folder.path())["format"], "numpy");
+    let sensor = folder.path().join("sensor.csv");
+    fs::write(&sensor, fs::read_to_string(&sensor).unwrap().replacen("0.", "0.1", 9)).unwrap();
+    let message = failure(&format!("{export} second"), folder.path(), 1);
+    assert!(
+        message.contains("has other samples than when the run was saved"),
+        "{message}"
+    );
+    assert!(!folder.path().join("second").exists());
+}
+
+#[test]
 fn files_of_a_checkpoint_that_have_moved_are_found_by_the_name_given() {
     let folder = recordings();
     let path = |name: &str| folder.path().join(name);

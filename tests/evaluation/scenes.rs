@@ -203,7 +203,7 @@ fn a_trade_has_a_point_for_every_choice() {
     };
     settings.training.stopping.epochs = 3;
     let mut points: Vec<TradeOffPoint> = Vec::new();
-    let keep = |_, point: Result<_, _>| points.push(point.unwrap());
+    let keep = |_, point: Result<_, _>, _: Option<&_>| points.push(point.unwrap());
     let sets = Setup::from(settings).sets(Path::new(""), &|| false, &mut |_| ());
     let sets = sets.unwrap().unwrap().sets;
     assert!(measure_trade_off(&settings.into(), &sets, &[2, 3], &DecoderKind::ALL, || false, keep).unwrap());
@@ -220,7 +220,7 @@ fn a_trade_has_a_point_for_every_choice() {
             .all(|point| fastest.report.cost.frame_us <= point.report.cost.frame_us)
     );
     let mut none = 0;
-    let count = |_, _: Result<_, _>| none += 1;
+    let count = |_, _: Result<_, _>, _: Option<&_>| none += 1;
     assert!(!measure_trade_off(&settings.into(), &sets, &[2], &DecoderKind::ALL, || true, count).unwrap());
     assert_eq!(none, 0);
 }

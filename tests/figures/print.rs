@@ -224,7 +224,7 @@ fn the_trade_off_tells_32_from_64_bits_and_hollow_marks_mean_nothing_else() {
         settings.source.sensor.scale = "4x4_2x12".parse().unwrap();
         (settings.source.samples, settings.source.validation_samples) = (100, 20);
         (settings.source.test_samples, settings.training.stopping.epochs) = (20, 2);
-        let on_point = |_, point: Result<_, _>| {
+        let on_point = |_, point: Result<_, _>, _: Option<&_>| {
             points.push(TradeOffPoint {
                 preset: Some(preset),
                 ..point.unwrap()

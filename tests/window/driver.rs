@@ -45,6 +45,9 @@ const DISMISS: &str = "Dismiss";
 /// Frames until something scrolled to lies still.
 const SCROLLING: usize = 5;
 
+/// Number of frames after which a window that still asks for more never comes to rest.
+const MOST_FRAMES: u64 = 100;
+
 /// The window and hands to work it.
 pub(crate) struct Driver {
     harness: Harness<'static, Option<DecouplerWindow>>,
@@ -120,6 +123,8 @@ impl Driver {
         };
         let builder = Harness::builder().with_size(size).with_context_setup(set_up);
         let builder = builder.renderer(Rasteriser::default()).with_render_cursor(false);
+        // News from threads that work meanwhile may ask for some frames more.
+        let builder = builder.with_max_steps(MOST_FRAMES);
         let harness = builder.build_ui_state(frame, None);
         let mut driver = Self { harness, asked };
         driver.wait("the first surface", |driver| {

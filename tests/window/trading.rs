@@ -46,7 +46,7 @@ fn measure(driver: &mut Driver) {
 fn by_library(plan: &TradeOffPlan, level: &PlannedLevel) -> Vec<TradeOffPoint> {
     let mut points = Vec::new();
     for run in &level.runs {
-        let on_point = |_, point: Result<TradeOffPoint, _>| points.push(point.unwrap());
+        let on_point = |_, point: Result<TradeOffPoint, _>, _: Option<&_>| points.push(point.unwrap());
         let sets = run.setup.sets(Path::new(""), &|| false, &mut |_| ()).unwrap().unwrap();
         let settings = run.setup.settings();
         measure_trade_off(settings, &sets.sets, &plan.hidden, &run.decoders, || false, on_point).unwrap();
@@ -322,4 +322,74 @@ fn decoders_of_a_recording_are_the_librarys_and_a_point_is_loaded() {
     let loaded = driver.state().recording.settings;
     assert_eq!((loaded.hidden, loaded.training.method.short_name()), (3, "lm"));
     assert_eq!(loaded.source, setup.settings().source);
+}
+
+/// Text of the first row of the table that begins so.
+fn row(driver: &Driver, name: &str) -> String {
+    let texts = driver.texts().into_iter();
+    let mut rows = texts.filter(|text| text.starts_with(&format!("{name}: ")));
+    rows.next().unwrap()
+}
+
+/// Types the path of the file asked for, waits until it is written, and returns the metadata of the bundle.
+fn save(driver: &mut Driver, path: &Path) -> serde_json::Value {
+    driver.harness().run_steps(5);
+    driver.type_into("File", &path.display().to_string());
+    driver.click_button("Save");
+    driver.wait("the answer", |driver| driver.notice().is_some());
+    assert!(driver.says("written and read back"), "{:#?}", driver.texts());
+    driver.settle();
+    driver.click("Dismiss");
+    serde_json::from_str(&fs::read_to_string(path.join("metadata.json")).unwrap()).unwrap()
+}
+
+#[test]
+fn the_decoder_of_a_point_is_exported_from_the_chart_and_from_the_table() {
+    for source in [SourceKind::Array, SourceKind::Recording] {
+        let Opened { mut driver, folder, .. } = open_small(source);
+        driver.click_button("Trade-off");
+        if source == SourceKind::Array {
+            driver.type_into("Noise levels", "1e-3");
+            driver.enter("Maximum samples", "100");
+            driver.enter("Test samples", "20");
+        }
+        driver.type_into("Hidden nodes", "3");
+        driver.enter("Maximum epochs", "3");
+        measure(&mut driver);
+        let (ridge, network) = match source {
+            SourceKind::Array => ("Ridge, paper preset", "Network, best preset, 3 hidden"),
+            SourceKind::Recording => ("Ridge", "Network, lm, 3 hidden"),
+        };
+        let marked = row(&driver, ridge);
+        driver.click(&marked);
+        driver.click("Export Ridge…");
+        driver.click_button("NumPy, f64");
+        let metadata = save(&mut driver, &folder.path().join("ridge"));
+        assert_eq!(metadata["decoder"], "ridge");
+        let look = driver.views().trade_off.look;
+        let point = &driver.views().trade_off.shown().unwrap().points[look.marked.unwrap()];
+        let errors = match source {
+            SourceKind::Array => {
+                assert_eq!(metadata["seed"], point.settings.seed.0);
+                serde_json::to_value(point.report.errors.nodes().unwrap()).unwrap()
+            }
+            SourceKind::Recording => {
+                let found = metadata["errors"].as_array().unwrap().iter();
+                let found = found.map(|target| target["errors"].clone());
+                let expected = serde_json::to_value(point.report.errors.targets()).unwrap();
+                assert_eq!(serde_json::Value::from_iter(found), expected, "the errors of the point");
+                metadata["errors"].clone()
+            }
+        };
+        assert_eq!(metadata["errors"], errors, "the errors of the point");
+
+        driver.right_click(&format!("Decoding: {network}"));
+        driver.click_button("ONNX, f32");
+        let metadata = save(&mut driver, &folder.path().join("network"));
+        assert_eq!(
+            (&metadata["decoder"], &metadata["hidden_nodes"]),
+            (&"network".into(), &3.into())
+        );
+        assert_eq!(driver.shown(), "Trade-off", "a right-click does not load the point");
+    }
 }

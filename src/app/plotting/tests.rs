@@ -204,7 +204,7 @@ fn figures_of_decoders_and_rows_are_the_same_on_screen_and_in_print() {
         let kinds = [DecoderKind::Ridge, DecoderKind::Network, DecoderKind::Newton];
         let settings = small(preset);
         let sets = settings.draw_sets().unwrap();
-        let on_point = |_, point: Result<TradeOffPoint, _>| {
+        let on_point = |_, point: Result<TradeOffPoint, _>, _: Option<&_>| {
             let preset = Some(preset);
             points.push(TradeOffPoint {
                 preset,

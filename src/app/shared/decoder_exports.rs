@@ -1,92 +1,104 @@
-//! Decoders beside the network as exports: fitted to the training samples of a run when they are written.
+//! Exports of single decoders, next to where their errors are shown.
 
-use std::path::Path;
+use std::{path::Path, sync::Arc};
+
+use eframe::egui::{Button, Ui, WidgetInfo, accesskit::Role, containers::menu::MenuButton};
 
 use super::{
-    Contents, FileTask, FileWords, NetworkSource,
-    network_exports::{bundle_name, bundles, said_of},
+    Contents, FileTask, NetworkSource,
+    network_exports::{bundle_name, bundle_words, bundles, file_stem, said_of},
 };
 use crate::{
-    decoupling::DecoderKind,
+    decoupling::{DecoderKind, Precision},
     export::{
         NetworkFile,
-        bundle::{BundleDecoder, BundleFormat, BundlePrecision, BundleReport, ExportedDecoder, export_bundle, fitted},
+        bundle::{BundleDecoder, BundleError, BundleFormat, BundlePrecision, ExportedDecoder, export_bundle},
     },
+    import::{Recorded, Setup, SetupSets},
 };
 
-/// The forms in which a decoder of the run `source` can be exported, each with its name: "C99, f32".
-pub fn decoder_tasks(source: &NetworkSource, kind: DecoderKind) -> Vec<(String, FileTask)> {
-    let decoder = BundleDecoder::Kind(kind);
-    let forms = bundles().filter(|(format, precision)| format.check_for(decoder, *precision).is_ok());
-    let task = |(format, precision): (BundleFormat, BundlePrecision)| {
-        let (name, stem) = match format {
-            BundleFormat::Json => ("JSON".to_owned(), kind.to_string()),
-            _ => (
-                format!("{}, {precision}", bundle_name(format)),
-                format!("{kind}-{format}-{precision}"),
-            ),
+/// Samples and network from which an exported decoder is made.
+#[derive(Clone, Debug)]
+pub enum DecoderSource {
+    /// Run with a trained network.
+    Run(NetworkSource),
+    /// Samples of a setup, to which a decoder without a network is fitted, and the origin of recorded ones.
+    Samples(Box<Setup>, Option<Box<Recorded>>),
+}
+
+impl DecoderSource {
+    fn task(&self, kind: DecoderKind, (format, precision): (BundleFormat, BundlePrecision)) -> FileTask {
+        let decoder = BundleDecoder::Kind(kind);
+        let words = bundle_words(format, decoder);
+        let what = match format {
+            BundleFormat::Json => kind.to_string(),
+            _ => format!("{kind}-{format}-{precision}"),
         };
-        let task = source.task(words(format), &stem, move |file, _| {
-            Contents::telling(move |path| {
-                let report = export(&file, decoder, (format, precision), path)?;
-                Ok(said_of(&report))
-            })
-        });
-        (name, task)
-    };
-    forms.map(task).collect()
-}
-
-/// Fits the decoder to the samples of the run of `file`, which are drawn or read again, and writes it.
-fn export(
-    file: &NetworkFile,
-    decoder: BundleDecoder,
-    (format, precision): (BundleFormat, BundlePrecision),
-    path: &Path,
-) -> Result<BundleReport, String> {
-    if decoder.is_network() {
-        return export_bundle(file, format, precision, path).map_err(|error| error.to_string());
-    }
-    let sets = file.setup().sets(Path::new(""), &|| false, &mut |_| ());
-    let sets = sets.map_err(|error| error.to_string())?;
-    let sets = sets.ok_or("the samples were not drawn")?.sets;
-    let networks = Some(file.network.clone());
-    let fitted = fitted(file.settings, sets.split.training, networks, decoder, &sets.test);
-    let exported = fitted.map(|fitted| ExportedDecoder::new(file, fitted));
-    exported
-        .and_then(|exported| export_bundle(exported, format, precision, path))
-        .map_err(|error| error.to_string())
-}
-
-fn words(format: BundleFormat) -> FileWords {
-    let (kind, description) = match format {
-        BundleFormat::Onnx => (
-            "decoder as ONNX",
-            "A folder with the decoder as an ONNX graph (opset 13) and golden vectors: readings in, targets out.",
-        ),
-        BundleFormat::C99 => (
-            "decoder as C99",
-            "A folder with one header and one source in C99 and a self-test: readings in, targets out.",
-        ),
-        BundleFormat::Matlab => (
-            "decoder for MATLAB and Octave",
-            "A folder with one function file for MATLAB and GNU Octave and golden vectors: readings in, targets out.",
-        ),
-        BundleFormat::NumPy => (
-            "decoder for NumPy",
-            "A folder with the numbers as .npz, a short decode.py and golden vectors: readings in, targets out.",
-        ),
-        BundleFormat::Json => {
-            return FileWords {
-                kind: "decoder",
-                description: "The numbers of the decoder as JSON, with what they mean.",
-                extensions: &["json"],
-            };
+        let write = move |path: &Path, exported: Result<ExportedDecoder<'_>, BundleError>| {
+            let report = exported.and_then(|exported| export_bundle(exported, format, precision, path));
+            report.map(|report| said_of(&report)).map_err(|error| error.to_string())
+        };
+        match self {
+            Self::Run(source) => source.task(words, &what, move |file: Arc<NetworkFile>, _| {
+                Contents::telling(move |path| {
+                    let exported = if decoder.is_network() {
+                        Ok(ExportedDecoder::from(&*file))
+                    } else {
+                        samples(&file.setup()).and_then(|sets| ExportedDecoder::of_run(&file, sets, decoder))
+                    };
+                    write(path, exported)
+                })
+            }),
+            Self::Samples(setup, recorded) => {
+                let stem = file_stem(&what, setup);
+                let (setup, recorded) = (setup.clone(), recorded.clone());
+                let contents = Contents::telling(move |path| {
+                    let exported = samples(&setup).and_then(|sets| {
+                        sets.check_saved(recorded.as_deref())?;
+                        ExportedDecoder::of_setup(&setup, sets, decoder)
+                    });
+                    write(path, exported)
+                });
+                FileTask::save(words, &stem, contents)
+            }
         }
-    };
-    FileWords {
-        kind,
-        description,
-        extensions: &[],
     }
+}
+
+/// Draws or reads the samples of a setup.
+fn samples(setup: &Setup) -> Result<SetupSets, BundleError> {
+    let sets = setup.sets(Path::new(""), &|| false, &mut |_| ())?;
+    Ok(sets.expect("nothing cancels it"))
+}
+
+/// A button that opens the menu of formats in which a decoder can be exported; returns the file asked for.
+pub fn decoder_export_ui(
+    ui: &mut Ui,
+    button: Button<'_>,
+    kind: DecoderKind,
+    source: &DecoderSource,
+) -> Option<FileTask> {
+    let mut asked = None;
+    let (button, _) = MenuButton::from_button(button).ui(ui, |ui| asked = decoder_forms_ui(ui, kind, source));
+    let name = format!("Export {}…", kind.name(Precision::Double));
+    button.widget_info(|| WidgetInfo::labeled(Role::Button, true, &name));
+    button.on_hover_text(name);
+    asked
+}
+
+/// The formats in which a decoder can be exported, such as "C99, f32"; returns the file asked for.
+pub fn decoder_forms_ui(ui: &mut Ui, kind: DecoderKind, source: &DecoderSource) -> Option<FileTask> {
+    let decoder = BundleDecoder::Kind(kind);
+    let mut asked = None;
+    for form in bundles().filter(|(format, precision)| format.check_for(decoder, *precision).is_ok()) {
+        let name = match form {
+            (BundleFormat::Json, _) => "JSON".to_owned(),
+            (format, precision) => format!("{}, {precision}", bundle_name(format)),
+        };
+        let button = ui.button(name).on_hover_text(bundle_words(form.0, decoder).description);
+        if button.clicked() {
+            asked = Some(source.task(kind, form));
+        }
+    }
+    asked
 }

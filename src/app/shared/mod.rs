@@ -27,7 +27,7 @@ mod view;
 
 pub use super::training_worker::RunResult;
 pub use colour_scale::colour_scale_ui;
-pub use decoder_exports::decoder_tasks;
+pub use decoder_exports::{DecoderSource, decoder_export_ui, decoder_forms_ui};
 pub use effect::Effect;
 pub use error_table::error_table_ui;
 pub use export::{

@@ -5,15 +5,18 @@ use std::{path::Path, sync::Arc};
 use super::{Ask, Contents, Effect, Export, ExportGroup, FileTask, FileWords};
 use crate::{
     app::training_worker::{RunId, TrainedRun},
+    decoupling::DecoderKind,
     evaluation::{DecoderReport, PastNetworks, Run},
     export::{
         NetworkFile,
-        bundle::{BundleError, BundleFormat, BundlePrecision, BundleReport, export_bundle},
+        bundle::{BundleDecoder, BundleError, BundleFormat, BundlePrecision, BundleReport, export_bundle},
         format_number,
         report::RunReport,
     },
     import::Setup,
 };
+
+const NETWORK: BundleDecoder = BundleDecoder::Kind(DecoderKind::Network);
 
 /// A trained network that can be exported.
 #[derive(Clone, Debug)]
@@ -78,7 +81,12 @@ pub fn network_exports<'a>(
     let mut exports: Vec<Export<'a>> = bundles()
         .map(|(format, precision)| {
             let task = move |source| bundle_task(&source, format, precision);
-            bundle_export(prefix, (format, precision), bundle_words(format), ask(Box::new(task)))
+            bundle_export(
+                prefix,
+                (format, precision),
+                bundle_words(format, NETWORK),
+                ask(Box::new(task)),
+            )
         })
         .collect();
     exports.push(Export {
@@ -136,43 +144,59 @@ pub(super) fn bundle_name(format: BundleFormat) -> &'static str {
     }
 }
 
-fn bundle_words(format: BundleFormat) -> FileWords {
-    let (kind, description) = match format {
-        BundleFormat::Onnx => (
+/// Words for a network or another decoder in a format.
+pub(super) fn bundle_words(format: BundleFormat, decoder: BundleDecoder) -> FileWords {
+    let is_network = decoder.is_network();
+    let (kind, description) = match (format, is_network) {
+        (BundleFormat::Onnx, true) => (
             "network as ONNX",
             "A folder with the network as an ONNX graph (opset 13) and golden vectors: readings in, targets out.",
         ),
-        BundleFormat::C99 => (
+        (BundleFormat::Onnx, false) => (
+            "decoder as ONNX",
+            "A folder with the decoder as an ONNX graph (opset 13) and golden vectors: readings in, targets out.",
+        ),
+        (BundleFormat::C99, true) => (
             "network as C99",
             "A folder with one header and one source in C99 and a self-test: readings in, targets out. fixed16 computes in whole \
              numbers only, for microcontrollers.",
         ),
-        BundleFormat::Matlab => (
-            "network for MATLAB and Octave",
+        (BundleFormat::C99, false) => (
+            "decoder as C99",
+            "A folder with one header and one source in C99 and a self-test: readings in, targets out.",
+        ),
+        (BundleFormat::Matlab, _) => (
+            if is_network {
+                "network for MATLAB and Octave"
+            } else {
+                "decoder for MATLAB and Octave"
+            },
             "A folder with one function file for MATLAB and GNU Octave and golden vectors: readings in, targets out.",
         ),
-        BundleFormat::NumPy => (
-            "network for NumPy",
+        (BundleFormat::NumPy, _) => (
+            if is_network {
+                "network for NumPy"
+            } else {
+                "decoder for NumPy"
+            },
             "A folder with the weights as .npz, a short decode.py and golden vectors: readings in, targets out.",
         ),
-        BundleFormat::Json => {
-            return FileWords {
-                kind: "network",
-                description: "Layers, scaling, array, geometry, training record and errors, as JSON; the terminal \
-                              commands decode and export read it.",
-                extensions: &["json"],
-            };
-        }
+        (BundleFormat::Json, true) => (
+            "network",
+            "Layers, scaling, array, geometry, training record and errors, as JSON; the terminal commands decode and \
+             export read it.",
+        ),
+        (BundleFormat::Json, false) => ("decoder", "The numbers of the decoder as JSON, with what they mean."),
     };
     FileWords {
         kind,
         description,
-        extensions: &[],
+        extensions: if format == BundleFormat::Json { &["json"] } else { &[] },
     }
 }
 
 fn bundle_task(source: &NetworkSource, format: BundleFormat, precision: BundlePrecision) -> FileTask {
-    let words = bundle_words(format);
+    let words = bundle_words(format, NETWORK);
     if format == BundleFormat::Json {
         return source.task(words, "network", |file, _| Contents::new(move |path| file.save(path)));
     }

@@ -12,7 +12,7 @@ use crate::{
     },
     import::{Plan, Progress, Setup},
     scene::RowModel,
-    training::StopReason,
+    training::{StopReason, TrainingSettings},
 };
 
 /// State that all views read.
@@ -138,6 +138,14 @@ impl Shared {
         match self.source {
             SourceKind::Array => self.draft.into(),
             SourceKind::Recording => self.recording.settings,
+        }
+    }
+
+    /// Sets the training settings of the next training.
+    pub fn set_training(&mut self, training: TrainingSettings) {
+        match self.source {
+            SourceKind::Array => self.draft.training = training,
+            SourceKind::Recording => self.recording.settings.training = training,
         }
     }
 

@@ -19,7 +19,7 @@ use crate::{
         job::Report,
         test_view::{TestSet, TestViewError},
     },
-    evaluation::{PastNetworks, Run, RunError, network_frame_time, recorded::Determination},
+    evaluation::{PastNetworks, Run, RunError, Scores, TestErrors, network_frame_time, recorded::Determination},
     export::{CheckpointFile, NetworkFile, describe_standings, describe_worse_than_ridge},
     import::{Progress, Setup, SetupSets},
     training::TrainingSettings,
@@ -103,13 +103,16 @@ impl<'a> TrainingLoop<'a> {
     fn answer(&mut self, request: Request) {
         match request {
             Request::Train(setup) => {
-                let prepared = self.prepare(&setup, |sets, is_cancelled| sets.run(&setup, is_cancelled));
+                let prepared = self.prepare_setup(&setup, |sets, is_cancelled| sets.run(&setup, is_cancelled));
                 self.begin(prepared, false, Event::Began);
             }
             Request::Open(path) => {
                 let prepared = CheckpointFile::load(&path).map_err(|error| error.to_string());
                 let prepared = prepared.and_then(|file| {
-                    let prepared = self.resume(file);
+                    let prepared = self.prepare(|is_cancelled, on_progress| {
+                        let resumed = file.resume_unless(is_cancelled, on_progress)?;
+                        Ok(resumed.map(|(run, sets)| TrainedRun::new(run, &sets)))
+                    });
                     prepared.map_err(|error| format!("'{}': {error}", path.display()))
                 });
                 self.begin(prepared, true, Event::Opened);
@@ -117,7 +120,7 @@ impl<'a> TrainingLoop<'a> {
             Request::TakeUp(setup, states) => {
                 let resume =
                     |sets: SetupSets, is_cancelled: &dyn Fn() -> bool| sets.resume(&setup, states, is_cancelled);
-                let prepared = self.prepare(&setup, resume);
+                let prepared = self.prepare_setup(&setup, resume);
                 self.begin(prepared.map_err(|error| error.to_string()), true, Event::Opened);
             }
             Request::Continue(training) => self.go_on(training),
@@ -142,32 +145,32 @@ impl<'a> TrainingLoop<'a> {
     }
 
     /// Draws or reads the samples of `setup` and starts its networks; `None` once that is cancelled.
-    fn prepare(
-        &mut self,
+    fn prepare_setup(
+        &self,
         setup: &Setup,
         run: impl FnOnce(SetupSets, &dyn Fn() -> bool) -> Result<Option<Run>, RunError>,
     ) -> Result<Option<(TrainedRun, Box<Began>)>, TestViewError> {
-        let (number, cancelled, report) = (self.preparations + 1, self.cancelled, self.report);
-        let is_cancelled = || cancelled.load(Ordering::Relaxed) >= number || report.is_cancelled();
-        let Some(sets) = setup.sets(Path::new(""), &is_cancelled, &mut |progress| reading(report, progress))? else {
-            return Ok(None);
-        };
-        let recorded = sets.recorded().cloned();
-        let run = run(sets, &is_cancelled)?;
-        let begun = run.map(|run| begun(TrainedRun { run, recorded })).transpose()?;
-        Ok(begun.filter(|_| !is_cancelled()))
+        self.prepare(|is_cancelled, on_progress| {
+            let Some(sets) = setup.sets(Path::new(""), is_cancelled, on_progress)? else {
+                return Ok(None);
+            };
+            let recorded = sets.recorded().cloned();
+            Ok(run(sets, is_cancelled)?.map(|run| TrainedRun { run, recorded }))
+        })
     }
 
-    /// Takes up the training of a checkpoint; `None` once that is cancelled.
-    fn resume(&mut self, file: CheckpointFile) -> Result<Option<(TrainedRun, Box<Began>)>, TestViewError> {
+    /// Gets a run by `get`, which may be cancelled and reports how far a recording has been read; `None` once that is
+    /// cancelled.
+    fn prepare(
+        &self,
+        get: impl FnOnce(&dyn Fn() -> bool, &mut dyn FnMut(Progress)) -> Result<Option<TrainedRun>, TestViewError>,
+    ) -> Result<Option<(TrainedRun, Box<Began>)>, TestViewError> {
         let (number, cancelled, report) = (self.preparations + 1, self.cancelled, self.report);
         let is_cancelled = || cancelled.load(Ordering::Relaxed) >= number || report.is_cancelled();
-        let resumed = file.resume_unless(&is_cancelled, &mut |progress| reading(report, progress))?;
-        let begun = resumed.map(|(run, sets)| {
-            let recorded = sets.recorded().cloned();
-            begun(TrainedRun { run, recorded })
-        });
-        Ok(begun.transpose()?.filter(|_| !is_cancelled()))
+        let trained = get(&is_cancelled, &mut |progress| {
+            report.progress(Event::Reading(progress), |_, _| ());
+        })?;
+        Ok(trained.map(begun).transpose()?.filter(|_| !is_cancelled()))
     }
 
     /// Puts a new run in the place of an older one, which stays, with its files, where the new one is impossible.
@@ -258,7 +261,7 @@ impl<'a> TrainingLoop<'a> {
             past: self.past.clone(),
             result: RunResult {
                 remarks: if is_standing {
-                    self.remarks(&answers)
+                    self.remarks(&answers, &errors)
                 } else {
                     Vec::new()
                 },
@@ -293,7 +296,7 @@ impl<'a> TrainingLoop<'a> {
     }
 
     /// Remarks on these answers to the test samples of a recording.
-    fn remarks(&self, answers: &Array2<f64>) -> Vec<String> {
+    fn remarks(&self, answers: &Array2<f64>, errors: &TestErrors) -> Vec<String> {
         let recorded = self
             .run
             .as_ref()
@@ -301,10 +304,16 @@ impl<'a> TrainingLoop<'a> {
         let Some((trained, recorded)) = recorded else {
             return Vec::new();
         };
-        let determined = Determination::measure(trained.run.test(), answers.view(), recorded.plan.division.by);
-        let mut remarks = describe_standings(&trained.run.problem().targets, &determined);
-        if let Ok(file) = trained.network_file() {
-            remarks.extend(describe_worse_than_ridge(&file));
+        let run = &trained.run;
+        let determined = Determination::measure(run.test(), answers.view(), recorded.plan.division.by);
+        let mut remarks = describe_standings(&run.problem().targets, &determined);
+        if let Some(baselines) = run.baselines() {
+            let scores = Scores {
+                network: errors.clone(),
+                baselines: baselines.clone(),
+            };
+            let method = run.settings().training.method;
+            remarks.extend(describe_worse_than_ridge(run.problem(), &scores, method));
         }
         remarks
     }
@@ -349,12 +358,14 @@ fn begun(trained: TrainedRun) -> Result<(TrainedRun, Box<Began>), TestViewError>
     Ok((trained, Box::new(began)))
 }
 
-/// Reports how far a recording has been read.
-fn reading(report: &Report<Event>, progress: Progress) {
-    report.progress(Event::Reading(progress), |_, _| ());
-}
-
 impl TrainedRun {
+    fn new(run: Run, sets: &SetupSets) -> Self {
+        Self {
+            run,
+            recorded: sets.recorded().cloned(),
+        }
+    }
+
     /// Takes the best network so far, with its record and errors.
     pub fn network_file(&self) -> Result<NetworkFile, String> {
         NetworkFile::from_run(&self.run, self.recorded.as_ref()).map_err(|error| error.to_string())

@@ -27,4 +27,4 @@ pub use slider::slider_ui;
 pub use snapshot::snapshot_ui;
 pub use table::{ColumnWidth, SortBy, TableCell, TableClick, TableColumn, TableRow, TableView, described_table_ui};
 pub use text_field::text_ui;
-pub use value_under::{take_claim, take_value_under, value_under};
+pub use value_under::{claim_right_click, take_claim, take_value_under, value_under};

@@ -59,10 +59,8 @@ impl DecouplerWindow {
                 // The settings on the left are always those that are trained with.
                 if let Some(run) = &mut shared.run {
                     run.is_saved = false;
-                    match shared.source {
-                        SourceKind::Array => shared.draft.training = run.asked.settings().training,
-                        SourceKind::Recording => shared.recording.settings.training = run.asked.settings().training,
-                    }
+                    let training = run.asked.settings().training;
+                    shared.set_training(training);
                 }
                 shared.phase = Phase::Training;
                 self.worker.ask(Request::Resume);

@@ -6,7 +6,7 @@ use super::{
 use crate::{
     app::{
         preview::PreviewEvent,
-        shared::{Matter, Notice, Phase, Preview, RunView, SourceKind},
+        shared::{Matter, Notice, Phase, Preview, RunView},
         training_worker::Event,
     },
     evaluation::RunSettings,
@@ -129,11 +129,8 @@ impl DecouplerWindow {
                 }
             }
             Event::Continued(Ok(settings)) => {
+                let training = shared.settings().training;
                 if let Some(run) = &mut shared.run {
-                    let training = match shared.source {
-                        SourceKind::Array => shared.draft.training,
-                        SourceKind::Recording => shared.recording.settings.training,
-                    };
                     run.asked = run.asked.with_settings(RunSettings {
                         training,
                         ..*run.asked.settings()

@@ -36,6 +36,11 @@ impl BundleDecoder {
         self == Self::Kind(DecoderKind::Network)
     }
 
+    /// Returns `true` if the decoder computes with a trained network.
+    pub fn needs_network(self) -> bool {
+        matches!(self, Self::Kind(kind) if kind.needs_network())
+    }
+
     /// Returns `true` if the decoder iterates on the equations of the sensor.
     pub fn solves_equations(self) -> bool {
         matches!(self, Self::Kind(kind) if kind.needs_sensor())

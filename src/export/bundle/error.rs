@@ -7,6 +7,7 @@ use crate::{
     decoupling::NotDescribed,
     evaluation::RunError,
     export::{DocumentError, WriteError},
+    import::SetupError,
 };
 
 /// Errors of exporting a bundle. Nothing is left behind.
@@ -19,6 +20,9 @@ pub enum BundleError {
     /// The decoder solves the equations of a sensor, and the samples have none.
     #[error("{0} solves the equations of a sensor, and a recording has no model of one: take another decoder")]
     NoSensor(BundleDecoder),
+    /// The decoder needs a network, and none was trained.
+    #[error("{0} needs a trained network: train one first")]
+    NoNetwork(BundleDecoder),
     /// No other program can compute what the decoder does.
     #[error("{decoder} cannot be exported: {reason}")]
     NotDescribed {
@@ -45,11 +49,14 @@ pub enum BundleError {
     /// The readings with which the bundle is verified could not be drawn.
     #[error("no readings to verify the bundle: {0}")]
     Readings(#[from] Box<RunError>),
-    /// The file of own data does not tell the range of the readings.
+    /// The network file does not have the range of the readings.
     #[error(
         "the network file does not have the range of the readings in training, without which no bundle can be verified: train again"
     )]
     NoRange,
+    /// The samples to which the decoder is fitted could not be drawn or read again.
+    #[error(transparent)]
+    Samples(#[from] SetupError),
     /// Something is in the place of the bundle.
     #[error("'{}' is there already: give another name, or delete it first", .0.display())]
     Exists(PathBuf),

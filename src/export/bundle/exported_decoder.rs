@@ -5,6 +5,7 @@ use super::{
     BundleDecoder, BundleError, BundlePrecision,
     fitted::FittedDecoder,
     meaning::Meaning,
+    origin::Origin,
     portable::{ChannelRanges, Portable},
 };
 use crate::{
@@ -12,12 +13,15 @@ use crate::{
     decoupling::{Description, Layer},
     evaluation::{Channel, RunError, SimulatedSettings, TargetErrors, TestErrors},
     export::NetworkFile,
+    import::{Setup, SetupSets},
     network::ReadingRange,
 };
 
-/// A decoder to be exported, with the network file that has its settings and the meaning of its readings and targets.
+/// A decoder to be exported, with the meaning of its readings and targets.
 pub struct ExportedDecoder<'a> {
-    file: &'a NetworkFile,
+    /// Network file of the run, if a network was trained.
+    file: Option<&'a NetworkFile>,
+    origin: Origin,
     fitted: FittedDecoder,
 }
 
@@ -31,16 +35,42 @@ impl<'a> From<&'a NetworkFile> for ExportedDecoder<'a> {
     /// Takes the network of a file.
     fn from(file: &'a NetworkFile) -> Self {
         Self {
-            fitted: FittedDecoder::of_networks(&file.network),
-            file,
+            fitted: FittedDecoder::of_networks(&file.network, file.scores.network.clone()),
+            origin: Origin::of_file(file),
+            file: Some(file),
         }
     }
 }
 
 impl<'a> ExportedDecoder<'a> {
-    /// Takes a decoder fitted to the training samples of `file`.
-    pub fn new(file: &'a NetworkFile, fitted: FittedDecoder) -> Self {
-        Self { file, fitted }
+    /// Fits a decoder to the training samples of the run of `file`; `sets` are its samples, drawn or read again. Takes the
+    /// network of the file if the decoder is the network.
+    ///
+    /// # Errors
+    /// The recording has changed, the samples cannot be scaled or decoded, or no other program can compute what the decoder
+    /// does.
+    pub fn of_run(file: &'a NetworkFile, sets: SetupSets, decoder: BundleDecoder) -> Result<Self, BundleError> {
+        sets.check_saved(file.recorded.as_ref())?;
+        if decoder.is_network() {
+            return Ok(file.into());
+        }
+        Ok(Self {
+            origin: Origin::of_file(file),
+            fitted: FittedDecoder::fit(file.settings, sets.sets, Some(file.network.clone()), decoder)?,
+            file: Some(file),
+        })
+    }
+
+    /// Fits a decoder that needs no network to the training samples of `setup`, which are `sets`.
+    ///
+    /// # Errors
+    /// As [`Self::of_run`], or if the decoder needs a network.
+    pub fn of_setup(setup: &Setup, sets: SetupSets, decoder: BundleDecoder) -> Result<Self, BundleError> {
+        Ok(Self {
+            origin: Origin::of_sets(setup, &sets)?,
+            fitted: FittedDecoder::fit(*setup.settings(), sets.sets, None, decoder)?,
+            file: None,
+        })
     }
 
     /// Kind of decoder.
@@ -48,7 +78,8 @@ impl<'a> ExportedDecoder<'a> {
         self.fitted.kind
     }
 
-    pub(super) fn file(&self) -> &'a NetworkFile {
+    /// Network file of the run, if a network was trained.
+    pub(super) fn file(&self) -> Option<&'a NetworkFile> {
         self.file
     }
 
@@ -57,12 +88,12 @@ impl<'a> ExportedDecoder<'a> {
     }
 
     pub(super) fn meaning(&self) -> Meaning {
-        match self.file.settings.simulated() {
+        match self.origin.settings.simulated() {
             Some(settings) => Meaning::Array(settings.source.sensor.scale),
             None => Meaning::Own {
-                inputs: self.file.problem.inputs.clone(),
-                targets: self.file.problem.targets.clone(),
-                row_wires: match (&self.file.row_wires, self.fitted.reading_ranges.len()) {
+                inputs: self.origin.problem.inputs.clone(),
+                targets: self.origin.problem.targets.clone(),
+                row_wires: match (&self.origin.row_wires, self.fitted.reading_ranges.len()) {
                     (Some(row_wires), 2..) => row_wires.clone(),
                     _ => Vec::new(),
                 },
@@ -107,7 +138,7 @@ impl<'a> ExportedDecoder<'a> {
         const SNAPSHOTS: [usize; 2] = [20, 1];
         /// Readings drawn for each network, and golden vectors among them.
         const EVEN: [usize; 2] = [100, 4];
-        match self.file.settings.simulated() {
+        match self.origin.settings.simulated() {
             Some(mut settings) => {
                 let rows = settings.source.model_size().map_or(1, |size| size.rows);
                 settings.source.test_samples = SNAPSHOTS[0] * rows;
@@ -147,10 +178,10 @@ impl<'a> ExportedDecoder<'a> {
             .kind
             .is_network()
             .then(|| json!({ "hidden_nodes": portable.widest() }));
-        let errors = self.fitted.errors.as_ref();
-        let own = match self.file.settings.simulated() {
-            Some(settings) => of_array(self.file, &settings, portable, errors),
-            None => of_recording(self.file, portable, errors),
+        let errors = &self.fitted.errors;
+        let own = match self.origin.settings.simulated() {
+            Some(settings) => of_array(&self.origin, &settings, portable, errors),
+            None => of_recording(&self.origin, portable, errors),
         };
         let mut fields = Metadata::new();
         for part in [Some(common), network, Some(own)] {
@@ -185,16 +216,11 @@ fn layers(portable: &Portable) -> Vec<String> {
     layers.collect::<Vec<_>>().into_iter().chain(iteration).collect()
 }
 
-fn of_array(
-    file: &NetworkFile,
-    settings: &SimulatedSettings,
-    portable: &Portable,
-    errors: Option<&TestErrors>,
-) -> Value {
+fn of_array(origin: &Origin, settings: &SimulatedSettings, portable: &Portable, errors: &TestErrors) -> Value {
     let sensor = &settings.source.sensor;
     let names = |channels: Vec<Channel>| channels.into_iter().map(|channel| channel.name).collect::<Vec<_>>();
     json!({
-        "trained_by": file.program,
+        "trained_by": origin.program,
         "array": sensor.scale.to_string(),
         "geometry": sensor.geometry,
         "scene": settings.source.scene,
@@ -204,35 +230,33 @@ fn of_array(
         "outputs": { "names": names(portable.meaning.targets()), "unit": "mm" },
         "training_samples": settings.source.samples,
         "seed": settings.seed,
-        "errors": errors.unwrap_or(&file.scores.network).nodes(),
+        "errors": errors.nodes(),
         "readings_in_training_ohm": ranges(portable),
         "output_range_mm": portable.output_range_mm(),
     })
 }
 
-fn of_recording(file: &NetworkFile, portable: &Portable, of_decoder: Option<&TestErrors>) -> Value {
+fn of_recording(origin: &Origin, portable: &Portable, errors: &TestErrors) -> Value {
     let columns = |channels: &[Channel]| {
         let (names, units): (Vec<_>, Vec<_>) = channels.iter().map(|channel| (&channel.name, &channel.unit)).unzip();
         json!({ "names": names, "units": units })
     };
-    // Without their folders, which are nobody's business.
-    let paths = file.recorded.iter().flat_map(|recorded| recorded.plan.files());
-    let files = paths.map(|path| path.file_name().map(|name| name.to_string_lossy().into_owned()));
-    let errors = |errors: &[TargetErrors]| {
+    let named = |errors: &TestErrors| {
         let of = |(channel, errors): (&Channel, &TargetErrors)| json!({ "name": channel.name, "errors": errors });
-        file.problem.targets.iter().zip(errors).map(of).collect::<Vec<_>>()
+        let targets = origin.problem.targets.iter();
+        targets.zip(errors.targets()).map(of).collect::<Vec<_>>()
     };
-    let row_wires = file.row_wires.iter().flatten().map(|row_wire| row_wire + 1);
+    let row_wires = origin.row_wires.iter().flatten().map(|row_wire| row_wire + 1);
     json!({
-        "trained_by": file.program,
-        "files": files.collect::<Vec<_>>(),
+        "trained_by": origin.program,
+        "files": origin.files,
         "row_numbers": portable.takes_row().then(|| row_wires.collect::<Vec<_>>()),
-        "inputs": columns(&file.problem.inputs),
-        "outputs": columns(&file.problem.targets),
-        "method": file.settings.training.method.short_name(),
-        "seed": file.settings.seed,
-        "errors": errors(of_decoder.unwrap_or(&file.scores.network).targets()),
-        "errors_of_ridge": errors(file.scores.baselines.linear.targets()),
+        "inputs": columns(&origin.problem.inputs),
+        "outputs": columns(&origin.problem.targets),
+        "method": origin.settings.training.method.short_name(),
+        "seed": origin.settings.seed,
+        "errors": named(errors),
+        "errors_of_ridge": named(&origin.errors_of_linear),
         "readings_in_training": ranges(portable),
         "output_ranges": portable.scales,
     })

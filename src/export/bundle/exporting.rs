@@ -75,7 +75,9 @@ fn export_network_file(exported: &ExportedDecoder<'_>, path: &Path) -> Result<Bu
     }
     let trial = tempfile::tempdir().map_err(|error| WriteError::io(path, error))?;
     let copy = trial.path().join("network.json");
-    let file = exported.file();
+    let file = exported
+        .file()
+        .expect("a network comes from its file: a decoder fitted to samples is not the network");
     file.save(&copy)?;
     let read = NetworkFile::load(&copy)?;
     if (&read.network, &read.settings) != (&file.network, &file.settings) {

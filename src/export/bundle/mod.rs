@@ -26,6 +26,7 @@ mod matlab;
 mod meaning;
 mod numpy;
 mod onnx;
+mod origin;
 mod portable;
 mod readme;
 mod report;
@@ -45,7 +46,6 @@ pub use self::{
     error::BundleError,
     exported_decoder::ExportedDecoder,
     exporting::export_bundle,
-    fitted::{FittedDecoder, fitted},
     fixed_point::FixedPointError,
     portable::FoldError,
     report::{BundleCheck, BundleReport, VectorCounts},

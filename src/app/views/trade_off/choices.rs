@@ -1,10 +1,11 @@
 //! The two questions and their answers, and the point that is marked.
 
-use eframe::egui::{Align, Label, Layout, RichText, Ui};
+use eframe::egui::{Label, RichText, Ui};
 
-use super::TradeOffLook;
+use super::{PointWish, TradeOffLook};
 use crate::{
     app::{
+        shared::{DecoderSource, decoder_export_ui},
         theme::{Theme, semibold, space, type_size},
         widgets::{dim_ui, fields::quantity_ui, ghost_button, section_heading_ui},
     },
@@ -14,9 +15,15 @@ use crate::{
     sensor::counted,
 };
 
-/// "Fastest under", "most accurate under", and what is marked. Returns the point that is to be loaded, if the user said
-/// so.
-pub fn choices_ui(ui: &mut Ui, level: &TradeOffLevel, look: &mut TradeOffLook, can_load: bool) -> Option<usize> {
+/// "Fastest under", "most accurate under", and the marked point. Returns what the user wants to do with it; `source` gives
+/// what the decoder of a point is exported from.
+pub fn choices_ui(
+    ui: &mut Ui,
+    level: &TradeOffLevel,
+    look: &mut TradeOffLook,
+    can_load: bool,
+    source: impl Fn(usize) -> Option<DecoderSource>,
+) -> Option<PointWish> {
     let [fastest, most_accurate] = level.answers(&look.limits);
     section_heading_ui(ui, "Recommended decoders");
     let hint = if level.noise.is_some() {
@@ -43,11 +50,11 @@ pub fn choices_ui(ui: &mut Ui, level: &TradeOffLevel, look: &mut TradeOffLook, c
     answer_ui(ui, &mut look.marked, level, "Most accurate", most_accurate, none);
     section_heading_ui(ui, "Marked point");
     match look.marked.and_then(|marked| Some((marked, level.points.get(marked)?))) {
-        Some((marked, point)) => marked_ui(ui, point, can_load).then_some(marked),
+        Some((marked, point)) => marked_ui(ui, (marked, point), can_load, source(marked).as_ref()),
         None => {
             dim_ui(
                 ui,
-                "Click a row of the table to mark its point, or a point of a chart to load it.",
+                "Click a row of the table to mark its point, or a point of a chart to load it; right-click a point to export it.",
             );
             None
         }
@@ -88,21 +95,27 @@ fn answer_ui(
     }
 }
 
-/// Returns whether the point is to be loaded.
-fn marked_ui(ui: &mut Ui, point: &TradeOffPoint, can_load: bool) -> bool {
-    let mut is_loaded = false;
+fn marked_ui(
+    ui: &mut Ui,
+    (number, point): (usize, &TradeOffPoint),
+    can_load: bool,
+    source: Option<&DecoderSource>,
+) -> Option<PointWish> {
+    let mut wish = None;
+    let name = RichText::new(point_name(point)).font(semibold(type_size().note));
+    ui.add(Label::new(name).truncate());
     ui.horizontal(|ui| {
-        ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
-            let load = ui.add_enabled(can_load, ghost_button("Load into Train view"));
-            is_loaded = load
-                .on_hover_text("Uses its source and network settings for the next training.")
-                .on_disabled_hover_text("A training is running in the Train view: its settings cannot be changed now")
-                .clicked();
-            ui.with_layout(Layout::left_to_right(Align::Center), |ui| {
-                let name = RichText::new(point_name(point)).font(semibold(type_size().note));
-                ui.add(Label::new(name).truncate());
-            });
-        });
+        let load = ui.add_enabled(can_load, ghost_button("Load into Train view"));
+        let is_loaded = load
+            .on_hover_text("Uses its source and network settings for the next training.")
+            .on_disabled_hover_text("A training is running in the Train view: its settings cannot be changed now")
+            .clicked();
+        wish = is_loaded.then_some(PointWish::Load(number));
+        if let Some(source) = source {
+            let button = ghost_button("Export this decoder…");
+            let task = decoder_export_ui(ui, button, point.report.kind, source);
+            wish = wish.take().or(task.map(|task| PointWish::Export(Box::new(task))));
+        }
     });
     dim_ui(ui, &format!("{}.", point_facts(point).join("; ")));
     let epochs = counted(point.settings.training.stopping.epochs, "epoch");
@@ -113,5 +126,5 @@ fn marked_ui(ui: &mut Ui, point: &TradeOffPoint, can_load: bool) -> bool {
         ),
         None => dim_ui(ui, &format!("At most {epochs}.")),
     };
-    is_loaded
+    wish
 }

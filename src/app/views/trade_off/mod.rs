@@ -15,4 +15,5 @@ mod worker;
 
 pub use form::{Thoroughness, TradeOffForm, WhichPresets};
 pub use plan::{PlannedLevel, PlannedRun, TradeOffPlan};
+use state::PointWish;
 pub use state::{TradeOffEnding, TradeOffLook, TradeOffOutcome, TradeOffView};

@@ -1,4 +1,8 @@
-use std::time::{Duration, Instant};
+use std::{
+    collections::BTreeMap,
+    sync::Arc,
+    time::{Duration, Instant},
+};
 
 use super::{
     TradeOffForm, TradeOffPlan,
@@ -8,10 +12,12 @@ use super::{
 use crate::{
     app::{
         job::{Job, Wake},
-        shared::{Effect, Matter, Shared, View as _},
+        shared::{DecoderSource, Effect, FileTask, Matter, NetworkSource, Shared, View as _},
     },
     evaluation::{RunSettings, TradeOffLevel, TradeOffLimits, TradeOffPoint},
-    import::Setup,
+    export::NetworkFile,
+    figure::trade_words::point_name,
+    import::{Recorded, Setup},
 };
 
 /// The Trade-off view.
@@ -26,6 +32,15 @@ pub struct TradeOffView {
     /// Level, limits and marked point of the display.
     pub look: TradeOffLook,
     pub(super) job: Job<TradeOffEvent>,
+}
+
+/// What the user wants to do with a point.
+#[derive(Debug)]
+pub(super) enum PointWish {
+    /// Load its configuration into the Train view.
+    Load(usize),
+    /// Write its decoder to a file.
+    Export(Box<FileTask>),
 }
 
 /// State of the display of a measurement.
@@ -62,8 +77,12 @@ pub struct TradeOffOutcome {
     pub plan: TradeOffPlan,
     /// One for each level of noise, or a single one of a recording.
     pub levels: Vec<TradeOffLevel>,
+    /// Files of the trained networks, by level and point.
+    pub networks: BTreeMap<(usize, usize), Arc<NetworkFile>>,
     /// Decoders that cannot be used, each with its level and the reason.
     pub refused: Vec<(usize, String)>,
+    /// Origin of the samples of a recording, once they are read.
+    pub recorded: Option<Box<Recorded>>,
     /// Unit that is decoded at a time, such as "a sample", once it is known.
     pub decoded: Option<String>,
     /// Ending of the measurement, once it has ended.
@@ -94,6 +113,18 @@ impl TradeOffOutcome {
             .filter(|run| run.preset == point.preset)
             .find(|run| is_of(&run.setup))?;
         Some(run.setup.with_settings(point.settings))
+    }
+
+    /// Samples and network from which the decoder of a point can be exported.
+    pub(super) fn source_of(&self, level: usize, point: usize) -> Option<DecoderSource> {
+        let setup = self.setup_of(level, point)?;
+        Some(match self.networks.get(&(level, point)) {
+            Some(file) => {
+                let name = point_name(self.levels.get(level)?.points.get(point)?);
+                DecoderSource::Run(NetworkSource::Kept(name, Arc::clone(file)))
+            }
+            None => DecoderSource::Samples(Box::new(setup), self.recorded.clone()),
+        })
     }
 }
 
@@ -152,7 +183,9 @@ impl TradeOffView {
         self.running = Some(TradeOffRunning { begun: Instant::now() });
         self.outcome = Some(TradeOffOutcome {
             levels: plan.levels.iter().map(level).collect(),
+            networks: BTreeMap::new(),
             refused: Vec::new(),
+            recorded: None,
             decoded: None,
             plan,
             ending: None,
@@ -160,12 +193,14 @@ impl TradeOffView {
         });
     }
 
-    /// Adds a point to a level.
-    pub fn record(&mut self, level: usize, point: TradeOffPoint) {
-        let level = self.outcome.as_mut().and_then(|outcome| outcome.levels.get_mut(level));
-        if let Some(level) = level {
-            level.points.push(point);
-        }
+    /// Adds a point to a level, with the file of its network if it has one.
+    pub(super) fn record(&mut self, level: usize, point: TradeOffPoint, file: Option<Arc<NetworkFile>>) {
+        let Some(outcome) = &mut self.outcome else { return };
+        let Some(points) = outcome.levels.get_mut(level).map(|level| &mut level.points) else {
+            return;
+        };
+        outcome.networks.extend(file.map(|file| ((level, points.len()), file)));
+        points.push(point);
     }
 
     /// The measurement has ended.

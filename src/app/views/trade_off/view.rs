@@ -3,7 +3,7 @@ use std::time::Instant;
 use eframe::egui::{Align, ComboBox, Key, Layout, Modifiers, RichText, Sense, Ui};
 
 use super::{
-    TradeOffEnding, TradeOffLook, TradeOffOutcome, TradeOffView, chart::charts_ui, choices::choices_ui,
+    PointWish, TradeOffEnding, TradeOffLook, TradeOffOutcome, TradeOffView, chart::charts_ui, choices::choices_ui,
     exports::trade_off_exports, names::noise_name, panel, table::table_ui, worker::TradeOffEvent,
 };
 use crate::{
@@ -26,12 +26,12 @@ impl View for TradeOffView {
     fn take_news(&mut self, _shared: &Shared, effects: &mut Vec<Effect>) {
         while let Some(event) = self.job.next_event() {
             match event {
-                TradeOffEvent::Decodes(unit) => {
+                TradeOffEvent::Samples { decoded, recorded } => {
                     if let Some(outcome) = &mut self.outcome {
-                        outcome.decoded = Some(unit);
+                        (outcome.decoded, outcome.recorded) = (Some(decoded), recorded);
                     }
                 }
-                TradeOffEvent::Measured(level, point) => self.record(level, *point),
+                TradeOffEvent::Measured(level, point, file) => self.record(level, *point, file),
                 TradeOffEvent::Refused(level, reason) => {
                     if let Some(outcome) = &mut self.outcome {
                         outcome.refused.push((level, reason));
@@ -126,7 +126,8 @@ fn trade_ui(ui: &mut Ui, trade: &mut TradeOffView, shared: &Shared, effects: &mu
         return;
     };
     let mut look = trade.look;
-    let mut loaded = None;
+    let mut asked = None;
+    let source = |point| outcome.source_of(trade.look.level, point);
     let gap = space(2);
     let lower_height = (0.38 * whole.height()).clamp(space(50), space(85));
     let (upper, lower) = whole.split_top_bottom_at_y(whole.bottom() - lower_height);
@@ -138,10 +139,7 @@ fn trade_ui(ui: &mut Ui, trade: &mut TradeOffView, shared: &Shared, effects: &mu
         }
         let figure = trade_off_figure(level, &look.limits);
         legend_ui(ui, &figure.keys);
-        if let Some(clicked) = charts_ui(ui, (level, &figure), look.marked, can_load) {
-            look.marked = Some(clicked);
-            loaded = can_load.then_some(clicked);
-        }
+        asked = charts_ui(ui, (level, &figure), &mut look.marked, can_load, source);
     });
     let choices_width = (0.4 * lower.width()).clamp(space(76), space(105));
     let (left, right) = lower.split_left_right_at_x(lower.right() - choices_width);
@@ -155,15 +153,21 @@ fn trade_ui(ui: &mut Ui, trade: &mut TradeOffView, shared: &Shared, effects: &mu
     });
     card_ui(ui, right, |ui| {
         scrolled_ui(ui, "trade choices", |ui| {
-            loaded = loaded.or(choices_ui(ui, level, &mut look, can_load));
+            asked = asked.take().or(choices_ui(ui, level, &mut look, can_load, source));
         });
     });
     ui.allocate_rect(whole, Sense::hover());
-    let setup = loaded.and_then(|point| outcome.setup_of(trade.look.level, point));
-    trade.look = look;
-    if let Some(setup) = setup {
-        effects.extend([Effect::TakeSetup(Box::new(setup)), Effect::ShowTraining]);
+    let level = trade.look.level;
+    match asked {
+        Some(PointWish::Load(point)) => {
+            if let Some(setup) = outcome.setup_of(level, point) {
+                effects.extend([Effect::TakeSetup(Box::new(setup)), Effect::ShowTraining]);
+            }
+        }
+        Some(PointWish::Export(task)) => effects.push(Effect::ChooseFile(*task)),
+        None => {}
     }
+    trade.look = look;
 }
 
 fn head_ui(ui: &mut Ui, outcome: &TradeOffOutcome, look: &mut TradeOffLook) {

@@ -1,22 +1,28 @@
 //! Measures speed against accuracy in the background. A measurement begins only when the one before it has let go of the
 //! processor, lest it disturb the times.
 
-use std::path::Path;
+use std::{path::Path, sync::Arc};
 
 use super::TradeOffPlan;
 use crate::{
     app::job::{Job, Report},
-    evaluation::{TradeOffPoint, Workload, decoded_unit, measure_trade_off},
-    import::{Setup, SetupSets},
+    evaluation::{Run, TradeOffPoint, Workload, decoded_unit, measure_trade_off},
+    export::NetworkFile,
+    import::{Recorded, Setup, SetupSets},
 };
 
 /// Event of the measurement begun last.
 #[derive(Debug)]
 pub enum TradeOffEvent {
-    /// The samples of a run are there; a decoder is timed on this unit of them, such as "a sample".
-    Decodes(String),
-    /// A point of a level.
-    Measured(usize, Box<TradeOffPoint>),
+    /// The samples of a run are there.
+    Samples {
+        /// Unit of them on which a decoder is timed, such as "a sample".
+        decoded: String,
+        /// Origin of recorded samples.
+        recorded: Option<Box<Recorded>>,
+    },
+    /// A point of a level, with the file of its network if it has one.
+    Measured(usize, Box<TradeOffPoint>, Option<Arc<NetworkFile>>),
     /// A decoder cannot be used with the samples of a level, and why.
     Refused(usize, String),
     /// The measurement has ended, or why it could not go on.
@@ -56,18 +62,31 @@ fn measure_all(plan: &TradeOffPlan, report: &Report<TradeOffEvent>) -> Result<()
                     sets
                 }
             };
-            report.send(TradeOffEvent::Decodes(decoded_unit(&sets.sets.test)));
+            let recorded = sets.recorded();
+            report.send(TradeOffEvent::Samples {
+                decoded: decoded_unit(&sets.sets.test),
+                recorded: recorded.cloned().map(Box::new),
+            });
+            // Several decoders use one network.
+            let mut last_file: Option<Arc<NetworkFile>> = None;
             let is_whole = measure_trade_off(
                 run.setup.settings(),
                 &sets.sets,
                 &plan.hidden,
                 &run.decoders,
                 is_cancelled,
-                |kind, point| {
+                |kind, point, trained: Option<&Run>| {
                     report.send(match point {
                         Ok(point) => {
-                            let preset = run.preset;
-                            TradeOffEvent::Measured(level, Box::new(TradeOffPoint { preset, ..point }))
+                            let point = TradeOffPoint {
+                                preset: run.preset,
+                                ..point
+                            };
+                            last_file = trained.and_then(|trained| {
+                                let last = last_file.take().filter(|file| file.settings == *trained.settings());
+                                last.or_else(|| NetworkFile::from_run(trained, recorded).ok().map(Arc::new))
+                            });
+                            TradeOffEvent::Measured(level, Box::new(point), last_file.clone())
                         }
                         Err(error) => TradeOffEvent::Refused(level, format!("{kind}: {error}")),
                     });

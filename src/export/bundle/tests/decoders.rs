@@ -1,6 +1,6 @@
 //! Bundles of other decoders than networks against the decoders themselves.
 
-use std::fs;
+use std::{fs, path::Path};
 
 use ndarray::array;
 
@@ -12,7 +12,7 @@ use crate::{
         NetworkFile,
         bundle::{
             BundleDecoder, BundleError, BundleFormat, BundlePrecision, BundleReport, ExportedDecoder,
-            exact::decode_exactly, export_bundle, fitted, folding::FoldedMap, portable::Portable, taking::Taking,
+            exact::decode_exactly, export_bundle, folding::FoldedMap, portable::Portable, taking::Taking,
             vectors::Vectors,
         },
     },
@@ -39,10 +39,8 @@ fn settings(rows: Rows, noise: f64) -> SimulatedSettings {
 
 /// The decoder fitted to the training samples of `file`.
 fn decoder(file: &NetworkFile, kind: BundleDecoder) -> Result<ExportedDecoder<'_>, BundleError> {
-    let (split, test) = file.settings.simulated().unwrap().draw().unwrap();
-    let networks = Some(file.network.clone());
-    let fitted = fitted(file.settings, split.training, networks, kind, &test)?;
-    Ok(ExportedDecoder::new(file, fitted))
+    let sets = file.setup().sets(Path::new(""), &|| false, &mut |_| ())?.unwrap();
+    ExportedDecoder::of_run(file, sets, kind)
 }
 
 /// The program's own decoders, which share no code with the layers, are the truth.

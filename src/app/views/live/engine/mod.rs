@@ -15,6 +15,7 @@ mod replay;
 mod replay_file;
 mod session;
 mod simulated;
+mod source_lines;
 mod stream;
 mod target_session;
 mod target_source;

@@ -1,12 +1,12 @@
-use std::{
-    io::Read,
-    time::{Duration, Instant},
-};
+use std::{io::Read, time::Duration};
 
-use super::{counts::Tally, frame_source::Next, message::Arrived};
+use super::{
+    counts::Tally,
+    frame_source::Next,
+    source_lines::{SourceLine, SourceLines},
+};
 use crate::{
-    dataset::system_cause,
-    live::{Keeping, LineParser, Lines, NextLine, ParsedLine, Source},
+    live::{Keeping, LineParser, ParsedLine, Source},
     scene::Rows,
     sensor::ArrayScale,
 };
@@ -14,18 +14,13 @@ use crate::{
 /// Frames from the lines of a device or socket.
 #[derive(Debug)]
 pub(super) struct StreamFrames {
-    name: String,
-    begins_anywhere: bool,
-    lines: Lines,
+    lines: SourceLines,
     parser: LineParser,
     columns: usize,
     /// Latest readings of every row read: rows × M4.
     latest_ohm: Vec<f64>,
     /// Rows of which readings came since the last frame.
     is_new: Vec<bool>,
-    dropped: u64,
-    /// When reading began.
-    begun: Instant,
 }
 
 impl StreamFrames {
@@ -38,45 +33,36 @@ impl StreamFrames {
     ) -> Result<Self, String> {
         let keeping = source.keeping();
         let parser = LineParser::new(scale, rows, keeping == Keeping::All).map_err(|error| error.to_string())?;
-        let lines = Lines::spawn(opened, keeping, source.begins_anywhere());
-        let mut lines = lines.map_err(|error| format!("no thread could be started: {error}"))?;
-        lines.set_kept(read);
         Ok(Self {
-            name: source.to_string(),
-            begins_anywhere: source.begins_anywhere(),
-            lines,
+            lines: SourceLines::new(source, opened, read)?,
             parser,
             columns: scale.columns(),
             latest_ohm: vec![0.0; read * scale.columns()],
             is_new: vec![false; read],
-            dropped: 0,
-            begun: Instant::now(),
         })
     }
 
     /// Waits for a line, at most so long, and writes the frame if it is whole with this line.
     pub(super) fn next(&mut self, patience: Duration, frame_ohm: &mut [f64], tally: &mut Tally) -> Next {
         let next = self.take_line(patience, frame_ohm);
-        let dropped = self.lines.dropped();
-        tally.dropped(dropped - self.dropped);
-        self.dropped = dropped;
+        self.lines.count_dropped(tally);
         next
     }
 
     fn take_line(&mut self, patience: Duration, frame_ohm: &mut [f64]) -> Next {
-        let line = match self.lines.next(patience) {
-            NextLine::Line(line) => line,
-            NextLine::None => return Next::Nothing,
-            NextLine::End(None) => return Next::End(Ok(())),
-            NextLine::End(Some(error)) => {
-                let cause = system_cause(&error);
-                return Next::End(Err(format!("{} is lost: {cause}; connect it again", self.name)));
+        let SourceLine {
+            number,
+            arrived,
+            text,
+            is_fragment,
+        } = match self.lines.take(patience) {
+            Ok(line) => line,
+            Err(next) => {
+                if matches!(next, Next::Bad(_)) {
+                    self.parser.count_bad();
+                }
+                return next;
             }
-        };
-        let (number, read_at) = (line.number, line.read_at);
-        let Some(text) = line.text else {
-            self.parser.count_bad();
-            return Next::Bad(format!("line {number}: it is longer than {} bytes", Lines::LONGEST));
         };
         let is_snapshot = match self.parser.parse(number, text) {
             Ok(ParsedLine::NoReadings) => return Next::Nothing,
@@ -98,15 +84,14 @@ impl StreamFrames {
                 frame_ohm.copy_from_slice(&self.latest_ohm);
                 false
             }
-            Err(error) if error.is_final() && !(self.begins_anywhere && number == 1) => {
-                return Next::End(Err(format!("{}: {error}", self.name)));
+            Err(error) if error.is_final() && !is_fragment => {
+                return Next::End(Err(self.lines.failed(&error)));
             }
             Err(error) => return Next::Bad(error.to_string()),
         };
         if is_snapshot {
             self.lines.set_kept(1);
         }
-        let time_s = read_at.saturating_duration_since(self.begun).as_secs_f64();
-        Next::Frame(Arrived { time_s, read_at })
+        Next::Frame(arrived)
     }
 }

@@ -10,16 +10,16 @@ use ndarray::Array3;
 use super::{
     counts::Tally,
     frame_source::Next,
-    message::{Arrived, LivePlan, SourcePlan},
+    message::{LivePlan, SourcePlan},
     opening::open,
     replay::ReplayFrames,
     replay_file::RATE_WITHOUT_TIMES,
+    source_lines::{SourceLine, SourceLines},
 };
 use crate::{
-    dataset::system_cause,
     export::NetworkFile,
     import::{InputLine, InputLines},
-    live::{Lines, NextLine, Recording, Source},
+    live::{Recording, Source},
 };
 
 /// Samples for a network of a recording. Each is the index of its network, then the readings in the order of the inputs.
@@ -32,13 +32,8 @@ pub(super) enum TargetSource {
 /// Samples from the lines of a device or socket.
 #[derive(Debug)]
 pub(super) struct TargetLines {
-    name: String,
-    begins_anywhere: bool,
-    lines: Lines,
+    lines: SourceLines,
     parser: InputLines,
-    dropped: u64,
-    /// When reading began.
-    begun: Instant,
 }
 
 impl TargetSource {
@@ -129,52 +124,38 @@ fn read(file: &NetworkFile, path: &Path, is_wanted: &dyn Fn() -> bool) -> Result
 
 impl TargetLines {
     fn new(source: &Source, opened: Box<dyn Read + Send>, file: &NetworkFile) -> Result<Self, String> {
-        let lines = Lines::spawn(opened, source.keeping(), source.begins_anywhere());
-        let mut lines = lines.map_err(|error| format!("no thread could be started: {error}"))?;
-        // The latest sample of each row-wire.
-        lines.set_kept(file.network.values().len());
         Ok(Self {
-            name: source.to_string(),
-            begins_anywhere: source.begins_anywhere(),
-            lines,
+            // The latest sample of each row-wire.
+            lines: SourceLines::new(source, opened, file.network.values().len())?,
             parser: file.input_lines(),
-            dropped: 0,
-            begun: Instant::now(),
         })
     }
 
     fn next(&mut self, patience: Duration, sample: &mut [f64], tally: &mut Tally) -> Next {
         let next = self.take_line(patience, sample);
-        let dropped = self.lines.dropped();
-        tally.dropped(dropped - self.dropped);
-        self.dropped = dropped;
+        self.lines.count_dropped(tally);
         next
     }
 
     fn take_line(&mut self, patience: Duration, sample: &mut [f64]) -> Next {
-        let line = match self.lines.next(patience) {
-            NextLine::Line(line) => line,
-            NextLine::None => return Next::Nothing,
-            NextLine::End(None) => return Next::End(Ok(())),
-            NextLine::End(Some(error)) => {
-                let cause = system_cause(&error);
-                return Next::End(Err(format!("{} is lost: {cause}; connect it again", self.name)));
-            }
-        };
-        let (number, read_at) = (line.number, line.read_at);
-        let Some(text) = line.text else {
-            return Next::Bad(format!("line {number}: it is longer than {} bytes", Lines::LONGEST));
+        let SourceLine {
+            number,
+            arrived,
+            text,
+            is_fragment,
+        } = match self.lines.take(patience) {
+            Ok(line) => line,
+            Err(next) => return next,
         };
         match self.parser.parse(number, text) {
             Ok(InputLine::NoReadings) => Next::Nothing,
             Ok(InputLine::Readings { row_index, readings }) => {
                 sample[0] = row_index as f64;
                 sample[1..].copy_from_slice(readings);
-                let time_s = read_at.saturating_duration_since(self.begun).as_secs_f64();
-                Next::Frame(Arrived { time_s, read_at })
+                Next::Frame(arrived)
             }
-            Err(error) if error.is_final() && !(self.begins_anywhere && number == 1) => {
-                Next::End(Err(format!("{}: line {number}: {error}", self.name)))
+            Err(error) if error.is_final() && !is_fragment => {
+                Next::End(Err(self.lines.failed(&format!("line {number}: {error}"))))
             }
             Err(error) => Next::Bad(format!("line {number}: {error}")),
         }

@@ -1,12 +1,12 @@
 use std::cell::RefCell;
 
-use eframe::egui::{Button, CollapsingHeader, Ui, Vec2, WidgetInfo, accesskit::Role, containers::menu::MenuButton};
+use eframe::egui::{Button, CollapsingHeader, Ui, Vec2};
 
 use super::{DecoderResult, DecodersState};
 use crate::{
     app::{
         glossary,
-        shared::{FileTask, NetworkSource, Phase, decoder_tasks, target_choice_ui},
+        shared::{DecoderSource, FileTask, Phase, decoder_export_ui, target_choice_ui},
         theme::{Theme, space},
         widgets::{ColumnWidth, TableColumn, TableRow, TableView, dim_ui, focus_ring_ui, note_ui},
     },
@@ -99,7 +99,7 @@ pub fn decoders_ui(
     phase: Phase,
     (problem, limit): (&Problem, Option<&Errors>),
     target: &mut usize,
-    source: Option<&NetworkSource>,
+    source: Option<&DecoderSource>,
 ) -> Option<FileTask> {
     let mut asked = None;
     ui.add_space(space(1));
@@ -134,7 +134,7 @@ fn measured_ui(
     measured: &[DecoderResult],
     (problem, limit): (&Problem, Option<&Errors>),
     target: &mut usize,
-    source: Option<&NetworkSource>,
+    source: Option<&DecoderSource>,
 ) -> Option<FileTask> {
     let palette = Theme::of(ui).palette;
     // Without noise there is no limit but rounding, and nothing to be compared with it.
@@ -168,7 +168,8 @@ fn measured_ui(
         match source {
             None => row,
             Some(source) => row.controls(|ui| {
-                let task = export_menu_ui(ui, result.kind, source);
+                let button = Button::new("…").min_size(Vec2::splat(space(5)));
+                let task = decoder_export_ui(ui, button, result.kind, source);
                 if task.is_some() {
                     asked.replace(task);
                 }
@@ -198,23 +199,6 @@ fn measured_ui(
         }
     }
     asked.into_inner()
-}
-
-/// The menu of the formats in which a decoder can be exported; returns the file asked for.
-fn export_menu_ui(ui: &mut Ui, kind: DecoderKind, source: &NetworkSource) -> Option<FileTask> {
-    let mut asked = None;
-    let (button, _) = MenuButton::from_button(Button::new("…").min_size(Vec2::splat(space(5)))).ui(ui, |ui| {
-        for (form, task) in decoder_tasks(source, kind) {
-            let button = ui.button(&form).on_hover_text(task.words.description);
-            if button.clicked() {
-                asked = Some(task);
-            }
-        }
-    });
-    let name = format!("Export {}…", kind.name(Precision::Double));
-    button.widget_info(|| WidgetInfo::labeled(Role::Button, true, &name));
-    button.on_hover_text(name);
-    asked
 }
 
 #[cfg(test)]

@@ -6,7 +6,10 @@ use super::{conditioning::conditioning_ui, spread::spread_ui};
 use crate::{
     app::{
         glossary,
-        shared::{Effect, NetworkSource, Phase, RunResult, RunView, Shared, SourceKind, error_table_ui, sentence},
+        shared::{
+            DecoderSource, Effect, NetworkSource, Phase, RunResult, RunView, Shared, SourceKind, error_table_ui,
+            sentence,
+        },
         theme::{space, type_size},
         views::train::{
             decoders::decoders_ui, exports::open_task, inspect::TestPlace, press::press_section_ui, recording::bias,
@@ -51,7 +54,8 @@ pub fn report_ui(ui: &mut Ui, view: &mut TrainView, shared: &Shared, effects: &m
             let limit = baselines.reference.as_ref().and_then(TestErrors::nodes);
             let measured = (&*run.problem, limit);
             let is_open = view.decoders.is_open;
-            let source = is_open.then(|| NetworkSource::Training(run.id, Box::new(run.setup.clone())));
+            let run_source = || NetworkSource::Training(run.id, Box::new(run.setup.clone()));
+            let source = is_open.then(|| DecoderSource::Run(run_source()));
             let (decoders, target) = (&mut view.decoders, &mut view.target);
             let asked = decoders_ui(ui, decoders, shared.phase, measured, target, source.as_ref());
             effects.extend(asked.map(Effect::ChooseFile));
