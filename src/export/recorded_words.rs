@@ -1,7 +1,7 @@
 use super::format_number;
 use crate::{
     evaluation::{
-        Channel, Problem, Scores, TargetErrors, TargetPosition,
+        Channel, Problem, Scores, TargetPosition,
         recorded::{Determination, Findings, Standing, TargetFindings, Undetermined},
     },
     training::Method,
@@ -53,29 +53,39 @@ pub fn describe_warnings(inputs: &[Channel], targets: &[Channel], findings: &Fin
     warnings
 }
 
-/// Warns of targets on which the network is worse than ridge, or no better to three digits.
-pub fn describe_worse_than_ridge(problem: &Problem, scores: &Scores, method: Method) -> Vec<String> {
+/// Warns of the targets on which the network is worse than ridge, or no better to three digits; `None` if there are none.
+pub fn describe_worse_than_ridge(problem: &Problem, scores: &Scores, method: Method) -> Option<String> {
+    /// Targets that are named; of a skin there can be hundreds.
+    const NAMED: usize = 3;
     let errors = scores.network.targets().iter().zip(scores.baselines.linear.targets());
-    let worse = problem
-        .targets
-        .iter()
-        .zip(errors)
-        // R² is undefined for a target that is constant in the test samples.
-        .filter(|(_, (network, ridge))| network.r2.is_some() && network.rmse > ridge.rmse);
+    let all = problem.targets.iter().zip(errors);
+    // R² is undefined for a target that is constant in the test samples.
+    let worse = all.filter(|(_, (network, ridge))| network.r2.is_some() && network.rmse > ridge.rmse);
+    let mut comparison = "no better than";
+    let mut targets = Vec::new();
+    for (target, (network, ridge)) in worse {
+        let (of_network, of_ridge) = (format_number(network.rmse), format_number(ridge.rmse));
+        targets.push(if of_network == of_ridge {
+            format!("{} (RMSE {of_ridge} for both)", target.name)
+        } else {
+            comparison = "worse than";
+            format!("{} (RMSE {of_network}, ridge {of_ridge})", target.name)
+        });
+    }
+    let more = match targets.len() {
+        0 => return None,
+        count if count > NAMED + 1 => format!(" and {} more", count - NAMED),
+        _ => String::new(),
+    };
+    if !more.is_empty() {
+        targets.truncate(NAMED);
+    }
     let cure = match method {
         Method::BayesianRegularization(_) => "record more samples, or use fewer hidden nodes",
         _ => "record more samples, or use fewer hidden nodes or Bayesian regularisation",
     };
-    let warning = |(target, (network, ridge)): (&Channel, (&TargetErrors, &TargetErrors))| {
-        let (name, of_network, of_ridge) = (&target.name, format_number(network.rmse), format_number(ridge.rmse));
-        if of_network == of_ridge {
-            format!("for {name} the network is no better than ridge regression (RMSE {of_ridge}): take ridge, {cure}")
-        } else {
-            format!(
-                "for {name} the network is worse than ridge regression (RMSE {of_network} against {of_ridge}): take ridge, \
-                 {cure}"
-            )
-        }
-    };
-    worse.map(warning).collect()
+    let targets = targets.join(", ");
+    Some(format!(
+        "the network is {comparison} ridge regression for {targets}{more}: take ridge, {cure}"
+    ))
 }

@@ -52,7 +52,7 @@ pub fn sample_figure(targets: &[Channel], actual: &[f64], decoded: &[f64], range
         series("decoded", Look::marker(Hue::Blue, Marker::Disc), decoded),
     ];
     let y = match targets.first().and_then(|target| target.unit.as_ref()) {
-        _ if !has_one_unit => "percent of the range of each target".to_owned(),
+        _ if !has_one_unit => "% of the target's range".to_owned(),
         Some(unit) => format!("value ({unit})"),
         None => "value".to_owned(),
     };

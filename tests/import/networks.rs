@@ -89,7 +89,7 @@ fn folders(root: &Path) -> [PathBuf; 2] {
     })
 }
 
-fn worse_than_ridge(file: &NetworkFile) -> Vec<String> {
+fn worse_than_ridge(file: &NetworkFile) -> Option<String> {
     describe_worse_than_ridge(&file.problem, &file.scores, file.settings.training.method)
 }
 
@@ -130,20 +130,34 @@ fn the_cure_of_a_network_worse_than_ridge_is_not_the_method_that_it_was_trained_
     let ridge = file.scores.baselines.linear.targets()[0];
     let with_rmse = |rmse: f64| TestErrors::Targets(vec![TargetErrors { rmse, ..ridge }]);
     file.scores.network = with_rmse(0.5 * ridge.rmse);
-    assert!(worse_than_ridge(&file).is_empty());
+    assert!(worse_than_ridge(&file).is_none());
     file.scores.network = with_rmse((1.0 + 1e-7) * ridge.rmse);
-    let hardly = &worse_than_ridge(&file)[0];
+    let hardly = worse_than_ridge(&file).unwrap();
     assert!(
-        hardly.contains("is no better than ridge regression (RMSE") && !hardly.contains("against"),
+        hardly.contains("is no better than ridge regression for force (RMSE") && hardly.contains(" for both)"),
         "{hardly}"
     );
     file.scores.network = with_rmse(2.0 * ridge.rmse);
     for (method, is_advised) in [(Method::default(), true), (Method::recorded_regularization(), false)] {
         file.settings.training.method = method;
-        let warnings = worse_than_ridge(&file);
-        assert_eq!(warnings.len(), 1);
-        assert_eq!(warnings[0].contains("Bayesian"), is_advised, "{warnings:?}");
+        let warning = worse_than_ridge(&file).unwrap();
+        assert_eq!(warning.contains("Bayesian"), is_advised, "{warning}");
     }
+    // Five targets make one sentence that names three.
+    let ridge = TestErrors::Targets(vec![ridge; 5]);
+    file.problem.targets = vec![file.problem.targets[0].clone(); 5];
+    file.scores.network = TestErrors::Targets(vec![with_rmse(2.0 * ridge.targets()[0].rmse).targets()[0]; 5]);
+    file.scores.baselines.linear = ridge;
+    let warning = worse_than_ridge(&file).unwrap();
+    assert!(
+        warning.contains("worse than ridge regression for force (RMSE"),
+        "{warning}"
+    );
+    assert_eq!(
+        (warning.matches("force").count(), warning.contains(" and 2 more: ")),
+        (3, true),
+        "{warning}"
+    );
 }
 
 #[test]

@@ -25,14 +25,13 @@ enum Figure {
     Rmse,
     R2,
     FrameTime,
-    FitTime,
 }
 
 impl Figure {
     /// The figures of this problem, from left to right.
     fn of(problem: &Problem, has_limit: bool) -> Vec<Self> {
         if !problem.has_nodes {
-            return vec![Self::RangePercent, Self::Rmse, Self::R2, Self::FrameTime, Self::FitTime];
+            return vec![Self::RangePercent, Self::Rmse, Self::R2, Self::FrameTime];
         }
         let figures = [Self::ZPercent, Self::TimesLimit, Self::Residual, Self::FrameTime].into_iter();
         figures
@@ -59,10 +58,6 @@ impl Figure {
                 "µs",
                 "Time to decode a frame (all rows, or one sample of a recording) on one thread, in µs: the median of many.",
             ),
-            Self::FitTime => (
-                "fit s",
-                "Time to fit the decoder to the training samples in seconds, without the training of a network.",
-            ),
         };
         TableColumn::figure(heading).meaning(meaning)
     }
@@ -76,7 +71,6 @@ impl Figure {
             Self::Rmse => Some(of_target?.rmse),
             Self::R2 => of_target?.r2,
             Self::FrameTime => Some(report.cost.frame_us),
-            Self::FitTime => Some(report.cost.fit_seconds),
         }
     }
 
@@ -143,7 +137,11 @@ fn measured_ui(
         target_choice_ui(ui, "RMSE and R² of", "target of the decoders", &problem.targets, target);
     }
     let target = (*target).min(problem.targets.len().saturating_sub(1));
-    let figures = Figure::of(problem, limit.is_some());
+    let mut figures = Figure::of(problem, limit.is_some());
+    // In a narrow window the buttons at the end come first.
+    if ui.available_width() < space(80) {
+        figures.retain(|figure| *figure != Figure::R2);
+    }
     let columns: Vec<TableColumn<'_>> = std::iter::once(TableColumn::text(""))
         .chain(figures.iter().map(|figure| figure.column()))
         .chain([TableColumn::text("").width(ColumnWidth::Points(space(7)))])
