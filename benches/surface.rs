@@ -2,11 +2,11 @@
 
 use std::sync::Arc;
 
-use decoupler::app::surface_view::SurfaceView;
-use decoupler::app::theme::{self, Theme};
-use decoupler::figure::SequentialMap;
-use decoupler::figure::surface::{OrbitCamera, Quantity, Surface, ViewMode};
-use decoupler::surface::SurfaceMap;
+use decoupler::window::surface_view::SurfaceView;
+use decoupler::window::theme::{self, Theme};
+use decoupler_core::surface::SurfaceMap;
+use decoupler_files::figure::SequentialMap;
+use decoupler_files::figure::surface::{OrbitCamera, Quantity, Surface, ViewMode};
 use divan::{Bencher, black_box};
 use eframe::egui::{Context, RawInput, Rect, Vec2, pos2, vec2};
 use glam::DVec3;

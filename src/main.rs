@@ -2,11 +2,6 @@
 
 use std::process::ExitCode;
 
-#[cfg(feature = "gui")]
-const WINDOW: Option<decoupler::cli::Window> = Some(|| Ok(decoupler::app::open()?));
-#[cfg(not(feature = "gui"))]
-const WINDOW: Option<decoupler::cli::Window> = None;
-
 fn main() -> ExitCode {
-    decoupler::cli::run(std::env::args_os(), WINDOW)
+    decoupler::terminal::run(std::env::args_os(), || Ok(decoupler::window::open()?))
 }

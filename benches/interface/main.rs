@@ -14,12 +14,12 @@ use std::{
     time::{Duration, Instant},
 };
 
-use decoupler::{
-    app::{DecouplerWindow, Desktop, Effect, Phase, Shared},
+use decoupler::window::{DecouplerWindow, Desktop, Effect, Phase, Shared};
+use decoupler_core::{
     evaluation::SimulatedSettings,
-    figure::{EpochOutline, loss_figure},
     training::{EpochRecord, Method, ScaledConjugateGradientSettings},
 };
+use decoupler_files::figure::{EpochOutline, loss_figure};
 use eframe::egui::{Context, Event, Modifiers, PointerButton, RawInput, Rect, accesskit::TreeUpdate, pos2, vec2};
 
 /// Time between two frames of a screen.

@@ -2,7 +2,7 @@
 
 use std::{fmt::Write as _, fs, path::Path};
 
-use decoupler::{
+use decoupler_core::{
     dataset::{Dataset, Seed, Stream},
     scene::{Loading, Noise, Scene},
     sensor::SensorModel,

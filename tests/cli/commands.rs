@@ -2,13 +2,13 @@
 
 use std::{fs, path::Path};
 
-use decoupler::{
+use decoupler_core::{
     dataset::{Dataset, Seed, Stream},
     evaluation::{Errors, SimulatedSettings},
-    export::NetworkFile,
     scene::Scene,
     sensor::{ArrayScale, SensorModel},
 };
+use decoupler_files::export::NetworkFile;
 use serde_json::Value;
 
 use crate::{folders::names, terminal::decoupler};

@@ -313,7 +313,7 @@ fn a_report_is_written_beside_json_with_the_same_figures_and_shares_no_path() {
         &printed["baselines"]["mean"]["z_mm"],
         &printed["decoders"]["ridge"]["residual"],
     ] {
-        let rounded = decoupler::export::format_number(value.as_f64().unwrap());
+        let rounded = decoupler_files::export::format_number(value.as_f64().unwrap());
         assert!(html.contains(&format!("<td>{rounded}</td>")), "{value}");
     }
     // The command in it repeats the run.

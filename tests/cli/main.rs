@@ -1,6 +1,5 @@
 //! The program in the terminal, run as its users run it.
 
-#![cfg(feature = "cli")]
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 mod calibrate;
@@ -8,7 +7,7 @@ mod causes;
 mod commands;
 mod export;
 mod files;
-#[cfg(all(unix, feature = "serial"))]
+#[cfg(unix)]
 mod follow;
 mod import;
 mod own_export;

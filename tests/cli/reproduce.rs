@@ -2,7 +2,7 @@
 
 use std::fs;
 
-use decoupler::sensor::ArrayScale;
+use decoupler_core::sensor::ArrayScale;
 use serde_json::Value;
 
 use crate::terminal::decoupler;

@@ -8,10 +8,8 @@ use std::{
     time::{Duration, Instant},
 };
 
-use decoupler::{
-    evaluation::Run,
-    export::{CheckpointFile, NetworkFile},
-};
+use decoupler_core::evaluation::Run;
+use decoupler_files::export::{CheckpointFile, NetworkFile};
 use serde_json::Value;
 use tempfile::TempDir;
 

@@ -1,6 +1,6 @@
 //! What readers of the screen hear, and what hands on the keyboard reach.
 
-use decoupler::app::Phase;
+use decoupler::window::Phase;
 use eframe::egui::{Event, Key, Modifiers, Rect, Shape, accesskit::Role};
 use egui_kittest::kittest::{By, NodeT as _, Queryable as _};
 

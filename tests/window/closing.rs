@@ -2,11 +2,9 @@
 
 use std::{fs, path::Path, time::Instant};
 
-use decoupler::{
-    app::{Effect, Phase},
-    export::CheckpointFile,
-    training::StopReason,
-};
+use decoupler::window::{Effect, Phase};
+use decoupler_core::training::StopReason;
+use decoupler_files::export::CheckpointFile;
 use eframe::egui::{Key, ViewportCommand, ViewportEvent, ViewportId};
 
 use crate::{

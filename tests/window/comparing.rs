@@ -2,8 +2,8 @@
 
 use std::{fmt::Write as _, fs, path::Path, sync::Arc};
 
-use decoupler::{
-    app::{BottomTab, Effect, Phase},
+use decoupler::window::{BottomTab, Effect, Phase};
+use decoupler_files::{
     export::{NetworkFile, format_number},
     figure::surface::ViewMode,
 };
@@ -63,7 +63,7 @@ fn two_runs_are_compared_and_survive_a_restart() {
     driver.enter("Name of run 1", "Six hidden nodes");
     assert!(driver.has("Six hidden nodes as A"), "{:#?}", driver.texts());
 
-    let settings = [6, 4].map(|hidden| decoupler::evaluation::SimulatedSettings { hidden, ..small() });
+    let settings = [6, 4].map(|hidden| decoupler_core::evaluation::SimulatedSettings { hidden, ..small() });
     let runs = settings.map(trained);
     let shown = runs.each_ref().map(|run| NetworkFile::from_run(run, None).unwrap());
     // What is compared is saved as it is in view, by the names of the runs.
@@ -357,7 +357,7 @@ fn two_runs_of_a_recording_are_compared_target_by_target() {
     let mut driver = Driver::open_keeping(&runs);
     driver.take_recording(&setup);
     train_and_keep(&mut driver, 1);
-    let other = decoupler::evaluation::RunSettings {
+    let other = decoupler_core::evaluation::RunSettings {
         hidden: 3,
         ..*setup.settings()
     };

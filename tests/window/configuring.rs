@@ -2,8 +2,8 @@
 
 use std::time::Instant;
 
-use decoupler::{
-    app::{Effect, Phase},
+use decoupler::window::{Effect, Phase};
+use decoupler_core::{
     evaluation::{Run, SimulatedSettings},
     sensor::{ArrayScale, Geometry},
     training::Method,

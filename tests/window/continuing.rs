@@ -2,12 +2,12 @@
 
 use std::{fs, path::Path, time::Duration};
 
-use decoupler::{
-    app::{Notice, Phase},
+use decoupler::window::{Notice, Phase};
+use decoupler_core::{
     evaluation::{Run, SimulatedSettings, Spread, StartRecord},
-    export::{CheckpointFile, NetworkFile, format_number},
     training::{Method, MomentumSettings, StopReason, StoppingRules},
 };
+use decoupler_files::export::{CheckpointFile, NetworkFile, format_number};
 
 use eframe::egui::vec2;
 

@@ -1,11 +1,11 @@
 //! The table of other decoders.
 
-use decoupler::{
-    app::DecoderResult,
+use decoupler::window::DecoderResult;
+use decoupler_core::{
     evaluation::{DecoderSet, Run, SimulatedSettings},
-    export::format_number,
     scene::{Noise, Rows},
 };
+use decoupler_files::export::format_number;
 use eframe::egui::{Key, Modifiers};
 
 use crate::{

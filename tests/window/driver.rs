@@ -8,9 +8,9 @@ use std::{
     time::{Duration, Instant},
 };
 
-use decoupler::app::{DecouplerWindow, Desktop, Notice, Phase, Shared, SourceKind, Views, WindowFile};
-use decoupler::evaluation::{ErrorTable, Run, SimulatedSettings, Simulation};
-use decoupler::export::format_number;
+use decoupler::window::{DecouplerWindow, Desktop, Notice, Phase, Shared, SourceKind, Views, WindowFile};
+use decoupler_core::evaluation::{ErrorTable, Run, SimulatedSettings, Simulation};
+use decoupler_files::export::format_number;
 use eframe::egui::{
     Context, Key, Modifiers, OutputCommand, Rect, Ui, UiBuilder, Vec2, ViewportCommand, ViewportEvent, ViewportId,
     accesskit::Role, vec2,

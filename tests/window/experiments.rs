@@ -2,14 +2,12 @@
 
 use std::{fs, num::NonZero};
 
-use decoupler::{
-    app::Phase,
-    evaluation::{
-        RunSettings,
-        experiments::{Axis, Experiment, ExperimentResults, PaperTable, TrialSamples, run_experiments, verdicts},
-    },
-    export::ExperimentTable,
+use decoupler::window::Phase;
+use decoupler_core::evaluation::{
+    RunSettings,
+    experiments::{Axis, Experiment, ExperimentResults, PaperTable, TrialSamples, run_experiments, verdicts},
 };
+use decoupler_files::export::ExperimentTable;
 
 use eframe::egui::vec2;
 
@@ -51,7 +49,7 @@ fn run_to_the_end(driver: &mut Driver) {
 /// What the library makes of `experiment` by itself.
 fn by_library(experiment: &Experiment) -> ExperimentResults {
     let mut results = ExperimentResults::new(experiment.clone());
-    let record = |finished: decoupler::evaluation::experiments::Finished| {
+    let record = |finished: decoupler_core::evaluation::experiments::Finished| {
         results.record(finished.cell, finished.outcome);
     };
     run_experiments(
@@ -228,7 +226,7 @@ fn a_sweep_is_shown_as_a_map_and_saved() {
     let outcome = driver.views().experiments.outcome().unwrap();
     let results = by_library(&outcome.results.experiment);
     for (cell, z) in results.cells.iter().zip(["2, 50", "3, 50", "2, 100", "3, 100"]) {
-        let percent = decoupler::export::format_percent(cell.percent().map(|spread| spread.median));
+        let percent = decoupler_files::export::format_percent(cell.percent().map(|spread| spread.median));
         let label = format!("{z}: median Z error {percent}");
         assert!(driver.has(&label), "{label} is not among {:#?}", driver.texts());
     }
@@ -280,7 +278,6 @@ fn the_form_keeps_to_its_panel_in_a_narrow_window() {
 }
 
 /// The window writes the sweep, the terminal trains it in two parts, and the window shows what is there after each.
-#[cfg(feature = "cli")]
 #[test]
 fn a_sweep_of_the_window_is_trained_by_the_terminal_and_seen_to_grow() {
     let home = tempfile::tempdir().unwrap();
@@ -323,7 +320,7 @@ fn a_sweep_of_the_window_is_trained_by_the_terminal_and_seen_to_grow() {
             continue;
         }
         let of = |option: &str| run["options"][option].to_string();
-        let z = decoupler::export::format_number(run["report"]["errors"]["z_percent"].as_f64());
+        let z = decoupler_files::export::format_number(run["report"]["errors"]["z_percent"].as_f64());
         let shown = format!("hidden {}, samples 40, seed {}, Z %: {z}", of("hidden"), of("seed"));
         assert!(driver.has(&shown), "{shown} is not among {:#?}", driver.texts());
     }
@@ -361,7 +358,7 @@ fn a_sweep_of_a_recording_has_the_runs_of_the_train_view() {
     let trial = &results.cells[1].trials[0];
     assert_eq!(trial.errors, alone.errors(), "12 hidden nodes, scaled to [−1, 1]");
     assert_eq!(trial.baselines, *alone.baselines().unwrap());
-    let percent = decoupler::export::format_percent(trial.errors.percent());
+    let percent = decoupler_files::export::format_percent(trial.errors.percent());
     let label = format!("12, minmax: median mean absolute error {percent}");
     assert!(driver.has(&label), "{label} is not among {:#?}", driver.texts());
     driver.click("Cell 12, minmax");

@@ -2,10 +2,8 @@
 
 use std::fs;
 
-use decoupler::{
-    export::{NetworkFile, format_number},
-    network::Networks,
-};
+use decoupler_core::network::Networks;
+use decoupler_files::export::{NetworkFile, format_number};
 use eframe::egui::{Key, Modifiers};
 
 use crate::{

@@ -1,6 +1,6 @@
 //! Settings at the edge of what is possible, and beyond.
 
-use decoupler::app::{Notice, Phase};
+use decoupler::window::{Notice, Phase};
 
 use crate::driver::{Driver, table_of, trained};
 

@@ -1,6 +1,6 @@
 //! What the hands learn: taking changes back, the list of all actions, keys, the size of the interface.
 
-use decoupler::app::Phase;
+use decoupler::window::Phase;
 use eframe::egui::{Key, Modifiers, vec2};
 
 use crate::{driver::Driver, training::start_endless};

@@ -2,16 +2,18 @@
 
 use std::{fmt::Write as _, fs, ops::ControlFlow, path::Path};
 
-use decoupler::{
-    app::{Analysis, Effect, Question, SourceKind},
+use decoupler::window::{Analysis, Effect, Question, SourceKind};
+use decoupler_core::{
     dataset::{Folds, SplitBy, Stream},
     evaluation::{
         CrossValidated, RunSettings,
         recorded::{Findings, FittedModel},
     },
+    sensor::{Identifiability, SensorModel},
+};
+use decoupler_files::{
     export::{describe_target, format_number},
     import::Setup,
-    sensor::{Identifiability, SensorModel},
 };
 use eframe::egui::{Key, vec2};
 use glam::DVec3;
@@ -42,7 +44,7 @@ fn analysis(driver: &Driver) -> &Analysis {
 
 /// The row with the smallest singular value, all nodes pressed by `compression` of the height, found by the library alone.
 fn worst_row(sensor: &SensorModel, compression: f64) -> Identifiability {
-    let axes = decoupler::sensor::Axes::Z;
+    let axes = decoupler_core::sensor::Axes::Z;
     let pressed = vec![DVec3::Z * compression * sensor.geometry.height_mm; sensor.scale.nodes_per_row()];
     let rows = (0..sensor.scale.rows()).map(|row| Identifiability::of_row(sensor, row, &pressed, axes).unwrap());
     let smallest = |row: &Identifiability| *row.singular_values_per_mm.last().unwrap();

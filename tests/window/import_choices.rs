@@ -2,7 +2,8 @@
 
 use std::{fmt::Write as _, fs, path::Path};
 
-use decoupler::{dataset::SplitBy, export::RecipeFile, import::Plan};
+use decoupler_core::dataset::SplitBy;
+use decoupler_files::{export::RecipeFile, import::Plan};
 use eframe::egui::{Event, Modifiers, MouseWheelSource, MouseWheelUnit, TouchPhase, vec2};
 use egui_kittest::kittest::{NodeT as _, Queryable as _};
 use tempfile::TempDir;

@@ -2,12 +2,9 @@
 
 use std::{fmt::Write as _, fs, path::Path};
 
-use decoupler::{
-    app::{Notice, Phase, SourceKind},
-    export::{NetworkFile, RecipeFile},
-    network::ScalingChoice,
-    scene::RowModel,
-};
+use decoupler::window::{Notice, Phase, SourceKind};
+use decoupler_core::{network::ScalingChoice, scene::RowModel};
+use decoupler_files::export::{NetworkFile, RecipeFile};
 use eframe::egui::{self, accesskit::Role, vec2};
 use egui_kittest::kittest::{By, NodeT as _, Queryable as _};
 

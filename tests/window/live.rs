@@ -10,14 +10,14 @@ use std::{
     sync::Arc,
 };
 
-use decoupler::{
-    app::Phase,
+use decoupler::window::Phase;
+use decoupler_core::{
     dataset::Seed,
     decoupling::{CompiledNetworks, Decoder},
-    export::NetworkFile,
     live::{Recording, Simulated, ZeroGains},
     scene::{Noise, Scene},
 };
+use decoupler_files::export::NetworkFile;
 use eframe::egui::{Key, Modifiers, accesskit::Role, vec2};
 use egui_kittest::kittest::{By, Queryable as _};
 use glam::DVec3;

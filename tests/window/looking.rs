@@ -1,6 +1,6 @@
 //! What holds however the window looks: everything within reach, and stillness when nothing happens.
 
-use decoupler::training::Method;
+use decoupler_core::training::Method;
 use eframe::egui::{Pos2, Rect, Vec2, accesskit::Role, vec2};
 use egui_kittest::kittest::{By, Queryable as _};
 

@@ -1,5 +1,4 @@
 //! The window, worked by its labels as a user works it, and compared with the library.
-#![cfg(feature = "gui")]
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 mod accessibility;

@@ -2,12 +2,12 @@
 
 use std::path::PathBuf;
 
-use decoupler::{
-    app::Phase,
+use decoupler::window::Phase;
+use decoupler_core::{
     evaluation::{Run, SimulatedSettings},
-    export::format_number,
     scene::Loading,
 };
+use decoupler_files::export::format_number;
 use eframe::egui::{Key, Modifiers, vec2};
 
 use crate::driver::{Driver, SKIP};

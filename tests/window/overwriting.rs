@@ -2,7 +2,7 @@
 
 use std::{fs, path::Path};
 
-use decoupler::export::{NetworkFile, RecipeFile};
+use decoupler_files::export::{NetworkFile, RecipeFile};
 use eframe::egui::{Event, Key};
 
 use crate::{

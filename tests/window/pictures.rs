@@ -2,7 +2,7 @@
 
 use std::fs;
 
-use decoupler::import::Setup;
+use decoupler_files::import::Setup;
 use eframe::egui::{Vec2, vec2};
 
 use crate::{

@@ -1,13 +1,13 @@
 //! Pressing the actual surface with the pointer, and what every decoder makes of it.
 
-use decoupler::{dataset::Dataset, ndarray::Array2};
-use decoupler::{
+use decoupler_core::{dataset::Dataset, ndarray::Array2};
+use decoupler_core::{
     evaluation::{Errors, Run, SimulatedSettings},
-    export::format_number,
     glam::DVec3,
     scene::Touch,
     sensor::SensorModel,
 };
+use decoupler_files::export::format_number;
 use eframe::egui::{Event, Key, Modifiers, MouseWheelUnit, Pos2, Rect, TouchPhase, vec2};
 
 use crate::driver::{Driver, small, trained};
@@ -58,7 +58,9 @@ fn expected(run: &Run, touch: &Touch) -> (Array2<f64>, Errors, String) {
     let mut targets = Array2::zeros((rows.len(), sensor.scale.coordinates_per_row()));
     for &row in &rows {
         let ohm = sensor.row_resistances(row, deformation.row_mm(row)).unwrap();
-        readings.row_mut(row).assign(&decoupler::ndarray::Array1::from(ohm));
+        readings
+            .row_mut(row)
+            .assign(&decoupler_core::ndarray::Array1::from(ohm));
         for (node, place) in deformation.row_positions_mm(&sensor, row).enumerate() {
             for axis in 0..3 {
                 targets[[row, 3 * node + axis]] = place[axis];
@@ -306,7 +308,7 @@ fn turning_is_one_click_away_and_keys_press_too() {
     let second = touch(&driver).print.unwrap();
     assert_eq!(
         second.place_mm - first.place_mm,
-        decoupler::glam::DVec2::new(0.5, 0.0),
+        decoupler_core::glam::DVec2::new(0.5, 0.0),
         "half a row pitch"
     );
     assert!(second.depth_mm < first.depth_mm);

@@ -1,6 +1,7 @@
 //! Reading errors: what is pointed at lights up everywhere; sections, the nodes in a bar, colours and their scales.
 
-use decoupler::{app::BottomTab, figure::SequentialMap};
+use decoupler::window::BottomTab;
+use decoupler_files::figure::SequentialMap;
 use eframe::egui::{Key, PointerButton, Pos2, accesskit::Role, pos2, vec2};
 use egui_kittest::kittest::{By, NodeT as _, Queryable as _};
 

@@ -6,13 +6,13 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use decoupler::{
-    app::Phase,
+use decoupler::window::Phase;
+use decoupler_core::{
     dataset::{Division, Seed},
     evaluation::{Measured, Run, RunSettings},
-    import::{Plan, Recipe},
     scene::RowModel,
 };
+use decoupler_files::import::{Plan, Recipe};
 use eframe::egui::{self, accesskit::Role};
 use egui_kittest::kittest::{By, Queryable as _};
 use tempfile::TempDir;

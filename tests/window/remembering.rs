@@ -2,7 +2,8 @@
 
 use std::{fs, path::PathBuf};
 
-use decoupler::{app::Phase, evaluation::SimulatedSettings, scene::Loading};
+use decoupler::window::Phase;
+use decoupler_core::{evaluation::SimulatedSettings, scene::Loading};
 
 use eframe::egui::{Vec2, vec2};
 

@@ -3,7 +3,7 @@
 
 use std::{fs, path::Path};
 
-use decoupler::app::{BottomTab, SourceKind};
+use decoupler::window::{BottomTab, SourceKind};
 use eframe::egui::{Vec2, vec2};
 use egui_kittest::kittest::NodeT as _;
 
@@ -23,7 +23,7 @@ fn range(driver: &Driver, surface: &str) -> String {
 }
 
 /// A window in which the recording that `make` writes was trained on.
-fn trained_on(make: impl Fn(&Path) -> decoupler::import::Setup) -> Opened {
+fn trained_on(make: impl Fn(&Path) -> decoupler_files::import::Setup) -> Opened {
     let folder = tempfile::tempdir().unwrap();
     let setup = make(folder.path());
     let mut driver = Driver::open();

@@ -1,12 +1,12 @@
 //! Scenes, inputs and presets in the window, and files written before there were scenes.
 
-use decoupler::{
+use decoupler_core::{
     evaluation::{Outlook, Preset, SimulatedSettings, Simulation},
-    export::format_number,
     network::{InputChoice, Quantity, ScalingChoice},
     scene::{Indenter, IndenterShape, Loading, Movement, Noise, NoisySets, Rows, Scene, Span},
     training::StoppingRules,
 };
+use decoupler_files::export::format_number;
 
 use crate::driver::{Driver, small, table_of, trained};
 

@@ -2,13 +2,15 @@
 
 use std::{fmt::Write as _, fs, path::Path, sync::Arc};
 
-use decoupler::{
-    app::{Effect, Phase, SourceKind},
+use decoupler::window::{Effect, Phase, SourceKind};
+use decoupler_core::{
     dataset::Division,
     evaluation::{ErrorMeasure, Measured, Run, RunSettings},
+    scene::RowModel,
+};
+use decoupler_files::{
     export::format_number,
     import::{Plan, Recipe, Setup},
-    scene::RowModel,
 };
 use tempfile::TempDir;
 
@@ -146,7 +148,7 @@ pub(crate) fn with_epochs(setup: &Setup, epochs: usize) -> Setup {
 /// Figures of the network in the error table, in the window's words: `network, Z %: 2.28`, `x (mm), network, RMSE: 0.01`.
 pub(crate) fn network_figures(run: &Run) -> Vec<String> {
     let (problem, scores) = (run.problem(), run.scores().unwrap());
-    let table = decoupler::evaluation::ErrorTable::of_scores(problem, &scores, None);
+    let table = decoupler_core::evaluation::ErrorTable::of_scores(problem, &scores, None);
     let mut figures = Vec::new();
     for block in &table.blocks {
         let caption = block

@@ -2,12 +2,12 @@
 
 use std::sync::Arc;
 
-use decoupler::app::surface_view::{ColourBar, SurfaceView};
-use decoupler::app::theme::{self, Theme};
-use decoupler::export::figures::PictureFormat;
-use decoupler::figure::surface::{OrbitCamera, Quantity, Surface, SurfaceFigure, ViewMode};
-use decoupler::figure::{Figure, SequentialMap};
-use decoupler::surface::SurfaceMap;
+use decoupler::window::surface_view::{ColourBar, SurfaceView};
+use decoupler::window::theme::{self, Theme};
+use decoupler_core::surface::SurfaceMap;
+use decoupler_files::export::figures::PictureFormat;
+use decoupler_files::figure::surface::{OrbitCamera, Quantity, Surface, SurfaceFigure, ViewMode};
+use decoupler_files::figure::{Figure, SequentialMap};
 use eframe::egui::{self, Key, Modifiers, Vec2, vec2};
 use egui_kittest::{
     Harness,

@@ -2,11 +2,9 @@
 
 use std::{fs, path::Path};
 
-use decoupler::{
-    app::{PlannedLevel, SourceKind, TradeOffEnding, TradeOffPlan},
-    evaluation::{Preset, TradeOffPoint, fastest_under, measure_trade_off, most_accurate_under},
-    export::format_percent,
-};
+use decoupler::window::{PlannedLevel, SourceKind, TradeOffEnding, TradeOffPlan};
+use decoupler_core::evaluation::{Preset, TradeOffPoint, fastest_under, measure_trade_off, most_accurate_under};
+use decoupler_files::export::format_percent;
 use eframe::egui::vec2;
 
 use crate::{

@@ -2,12 +2,12 @@
 
 use std::fs;
 
-use decoupler::{
-    app::{Effect, Phase},
+use decoupler::window::{Effect, Phase};
+use decoupler_core::{
     evaluation::{Run, SimulatedSettings},
-    figure::surface::ViewMode,
     training::{Method, MomentumSettings, StopReason},
 };
+use decoupler_files::figure::surface::ViewMode;
 use eframe::egui::{Key, Modifiers};
 
 use crate::{

@@ -1,6 +1,6 @@
 //! Numbers as they are typed: with units, and refused in place where they cannot be taken.
 
-use decoupler::{evaluation::SimulatedSettings, sensor::ArrayScale};
+use decoupler_core::{evaluation::SimulatedSettings, sensor::ArrayScale};
 use eframe::egui::{Event, Key, Modifiers, PointerButton, Pos2, accesskit::Role, vec2};
 use egui_kittest::kittest::{By, NodeT as _, Queryable as _};
 

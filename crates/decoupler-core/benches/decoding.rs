@@ -1,0 +1,306 @@
+//! How fast frames are decoded: `cargo bench --no-default-features --bench decoding`.
+//!
+//! One thread; medians of many frames, taken in turns within one run. Only ratios are worth remembering: what the
+//! arithmetic alone takes, divisions, square roots, hyperbolic tangents and multiplications in plain loops of the same
+//! number, is measured beside.
+#![expect(clippy::print_stdout, reason = "a benchmark's result is what it prints")]
+#![allow(missing_docs, clippy::unwrap_used)]
+
+#[path = "arithmetic/row.rs"]
+mod row_arithmetic;
+#[path = "arithmetic/untrained.rs"]
+mod untrained;
+
+use std::{hint::black_box, time::Instant};
+
+use decoupler_core::{
+    dataset::{Dataset, PerRow, Seed, Stream},
+    decoupling::{
+        AffineMap, CompiledNetworks, Decoder, NewtonDecoder, NewtonRules, PolishedDecoder, Posterior, PosteriorDecoder,
+        RadialBasisNetwork, RadialBasisSettings, TakagiSugeno, TrainingMean,
+    },
+    network::{InputChoice, Quantity, ScalingChoice, tanh_in_place, tanh_in_place_single},
+    scene::{Noise, NoiseSource, RowModel, Rows, Scene},
+    sensor::{ArrayScale, Axes, RowConductance, SensorModel},
+};
+use glam::DVec3;
+use pulp::{Simd, WithSimd};
+use row_arithmetic::RowArithmetic;
+use untrained::untrained_networks;
+
+/// A piece of work with its name.
+type Work<'a> = (String, Box<dyn FnMut() + 'a>);
+
+/// Nanoseconds of each piece of work: medians of blocks, taken in turns.
+fn medians_ns(works: &mut [Work<'_>]) -> Vec<f64> {
+    const TURNS: usize = 15;
+    const BLOCK_NS: f64 = 2e6;
+    let runs: Vec<usize> = works
+        .iter_mut()
+        .map(|(_, work)| {
+            work();
+            let begun = Instant::now();
+            work();
+            (BLOCK_NS / begun.elapsed().as_nanos().max(1) as f64).clamp(1.0, 20_000.0) as usize
+        })
+        .collect();
+    let mut times = vec![Vec::new(); works.len()];
+    for _ in 0..TURNS {
+        for (((_, work), &runs), times) in works.iter_mut().zip(&runs).zip(&mut times) {
+            let begun = Instant::now();
+            for _ in 0..runs {
+                work();
+            }
+            times.push(begun.elapsed().as_nanos() as f64 / runs as f64);
+        }
+    }
+    let middle = |times: &mut Vec<f64>| {
+        times.sort_by(f64::total_cmp);
+        times[TURNS / 2]
+    };
+    times.iter_mut().map(middle).collect()
+}
+
+/// What decoding of a frame by networks cannot avoid, in the precision of the array. The type rather than a closure, which
+/// would be too long to be moved into the code for vector registers.
+macro_rules! arithmetic {
+    ($real:ty, $tanh:path, $divisions:expr, $tangents:expr, $products:expr) => {{
+        struct Arithmetic<'a>(&'a mut [$real], &'a [$real]);
+        impl WithSimd for Arithmetic<'_> {
+            type Output = $real;
+
+            #[inline(always)]
+            fn with_simd<S: Simd>(self, _: S) -> $real {
+                const LANES: usize = 8;
+                for value in self.0 {
+                    *value = 1.0 / *value;
+                }
+                // Several sums, so that additions need not wait for each other.
+                let mut sums = [[0.0; LANES]; 4];
+                for blocks in self.1.as_chunks::<LANES>().0.as_chunks::<4>().0 {
+                    for (sums, block) in sums.iter_mut().zip(blocks) {
+                        for lane in 0..LANES {
+                            sums[lane] += 0.7 * block[lane];
+                        }
+                    }
+                }
+                sums.as_flattened().iter().sum()
+            }
+        }
+        let (mut quotients, mut tangents) = (vec![1.5 as $real; $divisions], vec![0.3 as $real; $tangents]);
+        let weights = vec![0.01 as $real; $products];
+        move || {
+            black_box(pulp::Arch::new().dispatch(Arithmetic(&mut quotients, &weights)));
+            $tanh(&mut tangents);
+            black_box((&quotients, &tangents));
+        }
+    }};
+}
+
+impl RowArithmetic {
+    /// Of Gaussians around `centres`, each with an exponential of about 16 products.
+    fn of_radial_basis(scale: ArrayScale, centres: usize) -> Self {
+        let (inputs, outputs) = (scale.columns(), scale.nodes_per_row());
+        Self {
+            roots: 0,
+            divisions: inputs,
+            products: inputs * inputs + centres * (inputs + outputs + 16),
+        }
+    }
+
+    /// Of `rounds` of expectation propagation over all nodes: a quadrature of 97 points and two products with the factor
+    /// of the covariance each.
+    fn of_propagation(scale: ArrayScale, rounds: usize) -> Self {
+        let nodes = scale.nodes_per_row();
+        Self {
+            roots: rounds * 2 * nodes,
+            divisions: rounds * 10 * nodes,
+            products: rounds * nodes * (97 * 5 + 2 * nodes * nodes),
+        }
+    }
+}
+
+/// Evaluations that Newton takes from an affine estimate: its error of a hundredth of the stroke is squared each time.
+const NEWTON_EVALUATIONS: usize = 3;
+
+fn print_scale(scale: ArrayScale) {
+    let model = SensorModel::new(scale);
+    let scene = Scene {
+        rows: Rows::Known,
+        ..Scene::default()
+    };
+    let noisy = Scene {
+        noise: Noise::relative(1e-3),
+        ..scene
+    };
+    let rows: Vec<usize> = (0..scale.rows()).collect();
+    let mut rng = Seed(0).rng(Stream::Training);
+    let training = Dataset::simulate(&model, &scene, 300 * scale.rows(), &mut rng).unwrap();
+    let frame = training.frames().unwrap().frame(0).to_vec();
+    let mut decoders: Vec<(String, Box<dyn Decoder>)> = vec![
+        ("mean".into(), Box::new(PerRow::shared(TrainingMean::fit(&training)))),
+        (
+            "ridge".into(),
+            Box::new(
+                PerRow::fit(&training, RowModel::Each, |set| {
+                    AffineMap::ridge(set, InputChoice::BEST, NoiseSource::default())
+                })
+                .unwrap(),
+            ),
+        ),
+        (
+            "fuzzy rules".into(),
+            Box::new(
+                PerRow::fit(&training, RowModel::Each, |set| {
+                    TakagiSugeno::fit(set, Quantity::Conductance, NoiseSource::default(), &mut rng)
+                })
+                .unwrap(),
+            ),
+        ),
+        (
+            "radial basis, 100 centres".into(),
+            Box::new(
+                PerRow::fit(&training, RowModel::Each, |set| {
+                    let settings = RadialBasisSettings::default();
+                    RadialBasisNetwork::fit(set, InputChoice::BEST, NoiseSource::default(), settings, &mut rng)
+                })
+                .unwrap(),
+            ),
+        ),
+    ];
+    for hidden in [6, 12, 24, 48] {
+        for quantity in Quantity::ALL {
+            let choice = InputChoice {
+                quantity,
+                scaling: ScalingChoice::Whitening,
+            };
+            let networks = untrained_networks(&training, choice, hidden);
+            let double = CompiledNetworks::<f64>::new(&networks, scale.rows());
+            let single = CompiledNetworks::<f32>::new(&networks, scale.rows());
+            decoders.push((format!("network, {hidden} hidden, {quantity}, f64"), Box::new(double)));
+            decoders.push((format!("network, {hidden} hidden, {quantity}, f32"), Box::new(single)));
+        }
+    }
+    let first = CompiledNetworks::<f64>::new(&untrained_networks(&training, InputChoice::BEST, 12), scale.rows());
+    decoders.push((
+        "polish, 1 step".into(),
+        Box::new(PolishedDecoder::new(Box::new(first), &model, &scene, &rows, 1, &mut rng).unwrap()),
+    ));
+    decoders.push((
+        "newton".into(),
+        Box::new(NewtonDecoder::new(&model, &scene, &rows, NewtonRules::default()).unwrap()),
+    ));
+    let mut posterior = Posterior::new(&model, &noisy, &rows, &mut rng).unwrap();
+    let mut answer = vec![0.0; scale.coordinates_per_row()];
+    let mut rounds_of = |row: usize| {
+        let readings = &frame[row * scale.columns()..(row + 1) * scale.columns()];
+        posterior.solve(row, readings, &mut answer).unwrap().rounds
+    };
+    let rounds = rows.iter().map(|&row| rounds_of(row)).sum::<usize>() / rows.len();
+    decoders.push((
+        "newton with prior, noise 1e-3".into(),
+        Box::new(PosteriorDecoder::new(posterior, &model, &scene, &rows).unwrap()),
+    ));
+    let coordinates = scale.rows() * scale.coordinates_per_row();
+    let (m1, m2, m4) = (scale.rows(), scale.nodes_per_row(), scale.columns());
+    let pressed = vec![DVec3::new(0.0, 0.0, 0.4); m2];
+    let mut resistances = vec![0.0; m4];
+    let mut works: Vec<Work<'_>> = Vec::new();
+    for (name, decoder) in &mut decoders {
+        let mut answer = vec![0.0; coordinates];
+        let frame = &frame;
+        let work = move || {
+            decoder.decode(black_box(frame), &mut answer).unwrap();
+            black_box(&answer);
+        };
+        works.push((name.clone(), Box::new(work)));
+    }
+    let (divisions, tangents, products) = (m1 * m4, m1 * 12, m1 * 12 * (m4 + m2));
+    works.push((
+        "arithmetic of 12 hidden, f64".into(),
+        Box::new(arithmetic!(f64, tanh_in_place, divisions, tangents, products)),
+    ));
+    works.push((
+        "arithmetic of 12 hidden, f32".into(),
+        Box::new(arithmetic!(f32, tanh_in_place_single, divisions, tangents, products)),
+    ));
+    works.push((
+        "forward model".into(),
+        Box::new(|| {
+            for row in 0..m1 {
+                model
+                    .row_resistances_into(row, black_box(&pressed), &mut resistances)
+                    .unwrap();
+                black_box(&resistances);
+            }
+        }),
+    ));
+    for axes in [Axes::Z, Axes::Xyz] {
+        let mut conductance = RowConductance::new(&model, axes);
+        let pressed = &pressed;
+        let model = &model;
+        works.push((
+            format!("forward model and Jacobian, {axes:?}"),
+            Box::new(move || {
+                for row in 0..m1 {
+                    conductance.evaluate(model, row, black_box(pressed));
+                    black_box(&conductance);
+                }
+            }),
+        ));
+    }
+    let mut distances = vec![30.0_f64; m1 * m2 * scale.nodes_per_column() * m4];
+    works.push((
+        "arithmetic of the forward model".into(),
+        Box::new(move || {
+            pulp::Arch::new().dispatch(|| {
+                for value in &mut distances {
+                    *value = 1.0 / (*value + 30.0).sqrt();
+                }
+            });
+            black_box(&distances);
+        }),
+    ));
+    let newton = |evaluations| RowArithmetic::of_newton(scale, evaluations);
+    let per_row = [
+        ("radial basis, 100 centres", RowArithmetic::of_radial_basis(scale, 100)),
+        ("polish, 1 step", newton(2)),
+        ("newton", newton(NEWTON_EVALUATIONS)),
+        (
+            "newton with prior, noise 1e-3",
+            RowArithmetic::of_propagation(scale, rounds),
+        ),
+    ];
+    for (name, arithmetic) in per_row {
+        works.push((format!("arithmetic of {name}"), Box::new(arithmetic.work(m1))));
+    }
+    let times = medians_ns(&mut works);
+    println!("\n{scale}: {m1} rows a frame");
+    println!("{:38} {:>12} {:>12}", "", "ns per row", "us per frame");
+    for ((name, _), ns) in works.iter().zip(&times) {
+        println!("{name:38} {:>12.0} {:>12.3}", ns / m1 as f64, ns * 1e-3);
+    }
+    let of = |name: &str| times[works.iter().position(|work| work.0 == name).unwrap()];
+    for precision in ["f64", "f32"] {
+        println!(
+            "12 hidden, conductance, {precision}: {:.1} times its arithmetic",
+            of(&format!("network, 12 hidden, conductance, {precision}"))
+                / of(&format!("arithmetic of 12 hidden, {precision}"))
+        );
+    }
+    for (name, _) in per_row {
+        let times = of(name) / of(&format!("arithmetic of {name}"));
+        println!("{name}: {times:.1} times its arithmetic");
+    }
+    println!(
+        "forward model: {:.1} times its arithmetic",
+        of("forward model") / of("arithmetic of the forward model")
+    );
+}
+
+fn main() {
+    for scale in ArrayScale::PRESETS {
+        print_scale(scale);
+    }
+    print_scale("20x20_10x60".parse().unwrap());
+}

@@ -1,0 +1,89 @@
+//! Growth of an epoch's time and memory with the samples of a whole run, past those that it holds.
+
+use std::{fs, process::Command};
+
+use decoupler_core::evaluation::{Run, SimulatedSettings, Workload};
+use rayon::ThreadPoolBuilder;
+
+use crate::{
+    exponent::exponent,
+    timing::{median, time_ms},
+};
+
+/// Argument that makes this program the measured process.
+const FLAG: &str = "--peak-of-run";
+const SAMPLES: [usize; 5] = [1000, 10_000, 100_000, 300_000, 999_000];
+
+pub(crate) fn print() {
+    println!("\n## A run of 10×10_5×30 with 12 hidden nodes, Levenberg-Marquardt, one thread\n");
+    println!(
+        "Up to 100 000 samples are held; further ones are drawn again whenever they are needed. Memory is the most that"
+    );
+    println!("a process held, less what one holds that trains 100 samples.\n");
+    println!("| samples | an epoch, ms | peak, MB | stated, MB |\n|---:|---:|---:|---:|");
+    let least_mb = peak_mb(100);
+    let mut times = Vec::new();
+    for samples in SAMPLES {
+        let ms = epoch_ms(samples);
+        times.push(ms);
+        let peak = match (peak_mb(samples), least_mb) {
+            (Some(peak), Some(least)) => format!("{:.0}", peak - least),
+            _ => "not measured here".to_owned(),
+        };
+        let stated = Workload::of(&settings(samples)).unwrap().bytes as f64 * 1e-6;
+        println!("| {samples} | {ms:.1} | {peak} | {stated:.0} |");
+    }
+    println!(
+        "\nExponent {:.2} where all are held; beyond, a sample takes {:.1} times as long.",
+        exponent(&SAMPLES[..3], &times[..3]),
+        (times[4] - times[2]) / (SAMPLES[4] - SAMPLES[2]) as f64 / (times[2] / SAMPLES[2] as f64)
+    );
+}
+
+fn settings(samples: usize) -> SimulatedSettings {
+    let mut settings = SimulatedSettings::default();
+    settings.source.samples = samples;
+    settings
+}
+
+/// Does `work` on one thread.
+fn on_one_thread<T: Send>(work: impl FnOnce() -> T + Send) -> T {
+    let pool = ThreadPoolBuilder::new().num_threads(1).build();
+    pool.expect("a thread can be had").install(work)
+}
+
+fn epoch_ms(samples: usize) -> f64 {
+    on_one_thread(|| {
+        let mut run = Run::prepare(settings(samples)).unwrap();
+        let epochs = if samples > 100_000 { 3 } else { 7 };
+        median(&mut Vec::from_iter((0..epochs).map(|_| time_ms(|| run.step()))))
+    })
+}
+
+fn peak_mb(samples: usize) -> Option<f64> {
+    let program = std::env::current_exe().ok()?;
+    let output = Command::new(program).arg(FLAG).arg(samples.to_string()).output().ok()?;
+    let kilobytes: f64 = String::from_utf8(output.stdout).ok()?.trim().parse().ok()?;
+    Some(kilobytes * 1024.0 / 1e6)
+}
+
+/// Returns the number of samples to train if this is the measured process.
+pub(crate) fn asked(arguments: &[String]) -> Option<usize> {
+    match arguments {
+        [flag, samples] if flag == FLAG => samples.parse().ok(),
+        _ => None,
+    }
+}
+
+/// Trains and prints the peak memory in kilobytes, as Linux reports it.
+pub(crate) fn print_peak(samples: usize) {
+    on_one_thread(|| {
+        let mut run = Run::prepare(settings(samples)).unwrap();
+        (0..2).for_each(|_| {
+            run.step();
+        });
+    });
+    let status = fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"));
+    println!("{}", line.unwrap_or_default().trim().trim_end_matches(" kB"));
+}

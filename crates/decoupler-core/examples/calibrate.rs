@@ -1,0 +1,100 @@
+//! Simulates, then calibrates: fits the geometry of Eq. (2) to frames of known presses, trains on the calibrated model and
+//! fine-tunes on the frames: `cargo run --release --example calibrate`.
+#![expect(clippy::print_stdout, reason = "an example's result is what it prints")]
+
+use std::error::Error;
+
+use decoupler_core::{
+    dataset::{Dataset, Division, Seed, Stream},
+    evaluation::{Errors, Preset, Run, SimulatedSettings, fine_tune, pressed_rows, rebased},
+    network::Networks,
+    scene::{Loading, Noise},
+    sensor::{Calibration, SensorModel, SensorParameter, Standing},
+};
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let mut settings = Preset::Best.settings();
+    settings.source.sensor.scale = "10x6_3x18".parse()?;
+    settings.source.scene.loading = Loading::SmoothField {
+        correlation_length_mm: 4.0,
+    };
+    settings.source.scene.noise = Noise::relative(1e-3);
+    settings.source.samples = 4000;
+    settings.training.stopping.epochs = 60;
+    let nominal = settings.source.sensor;
+    // A recording would stand here: 60 frames of a sensor that is not quite as drawn, with the presses known.
+    let mut real = nominal;
+    real.geometry.height_mm *= 1.05;
+    real.geometry.node_pitch_mm *= 0.95;
+    real.geometry.column_node_x0_mm *= 1.05;
+    let recorded = |snapshots: usize, seed: u64| -> Result<Dataset, Box<dyn Error>> {
+        let scene = settings.source.scene;
+        let mut set = Dataset::simulate(&real, &scene, 10 * snapshots, &mut Seed(seed).rng(Stream::Training))?;
+        set.disturb(&real, &scene.noise, &mut Seed(seed).rng(Stream::TrainingNoise))?;
+        Ok(rebased(&set, &real, &nominal)?) // Only displacements are known, not where the nodes really are.
+    };
+    let (frames, test) = (recorded(60, 1)?, recorded(100, 2)?);
+
+    let calibration = Calibration::fit(&nominal, &pressed_rows(&frames, &nominal)?)?;
+    for parameter in &calibration.parameters {
+        println!("{parameter}");
+    }
+    println!("{}", coverage(&nominal, &real, recorded)?);
+    let before = train(settings)?;
+    settings.source.sensor = calibration.model;
+    let calibrated = train(settings)?;
+    let moved = |set: &Dataset| rebased(set, &nominal, &calibration.model);
+    let division = Division {
+        validation_fraction: 0.2,
+        ..Division::default()
+    };
+    let parts = division.divide_for_training(&frames, &mut Seed(0).rng(Stream::Split))?;
+    let tuned = fine_tune(&calibrated, &parts.split(&moved(&frames)?), settings.training, &|| {
+        false
+    })?;
+    let (stroke_mm, after) = (settings.source.stroke_mm(), moved(&test)?);
+    let z_mm = |set: &Dataset, networks: &Networks| Errors::measure(set, &networks.decouple(set), stroke_mm).z_mm;
+    println!("Z error, nominal geometry:  {:.4} mm", z_mm(&test, &before));
+    println!("Z error, calibrated:        {:.4} mm", z_mm(&after, &calibrated));
+    println!(
+        "Z error, fine-tuned:        {:.4} mm",
+        z_mm(&after, &tuned.expect("nothing cancels it"))
+    );
+    Ok(())
+}
+
+/// Counts, over 50 recordings, how often the truth is within the interval of each parameter, and of all together.
+fn coverage(
+    nominal: &SensorModel,
+    real: &SensorModel,
+    recorded: impl Fn(usize, u64) -> Result<Dataset, Box<dyn Error>>,
+) -> Result<String, Box<dyn Error>> {
+    const SEEDS: u64 = 50;
+    let (mut of_each, mut of_all) = ([0; SensorParameter::ALL.len()], 0);
+    for seed in 0..SEEDS {
+        let calibration = Calibration::fit(nominal, &pressed_rows(&recorded(60, seed)?, nominal)?)?;
+        let holds = SensorParameter::ALL.map(|parameter| {
+            let (fitted, truth) = (calibration.parameter(parameter), parameter.of(real));
+            match fitted.standing {
+                Standing::Told(half_width) => (fitted.value - truth).abs() <= half_width,
+                Standing::Held => fitted.value == truth,
+            }
+        });
+        for (count, holds) in of_each.iter_mut().zip(holds) {
+            *count += usize::from(holds);
+        }
+        of_all += usize::from(holds.iter().all(|&holds| holds));
+    }
+    let of_each = SensorParameter::ALL.iter().zip(of_each);
+    let of_each = Vec::from_iter(of_each.map(|(parameter, count)| format!("{parameter} {count}")));
+    Ok(format!(
+        "Within its interval, of {SEEDS} recordings: {}; all together {of_all}",
+        of_each.join(", ")
+    ))
+}
+
+fn train(settings: SimulatedSettings) -> Result<Networks, Box<dyn Error>> {
+    let mut run = Run::prepare(settings)?;
+    while run.step().is_none() {}
+    Ok(run.network())
+}

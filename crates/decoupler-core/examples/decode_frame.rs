@@ -1,0 +1,28 @@
+//! Decodes one frame of readings, all row-wires at one moment, by networks of known rows:
+//! `cargo run --release --example decode_frame`.
+#![expect(clippy::print_stdout, reason = "an example's result is what it prints")]
+
+use std::error::Error;
+
+use decoupler_core::{
+    decoupling::{CompiledNetworks, Decoder, NewtonDecoder, NewtonRules},
+    evaluation::{Preset, Run},
+};
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let mut settings = Preset::Best.settings();
+    settings.source.sensor.scale = "10x6_3x18".parse()?;
+    settings.training.stopping.epochs = 100;
+    let mut run = Run::prepare(settings)?;
+    while run.step().is_none() {}
+    let frames = run.test().frames()?;
+    let mut coordinates_mm = vec![0.0; frames.rows() * run.test().outputs()];
+    let mut network = CompiledNetworks::<f32>::new(&run.network(), frames.rows());
+    network.decode(frames.frame(0), &mut coordinates_mm)?;
+    println!("network: node 1 of row-wire 1 is at z = {:.6} mm", coordinates_mm[2]);
+    let (source, rows) = (settings.source, Vec::from_iter(0..frames.rows()));
+    let mut newton = NewtonDecoder::new(&source.sensor, &source.scene, &rows, NewtonRules::default())?;
+    newton.decode(frames.frame(0), &mut coordinates_mm)?;
+    println!("Newton:  node 1 of row-wire 1 is at z = {:.6} mm", coordinates_mm[2]);
+    Ok(())
+}

@@ -1,0 +1,191 @@
+//! Breaks wires of a simulated array at random, and prints how often the right one is named and what leaving it out is
+//! worth: `cargo run --release --example faults -- [FAULTS [SOUND-FRAMES [ARRAY]]]`; 1000 faults and 100 000 sound frames
+//! take a few minutes.
+#![expect(clippy::print_stdout, reason = "an example's result is what it prints")]
+
+use std::error::Error;
+
+use decoupler_core::{
+    dataset::{Seed, Stream},
+    decoupling::{CompiledNetworks, Decoder},
+    evaluation::{Preset, Run, SimulatedSettings},
+    live::{FaultEvent, FaultMonitor, FaultyWire, LeftOutDecoder, Simulated},
+    rand::{Rng, RngExt},
+    scene::{ConverterEnd, Fault, Indenter, Loading, Noise},
+    sensor::ArrayScale,
+};
+
+const KINDS: [&str; 6] = [
+    "open row",
+    "open column",
+    "short rows",
+    "short columns",
+    "gain",
+    "stuck",
+];
+/// Frames between presses that are decoded, and frames in all with each fault.
+const FRAMES: usize = 20;
+
+/// What became of the faults of one kind.
+#[derive(Default)]
+struct Tally {
+    faults: usize,
+    right: usize,
+    wrong: usize,
+    frames: usize,
+    /// Sums of absolute errors in mm: sound frames, faulty ones by the network, and with the wire left out.
+    errors_mm: [f64; 3],
+    values: usize,
+}
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let argument = |index: usize, default: &str| arguments.get(index).map_or(default, String::as_str).to_owned();
+    let (faults, sound_frames): (usize, usize) = (argument(0, "12").parse()?, argument(1, "500").parse()?);
+    let mut settings = Preset::Best.settings_in(Noise::relative(1e-3));
+    settings.source.sensor.scale = argument(2, "10x10_5x30").parse()?;
+    settings.source.scene.loading = Loading::Indenter(Indenter::default());
+    (settings.source.samples, settings.source.validation_samples) = (5000, 1000);
+    settings.training.stopping.epochs = 50;
+    let mut run = Run::prepare(settings)?;
+    while run.step().is_none() {}
+    let mut network = CompiledNetworks::<f64>::new(&run.network(), settings.source.sensor.scale.rows());
+    let mut tallies: [Tally; 6] = Default::default();
+    let mut rng = Seed(1).rng(Stream::Live);
+    for trial in 0..faults {
+        let kind = trial % KINDS.len();
+        let (fault, wire) = draw(kind, settings.source.sensor.scale, &mut rng);
+        examine(
+            &settings,
+            Seed(trial as u64),
+            fault,
+            wire,
+            &mut network,
+            &mut tallies[kind],
+        )?;
+    }
+    println!("fault           right  wrong  of    frames  error: sound  faulty  left out (mm)");
+    for (name, tally) in KINDS.iter().zip(&tallies) {
+        let Tally {
+            right, wrong, faults, ..
+        } = tally;
+        let frames = tally.frames as f64 / (*right).max(1) as f64;
+        let [sound, faulty, left_out] = tally.errors_mm.map(|sum| sum / tally.values.max(1) as f64);
+        println!(
+            "{name:<14} {right:>6} {wrong:>6} {faults:>4} {frames:>8.1}       {sound:.4}  {faulty:.4}    {left_out:.4}"
+        );
+    }
+    let right: usize = tallies.iter().map(|tally| tally.right).sum();
+    println!("right wire named: {right} of {faults}");
+    let alarms = false_alarms(&settings, sound_frames)?;
+    println!("false alarms: {alarms} in {sound_frames} sound frames");
+    Ok(())
+}
+
+/// Draws a fault of one kind, with the wires that should be named. Errors of a gain are from 1 to 20 %.
+fn draw(kind: usize, scale: ArrayScale, rng: &mut impl Rng) -> (Fault, FaultyWire) {
+    let mut below = |count: usize| rng.random_range(0..count);
+    let (row, column) = (below(scale.rows()), below(scale.columns()));
+    match kind {
+        0 => {
+            let before_node = below(scale.nodes_per_row());
+            (Fault::OpenRow { row, before_node }, FaultyWire::Row(row))
+        }
+        1 => {
+            let before_node = below(scale.nodes_per_column());
+            (Fault::OpenColumn { column, before_node }, FaultyWire::Column(column))
+        }
+        2 => {
+            let row = below(scale.rows() - 1);
+            (Fault::ShortedRows { row }, FaultyWire::Rows(row))
+        }
+        3 => {
+            let column = below(scale.columns() - 1);
+            (Fault::ShortedColumns { column }, FaultyWire::Columns(column))
+        }
+        4 => {
+            let sign = if below(2) == 0 { 1.0 } else { -1.0 };
+            let relative = sign * 0.01 * 20.0_f64.powf(rng.random());
+            (Fault::Gain { column, relative }, FaultyWire::Column(column))
+        }
+        _ => {
+            let end = if below(2) == 0 {
+                ConverterEnd::Low
+            } else {
+                ConverterEnd::High
+            };
+            (Fault::Stuck { column, end }, FaultyWire::Column(column))
+        }
+    }
+}
+
+/// Runs the source with the fault until it is named, and decodes frames without and with the wire left out.
+fn examine(
+    settings: &SimulatedSettings,
+    seed: Seed,
+    fault: Fault,
+    wire: FaultyWire,
+    network: &mut dyn Decoder,
+    tally: &mut Tally,
+) -> Result<(), Box<dyn Error>> {
+    let (sensor, scene) = (&settings.source.sensor, &settings.source.scene);
+    let mut sound = Simulated::new(sensor, scene, seed, 10.0)?;
+    let mut source = Simulated::new(sensor, scene, seed, 10.0)?;
+    source.set_fault(Some(fault))?;
+    let mut monitor = FaultMonitor::new(sensor, scene, source.rows())?;
+    let (mut sound_ohm, mut frame_ohm) = (vec![0.0; source.readings()], vec![0.0; source.readings()]);
+    let mut answer_mm = vec![0.0; source.rows().len() * network.outputs()];
+    let mut left_out: Option<LeftOutDecoder> = None;
+    tally.faults += 1;
+    for frame in 0..FRAMES {
+        sound.next_frame(&mut sound_ohm)?;
+        source.next_frame(&mut frame_ohm)?;
+        if let Some(FaultEvent::Named(found)) = monitor.check(&frame_ohm) {
+            if found.wire == wire {
+                tally.right += 1;
+                tally.frames += frame + 1;
+            } else {
+                tally.wrong += 1;
+                println!("{fault}: {found}");
+            }
+            let mut decoder = LeftOutDecoder::new(sensor, scene, source.rows())?;
+            decoder.leave_out(Some(found));
+            left_out = Some(decoder);
+        }
+        let Some(left_out) = &mut left_out else { continue };
+        let mut error_mm = |decoder: &mut dyn Decoder, frame_ohm: &[f64]| -> Result<f64, Box<dyn Error>> {
+            decoder.decode(frame_ohm, &mut answer_mm)?;
+            let rows = answer_mm.chunks_exact(decoder.outputs()).enumerate();
+            let errors = rows.flat_map(|(row, answer_mm)| {
+                let truth = source.deformation().row_positions_mm(sensor, row);
+                answer_mm
+                    .chunks_exact(3)
+                    .zip(truth)
+                    .map(|(node, truth)| (node[2] - truth.z).abs())
+            });
+            Ok(errors.sum())
+        };
+        tally.errors_mm[0] += error_mm(network, &sound_ohm)?;
+        tally.errors_mm[1] += error_mm(network, &frame_ohm)?;
+        tally.errors_mm[2] += error_mm(left_out, &frame_ohm)?;
+        tally.values += source.rows().len() * sensor.scale.nodes_per_row();
+    }
+    if left_out.is_none() {
+        println!("{fault}: not named");
+    }
+    Ok(())
+}
+
+/// Events of the monitor in frames without a fault.
+fn false_alarms(settings: &SimulatedSettings, frames: usize) -> Result<usize, Box<dyn Error>> {
+    let (sensor, scene) = (&settings.source.sensor, &settings.source.scene);
+    let mut source = Simulated::new(sensor, scene, Seed(12345), 100.0)?;
+    let mut monitor = FaultMonitor::new(sensor, scene, source.rows())?;
+    let mut frame_ohm = vec![0.0; source.readings()];
+    let mut alarms = 0;
+    for _ in 0..frames {
+        source.next_frame(&mut frame_ohm)?;
+        alarms += usize::from(monitor.check(&frame_ohm).is_some());
+    }
+    Ok(alarms)
+}

@@ -1,0 +1,23 @@
+//! Trains a network for a simulated array and prints what it is worth: `cargo run --release --example train`.
+#![expect(clippy::print_stdout, reason = "an example's result is what it prints")]
+
+use decoupler_core::evaluation::{ErrorTable, Run, RunError, SimulatedSettings};
+
+fn main() -> Result<(), RunError> {
+    let mut settings = SimulatedSettings::default();
+    settings.source.sensor.scale = "10x6_3x18".parse().expect("an array scale of the paper");
+    settings.training.stopping.epochs = 100;
+    let mut run = Run::prepare(settings)?;
+    let reason = loop {
+        if let Some(reason) = run.step() {
+            break reason;
+        }
+    };
+    let scores = run.scores().expect("the baselines are measured");
+    let table = ErrorTable::of_scores(run.problem(), &scores, settings.published().as_ref());
+    println!("{} epochs: {reason}", run.leader().latest().epoch);
+    for row in table.blocks.iter().flat_map(|block| &block.rows) {
+        println!("{:<14} Z {:.3} %", row.name, row.errors[0].unwrap_or(f64::NAN));
+    }
+    Ok(())
+}

@@ -1,0 +1,27 @@
+//! Samples for training and testing. A sample is one row-wire at one moment: its readings, its targets, its row-wire
+//! and the snapshot it belongs to.
+//!
+//! Simulated samples are drawn as whole snapshots, with resistances as readings and the absolute coordinates of the
+//! row's nodes as targets; measured samples are built from their parts by [`Dataset::new`]. [`hold_out`], [`Division`]
+//! and [`Folds`] divide a set, and [`Frames`] groups it into whole frames.
+
+mod division;
+mod faults;
+mod folds;
+mod frames;
+mod per_row;
+mod samples;
+mod seed;
+mod simulation;
+mod split;
+mod split_by;
+
+pub use division::{Division, DivisionError, Parts};
+pub use folds::{FoldUnit, Folds, FoldsError};
+pub use frames::{Frames, FramesError};
+pub use per_row::PerRow;
+pub use samples::{Dataset, DatasetError, LARGEST_SAMPLES};
+pub use seed::{Seed, Stream};
+pub use simulation::SimulationError;
+pub use split::{Split, hold_out};
+pub use split_by::{SplitBy, SplitByError};

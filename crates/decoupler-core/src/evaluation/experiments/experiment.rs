@@ -1,0 +1,421 @@
+use serde::{Deserialize, Serialize};
+use thiserror::Error;
+
+use super::{Axis, AxisKind};
+use crate::{
+    dataset::{Division, DivisionError, FoldUnit, FoldsError, Seed, SplitBy},
+    evaluation::{CountError, CrossValidation, PublishedErrors, RunSettings, SimulatedSettings, Source},
+    scene::SceneError,
+    sensor::ArrayScale,
+    training::{SettingError, StoppingRules},
+};
+
+/// A grid of cells over one or two axes, each cell run with several seeds.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Experiment {
+    /// Settings shared by all cells; their seed is the first of [`Self::seeds`].
+    pub base: RunSettings,
+    /// Recording that is divided; `None` for a simulated array.
+    pub recording: Option<ExperimentRecording>,
+    /// First varied setting.
+    pub axis: Axis,
+    /// Second varied setting, if there is one.
+    pub second_axis: Option<Axis>,
+    /// Number of consecutive seeds for each cell; 1 if the seed is an axis.
+    pub seeds: usize,
+    /// Cross-validation to test by, instead of a separate test set.
+    pub cross_validation: Option<CrossValidation>,
+}
+
+/// Recording of an experiment.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ExperimentRecording {
+    /// Name in titles.
+    pub name: String,
+    /// `true` if a column assigns its samples to groups.
+    pub has_groups: bool,
+    /// `true` if the test samples have files of their own.
+    pub has_test_files: bool,
+    /// Division of its samples, where no axis varies it.
+    pub division: Division,
+}
+
+/// A cell of the grid.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Cell {
+    /// Index of its value on the first axis.
+    pub column: usize,
+    /// Index of its value on the second axis; 0 if there is none.
+    pub row: usize,
+    /// Settings of the cell, with the first seed.
+    pub settings: RunSettings,
+    /// Division of the recording, if the samples are recorded.
+    pub division: Option<Division>,
+    /// Errors that the paper reports for the cell, if there are any.
+    pub published: Option<PublishedErrors>,
+}
+
+/// Error in setting up an experiment.
+#[derive(Clone, Debug, PartialEq, Error)]
+#[non_exhaustive]
+pub enum ExperimentError {
+    /// An axis has no values.
+    #[error("there are no values for {0}: give at least one")]
+    Empty(&'static str),
+    /// Both axes vary the same setting.
+    #[error("both axes vary {0}: choose two different ones")]
+    SameAxes(&'static str),
+    /// A number is out of range.
+    #[error(transparent)]
+    Count(#[from] CountError),
+    /// A setting of the method is out of range.
+    #[error(transparent)]
+    Setting(#[from] SettingError),
+    /// The array has no such row-wire.
+    #[error(transparent)]
+    Scene(#[from] SceneError),
+    /// The folds cannot be filled.
+    #[error(transparent)]
+    Folds(#[from] FoldsError),
+    /// Runs on such a source have no such setting.
+    #[error("{of} have no setting '{axis}': vary another one")]
+    NoSetting {
+        /// Name of the setting.
+        axis: &'static str,
+        /// Source of the samples.
+        of: &'static str,
+    },
+    /// The settings are those of another source than the samples.
+    #[error("settings and samples are not of one source: one is simulated and one recorded")]
+    OtherSamples,
+    /// A recording cannot be divided so.
+    #[error(transparent)]
+    Division(#[from] DivisionError),
+    /// A recording without groups is divided by group.
+    #[error("split group: the recording has no column of groups; choose one, or leave this split out")]
+    NoGroups,
+    /// A recording is cross-validated.
+    #[error("a recording is divided for each seed: give seeds instead of a cross-validation")]
+    CrossValidation,
+    /// There are too many trainings.
+    #[error("{0} trainings: give fewer values, seeds or repeats, so that there are at most {MOST_TRAININGS}")]
+    TooMany(usize),
+    /// The operating system provides no threads.
+    #[error("cannot start worker threads: {0}")]
+    Threads(String),
+}
+
+/// Largest number of trainings in one experiment.
+const MOST_TRAININGS: usize = 1_000_000;
+
+/// Largest number of seeds or repeats.
+const MOST_TRIALS: usize = 1000;
+
+impl Experiment {
+    /// Returns the cells, row by row; at least one if [`Self::check`] succeeds.
+    pub fn cells(&self) -> Vec<Cell> {
+        let rows = self.second_axis.as_ref().map_or(1, Axis::len);
+        let places = (0..rows).flat_map(|row| (0..self.axis.len()).map(move |column| (row, column)));
+        places.map(|(row, column)| self.cell(row, column)).collect()
+    }
+
+    fn cell(&self, row: usize, column: usize) -> Cell {
+        let mut cell = Cell {
+            column,
+            row,
+            settings: self.base,
+            division: self.recording.as_ref().map(|recording| recording.division),
+            published: None,
+        };
+        self.axis.apply(column, &mut cell);
+        if let Some(axis) = &self.second_axis {
+            axis.apply(row, &mut cell);
+        }
+        cell.published = self.published(&cell.settings);
+        cell
+    }
+
+    fn published(&self, settings: &RunSettings) -> Option<PublishedErrors> {
+        let settings = settings.simulated().filter(SimulatedSettings::is_papers_scene)?;
+        let published = match self.cross_validation {
+            None => PublishedErrors::of,
+            Some(_) => PublishedErrors::of_cross_validation,
+        };
+        published(settings.source.sensor.scale, settings.hidden, settings.source.samples)
+    }
+
+    /// Returns the axes, one or two.
+    pub fn axes(&self) -> impl Iterator<Item = &Axis> {
+        std::iter::once(&self.axis).chain(&self.second_axis)
+    }
+
+    /// Returns the seeds of the cell with these settings.
+    pub fn seeds_of(&self, settings: &RunSettings) -> impl Iterator<Item = Seed> + use<> {
+        let seeds = if self.axes().any(|axis| matches!(axis, Axis::Seed(_))) {
+            1
+        } else {
+            self.seeds
+        };
+        let first = settings.seed.0;
+        (0..seeds as u64).map(move |offset| Seed(first.wrapping_add(offset)))
+    }
+
+    /// Number of trials per seed.
+    pub(super) fn repeats(&self) -> usize {
+        self.cross_validation
+            .map_or(1, |cross_validation| cross_validation.repeats)
+    }
+
+    /// Number of networks trained per trial, each with as many starts as the settings say.
+    pub(super) fn folds(&self) -> usize {
+        self.cross_validation
+            .map_or(1, |cross_validation| cross_validation.folds)
+    }
+
+    /// Checks everything that can be known before samples are drawn.
+    ///
+    /// # Errors
+    /// The first problem found.
+    pub fn check(&self) -> Result<(), ExperimentError> {
+        if let Some(empty) = self.axes().find(|axis| axis.is_empty()) {
+            return Err(ExperimentError::Empty(empty.name()));
+        }
+        if self
+            .second_axis
+            .as_ref()
+            .is_some_and(|second| second.kind() == self.axis.kind())
+        {
+            return Err(ExperimentError::SameAxes(self.axis.name()));
+        }
+        for (what, count) in [("seeds", self.seeds), ("repeats", self.repeats())] {
+            let allowed = 1..=MOST_TRIALS;
+            if !allowed.contains(&count) {
+                return Err(CountError { what, count, allowed }.into());
+            }
+        }
+        let cells = self
+            .axes()
+            .fold(1, |cells: usize, axis| cells.saturating_mul(axis.len()));
+        let factors = [self.seeds, self.repeats(), self.folds(), self.base.starts];
+        let trainings = factors.into_iter().fold(cells, usize::saturating_mul);
+        if trainings > MOST_TRAININGS {
+            return Err(ExperimentError::TooMany(trainings));
+        }
+        self.check_source()?;
+        self.cells().iter().try_for_each(|cell| self.check_cell(cell))
+    }
+
+    /// Checks that source and axes belong together.
+    fn check_source(&self) -> Result<(), ExperimentError> {
+        let of = match (self.base.source, &self.recording) {
+            (Source::Simulated(_), None) => "simulated arrays",
+            (Source::Measured(_), Some(_)) => "recordings",
+            _ => return Err(ExperimentError::OtherSamples),
+        };
+        for axis in self.axes() {
+            if !AxisKind::of_source(&self.base.source).any(|kind| kind == axis.kind()) {
+                return Err(ExperimentError::NoSetting { axis: axis.name(), of });
+            }
+        }
+        Ok(())
+    }
+
+    fn check_cell(&self, cell: &Cell) -> Result<(), ExperimentError> {
+        cell.settings.training.check()?;
+        let Some(settings) = cell.settings.simulated() else {
+            return self.check_recorded_cell(cell);
+        };
+        settings.check_counts()?;
+        settings.source.scene.check()?;
+        let Some(CrossValidation { folds, unit, .. }) = self.cross_validation else {
+            return Ok(());
+        };
+        let rows = settings.source.model_size()?.rows;
+        let snapshots = settings.source.samples.div_ceil(rows);
+        let units = match unit {
+            FoldUnit::Sample => snapshots * rows,
+            FoldUnit::Snapshot => snapshots,
+        };
+        if (2..=units).contains(&folds) {
+            Ok(())
+        } else {
+            let unit = unit.name();
+            Err(FoldsError { folds, units, unit }.into())
+        }
+    }
+
+    fn check_recorded_cell(&self, cell: &Cell) -> Result<(), ExperimentError> {
+        cell.settings.check_network()?;
+        if self.cross_validation.is_some() {
+            return Err(ExperimentError::CrossValidation);
+        }
+        if let Some((recording, division)) = self.recording.as_ref().zip(cell.division) {
+            division.check()?;
+            if division.by == SplitBy::Group && !recording.has_groups {
+                return Err(ExperimentError::NoGroups);
+            }
+        }
+        Ok(())
+    }
+}
+
+/// A table of the paper.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum PaperTable {
+    /// Table 1: different numbers of hidden nodes.
+    HiddenNodes,
+    /// Table 2 and Fig. 5: 10-fold cross-validation of a large and a small dataset.
+    CrossValidation,
+    /// Table 3: different array scales.
+    ArrayScales,
+}
+
+impl PaperTable {
+    /// All tables, in the paper's order.
+    pub const ALL: [Self; 3] = [Self::HiddenNodes, Self::CrossValidation, Self::ArrayScales];
+
+    /// Number of the table in the paper.
+    pub fn number(self) -> u8 {
+        match self {
+            Self::HiddenNodes => 1,
+            Self::CrossValidation => 2,
+            Self::ArrayScales => 3,
+        }
+    }
+
+    /// Returns the title of the table.
+    pub fn title(self) -> &'static str {
+        match self {
+            Self::HiddenNodes => "Errors with different numbers of hidden nodes",
+            Self::CrossValidation => "Errors by cross-validation of a large and a small dataset",
+            Self::ArrayScales => "Errors with different array scales",
+        }
+    }
+
+    /// Returns the number and title of the table.
+    pub fn heading(self) -> String {
+        format!("Table {}: {}", self.number(), self.title())
+    }
+
+    /// Returns the experiment that reproduces the table. The paper does not say how long it trained: epochs and
+    /// starts are chosen to reproduce all tables in about a minute on two cores. All epochs are run; the validation
+    /// set only selects the weights.
+    pub fn experiment(self) -> Experiment {
+        let with = |axis, epochs, starts, cross_validation| {
+            let mut base = SimulatedSettings::default();
+            base.training.stopping.epochs = epochs;
+            base.training.stopping.max_fail = StoppingRules::MOST_EPOCHS;
+            base.starts = starts;
+            Experiment {
+                base: base.into(),
+                recording: None,
+                axis,
+                second_axis: None,
+                seeds: 5,
+                cross_validation,
+            }
+        };
+        match self {
+            Self::HiddenNodes => with(Axis::Hidden(vec![6, 8, 10, 12, 14, 16]), 300, 3, None),
+            Self::CrossValidation => {
+                let sizes = Axis::Samples(vec![1000, 100]);
+                with(sizes, 80, 1, Some(CrossValidation::default()))
+            }
+            Self::ArrayScales => with(Axis::Array(ArrayScale::PRESETS.to_vec()), 300, 3, None),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::training::Method;
+
+    #[test]
+    fn the_papers_tables_meet_all_published_figures() {
+        let mut published = 0;
+        for table in PaperTable::ALL {
+            let experiment = table.experiment();
+            experiment.check().unwrap();
+            for cell in experiment.cells() {
+                published += usize::from(cell.published.is_some());
+                assert_eq!(
+                    cell.published.unwrap().table == 2,
+                    table == PaperTable::CrossValidation,
+                    "{cell:?}"
+                );
+            }
+        }
+        assert_eq!(published, 11);
+    }
+
+    #[test]
+    fn cells_are_the_product_of_the_axes() {
+        let experiment = Experiment {
+            second_axis: Some(Axis::Method(Method::all()[..2].to_vec())),
+            ..PaperTable::ArrayScales.experiment()
+        };
+        let cells = experiment.cells();
+        assert_eq!(cells.len(), 6);
+        for (index, cell) in cells.iter().enumerate() {
+            assert_eq!((cell.row, cell.column), (index / 3, index % 3));
+            let simulation = cell.settings.simulated().unwrap().source;
+            assert_eq!(simulation.sensor.scale, ArrayScale::PRESETS[cell.column]);
+            assert_eq!(cell.settings.training.method, Method::all()[cell.row]);
+        }
+    }
+
+    #[test]
+    fn what_cannot_be_run_is_named_before_anything_is() {
+        let table = |change: fn(&mut Experiment)| {
+            let mut experiment = PaperTable::CrossValidation.experiment();
+            change(&mut experiment);
+            experiment.check().unwrap_err().to_string()
+        };
+        let cases = [
+            (table(|e| e.axis = Axis::Hidden(vec![])), "no values for hidden nodes"),
+            (table(|e| e.axis = Axis::Hidden(vec![6, 0])), "hidden nodes: 0"),
+            (
+                table(|e| e.second_axis = Some(Axis::Samples(vec![10]))),
+                "both axes vary samples",
+            ),
+            (table(|e| e.seeds = 0), "seeds: 0"),
+            (table(|e| e.base.starts = 0), "starts: 0"),
+            (table(|e| e.base.training.stopping.epochs = 0), "epochs"),
+            (
+                table(|e| {
+                    e.cross_validation = Some(CrossValidation {
+                        folds: 11,
+                        unit: FoldUnit::Snapshot,
+                        repeats: 1,
+                    });
+                }),
+                "11 folds of 10 snapshots",
+            ),
+            (
+                table(|e| {
+                    e.axis = Axis::Hidden((1..=500).collect());
+                    e.seeds = 1000;
+                }),
+                "50000000 trainings",
+            ),
+        ];
+        for (message, expected) in cases {
+            assert!(message.contains(expected), "{message}");
+        }
+    }
+
+    #[test]
+    fn a_seed_axis_takes_the_place_of_the_seeds() {
+        let experiment = Experiment {
+            axis: Axis::Seed(vec![Seed(4), Seed(9)]),
+            ..PaperTable::HiddenNodes.experiment()
+        };
+        for (cell, seed) in experiment.cells().iter().zip([4, 9]) {
+            assert_eq!(experiment.seeds_of(&cell.settings).collect::<Vec<_>>(), [Seed(seed)]);
+        }
+    }
+}

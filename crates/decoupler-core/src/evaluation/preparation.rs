@@ -1,0 +1,295 @@
+use std::time::Instant;
+
+use rayon::prelude::*;
+
+use super::{
+    Baselines, Errors, NoReference, Run, RunError, RunSets, RunSettings, SimulatedSettings, StartTrainer, TestErrors,
+    baselines::fit_baselines,
+    reference_errors,
+    sets::check_sets,
+    task::{Task, tasks},
+};
+use crate::{
+    dataset::{Dataset, Split, Stream},
+    decoupling::decode_set,
+    network::nguyen_widrow,
+    training::{ResumeError, Trainer, TrainerState, check_width},
+};
+
+impl Run {
+    /// Draws and scales the sets, initialises the networks and measures the baselines.
+    ///
+    /// # Errors
+    /// If the settings are invalid.
+    pub fn prepare(settings: SimulatedSettings) -> Result<Self, RunError> {
+        whole(Self::prepare_unless(settings, &|| false))
+    }
+
+    /// As [`Self::prepare`]; returns `None` once `is_cancelled`, which is called between the parts of the work.
+    pub fn prepare_unless(
+        settings: SimulatedSettings,
+        is_cancelled: &dyn Fn() -> bool,
+    ) -> Result<Option<Self>, RunError> {
+        match settings.checked_sets_unless(is_cancelled)? {
+            Some(sets) => Self::on_unless(settings.into(), sets, is_cancelled),
+            None => Ok(None),
+        }
+    }
+
+    /// Prepares a run on existing sets, recorded or from a cross-validation; see [`Self::prepare`].
+    ///
+    /// # Errors
+    /// If the settings are invalid, or the sets do not belong together.
+    pub fn on_sets(settings: RunSettings, split: Split, test: Dataset) -> Result<Self, RunError> {
+        whole(Self::on_unless(settings, RunSets::new(split, test), &|| false))
+    }
+
+    /// As [`Self::on_sets`]; returns `None` once `is_cancelled`, which is called between the parts of the work.
+    pub fn on_unless(
+        settings: RunSettings,
+        sets: RunSets,
+        is_cancelled: &dyn Fn() -> bool,
+    ) -> Result<Option<Self>, RunError> {
+        Self::with_baselines(settings, sets, is_cancelled, |tasks| begin(settings, tasks))
+    }
+
+    /// Resumes a run of these settings from the states of all its trainings.
+    ///
+    /// # Errors
+    /// If the settings are invalid, or the states are damaged or from another run.
+    pub fn resume(settings: SimulatedSettings, states: Vec<TrainerState>) -> Result<Self, RunError> {
+        settings.check_states(&states)?;
+        let sets = settings.sets_unless(&|| false)?.expect("nothing cancels it");
+        whole(Self::resume_unless(settings.into(), states, sets, &|| false))
+    }
+
+    /// Resumes a run on the sets it was started on; see [`Self::resume`].
+    ///
+    /// # Errors
+    /// As [`Self::on_sets`], or if the states are damaged or do not match these settings and sets.
+    pub fn resume_on_sets(
+        settings: RunSettings,
+        states: Vec<TrainerState>,
+        split: Split,
+        test: Dataset,
+    ) -> Result<Self, RunError> {
+        whole(Self::resume_unless(
+            settings,
+            states,
+            RunSets::new(split, test),
+            &|| false,
+        ))
+    }
+
+    /// As [`Self::resume_on_sets`]; returns `None` once `is_cancelled`, which is called between the parts of the work.
+    pub fn resume_unless(
+        settings: RunSettings,
+        states: Vec<TrainerState>,
+        sets: RunSets,
+        is_cancelled: &dyn Fn() -> bool,
+    ) -> Result<Option<Self>, RunError> {
+        let resumed = Self::with_baselines(settings, sets, is_cancelled, |tasks| take_up(settings, states, tasks))?;
+        Ok(resumed.map(|mut run| {
+            // Trainings side by side do not know how long they took together.
+            run.wall_time = match &run.starts[..] {
+                [only] if only.rows().len() == 1 => Some(only.elapsed()),
+                _ => None,
+            };
+            run
+        }))
+    }
+
+    /// Prepares a run whose trainings are those of `begin`; `None` once `is_cancelled`.
+    fn with_baselines(
+        settings: RunSettings,
+        sets: RunSets,
+        is_cancelled: &dyn Fn() -> bool,
+        begin: impl FnOnce(&[Task]) -> Result<Vec<StartTrainer>, RunError>,
+    ) -> Result<Option<Self>, RunError> {
+        settings.check_network()?;
+        check_sets(&settings, &sets.split, &sets.test)?;
+        let test = &sets.test;
+        let (mut mean, mut linear) = fit_baselines(&sets.split.training, &settings)?;
+        if is_cancelled() {
+            return Ok(None);
+        }
+        let errors = |answers| TestErrors::measure(&settings.source, test, &answers);
+        let (mean, linear) = (
+            errors(decode_set(&mut mean, test)?),
+            errors(decode_set(&mut linear, test)?),
+        );
+        let reference = match settings.simulated() {
+            Some(simulated) => Some(reference(&simulated, test)?),
+            None => None,
+        };
+        let (reference, no_reference) = match reference {
+            Some(Ok(errors)) => (Some(TestErrors::Nodes(errors)), None),
+            Some(Err(reason)) => (None, Some(reason)),
+            None => (None, None),
+        };
+        let baselines = Baselines {
+            mean,
+            linear,
+            reference,
+            no_reference,
+        };
+        if is_cancelled() {
+            return Ok(None);
+        }
+        let run = Self::of_networks(settings, sets, is_cancelled, begin)?;
+        Ok(run.map(|run| Self {
+            baselines: Some(baselines),
+            ..run
+        }))
+    }
+
+    /// Prepares a run whose networks are all that is asked of it: without baselines and reference, such as that of a fold.
+    pub(super) fn of_networks_on_sets(settings: RunSettings, split: Split, test: Dataset) -> Result<Self, RunError> {
+        settings.check_network()?;
+        check_sets(&settings, &split, &test)?;
+        let sets = RunSets::new(split, test);
+        whole(Self::of_networks(settings, sets, &|| false, |tasks| {
+            begin(settings, tasks)
+        }))
+    }
+
+    /// As [`Self::with_baselines`], without baselines and reference, on settings and sets that were checked.
+    fn of_networks(
+        settings: RunSettings,
+        RunSets {
+            split,
+            further,
+            test,
+            problem,
+        }: RunSets,
+        is_cancelled: &dyn Fn() -> bool,
+        begin: impl FnOnce(&[Task]) -> Result<Vec<StartTrainer>, RunError>,
+    ) -> Result<Option<Self>, RunError> {
+        let tasks = tasks(&settings, &split, further.as_ref(), &test)?;
+        // The tasks hold the samples scaled; large sets need not be held twice.
+        drop(split);
+        let first = tasks.at(0);
+        let samples = first.problem.training.samples();
+        let trainings = settings.starts * tasks.values().len();
+        check_width(&settings.training.method, first.shape, samples, trainings)?;
+        if is_cancelled() {
+            return Ok(None);
+        }
+        let begun = Instant::now();
+        let starts = begin(tasks.values())?;
+        let wall_time = Some(begun.elapsed());
+        Ok(Some(Self {
+            wall_time,
+            settings,
+            test,
+            problem,
+            scalings: tasks.map(|task| task.scaling.clone()),
+            starts,
+            baselines: None,
+        }))
+    }
+}
+
+/// The run of a preparation that nothing cancels.
+fn whole(prepared: Result<Option<Run>, RunError>) -> Result<Run, RunError> {
+    Ok(prepared?.expect("nothing cancels it"))
+}
+
+/// Trainings from random initialisations.
+fn begin(settings: RunSettings, tasks: &[Task]) -> Result<Vec<StartTrainer>, RunError> {
+    let starts = (0..settings.starts).into_par_iter().map(|number| {
+        let mut rng = settings.seed.start_rng(number);
+        let begun: Vec<_> = tasks
+            .iter()
+            .map(|task| (task, nguyen_widrow(task.shape, &mut rng)))
+            .collect();
+        let rows = begun
+            .into_par_iter()
+            .map(|(task, start)| Trainer::new(start, task.problem.clone(), settings.training));
+        Ok(StartTrainer::new(rows.collect::<Result<_, _>>()?))
+    });
+    starts.collect()
+}
+
+/// Trainings as they stood.
+fn take_up(settings: RunSettings, states: Vec<TrainerState>, tasks: &[Task]) -> Result<Vec<StartTrainer>, RunError> {
+    let networks = tasks.len();
+    check_states(&states, settings.starts * networks)?;
+    let trainers = states.into_par_iter().enumerate().map(|(number, state)| {
+        let (start, task) = (number / networks, &tasks[number % networks]);
+        let refused = |source| RunError::Resume { start, source };
+        let trainer = Trainer::resume(state, task.problem.clone()).map_err(refused)?;
+        if trainer.present().shape() != task.shape {
+            return Err(refused(ResumeError::Damaged("it has another number of hidden nodes")));
+        }
+        Ok(trainer)
+    });
+    let mut trainers = trainers.collect::<Result<Vec<_>, RunError>>()?.into_iter();
+    let starts = (0..settings.starts).map(|_| StartTrainer::new(trainers.by_ref().take(networks).collect()));
+    Ok(starts.collect())
+}
+
+impl SimulatedSettings {
+    /// Checks these settings and the number of saved trainings, before samples are drawn for them.
+    pub fn check_states(&self, states: &[TrainerState]) -> Result<(), RunError> {
+        self.check_counts()?;
+        check_states(states, self.starts * self.source.model_size()?.networks)
+    }
+}
+
+/// Checks the number of saved trainings.
+fn check_states(states: &[TrainerState], expected: usize) -> Result<(), RunError> {
+    let found = states.len();
+    if found == expected {
+        Ok(())
+    } else {
+        Err(RunError::Starts { found, expected })
+    }
+}
+
+/// The errors of the Bayesian reference on `test`, or the reason for which there are none.
+pub(super) fn reference(settings: &SimulatedSettings, test: &Dataset) -> Result<Result<Errors, NoReference>, RunError> {
+    let SimulatedSettings { source, seed, .. } = settings;
+    let mut rng = seed.rng(Stream::Expectation);
+    Ok(reference_errors(&source.sensor, &source.scene, test, &mut rng)?)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::cell::Cell;
+
+    use super::*;
+
+    /// A run of few samples, cancelled at this look at the token; and how often the token was looked at.
+    fn cancelled_at(look: usize, prepare: &dyn Fn(&dyn Fn() -> bool) -> Option<Run>) -> (Option<Run>, usize) {
+        let looks = Cell::new(0);
+        let run = prepare(&|| {
+            looks.set(looks.get() + 1);
+            looks.get() > look
+        });
+        (run, looks.get())
+    }
+
+    #[test]
+    fn a_preparation_ends_at_the_next_part_once_it_is_cancelled() {
+        let mut settings = SimulatedSettings::default();
+        settings.source.sensor.scale = "4x4_2x12".parse().unwrap();
+        (settings.hidden, settings.source.samples, settings.source.test_samples) = (3, 40, 8);
+        let whole = Run::prepare(settings).unwrap();
+        let (states, answers_mm) = (whole.states(), whole.decouple_test());
+        let begun = |is_cancelled: &dyn Fn() -> bool| Run::prepare_unless(settings, is_cancelled).unwrap();
+        let resumed = |is_cancelled: &dyn Fn() -> bool| {
+            let sets = settings.sets_unless(is_cancelled).unwrap()?;
+            Run::resume_unless(settings.into(), states.clone(), sets, is_cancelled).unwrap()
+        };
+        for prepare in [&begun as &dyn Fn(&dyn Fn() -> bool) -> Option<Run>, &resumed] {
+            let (run, parts) = cancelled_at(usize::MAX, prepare);
+            assert_eq!(run.map(|run| run.decouple_test()).as_ref(), Some(&answers_mm));
+            assert!(parts >= 4, "looked at only {parts} times");
+            for part in 0..parts {
+                let (run, looks) = cancelled_at(part, prepare);
+                assert!(run.is_none() && looks == part + 1, "part {part}: {looks} looks");
+            }
+        }
+    }
+}

@@ -1,0 +1,111 @@
+//! Numerics of Decoupler: decoupling of flexible tactile sensor arrays.
+//!
+//! A tactile skin of conductive rubber is read through crossed row-wires and column-wires. Every reading is the
+//! parallel connection of many electrode nodes; *decoupling* recovers the deformation of each node from the
+//! row-column resistances. The modules tell that story in order, and each uses only the ones before it:
+//!
+//! | module | contents |
+//! |---|---|
+//! | [`text`] | numbers, names and CSV as text |
+//! | [`sensor`] | array scale, geometry, the resistance model and its Jacobian, identifiability |
+//! | [`scene`] | what happens to the sensor: rows, movement, loading, noise |
+//! | [`dataset`] | samples with their row-wire and snapshot, simulated or recorded; frames, folds, splits |
+//! | [`network`] | the three-layer network, its initialisation and scaling |
+//! | [`training`] | methods, the stepped [`training::Trainer`], stop reasons |
+//! | [`decoupling`] | readings to deformation by every decoder, behind one trait |
+//! | [`evaluation`] | errors, a whole run from settings to report, cross-validation, experiments |
+//! | [`surface`] | smooth surfaces through the nodes |
+//! | [`live`] | frames as they arrive: sources, re-zero, recorder, faults named from the residual |
+//!
+//! The crate reads and writes no files and opens no window: `decoupler-files` has recordings, figures and exports, and the
+//! program `decoupler` the window and the commands.
+//!
+//! # A tour
+//!
+//! A **sensor** is an array scale M1×M2_M3×M4 with a geometry. Eq. (2) of the paper gives its resistances:
+//!
+//! ```
+//! use decoupler_core::{glam::DVec3, sensor::SensorModel};
+//!
+//! let sensor = SensorModel::new("10x6_3x18".parse()?);
+//! let at_rest = vec![DVec3::ZERO; sensor.scale.nodes_per_row()];
+//! let mut pressed = at_rest.clone();
+//! pressed[2].z = 0.5; // The third node of a row-wire, half a millimetre down.
+//! let row_wire = 0;
+//! let before_ohm = sensor.row_resistances(row_wire, &at_rest)?;
+//! let after_ohm = sensor.row_resistances(row_wire, &pressed)?;
+//! assert_eq!(before_ohm.len(), 18); // One for each column-wire,
+//! assert!(before_ohm.iter().zip(&after_ohm).all(|(before, after)| after < before)); // all lower.
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! A **dataset** holds samples that know their row-wire and the snapshot they belong to: drawn in a scene, or built from
+//! measured parts by [`dataset::Dataset::new`].
+//!
+//! ```
+//! use decoupler_core::{dataset::{Dataset, Seed, Stream}, scene::{Noise, Scene}, sensor::SensorModel};
+//!
+//! let sensor = SensorModel::new("10x6_3x18".parse()?);
+//! let scene = Scene { noise: Noise::relative(1e-3), ..Scene::default() };
+//! let mut set = Dataset::simulate(&sensor, &scene, 200, &mut Seed(0).rng(Stream::Training))?;
+//! set.disturb(&sensor, &scene.noise, &mut Seed(0).rng(Stream::TrainingNoise))?;
+//! assert_eq!(set.readings().dim(), (200, 18)); // Ohms: samples × column-wires.
+//! assert_eq!(set.targets().dim(), (200, 18)); // Millimetres: samples × (x, y, z of 6 nodes).
+//! assert_eq!((set.row_wire(13), set.groups()[13]), (Some(3), 1));
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! A **training** is a value that is stepped one epoch at a time; pausing only means not calling `step`.
+//!
+//! ```
+//! use decoupler_core::evaluation::{Run, SimulatedSettings};
+//!
+//! let mut settings = SimulatedSettings::default(); // The paper's main experiment,
+//! settings.source.sensor.scale = "10x6_3x18".parse()?; // on its smallest array,
+//! settings.training.stopping.epochs = 20; // cut short.
+//! let mut run = Run::prepare(settings)?;
+//! while run.step().is_none() {}
+//! let scores = run.scores().expect("the baselines are measured");
+//! assert!(scores.network.percent() < scores.baselines.mean.percent());
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! Every way to **decode** is a [`decoupling::Decoder`] of single rows and of whole frames. Newton's method solves
+//! Eq. (2) itself:
+//!
+//! ```
+//! use decoupler_core::{
+//!     decoupling::{Decoder, NewtonDecoder, NewtonRules},
+//!     evaluation::Preset,
+//! };
+//!
+//! let mut settings = Preset::Best.settings(); // Known rows.
+//! settings.source.sensor.scale = "10x6_3x18".parse()?;
+//! let (test, source) = (settings.draw_test()?, settings.source);
+//! let frames = test.frames()?;
+//! let rows = Vec::from_iter(0..frames.rows());
+//! let mut newton = NewtonDecoder::new(&source.sensor, &source.scene, &rows, NewtonRules::default())?;
+//! let mut coordinates_mm = vec![0.0; frames.rows() * newton.outputs()];
+//! newton.decode(frames.frame(0), &mut coordinates_mm)?;
+//! assert!((coordinates_mm[2] - test.targets()[[0, 2]]).abs() < 1e-9);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! The programs in `examples/` go on from here: training with an error table, decoding frames, and measured pairs of
+//! readings and targets without any geometry.
+
+pub mod dataset;
+pub mod decoupling;
+pub mod evaluation;
+pub mod live;
+pub mod network;
+pub mod scene;
+pub mod sensor;
+pub mod surface;
+pub mod text;
+pub mod training;
+
+/// Crates whose types are part of public signatures: vectors in space (`glam::DVec3`) in [`sensor`], [`scene`] and
+/// [`dataset`]; arrays (`ndarray::Array2`) in [`dataset`], [`network`], [`decoupling`] and [`evaluation`]; generators of
+/// random numbers (`rand::Rng`) wherever something is drawn. Use these to have matching versions.
+pub use {glam, ndarray, rand};

@@ -1,0 +1,315 @@
+use thiserror::Error;
+
+use crate::{
+    scene::{RowModel, Rows, SceneError},
+    sensor::ArrayScale,
+    text::{CsvFields, ReadError, ResistanceColumns, number as parsed_number},
+};
+
+/// Reads frames from lines of CSV, one after the other, without allocation in steady state.
+///
+/// A line has the resistances of one row-wire: in columns named as for `decode`, also among others, M4 of them without
+/// names, or one more that begins with the number of the row-wire. Or it has those of a whole snapshot, rows × M4 without
+/// names, row by row. The first line of readings decides; names may come again, as from a device that starts anew.
+#[derive(Debug)]
+pub struct LineParser {
+    scale: ArrayScale,
+    rows: Rows,
+    /// Row-wires read.
+    read: Vec<usize>,
+    /// True if lines come from their beginning, so that their turn tells the row-wire.
+    is_complete: bool,
+    fields: CsvFields,
+    layout: Option<Layout>,
+    /// Lines of single rows without a number so far, good or bad.
+    turns: usize,
+    readings_ohm: Vec<f64>,
+}
+
+#[derive(Debug)]
+struct Layout {
+    columns: ResistanceColumns,
+    has_names: bool,
+    is_snapshot: bool,
+}
+
+/// Contents of a line.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum ParsedLine<'a> {
+    /// Nothing, or names of columns.
+    NoReadings,
+    /// Resistances of one row-wire in ohm: M4.
+    Row {
+        /// Index among the row-wires read; `None` if it is not known.
+        row_index: Option<usize>,
+        /// Its readings.
+        readings_ohm: &'a [f64],
+    },
+    /// Resistances of all row-wires read, in ohm: rows × M4.
+    Snapshot(&'a [f64]),
+}
+
+/// Error in a line. The next line can be read unless the error [is final](LineError::is_final).
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum LineError {
+    /// A field is missing or wrong.
+    #[error(transparent)]
+    Fields(#[from] ReadError),
+    /// The names of columns lack a resistance, or have one twice.
+    #[error("line {line}: {source}")]
+    Names {
+        /// Line number.
+        line: u64,
+        /// What is wrong with the names.
+        source: ReadError,
+    },
+    /// The network does not read this row-wire.
+    #[error("line {line}: it is of row {row}, but the network reads row {rows} only")]
+    OtherRow {
+        /// Line number.
+        line: u64,
+        /// Row-wire, from 1.
+        row: usize,
+        /// Rows that are read.
+        rows: Rows,
+    },
+    /// The line does not say its row-wire, which the network must know.
+    #[error(
+        "line {0}: it does not say its row-wire, and where a device begins is not known; send the number of the row \
+         before the resistances, or whole snapshots in one line"
+    )]
+    NoRow(u64),
+}
+
+impl LineError {
+    /// Returns `true` if the lines to come are not known to be readings of which wires, so that none should be decoded.
+    pub fn is_final(&self) -> bool {
+        matches!(self, Self::Names { .. } | Self::NoRow(_))
+    }
+}
+
+impl LineParser {
+    /// Prepares to read lines for a network of `rows` of an array. `is_complete` tells that the input is read from its
+    /// beginning and no line of it is lost, so that lines without a number are counted.
+    ///
+    /// # Errors
+    /// A row that the array does not have.
+    pub fn new(scale: ArrayScale, rows: Rows, is_complete: bool) -> Result<Self, SceneError> {
+        Ok(Self {
+            read: rows.read(scale.rows())?,
+            scale,
+            rows,
+            is_complete,
+            fields: CsvFields::default(),
+            layout: None,
+            turns: 0,
+            readings_ohm: Vec::with_capacity(scale.rows() * scale.columns()),
+        })
+    }
+
+    /// Returns `true` if the lines read so far are whole snapshots; `None` before the first.
+    pub fn is_snapshot(&self) -> Option<bool> {
+        self.layout.as_ref().map(|layout| layout.is_snapshot)
+    }
+
+    /// Reads a line without its line break, with its number for messages.
+    ///
+    /// # Errors
+    /// If the line is not a frame.
+    pub fn parse(&mut self, number: u64, line: &[u8]) -> Result<ParsedLine<'_>, LineError> {
+        let byte_order_mark: &[u8] = if number == 1 { b"\xef\xbb\xbf" } else { b"" };
+        let text = line.strip_prefix(byte_order_mark).unwrap_or(line).trim_ascii();
+        if text.is_empty() {
+            return Ok(ParsedLine::NoReadings);
+        }
+        if text.contains(&b'\r') {
+            self.count_bad();
+            return Err(ReadError::LineBreak(number).into());
+        }
+        self.fields.split(text);
+        if self.has_names() {
+            let columns = ResistanceColumns::named(&self.fields, self.scale.columns());
+            self.layout = Some(Layout {
+                columns: columns.map_err(|source| LineError::Names { line: number, source })?,
+                has_names: true,
+                is_snapshot: false,
+            });
+            return Ok(ParsedLine::NoReadings);
+        }
+        let is_first = self.layout.is_none();
+        let layout = self
+            .layout
+            .get_or_insert_with(|| Layout::unnamed(self.fields.len(), self.scale, self.read.len()));
+        self.readings_ohm.clear();
+        let columns = &layout.columns;
+        let read = columns.read(number, &self.fields, &mut self.readings_ohm);
+        let row_wire = read.and_then(|()| columns.row_wire(number, &self.fields, self.scale.rows()));
+        let is_snapshot = layout.is_snapshot;
+        match row_wire {
+            Err(error) => {
+                self.count_bad();
+                if is_first && !self.layout.as_ref().is_some_and(|layout| layout.has_names) {
+                    self.layout = None;
+                }
+                Err(error.into())
+            }
+            Ok(_) if is_snapshot => Ok(ParsedLine::Snapshot(&self.readings_ohm)),
+            Ok(row_wire) => Ok(ParsedLine::Row {
+                row_index: self.row_index(number, row_wire)?,
+                readings_ohm: &self.readings_ohm,
+            }),
+        }
+    }
+
+    /// Returns `true` for a line with a name of a resistance, or with as many other texts as there are resistances.
+    fn has_names(&self) -> bool {
+        let channels = self.scale.columns();
+        let is_text = |field: &[u8]| !field.is_empty() && parsed_number(field).is_none();
+        ResistanceColumns::has_name(&self.fields, channels)
+            || (self.fields.len() >= channels.max(2) && self.fields.iter().all(is_text))
+    }
+
+    /// A line that is no frame takes the turn of one, for there is nothing better to assume.
+    pub fn count_bad(&mut self) {
+        self.turns += usize::from(self.layout.as_ref().is_some_and(|layout| !layout.columns.has_row()));
+    }
+
+    /// Index among the row-wires read of a line that says `row_wire`, or of the line whose turn it is.
+    fn row_index(&mut self, line: u64, row_wire: Option<usize>) -> Result<Option<usize>, LineError> {
+        if let Some(row_wire) = row_wire {
+            let index = self.read.iter().position(|&other| other == row_wire);
+            return index.map(Some).ok_or(LineError::OtherRow {
+                line,
+                row: row_wire + 1,
+                rows: self.rows,
+            });
+        }
+        match self.rows.model() {
+            RowModel::Shared => Ok(None),
+            RowModel::Each if self.read.len() == 1 => Ok(Some(0)),
+            RowModel::Each if self.is_complete => {
+                let turn = self.turns % self.read.len();
+                self.turns += 1;
+                Ok(Some(turn))
+            }
+            RowModel::Each => Err(LineError::NoRow(line)),
+        }
+    }
+}
+
+impl Layout {
+    fn unnamed(found: usize, scale: ArrayScale, rows: usize) -> Self {
+        let (one, all) = (scale.columns(), rows * scale.columns());
+        let is_snapshot = found == all && rows > 1;
+        let count = if is_snapshot { all } else { one };
+        Self {
+            columns: ResistanceColumns::unnamed(count, found == one + 1 && !is_snapshot),
+            has_names: false,
+            is_snapshot,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn parser(rows: Rows, is_complete: bool) -> LineParser {
+        LineParser::new("2x1_1x3".parse().unwrap(), rows, is_complete).unwrap()
+    }
+
+    fn row(row_index: Option<usize>, readings_ohm: &[f64]) -> ParsedLine<'_> {
+        ParsedLine::Row {
+            row_index,
+            readings_ohm,
+        }
+    }
+
+    #[test]
+    fn rows_come_by_name_by_number_or_in_turn() {
+        let mut named = parser(Rows::Known, false);
+        assert_eq!(named.parse(1, b"time,row,r_2,r_1,r_3").unwrap(), ParsedLine::NoReadings);
+        assert_eq!(
+            named.parse(2, b"0.1,2,5,4,6\r").unwrap(),
+            row(Some(1), &[4.0, 5.0, 6.0])
+        );
+        let mut numbered = parser(Rows::Known, false);
+        assert_eq!(numbered.parse(1, b" 2, 4,5,6").unwrap(), row(Some(1), &[4.0, 5.0, 6.0]));
+        let mut in_turn = parser(Rows::Known, true);
+        for (line, index) in [(1, 0), (2, 1), (3, 0)] {
+            assert_eq!(
+                in_turn.parse(line, b"4,5,6").unwrap(),
+                row(Some(index), &[4.0, 5.0, 6.0])
+            );
+        }
+        let mut shared = parser(Rows::All, false);
+        assert_eq!(shared.parse(1, b"4,5,6").unwrap(), row(None, &[4.0, 5.0, 6.0]));
+    }
+
+    #[test]
+    fn a_snapshot_comes_in_one_line() {
+        let mut parser = parser(Rows::Known, false);
+        assert_eq!(
+            parser.parse(1, b"1,2,3,4,5,6").unwrap(),
+            ParsedLine::Snapshot(&[1.0, 2.0, 3.0, 4.0, 5.0, 6.0])
+        );
+        assert_eq!(parser.is_snapshot(), Some(true));
+        let message = parser.parse(2, b"1,2,3").unwrap_err().to_string();
+        assert!(message.starts_with("line 2: 3 columns where 6"), "{message}");
+    }
+
+    #[test]
+    fn a_bad_line_is_told_and_the_next_one_read() {
+        let mut parser = parser(Rows::Known, true);
+        assert_eq!(parser.parse(1, b"4,5,6").unwrap(), row(Some(0), &[4.0, 5.0, 6.0]));
+        for (line, bad) in [
+            (2, "#!?"),
+            (3, "4,5"),
+            (4, "4,nan,6"),
+            (5, "4,5\r,6"),
+            (6, "\u{ff},1,2"),
+        ] {
+            let message = parser.parse(line, bad.as_bytes()).unwrap_err().to_string();
+            assert!(message.starts_with(&format!("line {line}")), "{message}");
+        }
+        // Five bad lines took five turns.
+        assert_eq!(parser.parse(7, b"4,5,6").unwrap(), row(Some(0), &[4.0, 5.0, 6.0]));
+        assert_eq!(parser.parse(8, b"  ").unwrap(), ParsedLine::NoReadings);
+    }
+
+    #[test]
+    fn names_that_lack_a_resistance_are_refused() {
+        for (names, words) in [
+            ("time,r_1,r_2", "line 1: there is no column r_3"),
+            ("R1,R2,R3", "line 1: there is no column r_1"),
+            ("r_1,r_2,r_3,r_2", "line 1: there are two columns r_2"),
+        ] {
+            let error = parser(Rows::Known, true).parse(1, names.as_bytes()).unwrap_err();
+            assert!(error.is_final() && error.to_string().starts_with(words), "{error}");
+        }
+    }
+
+    #[test]
+    fn garbage_before_the_first_frame_decides_nothing() {
+        let mut parser = parser(Rows::Known, false);
+        assert!(parser.parse(1, b"5,6").is_err());
+        assert!(parser.parse(2, b"boot ok").is_err());
+        assert!(parser.parse(3, b"1,4,5,6").is_ok());
+    }
+
+    #[test]
+    fn rows_that_are_not_known_are_refused() {
+        let message = parser(Rows::Known, false).parse(3, b"4,5,6").unwrap_err().to_string();
+        assert!(message.starts_with("line 3: it does not say its row-wire"), "{message}");
+        let message = parser(Rows::One(0), false)
+            .parse(3, b"2,4,5,6")
+            .unwrap_err()
+            .to_string();
+        assert_eq!(message, "line 3: it is of row 2, but the network reads row 1 only");
+        assert_eq!(
+            parser(Rows::One(1), false).parse(3, b"4,5,6").unwrap(),
+            row(Some(0), &[4.0, 5.0, 6.0])
+        );
+    }
+}

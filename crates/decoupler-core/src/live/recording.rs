@@ -1,0 +1,255 @@
+use std::io::{self, BufRead, Write};
+
+use ndarray::{Array3, ArrayView2, Axis};
+use thiserror::Error;
+
+use crate::text::{CsvFields, ReadError, ResistanceColumns};
+
+/// Writes frames with their times as CSV: a line for each row-wire, with columns `time_s`, `row` (from 1) and `r_1` to
+/// `r_M4` in ohm, which `decode` reads too. Every frame is flushed, so that a file ends with a whole line whenever the
+/// program does.
+#[derive(Debug)]
+pub struct Recorder<W: Write> {
+    /// Lines of one frame, which are written together.
+    text: Vec<u8>,
+    rows: Vec<usize>,
+    channels: usize,
+    writer: W,
+}
+
+impl<W: Write> Recorder<W> {
+    /// Writes the names of the columns, for frames of these row-wires (from 0) with so many channels.
+    ///
+    /// # Errors
+    /// Any error of `writer`.
+    pub fn new(mut writer: W, rows: &[usize], channels: usize) -> io::Result<Self> {
+        let mut text = b"time_s,row".to_vec();
+        for channel in 1..=channels {
+            write!(text, ",r_{channel}")?;
+        }
+        text.push(b'\n');
+        writer.write_all(&text)?;
+        writer.flush()?;
+        Ok(Self {
+            text,
+            rows: rows.to_vec(),
+            channels,
+            writer,
+        })
+    }
+
+    /// Writes a frame, rows × channels in ohm, with its time in seconds.
+    ///
+    /// # Errors
+    /// Any error of the writer.
+    ///
+    /// # Panics
+    /// If the frame has another length.
+    pub fn record(&mut self, time_s: f64, frame_ohm: &[f64]) -> io::Result<()> {
+        assert_eq!(frame_ohm.len(), self.rows.len() * self.channels);
+        self.text.clear();
+        for (row, readings_ohm) in self.rows.iter().zip(frame_ohm.chunks_exact(self.channels)) {
+            write!(self.text, "{time_s:?},{}", row + 1)?;
+            for ohm in readings_ohm {
+                write!(self.text, ",{ohm:?}")?;
+            }
+            self.text.push(b'\n');
+        }
+        self.writer.write_all(&self.text)?;
+        self.writer.flush()
+    }
+}
+
+/// Recorded frames, to be replayed.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Recording {
+    /// Time of each frame in seconds, in ascending order.
+    times_s: Vec<f64>,
+    /// Frames × rows × channels in ohm.
+    frames_ohm: Array3<f64>,
+}
+
+/// Error in a recording.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum RecordingError {
+    /// A field is missing or wrong.
+    #[error(transparent)]
+    Fields(#[from] ReadError),
+    /// The time is missing or not in order.
+    #[error("line {0}: the time is not a number of seconds from that of the line before on; record again")]
+    Time(u64),
+    /// The row-wire is not the one expected.
+    #[error("line {line}: row {expected} is expected here: each frame needs its rows in ascending order")]
+    Row {
+        /// Line number.
+        line: u64,
+        /// Row expected, from 1.
+        expected: usize,
+    },
+    /// There is no whole frame.
+    #[error("there is no whole frame in it: record again, or choose another file")]
+    Empty,
+}
+
+impl Recording {
+    /// Reads what [`Recorder`] wrote, for these row-wires of an array with `array_rows` of them. A last frame that is not
+    /// whole is left out.
+    ///
+    /// # Errors
+    /// If the file cannot be read, is malformed, or has no whole frame.
+    pub fn read(
+        source: impl BufRead,
+        rows: &[usize],
+        array_rows: usize,
+        channels: usize,
+    ) -> Result<Self, RecordingError> {
+        let mut fields = CsvFields::default();
+        let mut columns: Option<(ResistanceColumns, usize)> = None;
+        let (mut times_s, mut readings_ohm): (Vec<f64>, Vec<f64>) = (Vec::new(), Vec::new());
+        let mut lines = 0;
+        for (text, number) in source.split(b'\n').zip(1..) {
+            let text = text.map_err(ReadError::from)?;
+            if text.trim_ascii().is_empty() {
+                continue;
+            }
+            fields.split(text.trim_ascii());
+            let Some((columns, time_column)) = &columns else {
+                let time = fields.iter().position(|name| name == b"time_s");
+                let named = ResistanceColumns::named(&fields, channels)?;
+                columns = Some((named, time.ok_or(RecordingError::Time(number))?));
+                continue;
+            };
+            columns.read(number, &fields, &mut readings_ohm)?;
+            let row = columns.row_wire(number, &fields, array_rows)?;
+            let expected = rows[lines % rows.len()];
+            if row != Some(expected) {
+                return Err(RecordingError::Row {
+                    line: number,
+                    expected: expected + 1,
+                });
+            }
+            let time_s = std::str::from_utf8(fields.get(*time_column))
+                .ok()
+                .and_then(|text| text.parse().ok());
+            let time_s =
+                time_s.filter(|time_s: &f64| time_s.is_finite() && times_s.last().is_none_or(|last| time_s >= last));
+            let time_s = time_s.ok_or(RecordingError::Time(number))?;
+            if lines.is_multiple_of(rows.len()) {
+                times_s.push(time_s);
+            }
+            lines += 1;
+        }
+        let frames = lines / rows.len();
+        if frames == 0 {
+            return Err(RecordingError::Empty);
+        }
+        times_s.truncate(frames);
+        readings_ohm.truncate(frames * rows.len() * channels);
+        let shape = (frames, rows.len(), channels);
+        Ok(Self {
+            times_s,
+            frames_ohm: Array3::from_shape_vec(shape, readings_ohm).expect("every line has all channels"),
+        })
+    }
+
+    /// Frames that come without times, frames × rows × channels in ohm, at an even rate.
+    ///
+    /// # Errors
+    /// If there is no frame.
+    pub fn at_rate(frames_ohm: Array3<f64>, frames_per_second: f64) -> Result<Self, RecordingError> {
+        let frames = frames_ohm.len_of(Axis(0));
+        if frames == 0 {
+            return Err(RecordingError::Empty);
+        }
+        Ok(Self {
+            times_s: (0..frames).map(|frame| frame as f64 / frames_per_second).collect(),
+            frames_ohm,
+        })
+    }
+
+    /// Times of the frames in seconds, in ascending order.
+    pub fn times_s(&self) -> &[f64] {
+        &self.times_s
+    }
+
+    /// Index of the last frame at or before a time; the first before that.
+    pub fn frame_at(&self, time_s: f64) -> usize {
+        self.times_s.partition_point(|other| *other <= time_s).saturating_sub(1)
+    }
+
+    /// Readings of a frame in ohm: rows × channels.
+    ///
+    /// # Panics
+    /// If there is no such frame.
+    pub fn frame_ohm(&self, index: usize) -> ArrayView2<'_, f64> {
+        self.frames_ohm.index_axis(Axis(0), index)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn recorded() -> Vec<u8> {
+        let mut file = Vec::new();
+        let mut recorder = Recorder::new(&mut file, &[0, 2], 3).unwrap();
+        for frame in 0..4 {
+            let frame_ohm: Vec<f64> = (0..6).map(|k| 0.1 + f64::from(10 * frame + k)).collect();
+            recorder.record(0.1 * f64::from(frame), &frame_ohm).unwrap();
+        }
+        file
+    }
+
+    fn read(bytes: &[u8]) -> Result<Recording, RecordingError> {
+        Recording::read(bytes, &[0, 2], 3, 3)
+    }
+
+    #[test]
+    fn what_is_recorded_is_replayed_with_the_same_bits() {
+        let recording = read(&recorded()).unwrap();
+        assert_eq!(recording.times_s(), [0.0, 0.1, 0.2, 0.1 * 3.0]);
+        assert_eq!(
+            recording.frame_ohm(2),
+            ndarray::array![[20.1, 21.1, 22.1], [23.1, 24.1, 25.1]]
+        );
+        for (time_s, frame) in [(-1.0, 0), (0.0, 0), (0.15, 1), (0.2, 2), (99.0, 3)] {
+            assert_eq!(recording.frame_at(time_s), frame, "{time_s}");
+        }
+    }
+
+    #[test]
+    fn frames_without_times_come_at_an_even_rate() {
+        let frames = Array3::from_shape_fn((3, 2, 3), |(frame, row, k)| (100 * frame + 10 * row + k) as f64);
+        let recording = Recording::at_rate(frames, 20.0).unwrap();
+        assert_eq!(recording.times_s(), [0.0, 0.05, 0.1]);
+        assert_eq!(
+            recording.frame_ohm(1),
+            ndarray::array![[100.0, 101.0, 102.0], [110.0, 111.0, 112.0]]
+        );
+        let empty = Recording::at_rate(Array3::zeros((0, 2, 3)), 20.0);
+        assert!(matches!(empty, Err(RecordingError::Empty)));
+    }
+
+    #[test]
+    fn a_recording_that_was_cut_off_keeps_its_whole_frames() {
+        let bytes = recorded();
+        let lines: Vec<&[u8]> = bytes.split_inclusive(|&byte| byte == b'\n').collect();
+        assert_eq!(read(&lines[..6].concat()).unwrap().times_s().len(), 2);
+        assert!(matches!(read(&lines[..2].concat()), Err(RecordingError::Empty)));
+    }
+
+    #[test]
+    fn what_is_wrong_is_found_at_its_line() {
+        let text = String::from_utf8(recorded()).unwrap();
+        for (from, to, expected) in [
+            ("0.1,3", "0.1,1", "line 5: row 3 is expected"),
+            ("0.2,1", "0.05,1", "line 6: the time"),
+            ("time_s", "time", "line 1: the time"),
+            ("0.1,1,10.1", "0.1,1,-1", "line 4, column 3: '-1'"),
+        ] {
+            let message = read(text.replacen(from, to, 1).as_bytes()).unwrap_err().to_string();
+            assert!(message.starts_with(expected), "{message}");
+        }
+    }
+}

@@ -1,0 +1,250 @@
+use std::{
+    fmt,
+    fs::File,
+    io::{self, Read, stdin},
+    net::TcpStream,
+    path::{Path, PathBuf},
+    str::FromStr,
+    time::Duration,
+};
+
+use thiserror::Error;
+
+use super::lines::Keeping;
+use crate::text::system_cause;
+
+/// Origin of frames.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Source {
+    /// Standard input.
+    StandardInput,
+    /// A file or a named pipe.
+    File(PathBuf),
+    /// A serial port with its baud rate, 8 data bits, no parity, 1 stop bit.
+    Serial {
+        /// Device.
+        path: String,
+        /// Bits a second.
+        baud: u32,
+    },
+    /// A TCP socket to connect to, as `HOST:PORT`.
+    Tcp(String),
+}
+
+/// Error in opening a source.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum SourceError {
+    /// No baud rate is given.
+    #[error("'{0}' is a serial device and needs its baud rate: give {0}:115200, or the rate it sends with")]
+    NoBaud(String),
+    /// Not a socket.
+    #[error("'tcp:{0}' is not a socket: give tcp:HOST:PORT, for example tcp:localhost:5000")]
+    NoPort(String),
+    /// There is no such device.
+    #[error("there is no device '{0}': check its cable and its name, for example with ls /dev/tty*")]
+    NoDevice(String),
+    /// Opening the device is not permitted.
+    #[error(
+        "no permission to read '{0}': join the group that owns it, on many systems with sudo usermod -aG dialout $USER, \
+         and log in again"
+    )]
+    Permission(String),
+    /// Another program has the device.
+    #[error("'{0}' is in use: close the other program that reads it")]
+    InUse(String),
+    /// The device does not take the baud rate.
+    #[error("'{path}' does not take {baud} baud: {cause}; give a rate that it supports, for example 9600 or 115200")]
+    Device {
+        /// Device.
+        path: String,
+        /// Rate given.
+        baud: u32,
+        /// Words of the system.
+        cause: String,
+    },
+    /// No connection.
+    #[error("cannot connect to 'tcp:{address}': {}; check that the sender listens there", system_cause(.source))]
+    Connect {
+        /// Address given.
+        address: String,
+        /// Error of the system.
+        source: io::Error,
+    },
+    /// The file cannot be opened.
+    #[error("cannot open '{}': {}", .path.display(), system_cause(.source))]
+    File {
+        /// File given.
+        path: PathBuf,
+        /// Error of the system.
+        source: io::Error,
+    },
+}
+
+impl FromStr for Source {
+    type Err = SourceError;
+
+    /// Reads `-`, `tcp:HOST:PORT`, `DEVICE:BAUD` or the path of a file.
+    fn from_str(text: &str) -> Result<Self, SourceError> {
+        if text == "-" {
+            return Ok(Self::StandardInput);
+        }
+        if let Some(address) = text.strip_prefix("tcp:") {
+            let port = address.rsplit_once(':').filter(|(host, _)| !host.is_empty());
+            return match port.and_then(|(_, port)| port.parse::<u16>().ok()) {
+                Some(_) => Ok(Self::Tcp(address.to_owned())),
+                None => Err(SourceError::NoPort(address.to_owned())),
+            };
+        }
+        if !Path::new(text).exists()
+            && let Some((path, baud)) = text.rsplit_once(':')
+            && let Ok(baud @ 1..) = baud.parse()
+            && (is_port(path) || path.starts_with("/dev/") || Path::new(path).exists())
+        {
+            let path = path.to_owned();
+            return Ok(Self::Serial { path, baud });
+        }
+        if is_port(text) && !Path::new(text).is_file() {
+            return Err(SourceError::NoBaud(text.to_owned()));
+        }
+        Ok(Self::File(PathBuf::from(text)))
+    }
+}
+
+impl fmt::Display for Source {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::StandardInput => f.write_str("standard input"),
+            Self::File(path) => write!(f, "'{}'", path.display()),
+            Self::Serial { path, baud } => write!(f, "'{path}:{baud}'"),
+            Self::Tcp(address) => write!(f, "'tcp:{address}'"),
+        }
+    }
+}
+
+impl Source {
+    /// Returns which lines count when they come faster than they are taken.
+    pub fn keeping(&self) -> Keeping {
+        match self {
+            Self::StandardInput | Self::File(_) => Keeping::All,
+            Self::Serial { .. } | Self::Tcp(_) => Keeping::Latest,
+        }
+    }
+
+    /// Returns `true` if reading may begin in the middle of a line.
+    pub fn begins_anywhere(&self) -> bool {
+        matches!(self, Self::Serial { .. })
+    }
+
+    /// Opens the source. Reading a device or socket times out now and then, so that who reads can be stopped.
+    ///
+    /// # Errors
+    /// If it cannot be opened.
+    pub fn open(&self) -> Result<Box<dyn Read + Send>, SourceError> {
+        match self {
+            Self::StandardInput => Ok(Box::new(stdin())),
+            Self::File(path) => {
+                let file = File::open(path).map_err(|source| SourceError::File {
+                    path: path.clone(),
+                    source,
+                })?;
+                Ok(Box::new(file))
+            }
+            Self::Serial { path, baud } => open_serial(path, *baud),
+            Self::Tcp(address) => {
+                let connected = TcpStream::connect(address).and_then(|stream| {
+                    stream.set_read_timeout(Some(TIMEOUT))?;
+                    Ok(stream)
+                });
+                let stream = connected.map_err(|source| SourceError::Connect {
+                    address: address.clone(),
+                    source,
+                })?;
+                Ok(Box::new(stream))
+            }
+        }
+    }
+}
+
+/// Returns `true` for a name that systems give to serial ports: `COM` and digits on Windows, a path in `/dev` elsewhere.
+fn is_port(name: &str) -> bool {
+    let bare = name.strip_prefix(r"\\.\").unwrap_or(name);
+    let is_numbered = bare
+        .split_at_checked(3)
+        .is_some_and(|(com, number)| com.eq_ignore_ascii_case("COM") && number.parse::<u16>().is_ok());
+    is_numbered
+        || ["/dev/tty", "/dev/pts/", "/dev/cu.", "/dev/rfcomm", "/dev/serial/"]
+            .iter()
+            .any(|start| name.starts_with(start))
+}
+
+/// Longest wait for a byte.
+const TIMEOUT: Duration = Duration::from_millis(200);
+
+fn open_serial(path: &str, baud: u32) -> Result<Box<dyn Read + Send>, SourceError> {
+    use serialport::ErrorKind;
+
+    let refused = |error: serialport::Error| match error.kind {
+        ErrorKind::Io(io::ErrorKind::NotFound) => SourceError::NoDevice(path.to_owned()),
+        ErrorKind::Io(io::ErrorKind::PermissionDenied) => SourceError::Permission(path.to_owned()),
+        ErrorKind::Io(io::ErrorKind::WouldBlock) => SourceError::InUse(path.to_owned()),
+        ErrorKind::NoDevice if Path::new(path).exists() => SourceError::InUse(path.to_owned()),
+        ErrorKind::NoDevice => SourceError::NoDevice(path.to_owned()),
+        _ => SourceError::Device {
+            path: path.to_owned(),
+            baud,
+            cause: error.description,
+        },
+    };
+    let port = serialport::new(path, baud).timeout(TIMEOUT).open().map_err(refused)?;
+    Ok(Box::new(port))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sources_are_told_apart() {
+        let serial = |path: &str, baud| Source::Serial {
+            path: path.to_owned(),
+            baud,
+        };
+        for (text, expected) in [
+            ("-", Source::StandardInput),
+            ("frames.csv", Source::File("frames.csv".into())),
+            // Files that are not there, whatever their names begin with.
+            ("COMPARISON.csv", Source::File("COMPARISON.csv".into())),
+            ("COM", Source::File("COM".into())),
+            ("COM1.csv", Source::File("COM1.csv".into())),
+            ("press at 12:30", Source::File("press at 12:30".into())),
+            ("tcp:localhost:5000", Source::Tcp("localhost:5000".to_owned())),
+            ("tcp:[::1]:5000", Source::Tcp("[::1]:5000".to_owned())),
+            ("/dev/ttyUSB0:115200", serial("/dev/ttyUSB0", 115_200)),
+            ("COM3:9600", serial("COM3", 9600)),
+        ] {
+            assert_eq!(text.parse::<Source>().unwrap(), expected, "{text}");
+        }
+        for (text, words) in [
+            ("/dev/ttyUSB0", "give /dev/ttyUSB0:115200"),
+            ("COM3", "give COM3:115200"),
+            ("tcp:5000", "tcp:HOST:PORT"),
+            ("tcp:host:99999", "tcp:HOST:PORT"),
+        ] {
+            let message = text.parse::<Source>().unwrap_err().to_string();
+            assert!(message.contains(words), "{message}");
+        }
+    }
+
+    #[test]
+    fn a_device_that_does_not_open_is_explained() {
+        let message = |text: &str| match text.parse::<Source>().unwrap().open() {
+            Ok(_) => panic!("{text} is open"),
+            Err(error) => error.to_string(),
+        };
+        let found = message("/dev/no-such-tty:9600");
+        assert!(found.starts_with("there is no device '/dev/no-such-tty'"), "{found}");
+        let found = message("/dev/null:9600");
+        assert!(found.contains("'/dev/null' does not take 9600 baud"), "{found}");
+    }
+}

@@ -1,0 +1,20 @@
+//! Properties that hold for arbitrary inputs, drawn from a fixed seed.
+#![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+mod folds;
+mod scaling;
+mod sensor;
+mod surfaces;
+mod training;
+
+use proptest::test_runner::{Config, RngSeed};
+
+/// So many cases of a property, the same in every run; hence nothing needs to be written down after a failure.
+fn cases(count: u32) -> Config {
+    Config {
+        cases: count,
+        failure_persistence: None,
+        rng_seed: RngSeed::Fixed(2),
+        ..Config::default()
+    }
+}

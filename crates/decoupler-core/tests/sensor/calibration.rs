@@ -1,0 +1,123 @@
+//! A sensor of unknown geometry: calibrated, trained on its calibrated model, fine-tuned on its frames.
+
+use decoupler_core::{
+    dataset::{Dataset, Division, Seed, Stream},
+    evaluation::{Errors, Preset, Run, SimulatedSettings, fine_tune, pressed_rows, rebased},
+    network::Networks,
+    scene::{Loading, Noise},
+    sensor::{Calibration, SensorModel},
+};
+
+fn settings() -> SimulatedSettings {
+    let mut settings = Preset::Best.settings();
+    settings.source.sensor.scale = "4x4_3x12".parse().unwrap();
+    settings.source.scene.loading = Loading::SmoothField {
+        correlation_length_mm: 4.0,
+    };
+    settings.source.scene.noise = Noise::relative(1e-3);
+    (settings.source.samples, settings.source.validation_samples) = (600, 100);
+    settings.training.stopping.epochs = 25;
+    settings.hidden = 6;
+    settings
+}
+
+fn real(nominal: &SensorModel) -> SensorModel {
+    let mut real = *nominal;
+    real.geometry.height_mm *= 1.05;
+    real.geometry.node_pitch_mm *= 0.95;
+    real.geometry.column_node_x0_mm *= 1.05;
+    real
+}
+
+/// Snapshots of the real sensor, of which only the displacements are known: told as coordinates of the nominal one.
+fn recorded(settings: &SimulatedSettings, snapshots: usize, seed: u64) -> Dataset {
+    let (scene, nominal) = (&settings.source.scene, &settings.source.sensor);
+    let real = real(nominal);
+    let rows = nominal.scale.rows();
+    let mut set = Dataset::simulate(&real, scene, rows * snapshots, &mut Seed(seed).rng(Stream::Training)).unwrap();
+    set.disturb(&real, &scene.noise, &mut Seed(seed).rng(Stream::TrainingNoise))
+        .unwrap();
+    rebased(&set, &real, nominal).unwrap()
+}
+
+fn trained(settings: SimulatedSettings) -> Networks {
+    let mut run = Run::prepare(settings).unwrap();
+    while run.step().is_none() {}
+    run.network()
+}
+
+#[test]
+fn calibrating_and_fine_tuning_bring_a_network_to_the_real_sensor() {
+    let mut settings = settings();
+    let nominal = settings.source.sensor;
+    let (frames, test) = (recorded(&settings, 40, 1), recorded(&settings, 60, 2));
+    let calibration = Calibration::fit(&nominal, &pressed_rows(&frames, &nominal).unwrap()).unwrap();
+    let stroke_mm = settings.source.stroke_mm();
+    let z_mm = |set: &Dataset, networks: &Networks| Errors::measure(set, &networks.decouple(set), stroke_mm).z_mm;
+    let before = z_mm(&test, &trained(settings));
+    settings.source.sensor = calibration.model;
+    let networks = trained(settings);
+    let moved = rebased(&test, &nominal, &calibration.model).unwrap();
+    let calibrated = z_mm(&moved, &networks);
+    // What a network trained on the real sensor itself reaches.
+    settings.source.sensor = real(&nominal);
+    let limit = z_mm(&rebased(&test, &nominal, &real(&nominal)).unwrap(), &trained(settings));
+    assert!(calibrated < 0.2 * before, "{before} {calibrated}");
+    assert!(calibrated < 1.2 * limit, "{calibrated} {limit}");
+    let frames = rebased(&frames, &nominal, &calibration.model).unwrap();
+    let division = Division {
+        validation_fraction: 0.2,
+        ..Division::default()
+    };
+    let parts = division
+        .divide_for_training(&frames, &mut Seed(0).rng(Stream::Split))
+        .unwrap();
+    let split = parts.split(&frames);
+    let tuned = fine_tune(&networks, &split, settings.training, &|| false)
+        .unwrap()
+        .unwrap();
+    assert!(z_mm(&moved, &tuned) < 1.2 * calibrated);
+    // A network of another sensor learns much from the frames.
+    settings.source.sensor = nominal;
+    let untold = trained(settings);
+    let tuned = fine_tune(&untold, &split, settings.training, &|| false)
+        .unwrap()
+        .unwrap();
+    assert!(z_mm(&moved, &tuned) < 0.5 * z_mm(&moved, &untold));
+    assert!(
+        fine_tune(&untold, &split, settings.training, &|| true)
+            .unwrap()
+            .is_none()
+    );
+}
+
+#[test]
+fn samples_of_another_sensor_are_refused() {
+    let mut settings = settings();
+    let split = Division::default().divide_for_training(&recorded(&settings, 10, 1), &mut Seed(0).rng(Stream::Split));
+    let split = split.unwrap().split(&recorded(&settings, 10, 1));
+    settings.source.sensor.scale = "4x5_3x15".parse().unwrap();
+    settings.training.stopping.epochs = 1;
+    let message = fine_tune(&trained(settings), &split, settings.training, &|| false)
+        .unwrap_err()
+        .to_string();
+    assert!(message.contains("12 channels, the networks have 15"), "{message}");
+}
+
+#[test]
+fn displacements_stay_and_coordinates_move() {
+    let settings = settings();
+    let nominal = settings.source.sensor;
+    let set = recorded(&settings, 3, 5);
+    let moved = rebased(&set, &nominal, &real(&nominal)).unwrap();
+    for (one, other) in pressed_rows(&set, &nominal)
+        .unwrap()
+        .iter()
+        .zip(&pressed_rows(&moved, &real(&nominal)).unwrap())
+    {
+        let pairs = one.displacements_mm.iter().zip(&other.displacements_mm);
+        assert!(pairs.into_iter().all(|(one, other)| one.distance(*other) < 1e-12));
+        assert_eq!((one.row, one.frame), (other.row, other.frame));
+    }
+    assert!((moved.targets()[[0, 2]] - set.targets()[[0, 2]] - 0.25).abs() < 1e-12);
+}

@@ -1,0 +1,465 @@
+//! Faults of wires and electronics: what they do to readings, and whether the right wire is named.
+
+use decoupler_core::{
+    dataset::{Seed, Stream},
+    decoupling::Decoder,
+    live::{Diagnosis, FaultCause, FaultEvent, FaultMonitor, FaultyWire, LeftOutDecoder, Simulated},
+    scene::{Deformation, Fault, FaultySensor, Indenter, Loading, Noise, Scene},
+    sensor::SensorModel,
+};
+use glam::DVec3;
+use rand::RngExt;
+
+/// Currents of a resistor network by nodal analysis: every row-wire and column-wire is two pieces, before and after a
+/// break, joined where the wire is whole.
+struct Network {
+    pieces: usize,
+    /// Conductance between pieces, and of each piece to its driver or amplifier.
+    between: Vec<Vec<f64>>,
+    to_ground: Vec<f64>,
+}
+
+/// Resistance of a driver and an amplifier, in ohm, and that of a joint: small beside those of the rubber.
+const DRIVER_OHM: f64 = 1e-5;
+const JOINT_OHM: f64 = 1e-9;
+
+impl Network {
+    fn new(model: &SensorModel, deformation: &Deformation, fault: Fault) -> Self {
+        let scale = model.scale;
+        let (rows, columns) = (scale.rows(), scale.columns());
+        let mut network = Self {
+            pieces: 2 * (rows + columns),
+            between: vec![vec![0.0; 2 * (rows + columns)]; 2 * (rows + columns)],
+            to_ground: vec![0.0; 2 * (rows + columns)],
+        };
+        let (near_row, near_column) = (|row: usize| 2 * row, |column: usize| 2 * (rows + column));
+        for wire in 0..rows + columns {
+            network.to_ground[2 * wire] = 1.0 / DRIVER_OHM;
+            let is_open = match fault {
+                Fault::OpenRow { row, .. } => wire == row,
+                Fault::OpenColumn { column, .. } => wire == rows + column,
+                _ => false,
+            };
+            if !is_open {
+                network.join(2 * wire, 2 * wire + 1, JOINT_OHM);
+            }
+        }
+        match fault {
+            Fault::ShortedRows { row } => network.join(near_row(row), near_row(row + 1), JOINT_OHM),
+            Fault::ShortedColumns { column } => network.join(near_column(column), near_column(column + 1), JOINT_OHM),
+            _ => {}
+        }
+        let beyond = |node: usize, break_at: Option<usize>| usize::from(break_at.is_some_and(|at| node >= at));
+        for row in 0..rows {
+            for column in 0..columns {
+                for node in 0..scale.nodes_per_row() {
+                    for electrode in 0..scale.nodes_per_column() {
+                        let at_mm = model.displaced_mm(row, node, deformation.row_mm(row)[node]);
+                        let apart_mm = (at_mm - model.geometry.column_node_mm(column, electrode)).length();
+                        let row_break = match fault {
+                            Fault::OpenRow { row: open, before_node } if open == row => Some(before_node),
+                            _ => None,
+                        };
+                        let column_break = match fault {
+                            Fault::OpenColumn {
+                                column: open,
+                                before_node,
+                            } if open == column => Some(before_node),
+                            _ => None,
+                        };
+                        let one = near_row(row) + beyond(node, row_break);
+                        let other = near_column(column) + beyond(electrode, column_break);
+                        network.join(one, other, model.resistivity_ohm_per_mm * apart_mm);
+                    }
+                }
+            }
+        }
+        network
+    }
+
+    fn join(&mut self, one: usize, other: usize, ohm: f64) {
+        self.between[one][other] += 1.0 / ohm;
+        self.between[other][one] += 1.0 / ohm;
+    }
+
+    /// Potential of every piece with 1 V behind the driver of piece `driven`, by Gaussian elimination.
+    fn potentials(&self, driven: usize) -> Vec<f64> {
+        let n = self.pieces;
+        let mut system = vec![vec![0.0; n + 1]; n];
+        for (i, equation) in system.iter_mut().enumerate() {
+            equation[i] = self.to_ground[i] + self.between[i].iter().sum::<f64>();
+            (0..n)
+                .filter(|&j| j != i)
+                .for_each(|j| equation[j] = -self.between[i][j]);
+        }
+        system[driven][n] = self.to_ground[driven];
+        for pivot in 0..n {
+            let best = (pivot..n)
+                .max_by(|&a, &b| system[a][pivot].abs().total_cmp(&system[b][pivot].abs()))
+                .unwrap();
+            system.swap(pivot, best);
+            let of_pivot = system[pivot].clone();
+            for (_, equation) in system.iter_mut().enumerate().filter(|(row, _)| *row != pivot) {
+                let factor = equation[pivot] / of_pivot[pivot];
+                equation
+                    .iter_mut()
+                    .zip(&of_pivot)
+                    .for_each(|(entry, other)| *entry -= factor * other);
+            }
+        }
+        (0..n).map(|i| system[i][n] / system[i][i]).collect()
+    }
+}
+
+#[test]
+fn faulty_readings_are_those_of_the_resistor_network() {
+    let model = SensorModel::new("3x2_2x4".parse().unwrap());
+    let mut rng = Seed(0).rng(Stream::Test);
+    let deformation = Deformation::from_fn(model.scale, |_, _| DVec3::Z * rng.random::<f64>());
+    let faults = [
+        "open-row:2@2",
+        "open-row:1@1",
+        "open-column:3@2",
+        "open-column:4@1",
+        "short-rows:1-2",
+        "short-columns:2-3",
+    ];
+    for text in faults {
+        let fault: Fault = text.parse().unwrap();
+        let network = Network::new(&model, &deformation, fault);
+        let faulty = FaultySensor::new(&model, Noise::default(), fault).unwrap();
+        let sound = (0..3).flat_map(|row| model.row_resistances(row, deformation.row_mm(row)).unwrap());
+        let mut readings_ohm: Vec<f64> = sound.collect();
+        let full_scale_ohm = 2.0 * at_rest_ohm(&model);
+        faulty.before_noise(&[0, 1, 2], &deformation, &mut readings_ohm);
+        for row in 0..3 {
+            let potentials = network.potentials(2 * row);
+            for column in 0..4 {
+                let current = potentials[2 * (3 + column)] / DRIVER_OHM;
+                let found_ohm = readings_ohm[4 * row + column];
+                let is_dead = current.abs() < 1e-9;
+                let expected_ohm = if is_dead { full_scale_ohm } else { 1.0 / current };
+                assert!(
+                    (found_ohm / expected_ohm - 1.0).abs() < 1e-4,
+                    "{text} {row} {column}: {found_ohm} {expected_ohm}"
+                );
+            }
+        }
+    }
+}
+
+/// Largest resistance of the unloaded array.
+fn at_rest_ohm(model: &SensorModel) -> f64 {
+    let at_rest = vec![DVec3::ZERO; model.scale.nodes_per_row()];
+    let rows = (0..model.scale.rows()).flat_map(|row| model.row_resistances(row, &at_rest).unwrap());
+    rows.fold(0.0, f64::max)
+}
+
+fn sensor_and_scene() -> (SensorModel, Scene) {
+    let scene = Scene {
+        noise: Noise::relative(1e-3),
+        loading: Loading::Indenter(Indenter::default()),
+        ..Scene::default()
+    };
+    (SensorModel::new("10x6_3x18".parse().unwrap()), scene)
+}
+
+#[test]
+fn the_wire_at_fault_is_named_with_its_cause_and_forgotten_when_it_is_mended() {
+    let (sensor, scene) = sensor_and_scene();
+    let row = FaultyWire::Row;
+    let column = FaultyWire::Column;
+    let cases = [
+        ("open-row:4", row(3), FaultCause::NoSignal),
+        ("open-row:4@3", row(3), FaultCause::Broken { before_node: 2 }),
+        ("open-column:7", column(6), FaultCause::NoSignal),
+        ("open-column:7@2", column(6), FaultCause::Broken { before_node: 1 }),
+        ("short-columns:3-4", FaultyWire::Columns(2), FaultCause::Shorted),
+        ("gain:11=0.05", column(10), FaultCause::Gain { relative: 0.05 }),
+        ("gain:18=-0.19", column(17), FaultCause::Gain { relative: -0.19 }),
+        ("stuck:2=low", column(1), FaultCause::NoSignal),
+        ("stuck:9=high", column(8), FaultCause::NoSignal),
+    ];
+    for (text, wire, cause) in cases {
+        let mut source = Simulated::new(&sensor, &scene, Seed(7), 20.0).unwrap();
+        let mut monitor = FaultMonitor::new(&sensor, &scene, source.rows()).unwrap();
+        let mut frame_ohm = vec![0.0; source.readings()];
+        let mut events = |source: &mut Simulated, frames: usize| -> Vec<(usize, FaultEvent)> {
+            let mut found = Vec::new();
+            for frame in 0..frames {
+                source.next_frame(&mut frame_ohm).unwrap();
+                found.extend(monitor.check(&frame_ohm).map(|event| (frame, event)));
+            }
+            found
+        };
+        assert_eq!(events(&mut source, 10), [], "{text}");
+        source.set_fault(Some(text.parse().unwrap())).unwrap();
+        let found = events(&mut source, 12);
+        let [(frame, FaultEvent::Named(named))] = found[..] else {
+            panic!("{text}: {found:?}");
+        };
+        assert!(frame + 1 >= FaultMonitor::PERSISTENCE, "{text}: {frame}");
+        assert_eq!(named.wire, wire, "{text}");
+        match (named.cause, cause) {
+            (FaultCause::Gain { relative: found }, FaultCause::Gain { relative }) => {
+                assert!((found - relative).abs() < 2e-3, "{text}: {named}");
+            }
+            (found, cause) => assert_eq!(found, cause, "{text}"),
+        }
+        source.set_fault(None).unwrap();
+        // Wires that touch are forgotten once their readings differ, and these two are far from the press at first.
+        if cause == FaultCause::Shorted {
+            let found = events(&mut source, 400);
+            assert!(matches!(found[..], [(_, FaultEvent::Recovered)]), "{text}: {found:?}");
+            continue;
+        }
+        let found = events(&mut source, 5);
+        assert_eq!(
+            found,
+            [(FaultMonitor::PERSISTENCE - 1, FaultEvent::Recovered)],
+            "{text}"
+        );
+    }
+}
+
+#[test]
+fn sound_frames_raise_no_alarm_and_two_faults_are_not_taken_for_one() {
+    let (sensor, scene) = sensor_and_scene();
+    let mut source = Simulated::new(&sensor, &scene, Seed(5), 10.0).unwrap();
+    let mut monitor = FaultMonitor::new(&sensor, &scene, source.rows()).unwrap();
+    let mut frame_ohm = vec![0.0; source.readings()];
+    for frame in 0..100 {
+        source.next_frame(&mut frame_ohm).unwrap();
+        assert_eq!(monitor.check(&frame_ohm), None, "{frame}");
+    }
+    source.set_fault(Some("gain:3=0.1".parse().unwrap())).unwrap();
+    let mut events = Vec::new();
+    for _ in 0..8 {
+        source.next_frame(&mut frame_ohm).unwrap();
+        frame_ohm.iter_mut().skip(11).step_by(18).for_each(|ohm| *ohm *= 0.9);
+        events.extend(monitor.check(&frame_ohm));
+    }
+    assert_eq!(events, [FaultEvent::Unexplained]);
+}
+
+/// Independent frames of `scene`, row by row, with `fault` if there is one.
+fn frames(
+    sensor: &SensorModel,
+    scene: &Scene,
+    fault: Option<Fault>,
+    count: usize,
+    mut take: impl FnMut(&[f64], &Deformation),
+) {
+    let (mut rng, mut noise_rng) = (Seed(3).rng(Stream::Live), Seed(3).rng(Stream::LiveNoise));
+    let rows: Vec<usize> = (0..sensor.scale.rows()).collect();
+    let columns = sensor.scale.columns();
+    let source = scene.noise.source(sensor).unwrap();
+    let faulty = fault.map(|fault| FaultySensor::new(sensor, scene.noise, fault).unwrap());
+    let sampler = scene.sampler(sensor);
+    let mut frame_ohm = vec![0.0; rows.len() * columns];
+    for _ in 0..count {
+        let deformation = sampler.draw(&mut rng);
+        for (&row, ohm) in rows.iter().zip(frame_ohm.chunks_exact_mut(columns)) {
+            sensor.row_resistances_into(row, deformation.row_mm(row), ohm).unwrap();
+        }
+        if let Some(faulty) = &faulty {
+            faulty.before_noise(&rows, &deformation, &mut frame_ohm);
+        }
+        source.disturb(&mut frame_ohm, &mut noise_rng);
+        take(&frame_ohm, &deformation);
+    }
+}
+
+/// Two row-wires that touch have readings that Eq. (2) explains: only that they stay equal gives them away.
+#[test]
+fn rows_that_touch_are_named_by_readings_that_stay_equal_and_forgotten_when_they_differ() {
+    let sensor = SensorModel::new("6x4_2x12".parse().unwrap());
+    for loading in ["random", "smooth:4", "indenter:sphere"] {
+        let scene = Scene {
+            noise: Noise {
+                drift: 0.01,
+                ..Noise::relative(1e-3)
+            },
+            loading: loading.parse().unwrap(),
+            ..Scene::default()
+        };
+        let mut monitor = FaultMonitor::new(&sensor, &scene, &[0, 1, 2, 3, 4, 5]).unwrap();
+        let mut events = Vec::new();
+        let mut check = |frame_ohm: &[f64], _: &Deformation| events.extend(monitor.check(frame_ohm));
+        frames(&sensor, &scene, None, 300, &mut check);
+        frames(
+            &sensor,
+            &scene,
+            Some("short-rows:3-4".parse().unwrap()),
+            100,
+            &mut check,
+        );
+        frames(&sensor, &scene, None, 50, &mut check);
+        let [FaultEvent::Named(named), FaultEvent::Recovered] = events[..] else {
+            panic!("{loading}: {events:?}");
+        };
+        assert_eq!(
+            (named.wire, named.cause),
+            (FaultyWire::Rows(2), FaultCause::Shorted),
+            "{loading}"
+        );
+        assert!(named.probability >= FaultMonitor::SURE);
+    }
+}
+
+/// Rows on both sides of the columns' middle read the same at rest, or wherever they are pressed alike.
+#[test]
+fn equal_readings_of_symmetric_rows_at_rest_or_under_a_held_press_are_no_short() {
+    let mut sensor = SensorModel::new("2x4_2x12".parse().unwrap());
+    sensor.geometry.row_x0_mm = 16.0;
+    let scene = Scene {
+        noise: Noise::relative(1e-3),
+        loading: Loading::Indenter(Indenter::default()),
+        ..Scene::default()
+    };
+    let source = scene.noise.source(&sensor).unwrap();
+    let mut monitor = FaultMonitor::new(&sensor, &scene, &[0, 1]).unwrap();
+    let mut rng = Seed(1).rng(Stream::LiveNoise);
+    for depth_mm in [0.0, 0.7] {
+        let pressed = vec![DVec3::Z * depth_mm; 4];
+        let rows = [0, 1].map(|row| sensor.row_resistances(row, &pressed).unwrap());
+        assert!(
+            rows[0]
+                .iter()
+                .zip(&rows[1])
+                .all(|(one, other)| (one / other - 1.0).abs() < 1e-12)
+        );
+        for frame in 0..500 {
+            let mut frame_ohm = rows.concat();
+            source.disturb(&mut frame_ohm, &mut rng);
+            assert_eq!(monitor.check(&frame_ohm), None, "{depth_mm} {frame}");
+        }
+    }
+}
+
+#[test]
+fn an_answer_without_a_wire_depends_on_no_frame_before() {
+    let (sensor, scene) = sensor_and_scene();
+    let rows = Vec::from_iter(0..10);
+    let mut decoder = LeftOutDecoder::new(&sensor, &scene, &rows).unwrap();
+    let mut all_ohm = Vec::new();
+    frames(&sensor, &scene, None, 6, |frame_ohm, _| {
+        all_ohm.push(frame_ohm.to_vec());
+    });
+    for (wire, cause) in [
+        (FaultyWire::Row(4), FaultCause::NoSignal),
+        (FaultyWire::Row(0), FaultCause::Unknown),
+        (FaultyWire::Rows(3), FaultCause::Shorted),
+        (FaultyWire::Column(2), FaultCause::NoSignal),
+    ] {
+        decoder.leave_out(Some(Diagnosis {
+            wire,
+            cause,
+            probability: 1.0,
+        }));
+        let mut decode = |frame_ohm: &[f64]| {
+            let mut answer_mm = vec![0.0; 10 * decoder.outputs()];
+            decoder.decode(frame_ohm, &mut answer_mm).unwrap();
+            for row in 0..10 {
+                let mut of_row = vec![0.0; decoder.outputs()];
+                decoder.decode_row_of(frame_ohm, row, &mut of_row).unwrap();
+                assert_eq!(
+                    of_row,
+                    answer_mm[row * decoder.outputs()..][..of_row.len()],
+                    "{wire} {row}"
+                );
+            }
+            answer_mm
+        };
+        let forwards: Vec<_> = all_ohm.iter().map(|frame_ohm| decode(frame_ohm)).collect();
+        let mut backwards: Vec<_> = all_ohm.iter().rev().map(|frame_ohm| decode(frame_ohm)).collect();
+        backwards.reverse();
+        assert_eq!(forwards, backwards, "{wire}");
+    }
+    // A row without signal is between its neighbours.
+    decoder.leave_out(Some(Diagnosis {
+        wire: FaultyWire::Row(4),
+        cause: FaultCause::NoSignal,
+        probability: 1.0,
+    }));
+    let mut answer_mm = vec![0.0; 10 * decoder.outputs()];
+    decoder.decode(&all_ohm[0], &mut answer_mm).unwrap();
+    let z_mm = |row: usize| answer_mm[row * decoder.outputs() + 2];
+    assert!((z_mm(4) - 0.5 * (z_mm(3) + z_mm(5))).abs() < 1e-12);
+}
+
+/// Errors in mm of z, of frames that the fault spoils, with all wires and without those at fault.
+#[test]
+fn leaving_the_wire_out_brings_the_answer_back() {
+    let (sensor, scene) = sensor_and_scene();
+    for (text, gain) in [("open-column:7", 1.5), ("gain:11=0.05", 1.5), ("stuck:2=low", 1.5)] {
+        let mut source = Simulated::new(&sensor, &scene, Seed(7), 10.0).unwrap();
+        source.set_fault(Some(text.parse().unwrap())).unwrap();
+        let mut monitor = FaultMonitor::new(&sensor, &scene, source.rows()).unwrap();
+        let mut decoder = LeftOutDecoder::new(&sensor, &scene, source.rows()).unwrap();
+        let mut frame_ohm = vec![0.0; source.readings()];
+        let mut answer_mm = vec![0.0; 10 * decoder.outputs()];
+        let mut errors_mm = [0.0; 2];
+        for _ in 0..20 {
+            source.next_frame(&mut frame_ohm).unwrap();
+            monitor.check(&frame_ohm);
+            let Some(named) = monitor.named() else { continue };
+            for (error_mm, fault) in errors_mm.iter_mut().zip([None, Some(named)]) {
+                decoder.leave_out(fault);
+                decoder.decode(&frame_ohm, &mut answer_mm).unwrap();
+                let truth = (0..10).flat_map(|row| source.deformation().row_positions_mm(&sensor, row));
+                let pairs = answer_mm.chunks_exact(3).zip(truth);
+                *error_mm += pairs.map(|(node, truth)| (node[2] - truth.z).abs()).sum::<f64>();
+            }
+        }
+        let [with, without] = errors_mm;
+        assert!(without > 0.0 && with > gain * without, "{text}: {with} {without}");
+    }
+}
+
+#[test]
+fn faults_are_read_as_they_are_written_and_others_are_refused() {
+    for text in [
+        "open-row:3@1",
+        "open-column:30@5",
+        "short-rows:9-10",
+        "short-columns:1-2",
+        "gain:7=-0.05",
+        "stuck:1=low",
+        "stuck:1=high",
+    ] {
+        assert_eq!(text.parse::<Fault>().unwrap().to_string(), text);
+    }
+    assert_eq!("open-row:3".parse::<Fault>(), "open-row:3@1".parse());
+    for text in [
+        "",
+        "open-row:0",
+        "short-rows:1-3",
+        "gain:7",
+        "stuck:1=up",
+        "broken:1",
+        "gain:1=nan",
+    ] {
+        assert!(text.parse::<Fault>().is_err(), "{text}");
+    }
+    let scale = "10x6_3x18".parse().unwrap();
+    for (text, words) in [
+        ("open-row:11", "no row-wire 11; give 1 to 10"),
+        ("open-row:10@7", "no node on a row-wire 7; give 1 to 6"),
+        ("short-columns:18-19", "no column-wire 19; give 1 to 18"),
+        ("short-rows:2-3", "row 3 is not read"),
+    ] {
+        let read: Vec<usize> = if text == "short-rows:2-3" {
+            vec![1]
+        } else {
+            (0..10).collect()
+        };
+        let message = text
+            .parse::<Fault>()
+            .unwrap()
+            .check(scale, &read)
+            .unwrap_err()
+            .to_string();
+        assert!(message.contains(words), "{message}");
+    }
+}

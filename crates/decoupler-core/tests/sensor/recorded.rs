@@ -1,0 +1,220 @@
+//! What recorded readings tell, judged on sets whose truth is known by construction.
+
+use decoupler_core::{
+    dataset::{Dataset, Division, Folds, Parts, Seed, SplitBy, Stream},
+    evaluation::{
+        CrossValidated, Measured, RunSettings,
+        recorded::{
+            Doubling, FittedModel, Interval, LearningCurve, NonlinearGain, SplitComparison, channel_importance,
+        },
+    },
+    scene::RowModel,
+};
+use ndarray::Array2;
+use rand::{Rng, RngExt, SeedableRng, rngs::ChaCha8Rng};
+
+/// A value of mean 0 and variance 1.
+fn normal(rng: &mut impl Rng) -> f64 {
+    (0..12).map(|_| rng.random::<f64>()).sum::<f64>() - 6.0
+}
+
+/// Independent samples of so many normal readings with one target.
+fn set(samples: usize, channels: usize, seed: u64, target: impl Fn(&[f64], &mut ChaCha8Rng) -> f64) -> Dataset {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let readings = Array2::from_shape_simple_fn((samples, channels), || normal(&mut rng));
+    let targets = Array2::from_shape_fn((samples, 1), |(sample, _)| {
+        target(readings.row(sample).as_slice().unwrap(), &mut rng)
+    });
+    Dataset::new(readings, targets, None, (0..samples).collect()).unwrap()
+}
+
+fn settings() -> RunSettings {
+    let mut settings = RunSettings::from(Measured { rows: RowModel::Shared });
+    (settings.hidden, settings.training.stopping.epochs) = (4, 30);
+    settings
+}
+
+#[test]
+fn a_random_split_flatters_where_samples_of_a_group_are_alike() {
+    // Readings tell the group and nothing else, and each group has an offset of its own.
+    let mut rng = ChaCha8Rng::seed_from_u64(3);
+    let offsets: Vec<f64> = (0..20).map(|_| rng.random_range(-1.0..1.0)).collect();
+    let readings = Array2::from_shape_fn((400, 20), |(sample, channel)| {
+        f64::from(u8::from(sample / 20 == channel))
+    });
+    let targets = Array2::from_shape_fn((400, 1), |(sample, _)| offsets[sample / 20] + 0.01 * normal(&mut rng));
+    let groups = (0..400).map(|sample| sample / 20).collect();
+    let alike = Dataset::new(readings, targets, None, groups).unwrap();
+    let compared = |set: &Dataset, by| {
+        let dealt = Folds::by(set, 5, by, &mut Seed(0).rng(Stream::Split)).unwrap();
+        let validated = CrossValidated::on_folds(&settings(), set, dealt, || false)
+            .unwrap()
+            .unwrap();
+        SplitComparison::complete(&settings(), set, 5, (by, &validated), &|| false)
+            .unwrap()
+            .unwrap()
+    };
+    // Whichever split was asked for, where there are groups random folds are compared with folds by group.
+    for by in SplitBy::ALL {
+        let compared = compared(&alike, by);
+        assert_eq!(compared.by, SplitBy::Group);
+        let ratios = [compared.network_ratio(0).unwrap(), compared.ridge_ratio(0).unwrap()];
+        assert!(ratios.iter().all(|ratio| *ratio < 0.2), "{by}: {ratios:?}");
+        let sentence = compared.sentence(0, "offset");
+        assert!(sentence.contains("split is optimistic by 9"), "{sentence}");
+    }
+    let independent = set(400, 3, 4, |c, rng| c[0] - 0.5 * c[1] + 0.3 * normal(rng));
+    let of_independent = compared(&independent, SplitBy::Random);
+    assert_eq!(of_independent.by, SplitBy::Time);
+    let sentence = of_independent.sentence(0, "y");
+    assert!(sentence.contains("is not optimistic"), "{sentence}");
+    let dealt = Folds::by(&independent, 5, SplitBy::Random, &mut Seed(0).rng(Stream::Split)).unwrap();
+    let validated = CrossValidated::on_folds(&settings(), &independent, dealt, || false)
+        .unwrap()
+        .unwrap();
+    let given = (SplitBy::Random, &validated);
+    let cancelled = SplitComparison::complete(&settings(), &independent, 5, given, &|| true).unwrap();
+    assert_eq!(cancelled, None);
+}
+
+#[test]
+fn the_error_grows_without_a_channel_by_what_only_that_channel_tells() {
+    let set = set(2000, 4, 5, |c, rng| 2.0 * c[0] + 0.5 * c[1] + 0.5 * normal(rng));
+    let folds = Folds::by(&set, 5, SplitBy::Time, &mut Seed(0).rng(Stream::Split)).unwrap();
+    let importance = |set: &Dataset, model| {
+        let found = channel_importance(&settings(), set, (&folds, SplitBy::Time), model, &|| false);
+        found.unwrap().unwrap()
+    };
+    let found = importance(&set, FittedModel::Ridge);
+    // √(2² + 0.5²)/0.5, √(0.5² + 0.5²)/0.5, and nothing.
+    for (channel, expected) in [(0, 4.123), (1, 1.414), (2, 1.0), (3, 1.0)] {
+        let growth = found[channel].growth[0].unwrap();
+        assert!((growth.value / expected - 1.0).abs() < 0.05, "{channel}: {growth:?}");
+        assert!(
+            growth.low - 0.01 < expected && expected < growth.high + 0.01,
+            "{channel}: {growth:?}"
+        );
+        assert_eq!(found[channel].is_dispensable(), channel > 1, "{channel}: {growth:?}");
+    }
+    // A copy makes the channel dispensable, which permuting it would not show.
+    let copied = set.of_channels(&[0, 1, 2, 0]);
+    let found = importance(&copied, FittedModel::Ridge);
+    assert!(found[0].largest().unwrap().value < 1.01 && found[1].largest().unwrap().value > 1.3);
+    let few = set.select(&Vec::from_iter(0..300));
+    let folds = Folds::by(&few, 3, SplitBy::Time, &mut Seed(0).rng(Stream::Split)).unwrap();
+    let found = channel_importance(
+        &settings(),
+        &few,
+        (&folds, SplitBy::Time),
+        FittedModel::Network,
+        &|| false,
+    );
+    let growth: Vec<f64> = found
+        .unwrap()
+        .unwrap()
+        .iter()
+        .map(|of| of.growth[0].unwrap().value)
+        .collect();
+    assert!(
+        growth[0] > 3.0 && (1.1..2.0).contains(&growth[1]) && growth[2] < 1.1,
+        "{growth:?}"
+    );
+}
+
+#[test]
+fn a_learning_curve_foretells_the_error_with_twice_the_samples() {
+    // Least squares with p = 20 readings: the error is σ √(1 + p/(n − p − 1)) for n samples, on average.
+    let all = set(4000, 20, 6, |c, rng| c.iter().sum::<f64>() + 3.0 * normal(rng));
+    let curve = |samples: usize, by| {
+        let parts = Parts {
+            training: (0..samples).collect(),
+            validation: Vec::new(),
+            test: (2000..4000).collect(),
+        };
+        let found = LearningCurve::measure(&settings(), &all, (&parts, by), FittedModel::Ridge, &|| false);
+        found.unwrap().unwrap().remove(0)
+    };
+    let theory = |samples: f64| 3.0 * (1.0 + 20.0 / (samples - 21.0)).sqrt();
+    for by in [SplitBy::Time, SplitBy::Random, SplitBy::Group] {
+        for samples in [60, 80, 120] {
+            let n = samples as f64;
+            let expected = theory(2.0 * n) / theory(n);
+            let ratio = curve(samples, by).doubling.unwrap().ratio;
+            assert!(
+                ratio.low < expected && expected < ratio.high,
+                "{by}, {samples}: {ratio:?}, {expected}"
+            );
+            assert!(ratio.value < 0.99, "{by}, {samples}: {ratio:?}");
+        }
+    }
+    let ratio = Interval {
+        value: 0.9,
+        low: 0.85,
+        high: 0.95,
+    };
+    let few = LearningCurve {
+        doubling: Some(Doubling { ratio }),
+        ..curve(80, SplitBy::Time)
+    };
+    assert!(few.gains());
+    assert_eq!(
+        few.sentence("y"),
+        "twice the samples would lower the error of y by about 10 % (5 to 15 %)"
+    );
+    let many = curve(2000, SplitBy::Time);
+    assert!(!many.gains(), "{:?}", many.doubling);
+    assert!(
+        many.sentence("y").starts_with("no gain seen for y"),
+        "{}",
+        many.sentence("y")
+    );
+    assert_eq!(many.points.len(), 7);
+    assert!(many.points.windows(2).all(|pair| pair[0].samples < pair[1].samples));
+    let least = many.points.last().unwrap();
+    assert!((least.rmse / theory(2000.0) - 1.0).abs() < 0.05, "{least:?}");
+    let none = curve(9, SplitBy::Time);
+    assert_eq!((none.law, none.doubling), (None, None));
+    assert!(none.sentence("y").contains("too few"));
+}
+
+#[test]
+fn a_network_no_better_than_ridge_is_said_to_be_no_better() {
+    let gain = |set: &Dataset| {
+        let folds = Folds::by(set, 5, SplitBy::Time, &mut Seed(0).rng(Stream::Split)).unwrap();
+        let validated = CrossValidated::on_folds(&settings(), set, folds, || false)
+            .unwrap()
+            .unwrap();
+        NonlinearGain::of_validated(set, &validated, SplitBy::Time)[0].unwrap()
+    };
+    let linear = gain(&set(400, 3, 7, |c, rng| c[0] + c[1] + normal(rng)));
+    let remark = linear.remark("y").unwrap();
+    assert!(remark.contains("found little more than a linear map"), "{remark}");
+    let curved = gain(&set(400, 3, 8, |c, rng| c[0] + c[1] * c[1] + 0.2 * normal(rng)));
+    assert!(curved.is_supported() && curved.remark("y").is_none(), "{curved:?}");
+}
+
+#[test]
+fn folds_of_every_rule_are_validated_and_seeded() {
+    let set = set(120, 3, 9, |c, rng| c[0] - c[2] + 0.1 * normal(rng));
+    for by in SplitBy::ALL {
+        let validate = || {
+            let folds = Folds::by(&set, 4, by, &mut Seed(1).rng(Stream::Split)).unwrap();
+            CrossValidated::on_folds(&settings(), &set, folds, || false)
+                .unwrap()
+                .unwrap()
+        };
+        let (one, other) = (validate(), validate());
+        assert_eq!((&one.network, &one.linear), (&other.network, &other.linear), "{by}");
+        let scores = one.scores(&set);
+        let r2 = [&scores.network, &scores.baselines.linear].map(|errors| errors.targets()[0].r2.unwrap());
+        assert!(r2.iter().all(|r2| *r2 > 0.95), "{by}: {r2:?}");
+    }
+    assert_eq!(settings().validation_fraction(), 0.0);
+    let parts = Division::default()
+        .divide(&set, &mut Seed(0).rng(Stream::Split))
+        .unwrap();
+    assert_eq!(
+        (parts.training.len(), parts.validation.len(), parts.test.len()),
+        (96, 0, 24)
+    );
+}

@@ -1,0 +1,169 @@
+//! Trainings that come to nothing say why, and what to change.
+
+use decoupler_core::training::{
+    Method, SettingError, StopReason, StoppingRules, Trainer, TrainingFlaw, TrainingSettings,
+};
+
+use crate::problems::{problem, start};
+
+/// Names of settings, and the values they are given.
+type Values = &'static [(&'static str, f64)];
+
+/// The method of this short name with these settings.
+fn method(short_name: &str, values: &[(&str, f64)]) -> Method {
+    let mut methods = Method::all().into_iter();
+    let mut method = methods.find(|method| method.short_name() == short_name).unwrap();
+    for (name, value) in values {
+        let mut settings = method.settings();
+        let setting = settings.iter_mut().find(|setting| setting.name == *name).unwrap();
+        *setting.value = *value;
+    }
+    method
+}
+
+fn trained(method: Method, epochs: usize) -> Trainer {
+    let stopping = StoppingRules {
+        epochs,
+        ..StoppingRules::default()
+    };
+    let mut trainer = Trainer::new(start(), problem(), TrainingSettings { method, stopping }).expect("it can begin");
+    while trainer.step().is_none() {}
+    trainer
+}
+
+#[test]
+fn settings_that_cannot_work_are_refused_with_the_way_out() {
+    let cases = [
+        (
+            "lm",
+            vec![("mu", 1e12)],
+            "mu is 1e12, above largest mu, which is 1e10: lower mu, or raise largest mu",
+        ),
+        ("br", vec![("largest mu", 1e-6)], "lower mu, or raise largest mu"),
+        ("varpro", vec![("mu", 1e300)], "mu is 1e300, above largest mu"),
+        (
+            "rp",
+            vec![("first step length", 1e300)],
+            "first step length is 1e300, above largest step length, which is 50",
+        ),
+        (
+            "gdms",
+            vec![("momentum", 1.0)],
+            "momentum is 1: it must be from 0 to 0.999999",
+        ),
+        (
+            "gdx",
+            vec![("momentum", 1.0)],
+            "momentum is 1: it must be from 0 to 0.999999",
+        ),
+    ];
+    for (name, values, words) in cases {
+        let settings = TrainingSettings {
+            method: method(name, &values),
+            stopping: StoppingRules::default(),
+        };
+        let refused: SettingError = settings.check().unwrap_err();
+        assert!(refused.to_string().contains(words), "{name}: {refused}");
+        assert!(Trainer::new(start(), problem(), settings).is_err(), "{name}");
+    }
+    // Momentum of gradients is the gradient of the epoch before: it works.
+    assert!(method("gdm", &[("momentum", 1.0)]).check().is_ok());
+}
+
+/// The flaw names the method's own settings, never those of another.
+#[test]
+fn a_training_that_leaves_its_start_or_diverges_says_why_and_what_to_change() {
+    let cases: [(&str, Values, &str); 8] = [
+        ("scg", &[("lambda", 1e300)], "lambda to 5e-7 (now 1e300)"),
+        ("gdx", &[("learning rate", 1e300)], "learning rate to 0.01 (now 1e300)"),
+        (
+            "gdx",
+            &[("learning rate", 1e-300)],
+            "learning rate to 0.01 (now 1e-300)",
+        ),
+        ("gd", &[("learning rate", 1e300)], "learning rate to 0.01 (now 1e300)"),
+        (
+            "gdm",
+            &[("learning rate", 1e6), ("momentum", 1.0)],
+            "learning rate to 0.01 (now 1e6), momentum to 0.9 (now 1)",
+        ),
+        ("gdms", &[("learning rate", 1e-9)], "learning rate to 0.01 (now 1e-9)"),
+        (
+            "rp",
+            &[("first step length", 1e300), ("largest step length", 1e300)],
+            "first step length to 0.07 (now 1e300)",
+        ),
+        ("lm", &[("mu", 1e300), ("largest mu", 1e300)], "mu to 0.001 (now 1e300)"),
+    ];
+    for (name, values, words) in cases {
+        let trainer = trained(method(name, values), 30);
+        let flaw = TrainingFlaw::of(&trainer).unwrap_or_else(|| panic!("{name} has a flaw"));
+        let text = flaw.to_string();
+        assert!(
+            flaw.is_at_start && text.contains("no better than its random start"),
+            "{text}"
+        );
+        assert!(text.contains(words), "{name}: {text}");
+        let has_rate = method(name, &[])
+            .settings()
+            .iter()
+            .any(|setting| setting.name == "learning rate");
+        assert!(has_rate || !text.contains("learning rate"), "{name}: {text}");
+    }
+}
+
+#[test]
+fn a_sound_training_has_no_flaw_and_one_under_way_not_yet() {
+    for method in Method::all() {
+        let trainer = trained(method, 200);
+        assert_eq!(TrainingFlaw::of(&trainer), None, "{method}");
+    }
+    let settings = TrainingSettings::default();
+    let trainer = Trainer::new(start(), problem(), settings).unwrap();
+    assert_eq!(TrainingFlaw::of(&trainer), None);
+}
+
+/// Step lengths that only grow lower the error for a while before it grows without end.
+#[test]
+fn a_training_that_diverges_late_names_the_epoch_and_keeps_the_best_weights() {
+    let mut found = false;
+    for increase in [1.3, 1.6, 2.0, 3.0, 5.0] {
+        let growing = [
+            ("length increase", increase),
+            ("length decrease", 0.999),
+            ("largest step length", 1e300),
+        ];
+        let trainer = trained(method("rp", &growing), 3000);
+        let Some(flaw) = TrainingFlaw::of(&trainer).filter(|flaw| !flaw.is_at_start) else {
+            continue;
+        };
+        found = true;
+        let epoch = flaw.diverged_in.expect("it is better than its start, so it diverged");
+        let history = trainer.history();
+        let start_mse = history[0].training_mse;
+        assert!(history[epoch..].iter().all(|record| record.training_mse > start_mse));
+        assert!(history[epoch - 1].training_mse <= start_mse);
+        assert!(
+            flaw.to_string().contains(&format!("diverged in epoch {epoch}")),
+            "{flaw}"
+        );
+        let errors = history.iter().filter_map(|record| record.validation_mse);
+        assert_eq!(trainer.best_mse(), errors.fold(f64::INFINITY, f64::min));
+        assert!(trainer.best_mse() < history[0].validation_mse.unwrap());
+    }
+    assert!(found, "one of these diverges after a good beginning");
+}
+
+#[test]
+fn no_reason_of_stopping_advises_a_setting_that_the_method_has_not() {
+    for reason in [StopReason::Diverged, StopReason::MuLarge, StopReason::LambdaLarge] {
+        for mut method in Method::all() {
+            let text = format!("{reason} {}", reason.remedy(&method));
+            let names: Vec<&str> = method.settings().iter().map(|setting| setting.name).collect();
+            for word in ["learning rate", "step length"] {
+                let has_it = names.iter().any(|name| name.contains(word));
+                assert!(has_it || !text.contains(word), "{method}: {text}");
+            }
+        }
+    }
+}

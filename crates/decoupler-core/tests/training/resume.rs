@@ -1,0 +1,109 @@
+//! A training that is interrupted, saved, read and resumed gives the same bits as one that is not.
+
+use decoupler_core::training::{
+    Method, ResumeError, StopReason, StoppingRules, Trainer, TrainerState, TrainingSettings,
+};
+
+use crate::problems::{problem, start, trainer};
+
+fn run(trainer: &mut Trainer, epochs: usize) {
+    (0..epochs).for_each(|_| {
+        trainer.step();
+    });
+}
+
+fn through_a_file(trainer: &Trainer) -> TrainerState {
+    let text = serde_json::to_string(&trainer.state()).expect("a state can be written");
+    serde_json::from_str(&text).expect("what was written can be read")
+}
+
+#[test]
+fn interrupted_and_uninterrupted_trainings_are_the_same_bits_for_every_method() {
+    for method in Method::all() {
+        let mut whole = trainer(method);
+        let mut first = trainer(method);
+        run(&mut whole, 20);
+        run(&mut first, 10);
+        let mut second = Trainer::resume(through_a_file(&first), problem()).unwrap();
+        run(&mut second, 10);
+        assert_eq!(second.history(), whole.history(), "{method}");
+        assert_eq!(second.history().len(), 21, "{method}");
+        assert_eq!(second.best(), whole.best(), "{method}");
+        assert_eq!(
+            (second.best_epoch(), second.stop_reason()),
+            (whole.best_epoch(), whole.stop_reason())
+        );
+    }
+}
+
+#[test]
+fn another_method_goes_on_from_the_present_weights() {
+    let [lm, .., gd] = Method::all();
+    let mut trainer = trainer(gd);
+    run(&mut trainer, 5);
+    let before = trainer.latest().training_mse;
+    trainer.continue_with(lm).unwrap();
+    trainer.step();
+    assert_eq!(trainer.latest().epoch, 6);
+    assert!(trainer.latest().training_mse < 0.5 * before);
+    assert_eq!(trainer.settings().method, lm);
+}
+
+#[test]
+fn more_epochs_let_a_finished_training_go_on() {
+    let few = StoppingRules {
+        epochs: 3,
+        ..StoppingRules::default()
+    };
+    let settings = TrainingSettings {
+        method: Method::default(),
+        stopping: few,
+    };
+    let mut trainer = Trainer::new(start(), problem(), settings).unwrap();
+    run(&mut trainer, 5);
+    assert_eq!(trainer.stop_reason(), Some(StopReason::EpochsReached));
+    trainer.continue_with(Method::default()).unwrap();
+    assert_eq!(trainer.stop_reason(), Some(StopReason::EpochsReached));
+    trainer.set_stopping(StoppingRules { epochs: 4, ..few }).unwrap();
+    assert_eq!(trainer.step(), Some(StopReason::EpochsReached));
+    assert_eq!(trainer.latest().epoch, 4);
+}
+
+#[test]
+fn a_damaged_or_foreign_state_is_refused() {
+    let mut trainer = trainer(Method::default());
+    run(&mut trainer, 3);
+    let text = serde_json::to_string(&trainer.state()).unwrap();
+    assert!(
+        serde_json::from_str::<TrainerState>(&text[..text.len() / 2]).is_err(),
+        "truncated"
+    );
+    let edited = |edit: fn(&mut serde_json::Value)| {
+        let mut value: serde_json::Value = serde_json::from_str(&text).unwrap();
+        edit(&mut value);
+        Trainer::resume(serde_json::from_value(value).unwrap(), problem())
+            .err()
+            .unwrap()
+    };
+    let damaged = |error| matches!(error, ResumeError::Damaged(_));
+    assert!(damaged(edited(|value| value["shape"]["hidden"] = 7.into())), "layers");
+    let gap = text.replacen("\"epoch\":[0,1,", "\"epoch\":[0,5,", 1);
+    let error = serde_json::from_str::<TrainerState>(&gap).expect_err("a gap is noticed");
+    assert!(error.to_string().contains("epoch 1 is missing"), "{error}");
+    assert!(damaged(edited(|value| value["best_epoch"] = 4.into())), "best epoch");
+    assert!(
+        damaged(edited(|value| value["stages"] = serde_json::json!([]))),
+        "stages"
+    );
+    assert!(
+        damaged(edited(|value| value["method"] = serde_json::json!("gradient_descent"))),
+        "method"
+    );
+    assert!(
+        matches!(
+            edited(|value| value["weights"][0] = 3.5.into()),
+            ResumeError::OtherSamples { .. }
+        ),
+        "samples"
+    );
+}

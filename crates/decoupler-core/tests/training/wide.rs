@@ -1,0 +1,112 @@
+//! Networks too wide for their equations to be factored.
+
+use decoupler_core::{
+    network::{Mlp, Shape},
+    training::{
+        Examples, MachineMemory, Method, Problem, StoppingRules, Trainer, TrainerState, TrainingError, TrainingSettings,
+    },
+};
+use ndarray::Array2;
+
+use crate::problems::wave;
+
+fn named(name: &str) -> Method {
+    let method = Method::all().into_iter().find(|method| method.short_name() == name);
+    method.expect("it is offered")
+}
+
+fn samples(shape: Shape, count: usize) -> (Array2<f64>, Array2<f64>) {
+    let inputs = Array2::from_shape_fn((count, shape.inputs), |(row, column)| wave(row, column));
+    let targets = Array2::from_shape_fn((count, shape.outputs), |(row, output)| {
+        (inputs[[row, output]] + 0.5 * inputs[[row, output + 1]]).sin()
+    });
+    (inputs, targets)
+}
+
+fn problem(shape: Shape, count: usize) -> Problem {
+    let (inputs, targets) = samples(shape, count);
+    Problem {
+        training: Examples::new(inputs.view(), targets.view()),
+        validation: None,
+        test: None,
+    }
+}
+
+fn begin(method: &str, shape: Shape, samples: usize) -> Result<Trainer, TrainingError> {
+    let start = Mlp::from_weights(shape, (0..shape.weights()).map(|index| 0.3 * wave(index, 9)).collect());
+    let settings = TrainingSettings {
+        method: named(method),
+        stopping: StoppingRules::default(),
+    };
+    Trainer::new(start, problem(shape, samples), settings)
+}
+
+const WIDE: Shape = Shape {
+    inputs: 40,
+    hidden: 60,
+    outputs: 6,
+};
+
+#[test]
+fn a_wide_network_learns() {
+    let mut trainer = begin("lm", WIDE, 700).unwrap();
+    let start = trainer.latest().training_mse;
+    for _ in 0..6 {
+        trainer.step();
+    }
+    let reached = trainer.latest().training_mse;
+    // What is recorded is the error of the network itself.
+    let (inputs, targets) = samples(WIDE, 700);
+    let errors = trainer.present().forward(inputs.view()) - targets;
+    let found = errors.mapv(|error| error * error).mean().expect("there are samples");
+    assert!((reached - found).abs() < 1e-12 * found, "{reached:e} {found:e}");
+    assert!(reached < 1e-2 * start, "{start:e} {reached:e}");
+}
+
+#[test]
+fn a_wide_network_is_resumed_with_the_same_bits() {
+    let run = |trainer: &mut Trainer| {
+        (0..2).for_each(|_| {
+            trainer.step();
+        });
+    };
+    let mut whole = begin("lm", WIDE, 700).unwrap();
+    run(&mut whole);
+    let text = serde_json::to_string(&whole.state()).unwrap();
+    let state: TrainerState = serde_json::from_str(&text).unwrap();
+    let mut resumed = Trainer::resume(state, problem(WIDE, 700)).unwrap();
+    run(&mut whole);
+    run(&mut resumed);
+    assert_eq!(whole.present(), resumed.present());
+}
+
+/// Its equations would have 2 million rows: 32 TB, and their inverse as much.
+#[test]
+fn only_a_method_that_must_factor_refuses_a_very_wide_network() {
+    let shape = Shape {
+        inputs: 2000,
+        hidden: 1000,
+        outputs: 3,
+    };
+    let refused = begin("br", shape, 8).err().unwrap();
+    assert!(
+        matches!(refused, TrainingError::TooWide { trainings: 1, memory, .. } if memory == MachineMemory::of_this_machine()),
+        "{refused:?}"
+    );
+    assert!(
+        refused
+            .to_string()
+            .contains(&MachineMemory::of_this_machine().to_string()),
+        "{refused}"
+    );
+    // 23 205 rows, were they written out: 4 GB.
+    let shape = Shape {
+        inputs: 220,
+        hidden: 105,
+        outputs: 3,
+    };
+    let mut trainer = begin("lm", shape, 8).unwrap();
+    let start = trainer.latest().training_mse;
+    trainer.step();
+    assert!(trainer.latest().training_mse < 0.5 * start);
+}

@@ -1,0 +1,81 @@
+//! Makes the files in `assets/samples`: a small network, a recording that it decodes, and a table of one row-wire with the
+//! deformation of its nodes, all simulated: `cargo run --release --example samples -- assets/samples`.
+#![expect(clippy::print_stdout, reason = "an example's result is what it prints")]
+
+use std::{error::Error, fmt::Write as _, fs, path::PathBuf};
+
+use decoupler_core::{
+    dataset::Seed,
+    evaluation::{Run, Simulation, ready_settings},
+    live::{Recorder, Simulated},
+    scene::Noise,
+};
+use decoupler_files::export::NetworkFile;
+
+/// A fifteenth of a second is enough for the eye, and keeps the file small.
+const FRAMES_PER_SECOND: f64 = 15.0;
+const FRAMES: usize = 60;
+/// Lines of the table, and the row-wire that it is of, from 0.
+const LINES: usize = 400;
+const ROW: usize = 2;
+/// Six digits of a reading lose nothing in this noise.
+const NOISE: f64 = 2e-5;
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let folder = std::env::args()
+        .nth(1)
+        .map_or_else(|| PathBuf::from("target/samples"), PathBuf::from);
+    fs::create_dir_all(&folder)?;
+    let mut source = Simulation::default();
+    source.sensor.scale = "10x6_3x18".parse()?;
+    let mut settings = ready_settings(&source).ok_or("the array is too large")?;
+    settings.source.scene.noise = Noise::relative(NOISE);
+    (settings.source.samples, settings.source.test_samples) = (4000, 200);
+    settings.hidden = 8;
+    settings.training.stopping.epochs = 60;
+    let mut run = Run::prepare(settings)?;
+    while run.step().is_none() {}
+    let file = NetworkFile::from_run(&run, None)?;
+    file.save(&folder.join("network.json"))?;
+    println!(
+        "network.json: Z {:.3} %",
+        file.scores.network.percent().unwrap_or(f64::NAN)
+    );
+
+    let columns = settings.source.sensor.scale.columns();
+    let (sensor, scene) = (&settings.source.sensor, &settings.source.scene);
+    let mut source = Simulated::new(sensor, scene, Seed(0), FRAMES_PER_SECOND)?;
+    let mut frame_ohm = vec![0.0; source.readings()];
+    let mut recording = Vec::new();
+    let mut recorder = Recorder::new(&mut recording, source.rows(), columns)?;
+    for _ in 0..FRAMES {
+        let time_s = source.next_frame(&mut frame_ohm)?;
+        frame_ohm.iter_mut().for_each(|ohm| *ohm = rounded(*ohm));
+        recorder.record(rounded(time_s), &frame_ohm)?;
+    }
+    fs::write(folder.join("recording.csv"), recording)?;
+
+    let mut table = String::from("time_s");
+    (1..=columns).for_each(|column| table += &format!(",r_{column}"));
+    (1..=sensor.scale.nodes_per_row()).for_each(|node| table += &format!(",depth_{node}_mm"));
+    table.push('\n');
+    let mut source = Simulated::new(sensor, scene, Seed(1), FRAMES_PER_SECOND)?;
+    for _ in 0..LINES {
+        let time_s = source.next_frame(&mut frame_ohm)?;
+        write!(table, "{time_s:.3}")?;
+        for ohm in &frame_ohm[ROW * columns..][..columns] {
+            write!(table, ",{}", rounded(*ohm))?;
+        }
+        for node in source.deformation().row_mm(ROW) {
+            write!(table, ",{:.4}", node.z)?;
+        }
+        table.push('\n');
+    }
+    fs::write(folder.join("simulated_row.csv"), table)?;
+    Ok(())
+}
+
+/// To six significant digits.
+fn rounded(value: f64) -> f64 {
+    format!("{value:.5e}").parse().unwrap_or(value)
+}

@@ -1,0 +1,346 @@
+use std::{
+    fs::{self, File, Permissions},
+    io::{self, BufWriter, ErrorKind, Write},
+    path::{Path, PathBuf},
+};
+
+use thiserror::Error;
+
+use super::unfinished::{Unfinished, folder_of};
+use decoupler_core::text::system_cause;
+
+/// Errors of writing a file.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum WriteError {
+    /// Its folder is missing.
+    #[error("cannot write '{}': the folder '{}' does not exist; make it first", .path.display(), .folder.display())]
+    NoFolder {
+        /// The file.
+        path: PathBuf,
+        /// Its folder.
+        folder: PathBuf,
+    },
+    /// The path is a folder.
+    #[error("cannot write '{}': it is a folder; give the name of a file", .0.display())]
+    Folder(PathBuf),
+    /// The file there is write-protected.
+    #[error("cannot write '{}': it is read-only; give another name", .0.display())]
+    ReadOnly(PathBuf),
+    /// The operating system refuses.
+    #[error("cannot write '{}': {}", .path.display(), system_cause(.source))]
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// The error of the operating system.
+        source: io::Error,
+    },
+}
+
+impl WriteError {
+    /// Wraps the operating system's error about `path`.
+    pub fn io(path: &Path, source: io::Error) -> Self {
+        Self::Io {
+            path: path.to_owned(),
+            source,
+        }
+    }
+
+    /// Returns true if there is such a file already, see [`AtomicFile::commit_new`].
+    pub(super) fn is_taken(&self) -> bool {
+        matches!(self, Self::Io { source, .. } if source.kind() == ErrorKind::AlreadyExists)
+    }
+}
+
+/// A file that is written under a temporary name beside its target and then renamed over it, so that nobody
+/// ever sees half of it. Dropped before [`Self::commit`], it leaves nothing.
+#[derive(Debug)]
+pub struct AtomicFile {
+    path: PathBuf,
+    writer: BufWriter<Sink>,
+}
+
+#[derive(Debug)]
+enum Sink {
+    /// Becomes the file at this target.
+    Beside(Unfinished, PathBuf),
+    /// A pipe or device, which nothing can replace.
+    Through(File),
+}
+
+/// Kind of file that a path leads to.
+enum Place {
+    /// A file, new or old, in an existing folder.
+    File {
+        target: PathBuf,
+        folder: PathBuf,
+        permissions: Option<Permissions>,
+    },
+    /// A pipe or device.
+    Special,
+}
+
+impl Place {
+    fn of(path: &Path) -> Result<Self, WriteError> {
+        let is_folder = path.file_name().is_none() || path.to_string_lossy().ends_with(std::path::is_separator);
+        if is_folder || path.is_dir() {
+            return Err(WriteError::Folder(path.to_owned()));
+        }
+        let folder = existing_folder(path, path)?;
+        let error = |source| WriteError::io(path, source);
+        match fs::metadata(path) {
+            Ok(old) if !old.is_file() => Ok(Self::Special),
+            Ok(old) if old.permissions().readonly() => Err(WriteError::ReadOnly(path.to_owned())),
+            Ok(old) => {
+                // What a link points to is replaced, not the link.
+                let target = fs::canonicalize(path).map_err(error)?;
+                let folder = target.parent().unwrap_or(&folder).to_owned();
+                let permissions = Some(old.permissions());
+                Ok(Self::File {
+                    target,
+                    folder,
+                    permissions,
+                })
+            }
+            Err(missing) if missing.kind() == ErrorKind::NotFound => {
+                let target = link_target(path);
+                let folder = existing_folder(path, &target)?;
+                Ok(Self::File {
+                    target,
+                    folder,
+                    permissions: None,
+                })
+            }
+            Err(source) => Err(error(source)),
+        }
+    }
+}
+
+/// Returns the folder of `target`, the file that `path` leads to.
+fn existing_folder(path: &Path, target: &Path) -> Result<PathBuf, WriteError> {
+    let folder = folder_of(target).to_owned();
+    if folder.is_dir() {
+        return Ok(folder);
+    }
+    let path = path.to_owned();
+    Err(WriteError::NoFolder { path, folder })
+}
+
+/// Follows a link to a file that is missing, through further links.
+fn link_target(path: &Path) -> PathBuf {
+    /// As many as Linux follows.
+    const MOST_LINKS: usize = 40;
+    let mut target = path.to_owned();
+    for _ in 0..MOST_LINKS {
+        let Ok(next) = fs::read_link(&target) else { break };
+        target = target.parent().unwrap_or(Path::new("")).join(next);
+    }
+    target
+}
+
+impl AtomicFile {
+    /// Creates the temporary file for `path`, whose folder must exist.
+    ///
+    /// # Errors
+    /// The path cannot be written.
+    pub fn create(path: &Path) -> Result<Self, WriteError> {
+        let error = |source| WriteError::io(path, source);
+        let sink = match Place::of(path)? {
+            Place::Special => Sink::Through(File::options().write(true).open(path).map_err(error)?),
+            Place::File {
+                target,
+                folder,
+                permissions,
+            } => {
+                let file = Unfinished::begin(&folder).map_err(error)?;
+                if let Some(permissions) = permissions {
+                    file.as_file().set_permissions(permissions).map_err(error)?;
+                }
+                Sink::Beside(file, target)
+            }
+        };
+        Ok(Self {
+            path: path.to_owned(),
+            writer: BufWriter::new(sink),
+        })
+    }
+
+    /// Renames the temporary file to its target.
+    ///
+    /// # Errors
+    /// Any error of the operating system; a file that was there before is then unchanged.
+    pub fn commit(self) -> Result<(), WriteError> {
+        self.finish(Unfinished::persist)
+    }
+
+    /// As [`Self::commit`], but never replaces a file, not even one that another program has just written.
+    ///
+    /// # Errors
+    /// Any error of the operating system: [`ErrorKind::AlreadyExists`] if there is such a file.
+    pub(super) fn commit_new(self) -> Result<(), WriteError> {
+        self.finish(Unfinished::persist_new)
+    }
+
+    fn finish(self, persist: fn(Unfinished, &Path) -> io::Result<()>) -> Result<(), WriteError> {
+        let error = |source| WriteError::io(&self.path, source);
+        match self.writer.into_inner().map_err(|e| error(e.into_error()))? {
+            Sink::Through(_) => Ok(()),
+            Sink::Beside(file, target) => {
+                file.as_file().sync_all().map_err(error)?;
+                persist(file, &target).map_err(error)
+            }
+        }
+    }
+}
+
+impl Write for AtomicFile {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.writer.write(bytes)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.writer.flush()
+    }
+}
+
+impl Write for Sink {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        match self {
+            Self::Beside(file, _) => file.as_file().write(bytes),
+            Self::Through(file) => file.write(bytes),
+        }
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        match self {
+            Self::Beside(file, _) => file.as_file().flush(),
+            Self::Through(file) => file.flush(),
+        }
+    }
+}
+
+/// Writes the file at `path` atomically: whole or not at all.
+///
+/// # Errors
+/// The path cannot be written, or `write` failed.
+pub fn atomic_write(path: &Path, write: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> Result<(), WriteError> {
+    let mut file = AtomicFile::create(path)?;
+    write(&mut file).map_err(|source| WriteError::io(path, source))?;
+    file.commit()
+}
+
+/// Checks that `path` can be written, before the work whose result goes there. Leaves no trace.
+///
+/// # Errors
+/// The path cannot be written.
+pub fn check_writable(path: &Path) -> Result<(), WriteError> {
+    match Place::of(path)? {
+        // Opening and closing a pipe would tell its reader that nothing comes.
+        Place::Special => Ok(()),
+        Place::File { .. } => AtomicFile::create(path).map(drop),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::export::test_folder::names;
+
+    #[test]
+    fn a_failed_write_leaves_the_old_file_and_nothing_else() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("kept.csv");
+        atomic_write(&path, |writer| writer.write_all(b"old")).unwrap();
+        let failed = atomic_write(&path, |writer| {
+            writer.write_all(b"new")?;
+            Err(io::Error::other("the disk is full"))
+        });
+        assert!(failed.unwrap_err().to_string().contains("kept.csv': the disk is full"));
+        assert_eq!(fs::read(&path).unwrap(), b"old");
+        assert_eq!(names(folder.path()), ["kept.csv"]);
+        check_writable(&folder.path().join("other.csv")).unwrap();
+        assert_eq!(names(folder.path()), ["kept.csv"]);
+    }
+
+    #[test]
+    fn what_cannot_be_written_is_said_before_any_work() {
+        let folder = tempfile::tempdir().unwrap();
+        let read_only = folder.path().join("fixed.csv");
+        fs::write(&read_only, "old").unwrap();
+        let mut permissions = fs::metadata(&read_only).unwrap().permissions();
+        permissions.set_readonly(true);
+        fs::set_permissions(&read_only, permissions).unwrap();
+        let cases = [
+            ("a missing folder", folder.path().join("none/file"), "does not exist"),
+            ("a folder", folder.path().to_owned(), "it is a folder"),
+            ("a folder to be", folder.path().join("new/"), "it is a folder"),
+            ("a read-only file", read_only.clone(), "read-only"),
+            ("a file as folder", read_only.join("file"), "does not exist"),
+            ("too long a name", folder.path().join("x".repeat(300)), "too long"),
+        ];
+        for (sentence, path, expected) in cases {
+            let message = check_writable(&path).unwrap_err().to_string();
+            assert!(message.contains(expected), "{sentence}: {message}");
+            assert!(atomic_write(&path, |_| Ok(())).is_err(), "{sentence}");
+        }
+        assert_eq!(names(folder.path()), ["fixed.csv"]);
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn others_may_read_it_and_links_and_permissions_stay() {
+        use std::os::unix::fs::PermissionsExt;
+        let folder = tempfile::tempdir().unwrap();
+        let [path, ordinary, link] = ["file", "ordinary", "link"].map(|name| folder.path().join(name));
+        let mode = |path: &Path| fs::metadata(path).unwrap().permissions().mode() & 0o777;
+        fs::write(&ordinary, "").unwrap();
+        atomic_write(&path, |_| Ok(())).unwrap();
+        assert_eq!(mode(&path), mode(&ordinary));
+        fs::set_permissions(&path, Permissions::from_mode(0o640)).unwrap();
+        std::os::unix::fs::symlink(&path, &link).unwrap();
+        atomic_write(&link, |writer| writer.write_all(b"through")).unwrap();
+        assert_eq!(fs::read(&path).unwrap(), b"through");
+        assert_eq!(mode(&path), 0o640);
+        atomic_write(Path::new("/dev/null"), |writer| writer.write_all(b"gone")).unwrap();
+        assert!(!fs::metadata("/dev/null").unwrap().is_file());
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn links_to_a_file_that_is_missing_stay_links_and_the_file_is_made() {
+        use std::os::unix::fs::symlink;
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name);
+        fs::create_dir(at("inner")).unwrap();
+        symlink("second", at("first")).unwrap();
+        symlink("inner/file", at("second")).unwrap();
+        symlink("none/file", at("stray")).unwrap();
+        symlink("circle", at("circle")).unwrap();
+        atomic_write(&at("first"), |writer| writer.write_all(b"through")).unwrap();
+        for link in ["first", "second"] {
+            assert!(fs::symlink_metadata(at(link)).unwrap().is_symlink(), "{link}");
+        }
+        assert_eq!(fs::read(at("inner/file")).unwrap(), b"through");
+        let missing = atomic_write(&at("stray"), |_| Ok(())).unwrap_err().to_string();
+        assert!(missing.contains("none' does not exist"), "{missing}");
+        assert!(atomic_write(&at("circle"), |_| Ok(())).is_err());
+        assert_eq!(names(&at("inner")), ["file"]);
+    }
+
+    #[test]
+    fn a_new_file_never_takes_the_place_of_another() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("run.json");
+        let write = |text: &[u8]| {
+            let mut file = AtomicFile::create(&path)?;
+            file.write_all(text).unwrap();
+            Ok(file)
+        };
+        let (first, second) = (write(b"first"), write(b"second"));
+        let commit = |file: Result<AtomicFile, WriteError>| file.unwrap().commit_new();
+        commit(first).unwrap();
+        assert!(commit(second).unwrap_err().is_taken());
+        assert_eq!(fs::read(&path).unwrap(), b"first");
+        assert_eq!(names(folder.path()), ["run.json"]);
+    }
+}

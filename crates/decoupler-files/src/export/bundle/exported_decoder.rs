@@ -1,0 +1,278 @@
+use rand::RngExt;
+use serde_json::{Map, Value, json};
+
+use super::{
+    BundleDecoder, BundleError, BundlePrecision,
+    fitted::FittedDecoder,
+    meaning::Meaning,
+    origin::Origin,
+    portable::{ChannelRanges, Portable},
+};
+use crate::{
+    export::NetworkFile,
+    import::{Setup, SetupSets},
+};
+use decoupler_core::{
+    dataset::{Seed, Stream},
+    decoupling::{Description, Layer},
+    evaluation::{Channel, RunError, SimulatedSettings, TargetErrors, TestErrors},
+    network::ReadingRange,
+};
+
+/// A decoder to be exported, with the meaning of its readings and targets.
+pub struct ExportedDecoder<'a> {
+    /// Network file of the run, if a network was trained.
+    file: Option<&'a NetworkFile>,
+    origin: Origin,
+    fitted: FittedDecoder,
+}
+
+/// Readings of one row with the index of the row-wire, 0 where that is no argument.
+pub(super) type Drawn = Vec<(usize, Vec<f64>)>;
+
+/// Facts about a decoder, for people and programs that have only the bundle: names of fields and JSON values.
+pub(super) type Metadata = Map<String, Value>;
+
+impl<'a> From<&'a NetworkFile> for ExportedDecoder<'a> {
+    /// Takes the network of a file.
+    fn from(file: &'a NetworkFile) -> Self {
+        Self {
+            fitted: FittedDecoder::of_networks(&file.network, file.scores.network.clone()),
+            origin: Origin::of_file(file),
+            file: Some(file),
+        }
+    }
+}
+
+impl<'a> ExportedDecoder<'a> {
+    /// Fits a decoder to the training samples of the run of `file`; `sets` are its samples, drawn or read again. Takes the
+    /// network of the file if the decoder is the network.
+    ///
+    /// # Errors
+    /// The recording has changed, the samples cannot be scaled or decoded, or no other program can compute what the decoder
+    /// does.
+    pub fn of_run(file: &'a NetworkFile, sets: SetupSets, decoder: BundleDecoder) -> Result<Self, BundleError> {
+        sets.check_saved(file.recorded.as_ref())?;
+        if decoder.is_network() {
+            return Ok(file.into());
+        }
+        Ok(Self {
+            origin: Origin::of_file(file),
+            fitted: FittedDecoder::fit(file.settings, sets.sets, Some(file.network.clone()), decoder)?,
+            file: Some(file),
+        })
+    }
+
+    /// Fits a decoder that needs no network to the training samples of `setup`, which are `sets`.
+    ///
+    /// # Errors
+    /// As [`Self::of_run`], or if the decoder needs a network.
+    pub fn of_setup(setup: &Setup, sets: SetupSets, decoder: BundleDecoder) -> Result<Self, BundleError> {
+        Ok(Self {
+            origin: Origin::of_sets(setup, &sets)?,
+            fitted: FittedDecoder::fit(*setup.settings(), sets.sets, None, decoder)?,
+            file: None,
+        })
+    }
+
+    /// Kind of decoder.
+    pub fn kind(&self) -> BundleDecoder {
+        self.fitted.kind
+    }
+
+    /// Network file of the run, if a network was trained.
+    pub(super) fn file(&self) -> Option<&'a NetworkFile> {
+        self.file
+    }
+
+    pub(super) fn description(&self) -> &Description {
+        &self.fitted.description
+    }
+
+    pub(super) fn meaning(&self) -> Meaning {
+        match self.origin.settings.simulated() {
+            Some(settings) => Meaning::Array(settings.source.sensor.scale),
+            None => Meaning::Own {
+                inputs: self.origin.problem.inputs.clone(),
+                targets: self.origin.problem.targets.clone(),
+                row_wires: match (&self.origin.row_wires, self.fitted.reading_ranges.len()) {
+                    (Some(row_wires), 2..) => row_wires.clone(),
+                    _ => Vec::new(),
+                },
+            },
+        }
+    }
+
+    /// Readings in training of all row-wires, or of each where the row is an argument.
+    pub(super) fn reading_ranges(&self) -> &[Option<ReadingRange>] {
+        &self.fitted.reading_ranges
+    }
+
+    /// Smallest and largest target in training, likewise.
+    pub(super) fn target_extremes(&self) -> &[Vec<(f64, f64)>] {
+        &self.fitted.target_extremes
+    }
+
+    /// Answer of this program to the readings of a row-wire.
+    ///
+    /// # Errors
+    /// A reading cannot be decoded.
+    pub(super) fn decode(&mut self, row: usize, readings: &[f64]) -> Result<Vec<f64>, BundleError> {
+        let mut answer = vec![0.0; self.fitted.decoder.outputs()];
+        let decoded = self.fitted.decoder.decode_row(row, readings, &mut answer);
+        decoded.map_err(|error| Box::new(RunError::from(error)))?;
+        Ok(answer)
+    }
+
+    /// Number of rows decoded since this was last asked whose equations have no solution, or more than one.
+    pub(super) fn take_open_rows(&mut self) -> usize {
+        let solved = self.fitted.decoder.take_solved_rows();
+        solved.unsolved + solved.undetermined
+    }
+
+    /// Draws readings for the verification: the number of those that are golden vectors, which come first, and all. Those of
+    /// a simulated sensor are of its scene; of a recording nothing is known but their range, in which they are even.
+    ///
+    /// # Errors
+    /// The scene could not be drawn, or the range is not known.
+    pub(super) fn draw(&self, portable: &Portable) -> Result<(usize, Drawn), BundleError> {
+        /// Snapshots drawn, and snapshots among them that are golden vectors.
+        const SNAPSHOTS: [usize; 2] = [20, 1];
+        /// Readings drawn for each network, and golden vectors among them.
+        const EVEN: [usize; 2] = [100, 4];
+        match self.origin.settings.simulated() {
+            Some(mut settings) => {
+                let rows = settings.source.model_size().map_or(1, |size| size.rows);
+                settings.source.test_samples = SNAPSHOTS[0] * rows;
+                let set = settings.draw_test().map_err(Box::new)?;
+                let network = |sample| if portable.takes_row() { set.row_index(sample) } else { 0 };
+                let samples = 0..set.samples();
+                let drawn = samples.map(|sample| (network(sample), set.sample_readings(sample).to_vec()));
+                Ok((SNAPSHOTS[1] * rows, drawn.collect()))
+            }
+            None => {
+                let mut rng = Seed::default().rng(Stream::Test);
+                let mut drawn = Drawn::new();
+                for _ in 0..EVEN[0] {
+                    for (index, range) in portable.ranges.iter().enumerate() {
+                        let range = range.as_ref().ok_or(BundleError::NoRange)?;
+                        let mut between = |&(low, high): &(f64, f64)| low + rng.random::<f64>() * (high - low);
+                        drawn.push((index, range.extremes.iter().map(&mut between).collect()));
+                    }
+                }
+                Ok((EVEN[1] * portable.rows(), drawn))
+            }
+        }
+    }
+
+    /// Collects the metadata of a bundle.
+    pub(super) fn metadata(&self, portable: &Portable, precision: BundlePrecision) -> Metadata {
+        let common = json!({
+            "program": crate::export::document::PROGRAM,
+            "decoder": self.fitted.kind.to_string(),
+            "takes_row": portable.takes_row(),
+            "quantity": portable.quantity,
+            "layers": layers(portable),
+            "precision": precision.to_string(),
+        });
+        let network = self
+            .fitted
+            .kind
+            .is_network()
+            .then(|| json!({ "hidden_nodes": portable.widest() }));
+        let errors = &self.fitted.errors;
+        let own = match self.origin.settings.simulated() {
+            Some(settings) => of_array(&self.origin, &settings, portable, errors),
+            None => of_recording(&self.origin, portable, errors),
+        };
+        let mut fields = Metadata::new();
+        for part in [Some(common), network, Some(own)] {
+            if let Some(Value::Object(part)) = part {
+                fields.extend(part);
+            }
+        }
+        fields
+    }
+}
+
+/// The steps of the decoder with their sizes, in words.
+fn layers(portable: &Portable) -> Vec<String> {
+    let mut inputs = portable.channels;
+    let layers = portable.layers().iter().map(|layer| {
+        let outputs = layer.outputs(inputs);
+        let text = match layer {
+            Layer::Affine(_) => format!("affine, {inputs} to {outputs}"),
+            Layer::Tanh => "hyperbolic tangent".to_owned(),
+            Layer::Gaussians { .. } => format!("{outputs} Gaussians of {inputs} values"),
+            Layer::Rules { memberships, .. } => {
+                format!("{} fuzzy rules, {inputs} to {outputs}", memberships.outputs())
+            }
+        };
+        inputs = outputs;
+        text
+    });
+    let iteration = portable
+        .equations
+        .as_ref()
+        .map(|equations| format!("at most {} Gauss-Newton steps", equations.steps));
+    layers.collect::<Vec<_>>().into_iter().chain(iteration).collect()
+}
+
+fn of_array(origin: &Origin, settings: &SimulatedSettings, portable: &Portable, errors: &TestErrors) -> Value {
+    let sensor = &settings.source.sensor;
+    let names = |channels: Vec<Channel>| channels.into_iter().map(|channel| channel.name).collect::<Vec<_>>();
+    json!({
+        "trained_by": origin.program,
+        "array": sensor.scale.to_string(),
+        "geometry": sensor.geometry,
+        "scene": settings.source.scene,
+        "rows": settings.source.scene.rows.to_string(),
+        "row_numbers": portable.takes_row().then_some([1, portable.rows()]),
+        "inputs": { "names": names(portable.meaning.inputs()), "unit": "ohm" },
+        "outputs": { "names": names(portable.meaning.targets()), "unit": "mm" },
+        "training_samples": settings.source.samples,
+        "seed": settings.seed,
+        "errors": errors.nodes(),
+        "readings_in_training_ohm": ranges(portable),
+        "output_range_mm": portable.output_range_mm(),
+    })
+}
+
+fn of_recording(origin: &Origin, portable: &Portable, errors: &TestErrors) -> Value {
+    let columns = |channels: &[Channel]| {
+        let (names, units): (Vec<_>, Vec<_>) = channels.iter().map(|channel| (&channel.name, &channel.unit)).unzip();
+        json!({ "names": names, "units": units })
+    };
+    let named = |errors: &TestErrors| {
+        let of = |(channel, errors): (&Channel, &TargetErrors)| json!({ "name": channel.name, "errors": errors });
+        let targets = origin.problem.targets.iter();
+        targets.zip(errors.targets()).map(of).collect::<Vec<_>>()
+    };
+    let row_wires = origin.row_wires.iter().flatten().map(|row_wire| row_wire + 1);
+    json!({
+        "trained_by": origin.program,
+        "files": origin.files,
+        "row_numbers": portable.takes_row().then(|| row_wires.collect::<Vec<_>>()),
+        "inputs": columns(&origin.problem.inputs),
+        "outputs": columns(&origin.problem.targets),
+        "method": origin.settings.training.method.short_name(),
+        "seed": origin.settings.seed,
+        "errors": named(errors),
+        "errors_of_ridge": named(&origin.errors_of_linear),
+        "readings_in_training": ranges(portable),
+        "output_ranges": portable.scales,
+    })
+}
+
+/// Smallest and largest readings in training, row by row.
+fn ranges(portable: &Portable) -> Vec<Option<Value>> {
+    let range = |range: &ChannelRanges| {
+        let (minimum, maximum): (Vec<f64>, Vec<f64>) = range.extremes.iter().copied().unzip();
+        json!({ "minimum": minimum, "maximum": maximum })
+    };
+    portable
+        .ranges
+        .iter()
+        .map(|of_row| of_row.as_ref().map(range))
+        .collect()
+}

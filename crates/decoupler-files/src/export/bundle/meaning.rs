@@ -1,0 +1,198 @@
+use decoupler_core::{evaluation::Channel, sensor::ArrayScale, text::is_unprintable};
+
+/// Meaning of the readings and outputs of an exported network, and the words for them in its files.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) enum Meaning {
+    /// Resistances of a row-wire of an array in ohm, and the coordinates of its nodes in mm.
+    Array(ArrayScale),
+    /// Columns of own data, in the user's units.
+    Own {
+        inputs: Vec<Channel>,
+        targets: Vec<Channel>,
+        /// Row-wires that have a network each, from 0, in their order; empty if one network serves all.
+        row_wires: Vec<usize>,
+    },
+}
+
+impl Meaning {
+    /// Identifier of the readings in code and graphs.
+    pub(super) fn readings(&self) -> &'static str {
+        self.either("resistances_ohm", "readings")
+    }
+
+    /// Identifier of the outputs.
+    pub(super) fn outputs(&self) -> &'static str {
+        self.either("coordinates_mm", "targets")
+    }
+
+    /// Word for one output.
+    pub(super) fn output(&self) -> &'static str {
+        self.either("coordinate", "target")
+    }
+
+    /// The unit of decoding.
+    pub(super) fn sample(&self) -> &'static str {
+        self.either("one row-wire", "one sample")
+    }
+
+    /// Identifier of the middles of the channels.
+    pub(super) fn centre(&self) -> &'static str {
+        self.either("centre_ohm", "centre")
+    }
+
+    /// Identifiers of the limits beyond which a reading is outside.
+    pub(super) fn limits(&self) -> [&'static str; 2] {
+        [
+            self.either("lowest_ohm", "lowest"),
+            self.either("highest_ohm", "highest"),
+        ]
+    }
+
+    /// Name of the range to which deviations are relative.
+    pub(super) fn scale(&self) -> &'static str {
+        self.either(
+            "the widest range of a coordinate in training",
+            "the range of the target in training",
+        )
+    }
+
+    /// A way to train a network with smaller weights, which amplifies less.
+    pub(super) fn smaller_weights(&self) -> &'static str {
+        self.either("train with noise (--noise)", "train with fewer hidden nodes or epochs")
+    }
+
+    fn either(&self, array: &'static str, own: &'static str) -> &'static str {
+        match self {
+            Self::Array(_) => array,
+            Self::Own { .. } => own,
+        }
+    }
+
+    /// Names and units of the readings: r_1, r_2, … in ohm, or those of the columns.
+    pub(super) fn inputs(&self) -> Vec<Channel> {
+        match self {
+            Self::Array(scale) => (1..=scale.columns())
+                .map(|channel| named(format!("r_{channel}"), "ohm"))
+                .collect(),
+            Self::Own { inputs, .. } => inputs.clone(),
+        }
+    }
+
+    /// Names and units of the outputs: x_1, y_1, z_1, x_2, … in mm, or those of the columns.
+    pub(super) fn targets(&self) -> Vec<Channel> {
+        match self {
+            Self::Array(scale) => (0..scale.coordinates_per_row())
+                .map(|output| named(format!("{}_{}", ["x", "y", "z"][output % 3], output / 3 + 1), "mm"))
+                .collect(),
+            Self::Own { targets, .. } => targets.clone(),
+        }
+    }
+
+    /// Figures of the outputs with their names and units: the largest of all coordinates, or that of each target.
+    pub(super) fn named(&self, figures: &[f64]) -> Vec<(Channel, f64)> {
+        match self {
+            Self::Array(_) => {
+                let largest = figures.iter().fold(0.0_f64, |largest, &figure| largest.max(figure));
+                vec![(named("any coordinate".to_owned(), "mm"), largest)]
+            }
+            Self::Own { targets, .. } => targets.iter().cloned().zip(figures.iter().copied()).collect(),
+        }
+    }
+
+    /// Sentences with the names and units of own data, in lines of at most 100 characters that can stand in a comment of any
+    /// language; none for an array.
+    pub(super) fn legend(&self) -> Vec<String> {
+        let Self::Own {
+            inputs,
+            targets,
+            row_wires,
+        } = self
+        else {
+            return Vec::new();
+        };
+        let list = |what: &str, channels: &[Channel]| {
+            let titles: Vec<String> = channels.iter().map(|channel| comment(&channel.title())).collect();
+            format!("{what}, in this order: {}.", titles.join(", "))
+        };
+        let mut sentences = vec![list("Readings", inputs), list("Targets", targets)];
+        // The usual numbering needs no words.
+        if row_wires.iter().enumerate().any(|(index, &row_wire)| index != row_wire) {
+            let rows = row_wires.iter().enumerate();
+            let rows: Vec<String> = rows
+                .map(|(index, row_wire)| format!("{} is row-wire {}", index + 1, row_wire + 1))
+                .collect();
+            sentences.push(format!("Rows: {}.", rows.join(", ")));
+        }
+        sentences.iter().flat_map(|sentence| wrapped(sentence)).collect()
+    }
+}
+
+fn named(name: String, unit: &str) -> Channel {
+    Channel {
+        name,
+        unit: Some(unit.to_owned()),
+    }
+}
+
+/// The text of a user without what would end a comment, or what compilers warn of in one.
+pub(super) fn comment(text: &str) -> String {
+    let plain = text.replace(is_unprintable, " ");
+    plain
+        .replace("*/", "* /")
+        .replace("/*", "/ *")
+        .replace("??", "? ?")
+        .replace("??", "? ?")
+}
+
+/// Lines of at most 100 characters with these words.
+pub(super) fn wrapped(text: &str) -> Vec<String> {
+    const WIDTH: usize = 100;
+    let mut lines: Vec<String> = Vec::new();
+    for word in text.split(' ').filter(|word| !word.is_empty()) {
+        match lines.last_mut() {
+            Some(line) if line.chars().count() + 1 + word.chars().count() <= WIDTH => {
+                line.push(' ');
+                line.push_str(word);
+            }
+            _ => lines.push(word.to_owned()),
+        }
+    }
+    lines
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_of_users_end_no_comment() {
+        let odd = ["a */ b", "/* c", "d\n*/", "e\u{202e}f", "??/", "**/", "*\n/", "/\u{7}*"];
+        let channel = |name: &&str| Channel {
+            name: (*name).to_owned(),
+            unit: Some("µT*/".to_owned()),
+        };
+        let meaning = Meaning::Own {
+            inputs: odd.iter().map(channel).collect(),
+            targets: vec![channel(&"x")],
+            row_wires: vec![0, 4],
+        };
+        let text = meaning.legend().join("\n");
+        for forbidden in ["*/", "/*", "??", "\u{202e}", "\u{7}"] {
+            assert!(!text.contains(forbidden), "{forbidden}: {text}");
+        }
+        assert!(
+            text.contains("µT") && text.ends_with("Rows: 1 is row-wire 1, 2 is row-wire 5."),
+            "{text}"
+        );
+        assert!(text.lines().all(|line| line.chars().count() <= 100), "{text}");
+    }
+
+    #[test]
+    fn an_array_has_the_names_of_the_paper() {
+        let meaning = Meaning::Array("3x2_2x6".parse().unwrap());
+        let titles = |channels: Vec<Channel>| channels.iter().map(Channel::title).collect::<Vec<_>>();
+        assert_eq!(titles(meaning.inputs())[5], "r_6 (ohm)");
+        assert_eq!(titles(meaning.targets())[4], "y_2 (mm)");
+        assert_eq!(meaning.legend(), [""; 0]);
+    }
+}

@@ -1,0 +1,192 @@
+use thiserror::Error;
+
+use super::{exported_decoder::ExportedDecoder, folding::FoldedMap, meaning::Meaning};
+use crate::export::format_number;
+use decoupler_core::{
+    decoupling::{Layer, RowProblemDescription},
+    network::Quantity,
+};
+
+/// Everything that a decoder computes, from readings (in ohm, or as the user has them) to outputs (in mm, or in the units of
+/// the targets), with all scaling folded into its layers. Every writer starts from it, and knows layers but no decoders.
+///
+/// The first layer takes the change x of each reading r from a value R₀ in the middle of its channel. The change is computed
+/// from the difference r − R₀, so that a number of few digits loses nothing where readings differ little:
+///
+/// | quantity | change x |
+/// |---|---|
+/// | resistance, raw | r − R₀ |
+/// | conductance | (R₀ − r)/r, the relative change of 1/r |
+/// | logarithm | ln(1 + (r − R₀)/R₀) |
+#[derive(Clone, Debug)]
+pub(super) struct Portable {
+    /// Name of the decoder.
+    pub(super) name: &'static str,
+    /// Word for it in sentences, and the name of its file of weights: network or decoder.
+    pub(super) decoder: &'static str,
+    pub(super) quantity: Quantity,
+    /// Meaning of readings and outputs.
+    pub(super) meaning: Meaning,
+    /// Number of readings of a row, M4 of an array.
+    pub(super) channels: usize,
+    /// Number of outputs, 3·M2 of an array.
+    pub(super) outputs: usize,
+    /// One for all row-wires, or one for each, from the first, all of one shape.
+    pub(super) maps: Vec<FoldedMap>,
+    /// Iteration on the equations of the sensor that begins at the answers of the maps.
+    pub(super) equations: Option<RowProblemDescription>,
+    /// Readings in training of all row-wires, or of each where the row is an argument.
+    pub(super) ranges: Vec<Option<ChannelRanges>>,
+    /// Range to which deviations of each output are relative: the widest of any in training for the coordinates of an array,
+    /// and its own for a target of own data, as units differ.
+    pub(super) scales: Vec<f64>,
+}
+
+/// Readings of each channel in training.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct ChannelRanges {
+    /// Smallest and largest reading.
+    pub(super) extremes: Vec<(f64, f64)>,
+    /// Limits beyond which a reading counts as outside.
+    pub(super) limits: Vec<(f64, f64)>,
+}
+
+/// Errors of folding the scaling of decoders into their layers.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+#[non_exhaustive]
+pub enum FoldError {
+    /// A weight overflows.
+    #[error(
+        "network {network}: a weight is beyond the range of single precision when the scaling is folded into it; train again with other settings"
+    )]
+    NotFinite {
+        /// Number of the network, from 1.
+        network: usize,
+    },
+    /// The networks of a file read different quantities.
+    #[error("the networks of the rows read different quantities: train them together")]
+    Quantities,
+}
+
+impl Portable {
+    /// Folds the scaling of the decoder of `exported` into its layers.
+    ///
+    /// # Errors
+    /// A folded weight is not a finite number, or the maps read different quantities.
+    pub(super) fn of(exported: &ExportedDecoder<'_>) -> Result<Self, FoldError> {
+        let description = exported.description();
+        let quantity = description.maps[0].quantity;
+        if description.maps.iter().any(|map| map.quantity != quantity) {
+            return Err(FoldError::Quantities);
+        }
+        let mut maps: Vec<_> = description.maps.iter().map(FoldedMap::of).collect();
+        if let Some(index) = maps.iter().position(|map| !is_finite(map, quantity)) {
+            return Err(FoldError::NotFinite { network: index + 1 });
+        }
+        FoldedMap::widen(&mut maps);
+        let channels = maps[0].centre.len();
+        let outputs = maps[0]
+            .layers
+            .iter()
+            .fold(channels, |width, layer| layer.outputs(width));
+        let meaning = exported.meaning();
+        let targets = exported.target_extremes();
+        let scales = match &meaning {
+            Meaning::Array(_) => vec![scale(targets, 0..outputs); outputs],
+            Meaning::Own { .. } => (0..outputs).map(|output| scale(targets, output..output + 1)).collect(),
+        };
+        let ranges = exported.reading_ranges().iter().map(|range| {
+            range.as_ref().map(|range| ChannelRanges {
+                extremes: (0..range.channels()).map(|channel| range.extremes(channel)).collect(),
+                limits: (0..range.channels())
+                    .map(|channel| range.limits(quantity, channel))
+                    .collect(),
+            })
+        });
+        Ok(Self {
+            name: exported.kind().name(),
+            decoder: exported.kind().noun(),
+            ranges: ranges.collect(),
+            equations: description.equations.clone(),
+            meaning,
+            quantity,
+            channels,
+            outputs,
+            maps,
+            scales,
+        })
+    }
+
+    /// Returns `true` if there is a decoder for each known row, so that the row is an argument.
+    pub(super) fn takes_row(&self) -> bool {
+        self.rows() > 1
+    }
+
+    /// Number of row-wires that are told apart; 1 if the row is no argument.
+    pub(super) fn rows(&self) -> usize {
+        self.ranges.len()
+    }
+
+    /// The layers of the first map, which have the shapes of all.
+    pub(super) fn layers(&self) -> &[Layer<super::twofold::Twofold>] {
+        &self.maps[0].layers
+    }
+
+    /// Number of values that the widest layer gives.
+    pub(super) fn widest(&self) -> usize {
+        let mut inputs = self.channels;
+        let widths = self.layers().iter().map(|layer| {
+            inputs = layer.outputs(inputs);
+            inputs
+        });
+        // Outputs are not added up any more.
+        let mut widths: Vec<usize> = widths.collect();
+        widths.pop();
+        widths.into_iter().max().unwrap_or(0)
+    }
+
+    /// Widest range of a coordinate of an array in training; `None` for own data.
+    pub(super) fn output_range_mm(&self) -> Option<f64> {
+        match self.meaning {
+            Meaning::Array(_) => self.scales.first().copied(),
+            Meaning::Own { .. } => None,
+        }
+    }
+
+    /// A deviation relative to [`Self::scales`], in mm for an array, and in per cent of the range of a target of own data.
+    pub(super) fn in_words(&self, relative: f64) -> String {
+        match self.output_range_mm() {
+            Some(range_mm) => format!("{} mm", format_number(relative * range_mm)),
+            None => format!("{} % of its range in training", format_number(100.0 * relative)),
+        }
+    }
+
+    /// A way to have a decoder that amplifies less.
+    pub(super) fn smaller_weights(&self) -> &'static str {
+        match (&self.meaning, self.decoder) {
+            (Meaning::Own { .. }, decoder) if decoder != "network" => "take another decoder",
+            (meaning, _) => meaning.smaller_weights(),
+        }
+    }
+
+    /// The ranges of the readings of all rows in training, if all are known.
+    pub(super) fn known_ranges(&self) -> Option<Vec<&ChannelRanges>> {
+        self.ranges.iter().map(Option::as_ref).collect()
+    }
+}
+
+/// Widest range in training among these outputs of all rows.
+fn scale(targets: &[Vec<(f64, f64)>], outputs: std::ops::Range<usize>) -> f64 {
+    let extremes = targets.iter().flat_map(|row| row[outputs.clone()].iter());
+    let (width, largest) = extremes.fold((0.0_f64, 0.0_f64), |(width, largest), &(low, high)| {
+        (width.max(high - low), largest.max(low.abs()).max(high.abs()))
+    });
+    // Outputs that did not vary are constants, and deviations are relative to these.
+    [width, largest].into_iter().find(|&scale| scale > 0.0).unwrap_or(1.0)
+}
+
+fn is_finite(map: &FoldedMap, quantity: Quantity) -> bool {
+    // Single precision has a smaller range.
+    let mut all = map.layers.iter().flat_map(Layer::values);
+    all.all(|weight| (weight.to_f64() as f32).is_finite()) && map.centre.iter().all(|&ohm| quantity.accepts(ohm))
+}

@@ -1,0 +1,251 @@
+//! Bundles of other decoders than networks against the decoders themselves.
+
+use std::{fs, path::Path};
+
+use ndarray::array;
+
+use super::{run_of, trained_settings};
+use crate::export::{
+    NetworkFile,
+    bundle::{
+        BundleDecoder, BundleError, BundleFormat, BundlePrecision, BundleReport, ExportedDecoder,
+        exact::decode_exactly, export_bundle, folding::FoldedMap, portable::Portable, taking::Taking, vectors::Vectors,
+    },
+};
+use decoupler_core::{
+    decoupling::{AffineLayer, DecoderKind, Layer, LayeredMap},
+    evaluation::SimulatedSettings,
+    network::{Quantity, ScalingChoice},
+    scene::{Movement, Rows},
+};
+
+/// Decoders that consist of layers.
+const LAYERED: [BundleDecoder; 5] = [
+    BundleDecoder::Kind(DecoderKind::Mean),
+    BundleDecoder::Kind(DecoderKind::Ridge),
+    BundleDecoder::Linear,
+    BundleDecoder::Kind(DecoderKind::RadialBasis),
+    BundleDecoder::Kind(DecoderKind::Fuzzy),
+];
+const EQUATIONS: [BundleDecoder; 2] = [
+    BundleDecoder::Kind(DecoderKind::Newton),
+    BundleDecoder::Kind(DecoderKind::Polish),
+];
+
+fn settings(rows: Rows, noise: f64) -> SimulatedSettings {
+    trained_settings(rows, Quantity::Conductance, ScalingChoice::Whitening, noise)
+}
+
+/// The decoder fitted to the training samples of `file`.
+fn decoder(file: &NetworkFile, kind: BundleDecoder) -> Result<ExportedDecoder<'_>, BundleError> {
+    let sets = file.setup().sets(Path::new(""), &|| false, &mut |_| ())?.unwrap();
+    ExportedDecoder::of_run(file, sets, kind)
+}
+
+/// The program's own decoders, which share no code with the layers, are the truth.
+#[test]
+fn descriptions_folded_and_answered_exactly_give_the_answers_of_the_decoders() {
+    for rows in [Rows::All, Rows::Known, Rows::One(1)] {
+        let file = run_of(settings(rows, 1e-3));
+        for kind in LAYERED {
+            let mut exported = decoder(&file, kind).unwrap();
+            let portable = Portable::of(&exported).unwrap();
+            assert_eq!(portable.takes_row(), rows == Rows::Known, "{kind}");
+            let vectors = Vectors::of(&mut exported, &portable, Taking::Double).unwrap();
+            assert!(
+                vectors.program_deviation < 1e-10,
+                "{kind}, rows {rows}: {}",
+                vectors.program_deviation
+            );
+            // The answers vary, except those of the mean.
+            let first = &vectors.all()[0].answers;
+            let is_constant = vectors.all().iter().all(|vector| vector.answers[2] == first[2]);
+            assert_eq!(
+                is_constant,
+                kind == LAYERED[0] && rows != Rows::Known,
+                "{kind}, rows {rows}"
+            );
+        }
+    }
+}
+
+#[test]
+fn every_decoder_of_layers_leaves_in_every_format() {
+    let home = tempfile::tempdir().unwrap();
+    let file = run_of(settings(Rows::Known, 1e-2));
+    for kind in LAYERED {
+        for format in BundleFormat::ALL {
+            for &precision in format.precisions() {
+                if precision == BundlePrecision::Fixed16 {
+                    continue;
+                }
+                let path = home.path().join(format!("{kind} {format} {precision}"));
+                let report = export_bundle(decoder(&file, kind).unwrap(), format, precision, &path).unwrap();
+                assert!(report.deviation() <= report.limit, "{kind}, {format}: {report:?}");
+                assert!(report.vectors.golden > 0, "{kind}, {format}: {report:?}");
+                if format == BundleFormat::Json {
+                    let document: serde_json::Value =
+                        serde_json::from_str(&fs::read_to_string(&path).unwrap()).unwrap();
+                    assert_eq!(document["metadata"]["decoder"], kind.to_string());
+                    continue;
+                }
+                let read = |name: &str| fs::read_to_string(path.join(name)).unwrap();
+                assert!(read("README.txt").starts_with(kind.name()), "{}", read("README.txt"));
+                let metadata: serde_json::Value = serde_json::from_str(&read("metadata.json")).unwrap();
+                assert_eq!(metadata["decoder"], kind.to_string());
+                assert_eq!(metadata["row_numbers"], serde_json::json!([1, 3]));
+                // Its own errors, and not those of the network.
+                let error = metadata["errors"]["z_mm"].as_f64().unwrap();
+                assert!(
+                    error > 0.0 && Some(error) != file.scores.network.nodes().map(|errors| errors.z_mm),
+                    "{kind}: {error}"
+                );
+            }
+        }
+    }
+}
+
+/// Changes nothing, whatever the numbers of rules and Gaussians of the other rows.
+#[test]
+fn maps_of_different_sizes_are_widened_without_effect() {
+    let affine = |weights, biases: &[f64]| AffineLayer {
+        weights,
+        biases: biases.to_vec(),
+    };
+    let rules = |memberships, consequents| LayeredMap {
+        quantity: Quantity::Raw,
+        centre: vec![0.3, -0.1],
+        layers: vec![Layer::Rules {
+            memberships,
+            consequents,
+        }],
+    };
+    let gaussians = |inputs, centres, outputs| LayeredMap {
+        quantity: Quantity::Raw,
+        centre: vec![0.5, 0.2],
+        layers: vec![
+            Layer::Affine(inputs),
+            Layer::Gaussians { centres },
+            Layer::Affine(outputs),
+        ],
+    };
+    let pairs = [
+        [
+            rules(
+                affine(array![[1.0], [-0.5]], &[0.1]),
+                affine(array![[2.0], [1.0]], &[0.7]),
+            ),
+            rules(
+                affine(array![[1.0, 0.4, -1.0], [-0.5, 0.2, 0.3]], &[0.1, -0.3, 0.2]),
+                affine(array![[2.0, 0.3, 1.0], [1.0, -2.0, 0.1]], &[0.7, 0.1, -1.0]),
+            ),
+        ],
+        [
+            gaussians(
+                affine(array![[1.0], [0.5]], &[0.2]),
+                array![[0.4]],
+                affine(array![[3.0]], &[0.1]),
+            ),
+            gaussians(
+                affine(array![[1.0, -1.0], [0.5, 0.3]], &[0.2, 0.0]),
+                array![[0.4, 0.1, -0.2], [-0.3, 0.9, 0.0]],
+                affine(array![[3.0], [-1.0], [0.5]], &[0.1]),
+            ),
+        ],
+    ];
+    let file = run_of(settings(Rows::All, 1e-3));
+    let any = Portable::of(&(&file).into()).unwrap();
+    let any = Portable {
+        quantity: Quantity::Raw,
+        scales: vec![1.0],
+        ..any
+    };
+    for pair in pairs {
+        let before = pair.each_ref().map(FoldedMap::of);
+        let mut after = before.to_vec();
+        FoldedMap::widen(&mut after);
+        for readings in [[0.0, 0.0], [1.0, -2.0], [30.0, 40.0]] {
+            for (before, after) in before.iter().zip(&after) {
+                let [expected, found] = [before, after].map(|map| decode_exactly(&any, map, &readings).answers);
+                assert_eq!(expected, found, "{readings:?}");
+            }
+        }
+        let shapes = |map: &FoldedMap| {
+            map.layers
+                .iter()
+                .map(|layer| layer.values().count())
+                .collect::<Vec<_>>()
+        };
+        assert_ne!(shapes(&before[0]), shapes(&before[1]));
+        assert_eq!(shapes(&after[0]), shapes(&after[1]));
+    }
+}
+
+fn export(file: &NetworkFile, kind: BundleDecoder, format: BundleFormat) -> Result<BundleReport, BundleError> {
+    let home = tempfile::tempdir().unwrap();
+    let path = home.path().join("bundle");
+    let report = export_bundle(decoder(file, kind)?, format, BundlePrecision::Double, &path);
+    assert_eq!(path.exists(), report.is_ok());
+    report
+}
+
+/// The model is the iteration in the sources, which knows neither damping nor side-by-side lanes; the truth are the decoders.
+#[test]
+fn iterations_on_the_equations_find_the_answers_of_the_decoders() {
+    let sideways = {
+        let mut settings = settings(Rows::Known, 0.0);
+        settings.source.sensor = decoupler_core::sensor::SensorModel::new("2x2_3x18".parse().unwrap());
+        settings.source.scene.movement = Movement::SIDEWAYS;
+        settings
+    };
+    let all = [Rows::All, Rows::Known, Rows::One(2)].map(|rows| settings(rows, 0.0));
+    for settings in all.into_iter().chain([sideways]) {
+        let file = run_of(settings);
+        // Three steps sideways after a network of four epochs are not yet at the answer.
+        let is_sideways = settings.source.scene.movement != Movement::Z;
+        for kind in EQUATIONS.into_iter().take(if is_sideways { 1 } else { 2 }) {
+            for format in [BundleFormat::C99, BundleFormat::NumPy] {
+                let report = export(&file, kind, format).unwrap();
+                let what = format!("{kind}, {format}, {}", settings.source.scene.rows);
+                assert!(report.deviation() < 1e-8, "{what}: {report:?}");
+                assert!(report.vectors.verified > 20, "{what}: {report:?}");
+                assert!(
+                    report.remarks.iter().any(|remark| remark.contains("noise")),
+                    "{what}: {report:?}"
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn what_a_format_cannot_express_is_refused_with_the_reason() {
+    let (exact, noisy) = (run_of(settings(Rows::Known, 0.0)), run_of(settings(Rows::Known, 1e-3)));
+    for kind in EQUATIONS {
+        for format in [BundleFormat::Onnx, BundleFormat::Matlab, BundleFormat::Json] {
+            let message = export(&exact, kind, format).unwrap_err().to_string();
+            assert!(message.contains("give c99 or numpy"), "{message}");
+        }
+        let message = export(&noisy, kind, BundleFormat::C99).unwrap_err().to_string();
+        assert!(
+            message.contains("noise") && message.contains("take another decoder"),
+            "{message}"
+        );
+        let single = BundleFormat::C99.check_for(kind, BundlePrecision::Single).unwrap_err();
+        assert!(single.to_string().contains("give f64"), "{single}");
+    }
+    // Two readings of each row for two unknowns.
+    let mut open = settings(Rows::Known, 0.0);
+    open.source.sensor = decoupler_core::sensor::SensorModel::new("3x2_2x2".parse().unwrap());
+    let message = export(&run_of(open), EQUATIONS[0], BundleFormat::C99)
+        .unwrap_err()
+        .to_string();
+    assert!(message.contains("too few"), "{message}");
+    for kind in LAYERED {
+        let refused = BundleFormat::C99.check_for(kind, BundlePrecision::Fixed16).unwrap_err();
+        assert!(refused.to_string().contains("networks only"), "{refused}");
+    }
+    for kind in BundleDecoder::all() {
+        assert_eq!(kind.to_string().parse(), Ok(kind));
+    }
+}

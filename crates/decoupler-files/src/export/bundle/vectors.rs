@@ -1,0 +1,263 @@
+use super::{
+    error::BundleError,
+    exact::{Growth, decode_exactly},
+    exported_decoder::{Drawn, ExportedDecoder},
+    meaning::Meaning,
+    portable::Portable,
+    report::VectorCounts,
+    taking::{ReadingRounding, Taking},
+};
+use decoupler_core::{decoupling::RowProblemDescription, evaluation::RunError};
+
+/// Readings with the answers that the decoder gives to them.
+#[derive(Clone, Debug)]
+pub(super) struct Vectors {
+    /// The golden vectors first: of each row the smallest, middle and largest readings of its training range, and a
+    /// few of those drawn.
+    all: Vec<Vector>,
+    golden: usize,
+    /// Growth of rounding errors in the worst of them.
+    pub(super) growth: Growth,
+    /// Changes of the answers by rounding the readings to the form that the bundle takes.
+    pub(super) rounding: ReadingRounding,
+    /// The bound of [`Self::rounding`] if a constant in the middle of each channel had been subtracted from the readings.
+    centred_bound: f64,
+    /// Largest deviation of `decode` of this program from the exact answers.
+    pub(super) program_deviation: f64,
+    /// [`Portable::scales`].
+    scales: Vec<f64>,
+}
+
+/// Readings of a row with the answer.
+#[derive(Clone, Debug)]
+pub(super) struct Vector {
+    /// Index of the row-wire where that is an argument, and 0 otherwise.
+    pub(super) row: usize,
+    /// As a caller has them, in double precision.
+    pub(super) readings: Vec<f64>,
+    /// The readings in the form that the bundle takes.
+    pub(super) taken: Vec<f64>,
+    /// Exact answers to the readings.
+    pub(super) answers: Vec<f64>,
+    /// Exact answers to the readings as taken.
+    pub(super) answers_to_taken: Vec<f64>,
+}
+
+/// Largest differences of an evaluation, relative to the scales of the outputs. NaN if an answer is NaN.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Deviation {
+    /// From the answers of the decoder to the readings that a caller has.
+    pub(super) total: f64,
+    /// From the answers of the decoder to the readings as taken: by the arithmetic alone.
+    pub(super) of_arithmetic: f64,
+}
+
+impl Vectors {
+    /// Draws readings and answers them.
+    ///
+    /// # Errors
+    /// No readings could be drawn, or the bundle cannot take one of them.
+    pub(super) fn of(
+        exported: &mut ExportedDecoder<'_>,
+        portable: &Portable,
+        taking: Taking<'_>,
+    ) -> Result<Self, BundleError> {
+        let mut readings = Vec::new();
+        let ranges = portable
+            .ranges
+            .iter()
+            .enumerate()
+            .filter(|_| portable.equations.is_none());
+        for (index, range) in ranges {
+            let Some(range) = range else { continue };
+            for place in [0.0, 0.5, 1.0] {
+                let between = |&(low, high): &(f64, f64)| if place == 1.0 { high } else { low + place * (high - low) };
+                readings.push((index, range.extremes.iter().map(between).collect::<Vec<_>>()));
+            }
+        }
+        let (golden, drawn) = exported.draw(portable)?;
+        if let Some(equations) = &portable.equations {
+            readings.extend(of_extremes(equations, portable.takes_row())?);
+        }
+        let mut vectors = Self {
+            all: Vec::new(),
+            golden: readings.len() + golden,
+            growth: Growth::default(),
+            rounding: ReadingRounding::default(),
+            centred_bound: 0.0,
+            program_deviation: 0.0,
+            scales: portable.scales.clone(),
+        };
+        readings.extend(drawn);
+        for (index, readings) in readings {
+            let channels = readings.iter().enumerate();
+            let taken: Vec<f64> = (channels.clone())
+                .map(|(channel, &reading)| taking.rounded(channel, reading))
+                .collect();
+            let refused = taken.iter().position(|&reading| !portable.quantity.accepts(reading));
+            if let Some(channel) = refused {
+                let (channel, reading) = (portable.meaning.inputs()[channel].name.clone(), readings[channel]);
+                return Err(BundleError::ReadingBeyond { channel, reading });
+            }
+            let errors: Vec<f64> = channels
+                .map(|(channel, &reading)| taking.error(channel, reading))
+                .collect();
+            let of_program = exported.decode(index, &readings)?;
+            if portable.equations.is_some() {
+                // Equations are their own exact answer, to within what counts as their solution.
+                vectors.all.push(Vector {
+                    row: index,
+                    taken,
+                    answers_to_taken: of_program.clone(),
+                    answers: of_program,
+                    readings,
+                });
+                continue;
+            }
+            let map = &portable.maps[index];
+            let exact = decode_exactly(portable, map, &readings);
+            let of_taken = if taken == readings {
+                exact.clone()
+            } else {
+                decode_exactly(portable, map, &taken)
+            };
+            vectors.growth = vectors.growth.largest(&of_taken.growth);
+            let bound = exact.change_by(portable, map, &readings, &errors);
+            if let Some(range) = &portable.ranges[index] {
+                let errors: Vec<f64> = (range.limits.iter().enumerate())
+                    .map(|(channel, &(low, high))| taking.error(channel, 0.5 * (high - low)))
+                    .collect();
+                let bound = exact.change_by(portable, map, &readings, &errors);
+                vectors.centred_bound = larger(vectors.centred_bound, bound);
+            } else {
+                vectors.centred_bound = f64::INFINITY;
+            }
+            vectors.rounding = ReadingRounding {
+                largest: larger(
+                    vectors.rounding.largest,
+                    relative(&of_taken.answers, &exact.answers, &vectors.scales),
+                ),
+                bound: larger(vectors.rounding.bound, bound),
+            };
+            vectors.program_deviation = larger(
+                vectors.program_deviation,
+                relative(&of_program, &exact.answers, &vectors.scales),
+            );
+            vectors.all.push(Vector {
+                row: index,
+                readings,
+                taken,
+                answers: exact.answers,
+                answers_to_taken: of_taken.answers,
+            });
+        }
+        if portable
+            .equations
+            .as_ref()
+            .is_some_and(|equations| equations.seeks_solution)
+        {
+            let (decoder, open, rows) = (exported.kind(), exported.take_open_rows(), vectors.all.len());
+            if open > 0 {
+                return Err(BundleError::OpenRows { decoder, open, rows });
+            }
+        }
+        Ok(vectors)
+    }
+
+    /// Leaves out the vectors with a reading that counts as outside the range of training.
+    pub(super) fn inside(mut self, portable: &Portable) -> Self {
+        let is_inside = |vector: &Vector| {
+            portable.ranges[vector.row].as_ref().is_none_or(|range| {
+                let mut readings = vector.readings.iter().zip(&range.limits);
+                readings.all(|(ohm, (low, high))| (low..=high).contains(&ohm))
+            })
+        };
+        self.golden = self.all[..self.golden]
+            .iter()
+            .filter(|vector| is_inside(vector))
+            .count();
+        self.all.retain(is_inside);
+        self
+    }
+
+    /// Advice for a bundle in single precision that changes too much by rounding readings to it.
+    pub(super) fn cure(&self, portable: &Portable) -> String {
+        /// Part of the change that may be left.
+        const WORTHWHILE: f64 = 0.1;
+        let subtracted = match portable.meaning {
+            Meaning::Own { .. } => self.centred_bound < WORTHWHILE * self.rounding.bound,
+            Meaning::Array(_) => false,
+        };
+        if subtracted {
+            "give --precision f64, or subtract a constant from each input before training, because the readings vary little \
+             in proportion to their size"
+                .to_owned()
+        } else {
+            format!(
+                "give --precision f64, or {} for one that amplifies less",
+                portable.smaller_weights()
+            )
+        }
+    }
+
+    /// Numbers of vectors.
+    pub(super) fn counts(&self) -> VectorCounts {
+        VectorCounts {
+            verified: self.all.len(),
+            golden: self.golden,
+        }
+    }
+
+    pub(super) fn all(&self) -> &[Vector] {
+        &self.all
+    }
+
+    /// The vectors that the bundle contains.
+    pub(super) fn golden(&self) -> &[Vector] {
+        &self.all[..self.golden]
+    }
+
+    /// Largest differences of `decode`, which is to decode the readings as taken.
+    pub(super) fn deviation(&self, mut decode: impl FnMut(&Vector) -> Vec<f64>) -> Deviation {
+        self.all.iter().fold(Deviation::default(), |largest, vector| {
+            let answers = decode(vector);
+            Deviation {
+                total: larger(largest.total, relative(&answers, &vector.answers, &self.scales)),
+                of_arithmetic: larger(
+                    largest.of_arithmetic,
+                    relative(&answers, &vector.answers_to_taken, &self.scales),
+                ),
+            }
+        })
+    }
+}
+
+/// Readings of every row-wire at rest and fully pressed.
+fn of_extremes(equations: &RowProblemDescription, takes_row: bool) -> Result<Drawn, BundleError> {
+    let model = &equations.model;
+    let mut readings = Drawn::new();
+    for (index, &row) in equations.rows.iter().enumerate() {
+        // The unknowns end with z, the stroke of which is that of all nodes.
+        for pressed_mm in equations.ranges.last().map_or([0.0, 0.0], |&(low, high)| [low, high]) {
+            let displacements = vec![glam::DVec3::Z * pressed_mm; model.scale.nodes_per_row()];
+            let of_row = model.row_resistances(row, &displacements);
+            let of_row = of_row.map_err(|error| Box::new(RunError::from(error)))?;
+            readings.push((if takes_row { index } else { 0 }, of_row));
+        }
+    }
+    Ok(readings)
+}
+
+/// Largest difference of `answers` from those `expected`, each relative to its scale. NaN if an answer is NaN.
+fn relative(answers: &[f64], expected: &[f64], scales: &[f64]) -> f64 {
+    assert_eq!(answers.len(), expected.len());
+    let pairs = answers.iter().zip(expected).zip(scales);
+    pairs.fold(0.0, |largest, ((answer, expected), scale)| {
+        larger(largest, (answer - expected).abs() / scale)
+    })
+}
+
+/// The larger of two deviations; once it is NaN it stays so.
+fn larger(one: f64, other: f64) -> f64 {
+    if one.is_nan() || one >= other { one } else { other }
+}

@@ -1,0 +1,181 @@
+use ndarray::ArrayView1;
+
+use super::{folding::FoldedMap, portable::Portable};
+use decoupler_core::{
+    decoupling::{AffineLayer, Layer},
+    network::Quantity,
+};
+
+/// Digits of a floating-point number.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Digits {
+    Single,
+    Double,
+}
+
+/// Digits in which a bundle of floating-point numbers decodes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Arithmetic {
+    /// Number of first layers that are computed in double precision, with the changes of the readings.
+    pub(super) wide_layers: usize,
+    /// Of the readings, and of everything after these layers.
+    pub(super) rest: Digits,
+}
+
+/// Rounded weights, as a bundle has them.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Weights {
+    pub(super) quantity: Quantity,
+    pub(super) arithmetic: Arithmetic,
+    pub(super) maps: Vec<RoundedMap>,
+}
+
+/// The numbers of one map.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct RoundedMap {
+    pub(super) centre: Vec<f64>,
+    pub(super) layers: Vec<Layer<f64>>,
+}
+
+impl Digits {
+    /// Rounds to these digits. A sum, product, quotient or root of singles, computed in double and then rounded, is the
+    /// one of single precision (S. A. Figueroa, SIGNUM Newsletter 30 (1995), 21-26).
+    pub(super) fn round(self, value: f64) -> f64 {
+        match self {
+            Self::Single => f64::from(value as f32),
+            Self::Double => value,
+        }
+    }
+
+    /// Half the spacing of numbers at 1.
+    pub(super) fn unit_roundoff(self) -> f64 {
+        0.5 * match self {
+            Self::Single => f64::from(f32::EPSILON),
+            Self::Double => f64::EPSILON,
+        }
+    }
+}
+
+impl Arithmetic {
+    pub(super) const DOUBLE: Self = Self {
+        wide_layers: 0,
+        rest: Digits::Double,
+    };
+
+    /// Single precision, with this number of first layers in double.
+    pub(super) fn single(wide_layers: usize) -> Self {
+        Self {
+            wide_layers,
+            rest: Digits::Single,
+        }
+    }
+
+    /// Digits of a layer, by its index; those of the changes are those of the first.
+    pub(super) fn of_layer(self, index: usize) -> Digits {
+        if index < self.wide_layers {
+            Digits::Double
+        } else {
+            self.rest
+        }
+    }
+}
+
+impl Weights {
+    /// Rounds the weights of `portable`.
+    pub(super) fn of(portable: &Portable, arithmetic: Arithmetic) -> Self {
+        let map = |map: &FoldedMap| {
+            let layers = map.layers.iter().enumerate().map(|(index, layer)| {
+                let digits = arithmetic.of_layer(index);
+                let mut values = layer.values().map(|value| digits.round(value.to_f64()));
+                layer.with_values(&mut values).expect("as many values as the layer has")
+            });
+            RoundedMap {
+                centre: map.centre.clone(),
+                layers: layers.collect(),
+            }
+        };
+        Self {
+            quantity: portable.quantity,
+            arithmetic,
+            maps: portable.maps.iter().map(map).collect(),
+        }
+    }
+
+    /// Decodes a row in the arithmetic of the bundle.
+    pub(super) fn decode(&self, map: usize, readings: &[f64]) -> Vec<f64> {
+        let (arithmetic, map) = (self.arithmetic, &self.maps[map]);
+        let readings = readings.iter().zip(&map.centre);
+        let changes = readings.map(|(&ohm, &centre)| {
+            let ohm = arithmetic.rest.round(ohm);
+            change(self.quantity, arithmetic.of_layer(0), ohm, centre)
+        });
+        let mut values: Vec<f64> = changes.collect();
+        for (index, layer) in map.layers.iter().enumerate() {
+            let digits = arithmetic.of_layer(index);
+            values.iter_mut().for_each(|value| *value = digits.round(*value));
+            values = apply(layer, digits, values);
+        }
+        values.into_iter().map(|value| arithmetic.rest.round(value)).collect()
+    }
+}
+
+fn change(quantity: Quantity, digits: Digits, ohm: f64, centre: f64) -> f64 {
+    let difference = digits.round(ohm - centre);
+    match quantity {
+        Quantity::Resistance | Quantity::Raw => difference,
+        Quantity::Conductance => digits.round(-difference / ohm),
+        Quantity::LogResistance => digits.round(libm::log1p(digits.round(difference / centre))),
+    }
+}
+
+fn apply(layer: &Layer<f64>, digits: Digits, values: Vec<f64>) -> Vec<f64> {
+    match layer {
+        Layer::Affine(affine) => sums(digits, &values, affine),
+        Layer::Tanh => values
+            .into_iter()
+            .map(|value| digits.round(libm::tanh(value)))
+            .collect(),
+        Layer::Gaussians { centres } => {
+            let gaussian = |centre: ArrayView1<'_, f64>| {
+                let square = values.iter().zip(centre).fold(0.0, |sum, (value, centre)| {
+                    let apart = digits.round(value - centre);
+                    digits.round(sum + digits.round(apart * apart))
+                });
+                digits.round(libm::exp(-square))
+            };
+            centres.columns().into_iter().map(gaussian).collect()
+        }
+        Layer::Rules {
+            memberships,
+            consequents,
+        } => {
+            let logarithms = sums(digits, &values, memberships);
+            let largest = logarithms.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+            let strengths: Vec<f64> = logarithms
+                .iter()
+                .map(|logarithm| digits.round(libm::exp(digits.round(logarithm - largest))))
+                .collect();
+            let total = strengths.iter().fold(0.0, |sum, strength| digits.round(sum + strength));
+            let of_rules = sums(digits, &values, consequents);
+            let mut blended = vec![0.0; consequents.outputs() / strengths.len()];
+            for (strength, answers) in strengths.iter().zip(of_rules.chunks_exact(blended.len().max(1))) {
+                let share = digits.round(strength / total);
+                for (sum, answer) in blended.iter_mut().zip(answers) {
+                    *sum = digits.round(*sum + digits.round(share * answer));
+                }
+            }
+            blended
+        }
+    }
+}
+
+/// values · weights + biases.
+fn sums(digits: Digits, values: &[f64], affine: &AffineLayer<f64>) -> Vec<f64> {
+    let mut sums = affine.biases.clone();
+    for (value, row) in values.iter().zip(affine.weights.rows()) {
+        for (sum, weight) in sums.iter_mut().zip(row) {
+            *sum = digits.round(*sum + digits.round(value * weight));
+        }
+    }
+    sums
+}

@@ -1,0 +1,138 @@
+use std::{path::Path, time::Duration};
+
+use serde::{Deserialize, Serialize};
+use serde_json::value::to_raw_value;
+
+use super::{
+    AtomicFile, DocumentError, DocumentKind, document::PROGRAM, sealed::Sealed, soundness::settings_flaw,
+    unfinished::folder_of,
+};
+use crate::import::{Progress, Recorded, Setup, SetupError, SetupSets};
+use decoupler_core::{
+    evaluation::{Run, RunSettings},
+    training::TrainerState,
+};
+
+const KIND: DocumentKind = DocumentKind::Checkpoint;
+
+/// A run saved at some epoch. A resumed run gives bit-identical results.
+///
+/// The file is JSON. It does not contain the samples: those of a simulated array follow from the settings, those of a recording
+/// are read again by its plan and recognised by their checksum. Another checksum (CRC-32) detects changes of the file.
+#[derive(Clone, Debug, PartialEq)]
+pub struct CheckpointFile {
+    /// Program and version that wrote the file.
+    pub program: String,
+    /// Settings of the run, with the method and stopping rules of that epoch.
+    pub settings: RunSettings,
+    /// Origin of recorded samples, with absolute paths; `None` for a simulated array.
+    pub recorded: Option<Recorded>,
+    /// Time that all starts together have taken: [`Run::wall_time`].
+    pub wall_time: Option<Duration>,
+    /// State of every trainer: by start, then, if there is a network for each row-wire, by row.
+    pub starts: Vec<TrainerState>,
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Document {
+    settings: RunSettings,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    recorded: Option<Recorded>,
+    wall_time: Option<Duration>,
+    starts: Vec<TrainerState>,
+}
+
+impl CheckpointFile {
+    /// Takes the present state of `run`; `recorded` is the origin of its samples if they are recorded.
+    ///
+    /// # Errors
+    /// [`DocumentError::NoPlan`] if the samples are recorded and nothing says where.
+    pub fn from_run(run: &Run, recorded: Option<&Recorded>) -> Result<Self, DocumentError> {
+        Ok(Self {
+            program: PROGRAM.to_owned(),
+            settings: *run.settings(),
+            recorded: KIND.recorded_of(run, recorded)?,
+            wall_time: run.wall_time(),
+            starts: run.states(),
+        })
+    }
+
+    /// Setup of the run.
+    pub fn setup(&self) -> Setup {
+        let plan = self.recorded.as_ref().map(|recorded| recorded.plan.clone());
+        Setup::of(self.settings, plan).expect("a file of a recording has its plan, as reading and writing check")
+    }
+
+    /// Resumes the run from this epoch: draws or reads its samples again and restores every trainer.
+    ///
+    /// # Errors
+    /// The settings are impossible, the recording has changed or is missing, or the states do not fit the settings or each
+    /// other.
+    pub fn resume(self) -> Result<Run, SetupError> {
+        let resumed = self.resume_unless(&|| false, &mut |_| ())?;
+        Ok(resumed.expect("nothing cancels it").0)
+    }
+
+    /// As [`Self::resume`], with the sets; returns `None` once `is_cancelled`, which is called between the parts of the work.
+    pub fn resume_unless(
+        self,
+        is_cancelled: &dyn Fn() -> bool,
+        on_progress: &mut dyn FnMut(Progress),
+    ) -> Result<Option<(Run, SetupSets)>, SetupError> {
+        let setup = self.setup();
+        if let Some(settings) = setup.simulated() {
+            settings.check_states(&self.starts)?;
+        }
+        let Some(sets) = setup.sets(Path::new(""), is_cancelled, on_progress)? else {
+            return Ok(None);
+        };
+        sets.check_saved(self.recorded.as_ref())?;
+        let run = sets.clone().resume(&setup, self.starts, is_cancelled)?;
+        Ok(run.map(|run| (run.with_wall_time(self.wall_time), sets)))
+    }
+
+    /// Writes the file whole or not at all.
+    ///
+    /// # Errors
+    /// The run has numbers that JSON cannot hold, or the path cannot be written.
+    pub fn save(&self, path: &Path) -> Result<(), DocumentError> {
+        let unsound = |error: serde_json::Error| DocumentError::Unsound {
+            path: path.to_owned(),
+            flaw: error.to_string(),
+        };
+        let recorded = self.recorded.as_ref();
+        let run = to_raw_value(&Document {
+            settings: self.settings,
+            recorded: recorded.map(|recorded| recorded.relative_to(folder_of(path))),
+            wall_time: self.wall_time,
+            starts: self.starts.clone(),
+        });
+        let run = run.map_err(unsound)?;
+        // What was written must be readable: a weight that is not finite would be `null`.
+        serde_json::from_str::<Document>(run.get()).map_err(unsound)?;
+        Ok(Sealed::new(KIND, &self.program, &run).save(path, AtomicFile::commit)?)
+    }
+
+    /// Reads the file at `path`.
+    ///
+    /// # Errors
+    /// The file cannot be read, is of another kind or version, or is damaged.
+    pub fn load(path: &Path) -> Result<Self, DocumentError> {
+        let bytes = KIND.read(path)?;
+        Self::parse(&bytes, folder_of(path)).map_err(|flaw| KIND.damaged(path, flaw))
+    }
+
+    fn parse(bytes: &[u8], folder: &Path) -> Result<Self, String> {
+        let Sealed { program, run, .. } = Sealed::read(bytes)?;
+        let document: Document = serde_json::from_str(run.get()).map_err(|error| error.to_string())?;
+        let file = Self {
+            program,
+            settings: document.settings,
+            recorded: document.recorded.map(|recorded| recorded.within(folder)),
+            wall_time: document.wall_time,
+            starts: document.starts,
+        };
+        settings_flaw(&file.settings, file.recorded.as_ref()).map_or(Ok(file), Err)
+    }
+}

@@ -1,0 +1,368 @@
+use std::{
+    io::{self, Write},
+    time::Duration,
+};
+
+use super::{Cell, Table, TableColumn, TableForm, format_duration, format_number};
+use decoupler_core::evaluation::{
+    Channel, TargetErrors,
+    experiments::{CellResults, CellSummary, ExperimentResults, Figure, SummaryErrors, Trial, Verdict},
+};
+
+/// The results of an experiment for reading: the same columns in the terminal, in files and in the window.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ExperimentTable {
+    /// Columns of the table.
+    pub columns: Vec<ExperimentColumn>,
+    /// Cells of the experiment, row by row.
+    pub rows: Vec<Vec<String>>,
+    /// Sort keys of the rows: the numbers behind the texts; for an axis, the index of the value in its list.
+    pub values: Vec<Vec<Option<f64>>>,
+    /// Explanation of the last columns, to be shown below the table.
+    pub note: &'static str,
+}
+
+/// A column of the results of an experiment.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ExperimentColumn {
+    /// Name of the column.
+    pub heading: &'static str,
+    /// Kind of its figures.
+    pub kind: ExperimentColumnKind,
+}
+
+/// Kind of the figures in a column.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ExperimentColumnKind {
+    /// Values of a setting that is varied.
+    Axis,
+    /// Errors by which cells are ranked.
+    Ranking,
+    /// Errors that the paper reports.
+    Published,
+    /// Errors of the linear baseline.
+    Linear,
+    /// Training time.
+    Time,
+    /// Other figures.
+    Other,
+}
+
+/// A column with the figure of a cell: its number and its text.
+type CellFigure = (ExperimentColumn, Option<f64>, String);
+
+impl ExperimentTable {
+    /// The results so far.
+    pub fn new(results: &ExperimentResults) -> Self {
+        let summaries = results.summaries();
+        let layout = Layout {
+            has_published: results.cells.iter().any(|cell| cell.cell.published.is_some()),
+            has_bound: results.experiment.recording.is_none() || summaries.iter().any(has_bound),
+        };
+        let axes = results.experiment.axes().map(|axis| ExperimentColumn {
+            heading: axis.name(),
+            kind: ExperimentColumnKind::Axis,
+        });
+        let figures = summaries
+            .first()
+            .map(|summary| layout.figures(summary))
+            .unwrap_or_default();
+        let columns = axes.chain(figures.into_iter().map(|(column, ..)| column)).collect();
+        let row = |(cell, summary): (&CellResults, &CellSummary)| {
+            let places = [cell.cell.column, cell.cell.row].map(|place| Some(place as f64));
+            let labels = places.into_iter().zip(results.cell_labels(cell));
+            let figures = layout.figures(summary).into_iter();
+            labels.chain(figures.map(|(_, value, text)| (value, text))).unzip()
+        };
+        let (values, rows) = results.cells.iter().zip(&summaries).map(row).unzip();
+        let note = match results.experiment.recording {
+            None => NODES_NOTE,
+            Some(_) => TARGETS_NOTE,
+        };
+        Self {
+            columns,
+            rows,
+            values,
+            note,
+        }
+    }
+
+    /// The table for other documents, with the training time in seconds.
+    pub fn table(&self) -> Table {
+        let is_axis = |column: &&ExperimentColumn| column.kind == ExperimentColumnKind::Axis;
+        let axes = self.columns.iter().take_while(is_axis).count();
+        let columns = self.columns.iter().map(|column| match column.kind {
+            ExperimentColumnKind::Time => TableColumn::new(column.heading, column.heading, "s"),
+            _ => TableColumn::field(column.heading),
+        });
+        let row = |(texts, values): (&Vec<String>, &Vec<Option<f64>>)| {
+            let labels = texts[..axes].iter().map(|label| match label.parse() {
+                Ok(count) => Cell::Count(count),
+                Err(_) => Cell::Text(label.clone()),
+            });
+            labels.chain(values[axes..].iter().copied().map(Cell::from)).collect()
+        };
+        Table {
+            columns: columns.collect(),
+            rows: self.rows.iter().zip(&self.values).map(row).collect(),
+        }
+    }
+}
+
+const NODES_NOTE: &str = "Medians, least and largest over seeds (and repeats). mean: always answering the training mean; \
+     linear: best affine map on resistance; bound: what so few hidden nodes can carry, the least-squares best answer of \
+     any network with them; epochs: mean of the starts; training: one network, all its starts.";
+
+const TARGETS_NOTE: &str = "Medians, minimum and maximum over seeds. error: mean absolute error in percent of the range of \
+     the target, averaged over the targets that vary, and R² likewise; mean: always answering the training mean; ridge: \
+     ridge regression; bound: error of the best answer of any network with so few hidden nodes; epochs: mean of the \
+     starts; training: one network, all its starts.";
+
+fn has_bound(summary: &CellSummary) -> bool {
+    summary.bound_percent.is_some_and(|percent| percent > 0.0)
+}
+
+/// Optional columns of a table.
+struct Layout {
+    has_published: bool,
+    has_bound: bool,
+}
+
+impl Layout {
+    /// Columns with the figures of a cell.
+    fn figures(&self, summary: &CellSummary) -> Vec<CellFigure> {
+        use ExperimentColumnKind::{Linear, Other, Published, Ranking, Time};
+        let number = |heading, kind, value: Option<f64>| {
+            let column = ExperimentColumn { heading, kind };
+            (column, value, format_number(value))
+        };
+        let published = |heading, figure: &Figure| {
+            let value = figure.published;
+            self.has_published.then(|| number(heading, Published, value))
+        };
+        let percent = &summary.percent;
+        let [publ, median, mean, linear, bound] = match summary.errors {
+            SummaryErrors::Nodes { .. } => ["Z % publ.", "Z % median", "mean Z %", "linear Z %", "bound Z %"],
+            SummaryErrors::Targets { .. } => ["error % publ.", "error % median", "mean %", "ridge %", "bound %"],
+        };
+        let mut figures = Vec::from_iter(published(publ, percent));
+        figures.extend([
+            number(median, Ranking, percent.median),
+            number("min", Other, percent.min),
+            number("max", Other, percent.max),
+        ]);
+        match &summary.errors {
+            SummaryErrors::Nodes {
+                x_percent, y_percent, ..
+            } => {
+                figures.extend(published("X % publ.", x_percent));
+                figures.push(number("X % median", Other, x_percent.median));
+                figures.extend(published("Y % publ.", y_percent));
+                figures.push(number("Y % median", Other, y_percent.median));
+            }
+            SummaryErrors::Targets { r2 } => figures.push(number("R² median", Other, r2.median)),
+        }
+        figures.push(number(mean, Other, summary.mean_percent));
+        figures.push(number(linear, Linear, summary.linear_percent));
+        if self.has_bound {
+            figures.push(number(bound, Other, summary.bound_percent));
+        }
+        figures.push(number("epochs", Other, summary.epochs_run));
+        let seconds = summary.training_seconds;
+        let time = seconds.and_then(|seconds| Duration::try_from_secs_f64(seconds).ok());
+        let column = ExperimentColumn {
+            heading: "training",
+            kind: Time,
+        };
+        let time = time.map_or_else(|| format_number(None), format_duration);
+        figures.push((column, seconds, time));
+        figures
+    }
+}
+
+/// The figures of every cell: for programs.
+pub fn cells_table(results: &ExperimentResults) -> Table {
+    let rows = results.cells.iter().zip(results.summaries());
+    let rows = rows.map(|(cell, summary)| {
+        let mut fields = settings_fields(cell);
+        fields.extend([
+            field("starts", summary.starts.into()),
+            field("trials", summary.trials.into()),
+        ]);
+        let figure = |name: &str, figure: &Figure, has_published: bool| {
+            let published = has_published.then_some(("published", figure.published));
+            let of_trials = [("median", figure.median), ("min", figure.min), ("max", figure.max)];
+            let figures = published.into_iter().chain(of_trials);
+            Vec::from_iter(figures.map(|(which, value)| field(&format!("{name}_{which}"), value.into())))
+        };
+        let name = match &summary.errors {
+            SummaryErrors::Nodes {
+                x_percent, y_percent, ..
+            } => {
+                fields.extend(figure("z_percent", &summary.percent, true));
+                fields.extend(figure("x_percent", x_percent, true));
+                fields.extend(figure("y_percent", y_percent, true));
+                "z_percent"
+            }
+            SummaryErrors::Targets { r2 } => {
+                fields.extend(figure("percent_of_range", &summary.percent, false));
+                fields.extend(figure("r2", r2, false));
+                "percent_of_range"
+            }
+        };
+        let baselines =
+            BASELINES
+                .into_iter()
+                .zip([summary.mean_percent, summary.linear_percent, summary.bound_percent]);
+        fields.extend(baselines.map(|(baseline, percent)| field(&format!("{baseline}_{name}"), percent.into())));
+        fields.extend([
+            field("epochs_run", summary.epochs_run.into()),
+            field("training_seconds", summary.training_seconds.into()),
+            field("epoch_ms", summary.epoch_ms.into()),
+        ]);
+        fields
+    });
+    table_of(rows)
+}
+
+/// Names of the baselines in the fields of tables for programs.
+const BASELINES: [&str; 3] = ["mean", "linear", "bound"];
+
+/// Every trial: for programs. Repeats are counted from 1.
+pub fn trials_table(results: &ExperimentResults) -> Table {
+    let trials = results
+        .cells
+        .iter()
+        .flat_map(|cell| cell.trials.iter().map(move |trial| (cell, trial)));
+    let targets = results.problem.as_ref().map_or(&[][..], |problem| &problem.targets);
+    table_of(trials.map(|(cell, trial)| {
+        let mut fields = settings_fields(cell);
+        fields.extend([
+            field("seed", Cell::Count(trial.seed.0)),
+            field("repeat", (trial.repeat + 1).into()),
+        ]);
+        let name = match trial.errors.nodes() {
+            Some(errors) => {
+                fields.extend([
+                    field("z_percent", errors.z_percent.into()),
+                    field("x_percent", errors.x_percent.into()),
+                    field("y_percent", errors.y_percent.into()),
+                    field("z_mm", errors.z_mm.into()),
+                    field("worst_mm", errors.worst_mm.into()),
+                ]);
+                "z_percent"
+            }
+            None => {
+                fields.extend(target_fields(trial, targets));
+                "percent_of_range"
+            }
+        };
+        let bound = trial.bottleneck.as_ref().and_then(|errors| errors.percent());
+        let baselines =
+            BASELINES
+                .into_iter()
+                .zip([trial.baselines.mean.percent(), trial.baselines.linear.percent(), bound]);
+        fields.extend(baselines.map(|(baseline, percent)| field(&format!("{baseline}_{name}"), percent.into())));
+        fields.extend([
+            field("epochs_run", trial.epochs.into()),
+            field("seconds", trial.seconds.into()),
+        ]);
+        fields
+    }))
+}
+
+type Field = (String, Cell);
+
+fn field(name: &str, value: Cell) -> Field {
+    (name.to_owned(), value)
+}
+
+/// Settings of a cell.
+fn settings_fields(cell: &CellResults) -> Vec<Field> {
+    let settings = &cell.cell.settings;
+    let method = field("method", settings.training.method.short_name().into());
+    let epochs = field("epochs", settings.training.stopping.epochs.into());
+    match settings.source.simulation() {
+        Some(source) => vec![
+            field("array", source.sensor.scale.to_string().into()),
+            field("hidden", settings.hidden.into()),
+            field("samples", source.samples.into()),
+            method,
+            epochs,
+        ],
+        None => {
+            let split = cell.cell.division.map(|division| division.by.to_string());
+            vec![
+                field("split", split.unwrap_or_default().into()),
+                field("scaling", settings.inputs.scaling.to_string().into()),
+                field("hidden", settings.hidden.into()),
+                method,
+                epochs,
+            ]
+        }
+    }
+}
+
+/// Errors of a trial on a recording: over all targets, and of each in its unit.
+fn target_fields(trial: &Trial, targets: &[Channel]) -> Vec<Field> {
+    let errors = trial.errors.targets();
+    let r2 = TargetErrors::over_all(errors).and_then(|errors| errors.r2);
+    let mut fields = vec![
+        field("percent_of_range", trial.errors.percent().into()),
+        field("r2", r2.into()),
+    ];
+    for (number, errors) in errors.iter().enumerate() {
+        let name = targets
+            .get(number)
+            .map_or_else(|| format!("t{}", number + 1), |target| target.name.clone());
+        fields.extend([
+            field(&format!("{name}.rmse"), errors.rmse.into()),
+            field(&format!("{name}.mae"), errors.mae.into()),
+            field(&format!("{name}.r2"), errors.r2.into()),
+            field(&format!("{name}.worst"), errors.worst.into()),
+        ]);
+    }
+    fields
+}
+
+/// A table of rows that have the same fields.
+fn table_of(rows: impl Iterator<Item = Vec<Field>>) -> Table {
+    let mut columns = Vec::new();
+    let rows = rows.map(|fields| {
+        if columns.is_empty() {
+            columns = fields
+                .iter()
+                .map(|(name, _)| TableColumn::field(name.clone()))
+                .collect();
+        }
+        fields.into_iter().map(|(_, value)| value).collect()
+    });
+    let rows = Vec::from_iter(rows);
+    Table { columns, rows }
+}
+
+/// Writes table and verdicts as Markdown under `title`, with `conditions` between.
+///
+/// # Errors
+/// Any error of `writer`.
+pub fn write_experiment_markdown(
+    title: &str,
+    conditions: &str,
+    results: &ExperimentResults,
+    verdicts: &[Verdict],
+    writer: &mut dyn Write,
+) -> io::Result<()> {
+    let table = ExperimentTable::new(results);
+    let text = table.table().text(TableForm::Markdown);
+    writeln!(writer, "## {title}\n\n{conditions}\n\n{text}")?;
+    writeln!(writer, "{}\n", table.note)?;
+    for Verdict {
+        claim,
+        standing,
+        finding,
+    } in verdicts
+    {
+        writeln!(writer, "* {claim}: **{standing}**. {finding}")?;
+    }
+    Ok(())
+}

@@ -1,0 +1,90 @@
+//! Files for later and for other programs: network files, checkpoints, recipes, tables, figures and reports (feature
+//! `figures`), and the one way in which all of them are written: whole or not at all.
+//!
+//! # Files that are read again
+//!
+//! All are JSON with the fields `format`, `version` and `program`, the program that wrote the file. There is one file of each
+//! kind for simulated arrays and for recordings, and a program reads one version of each: any other is refused with the
+//! version and the program that wrote it. Files that only the program writes keep their contents in the field `run`, whose
+//! CRC-32 is in `crc32`: any change is noticed. Paths of recordings are relative to the folder of the file; those of
+//! recordings in the user's home, seen from a folder elsewhere, are names alone.
+//!
+//! *Network file* (`decoupler network`, [`NetworkFile`]): `settings` of the run with its source, `recorded` (only of a
+//! recording: the plan that reads it, CRC-32 of each file and of the samples), `problem` (names, units and positions of
+//! readings and targets), `row_wires`, `network` (scalings and weights of each network), `training` (every epoch, methods,
+//! starts, reason for stopping), and `scores` (errors of network and baselines on the test set).
+//!
+//! *Checkpoint* (`decoupler checkpoint`, [`CheckpointFile`]): `settings` and `recorded` as above, `wall_time`, and `starts`,
+//! the state of every training. It has no samples: they are drawn or read again, and those of a recording are compared with
+//! their CRC-32.
+//!
+//! *Recipe* (`decoupler recipe`, [`RecipeFile`]), to be written by hand too: `source`, which is either `simulated` (sensor,
+//! scene and numbers of samples, each with a default) or `recording` (files, meanings of columns, division of the samples).
+//!
+//! *Sensor file* (`decoupler sensor`, [`SensorFile`]), to be written by hand too: `sensor` with the array scale, the geometry and
+//! the resistance per millimetre, such as `decoupler calibrate` fits.
+//!
+//! *Run folder* ([`RunFolder`]): `run-N.json` is the network file of run N, `run-N.name.json` its name, and `pinned.json` the
+//! numbers of the two runs that are compared; the last two are of the kind `decoupler run list`.
+
+mod atomic;
+pub mod bundle;
+mod checkpoint_file;
+mod document;
+mod experiment_tables;
+mod experiment_words;
+pub mod figures;
+mod heading;
+mod kept_files;
+mod limited;
+mod network_file;
+mod recipe_file;
+mod recorded_words;
+pub mod report;
+mod run_folder;
+mod same_file;
+mod samples;
+mod sealed;
+mod sensor_file;
+mod soundness;
+mod sweep;
+mod table;
+mod tables;
+#[cfg(test)]
+mod test_folder;
+mod trade_tables;
+mod training_record;
+mod unfinished;
+mod workload_words;
+
+pub use atomic::{AtomicFile, WriteError, atomic_write, check_writable};
+pub use checkpoint_file::CheckpointFile;
+pub use decoupler_core::text::{format_decimals, format_duration, format_number, format_percent, format_r2};
+pub use document::{DocumentError, DocumentKind};
+pub use experiment_tables::{
+    ExperimentColumn, ExperimentColumnKind, ExperimentTable, cells_table, trials_table, write_experiment_markdown,
+};
+pub use experiment_words::{describe_conditions, describe_failures, describe_worse_than_mean};
+pub use network_file::NetworkFile;
+pub use recipe_file::{RecipeFile, RecipeSource};
+pub use recorded_words::{
+    describe_positions, describe_standings, describe_target, describe_warnings, describe_worse_than_ridge,
+};
+pub use run_folder::{KeptRun, KeptRuns, RunFolder};
+pub use same_file::is_same;
+pub use samples::{write_decoded, write_decoded_header};
+pub use samples::{write_samples, write_samples_header};
+pub use sensor_file::SensorFile;
+pub use sweep::MergedSweep;
+pub use sweep::sweep_specification;
+pub use sweep::{
+    PlanAxis, SweepFolderError, SweepPlan, SweepTableFormat, Trial, TrialId, TrialOptions, decoders_in_order,
+    recording_options, train_options,
+};
+pub use sweep::{SweepFiles, SweepRow};
+pub use table::{Cell, Table, TableColumn, TableForm};
+pub use tables::{decoder_table, error_table, write_loss_curves};
+pub use trade_tables::{trade_off_points, trade_off_summary};
+pub use training_record::TrainingRecord;
+pub use unfinished::exit_leaving_nothing;
+pub use workload_words::describe_workload;

@@ -1,0 +1,282 @@
+//! The command of the terminal that trains a network again.
+
+use std::{fmt, path::Path};
+
+use crate::import::{DialectChoice, Plan, Recipe, Setup};
+use decoupler_core::{
+    dataset::{Division, SplitBy},
+    evaluation::{Measured, RunSettings, SimulatedSettings},
+    scene::{Loading, Movement, NoisySets, RowModel},
+    sensor::SensorModel,
+};
+
+/// Settings for which the terminal has no option.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct CommandGap(Vec<&'static str>);
+
+impl fmt::Display for CommandGap {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "the terminal has no option for {}", self.0.join(", "))
+    }
+}
+
+/// Returns the command that trains with `setup` in a terminal. Options that have their default are left out. A plan that was
+/// read from `recipe` is given by that file.
+///
+/// # Errors
+/// Settings for which the terminal has no option.
+pub fn train_command(setup: &Setup, recipe: Option<&Path>) -> Result<String, CommandGap> {
+    let settings = setup.settings();
+    let mut command = Command("decoupler train".to_owned());
+    let default = match (setup.simulated(), setup.plan()) {
+        (Some(settings), _) => {
+            check_simulation(&settings)?;
+            command.simulation(&settings);
+            let default = SimulatedSettings::default();
+            command.option("hidden", settings.hidden, default.hidden);
+            default.into()
+        }
+        (None, Some(plan)) => {
+            let default = RunSettings::from(Measured { rows: RowModel::Shared });
+            check([(
+                settings.inputs.quantity != default.inputs.quantity,
+                "the quantity of the inputs",
+            )])?;
+            check_plan(plan, recipe)?;
+            command.recording(plan, recipe, settings.validation_fraction());
+            if settings.source.row_model() == RowModel::Each {
+                command.add("rows", "known");
+            }
+            command.option("scaling", settings.inputs.scaling, default.inputs.scaling);
+            command.add("hidden", settings.hidden);
+            default
+        }
+        (None, None) => return Err(CommandGap(vec!["samples in memory"])),
+    };
+    command.training(settings, &default);
+    Ok(command.0)
+}
+
+/// Quotes a word for a POSIX shell.
+pub fn quoted(path: &Path) -> String {
+    let text = path.display().to_string();
+    let is_plain = |c: char| c.is_alphanumeric() || "/._-+=:,@".contains(c);
+    if !text.is_empty() && text.chars().all(is_plain) {
+        return text;
+    }
+    format!("'{}'", text.replace('\'', r"'\''"))
+}
+
+fn check_simulation(settings: &SimulatedSettings) -> Result<(), CommandGap> {
+    let (source, scene) = (&settings.source, &settings.source.scene);
+    let usual = SimulatedSettings::default().source.scene;
+    let read_back = |loading: Loading| loading.to_string().parse() == Ok(loading);
+    check([
+        (
+            source.sensor != SensorModel::new(source.sensor.scale),
+            "the geometry or the resistance per mm",
+        ),
+        (
+            scene.largest_compression.to_bits() != usual.largest_compression.to_bits(),
+            "the largest compression",
+        ),
+        (
+            !matches!(scene.movement, Movement::Z) && scene.movement != Movement::SIDEWAYS,
+            "the largest shift sideways",
+        ),
+        (!read_back(scene.loading), "the sizes of the indenter"),
+    ])
+}
+
+fn check_plan(plan: &Plan, recipe: Option<&Path>) -> Result<(), CommandGap> {
+    if recipe.is_some() {
+        return Ok(());
+    }
+    let join = &plan.import.join;
+    let is_same_limit = join.windows(2).all(|pair| pair[0].limit == pair[1].limit);
+    let times = join.iter().filter(|joined| joined.time.is_some()).count();
+    let mut unnamed = plan.import.clone();
+    unnamed.join.iter_mut().for_each(|joined| joined.stem = None);
+    check([
+        (!is_same_limit, "several largest times between partners"),
+        (
+            times != 0 && times != join.len(),
+            "a time column of some of the joined files only",
+        ),
+        (plan.import.stems() != unnamed.stems(), "other names for joined files"),
+    ])
+}
+
+fn check<const N: usize>(gaps: [(bool, &'static str); N]) -> Result<(), CommandGap> {
+    let gaps = Vec::from_iter(gaps.into_iter().filter_map(|(is_gap, name)| is_gap.then_some(name)));
+    if gaps.is_empty() { Ok(()) } else { Err(CommandGap(gaps)) }
+}
+
+struct Command(String);
+
+impl Command {
+    fn add(&mut self, name: &str, value: impl fmt::Display) {
+        self.0 += &format!(" --{name} {}", quoted(Path::new(&value.to_string())));
+    }
+
+    /// Adds an option that is not as usual.
+    fn option<T: PartialEq + fmt::Display>(&mut self, name: &str, value: T, usual: T) {
+        if value != usual {
+            self.add(name, value);
+        }
+    }
+
+    /// Adds the options of a simulated array.
+    fn simulation(&mut self, settings: &SimulatedSettings) {
+        let default = SimulatedSettings::default();
+        let (source, usual) = (&settings.source, &default.source);
+        let (scene, noise) = (&source.scene, &source.scene.noise);
+        let array = |sensor: &SensorModel| sensor.scale.to_string().replace('×', "x");
+        self.option("array", array(&source.sensor), array(&usual.sensor));
+        self.option("rows", scene.rows, usual.scene.rows);
+        self.option("axes", scene.movement, usual.scene.movement);
+        self.option("loading", scene.loading, usual.scene.loading);
+        self.option("noise", noise.relative, 0.0);
+        self.option("noise-ohm", noise.additive_ohm, 0.0);
+        self.option("adc-bits", noise.converter_bits.unwrap_or(0), 0);
+        self.option("drift", noise.drift, 0.0);
+        let sets = match noise.sets {
+            NoisySets::Both => "both",
+            NoisySets::Training => "training",
+            NoisySets::Test => "test",
+        };
+        self.option("noise-in", sets, "both");
+        self.option("inputs", settings.inputs.quantity, default.inputs.quantity);
+        self.option("scaling", settings.inputs.scaling, default.inputs.scaling);
+        self.option("samples", source.samples, usual.samples);
+        self.option(
+            "validation-samples",
+            source.validation_samples,
+            usual.validation_samples,
+        );
+        self.option("test-samples", source.test_samples, usual.test_samples);
+    }
+
+    /// Adds the files of a recording, the meanings of their columns and the division of the samples, of which
+    /// `validation_fraction` is held out by default.
+    fn recording(&mut self, plan: &Plan, recipe: Option<&Path>, validation_fraction: f64) {
+        match recipe {
+            Some(recipe) => self.add("recipe", recipe.display()),
+            None => self.import(&plan.import),
+        }
+        if let Some(test) = &plan.test {
+            self.add("test-data", test.data.display());
+            test.join.iter().for_each(|file| self.add("test-join", file.display()));
+        }
+        let (division, default) = (plan.division, Division::default());
+        let by_default = match plan.import.group {
+            Some(_) => SplitBy::Group,
+            None => default.by,
+        };
+        // The recipe may have another division.
+        if recipe.is_some() || division.by != by_default || division.by != default.by {
+            self.add("split", division.by);
+        }
+        if plan.test.is_none() && (recipe.is_some() || division.test_fraction != default.test_fraction) {
+            self.add("test-fraction", division.test_fraction);
+        }
+        if recipe.is_some() || division.validation_fraction != validation_fraction {
+            self.add("validation-fraction", division.validation_fraction);
+        }
+    }
+
+    fn import(&mut self, recipe: &Recipe) {
+        let Recipe {
+            data,
+            join,
+            dialect,
+            inputs,
+            targets,
+            time,
+            group,
+            row_wire,
+            conditions,
+            missing,
+            units,
+            positions,
+        } = recipe;
+        self.add("data", data.display());
+        join.iter().for_each(|joined| self.add("join", joined.file.display()));
+        let times = Vec::from_iter(join.iter().filter_map(|joined| joined.time.as_deref()));
+        // One for all, or one for each.
+        let is_one = times.windows(2).all(|pair| pair[0] == pair[1]);
+        let most = if is_one { 1 } else { times.len() };
+        times.iter().take(most).for_each(|time| self.add("join-time", time));
+        if let Some(limit) = join.first().and_then(|joined| joined.limit) {
+            self.add("join-limit", limit);
+        }
+        self.add("inputs", inputs.join(","));
+        self.add("targets", targets.join(","));
+        for (name, column) in [("time", time), ("group", group), ("row-wire", row_wire)] {
+            column.iter().for_each(|column| self.add(name, column));
+        }
+        conditions.iter().for_each(|condition| self.add("where", condition));
+        missing.iter().for_each(|missing| self.add("missing", missing));
+        units
+            .iter()
+            .for_each(|(column, unit)| self.add("unit", format!("{column}={unit}")));
+        positions.iter().for_each(|file| self.add("positions", file.display()));
+        let DialectChoice {
+            encoding,
+            separator,
+            decimal,
+            header,
+            skip_lines,
+        } = dialect;
+        separator.iter().for_each(|separator| self.add("separator", separator));
+        decimal.iter().for_each(|decimal| self.add("decimal", decimal));
+        let header = header.map(|header| if header { "yes" } else { "no" });
+        header.iter().for_each(|header| self.add("header", header));
+        encoding.iter().for_each(|encoding| self.add("encoding", encoding));
+        skip_lines.iter().for_each(|lines| self.add("skip-lines", lines));
+    }
+
+    /// Adds the options of the network and its training.
+    fn training(&mut self, settings: &RunSettings, default: &RunSettings) {
+        self.option("starts", settings.starts, default.starts);
+        let (mut method, mut usual_method) = (settings.training.method, default.training.method);
+        self.option("method", method.short_name(), usual_method.short_name());
+        let is_usual = method.short_name() == usual_method.short_name();
+        let usual_settings = usual_method.settings();
+        for (place, setting) in method.settings().into_iter().enumerate() {
+            // The default method of recordings has settings of its own.
+            let usual = if is_usual {
+                *usual_settings[place].value
+            } else {
+                setting.default
+            };
+            if setting.value.to_bits() != usual.to_bits() {
+                self.add("set", format!("{}={}", setting.name.replace(' ', "-"), setting.value));
+            }
+        }
+        let (rules, usual) = (settings.training.stopping, default.training.stopping);
+        self.option("epochs", rules.epochs, usual.epochs);
+        self.option("goal", rules.goal_mse, usual.goal_mse);
+        self.option("max-fail", rules.max_fail, usual.max_fail);
+        self.option("min-gradient", rules.min_gradient, usual.min_gradient);
+        self.option("seed", settings.seed.0, default.seed.0);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn words_are_quoted_as_a_shell_needs_it() {
+        let cases = [
+            ("run.checkpoint", "run.checkpoint"),
+            ("my runs/a.json", "'my runs/a.json'"),
+            ("it's", r"'it'\''s'"),
+            ("$HOME", "'$HOME'"),
+        ];
+        for (path, expected) in cases {
+            assert_eq!(quoted(Path::new(path)), expected);
+        }
+    }
+}

@@ -1,0 +1,322 @@
+use std::{path::Path, time::Duration};
+
+use super::{
+    command::train_command,
+    html::Html,
+    pictures::pictures,
+    settings::{recording_facts, settings_facts},
+};
+use crate::{
+    export::{
+        Cell, NetworkFile, Table, TableColumn, WriteError, atomic_write, decoder_table, describe_standings,
+        describe_worse_than_ridge, document::PROGRAM, error_table, figures::dark_style, format_duration,
+        format_percent, unfinished::folder_of,
+    },
+    import::{Plan, Setup},
+};
+use decoupler_core::{
+    dataset::Dataset,
+    evaluation::{
+        DecoderReport, Outlook, ReferenceNote, RunFlaw, SimulatedSettings, StartRecord, TestErrors, error_remarks,
+        recorded::Determination,
+    },
+    sensor::Geometry,
+    text::counted,
+    training::StopReason,
+};
+
+/// A run to be reported: of a simulated array or a recording.
+#[derive(Clone, Copy, Debug)]
+pub struct RunReport<'a> {
+    /// Name that the user gave it.
+    pub name: Option<&'a str>,
+    /// Its network, record and errors.
+    pub file: &'a NetworkFile,
+    /// Defect of its training.
+    pub flaw: Option<&'a RunFlaw>,
+    /// Other decoders on its test set, as far as they were measured.
+    pub decoders: &'a [DecoderReport],
+    /// Its test set: [`Run::test`](decoupler_core::evaluation::Run::test), or [`NetworkFile::test_set`], which draws or reads it again.
+    pub test: &'a Dataset,
+}
+
+impl RunReport<'_> {
+    /// Writes the report atomically. It names recordings relative to its folder.
+    ///
+    /// # Errors
+    /// The path cannot be written.
+    ///
+    /// # Panics
+    /// If the test set is not that of the run.
+    pub fn save(&self, path: &Path) -> Result<(), WriteError> {
+        let html = self.html(folder_of(path));
+        atomic_write(path, |writer| writer.write_all(html.as_bytes()))
+    }
+
+    /// Returns the report as HTML for a file in `folder`.
+    ///
+    /// # Panics
+    /// If the test set is not that of the run.
+    pub fn html(&self, folder: &Path) -> String {
+        let Self { file, decoders, .. } = *self;
+        let setup = self.setup(folder);
+        let answers = file.network.decouple(self.test);
+        let title = self.title();
+        let mut html = Html::default();
+        html.element("h1", "", &title);
+        html.element("p", "dim", &self.summary());
+        for remark in self.remarks(&setup, &answers) {
+            html.element("p", "warning", &remark);
+        }
+        html.section("Errors on the test set", |html| {
+            html.table(&error_table(&file.error_table()), "network");
+            let text = match setup.plan() {
+                None => {
+                    "Means of |error|, in percent of the coordinate as in the paper, in mm, or in percent of the stroke. \
+                     The reference is the error that remains given the noise and the loading of the scene; training mean \
+                     and linear map are what a network has to beat."
+                }
+                Some(_) => {
+                    "RMSE, MAE and worst are in the unit of the target. R² is the share of the target's variance that the \
+                     answers explain: 1 is exact, 0 is no better than the mean. Training mean and ridge regression are what \
+                     a network has to beat."
+                }
+            };
+            html.element("p", "dim", text);
+        });
+        if !decoders.is_empty() {
+            html.section("Decoders", |html| {
+                let reference = file.scores.baselines.reference.as_ref();
+                html.table(&decoder_table(&file.problem, decoders, reference), "Network");
+                let text = match setup.plan() {
+                    None => {
+                        "The residual is the rms relative difference between the readings and those of the decoded \
+                         deformation; it needs no ground truth. Times are those of a frame on one thread."
+                    }
+                    Some(_) => {
+                        "Times are those of a frame on one thread. All decoders were fitted to the same samples."
+                    }
+                };
+                html.element("p", "dim", text);
+            });
+        }
+        html.section("Figures", |html| {
+            for (number, (caption, figure)) in pictures(file, self.test, &answers).into_iter().enumerate() {
+                html.figure(&caption, &figure.draw().inline_svg(number, &caption));
+            }
+        });
+        if file.training.starts.len() > 1 {
+            html.section("Starts", |html| html.table(&self.starts_table(), ""));
+        }
+        html.section("Settings", |html| match (setup.simulated(), &file.recorded) {
+            (Some(settings), _) => {
+                html.facts(&settings_facts(file, &settings));
+                for note in settings.source.sensor.scale.note().iter().map(String::as_str) {
+                    html.element("p", "dim", note);
+                }
+                html.element("p", "dim", Geometry::ASSUMPTION);
+            }
+            (None, Some(recorded)) => html.facts(&recording_facts(file, &recorded.relative_to(folder), self.test)),
+            (None, None) => {}
+        });
+        html.section("How to repeat it", |html| self.repeat(&setup, html));
+        html.finish(&title, &format!("{}{}", include_str!("style.css"), dark_style()))
+    }
+
+    /// Setup of the run, with paths for a file in `folder`.
+    fn setup(&self, folder: &Path) -> Setup {
+        let plan = self
+            .file
+            .recorded
+            .as_ref()
+            .map(|recorded| recorded.relative_to(folder).plan);
+        Setup::of(self.file.settings, plan).expect("a file of a recording has its plan")
+    }
+
+    fn title(&self) -> String {
+        let what = format!(
+            "{}, {}, seed {}",
+            self.file.source_name(),
+            counted(self.file.settings.hidden, "hidden node"),
+            self.file.settings.seed
+        );
+        match self.name {
+            Some(name) => format!("{name}: {what}"),
+            None => what,
+        }
+    }
+
+    /// The course of the training in two sentences.
+    fn summary(&self) -> String {
+        let Self { file, .. } = *self;
+        let training = &file.training;
+        let reason = training
+            .stop_reason
+            .map_or("not ended".to_owned(), |reason| reason.to_string());
+        let time = Duration::try_from_secs_f64(training.seconds).unwrap_or_default();
+        let error = format_percent(file.scores.network.percent());
+        let error = match file.scores.network {
+            TestErrors::Nodes(_) => format!("Z error {error} on the test set"),
+            TestErrors::Targets(_) => format!(
+                "Mean absolute error {error} of the range on the test set, averaged over {}",
+                counted(file.problem.targets.len(), "target")
+            ),
+        };
+        format!(
+            "{error}. Trained for {}, {} on one thread ({reason}); weights kept from epoch {}.",
+            counted(training.epochs(), "epoch"),
+            format_duration(time),
+            training.best_epoch
+        )
+    }
+
+    /// Everything that a reader has to weigh, with cause and cure.
+    fn remarks(&self, setup: &Setup, answers: &ndarray::Array2<f64>) -> Vec<String> {
+        let mut remarks = Vec::from_iter(self.flaw.map(ToString::to_string));
+        match (setup.simulated(), setup.plan()) {
+            (Some(settings), _) => remarks.extend(self.array_remarks(&settings)),
+            (None, Some(plan)) => remarks.extend(self.recording_remarks(plan, answers)),
+            (None, None) => {}
+        }
+        for decoder in self.decoders {
+            let name = decoder.kind.name(decoder.precision);
+            remarks.extend(decoder.remarks.iter().map(|remark| format!("{name}: {remark}")));
+        }
+        remarks.into_iter().map(|remark| sentence(&remark)).collect()
+    }
+
+    fn array_remarks(&self, settings: &SimulatedSettings) -> Vec<String> {
+        let Self { file, .. } = *self;
+        let outlook = Outlook::of(&settings.source).ok();
+        let warnings = outlook.iter().flat_map(|outlook| &outlook.warnings);
+        let mut remarks = Vec::from_iter(warnings.map(ToString::to_string));
+        let reason = file.training.stop_reason;
+        let of_rows = error_remarks(settings, &file.scores, reason);
+        remarks.extend(of_rows.iter().map(|(row, remark)| format!("{row}: {remark}")));
+        let Some(scores) = file.scores.nodes() else {
+            return remarks;
+        };
+        if scores.network.z_mm > scores.baselines.linear.z_mm
+            && let Some(reason) = reason
+        {
+            let remedy = reason.remedy(&file.settings.training.method);
+            remarks.push(format!(
+                "a linear map of the resistances is better on z than this network: {remedy}"
+            ));
+        }
+        remarks.extend(ReferenceNote::of(&file.scores.baselines).map(|note| note.to_string()));
+        if scores
+            .baselines
+            .reference
+            .is_some_and(|reference| reference.is_rounding())
+        {
+            let text = "the reference is nothing but rounding: the readings determine the deformation, and no ratio to \
+                        it is given";
+            remarks.push(text.to_owned());
+        }
+        remarks
+    }
+
+    fn recording_remarks(&self, plan: &Plan, answers: &ndarray::Array2<f64>) -> Vec<String> {
+        let measured = Determination::measure(self.test, answers.view(), plan.division.by);
+        let mut remarks = describe_standings(&self.file.problem.targets, &measured);
+        let NetworkFile {
+            problem,
+            scores,
+            settings,
+            ..
+        } = self.file;
+        remarks.extend(describe_worse_than_ridge(problem, scores, settings.training.method));
+        if plan.is_optimistic() {
+            let text = "test samples are drawn at random, which is optimistic where neighbouring rows are similar; split \
+                        by time or by group for an honest test";
+            remarks.push(text.to_owned());
+        }
+        remarks
+    }
+
+    fn starts_table(&self) -> Table {
+        let columns = [
+            TableColumn::new("start", "Start", ""),
+            TableColumn::new("train_mse", "training mse", ""),
+            TableColumn::new("validation_mse", "validation mse", ""),
+            TableColumn::new("z_percent", "Z", "%"),
+            TableColumn::new("epochs", "epochs", ""),
+            TableColumn::new("best_epoch", "best epoch", ""),
+        ];
+        let starts = self.file.training.starts.iter().enumerate();
+        let row = |(number, start): (usize, &StartRecord)| -> Vec<Cell> {
+            vec![
+                (number + 1).into(),
+                start.train_mse.into(),
+                start.validation_mse.into(),
+                start.percent().into(),
+                start.epochs.into(),
+                start.best_epoch.into(),
+            ]
+        };
+        let mut table = Table {
+            columns: columns.to_vec(),
+            rows: starts.map(row).collect(),
+        };
+        if !self.file.problem.has_nodes {
+            table.remove_column("z_percent");
+        }
+        table
+    }
+
+    /// The command of the terminal, and what it does not repeat.
+    fn repeat(&self, setup: &Setup, html: &mut Html) {
+        let training = &self.file.training;
+        let mut settings = *setup.settings();
+        if let Some(first) = training.stages.first() {
+            settings.training.method = first.method;
+        }
+        let is_cut_short = matches!(training.stop_reason, None | Some(StopReason::Stopped));
+        if is_cut_short {
+            settings.training.stopping.epochs = training.epochs().max(1);
+        }
+        match train_command(&setup.with_settings(settings), None) {
+            Ok(command) => {
+                let place = match setup.plan() {
+                    None => "In a terminal",
+                    Some(_) => "In a terminal, in the folder of this report",
+                };
+                let text = format!("{place}, the same version of the program gives the same network with:");
+                html.element("p", "", &text);
+                html.element("pre", "", &command);
+            }
+            Err(gap) => {
+                let text = format!("No command repeats this run: {gap}. The window does, with the settings above.");
+                html.element("p", "", &text);
+            }
+        }
+        if let Some(second) = training.stages.get(1) {
+            let text = format!(
+                "This trains with the first method only; the run changed its method at epoch {}. A checkpoint resumed with \
+                 --method continues with another.",
+                second.first_epoch
+            );
+            html.element("p", "warning", &text);
+        } else if is_cut_short {
+            html.element(
+                "p",
+                "dim",
+                "The run was cut short: the command ends after as many epochs.",
+            );
+        }
+        let program = &self.file.program;
+        let mut text = format!("Report by {PROGRAM}");
+        if program != PROGRAM {
+            text += &format!("; the network was saved by {program}");
+        }
+        html.element("p", "dim", &format!("{text}."));
+    }
+}
+
+/// The text with a capital and one full stop.
+fn sentence(text: &str) -> String {
+    let mut letters = text.trim_end_matches('.').chars();
+    let first = letters.next().into_iter().flat_map(char::to_uppercase);
+    first.chain(letters).chain(['.']).collect()
+}

@@ -1,0 +1,190 @@
+//! The figures of a report.
+
+use std::sync::Arc;
+
+use glam::DVec3;
+use ndarray::{Array2, ArrayView2};
+
+use crate::{
+    export::NetworkFile,
+    figure::{
+        Figure, RegressionLine, SequentialMap, TargetSurface, error_histogram_figure, loss_figure, regression_figure,
+        surface::{OrbitCamera, Quantity, Surface, SurfaceFigure, ViewMode},
+        target_histogram_figure, target_pairs, target_regression_figure, training_state_figure, z_pairs_mm,
+    },
+};
+use decoupler_core::{
+    dataset::Dataset,
+    evaluation::{Channel, NodeAddress, SimulatedSettings},
+    surface::SurfaceMap,
+};
+
+/// Largest number of targets of a recording with figures of their own.
+const MAX_TARGETS: usize = 8;
+
+/// Captions and figures of a run: `answers` are those of its network to `test`.
+pub(super) fn pictures(file: &NetworkFile, test: &Dataset, answers: &Array2<f64>) -> Vec<(String, Figure)> {
+    let training = &file.training;
+    let of_training = [
+        (
+            "Errors of every epoch, mean squared, in scaled units.".to_owned(),
+            loss_figure(&training.history, &training.stages, training.best_epoch).into(),
+        ),
+        (
+            "Gradient and the method's own quantities.".to_owned(),
+            training_state_figure(&training.history, &training.stages).into(),
+        ),
+    ];
+    let (surfaces, of_errors) = match (file.settings.simulated(), file.scores.network.nodes()) {
+        (Some(settings), Some(errors)) => (
+            array_surfaces(&settings, test, answers, errors.worst_node),
+            array_errors(test, answers).into(),
+        ),
+        _ => (target_surfaces(file, test, answers), target_errors(file, test, answers)),
+    };
+    surfaces.into_iter().chain(of_training).chain(of_errors).collect()
+}
+
+/// Errors of the nodes of an array.
+fn array_errors(test: &Dataset, decoupled_mm: &Array2<f64>) -> [(String, Figure); 2] {
+    let pairs_mm = z_pairs_mm(test, decoupled_mm);
+    [
+        (
+            "Distribution of the z errors of the test set.".to_owned(),
+            error_histogram_figure(&pairs_mm, None).into(),
+        ),
+        (
+            "Decoupled against actual z of the nodes of the test set.".to_owned(),
+            regression_figure(&pairs_mm).into(),
+        ),
+    ]
+}
+
+/// Errors of the targets of a recording, of the first if there are many.
+fn target_errors(file: &NetworkFile, test: &Dataset, answers: &Array2<f64>) -> Vec<(String, Figure)> {
+    let targets = file.problem.targets.iter().enumerate().take(MAX_TARGETS);
+    let of_target = |(index, target): (usize, &Channel)| {
+        let pairs = target_pairs(test, answers, index);
+        let line = RegressionLine::of(pairs.iter().copied());
+        let (name, unit) = (&target.name, target.unit.as_deref());
+        [
+            (
+                format!("Decoded against actual values of {name} in the test set."),
+                target_regression_figure((pairs.len(), &|sample| pairs[sample]), &line, name, unit).into(),
+            ),
+            (
+                format!("Distribution of the errors of {name} in the test set."),
+                target_histogram_figure(&pairs, None, target).into(),
+            ),
+        ]
+    };
+    targets.flat_map(of_target).collect()
+}
+
+/// Actual and decoded surface of the test sample with the largest error of a target that has a position, and the error;
+/// `None` where no surface can be laid through the positions.
+fn target_surfaces(file: &NetworkFile, test: &Dataset, answers: &Array2<f64>) -> Option<(String, Figure)> {
+    let problem = &file.problem;
+    let surface = TargetSurface::new(&problem.positions, &problem.targets).ok()?;
+    let errors = file.scores.network.targets();
+    let nodes = surface.nodes().iter().enumerate();
+    let worst = nodes.filter_map(|(node, position)| Some((node, errors.get(position.target)?)));
+    let (node, worst) = worst.max_by(|(_, one), (_, other)| one.worst.total_cmp(&other.worst))?;
+    let targets = test.targets();
+    let ranges = targets.columns().into_iter().map(|column| {
+        let ends = |(low, high): (f64, f64), &value: &f64| (low.min(value), high.max(value));
+        column.iter().fold((f64::INFINITY, f64::NEG_INFINITY), ends)
+    });
+    let range = surface.range_of(&Vec::from_iter(ranges));
+    let sample = Some(worst.worst_sample).filter(|&sample| sample < test.samples())?;
+    let values = |rows: ArrayView2<'_, f64>| rows.row(sample).to_vec();
+    let surfaces = surface.surfaces(&values(targets), &values(answers.view()), range);
+    let top = |surface: Surface| Surface {
+        mode: ViewMode::Top,
+        ..surface
+    };
+    let name = &problem.targets[surface.nodes()[node].target].name;
+    let caption = format!(
+        "Sample {} of the test set, which has the largest error of all targets with a position ({name}, marked).",
+        sample + 1
+    );
+    let figure = SurfaceFigure {
+        surfaces: surfaces.map(top).into(),
+        camera: OrbitCamera::default(),
+        marked_node: Some(node),
+        ..SurfaceFigure::default()
+    };
+    Some((caption, figure.into()))
+}
+
+/// Actual and decoupled surface of the snapshot of `worst`, which is marked, and the error; `None` where no surface can be
+/// laid through the nodes.
+fn array_surfaces(
+    settings: &SimulatedSettings,
+    test: &Dataset,
+    decoupled_mm: &Array2<f64>,
+    worst: NodeAddress,
+) -> Option<(String, Figure)> {
+    let source = &settings.source;
+    let (scale, geometry) = (source.sensor.scale, &source.sensor.geometry);
+    let rows = source.scene.rows.read(scale.rows()).ok()?;
+    let x_mm: Vec<f64> = rows.iter().map(|&row| geometry.row_x_mm(row)).collect();
+    let nodes = 0..scale.nodes_per_row();
+    let y_mm: Vec<f64> = nodes.map(|node| geometry.node_y_mm(scale, node)).collect();
+    let map = Arc::new(SurfaceMap::new(&x_mm, &y_mm).ok()?);
+    let snapshots = test.snapshots();
+    let samples = snapshots.get(worst.snapshot)?;
+    let nodes_of = |row: ndarray::ArrayView1<'_, f64>| -> Vec<DVec3> {
+        let coordinates = row.to_vec();
+        coordinates.chunks_exact(3).map(DVec3::from_slice).collect()
+    };
+    let targets = test.targets();
+    let actual: Vec<DVec3> = samples
+        .iter()
+        .flat_map(|&sample| nodes_of(targets.row(sample)))
+        .collect();
+    let decoupled: Vec<DVec3> = samples
+        .iter()
+        .flat_map(|&sample| nodes_of(decoupled_mm.row(sample)))
+        .collect();
+    let error: Vec<DVec3> = actual
+        .iter()
+        .zip(&decoupled)
+        .map(|(a, d)| a.with_z(d.z - a.z))
+        .collect();
+    let surface = |title: &str, nodes: Vec<DVec3>, quantity, range| {
+        let z_mm: Vec<f64> = nodes.iter().map(|node| node.z).collect();
+        Surface {
+            title: title.to_owned(),
+            map: Arc::clone(&map),
+            values: map.evaluate(&z_mm).into(),
+            nodes: nodes.into(),
+            quantity,
+            range,
+            mode: ViewMode::Top,
+            colours: SequentialMap::default(),
+        }
+    };
+    let heights = geometry.height_mm - source.stroke_mm()..=geometry.height_mm;
+    let errors_mm = error.iter().map(|node| node.z.abs()).filter(|z| z.is_finite());
+    // Errors below a nanometre have no colour of their own.
+    let largest_mm = errors_mm.fold(1e-6, f64::max);
+    let place = rows.iter().position(|&row| row == worst.row)?;
+    let caption = format!(
+        "Snapshot {} of the test set, which has the worst node of all (row {}, node {}, marked).",
+        worst.snapshot + 1,
+        worst.row + 1,
+        worst.node + 1
+    );
+    let figure = SurfaceFigure {
+        surfaces: vec![
+            surface("Actual", actual, Quantity::Height, heights.clone()),
+            surface("Decoupled", decoupled, Quantity::Height, heights),
+            surface("Error", error, Quantity::Error, -largest_mm..=largest_mm),
+        ],
+        camera: OrbitCamera::default(),
+        marked_node: Some(place * scale.nodes_per_row() + worst.node),
+        ..SurfaceFigure::default()
+    };
+    Some((caption, figure.into()))
+}

@@ -1,0 +1,271 @@
+use std::{collections::HashSet, path::Path};
+
+use resvg::usvg::roxmltree::{Document, ParsingOptions};
+
+use super::*;
+use crate::{
+    export::{NetworkFile, format_number},
+    import::{Joined, Plan, Recipe, Setup},
+};
+use decoupler_core::{
+    dataset::SplitBy,
+    decoupling::{DecoderKind, Precision},
+    evaluation::{DecoderSet, Measured, Run, RunSettings, SimulatedSettings},
+    scene::{Indenter, Loading, RowModel},
+    training::Method,
+};
+
+fn run() -> Run {
+    let mut settings = SimulatedSettings::default();
+    settings.source.sensor.scale = "4x4_2x12".parse().unwrap();
+    (settings.hidden, settings.source.samples, settings.starts) = (3, 60, 2);
+    settings.training.stopping.epochs = 5;
+    let mut run = Run::prepare(settings).unwrap();
+    while run.step().is_none() {}
+    run
+}
+
+/// The report under `name`, as a program reads it.
+fn report(name: &str, file: &NetworkFile, run: &Run) -> String {
+    let set = DecoderSet::new(&file.settings.simulated().unwrap(), Some(file.network.clone())).unwrap();
+    let ridge = set.measure(DecoderKind::Ridge, Precision::Double, run.test()).unwrap();
+    let (flaw, decoders) = (run.flaw(), [ridge.unwrap()]);
+    let report = RunReport {
+        name: Some(name),
+        file,
+        flaw: flaw.as_ref(),
+        decoders: &decoders,
+        test: run.test(),
+    };
+    report.html(Path::new(""))
+}
+
+fn parsed(html: &str) -> Document<'_> {
+    let options = ParsingOptions {
+        allow_dtd: true,
+        ..ParsingOptions::default()
+    };
+    Document::parse_with_options(html, options).unwrap()
+}
+
+#[test]
+fn a_report_is_one_well_formed_file_that_asks_nobody_for_anything() {
+    let run = run();
+    let file = NetworkFile::from_run(&run, None).unwrap();
+    let name = "</title><script>alert(1)</script> & \"50 %\" 'ü' \u{7}";
+    let html = report(name, &file, &run);
+    let document = parsed(&html);
+    let elements = || document.descendants().filter(|node| node.is_element());
+    let names: HashSet<&str> = elements().map(|node| node.tag_name().name()).collect();
+    assert!(
+        ["script", "link", "img", "iframe", "object", "image"]
+            .iter()
+            .all(|name| !names.contains(name))
+    );
+    for node in elements() {
+        for attribute in node.attributes() {
+            assert!(!["src", "href", "style"].contains(&attribute.name()), "{attribute:?}");
+            assert!(!attribute.name().starts_with("on"), "{attribute:?}");
+        }
+    }
+    assert!(
+        !html.contains("http") && !html.contains("@import"),
+        "a reference to the outside"
+    );
+    let heading = document.descendants().find(|node| node.has_tag_name("h1")).unwrap();
+    let plain = name.replace('\u{7}', "");
+    assert!(heading.text().unwrap().starts_with(&plain), "{heading:?}");
+    // Every name is there once, and every use finds its own.
+    let ids: Vec<&str> = elements().filter_map(|node| node.attribute("id")).collect();
+    assert_eq!(ids.iter().collect::<HashSet<_>>().len(), ids.len(), "{ids:?}");
+    for used in elements().filter_map(|node| node.attribute("clip-path")) {
+        let id = used.trim_start_matches("url(#").trim_end_matches(')');
+        assert!(ids.contains(&id), "{used}");
+    }
+    assert!(elements().filter(|node| node.has_tag_name("svg")).count() >= 5);
+    assert!(html.contains("prefers-color-scheme: dark") && html.contains("@media print"));
+    assert!(!html.contains("NaN"));
+}
+
+#[test]
+fn a_report_holds_the_figures_of_its_run() {
+    let run = run();
+    let file = NetworkFile::from_run(&run, None).unwrap();
+    let html = report("a run", &file, &run);
+    let document = parsed(&html);
+    let rows = document.descendants().filter(|node| node.has_tag_name("tr"));
+    let rows: Vec<Vec<String>> = rows
+        .map(|row| {
+            row.children()
+                .filter_map(|cell| cell.text().map(str::to_owned))
+                .collect()
+        })
+        .collect();
+    for row in &file.error_table().blocks[0].rows {
+        let mut expected = vec![row.name.to_owned()];
+        expected.extend(row.errors.iter().map(|error| format_number(*error)));
+        assert!(rows.contains(&expected), "{expected:?} is not among {rows:#?}");
+    }
+    for (number, start) in run.starts().iter().enumerate() {
+        let expected = [(number + 1).to_string(), format_number(start.train_mse)];
+        assert!(rows.iter().any(|row| row.starts_with(&expected)), "{expected:?}");
+    }
+    let command = document.descendants().find(|node| node.has_tag_name("pre")).unwrap();
+    assert_eq!(
+        command.text(),
+        Some("decoupler train --array 4x4_2x12 --samples 60 --hidden 3 --starts 2 --epochs 5")
+    );
+    assert!(html.contains(crate::export::document::PROGRAM));
+}
+
+#[test]
+fn settings_that_the_terminal_lacks_are_named_instead_of_a_command_that_trains_something_else() {
+    let mut settings = SimulatedSettings::default();
+    settings.source.sensor.geometry.height_mm = 6.0;
+    settings.source.scene.largest_compression = 0.1;
+    let gap = train_command(&settings.into(), None).unwrap_err().to_string();
+    assert!(gap.contains("geometry") && gap.contains("compression"), "{gap}");
+    let mut indenter = Indenter::default();
+    indenter.spread_mm *= 2.0;
+    let mut settings = SimulatedSettings::default();
+    settings.source.scene.loading = Loading::Indenter(indenter);
+    let gap = train_command(&settings.into(), None).unwrap_err().to_string();
+    assert!(gap.contains("indenter"), "{gap}");
+}
+
+/// A run on a recording in `folder` of two readings and four deformations with positions on a grid.
+fn recorded_run(folder: &Path) -> (Run, NetworkFile) {
+    let lines = (0..60).map(|row| {
+        let (a, b) = ((0.31 * f64::from(row)).sin(), (0.17 * f64::from(row)).cos());
+        format!("{a},{b},{},{},{},{}\n", a + b, a - b, a * b, a * a)
+    });
+    let text = "a,b,d1 (mm),d2 (mm),d3 (mm),d4 (mm)\n".to_owned() + &String::from_iter(lines);
+    std::fs::write(folder.join("press.csv"), text).unwrap();
+    std::fs::write(
+        folder.join("taxels.csv"),
+        "target,x,y\nd1,0,0\nd2,1,0\nd3,0,1\nd4,1,1\n",
+    )
+    .unwrap();
+    let names = |names: &[&str]| names.iter().map(|name| (*name).to_owned()).collect();
+    let plan = Plan {
+        import: Recipe {
+            data: "press.csv".into(),
+            inputs: names(&["a", "b"]),
+            targets: names(&["d1..d4"]),
+            positions: Some("taxels.csv".into()),
+            ..Recipe::default()
+        },
+        ..Plan::default()
+    };
+    let mut settings = RunSettings::from(Measured { rows: RowModel::Shared });
+    (settings.hidden, settings.training.stopping.epochs) = (2, 5);
+    let setup = Setup::recording(settings, plan);
+    let sets = setup.sets(folder, &|| false, &mut |_| ()).unwrap().unwrap();
+    let mut run = sets.run(&setup, &|| false).unwrap().unwrap();
+    while run.step().is_none() {}
+    let file = NetworkFile::from_run(&run, sets.recorded()).unwrap();
+    (run, file)
+}
+
+#[test]
+fn a_report_of_a_recording_has_its_errors_figures_and_command() {
+    let root = tempfile::tempdir().unwrap();
+    let (run, file) = recorded_run(root.path());
+    let set = DecoderSet::on_set(file.settings, run.test().as_ref().clone(), Some(file.network.clone()));
+    let ridge = set.measure(DecoderKind::Ridge, Precision::Double, run.test()).unwrap();
+    let decoders = [ridge.unwrap()];
+    let report = RunReport {
+        name: None,
+        file: &file,
+        flaw: None,
+        decoders: &decoders,
+        test: run.test(),
+    };
+    let html = report.html(root.path());
+    let document = parsed(&html);
+    let count = |name: &str| document.descendants().filter(|node| node.has_tag_name(name)).count();
+    assert_eq!(count("figure"), 1 + 2 + 4 * 2, "surfaces, training, two of each target");
+    let rows = document.descendants().filter(|node| node.has_tag_name("tr"));
+    let rows = Vec::from_iter(rows.map(|row| {
+        let cells = row.children().filter_map(|cell| cell.text().map(str::to_owned));
+        Vec::from_iter(cells)
+    }));
+    for block in &file.error_table().blocks {
+        for row in &block.rows {
+            let mut expected = vec![block.target.as_ref().unwrap().title(), row.name.to_owned()];
+            expected.extend(row.errors.iter().map(|error| format_number(*error)));
+            assert!(rows.contains(&expected), "{expected:?} is not among {rows:#?}");
+        }
+    }
+    for (target, errors) in file.problem.targets.iter().zip(decoders[0].errors.targets()) {
+        let expected = ["Ridge".to_owned(), target.title(), format_number(errors.rmse)];
+        assert!(rows.iter().any(|row| row.starts_with(&expected)), "{expected:?}");
+    }
+    let heading = document.descendants().find(|node| node.has_tag_name("h1")).unwrap();
+    assert_eq!(heading.text(), Some("press, 2 hidden nodes, seed 0"));
+    let command = document.descendants().find(|node| node.has_tag_name("pre")).unwrap();
+    assert_eq!(
+        command.text(),
+        Some(
+            "decoupler train --data press.csv --inputs a,b --targets d1..d4 --positions taxels.csv --hidden 2 --epochs 5"
+        )
+    );
+    // In another folder the recording is named as seen from there.
+    let folder = root.path().join("reports");
+    std::fs::create_dir(&folder).unwrap();
+    report.save(&folder.join("report.html")).unwrap();
+    let saved = std::fs::read_to_string(folder.join("report.html")).unwrap();
+    assert!(saved.contains("--data ../press.csv") && !saved.contains(&*root.path().to_string_lossy()));
+}
+
+#[test]
+fn the_command_of_a_recording_names_files_columns_and_division() {
+    let names = |names: &[&str]| names.iter().map(|name| (*name).to_owned()).collect();
+    let joined = Joined {
+        file: "my states.csv".into(),
+        time: Some("t2".to_owned()),
+        limit: Some(0.5),
+        ..Joined::default()
+    };
+    let mut plan = Plan {
+        import: Recipe {
+            data: "press.csv".into(),
+            join: vec![joined],
+            inputs: names(&["c2..c5"]),
+            targets: names(&["force"]),
+            time: Some("t".to_owned()),
+            group: Some("session".to_owned()),
+            conditions: vec!["t>0".parse().unwrap()],
+            missing: vec!["-1".parse().unwrap()],
+            ..Recipe::default()
+        },
+        ..Plan::default()
+    };
+    plan.division.by = SplitBy::Group;
+    let settings = RunSettings::from(Measured { rows: RowModel::Shared });
+    let command = |plan: &Plan, settings, recipe: Option<&str>| {
+        let setup = Setup::recording(settings, plan.clone());
+        train_command(&setup, recipe.map(Path::new)).map_err(|gap| gap.to_string())
+    };
+    assert_eq!(
+        command(&plan, settings, None).unwrap(),
+        "decoupler train --data press.csv --join 'my states.csv' --join-time t2 --join-limit 0.5 --inputs c2..c5 --targets \
+         force --time t --group session --where 't>0' --missing -1 --split group --hidden 12"
+    );
+    // The default method has settings of its own for recordings; others hold a part out for validation.
+    let mut other = settings;
+    other.training.method = Method::default();
+    plan.division.by = SplitBy::Random;
+    plan.division.validation_fraction = 0.0;
+    let text = command(&plan, other, None).unwrap();
+    assert!(
+        text.ends_with("--split random --validation-fraction 0 --hidden 12 --method lm"),
+        "{text}"
+    );
+    assert_eq!(
+        command(&plan, settings, Some("recipe.json")).unwrap(),
+        "decoupler train --recipe recipe.json --split random --test-fraction 0.2 --validation-fraction 0 --hidden 12"
+    );
+    plan.import.join[0].stem = Some("other".to_owned());
+    assert!(command(&plan, settings, None).unwrap_err().contains("joined files"));
+}

@@ -1,0 +1,231 @@
+use std::{
+    collections::BTreeSet,
+    fs,
+    path::{Path, PathBuf},
+    sync::Arc,
+    time::{SystemTime, UNIX_EPOCH},
+};
+
+use super::{
+    AtomicFile, DocumentError, NetworkFile, WriteError,
+    kept_files::{ids, name_path, pinned_path, read, run_path, write},
+};
+use decoupler_core::text::{clean_name, system_cause};
+
+/// The finished trainings, and the two that are compared.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct KeptRuns {
+    /// The runs in the order in which they were finished.
+    pub runs: Vec<KeptRun>,
+    /// [`KeptRun::id`] of the two runs that are compared.
+    pub pinned: [Option<u64>; 2],
+}
+
+/// A finished training.
+#[derive(Clone, Debug, PartialEq)]
+pub struct KeptRun {
+    /// Number of the run, unique in its folder: microseconds from 1970 to its end.
+    pub id: u64,
+    /// Name given by the user.
+    pub name: String,
+    /// Settings, network, training record and errors.
+    pub file: Arc<NetworkFile>,
+}
+
+/// The run list and the folder that keeps it.
+///
+/// Each run is a network file of its own, written once and never again. Its name is another small file, and so is the
+/// pair that is compared; each is written when it changes. So several programs share a folder without locks: no two
+/// write the same run, the last name given counts, and [`Self::look`] finds what others have done.
+///
+/// A run that cannot be written stays in memory.
+#[derive(Debug, Default)]
+pub struct RunFolder {
+    /// `None` if runs are not kept.
+    path: Option<PathBuf>,
+    kept: KeptRuns,
+    /// Runs that are in memory only.
+    unwritten: BTreeSet<u64>,
+    /// Problems that [`Self::look`] has returned.
+    told: BTreeSet<String>,
+}
+
+impl RunFolder {
+    /// Opens the folder at `path`, which is created if it is missing, and reads its runs.
+    ///
+    /// # Errors
+    /// The folder cannot be written.
+    pub fn open(path: &Path) -> Result<(Self, Vec<String>), DocumentError> {
+        fs::create_dir_all(path).map_err(|source| WriteError::io(path, source))?;
+        let mut folder = Self {
+            path: Some(path.to_owned()),
+            ..Self::default()
+        };
+        let problems = folder.look();
+        Ok((folder, problems))
+    }
+
+    /// Folder in which the runs are kept, if they are.
+    pub fn path(&self) -> Option<&Path> {
+        self.path.as_deref()
+    }
+
+    /// The list as it was last seen.
+    pub fn runs(&self) -> &KeptRuns {
+        &self.kept
+    }
+
+    /// Reads what other programs have changed: new runs, names, the pair that is compared, removals. Returns the files
+    /// that cannot be read, each once; they are left as they are.
+    pub fn look(&mut self) -> Vec<String> {
+        let Some(path) = &self.path else { return Vec::new() };
+        let mut problems = Vec::new();
+        let ids = match ids(path) {
+            Ok(ids) => ids,
+            Err(error) => {
+                let path = path.display();
+                return self.untold(vec![format!(
+                    "cannot read the run list '{path}': {}",
+                    system_cause(&error)
+                )]);
+            }
+        };
+        let unwritten = &self.unwritten;
+        self.kept
+            .runs
+            .retain(|run| ids.contains(&run.id) || unwritten.contains(&run.id));
+        for id in ids {
+            if let Err(place) = self.kept.runs.binary_search_by_key(&id, |run| run.id) {
+                match NetworkFile::load(&run_path(path, id)) {
+                    Ok(file) => {
+                        let name = new_name(&self.kept.runs, &file);
+                        let file = Arc::new(file);
+                        self.kept.runs.insert(place, KeptRun { id, name, file });
+                    }
+                    // Another program has removed it just now.
+                    Err(_) if !run_path(path, id).exists() => {}
+                    Err(error) => problems.push(format!("a run is left out of the list: {error}")),
+                }
+            }
+        }
+        for run in &mut self.kept.runs {
+            match read::<String>(&name_path(path, run.id)) {
+                Ok(Some(name)) => run.name = clean_name(&name),
+                Ok(None) => {}
+                Err(flaw) => problems.push(format!(
+                    "the name of a run cannot be read: {flaw}; rename '{}'",
+                    run.name
+                )),
+            }
+        }
+        match read::<[Option<u64>; 2]>(&pinned_path(path)) {
+            Ok(pinned) => self.kept.pinned = pinned.unwrap_or(self.kept.pinned),
+            Err(flaw) => problems.push(format!(
+                "the runs compared cannot be read: {flaw}; choose A and B again"
+            )),
+        }
+        let runs = &self.kept.runs;
+        let is_there = |id: &u64| runs.iter().any(|run| run.id == *id);
+        self.kept.pinned = self.kept.pinned.map(|id| id.filter(is_there));
+        self.untold(problems)
+    }
+
+    fn untold(&mut self, mut problems: Vec<String>) -> Vec<String> {
+        problems.retain(|problem| self.told.insert(problem.clone()));
+        problems
+    }
+
+    /// Adds a finished training under a new name: source, hidden nodes and method.
+    ///
+    /// # Errors
+    /// Its file cannot be written; it is then in the list until the program ends.
+    pub fn keep(&mut self, file: Arc<NetworkFile>) -> Result<(), DocumentError> {
+        let name = new_name(&self.kept.runs, &file);
+        let (id, written) = self.write_run(&file, &name);
+        if self.folder_of(id).is_none() {
+            self.unwritten.insert(id);
+        }
+        let place = self.kept.runs.partition_point(|run| run.id < id);
+        self.kept.runs.insert(place, KeptRun { id, name, file });
+        written
+    }
+
+    /// Writes the run under an id that no other has, not even one that another program is writing just now.
+    fn write_run(&self, file: &NetworkFile, name: &str) -> (u64, Result<(), DocumentError>) {
+        let now = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
+        let mut id = u64::try_from(now.as_micros()).unwrap_or(0);
+        loop {
+            if !self.kept.runs.iter().any(|run| run.id == id) {
+                let Some(folder) = &self.path else { return (id, Ok(())) };
+                match file.save_by(&run_path(folder, id), AtomicFile::commit_new) {
+                    Err(DocumentError::Write(error)) if error.is_taken() => {}
+                    Err(error) => return (id, Err(error)),
+                    Ok(()) => return (id, write(&name_path(folder, id), &name).map_err(Into::into)),
+                }
+            }
+            id = id.wrapping_add(1);
+        }
+    }
+
+    /// Gives run `id` another name.
+    ///
+    /// # Errors
+    /// The name cannot be written; it then lasts until the next look.
+    pub fn rename(&mut self, id: u64, name: &str) -> Result<(), WriteError> {
+        let Some(run) = self.kept.runs.iter_mut().find(|run| run.id == id) else {
+            return Ok(());
+        };
+        name.clone_into(&mut run.name);
+        match self.folder_of(id) {
+            Some(folder) => write(&name_path(folder, id), &name),
+            None => Ok(()),
+        }
+    }
+
+    /// Chooses the two runs that are compared.
+    ///
+    /// # Errors
+    /// The choice cannot be written; it then lasts until the next look.
+    pub fn pin(&mut self, pinned: [Option<u64>; 2]) -> Result<(), WriteError> {
+        self.kept.pinned = pinned;
+        match &self.path {
+            Some(folder) => write(&pinned_path(folder), &pinned),
+            None => Ok(()),
+        }
+    }
+
+    /// Removes run `id` for good.
+    ///
+    /// # Errors
+    /// Its file cannot be removed; the next look finds it again.
+    pub fn remove(&mut self, id: u64) -> Result<(), WriteError> {
+        let removed = match self.folder_of(id) {
+            Some(folder) => {
+                let path = run_path(folder, id);
+                // A name without a run is harmless.
+                let _ = fs::remove_file(name_path(folder, id));
+                fs::remove_file(&path).map_err(|source| WriteError::io(&path, source))
+            }
+            None => Ok(()),
+        };
+        self.kept.runs.retain(|run| run.id != id);
+        self.unwritten.remove(&id);
+        self.kept.pinned = self.kept.pinned.map(|pinned| pinned.filter(|pinned| *pinned != id));
+        removed
+    }
+
+    /// The folder, if it has the file of run `id`.
+    fn folder_of(&self, id: u64) -> Option<&Path> {
+        self.path().filter(|folder| run_path(folder, id).exists())
+    }
+}
+
+/// Returns source, hidden nodes and method; numbered if there is such a name.
+fn new_name(runs: &[KeptRun], file: &NetworkFile) -> String {
+    let method = file.settings.training.method.short_name();
+    let name = format!("{} h{} {method}", file.source_name(), file.settings.hidden);
+    let is_taken = |name: &str| runs.iter().any(|run| run.name == name);
+    let numbered = (2..).map(|number| format!("{name} ({number})"));
+    let mut names = std::iter::once(name.clone()).chain(numbered);
+    names.find(|name| !is_taken(name)).unwrap_or(name)
+}

@@ -1,0 +1,308 @@
+use std::{cmp::Ordering, collections::BTreeMap};
+
+use serde::Serialize;
+use serde_json::{Map, Value};
+
+use super::{Trial, TrialId, TrialOptions};
+
+/// Fields of a report that are times: they differ from run to run, and nothing is compared by them.
+const TIMES: [&str; 4] = ["epoch_ms", "frame_us", "fit_seconds", "training_seconds"];
+
+/// A trial in a table: what it was, what came out, and how long it took.
+#[derive(Clone, Debug, Serialize)]
+pub struct SweepRow {
+    pub(crate) trial: TrialId,
+    pub(crate) program: String,
+    pub options: TrialOptions,
+    /// The report without its times.
+    pub result: Value,
+    /// Times by their place in the report, and the whole time as `seconds`.
+    pub time: BTreeMap<String, Value>,
+}
+
+impl From<Trial> for SweepRow {
+    fn from(trial: Trial) -> Self {
+        let mut time = BTreeMap::from([("seconds".to_owned(), Value::from(trial.seconds))]);
+        let trial_id = trial.id();
+        let mut result = trial.report;
+        take_times(&mut result, "", &mut time);
+        Self {
+            trial: trial_id,
+            program: trial.program,
+            options: trial.options,
+            result,
+            time,
+        }
+    }
+}
+
+impl SweepRow {
+    /// The options as one text: the same for the same options.
+    pub(super) fn key(&self) -> String {
+        let pairs: Vec<_> = self
+            .options
+            .iter()
+            .map(|(option, value)| format!("{option}={value}"))
+            .collect();
+        pairs.join("\n")
+    }
+
+    /// The part by which tables of results are compared: options and result.
+    pub(super) fn compared(&self) -> String {
+        format!("{}\n{}", self.key(), sorted(&self.result))
+    }
+
+    /// Order in the table: by the options, in the order of their names; numbers by their size.
+    pub(super) fn order(&self, other: &Self) -> Ordering {
+        let pairs = self.options.iter().zip(&other.options);
+        let by_value = pairs.map(|((name, value), (other_name, other_value))| {
+            let names = name.cmp(other_name);
+            names.then_with(|| match (value.as_f64(), other_value.as_f64()) {
+                // Whole numbers beyond 2⁵³ are the same as floating-point numbers.
+                (Some(one), Some(two)) => one.total_cmp(&two).then(value.as_u64().cmp(&other_value.as_u64())),
+                _ => value.to_string().cmp(&other_value.to_string()),
+            })
+        });
+        let decided = by_value.into_iter().find(|order| order.is_ne());
+        let length = self.options.len().cmp(&other.options.len());
+        decided.unwrap_or(length).then(self.trial.cmp(&other.trial))
+    }
+
+    /// Cells of the row by column. Results that the options give already, and lists of objects, are left out.
+    pub(super) fn cells(&self) -> BTreeMap<Column, String> {
+        let mut cells = BTreeMap::new();
+        cells.insert(Column::Trial, self.trial.to_string());
+        cells.insert(Column::Program, self.program.clone());
+        for (option, value) in &self.options {
+            cells.insert(Column::Option(option.clone()), text(value).unwrap_or_default());
+        }
+        for (place, value) in &self.time {
+            cells.insert(Column::Time(place.clone()), text(value).unwrap_or_default());
+        }
+        if let Value::Object(fields) = &self.result {
+            let own = fields.iter().filter(|(name, _)| !self.is_told_by_options(name));
+            for (name, value) in own {
+                flatten(value, name, &mut |place, value| {
+                    if let Some(text) = text(value) {
+                        cells.insert(Column::Result(place.to_owned()), text);
+                    }
+                });
+            }
+        }
+        cells
+    }
+
+    fn is_told_by_options(&self, field: &str) -> bool {
+        let is_option = self.options.contains_key(&field.replace('_', "-"));
+        // The option is the largest number of epochs, the result the number that were run; of targets the option has the names,
+        // the result the errors.
+        (is_option && !["epochs", "targets"].contains(&field)) || ["scene", "inputs"].contains(&field)
+    }
+}
+
+/// Columns of a table, in their order.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum Column {
+    Trial,
+    Program,
+    Option(String),
+    Result(String),
+    Time(String),
+}
+
+impl Column {
+    pub(super) fn heading(&self) -> String {
+        match self {
+            Self::Trial => "trial".to_owned(),
+            Self::Program => "program".to_owned(),
+            Self::Option(option) => option.clone(),
+            Self::Result(place) => format!("result.{place}"),
+            Self::Time(place) => format!("time.{place}"),
+        }
+    }
+}
+
+/// Moves the times out of an object and the objects in it.
+fn take_times(value: &mut Value, place: &str, times: &mut BTreeMap<String, Value>) {
+    match value {
+        Value::Object(fields) => {
+            let mut kept = Map::new();
+            for (name, mut value) in std::mem::take(fields) {
+                let place = joined(place, &name);
+                if TIMES.contains(&name.as_str()) {
+                    times.insert(place, value);
+                } else {
+                    take_times(&mut value, &place, times);
+                    kept.insert(name, value);
+                }
+            }
+            *fields = kept;
+        }
+        Value::Array(values) => {
+            for (index, value) in values.iter_mut().enumerate() {
+                take_times(value, &joined(place, &index.to_string()), times);
+            }
+        }
+        _ => {}
+    }
+}
+
+/// JSON with the fields of each object in the order of their names, in which objects need not be held.
+fn sorted(value: &Value) -> String {
+    match value {
+        Value::Object(fields) => {
+            let texts: BTreeMap<_, _> = fields.iter().map(|(name, value)| (name, sorted(value))).collect();
+            let texts: Vec<_> = texts
+                .into_iter()
+                .map(|(name, text)| format!("{name:?}:{text}"))
+                .collect();
+            format!("{{{}}}", texts.join(","))
+        }
+        Value::Array(values) => {
+            let texts: Vec<_> = values.iter().map(sorted).collect();
+            format!("[{}]", texts.join(","))
+        }
+        value => value.to_string(),
+    }
+}
+
+/// Visits everything in `value` that is no object, with its place. Objects of a list are placed by their names, if they have
+/// some.
+fn flatten(value: &Value, place: &str, visit: &mut impl FnMut(&str, &Value)) {
+    match value {
+        Value::Object(fields) => {
+            for (name, value) in fields {
+                flatten(value, &joined(place, name), visit);
+            }
+        }
+        Value::Array(values) if values.iter().any(|value| value["name"].is_string()) => {
+            for value in values {
+                let Value::Object(fields) = value else { continue };
+                let place = joined(place, value["name"].as_str().unwrap_or_default());
+                for (field, value) in fields.iter().filter(|(field, _)| *field != "name") {
+                    flatten(value, &joined(&place, field), visit);
+                }
+            }
+        }
+        value => visit(place, value),
+    }
+}
+
+fn joined(place: &str, name: &str) -> String {
+    if place.is_empty() {
+        name.to_owned()
+    } else {
+        format!("{place}.{name}")
+    }
+}
+
+/// A cell: numbers so that reading gives the same bits, nothing where there is none; none for lists of objects.
+fn text(value: &Value) -> Option<String> {
+    match value {
+        Value::Null => Some(String::new()),
+        Value::String(text) => Some(text.clone()),
+        Value::Array(values) => {
+            let texts: Option<Vec<_>> = values.iter().map(|value| value.as_str()).collect();
+            // Remarks are sentences, the values of an option are words.
+            texts.map(|texts| {
+                texts.join(if texts.iter().any(|text| text.contains(' ')) {
+                    "; "
+                } else {
+                    " "
+                })
+            })
+        }
+        Value::Object(_) => None,
+        value => Some(value.to_string()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use serde_json::json;
+
+    use super::*;
+
+    fn row(options: Value, report: Value) -> SweepRow {
+        let options = serde_json::from_value(options).unwrap();
+        SweepRow::from(Trial::new(options, report, 1.5))
+    }
+
+    #[test]
+    fn times_stand_apart_and_options_are_told_once() {
+        let report = json!({
+            "epochs": 20, "hidden": 8, "scene": {"rows": "all"}, "epoch_ms": 2.5, "published": null,
+            "warnings": ["first of two", "second"], "starts": [{"epochs": 20}],
+            "decoders": {"ridge": {"z_mm": 0.5, "frame_us": 3.0}},
+        });
+        let row = row(json!({"epochs": 100, "hidden": 8, "decoder": ["ridge"]}), report);
+        let cells = row.cells();
+        let told: Vec<_> = cells
+            .iter()
+            .map(|(column, text)| (column.heading(), text.as_str()))
+            .collect();
+        let told: Vec<_> = told
+            .iter()
+            .map(|(heading, text)| (heading.as_str(), *text))
+            .skip(2)
+            .collect();
+        assert_eq!(
+            told,
+            [
+                ("decoder", "ridge"),
+                ("epochs", "100"),
+                ("hidden", "8"),
+                ("result.decoders.ridge.z_mm", "0.5"),
+                ("result.epochs", "20"),
+                ("result.published", ""),
+                ("result.warnings", "first of two; second"),
+                ("time.decoders.ridge.frame_us", "3.0"),
+                ("time.epoch_ms", "2.5"),
+                ("time.seconds", "1.5"),
+            ]
+        );
+    }
+
+    #[test]
+    fn errors_of_targets_are_columns_by_their_names() {
+        let report = json!({
+            "targets": [{"name": "fx", "unit": null, "rmse": 0.5}, {"name": "fz", "unit": "N", "rmse": 0.25}],
+            "baselines": {"ridge": [{"name": "fx", "rmse": 0.75}]},
+        });
+        let cells = row(json!({"targets": ["fx", "fz"]}), report).cells();
+        let of_results = cells.iter().filter(|(column, _)| matches!(column, Column::Result(_)));
+        let of_results: Vec<_> = of_results
+            .map(|(column, text)| (column.heading(), text.as_str()))
+            .collect();
+        let expected = [
+            ("result.baselines.ridge.fx.rmse", "0.75"),
+            ("result.targets.fx.rmse", "0.5"),
+            ("result.targets.fx.unit", ""),
+            ("result.targets.fz.rmse", "0.25"),
+            ("result.targets.fz.unit", "N"),
+        ];
+        assert_eq!(of_results, expected.map(|(heading, text)| (heading.to_owned(), text)));
+    }
+
+    #[test]
+    fn rows_are_in_the_order_of_numbers() {
+        let with = |hidden: u64, seed: u64| row(json!({"hidden": hidden, "seed": seed}), json!({}));
+        let mut rows = [
+            with(10, 2),
+            with(6, 18_446_744_073_709_551_615),
+            with(6, 18_446_744_073_709_551_614),
+            with(8, 0),
+        ];
+        rows.sort_by(SweepRow::order);
+        let options = rows.map(|row| (row.options["hidden"].as_u64(), row.options["seed"].as_u64()));
+        assert_eq!(
+            options,
+            [
+                (Some(6), Some(18_446_744_073_709_551_614)),
+                (Some(6), Some(18_446_744_073_709_551_615)),
+                (Some(8), Some(0)),
+                (Some(10), Some(2))
+            ]
+        );
+    }
+}

@@ -1,0 +1,229 @@
+use std::fmt;
+
+use super::{Cell, Table, TableColumn, latex::latex};
+use decoupler_core::text::inert;
+
+/// Form in which a table is copied into other documents.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum TableForm {
+    /// GitHub-flavoured Markdown, numbers rounded for readers.
+    Markdown,
+    /// LaTeX for the packages `booktabs` and `siunitx`, numbers rounded for readers and aligned at the decimal point.
+    Latex,
+    /// Columns separated by tabs, numbers with every digit: for spreadsheets.
+    TabSeparated,
+    /// An array of objects by the names of the fields, numbers with every digit: for programs.
+    Json,
+}
+
+impl TableForm {
+    /// All forms, in the order offered to the user.
+    pub const ALL: [Self; 4] = [Self::Markdown, Self::Latex, Self::TabSeparated, Self::Json];
+}
+
+impl fmt::Display for TableForm {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(match self {
+            Self::Markdown => "Markdown",
+            Self::Latex => "LaTeX",
+            Self::TabSeparated => "tab-separated",
+            Self::Json => "JSON",
+        })
+    }
+}
+
+impl Table {
+    /// Returns the table in `form`.
+    pub fn text(&self, form: TableForm) -> String {
+        match form {
+            TableForm::Markdown => self.markdown(),
+            TableForm::Latex => latex(self),
+            TableForm::TabSeparated => self.tab_separated(),
+            TableForm::Json => self.json(),
+        }
+    }
+
+    /// Returns the table for a terminal: numbers rounded for readers, columns apart by two spaces. Figures are aligned on the
+    /// right, also those with a unit or an interval; other texts on the left.
+    pub fn aligned(&self) -> String {
+        let headings: Vec<String> = self.columns.iter().map(TableColumn::title).collect();
+        let rows = self.rows.iter().map(|row| row.iter().map(Cell::rounded).collect());
+        let lines: Vec<Vec<String>> = std::iter::once(headings).chain(rows).collect();
+        let width = |column: usize| {
+            let cells = lines.iter().filter_map(|line| line.get(column));
+            cells.map(|cell| cell.chars().count()).max().unwrap_or(0)
+        };
+        let widths: Vec<usize> = (0..self.columns.len()).map(width).collect();
+        let is_figure =
+            |text: &String| text.is_empty() || text.starts_with(|c: char| c.is_ascii_digit() || "-–".contains(c));
+        let is_right = |column: usize| lines[1..].iter().filter_map(|line| line.get(column)).all(is_figure);
+        let right: Vec<bool> = (0..self.columns.len()).map(is_right).collect();
+        let line = |cells: &Vec<String>| {
+            let padded = cells.iter().zip(&widths).zip(&right).map(|((cell, width), is_right)| {
+                if *is_right {
+                    format!("{cell:>width$}")
+                } else {
+                    format!("{cell:<width$}")
+                }
+            });
+            padded.collect::<Vec<_>>().join("  ").trim_end().to_owned() + "\n"
+        };
+        lines.iter().map(line).collect()
+    }
+
+    fn json(&self) -> String {
+        // Of texts and finite numbers, which always can be written.
+        let json = serde_json::to_string_pretty(self);
+        json.unwrap_or_default() + "\n"
+    }
+
+    fn markdown(&self) -> String {
+        let line = |cells: Vec<String>| format!("| {} |\n", cells.join(" | "));
+        let mut text = line(self.columns.iter().map(|column| escaped(&column.title())).collect());
+        let rules = (0..self.columns.len()).map(|column| if self.is_numeric(column) { "---:" } else { "---" });
+        text += &line(rules.map(str::to_owned).collect());
+        for row in &self.rows {
+            text += &line(row.iter().map(|cell| escaped(&cell.rounded())).collect());
+        }
+        text
+    }
+
+    fn tab_separated(&self) -> String {
+        // A tab or line break inside a cell would begin another.
+        let plain = |text: String| text.replace(['\t', '\n', '\r'], " ");
+        let line = |cells: Vec<String>| cells.join("\t") + "\n";
+        let mut text = line(
+            self.columns
+                .iter()
+                .map(|column| plain(inert(&column.title())))
+                .collect(),
+        );
+        for row in &self.rows {
+            text += &line(row.iter().map(|cell: &Cell| plain(cell.for_spreadsheet())).collect());
+        }
+        text
+    }
+}
+
+/// Escapes what Markdown would take for markup.
+fn escaped(text: &str) -> String {
+    let mut escaped = String::with_capacity(text.len());
+    let mut before = ' ';
+    let mut letters = text.chars().peekable();
+    while let Some(letter) = letters.next() {
+        // Inside a word an underscore is one.
+        let is_inside = before.is_alphanumeric() && letters.peek().is_some_and(|next| next.is_alphanumeric());
+        match letter {
+            '\n' | '\r' => escaped.push(' '),
+            '_' if is_inside => escaped.push(letter),
+            '\\' | '|' | '*' | '_' | '`' | '[' | '<' | '~' => escaped.extend(['\\', letter]),
+            _ => escaped.push(letter),
+        }
+        before = letter;
+    }
+    escaped
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn table() -> Table {
+        Table {
+            columns: vec![
+                TableColumn::new("decoder", "Decoder", ""),
+                TableColumn::new("z_percent", "Z", "%"),
+                TableColumn::new("epochs", "epochs", ""),
+            ],
+            rows: vec![
+                vec!["a|b_c 10×6_3×18\n*".into(), (1.0 / 3.0).into(), 1000_usize.into()],
+                vec!["R&D 50 % #1 \\x{y}~^".into(), (-6.13e-5).into(), 7_usize.into()],
+                vec!["none".into(), Cell::Number(None), 20_usize.into()],
+            ],
+        }
+    }
+
+    #[test]
+    fn markdown_has_as_many_cells_in_every_line_whatever_the_names() {
+        let text = table().text(TableForm::Markdown);
+        let expected = "| Decoder | Z (%) | epochs |\n\
+                        | --- | ---: | ---: |\n\
+                        | a\\|b_c 10×6_3×18 \\* | 0.333 | 1000 |\n\
+                        | R&D 50 % #1 \\\\x{y}\\~^ | -6.13e-5 | 7 |\n\
+                        | none | – | 20 |\n";
+        assert_eq!(text, expected);
+    }
+
+    #[test]
+    fn spreadsheets_get_every_digit_and_one_line_a_row() {
+        let text = table().text(TableForm::TabSeparated);
+        let lines: Vec<Vec<&str>> = text.lines().map(|line| line.split('\t').collect()).collect();
+        assert_eq!(lines[0], ["Decoder", "Z (%)", "epochs"]);
+        assert_eq!(lines[1], ["a|b_c 10×6_3×18 *", "0.3333333333333333", "1000"]);
+        assert_eq!(lines[3], ["none", "", "20"]);
+        assert_eq!(lines.len(), 4);
+    }
+
+    #[test]
+    fn a_terminal_gets_columns_as_wide_as_their_widest_cell() {
+        let mut table = table();
+        table.rows.truncate(2);
+        table.rows[0][0] = "a".into();
+        table.rows[1][0] = "long name".into();
+        let expected = "Decoder       Z (%)  epochs\n\
+                        a             0.333    1000\n\
+                        long name  -6.13e-5       7\n";
+        assert_eq!(table.aligned(), expected);
+        let times = Table::of_headings(
+            ["decoder", "training", "note"],
+            [
+                vec!["ridge".into(), "3 ms".into(), "".into()],
+                vec!["network".into(), "12.3 s".into(), "*".into()],
+            ],
+        );
+        let expected = "decoder  training  note\n\
+                        ridge        3 ms\n\
+                        network    12.3 s  *\n";
+        assert_eq!(times.aligned(), expected);
+    }
+
+    #[test]
+    fn latex_escapes_names_and_aligns_numbers_at_the_decimal_point() {
+        let expected = "% \\usepackage{booktabs, siunitx}\n\
+                        \\begin{tabular}{l S[table-format=-1.3e-1] S[table-format=4.0]}\n\
+                        \\toprule\n\
+                        Decoder & {Z (\\%)} & {epochs} \\\\\n\
+                        \\midrule\n\
+                        a|b\\_c 10×6\\_3×18 * & 0.333 & 1000 \\\\\n\
+                        R\\&D 50 \\% \\#1 \\textbackslash{}x\\{y\\}\\textasciitilde{}\\textasciicircum{} & -6.13e-5 & 7 \\\\\n\
+                        none & {–} & 20 \\\\\n\
+                        \\bottomrule\n\
+                        \\end{tabular}\n";
+        assert_eq!(table().text(TableForm::Latex), expected);
+    }
+
+    /// Read back as a spreadsheet reads them.
+    #[test]
+    fn names_are_no_formulas_and_numbers_stay_numbers() {
+        let names = ["=1+2", "+a", "-b", "@c", "-0.5", "plain"];
+        let table = Table {
+            columns: vec![TableColumn::new("=x", "=x", ""), TableColumn::new("z", "Z", "")],
+            rows: names.iter().map(|&name| vec![name.into(), Cell::from(-0.5)]).collect(),
+        };
+        let mut written = Vec::new();
+        table.write_csv(&mut written).unwrap();
+        let tabbed = table.text(TableForm::TabSeparated);
+        for (separator, text) in [(b',', written.as_slice()), (b'\t', tabbed.as_bytes())] {
+            let mut reader = csv::ReaderBuilder::new().delimiter(separator).from_reader(text);
+            assert_eq!(&reader.headers().unwrap()[0], "'=x");
+            let read: Vec<csv::StringRecord> = reader.records().map(Result::unwrap).collect();
+            for (record, name) in read.iter().zip(names) {
+                let is_plain = matches!(name, "plain" | "-0.5");
+                let expected = if is_plain { name.to_owned() } else { format!("'{name}") };
+                assert_eq!((&record[0], &record[1]), (expected.as_str(), "-0.5"));
+            }
+        }
+        let latex = table.text(TableForm::Latex);
+        assert!(latex.contains("\n{}=1+2 & ") && latex.contains("& -0.5"), "{latex}");
+    }
+}

@@ -1,0 +1,178 @@
+use super::{Cell, Table, TableColumn};
+use crate::figure::trade_words::point_name;
+use decoupler_core::{
+    decoupling::Precision,
+    evaluation::{TradeOffCost, TradeOffLevel, TradeOffPoint},
+};
+
+/// Every point of every level, with all its figures: for programs.
+pub fn trade_off_points(levels: &[TradeOffLevel]) -> Table {
+    const FIELDS: [&str; 17] = [
+        "noise",
+        "preset",
+        "decoder",
+        "precision",
+        "hidden",
+        "method",
+        "samples",
+        "epochs",
+        "z_percent",
+        "z_mm",
+        "frame_us",
+        "training_s",
+        "residual",
+        "reference_z_percent",
+        "reference_z_mm",
+        "on_decoding_front",
+        "on_training_front",
+    ];
+    let of_level = |level: &TradeOffLevel| {
+        let [decoding, training] = TradeOffCost::ALL.map(|cost| level.front(cost));
+        let points = level.points.iter().zip(decoding).zip(training);
+        let row = |((point, on_decoding), on_training): ((&TradeOffPoint, bool), bool)| {
+            let report = &point.report;
+            let precision = match report.precision {
+                Precision::Double => "f64",
+                Precision::Single => "f32",
+            };
+            let hidden = point.hidden();
+            let count = |count: Option<usize>| count.map_or(Cell::Number(None), Cell::from);
+            vec![
+                level.noise.into(),
+                point
+                    .preset
+                    .map_or(Cell::Number(None), |preset| preset.to_string().into()),
+                report.kind.to_string().into(),
+                precision.into(),
+                count(hidden),
+                point
+                    .method()
+                    .map_or(Cell::Number(None), |method| method.short_name().into()),
+                count(point.settings.source.simulation().map(|simulation| simulation.samples)),
+                count(hidden.map(|_| point.settings.training.stopping.epochs)),
+                report.errors.percent().into(),
+                report.errors.nodes().map(|errors| errors.z_mm).into(),
+                report.cost.frame_us.into(),
+                point.training_seconds.into(),
+                report.residual.into(),
+                point.reference.and_then(|errors| errors.z_percent).into(),
+                point.reference.map(|errors| errors.z_mm).into(),
+                on_decoding.to_string().into(),
+                on_training.to_string().into(),
+            ]
+        };
+        points.map(row).collect::<Vec<_>>()
+    };
+    let mut table = Table {
+        columns: FIELDS.map(TableColumn::field).to_vec(),
+        rows: levels.iter().flat_map(of_level).collect(),
+    };
+    if levels.iter().all(|level| level.noise.is_none()) {
+        let of_arrays = ["noise", "preset", "samples", "z_mm", "residual"];
+        for field in of_arrays.into_iter().chain(["reference_z_percent", "reference_z_mm"]) {
+            table.remove_column(field);
+        }
+        let percent = table.columns.iter_mut().find(|column| column.field == "z_percent");
+        percent
+            .into_iter()
+            .for_each(|column| *column = TableColumn::field("percent_of_range"));
+    }
+    table
+}
+
+/// The points of one level, fastest first: for readers.
+pub fn trade_off_summary(level: &TradeOffLevel) -> Table {
+    let row = |point: &TradeOffPoint| {
+        vec![
+            point_name(point).into(),
+            point.report.errors.percent().into(),
+            point.report.errors.nodes().map(|errors| errors.z_mm).into(),
+            point.to_reference().into(),
+            point.report.cost.frame_us.into(),
+            point.training_seconds.into(),
+        ]
+    };
+    let mut points: Vec<&TradeOffPoint> = level.points.iter().collect();
+    points.sort_by(|a, b| a.report.cost.frame_us.total_cmp(&b.report.cost.frame_us));
+    let mut table = Table {
+        columns: vec![
+            TableColumn::new("decoder", "Decoder", ""),
+            TableColumn::new("z_percent", "Z", "%"),
+            TableColumn::new("z_mm", "Z", "mm"),
+            TableColumn::new("times_reference", "times reference", ""),
+            TableColumn::new("frame_us", "a frame", "µs"),
+            TableColumn::new("training_s", "training", "s"),
+        ],
+        rows: points.into_iter().map(row).collect(),
+    };
+    if level.noise.is_none() {
+        table.remove_column("z_mm");
+        let percent = table.columns.iter_mut().find(|column| column.field == "z_percent");
+        percent
+            .into_iter()
+            .for_each(|column| *column = TableColumn::new("percent_of_range", "MAE", "% of range"));
+    }
+    // Without noise there is no limit to compare with.
+    if level.points.iter().all(|point| point.to_reference().is_none()) {
+        table.remove_column("times_reference");
+    }
+    table
+}
+
+#[cfg(test)]
+mod tests {
+    use ndarray::Array2;
+
+    use super::*;
+    use decoupler_core::{
+        dataset::{Dataset, Split},
+        decoupling::DecoderKind,
+        evaluation::{Measured, RunSets, RunSettings, measure_trade_off},
+        scene::RowModel,
+    };
+
+    #[test]
+    fn points_of_a_recording_have_no_columns_of_a_sensor_model() {
+        let set = |from: usize| {
+            let readings = Array2::from_shape_fn((40, 2), |(row, channel)| {
+                ((from + row) as f64 * [0.3, 0.7][channel]).sin()
+            });
+            let targets = Array2::from_shape_fn((40, 1), |(row, _)| readings[[row, 0]] * readings[[row, 1]]);
+            Dataset::new(readings, targets, None, (0..40).collect()).unwrap()
+        };
+        let split = Split {
+            training: set(0),
+            validation: None,
+        };
+        let mut settings = RunSettings::from(Measured { rows: RowModel::Shared });
+        settings.training.stopping.epochs = 3;
+        let mut points = Vec::new();
+        let keep = |_, point: Result<TradeOffPoint, _>, _: Option<&_>| points.push(point.unwrap());
+        let kinds = [DecoderKind::Ridge, DecoderKind::Network];
+        measure_trade_off(&settings, &RunSets::new(split, set(40)), &[2], &kinds, || false, keep).unwrap();
+        let level = TradeOffLevel { noise: None, points };
+        let fields = |table: &Table| Vec::from_iter(table.columns.iter().map(|column| column.field.clone()));
+        let summary = trade_off_summary(&level);
+        assert_eq!(
+            fields(&summary),
+            ["decoder", "percent_of_range", "frame_us", "training_s"]
+        );
+        assert_eq!(summary.columns[1].title(), "MAE (% of range)");
+        let table = trade_off_points(&[level]);
+        let expected = [
+            "decoder",
+            "precision",
+            "hidden",
+            "method",
+            "epochs",
+            "percent_of_range",
+            "frame_us",
+            "training_s",
+            "on_decoding_front",
+            "on_training_front",
+        ];
+        assert_eq!(fields(&table), expected);
+        assert_eq!(table.rows.len(), 3, "ridge, and the network in two precisions");
+        assert!(table.rows.iter().all(|row| row.len() == expected.len()));
+    }
+}

@@ -1,0 +1,245 @@
+use std::{
+    collections::BTreeSet,
+    ffi::OsStr,
+    fs::{self, File},
+    io,
+    path::{Path, PathBuf},
+    sync::{Mutex, MutexGuard, PoisonError},
+};
+
+use tempfile::{NamedTempFile, PersistError};
+
+const PREFIX: &str = ".decoupler-";
+const SUFFIX: &str = ".part";
+
+/// Paths of all files and folders in the making. A program that is ended from another thread drops nothing, so it looks here.
+static ALL: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
+
+fn all() -> MutexGuard<'static, BTreeSet<PathBuf>> {
+    // A set is whole at any time.
+    ALL.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Folders in which this program has looked for what others left.
+static SWEPT: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
+
+/// A file in the making, removed when dropped. It is locked while it is worked on: one that is not locked was left by a
+/// program that was killed.
+#[derive(Debug)]
+pub(super) struct Unfinished {
+    file: NamedTempFile,
+    listed: Listed,
+}
+
+/// An entry of [`ALL`], while it lives.
+#[derive(Debug)]
+struct Listed(PathBuf);
+
+impl Drop for Listed {
+    fn drop(&mut self) {
+        all().remove(&self.0);
+    }
+}
+
+impl Unfinished {
+    /// Begins a temporary file in `folder`, created with the default permissions (0666 minus the umask). The first time
+    /// it removes what killed programs left there.
+    pub(super) fn begin(folder: &Path) -> io::Result<Self> {
+        sweep_once(folder);
+        let mut builder = tempfile::Builder::new();
+        builder.prefix(PREFIX).suffix(SUFFIX);
+        #[cfg(unix)]
+        {
+            use std::{fs::Permissions, os::unix::fs::PermissionsExt};
+            builder.permissions(Permissions::from_mode(0o666));
+        }
+        let mut all = all();
+        let file = loop {
+            let file = builder.tempfile_in(folder).map_err(plain)?;
+            // Some file systems have no locks: nobody will sweep there.
+            let _ = file.as_file().lock();
+            // Another program may have swept it before it was locked.
+            if file.path().exists() {
+                break file;
+            }
+        };
+        all.insert(file.path().to_owned());
+        let listed = Listed(file.path().to_owned());
+        Ok(Self { file, listed })
+    }
+
+    pub(super) fn as_file(&self) -> &File {
+        self.file.as_file()
+    }
+
+    /// Puts it in the place of `target`.
+    pub(super) fn persist(self, target: &Path) -> io::Result<()> {
+        self.persist_by(target, NamedTempFile::persist)
+    }
+
+    /// Puts it at `target`, where no file may be.
+    pub(super) fn persist_new(self, target: &Path) -> io::Result<()> {
+        self.persist_by(target, NamedTempFile::persist_noclobber)
+    }
+
+    fn persist_by(
+        self,
+        target: &Path,
+        persist: fn(NamedTempFile, PathBuf) -> Result<File, PersistError>,
+    ) -> io::Result<()> {
+        let Self { file, listed } = self;
+        let persisted = persist(file, target.to_owned());
+        drop(listed);
+        persisted.map_err(|error| error.error)?;
+        sync_folder(folder_of(target));
+        Ok(())
+    }
+}
+
+/// The system's own words: the default error repeats the temporary name, which means nothing to the user.
+fn plain(error: io::Error) -> io::Error {
+    error.raw_os_error().map_or(error, io::Error::from_raw_os_error)
+}
+
+/// A folder in the making, removed when dropped, and locked as [`Unfinished`] is. Windows cannot lock a folder, so none
+/// is swept there.
+#[derive(Debug)]
+pub(super) struct UnfinishedFolder {
+    folder: tempfile::TempDir,
+    listed: Listed,
+    /// Held open while the folder is worked on.
+    lock: Option<File>,
+}
+
+impl UnfinishedFolder {
+    /// Begins a temporary folder in `parent`, created with the default permissions (0777 minus the umask). The first time
+    /// it removes what killed programs left there.
+    pub(super) fn begin(parent: &Path) -> io::Result<Self> {
+        sweep_once(parent);
+        let mut builder = tempfile::Builder::new();
+        builder.prefix(PREFIX).suffix(SUFFIX);
+        #[cfg(unix)]
+        {
+            use std::{fs::Permissions, os::unix::fs::PermissionsExt};
+            builder.permissions(Permissions::from_mode(0o777));
+        }
+        let mut all = all();
+        let (folder, lock) = loop {
+            let folder = builder.tempdir_in(parent).map_err(plain)?;
+            let lock = locked_folder(folder.path());
+            // Another program may have swept it before it was locked.
+            if folder.path().exists() {
+                break (folder, lock);
+            }
+        };
+        all.insert(folder.path().to_owned());
+        let listed = Listed(folder.path().to_owned());
+        Ok(Self { folder, listed, lock })
+    }
+
+    pub(super) fn path(&self) -> &Path {
+        self.folder.path()
+    }
+
+    /// Renames it to `target`, where nothing or an empty folder may be.
+    pub(super) fn persist(self, target: &Path) -> io::Result<()> {
+        let Self { folder, listed, lock } = self;
+        fs::rename(folder.path(), target)?;
+        // It is not there any more under its temporary name.
+        let _ = folder.keep();
+        drop((listed, lock));
+        sync_folder(folder_of(target));
+        Ok(())
+    }
+}
+
+/// Opens and locks a folder that nobody else works on.
+fn locked_folder(path: &Path) -> Option<File> {
+    let folder = File::open(path).ok()?;
+    folder.try_lock().is_ok().then_some(folder)
+}
+
+/// Folder of the file `path`.
+pub(super) fn folder_of(path: &Path) -> &Path {
+    let parent = path.parent().filter(|parent| !parent.as_os_str().is_empty());
+    parent.unwrap_or(Path::new("."))
+}
+
+/// Has the names in `folder` outlast a power failure, as far as its file system can.
+fn sync_folder(folder: &Path) {
+    // The file is whole and in its place, so there is nothing to fail; Windows opens no folders.
+    if cfg!(unix) {
+        let _ = File::open(folder).and_then(|folder| folder.sync_all());
+    }
+}
+
+/// Sweeps `folder` the first time that this program writes there.
+fn sweep_once(folder: &Path) {
+    let is_new = SWEPT
+        .lock()
+        .unwrap_or_else(PoisonError::into_inner)
+        .insert(folder.to_owned());
+    if is_new {
+        sweep(folder);
+    }
+}
+
+/// Removes the unfinished files and folders in `folder` that nobody works on. What cannot be removed stays.
+fn sweep(folder: &Path) {
+    let Ok(entries) = fs::read_dir(folder) else { return };
+    for entry in entries.flatten() {
+        let Ok(kind) = entry.file_type() else { continue };
+        if !is_our_name(&entry.file_name()) {
+            continue;
+        }
+        let path = entry.path();
+        if kind.is_file() {
+            let left = File::options().read(true).write(true).open(&path);
+            if left.is_ok_and(|left| left.try_lock().is_ok()) {
+                let _ = fs::remove_file(path);
+            }
+        } else if kind.is_dir() && locked_folder(&path).is_some() {
+            let _ = fs::remove_dir_all(path);
+        }
+    }
+}
+
+fn is_our_name(name: &OsStr) -> bool {
+    /// As many as the random part has by default.
+    const RANDOM: usize = 6;
+    let random = name
+        .to_str()
+        .and_then(|name| name.strip_prefix(PREFIX)?.strip_suffix(SUFFIX));
+    random.is_some_and(|random| random.len() == RANDOM && random.bytes().all(|byte| byte.is_ascii_alphanumeric()))
+}
+
+/// Ends the program with this exit status, from any thread. Files in the making leave nothing.
+pub fn exit_leaving_nothing(status: i32) -> ! {
+    // Held to the end, so that no other thread begins one meanwhile.
+    let all = all();
+    for path in all.iter() {
+        // It may have found its place or have been removed just now.
+        let _ = std::fs::remove_file(path).or_else(|_| std::fs::remove_dir_all(path));
+    }
+    std::process::exit(status)
+}
+
+#[cfg(all(test, unix))]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_folder_at_work_stays_and_one_that_was_left_is_removed() {
+        let home = tempfile::tempdir().unwrap();
+        let at_work = UnfinishedFolder::begin(home.path()).unwrap();
+        fs::write(at_work.path().join("half"), "1").unwrap();
+        sweep(home.path());
+        assert!(at_work.path().join("half").exists());
+        // As a killed program leaves it: neither removed nor locked.
+        let UnfinishedFolder { folder, lock, .. } = at_work;
+        let left = folder.keep();
+        drop(lock);
+        sweep(home.path());
+        assert!(!left.exists());
+    }
+}

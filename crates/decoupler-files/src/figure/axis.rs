@@ -1,0 +1,333 @@
+use std::ops::RangeInclusive;
+
+use super::ticks::{multiples, step_for, tick_text};
+use decoupler_core::text::format_number;
+
+/// Largest number of parts into which ticks divide an axis.
+const MOST_PARTS: f64 = 8.0;
+/// Values beyond this have no place: differences between them would overflow.
+const LARGEST: f64 = 1e300;
+
+/// Scale of an axis.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum AxisScale {
+    /// Linear.
+    Linear,
+    /// Logarithmic; values that are not positive are left out.
+    Logarithmic,
+}
+
+/// Values at which an axis has ticks.
+#[derive(Clone, Debug, PartialEq)]
+pub enum TickRule {
+    /// Round numbers; on a logarithmic axis decades, and 2 and 5 between them where there is room.
+    Round,
+    /// Whole numbers.
+    Whole,
+    /// Multiples of this number.
+    Every(f64),
+    /// The values 0, 1, 2 … by these names.
+    Names(Vec<String>),
+}
+
+/// An axis of a plot. A *place* is a position along it: the value itself, or its decimal logarithm.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PlotAxis {
+    /// Name of the quantity, with its unit.
+    pub name: String,
+    /// Linear or logarithmic.
+    pub scale: AxisScale,
+    /// Rule that places the ticks.
+    pub ticks: TickRule,
+    /// Values that are always in view; where one is the least or the largest, the axis ends there.
+    pub includes: Vec<f64>,
+    /// Values beyond this range are drawn at its ends.
+    pub limits: Option<RangeInclusive<f64>>,
+}
+
+/// Ticks of an axis.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Ticks {
+    /// Their places, ascending.
+    pub places: Vec<f64>,
+    /// Smallest distance between two of them.
+    pub step: f64,
+}
+
+impl PlotAxis {
+    /// A linear axis.
+    pub fn linear(name: impl Into<String>) -> Self {
+        Self {
+            name: name.into(),
+            scale: AxisScale::Linear,
+            ticks: TickRule::Round,
+            includes: Vec::new(),
+            limits: None,
+        }
+    }
+
+    /// A logarithmic axis.
+    pub fn logarithmic(name: impl Into<String>) -> Self {
+        Self {
+            scale: AxisScale::Logarithmic,
+            ..Self::linear(name)
+        }
+    }
+
+    /// The axis with these values always in view.
+    #[must_use]
+    pub fn including(self, values: impl IntoIterator<Item = f64>) -> Self {
+        Self {
+            includes: values.into_iter().collect(),
+            ..self
+        }
+    }
+
+    /// The axis with ticks by this rule.
+    #[must_use]
+    pub fn ticked(self, ticks: TickRule) -> Self {
+        Self { ticks, ..self }
+    }
+
+    /// The axis on which values beyond `limits` are drawn at the ends of that range.
+    #[must_use]
+    pub fn limited(self, limits: RangeInclusive<f64>) -> Self {
+        Self {
+            limits: Some(limits),
+            ..self
+        }
+    }
+
+    /// Returns the place of a value; `None` if it has none.
+    pub fn place(&self, value: f64) -> Option<f64> {
+        if self.scale == AxisScale::Logarithmic && value <= 0.0 {
+            return None;
+        }
+        let value = match &self.limits {
+            Some(limits) => value.max(*limits.start()).min(*limits.end()),
+            None => value,
+        };
+        let place = match self.scale {
+            AxisScale::Linear => value,
+            AxisScale::Logarithmic => value.log10(),
+        };
+        (place.abs() < LARGEST).then_some(place)
+    }
+
+    /// Returns a value in words: `12`, `0.0123`, the name of a named value.
+    pub fn value_text(&self, value: f64) -> String {
+        match &self.ticks {
+            TickRule::Names(_) => self.tick_text(value, 1.0),
+            _ if value.fract() == 0.0 && value.abs() < 1e9 => format!("{value:.0}").replace('-', "−"),
+            _ => format_number(value).replace('-', "−"),
+        }
+    }
+
+    /// Returns the range of places that holds all `places`, with a little room.
+    pub(crate) fn range(&self, places: impl Iterator<Item = f64>) -> RangeInclusive<f64> {
+        let hull = |places: &mut dyn Iterator<Item = f64>| {
+            places.fold((f64::MAX, f64::MIN), |(low, high), place| {
+                (low.min(place), high.max(place))
+            })
+        };
+        let (data_low, data_high) = hull(&mut places.into_iter());
+        let (fixed_low, fixed_high) = hull(&mut self.includes.iter().filter_map(|&value| self.place(value)));
+        let (low, high) = (data_low.min(fixed_low), data_high.max(fixed_high));
+        if low > high {
+            return 0.0..=1.0;
+        }
+        // A single value, or values apart by rounding only, still have a range.
+        let width = (high - low).max(1e-9 * low.abs().max(high.abs())).max(1e-12);
+        let margin = if high > low { 0.05 * width } else { 0.5 };
+        let below = if fixed_low == low && high > low { 0.0 } else { margin };
+        let above = if fixed_high == high && high > low { 0.0 } else { margin };
+        low - below..=high + above
+    }
+
+    /// Returns the ticks within a range of places, at least `apart` from each other: the room that a number takes.
+    pub fn ticks(&self, range: &RangeInclusive<f64>, apart: f64) -> Ticks {
+        let width = range.end() - range.start();
+        if !(width.is_finite() && width > 0.0) {
+            return Ticks {
+                places: Vec::new(),
+                step: 1.0,
+            };
+        }
+        let parts = (width / apart).clamp(1.0, MOST_PARTS) as usize;
+        let multiples_of = |step: f64| Ticks {
+            places: multiples(range, step),
+            step,
+        };
+        match (&self.ticks, self.scale) {
+            (TickRule::Round, AxisScale::Linear) => multiples_of(step_for(range, parts)),
+            (TickRule::Round, AxisScale::Logarithmic) => logarithmic_ticks(range, apart, parts),
+            (TickRule::Whole, _) => multiples_of(step_for(range, parts).max(1.0)),
+            (TickRule::Every(step), _) => multiples_of(step * (apart / step).ceil().max(1.0)),
+            (TickRule::Names(names), _) => {
+                // The room is that of a number of six characters.
+                let longest = names.iter().map(|name| name.chars().count()).max().unwrap_or(0);
+                let needed = apart * (longest + 2) as f64 / 6.0;
+                let Ticks { mut places, step } = multiples_of(needed.ceil().max(1.0));
+                places.retain(|place| (0.0..names.len() as f64).contains(place));
+                Ticks { places, step }
+            }
+        }
+    }
+
+    /// Returns the text at a tick, given the distance to the next.
+    pub fn tick_text(&self, place: f64, step: f64) -> String {
+        match (&self.ticks, self.scale) {
+            (TickRule::Names(names), _) => names.get(place.round() as usize).cloned().unwrap_or_default(),
+            (_, AxisScale::Linear) => tick_text(place, step),
+            (_, AxisScale::Logarithmic) => power_text(place),
+        }
+    }
+}
+
+/// Returns the position of `place` in its range, from 0 to 1.
+pub fn share(place: f64, range: &RangeInclusive<f64>) -> f64 {
+    (place - range.start()) / (range.end() - range.start())
+}
+
+/// Whole decades; 2 and 5 between them where there is room; round numbers within less than a decade.
+fn logarithmic_ticks(range: &RangeInclusive<f64>, apart: f64, parts: usize) -> Ticks {
+    let (low, high) = (*range.start(), *range.end());
+    if high - low < 0.9 {
+        return ticks_within_a_decade(range, apart);
+    }
+    let has_room = 2.0_f64.log10() > apart && high - low < 4.0;
+    let factors: &[f64] = if has_room { &[1.0, 2.0, 5.0] } else { &[1.0] };
+    let stride = if has_room {
+        1.0
+    } else {
+        step_for(range, parts).max(1.0).ceil()
+    };
+    let decades = multiples(&(low - stride..=high), stride).into_iter();
+    let places = decades.flat_map(|decade| factors.iter().map(move |factor| decade + factor.log10()));
+    Ticks {
+        places: places.filter(|place| range.contains(place)).collect(),
+        step: if has_room { 2.0_f64.log10() } else { stride },
+    }
+}
+
+fn ticks_within_a_decade(range: &RangeInclusive<f64>, apart: f64) -> Ticks {
+    let [low, high] = [range.start(), range.end()].map(|end| 10.0_f64.powf(*end));
+    // The upper end is the more crowded one.
+    let number = high - 10.0_f64.powf(range.end() - apart);
+    let parts = ((high - low) / number).clamp(1.0, MOST_PARTS) as usize;
+    let step = step_for(&(low..=high), parts);
+    let places = multiples(&(low..=high), step).into_iter().map(f64::log10);
+    Ticks {
+        places: places.filter(|place| place.is_finite()).collect(),
+        step: (1.0 + step / high).log10(),
+    }
+}
+
+/// The number at a tick of a logarithmic axis, given its decimal logarithm: `0.02`, `5e−4`, `1e80`.
+fn power_text(log: f64) -> String {
+    // Three digits tell any two ticks apart. The exponent is split off before 10 to its power overflows.
+    let decade = (log + 1e-9).floor();
+    let short = |text: String| match text.contains('.') {
+        true => text.trim_end_matches('0').trim_end_matches('.').to_owned(),
+        false => text,
+    };
+    if (-3.0..5.0).contains(&decade) {
+        short(format!("{:.*}", (2.0 - decade).max(0.0) as usize, 10.0_f64.powf(log)))
+    } else {
+        let digits = short(format!("{:.2}", 10.0_f64.powf(log - decade)));
+        format!("{digits}e{decade}").replace('-', "−")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Texts at the ticks of an axis `points` long on which a number takes `number` points.
+    fn texts(axis: &PlotAxis, [low, high]: [f64; 2], points: f64, number: f64) -> Vec<String> {
+        let ticks = axis.ticks(&(low..=high), (high - low) * number / points);
+        let places = ticks.places.iter();
+        places.map(|&place| axis.tick_text(place, ticks.step)).collect()
+    }
+
+    #[test]
+    fn ticks_of_a_plain_axis_are_round_and_few() {
+        let axis = PlotAxis::linear("");
+        let texts = |low, high, points| texts(&axis, [low, high], points, 50.0);
+        assert_eq!(texts(-0.3, 1.1, 300.0), ["0.0", "0.5", "1.0"]);
+        assert_eq!(texts(3.98, 5.02, 300.0), ["4.0", "4.2", "4.4", "4.6", "4.8", "5.0"]);
+        assert_eq!(texts(0.0, 1000.0, 300.0), ["0", "200", "400", "600", "800", "1000"]);
+        assert_eq!(texts(0.0, 1000.0, 120.0), ["0", "500", "1000"], "a narrow chart");
+        assert!(texts(1.0, 1.0, 300.0).is_empty());
+        assert!(texts(f64::NAN, 1.0, 300.0).is_empty());
+    }
+
+    #[test]
+    fn ticks_of_a_logarithmic_axis_lie_in_view_and_read_as_numbers() {
+        let axis = PlotAxis::logarithmic("");
+        let texts = |low, high, points| texts(&axis, [low, high], points, 16.0);
+        assert_eq!(texts(-4.2, 0.1, 150.0), ["1e−4", "0.001", "0.01", "0.1", "1"]);
+        assert_eq!(texts(-1.1, 0.2, 150.0), ["0.1", "0.2", "0.5", "1"]);
+        assert_eq!(texts(-1.1, 0.2, 60.0), ["0.1", "1"]);
+        assert_eq!(texts(-0.73, -0.69, 150.0), ["0.19", "0.195", "0.2"]);
+        assert!(texts(f64::NAN, 1.0, 150.0).is_empty());
+    }
+
+    #[test]
+    fn a_diverged_training_has_numbers_on_its_axis_however_low_the_plot() {
+        let axis = PlotAxis::logarithmic("");
+        for points in [40.0, 80.0, 120.0, 200.0] {
+            for high in [3.0, 20.0, 80.0, 300.0] {
+                let range = -0.5..=high;
+                let ticks = axis.ticks(&range, (high + 0.5) * 16.0 / points);
+                assert!((2..=12).contains(&ticks.places.len()), "{ticks:?}");
+                let apart = ticks.step * points / (high + 0.5);
+                assert!(apart >= 16.0, "{apart} points between numbers");
+            }
+        }
+    }
+
+    #[test]
+    fn counts_have_no_ticks_between_whole_numbers() {
+        let axis = PlotAxis::linear("").ticked(TickRule::Whole);
+        assert_eq!(texts(&axis, [-0.08, 1.08], 150.0, 16.0), ["0", "1"]);
+        assert_eq!(
+            texts(&axis, [-0.08, 6.4], 150.0, 16.0),
+            ["0", "1", "2", "3", "4", "5", "6"]
+        );
+    }
+
+    #[test]
+    fn names_stand_at_their_values_and_make_room_for_each_other() {
+        let names = ["10×6_3×18", "10×8_4×24", "10×10_5×30"].map(str::to_owned).to_vec();
+        let axis = PlotAxis::linear("array").ticked(TickRule::Names(names.clone()));
+        assert_eq!(texts(&axis, [-0.5, 2.5], 400.0, 36.0), names);
+        assert_eq!(texts(&axis, [-0.5, 2.5], 150.0, 36.0), [&*names[0], &*names[2]]);
+        assert_eq!(axis.value_text(1.0), names[1]);
+    }
+
+    #[test]
+    fn an_axis_ends_where_it_is_told_and_has_room_where_it_is_not() {
+        let axis = PlotAxis::linear("").including([0.0]);
+        let range = axis.range([1.0, 4.0].into_iter());
+        assert_eq!(*range.start(), 0.0);
+        assert!(*range.end() > 4.0);
+        let below = axis.range([-1.0, 4.0].into_iter());
+        assert!(*below.start() < -1.0, "no value is hidden");
+    }
+
+    #[test]
+    fn values_beyond_the_limits_stand_at_the_ends() {
+        let axis = PlotAxis::logarithmic("").limited(0.0..=100.0);
+        assert_eq!(
+            [1.0, 1e9, f64::INFINITY].map(|value| axis.place(value)),
+            [0.0, 2.0, 2.0].map(Some)
+        );
+        assert_eq!([0.0, -1.0, f64::NAN].map(|value| axis.place(value)), [None; 3]);
+        let unlimited = PlotAxis::linear("");
+        assert_eq!(
+            [f64::INFINITY, f64::MAX, f64::NAN].map(|value| unlimited.place(value)),
+            [None; 3]
+        );
+    }
+}

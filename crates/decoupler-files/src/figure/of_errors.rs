@@ -1,0 +1,199 @@
+//! Distribution of the errors of nodes, or of a target of a recording.
+
+use ndarray::Array2;
+
+use super::{
+    axis::PlotAxis,
+    look::{Hue, Key, LineStyle, Look},
+    plot::{LineAt, Plot, PlotPoint, ReferenceLine, Series},
+    plot_figure::PlotFigure,
+};
+use decoupler_core::{dataset::Dataset, evaluation::Channel};
+
+const BINS: usize = 41;
+
+/// Largest number of samples of a recording looked at in a figure; of a larger test set, evenly spaced ones.
+const MOST_PAIRS: usize = 20_000;
+
+/// Every so many samples are looked at.
+fn stride(test: &Dataset) -> usize {
+    test.samples().div_ceil(MOST_PAIRS).max(1)
+}
+
+/// Returns actual and decoded values of a target, in its unit. `answers` has the shape of the targets of `test`.
+pub fn target_pairs(test: &Dataset, answers: &Array2<f64>, target: usize) -> Vec<(f64, f64)> {
+    let actual = test.targets();
+    (0..test.samples())
+        .step_by(stride(test))
+        .map(|sample| (actual[[sample, target]], answers[[sample, target]]))
+        .collect()
+}
+
+/// Returns the sample that one of [`target_pairs`] belongs to; `None` beyond the last.
+pub fn pair_sample(test: &Dataset, pair: usize) -> Option<usize> {
+    Some(pair * stride(test)).filter(|&sample| sample < test.samples())
+}
+
+/// Bins of a histogram of errors, symmetric about 0: as many on either side of the middle one, which holds no error.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ErrorBins {
+    /// In the unit of the values.
+    width: f64,
+}
+
+impl ErrorBins {
+    /// Returns the bins that hold all finite errors of these pairs of actual and decoded values.
+    pub fn new(pairs: &[(f64, f64)]) -> Self {
+        let errors = pairs.iter().map(|(actual, decoded)| (decoded - actual).abs());
+        let largest = errors.filter(|error| error.is_finite()).fold(0.0, f64::max);
+        Self {
+            // Without any error every bin is as good.
+            width: if largest > 0.0 { largest } else { 1.0 } / (BINS / 2) as f64,
+        }
+    }
+
+    /// Number of bins.
+    pub const COUNT: usize = BINS;
+
+    /// Returns the bin of an error; `None` if it is not a number or beyond them.
+    pub fn bin(&self, error: f64) -> Option<usize> {
+        let bin = (error / self.width).round() + (BINS / 2) as f64;
+        (0.0..BINS as f64).contains(&bin).then_some(bin as usize)
+    }
+
+    /// Returns the errors that a bin holds, in the unit of the values.
+    pub fn range(&self, bin: usize) -> [f64; 2] {
+        [-0.5, 0.5].map(|half| self.width * (bin as f64 - (BINS / 2) as f64 + half))
+    }
+
+    /// Returns the pairs in a bin, those with the largest error first.
+    pub fn pairs_in(&self, bin: usize, pairs: &[(f64, f64)]) -> Vec<usize> {
+        let error = |pair: usize| pairs[pair].1 - pairs[pair].0;
+        let mut found: Vec<usize> = (0..pairs.len())
+            .filter(|&pair| self.bin(error(pair)) == Some(bin))
+            .collect();
+        found.sort_by(|&one, &other| error(other).abs().total_cmp(&error(one).abs()));
+        found
+    }
+
+    fn counts(&self, pairs: &[(f64, f64)]) -> [usize; BINS] {
+        let mut counts = [0; BINS];
+        let bins = pairs.iter().filter_map(|(actual, decoded)| self.bin(decoded - actual));
+        bins.for_each(|bin| counts[bin] += 1);
+        counts
+    }
+}
+
+/// Distribution of the errors of z (decoupled − actual) of nodes, in [`ErrorBins`]; the bar `chosen` is highlighted.
+pub fn error_histogram_figure(pairs_mm: &[(f64, f64)], chosen: Option<usize>) -> PlotFigure {
+    histogram(pairs_mm, chosen, "error of z (mm), decoupled − actual", "nodes")
+}
+
+/// Distribution of the errors of a target (decoded − actual), in [`ErrorBins`]; the bar `chosen` is highlighted.
+pub fn target_histogram_figure(pairs: &[(f64, f64)], chosen: Option<usize>, target: &Channel) -> PlotFigure {
+    let axis = format!("error of {}, decoded − actual", target.title());
+    histogram(pairs, chosen, &axis, "samples")
+}
+
+/// The histogram of so many `counted`.
+fn histogram(pairs: &[(f64, f64)], chosen: Option<usize>, axis: &str, counted: &str) -> PlotFigure {
+    let bins = ErrorBins::new(pairs);
+    let counts = bins.counts(pairs);
+    let bars = |name: &str, hue: Hue, is_shown: &dyn Fn(usize) -> bool| Series {
+        bar_width: Some(0.92 * bins.width),
+        points: (0..BINS)
+            .filter(|&bin| is_shown(bin))
+            .map(|bin| PlotPoint {
+                item: Some(bin),
+                ..PlotPoint::from([bins.width * (bin as f64 - (BINS / 2) as f64), counts[bin] as f64])
+            })
+            .collect(),
+        ..Series::new(name, Look::area(hue), [])
+    };
+    let mut series = vec![bars(counted, Hue::Blue, &|bin| Some(bin) != chosen)];
+    if let Some(chosen) = chosen {
+        series.push(bars(&format!("chosen {counted}"), Hue::Orange, &|bin| bin == chosen));
+    }
+    let plot = Plot::new(
+        PlotAxis::linear(axis),
+        PlotAxis::linear(format!("{counted} of the test set")).including([0.0]),
+        series,
+    );
+    let no_error = ReferenceLine::new("no error", LineAt::X(0.0), Hue::Grey, LineStyle::Dashed);
+    PlotFigure {
+        keys: vec![Key::new("no error", Look::line(no_error.hue, no_error.style))],
+        plots: vec![Plot {
+            lines: vec![no_error],
+            ..plot
+        }],
+        notes: Vec::new(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_finite_error_is_counted_once_and_zero_stands_in_the_middle() {
+        let pairs = [0.0, 0.0, 1.0, -1.0, 0.5, f64::NAN].map(|error| (4.0, 4.0 + error));
+        let bins = ErrorBins::new(&pairs);
+        let counts = bins.counts(&pairs);
+        assert_eq!(counts.iter().sum::<usize>(), 5);
+        assert_eq!((counts[0], counts[BINS / 2], counts[BINS - 1]), (1, 2, 1));
+        assert!((bins.width - 0.05).abs() < 1e-15);
+        assert_eq!(ErrorBins::new(&[]).counts(&[]), [0; BINS]);
+        assert_eq!(ErrorBins::new(&[(4.0, 4.0); 3]).counts(&[(4.0, 4.0); 3])[BINS / 2], 3);
+    }
+
+    #[test]
+    fn a_bar_holds_the_nodes_whose_errors_it_spans() {
+        let pairs: Vec<(f64, f64)> = (0..200).map(|i| (4.0, 4.0 + (f64::from(i) * 0.731).sin())).collect();
+        let bins = ErrorBins::new(&pairs);
+        let mut held = 0;
+        for bin in 0..ErrorBins::COUNT {
+            let [low, high] = bins.range(bin);
+            let found = bins.pairs_in(bin, &pairs);
+            held += found.len();
+            let errors: Vec<f64> = found.iter().map(|&pair| pairs[pair].1 - pairs[pair].0).collect();
+            assert!(
+                errors.iter().all(|error| (low..=high).contains(error)),
+                "{low} to {high}: {errors:?}"
+            );
+            assert!(
+                errors.windows(2).all(|pair| pair[0].abs() >= pair[1].abs()),
+                "{errors:?}"
+            );
+        }
+        assert_eq!(held, pairs.len());
+        let figure = error_histogram_figure(&pairs, Some(3));
+        let bars = figure.plots[0]
+            .series
+            .iter()
+            .map(|series| series.points.len())
+            .collect::<Vec<_>>();
+        assert_eq!(bars, [ErrorBins::COUNT - 1, 1]);
+    }
+
+    #[test]
+    fn the_histogram_of_a_target_leads_back_to_its_samples() {
+        const SAMPLES: usize = 50_000;
+        let actual = Array2::from_shape_fn((SAMPLES, 2), |(sample, target)| (sample + target) as f64);
+        let test = Dataset::new(actual.clone(), actual.clone(), None, (0..SAMPLES).collect()).unwrap();
+        let mut answers = actual;
+        answers[[30_000, 1]] += 2.0;
+        let pairs = target_pairs(&test, &answers, 1);
+        assert!(pairs.len() <= MOST_PAIRS, "{}", pairs.len());
+        let off = pairs.iter().position(|(actual, decoded)| actual != decoded).unwrap();
+        assert_eq!(pair_sample(&test, off), Some(30_000));
+        assert_eq!(pair_sample(&test, pairs.len()), None);
+        let force = Channel {
+            name: "force".to_owned(),
+            unit: Some("N".to_owned()),
+        };
+        let figure = target_histogram_figure(&pairs, ErrorBins::new(&pairs).bin(2.0), &force);
+        let plot = &figure.plots[0];
+        assert_eq!(plot.x.name, "error of force (N), decoded − actual");
+        assert_eq!((plot.series[1].points[0].x, plot.series[1].points[0].y), (2.0, 1.0));
+    }
+}

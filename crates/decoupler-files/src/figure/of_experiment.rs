@@ -1,0 +1,389 @@
+//! The figure of an experiment.
+
+use ndarray::Array2;
+
+use super::{
+    axis::{PlotAxis, TickRule},
+    colour_map::SequentialMap,
+    heat_map::HeatMap,
+    look::{Hue, Key, LineStyle, Look, Marker},
+    plot::{LineAt, Plot, PlotPoint, ReferenceLine, Series, Span},
+    plot_figure::PlotFigure,
+};
+use crate::figure::Figure;
+use decoupler_core::{
+    evaluation::{
+        TestErrors,
+        experiments::{
+            Axis, CellResults, CellSummary, Experiment, ExperimentResults, Figure as Measured, SummaryErrors, Trial,
+        },
+    },
+    network::HiddenSuggestions,
+    text::format_percent,
+};
+
+/// The results so far of an experiment: a heat map of the median error over two axes, the errors of every repeat of a
+/// cross-validation (the paper's Fig. 5), or else the error along the axis next to the published one, with R² along the axis
+/// for a recording.
+pub fn experiment_figure(results: &ExperimentResults) -> Figure {
+    let summaries = results.summaries();
+    if let Some(rows) = &results.experiment.second_axis {
+        heat_map(results, &summaries, rows).into()
+    } else if results.experiment.cross_validation.is_some() {
+        repeats(results, &summaries).into()
+    } else {
+        along_the_axis(results, &summaries).into()
+    }
+}
+
+/// Name of the error in percent by which cells are ranked.
+fn error_name(results: &ExperimentResults) -> &'static str {
+    match results.experiment.recording {
+        None => "Z error",
+        Some(_) => "mean absolute error",
+    }
+}
+
+/// Name of the axis of that error.
+fn error_axis(results: &ExperimentResults) -> &'static str {
+    match results.experiment.recording {
+        None => "Z error (%)",
+        Some(_) => "mean absolute error (% of range)",
+    }
+}
+
+fn labels(axis: &Axis) -> Vec<String> {
+    (0..axis.len()).map(|index| axis.label(index)).collect()
+}
+
+fn heat_map(results: &ExperimentResults, summaries: &[CellSummary], rows: &Axis) -> HeatMap {
+    let columns = &results.experiment.axis;
+    let shape = [rows.len(), columns.len()];
+    let mut values = Array2::from_elem(shape, f64::NAN);
+    let mut notes = Array2::from_elem(shape, String::new());
+    for (cell, summary) in results.cells.iter().zip(summaries) {
+        let at = [cell.cell.row, cell.cell.column];
+        let Measured { median, min, max, .. } = summary.percent;
+        values[at] = median.unwrap_or(f64::NAN);
+        let name = results.cell_labels(cell).join(", ");
+        notes[at] = format!("{name}: median {} {}", error_name(results), format_percent(median));
+        if let Some((least, largest)) = min.zip(max) {
+            notes[at] += &format!("\n{} to {}", format_percent(least), format_percent(largest));
+        }
+    }
+    HeatMap {
+        colours: SequentialMap::default(),
+        x_name: columns.name().to_owned(),
+        y_name: rows.name().to_owned(),
+        columns: labels(columns),
+        rows: labels(rows),
+        values,
+        notes,
+        value_axis: PlotAxis::logarithmic(format!("median {}", error_axis(results))),
+    }
+}
+
+/// Position of a cell on the axis: the value itself, or its index in the list.
+fn position(axis: &Axis, index: usize, cell: &CellSummary) -> f64 {
+    match axis {
+        Axis::Hidden(_) => cell.hidden as f64,
+        _ => index as f64,
+    }
+}
+
+fn along_the_axis(results: &ExperimentResults, summaries: &[CellSummary]) -> PlotFigure {
+    let axis = &results.experiment.axis;
+    let is_number = matches!(axis, Axis::Hidden(_));
+    let mut cells: Vec<(f64, &CellSummary)> = summaries
+        .iter()
+        .enumerate()
+        .map(|(index, cell)| (position(axis, index, cell), cell))
+        .collect();
+    cells.sort_by(|one, other| one.0.total_cmp(&other.0));
+    let points = |value: fn(&CellSummary) -> Option<f64>| {
+        let points = cells.iter().filter_map(move |(x, cell)| Some([*x, value(cell)?]));
+        points.collect::<Vec<_>>()
+    };
+    // Values that are no numbers have no line between them.
+    let joined = |look: Look| if is_number { look.joined() } else { look };
+    let reference = |hue, marker| match is_number {
+        true => Look::line(hue, LineStyle::Dashed),
+        false => Look::marker(hue, marker),
+    };
+    let ours = cells.iter().filter_map(|(x, cell)| {
+        let Measured { median, min, max, .. } = cell.percent;
+        Some(PlotPoint {
+            bar: min.zip(max).map(|(least, largest)| [least, largest]),
+            ..PlotPoint::from([*x, median?])
+        })
+    });
+    let bound = if is_number {
+        points(|cell| cell.bound_percent)
+    } else {
+        Vec::new()
+    };
+    let published = Look {
+        line: is_number.then_some(LineStyle::Fine),
+        ..Look::marker(Hue::Ink, Marker::Square)
+    };
+    let mut series = vec![
+        Series::new(
+            match results.experiment.recording {
+                None => "linear map",
+                Some(_) => "ridge",
+            },
+            reference(Hue::Grey, Marker::Ring),
+            points(|cell| cell.linear_percent),
+        ),
+        Series::new("bound of the hidden nodes", reference(Hue::Green, Marker::Ring), bound),
+        Series::new("published", published, points(|cell| cell.percent.published)),
+        Series {
+            points: ours.collect(),
+            ..Series::new(
+                "ours: median, smallest to largest",
+                joined(Look::marker(Hue::Blue, Marker::Disc)),
+                [],
+            )
+        },
+    ];
+    series.retain(|series| !series.points.is_empty());
+    let x = PlotAxis::linear(axis.name());
+    let x = match is_number {
+        true => x.ticked(TickRule::Whole),
+        false => x
+            .ticked(TickRule::Names(labels(axis)))
+            .including([-0.5, axis.len() as f64 - 0.5]),
+    };
+    let keys = series
+        .iter()
+        .rev()
+        .map(|series| Key::new(&series.name, series.look))
+        .collect();
+    let r2 = r2_plot(x.clone(), &cells, joined(Look::marker(Hue::Blue, Marker::Disc)));
+    let mut plot = Plot::new(x, PlotAxis::linear(error_axis(results)).including([0.0, 1.0]), series);
+    if let Some(problem) = results.problem.as_ref().filter(|_| is_number) {
+        // The suggestions of Eq. (12) and (13).
+        let suggested = HiddenSuggestions::new(problem.inputs.len(), problem.targets.len());
+        let (fewest, most) = (
+            *suggested.square_root.start() as f64,
+            *suggested.square_root.end() as f64,
+        );
+        let (hue, style) = (Hue::Orange, LineStyle::Solid);
+        plot.spans.push(Span {
+            name: "Eq. (12)".to_owned(),
+            hue,
+            range: fewest..=most,
+        });
+        let at = LineAt::X(suggested.logarithm as f64);
+        plot.lines.push(ReferenceLine {
+            label: Some("Eq. (13)".to_owned()),
+            ..ReferenceLine::new("Eq. (13)", at, hue, style)
+        });
+    }
+    PlotFigure {
+        plots: std::iter::once(plot).chain(r2).collect(),
+        keys,
+        notes: Vec::new(),
+    }
+}
+
+/// R² of the networks along the axis; `None` for the nodes of an array.
+fn r2_plot(x: PlotAxis, cells: &[(f64, &CellSummary)], look: Look) -> Option<Plot> {
+    let points = cells.iter().map(|(x, cell)| match &cell.errors {
+        SummaryErrors::Nodes { .. } => None,
+        SummaryErrors::Targets { r2 } => Some(r2.median.map(|median| PlotPoint {
+            bar: r2.min.zip(r2.max).map(|(least, largest)| [least, largest]),
+            ..PlotPoint::from([*x, median])
+        })),
+    });
+    let points: Vec<_> = points.collect::<Option<_>>()?;
+    let series = Series {
+        points: points.into_iter().flatten().collect(),
+        ..Series::new("R²", look, [])
+    };
+    Some(Plot::new(x, PlotAxis::linear("R²").including([1.0]), vec![series]))
+}
+
+type PublishedError = fn(&CellSummary) -> Option<f64>;
+type TrialError = fn(&TestErrors) -> Option<f64>;
+
+/// The errors of every trial, one plot each for Z, X and Y.
+fn repeats(results: &ExperimentResults, summaries: &[CellSummary]) -> PlotFigure {
+    const HUES: [Hue; 4] = [Hue::Blue, Hue::Orange, Hue::Green, Hue::Grey];
+    let experiment = &results.experiment;
+    let axis = &experiment.axis;
+    let linear = |name: &str| PlotAxis::linear(name).including([0.0]);
+    let errors: [(PlotAxis, PublishedError, TrialError); 3] = [
+        (
+            linear("Z error (%)"),
+            |cell| cell.percent.published,
+            TestErrors::percent,
+        ),
+        (
+            linear("X error (%)"),
+            |cell| node_figures(cell)[0]?.published,
+            |errors| errors.nodes()?.x_percent,
+        ),
+        // Y is constant, so its error is of the size of rounding for some and not for others.
+        (
+            PlotAxis::logarithmic("Y error (%)"),
+            |cell| node_figures(cell)[1]?.published,
+            |errors| errors.nodes()?.y_percent,
+        ),
+    ];
+    let trials = results.cells.iter().map(|cell| cell.expected).max().unwrap_or(1);
+    let names = labels(axis).into_iter().map(|label| format!("{label} {}", axis.name()));
+    let cells: Vec<(String, Hue)> = names.zip(HUES.into_iter().cycle()).collect();
+    let plots = errors.map(|(y, published, measured)| {
+        let x = PlotAxis::linear(repeat_name(results)).including([0.5, trials as f64 + 0.5]);
+        let of_cells = || results.cells.iter().zip(summaries).zip(&cells);
+        let series = of_cells().map(|((cell, _), (name, hue))| {
+            let look = Look::marker(*hue, Marker::Disc);
+            Series::new(name, look, trial_points(experiment, cell, measured))
+        });
+        let mut plot = Plot::new(x.ticked(TickRule::Whole), y, series.collect());
+        let lines = of_cells().filter_map(|((_, summary), (name, hue))| {
+            let at = LineAt::Y(published(summary)?);
+            Some(ReferenceLine::new(
+                format!("{name}, published"),
+                at,
+                *hue,
+                LineStyle::Dashed,
+            ))
+        });
+        plot.lines = lines.collect();
+        plot
+    });
+    let keys = cells
+        .iter()
+        .map(|(name, hue)| Key::new(name, Look::marker(*hue, Marker::Disc)));
+    let published = Key::new("published", Look::line(Hue::Ink, LineStyle::Dashed));
+    let is_published = plots.iter().any(|plot| !plot.lines.is_empty());
+    let keys = keys.chain(is_published.then_some(published)).collect();
+    let is_zero = |cell: &CellSummary| node_figures(cell)[1].is_some_and(|y| y.median == Some(0.0));
+    let note = "Y is constant: its error is 0 and lies below the axis.";
+    PlotFigure {
+        plots: plots.into(),
+        keys,
+        notes: summaries
+            .iter()
+            .any(is_zero)
+            .then(|| note.to_owned())
+            .into_iter()
+            .collect(),
+    }
+}
+
+/// An error of each trial of a cell against its number, from 1 and counted through all seeds: Fig. 5.
+fn trial_points(experiment: &Experiment, cell: &CellResults, error: TrialError) -> Vec<[f64; 2]> {
+    let repeats = experiment.cross_validation.map_or(1, |validation| validation.repeats);
+    let number = |trial: &Trial| {
+        let seeds_before = trial.seed.0.wrapping_sub(cell.cell.settings.seed.0) as f64;
+        seeds_before * repeats as f64 + trial.repeat as f64 + 1.0
+    };
+    let points = cell.trials.iter();
+    points
+        .filter_map(|trial| Some([number(trial), error(&trial.errors)?]))
+        .collect()
+}
+
+/// Errors in x and y; `None` for a recording.
+fn node_figures(cell: &CellSummary) -> [Option<&Measured>; 2] {
+    match &cell.errors {
+        SummaryErrors::Nodes {
+            x_percent, y_percent, ..
+        } => [Some(x_percent), Some(y_percent)],
+        SummaryErrors::Targets { .. } => [None, None],
+    }
+}
+
+/// Name of what the trials of a cross-validation are counted by.
+fn repeat_name(results: &ExperimentResults) -> &'static str {
+    match results.experiment.seeds {
+        1 => "repeat",
+        _ => "trial",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::num::NonZero;
+
+    use super::*;
+    use decoupler_core::{
+        dataset::{FoldUnit, Seed},
+        evaluation::{
+            CrossValidation,
+            experiments::{Finished, PaperTable, TrialSamples, run_experiments},
+        },
+    };
+
+    #[test]
+    fn trials_keep_their_numbers_in_whichever_order_they_finish() {
+        let mut experiment = PaperTable::CrossValidation.experiment();
+        experiment.base.training.stopping.epochs = 1;
+        experiment.base.hidden = 1;
+        experiment.axis = Axis::Samples(vec![40]);
+        (experiment.seeds, experiment.base.seed) = (2, Seed(7));
+        experiment.cross_validation = Some(CrossValidation {
+            folds: 2,
+            repeats: 3,
+            unit: FoldUnit::Sample,
+        });
+        let mut results = ExperimentResults::new(experiment.clone());
+        let mut finished = Vec::new();
+        let keep = |trial: Finished| finished.push(trial);
+        let one = NonZero::<usize>::MIN;
+        run_experiments(
+            std::slice::from_ref(&experiment),
+            &TrialSamples::Drawn,
+            one,
+            || false,
+            keep,
+        )
+        .unwrap();
+        // The fourth trial is the second seed's first.
+        for trial in finished.into_iter().rev().take(3) {
+            results.record(trial.cell, trial.outcome);
+        }
+        let points = trial_points(&experiment, &results.cells[0], TestErrors::percent);
+        assert_eq!(points.iter().map(|point| point[0]).collect::<Vec<_>>(), [4.0, 5.0, 6.0]);
+    }
+
+    fn plots_of(table: PaperTable) -> PlotFigure {
+        match experiment_figure(&ExperimentResults::new(table.experiment())) {
+            Figure::Plots(figure) => figure,
+            _ => panic!("a table is no heat map"),
+        }
+    }
+
+    #[test]
+    fn the_published_figures_stand_before_anything_is_run() {
+        let keys = |figure: &PlotFigure| figure.keys.iter().map(|key| key.name.clone()).collect::<Vec<_>>();
+        let hidden = plots_of(PaperTable::HiddenNodes);
+        assert_eq!(keys(&hidden), ["published"], "nothing is known of the rest");
+        assert_eq!(hidden.plots[0].series[0].points[3], PlotPoint::from([12.0, 2.28]));
+        let repeats = plots_of(PaperTable::CrossValidation);
+        assert_eq!(keys(&repeats), ["1000 samples", "100 samples", "published"]);
+        let published = |plot: &Plot| plot.lines.iter().map(|line| line.at).collect::<Vec<_>>();
+        assert_eq!(published(&repeats.plots[0]), [LineAt::Y(2.01), LineAt::Y(3.35)]);
+        let arrays = plots_of(PaperTable::ArrayScales);
+        assert!(matches!(&arrays.plots[0].x.ticks, TickRule::Names(names) if names[1] == "10×8_4×24"));
+    }
+
+    #[test]
+    fn a_sweep_is_a_heat_map_with_rows_and_columns_named() {
+        let mut experiment = PaperTable::ArrayScales.experiment();
+        experiment.second_axis = Some(Axis::Hidden(vec![7, 9]));
+        let Figure::HeatMap(map) = experiment_figure(&ExperimentResults::new(experiment)) else {
+            panic!("two axes make a heat map");
+        };
+        assert_eq!(map.values.dim(), (2, 3));
+        assert!(map.values.iter().all(|value| value.is_nan()));
+        assert_eq!(
+            (map.rows, map.columns[0].as_str()),
+            (vec!["7".to_owned(), "9".to_owned()], "10×6_3×18")
+        );
+        assert_eq!(map.notes[[1, 2]], "10×10_5×30, 9: median Z error –");
+    }
+}

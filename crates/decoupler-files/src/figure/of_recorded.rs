@@ -1,0 +1,155 @@
+//! Figures of targets of any meaning, decoded from recorded readings.
+
+use std::ops::RangeInclusive;
+
+use ndarray::{Array2, ArrayView2};
+
+use super::{
+    axis::PlotAxis,
+    colour_map::SequentialMap,
+    heat_map::HeatMap,
+    ticks::{step_for, tick_text},
+};
+use decoupler_core::text::{counted, format_number};
+
+/// Largest number of cells along an axis of a map, but for those that round limits add.
+const CELLS: usize = 16;
+
+/// Error of a position over the position: root mean square of the distance between the decoded and the actual one, for
+/// the samples in each cell. `targets` and `answers` are samples × 2; `names` are those of both axes, in `unit`.
+///
+/// `None` if a position does not vary, or a value is not finite.
+pub fn position_error_map(
+    targets: ArrayView2<'_, f64>,
+    answers: ArrayView2<'_, f64>,
+    names: [&str; 2],
+    unit: Option<&str>,
+) -> Option<HeatMap> {
+    if targets.iter().chain(&answers).any(|value| !value.is_finite()) {
+        return None;
+    }
+    let [across, up] = [0, 1].map(|axis| Cells::of(targets.column(axis).iter().copied()));
+    let (across, up) = (across?, up?);
+    let (mut squares, mut counts) = (
+        Array2::<f64>::zeros((up.count, across.count)),
+        Array2::<usize>::zeros((up.count, across.count)),
+    );
+    for (target, answer) in targets.rows().into_iter().zip(answers.rows()) {
+        // The first row is at the top.
+        let cell = [up.count - 1 - up.place(target[1]), across.place(target[0])];
+        squares[cell] += (answer[0] - target[0]).powi(2) + (answer[1] - target[1]).powi(2);
+        counts[cell] += 1;
+    }
+    let values = Array2::from_shape_fn(squares.dim(), |cell| match counts[cell] {
+        0 => f64::NAN,
+        count => (squares[cell] / count as f64).sqrt(),
+    });
+    let with_unit = |text: String| unit.map_or(text.clone(), |unit| format!("{text} {unit}"));
+    let notes = Array2::from_shape_fn(values.dim(), |(row, column)| {
+        let of = |name: &str, range: RangeInclusive<f64>| {
+            let width = range.end() - range.start();
+            let ends = [range.start(), range.end()]
+                .map(|end| tick_text(*end, width))
+                .join(" to ");
+            format!("{name} {}", with_unit(ends))
+        };
+        let place = format!(
+            "{}, {}",
+            of(names[0], across.range(column)),
+            of(names[1], up.range(up.count - 1 - row))
+        );
+        match counts[[row, column]] {
+            0 => format!("{place}: no test sample"),
+            count => format!(
+                "{place}: error {} over {}",
+                with_unit(format_number(values[[row, column]])),
+                counted(count, "test sample")
+            ),
+        }
+    });
+    let title = |name: &str| unit.map_or(name.to_owned(), |unit| format!("{name} ({unit})"));
+    Some(HeatMap {
+        x_name: title(names[0]),
+        y_name: title(names[1]),
+        columns: (0..across.count).map(|cell| across.centre_text(cell)).collect(),
+        rows: (0..up.count).rev().map(|cell| up.centre_text(cell)).collect(),
+        values,
+        notes,
+        value_axis: PlotAxis::linear(title("error in both targets")).including([0.0]),
+        colours: SequentialMap::default(),
+    })
+}
+
+/// Cells of equal width along an axis, with round limits.
+struct Cells {
+    first: f64,
+    width: f64,
+    count: usize,
+}
+
+impl Cells {
+    /// `None` if the values do not vary, or too far for their range to be a number.
+    fn of(values: impl Iterator<Item = f64>) -> Option<Self> {
+        let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| {
+            (low.min(value), high.max(value))
+        });
+        if low >= high || !(high - low).is_finite() {
+            return None;
+        }
+        let width = step_for(&(low..=high), CELLS);
+        let first = (low / width).floor() * width;
+        let count = (((high - first) / width) as usize + 1).min(CELLS + 2);
+        Some(Self { first, width, count })
+    }
+
+    fn place(&self, value: f64) -> usize {
+        (((value - self.first) / self.width) as usize).min(self.count - 1)
+    }
+
+    fn range(&self, cell: usize) -> RangeInclusive<f64> {
+        let low = self.first + self.width * cell as f64;
+        low..=low + self.width
+    }
+
+    fn centre_text(&self, cell: usize) -> String {
+        tick_text(self.first + self.width * (cell as f64 + 0.5), 0.1 * self.width)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use ndarray::array;
+
+    use super::*;
+
+    #[test]
+    fn a_cell_has_the_root_mean_square_distance_of_its_samples() {
+        // Cells are 1 wide; the first two samples share one, 3–4–5 triangles give the distances.
+        let targets = array![[0.2, 0.2], [0.8, 0.8], [11.9, 11.9]];
+        let answers = array![[3.2, 4.2], [0.8, 0.8], [11.9, 10.9]];
+        let map = position_error_map(targets.view(), answers.view(), ["x", "y"], Some("mm")).unwrap();
+        assert_eq!(map.values.dim(), (12, 12));
+        assert!(
+            (map.values[[11, 0]] - 12.5_f64.sqrt()).abs() < 1e-12,
+            "below on the left"
+        );
+        assert!((map.values[[0, 11]] - 1.0).abs() < 1e-12, "above on the right");
+        assert_eq!(map.values.iter().filter(|value| value.is_nan()).count(), 142);
+        assert_eq!(
+            map.notes[[11, 0]],
+            "x 0 to 1 mm, y 0 to 1 mm: error 3.54 mm over 2 test samples"
+        );
+        assert_eq!(map.notes[[0, 0]], "x 0 to 1 mm, y 11 to 12 mm: no test sample");
+        assert_eq!((map.rows[0].as_str(), map.columns[0].as_str()), ("11.5", "0.5"));
+    }
+
+    #[test]
+    fn what_cannot_be_mapped_has_no_map() {
+        let varying = array![[0.0, 0.0], [1.0, 1.0]];
+        for targets in [array![[1.0, 0.0], [1.0, 2.0]], array![[0.0, f64::NAN], [1.0, 2.0]]] {
+            assert!(position_error_map(targets.view(), varying.view(), ["x", "y"], None).is_none());
+        }
+        let huge = array![[-1e308, 0.0], [1e308, 1.0]];
+        assert!(position_error_map(huge.view(), huge.view(), ["x", "y"], None).is_none());
+    }
+}

@@ -1,0 +1,205 @@
+//! The figure of speed against accuracy.
+
+use super::{
+    axis::PlotAxis,
+    look::{Hue, Key, LineStyle, Look, Marker},
+    plot::{LineAt, Plot, PlotPoint, ReferenceLine, Series},
+    plot_figure::PlotFigure,
+    trade_words::{frame_time, point_facts, point_label, point_name},
+};
+use decoupler_core::{
+    decoupling::{DecoderKind, Precision},
+    evaluation::{Preset, TradeOffCost, TradeOffLevel, TradeOffLimits, TradeOffPoint},
+    text::format_percent,
+};
+
+const FRONT: Look = Look {
+    hue: Hue::Grey,
+    line: Some(LineStyle::Solid),
+    marker: None,
+};
+const REFERENCE: Look = Look {
+    hue: Hue::Ink,
+    line: Some(LineStyle::Dashed),
+    marker: None,
+};
+const LIMIT: Look = Look {
+    hue: Hue::Blue,
+    line: Some(LineStyle::Dotted),
+    marker: None,
+};
+const ANSWER: Look = Look {
+    hue: Hue::Blue,
+    line: None,
+    marker: Some(Marker::Halo),
+};
+
+/// The points at one level of noise, one plot for each cost: colours tell the decoder, discs and diamonds the preset,
+/// hollow marks 32 bits. With the Pareto front, whose points are named, the Bayesian reference, and the answers to the two
+/// questions with their limits.
+pub fn trade_off_figure(level: &TradeOffLevel, limits: &TradeOffLimits) -> PlotFigure {
+    let plots: Vec<Plot> = TradeOffCost::ALL.map(|cost| plot(level, limits, cost)).into();
+    let mut keys = Vec::new();
+    for kind in DecoderKind::ALL {
+        let is_there = level.points.iter().any(|point| point.report.kind == kind);
+        let look = Look::marker(kind.colour().into(), Marker::Disc);
+        keys.extend(is_there.then(|| Key::new(kind.name(Precision::Double), look)));
+    }
+    for preset in Preset::ALL {
+        let look = Look::marker(Hue::Ink, marker(Some(preset), Precision::Double));
+        let is_there = level.points.iter().any(|point| point.preset == Some(preset));
+        keys.extend(is_there.then(|| Key::new(format!("{preset} preset"), look)));
+    }
+    let mut points = level.points.iter();
+    if points.any(|point| point.report.precision == Precision::Single) {
+        keys.push(Key::new("hollow: 32 bits", Look::marker(Hue::Ink, Marker::Ring)));
+    }
+    let has = |look: Look| {
+        let mut series = plots.iter().flat_map(|plot| &plot.series);
+        let mut lines = plots.iter().flat_map(|plot| &plot.lines);
+        series.any(|series| series.look == look && !series.points.is_empty())
+            || lines.any(|line| (line.hue, Some(line.style)) == (look.hue, look.line))
+    };
+    let marks = [
+        ("Pareto front", FRONT),
+        ("Bayesian reference", REFERENCE),
+        ("limits asked for", LIMIT),
+    ];
+    keys.extend(
+        marks
+            .into_iter()
+            .filter(|(_, look)| has(*look))
+            .map(|(name, look)| Key::new(name, look)),
+    );
+    PlotFigure {
+        plots,
+        keys,
+        notes: Vec::new(),
+    }
+}
+
+fn marker(preset: Option<Preset>, precision: Precision) -> Marker {
+    match (preset, precision) {
+        (Some(Preset::Paper) | None, Precision::Double) => Marker::Disc,
+        (Some(Preset::Paper) | None, Precision::Single) => Marker::Ring,
+        (Some(Preset::Best), Precision::Double) => Marker::Diamond,
+        (Some(Preset::Best), Precision::Single) => Marker::HollowDiamond,
+    }
+}
+
+fn plot(level: &TradeOffLevel, limits: &TradeOffLimits, cost: TradeOffCost) -> Plot {
+    let at = |point: &TradeOffPoint| {
+        let (x, y) = cost.of(point);
+        [x, y]
+    };
+    let mut series = vec![Series::new("Pareto front", FRONT, front(level, cost))];
+    let is_on_front = level.front(cost);
+    for kind in DecoderKind::ALL {
+        for &precision in kind.precisions() {
+            for preset in Preset::ALL.into_iter().map(Some).chain([None]) {
+                let is_of = |(point, _): &(&TradeOffPoint, &bool)| {
+                    (point.report.kind, point.report.precision, point.preset) == (kind, precision, preset)
+                };
+                let points = level.points.iter().zip(&is_on_front).filter(is_of);
+                let points = points.map(|(point, is_on_front)| PlotPoint {
+                    note: Some(format!("{}\n{}", point_name(point), point_facts(point).join("\n"))),
+                    label: is_on_front.then(|| point_label(point)),
+                    ..PlotPoint::from(at(point))
+                });
+                let look = Look::marker(kind.colour().into(), marker(preset, precision));
+                let name = match preset {
+                    Some(preset) => format!("{}, {preset} preset", kind.name(precision)),
+                    None => kind.name(precision).to_owned(),
+                };
+                series.push(Series {
+                    points: points.collect(),
+                    ..Series::new(name, look, [])
+                });
+            }
+        }
+    }
+    let questions = [
+        format!("fastest under {}", format_percent(limits.percent)),
+        format!("most accurate under {}", frame_time(limits.microseconds)),
+    ];
+    for (answer, name) in level.answers(limits).into_iter().zip(questions) {
+        let Some(answer) = answer.and_then(|answer| level.points.get(answer)) else {
+            continue;
+        };
+        // The questions are about decoding.
+        let label = (cost == TradeOffCost::Decoding).then(|| name.clone());
+        let point = PlotPoint {
+            label,
+            ..PlotPoint::from(at(answer))
+        };
+        series.push(Series {
+            points: vec![point],
+            ..Series::new(name, ANSWER, [])
+        });
+    }
+    series.retain(|series| !series.points.is_empty());
+    let mut plot = Plot::new(
+        PlotAxis::logarithmic(cost.name()),
+        PlotAxis::logarithmic(if level.noise.is_some() {
+            "Z error (%)"
+        } else {
+            "mean absolute error (% of range)"
+        }),
+        series,
+    );
+    let reference = level.points.first().and_then(|point| point.reference);
+    let reference = reference.filter(|reference| !reference.is_rounding());
+    if let Some(percent) = reference.and_then(|reference| reference.z_percent) {
+        plot.lines
+            .push(line("Bayesian reference", LineAt::Y(percent), REFERENCE));
+    }
+    // The limits are of decoding, and shown where they lie among the points.
+    let places: Vec<[f64; 2]> = level
+        .points
+        .iter()
+        .map(at)
+        .filter(|[x, y]| plot.place(*x, *y).is_some())
+        .collect();
+    let is_among = |limit: f64, axis: usize| {
+        places.iter().any(|place| place[axis] <= limit) && places.iter().any(|place| place[axis] >= limit)
+    };
+    if cost == TradeOffCost::Decoding {
+        if is_among(limits.microseconds, 0) {
+            plot.lines
+                .push(line("longest time", LineAt::X(limits.microseconds), LIMIT));
+        }
+        if is_among(limits.percent, 1) {
+            plot.lines.push(line("largest error", LineAt::Y(limits.percent), LIMIT));
+        }
+    }
+    plot
+}
+
+fn line(name: &str, at: LineAt, look: Look) -> ReferenceLine {
+    ReferenceLine::new(name, at, look.hue, look.line.unwrap_or(LineStyle::Solid))
+}
+
+/// The points that no other beats, joined.
+fn front(level: &TradeOffLevel, cost: TradeOffCost) -> Vec<[f64; 2]> {
+    let chosen = level.points.iter().zip(level.front(cost));
+    steps(chosen.filter(|(_, is_chosen)| *is_chosen).map(|(point, _)| {
+        let (x, y) = cost.of(point);
+        [x, y]
+    }))
+}
+
+/// From point to point of a Pareto front, in steps: between them nothing better was measured.
+pub(super) fn steps(places: impl Iterator<Item = [f64; 2]>) -> Vec<[f64; 2]> {
+    let mut places: Vec<[f64; 2]> = places
+        .filter(|place| place.iter().all(|part| part.is_finite()))
+        .collect();
+    places.sort_by(|a, b| a[0].total_cmp(&b[0]));
+    let mut steps: Vec<[f64; 2]> = Vec::new();
+    for place in places {
+        if let Some(&[_, y]) = steps.last() {
+            steps.push([place[0], y]);
+        }
+        steps.push(place);
+    }
+    steps
+}

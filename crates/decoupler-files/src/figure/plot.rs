@@ -1,0 +1,258 @@
+use std::ops::RangeInclusive;
+
+use super::{
+    axis::PlotAxis,
+    look::{Hue, LineStyle, Look},
+};
+
+/// A plot of series of points: curves, scatter, bars.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Plot {
+    /// Across.
+    pub x: PlotAxis,
+    /// Up.
+    pub y: PlotAxis,
+    /// Marked stretches of the x axis, behind everything.
+    pub spans: Vec<Span>,
+    /// Reference lines, behind the series.
+    pub lines: Vec<ReferenceLine>,
+    /// Drawn in this order.
+    pub series: Vec<Series>,
+    /// Makes a unit as long across as up.
+    pub has_equal_scales: bool,
+}
+
+/// Points that belong together.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Series {
+    /// Name, shown with the values of a point.
+    pub name: String,
+    /// Appearance.
+    pub look: Look,
+    /// Width of a bar from 0 to each point, for histograms.
+    pub bar_width: Option<f64>,
+    /// In the order in which the line runs.
+    pub points: Vec<PlotPoint>,
+}
+
+/// A point of a series.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct PlotPoint {
+    /// Across.
+    pub x: f64,
+    /// Up.
+    pub y: f64,
+    /// Ends of its error bar.
+    pub bar: Option<[f64; 2]>,
+    /// Words about the point in place of its coordinates.
+    pub note: Option<String>,
+    /// Words beside it, where there is room.
+    pub label: Option<String>,
+    /// Number of what it stands for, by which other figures know it too: a node, a bar.
+    pub item: Option<usize>,
+}
+
+/// A marked stretch of the x axis.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Span {
+    /// Meaning.
+    pub name: String,
+    /// Colour of which it has a tint.
+    pub hue: Hue,
+    /// Its ends.
+    pub range: RangeInclusive<f64>,
+}
+
+/// Position of a reference line.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum LineAt {
+    /// Upright at this value of x.
+    X(f64),
+    /// Level at this value of y.
+    Y(f64),
+}
+
+/// A line across the whole plot.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ReferenceLine {
+    /// Meaning, shown under the pointer.
+    pub name: String,
+    /// Position.
+    pub at: LineAt,
+    /// Colour.
+    pub hue: Hue,
+    /// Style.
+    pub style: LineStyle,
+    /// Words at the upper end of an upright line.
+    pub label: Option<String>,
+}
+
+impl From<[f64; 2]> for PlotPoint {
+    fn from([x, y]: [f64; 2]) -> Self {
+        Self {
+            x,
+            y,
+            ..Self::default()
+        }
+    }
+}
+
+impl Series {
+    /// A series of plain points.
+    pub fn new(name: impl Into<String>, look: Look, points: impl IntoIterator<Item = [f64; 2]>) -> Self {
+        Self {
+            name: name.into(),
+            look,
+            bar_width: None,
+            points: points.into_iter().map(PlotPoint::from).collect(),
+        }
+    }
+}
+
+impl ReferenceLine {
+    /// A line without words of its own.
+    pub fn new(name: impl Into<String>, at: LineAt, hue: Hue, style: LineStyle) -> Self {
+        Self {
+            name: name.into(),
+            at,
+            hue,
+            style,
+            label: None,
+        }
+    }
+}
+
+impl Plot {
+    /// A plot of these series.
+    pub fn new(x: PlotAxis, y: PlotAxis, series: Vec<Series>) -> Self {
+        Self {
+            x,
+            y,
+            spans: Vec::new(),
+            lines: Vec::new(),
+            series,
+            has_equal_scales: false,
+        }
+    }
+
+    /// Returns the place of a point on both axes; `None` if one of them has none for it.
+    pub fn place(&self, x: f64, y: f64) -> Option<[f64; 2]> {
+        Some([self.x.place(x)?, self.y.place(y)?])
+    }
+
+    /// Returns true if words stand beside any point.
+    pub fn has_point_labels(&self) -> bool {
+        let mut points = self.series.iter().flat_map(|series| &series.points);
+        points.any(|point| point.label.is_some())
+    }
+
+    /// Returns the points of a series that have a place, with their places.
+    pub fn placed<'a>(&self, series: &'a Series) -> impl Iterator<Item = (&'a PlotPoint, [f64; 2])> {
+        let points = series.points.iter();
+        points.filter_map(|point| Some((point, self.place(point.x, point.y)?)))
+    }
+
+    /// Returns the places of the ends of an error bar. What a logarithmic axis has no place for lies below its lower end.
+    pub fn bar_ends(&self, ends: [f64; 2], y_range: &RangeInclusive<f64>) -> [f64; 2] {
+        ends.map(|end| self.y.place(end).unwrap_or(*y_range.start()))
+    }
+
+    /// Returns the ranges of places in view on both axes.
+    pub fn ranges(&self) -> [RangeInclusive<f64>; 2] {
+        let placed = || {
+            self.series
+                .iter()
+                .flat_map(|series| self.placed(series).map(move |point| (series, point)))
+        };
+        let lines = |is_x: bool| {
+            self.lines.iter().filter_map(move |line| match line.at {
+                LineAt::X(x) if is_x => Some(x),
+                LineAt::Y(y) if !is_x => Some(y),
+                _ => None,
+            })
+        };
+        let x_values = placed().flat_map(|(series, (point, _))| {
+            let half = 0.5 * series.bar_width.unwrap_or(0.0);
+            [point.x - half, point.x + half]
+        });
+        let spans = self
+            .spans
+            .iter()
+            .flat_map(|span| [*span.range.start(), *span.range.end()]);
+        let x_values = x_values.chain(spans).chain(lines(true));
+        let y_values = placed().flat_map(|(series, (point, _))| {
+            let foot = series.bar_width.map(|_| 0.0);
+            std::iter::once(point.y)
+                .chain(point.bar.into_iter().flatten())
+                .chain(foot)
+        });
+        let y_values = y_values.chain(lines(false));
+        let x = self.x.range(x_values.filter_map(|value| self.x.place(value)));
+        let y = self.y.range(y_values.filter_map(|value| self.y.place(value)));
+        if self.has_equal_scales {
+            let both = x.start().min(*y.start())..=x.end().max(*y.end());
+            return [both.clone(), both];
+        }
+        [x, y]
+    }
+
+    /// Returns the words about a point of a series.
+    pub fn words(&self, series: &Series, point: &PlotPoint) -> String {
+        if let Some(note) = &point.note {
+            return note.clone();
+        }
+        let (x, y) = (self.x.value_text(point.x), self.y.value_text(point.y));
+        let mut words = format!("{}\n{}: {x}\n{}: {y}", series.name, self.x.name, self.y.name);
+        if let Some([low, high]) = point.bar {
+            words += &format!(", {} to {}", self.y.value_text(low), self.y.value_text(high));
+        }
+        words
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn words_about_a_point_say_which_where_and_how_large() {
+        let look = Look::line(Hue::Blue, LineStyle::Solid);
+        let mut series = Series::new("test", look, [[12.0, 0.001_234]]);
+        let plot = Plot::new(
+            PlotAxis::linear("epoch"),
+            PlotAxis::logarithmic("error (%)"),
+            Vec::new(),
+        );
+        assert_eq!(
+            plot.words(&series, &series.points[0]),
+            "test\nepoch: 12\nerror (%): 0.00123"
+        );
+        series.points[0].bar = Some([0.001, 0.002]);
+        assert!(
+            plot.words(&series, &series.points[0])
+                .ends_with("0.00123, 0.00100 to 0.00200")
+        );
+        series.points[0].note = Some("the best".to_owned());
+        assert_eq!(plot.words(&series, &series.points[0]), "the best");
+    }
+
+    #[test]
+    fn everything_that_is_drawn_is_in_view() {
+        let look = Look::area(Hue::Blue);
+        let series = Series {
+            bar_width: Some(2.0),
+            ..Series::new("bars", look, [[1.0, 5.0]])
+        };
+        let mut plot = Plot::new(PlotAxis::linear(""), PlotAxis::linear(""), vec![series]);
+        plot.lines = vec![
+            ReferenceLine::new("x", LineAt::X(9.0), Hue::Grey, LineStyle::Dashed),
+            ReferenceLine::new("y", LineAt::Y(-3.0), Hue::Grey, LineStyle::Dashed),
+        ];
+        let [x, y] = plot.ranges();
+        assert!([0.0, 2.0, 9.0].iter().all(|value| x.contains(value)), "{x:?}");
+        assert!([0.0, 5.0, -3.0].iter().all(|value| y.contains(value)), "{y:?}");
+        plot.has_equal_scales = true;
+        let [x, y] = plot.ranges();
+        assert_eq!(x, y);
+    }
+}

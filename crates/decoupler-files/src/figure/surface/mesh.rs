@@ -1,0 +1,339 @@
+//! The height field as one mesh, painted from far to near so that what is near hides what is far.
+
+use std::ops::RangeInclusive;
+
+use glam::{DVec3, Vec2};
+
+use super::{
+    contour::cross_cell,
+    cut::cut_cell,
+    field::{CellPart, Field},
+    plateau::plateau_marks,
+    stage::Stage,
+    vertices::{Vertex, mixed, vertices},
+};
+use crate::figure::{
+    colour_map::{ColourMap, is_light},
+    ticks::{multiples, step_for},
+};
+
+const CONTOUR_LEVELS: usize = 10;
+const CONTOUR_OPACITY: f32 = 0.34;
+/// Opacity of the hatching and the rim of a plateau.
+const HATCH_OPACITY: f32 = 0.5;
+
+/// A piece of a contour line or of hatching, about one point wide.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ContourLine {
+    /// First end.
+    pub from: Vec2,
+    /// Second end.
+    pub to: Vec2,
+    /// Black on light colours, white on dark ones.
+    pub is_black: bool,
+    /// 1 hides what lies behind it.
+    pub opacity: f32,
+}
+
+/// The surface with its contour lines.
+#[derive(Clone, Debug, Default)]
+pub struct Mesh {
+    /// The grid points, `x points × y points`, followed by the corners of cells cut at the ends of the value axis.
+    pub vertices: Vec<Vertex>,
+    /// Number of grid points.
+    points: u32,
+    /// Corners of the pieces of cut cells, going round; a triangle has its last one twice.
+    pieces: Vec<[u32; 4]>,
+    /// Number of points along y.
+    across: usize,
+    /// Cells by their first corner, or as many more than the grid points as the piece's number, in the order of painting.
+    cells: Vec<u32>,
+    /// Contour lines in the order of painting.
+    lines: Vec<ContourLine>,
+    /// End of each strip of cells and of its lines.
+    strips: Vec<[usize; 2]>,
+    /// True if a part of the surface lies beyond the box and is drawn at its edge.
+    pub(super) has_plateau: bool,
+}
+
+impl Mesh {
+    /// The surface in the colours of `map`.
+    pub(super) fn new(field: &Field<'_>, stage: &Stage<'_>, map: &ColourMap) -> Self {
+        let (x_mm, y_mm) = (field.grid.x_mm(), field.grid.y_mm());
+        let mut mesh = Self {
+            vertices: vertices(field, stage, map),
+            across: y_mm.len(),
+            cells: Vec::with_capacity(x_mm.len() * y_mm.len()),
+            ..Self::default()
+        };
+        if mesh.vertices.is_empty() {
+            return mesh;
+        }
+        mesh.points = mesh.vertices.len() as u32;
+        let eye_mm = stage.eye_mm().unwrap_or(DVec3::INFINITY);
+        let rows = far_to_near(y_mm, eye_mm.y);
+        let levels = contour_levels(&field.range);
+        let is_black = |value: f64| is_light(map.at(field.share(value)));
+        let inks: Vec<bool> = levels.iter().map(|level| is_black(*level)).collect();
+        let mut lineless = Vec::new();
+        for ix in far_to_near(x_mm, eye_mm.x) {
+            let mut strip = Vec::with_capacity(rows.len());
+            for &iy in &rows {
+                match field.part(ix, iy) {
+                    CellPart::Nothing => continue,
+                    CellPart::Whole | CellPart::Plateau => mesh.cells.push(field.grid.index(ix, iy) as u32),
+                    CellPart::Cut => mesh.cut(ix, iy, field, stage),
+                }
+                strip.push((ix, iy));
+            }
+            // Lines lag one strip behind, or the next strip would cover half of their width.
+            mesh.hatch(&lineless, field, stage, is_black);
+            mesh.end_strip(&lineless, field, stage, (&levels, &inks));
+            lineless = strip;
+        }
+        mesh.hatch(&lineless, field, stage, is_black);
+        mesh.end_strip(&lineless, field, stage, (&levels, &inks));
+        mesh
+    }
+
+    /// Appends what the box leaves of a cell.
+    fn cut(&mut self, ix: usize, iy: usize, field: &Field<'_>, stage: &Stage<'_>) {
+        let of_cell = field.corners(ix, iy).map(|corner| self.vertices[corner]);
+        let (low, high) = (*field.shown().start(), *field.shown().end());
+        let keeps_plateau = field.keeps_plateau(ix, iy);
+        for polygon in cut_cell(field.corners_mm(ix, iy), low, high, keeps_plateau) {
+            let first = self.vertices.len() as u32;
+            self.vertices.extend(polygon.iter().map(|corner| Vertex {
+                at: stage.point(corner.place),
+                ..mixed(&of_cell, corner.shares)
+            }));
+            let last = polygon.len() as u32 - 1;
+            for second in (1..last).step_by(2) {
+                self.cells.push(self.points + self.pieces.len() as u32);
+                let others = [second, second + 1, (second + 2).min(last)];
+                let [b, c, d] = others.map(|corner| first + corner);
+                self.pieces.push([first, b, c, d]);
+            }
+        }
+    }
+
+    /// Appends the marks of what lies beyond the box in `cells`.
+    fn hatch(
+        &mut self,
+        cells: &[(usize, usize)],
+        field: &Field<'_>,
+        stage: &Stage<'_>,
+        is_black: impl Fn(f64) -> bool,
+    ) {
+        let is_beyond =
+            |cell: &&(usize, usize)| matches!(field.part(cell.0, cell.1), CellPart::Cut | CellPart::Plateau);
+        for &(ix, iy) in cells.iter().filter(is_beyond) {
+            plateau_marks(field, ix, iy, |ends| {
+                let [from, to] = ends.map(|place| stage.point(place));
+                self.has_plateau = true;
+                self.lines.push(ContourLine {
+                    from,
+                    to,
+                    is_black: is_black(ends[0].z),
+                    opacity: HATCH_OPACITY,
+                });
+            });
+        }
+    }
+
+    /// Appends the contour lines in `cells` and ends the strip.
+    fn end_strip(
+        &mut self,
+        cells: &[(usize, usize)],
+        field: &Field<'_>,
+        stage: &Stage<'_>,
+        (levels, inks): (&[f64], &[bool]),
+    ) {
+        for &(ix, iy) in cells {
+            let corners = field.corners(ix, iy);
+            let values = corners.map(|corner| field.values[corner]);
+            let (low, high) = values
+                .iter()
+                .fold((f64::MAX, f64::MIN), |(low, high), v| (low.min(*v), high.max(*v)));
+            if high <= low {
+                continue;
+            }
+            let [a, b, c, d] = corners.map(|corner| self.vertices[corner]);
+            let opacity = CONTOUR_OPACITY * a.opacity.min(c.opacity);
+            let is_cut = field.part(ix, iy) == CellPart::Cut;
+            let (places, corners_mm) = ([a.at, b.at, c.at, d.at], field.corners_mm(ix, iy));
+            // A cell that is cut has corners that are not seen where they are.
+            let point = |(a, b, part): (usize, usize, f32)| match is_cut {
+                true => stage.point(corners_mm[a].lerp(corners_mm[b], f64::from(part))),
+                false => places[a].lerp(places[b], part),
+            };
+            for (&level, &is_black) in levels.iter().zip(inks).filter(|(level, _)| (low..high).contains(level)) {
+                cross_cell(values, level, |ends| {
+                    let [from, to] = ends.map(point);
+                    self.lines.push(ContourLine {
+                        from,
+                        to,
+                        is_black,
+                        opacity,
+                    });
+                });
+            }
+        }
+        self.strips.push([self.cells.len(), self.lines.len()]);
+    }
+
+    /// Indices of the corners of a cell, going round it.
+    pub fn corners(&self, cell: u32) -> [usize; 4] {
+        if let Some(piece) = cell.checked_sub(self.points) {
+            return self.pieces[piece as usize].map(|corner| corner as usize);
+        }
+        let (a, b) = (cell as usize, cell as usize + self.across);
+        [a, b, b + 1, a + 1]
+    }
+
+    /// Cells and contour lines from far to near: each slice of cells is followed by the lines drawn after it.
+    pub fn strips(&self) -> impl Iterator<Item = (&[u32], &[ContourLine])> {
+        let starts = std::iter::once(&[0, 0]).chain(&self.strips);
+        starts
+            .zip(&self.strips)
+            .map(|(start, end)| (&self.cells[start[0]..end[0]], &self.lines[start[1]..end[1]]))
+    }
+
+    /// Number of cells and of contour lines.
+    pub fn counts(&self) -> [usize; 2] {
+        [self.cells.len(), self.lines.len()]
+    }
+}
+
+/// Values of the contour lines, strictly within the range: a sensor at rest lies at its upper end, where overshoots of a
+/// micrometre would draw lines all over it.
+fn contour_levels(range: &RangeInclusive<f64>) -> Vec<f64> {
+    let step = step_for(range, CONTOUR_LEVELS);
+    let is_within = |level: &f64| level - range.start() > 1e-3 * step && range.end() - level > 1e-3 * step;
+    multiples(range, step).into_iter().filter(is_within).collect()
+}
+
+/// Cells of an axis, farthest first: from both ends towards the eye.
+fn far_to_near(points_mm: &[f64], eye_mm: f64) -> Vec<usize> {
+    let cells = points_mm.len() - 1;
+    let before = (0..cells).take_while(|&cell| points_mm[cell + 1] <= eye_mm).count();
+    (0..before).chain((before..cells).rev()).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use super::*;
+    use crate::figure::surface::{
+        Bounds, OrbitCamera, Quantity, Surface, ViewMode,
+        projection::{PlotBox, Projection},
+    };
+    use decoupler_core::surface::SurfaceMap;
+
+    /// Returns the distance from the eye to a triangle at a place on the screen; `None` beside it.
+    fn distance_at(place: Vec2, corners: [(Vec2, f32); 3]) -> Option<f32> {
+        let [a, b, c] = corners.map(|(at, _)| at);
+        let whole = (b - a).perp_dot(c - a);
+        let parts = [(b, c), (c, a), (a, b)].map(|(from, to)| (to - from).perp_dot(place - from) / whole);
+        let mean = || {
+            parts
+                .iter()
+                .zip(&corners)
+                .map(|(part, (_, distance))| part * distance)
+                .sum()
+        };
+        parts.iter().all(|part| *part > 0.0).then(mean)
+    }
+
+    #[test]
+    fn what_is_near_is_painted_over_what_is_far() {
+        let places: Vec<f64> = (0..6).map(f64::from).collect();
+        let map = Arc::new(SurfaceMap::new(&places, &places).expect("a lattice"));
+        let values = map.evaluate(
+            &(0..36)
+                .map(|node| 4.5 + 0.5 * (1.9 * f64::from(node)).sin())
+                .collect::<Vec<_>>(),
+        );
+        let surface = Surface {
+            title: String::new(),
+            values: values.into(),
+            nodes: Arc::new([]),
+            map,
+            quantity: Quantity::Height,
+            range: 4.0..=5.0,
+            mode: ViewMode::ThreeD,
+            colours: Default::default(),
+        };
+        let (field, colours) = (Field::new(&surface), surface.colours.colours());
+        let (min_mm, max_mm) = field.box_mm();
+        let plot_box = PlotBox::new(min_mm, max_mm, 1.0);
+        let screen = Bounds::of([Vec2::ZERO, Vec2::splat(400.0)]);
+        let mut hidden = 0;
+        for turn in 0..6 {
+            let camera = OrbitCamera::default().dragged(140.0 * turn as f32, 12.0 * turn as f32 - 40.0);
+            let projection = Projection::fit(plot_box, camera, screen);
+            let mesh = Mesh::new(&field, &Stage::Space(&projection), colours);
+            let distance = |index: usize| {
+                let (x_mm, y_mm) = (field.grid.x_mm(), field.grid.y_mm());
+                let z = field.values[index].clamp(min_mm.z, max_mm.z);
+                let place = DVec3::new(x_mm[index / y_mm.len()], y_mm[index % y_mm.len()], z);
+                plot_box.unit(place).distance(projection.eye)
+            };
+            let corners: Vec<(Vec2, f32)> = (0..field.values.len())
+                .map(|index| (mesh.vertices[index].at, distance(index)))
+                .collect();
+            for probe in 0..100 {
+                let place = Vec2::new(20.3 + 39.7 * (probe / 10) as f32, 20.7 + 39.1 * (probe % 10) as f32);
+                let cells = mesh.strips().flat_map(|(cells, _)| cells);
+                // Those cut at the ends of the axis have corners of their own.
+                let whole = cells.filter(|cell| (**cell as usize) < field.values.len());
+                let painted = whole.flat_map(|&cell| {
+                    let [a, b, c, d] = mesh.corners(cell).map(|corner| corners[corner]);
+                    [[a, b, c], [a, c, d]]
+                        .into_iter()
+                        .filter_map(|corners| distance_at(place, corners))
+                });
+                let painted: Vec<f32> = painted.collect();
+                hidden += painted.len().saturating_sub(1);
+                let nearest = painted.iter().copied().fold(f32::INFINITY, f32::min);
+                // Neighbouring cells may meet here.
+                assert!(painted.last().is_none_or(|last| *last < nearest + 0.03), "{painted:?}");
+            }
+        }
+        assert!(hidden > 100, "{hidden}: there is something to hide");
+    }
+
+    #[test]
+    fn contour_lines_lie_between_the_ends_of_the_range() {
+        let near = |levels: Vec<f64>, expected: &[f64]| {
+            assert_eq!(levels.len(), expected.len(), "{levels:?}");
+            let pairs = levels.iter().zip(expected);
+            pairs.for_each(|(level, expected)| assert!((level - expected).abs() < 1e-12, "{levels:?}"));
+        };
+        near(
+            contour_levels(&(4.0..=5.0)),
+            &[4.1, 4.2, 4.3, 4.4, 4.5, 4.6, 4.7, 4.8, 4.9],
+        );
+        near(
+            contour_levels(&(-0.25..=0.25)),
+            &[-0.2, -0.15, -0.1, -0.05, 0.0, 0.05, 0.1, 0.15, 0.2],
+        );
+        near(
+            contour_levels(&(3.95..=4.05)),
+            &[3.96, 3.97, 3.98, 3.99, 4.0, 4.01, 4.02, 4.03, 4.04],
+        );
+    }
+
+    #[test]
+    fn cells_are_drawn_towards_the_eye() {
+        let points = [0.0, 1.0, 2.0, 3.0, 4.0];
+        for (eye, order, sentence) in [
+            (9.0, [0, 1, 2, 3], "the eye beyond the far end"),
+            (-9.0, [3, 2, 1, 0], "the eye before the near end"),
+            (2.5, [0, 1, 3, 2], "the eye over a cell, which comes last"),
+        ] {
+            assert_eq!(far_to_near(&points, eye), order, "{sentence}");
+        }
+    }
+}

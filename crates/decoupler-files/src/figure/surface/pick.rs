@@ -1,0 +1,295 @@
+//! The place on the surface under a point of the screen.
+
+use glam::DVec3;
+
+use super::{
+    field::{CellPart, Field},
+    sight::Ray,
+    surface_figure::Surface,
+};
+
+/// Part of a triangle by which a ray may miss it, so that none slips through between two.
+const CRACK: f64 = 1e-9;
+
+impl Surface {
+    /// Returns the place where `ray` first meets the surface as it is drawn; `None` if it misses it.
+    pub fn pick(&self, ray: &Ray) -> Option<DVec3> {
+        let field = Field::new(self);
+        if field.values.is_empty() {
+            return None;
+        }
+        let crossings = crossings(&field, ray)?;
+        crossings.windows(2).find_map(|pair| {
+            let middle = ray.from_mm + ray.direction * (0.5 * (pair[0] + pair[1]));
+            let (ix, iy) = (cell(field.grid.x_mm(), middle.x)?, cell(field.grid.y_mm(), middle.y)?);
+            let (low, high) = (*field.shown().start(), *field.shown().end());
+            let corners = match field.part(ix, iy) {
+                CellPart::Nothing => return None,
+                CellPart::Cut => field.corners_mm(ix, iy),
+                CellPart::Whole | CellPart::Plateau => field
+                    .corners_mm(ix, iy)
+                    .map(|corner| corner.with_z(corner.z.clamp(low, high))),
+            };
+            let [a, b, c, d] = corners;
+            let met = [[a, b, c], [a, c, d]].map(|corners| share_at(ray, corners));
+            let places = met
+                .into_iter()
+                .flatten()
+                .map(|share| (share, ray.from_mm + ray.direction * share));
+            let shown = places.filter(|(_, place)| (low - CRACK..=high + CRACK).contains(&place.z));
+            let plateaus = [(low, -1.0), (high, 1.0)].into_iter().filter_map(|(level, side)| {
+                let share = (level - ray.from_mm.z) / ray.direction.z;
+                let place = ray.at_level(level).filter(|_| field.keeps_plateau(ix, iy))?;
+                (side * (height_at(corners, place)? - level) > 0.0).then_some((share, place))
+            });
+            let shown = shown.chain(plateaus);
+            Some(shown.min_by(|(one, _), (other, _)| one.total_cmp(other))?.1)
+        })
+    }
+}
+
+/// The cell of an axis that a place lies in.
+fn cell(points_mm: &[f64], at_mm: f64) -> Option<usize> {
+    let after = points_mm.partition_point(|point| *point <= at_mm);
+    (after > 0 && at_mm <= points_mm[points_mm.len() - 1]).then(|| (after - 1).min(points_mm.len() - 2))
+}
+
+/// Shares of the ray at which, seen from above, it crosses the lines of the grid, in its own units and order; `None` beside the grid.
+fn crossings(field: &Field<'_>, ray: &Ray) -> Option<Vec<f64>> {
+    if ray.direction.truncate() == glam::DVec2::ZERO {
+        // Straight down it stays over one cell.
+        return Some(vec![-1.0, 1.0]);
+    }
+    let axes = [(field.grid.x_mm(), 0), (field.grid.y_mm(), 1)];
+    let share = |line: f64, axis: usize| (line - ray.from_mm[axis]) / ray.direction[axis];
+    let (mut from, mut to) = (0.0_f64, f64::INFINITY);
+    for (points_mm, axis) in axes {
+        let (low, high) = (points_mm[0], points_mm[points_mm.len() - 1]);
+        if ray.direction[axis] == 0.0 {
+            if !(low..=high).contains(&ray.from_mm[axis]) {
+                return None;
+            }
+        } else {
+            let (one, other) = (share(low, axis), share(high, axis));
+            (from, to) = (from.max(one.min(other)), to.min(one.max(other)));
+        }
+    }
+    if from >= to {
+        return None;
+    }
+    let lines = axes
+        .into_iter()
+        .flat_map(|(points_mm, axis)| points_mm.iter().map(move |&line| share(line, axis)));
+    let mut crossings: Vec<f64> = lines.filter(|share| *share > from && *share < to).collect();
+    crossings.extend([from, to]);
+    crossings.sort_by(f64::total_cmp);
+    Some(crossings)
+}
+
+/// Height of the two triangles of a cell at a place; `None` beside it.
+fn height_at([a, b, c, d]: [DVec3; 4], place: DVec3) -> Option<f64> {
+    let along = |from: f64, to: f64, at: f64| (at - from) / (to - from);
+    let (x, y) = (along(a.x, c.x, place.x), along(a.y, c.y, place.y));
+    let is_inside = [x, y].iter().all(|share| (0.0..=1.0).contains(share));
+    let height = if y <= x {
+        a.z + x * (b.z - a.z) + y * (c.z - b.z)
+    } else {
+        a.z + y * (d.z - a.z) + x * (c.z - d.z)
+    };
+    is_inside.then_some(height)
+}
+
+/// Share of the ray at which it meets a triangle, in its own units (Möller and Trumbore 1997).
+fn share_at(ray: &Ray, [a, b, c]: [DVec3; 3]) -> Option<f64> {
+    let (ab, ac, from) = (b - a, c - a, ray.from_mm - a);
+    let across = ray.direction.cross(ac);
+    let scale = 1.0 / ab.dot(across);
+    let (along_b, other) = (scale * from.dot(across), from.cross(ab));
+    let along_c = scale * ray.direction.dot(other);
+    let is_inside = along_b >= -CRACK && along_c >= -CRACK && along_b + along_c <= 1.0 + CRACK;
+    let share = scale * ac.dot(other);
+    (is_inside && share.is_finite()).then_some(share)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use glam::{DVec2, Vec2};
+
+    use super::*;
+    use crate::figure::{
+        SequentialMap,
+        surface::{Bounds, Card, OrbitCamera, Quantity, Sight, ViewMode},
+    };
+    use decoupler_core::surface::SurfaceMap;
+
+    /// A surface over 5 × 4 nodes at x = 8, 9 … and y = 3, 5 …
+    fn surface(mode: ViewMode, height: impl Fn(f64, f64) -> f64) -> Surface {
+        let (x, y) = ([8.0, 9.0, 10.0, 11.0, 12.0], [3.0, 5.0, 7.0, 9.0]);
+        let map = Arc::new(SurfaceMap::new(&x, &y).unwrap());
+        let nodes: Vec<DVec3> = x
+            .iter()
+            .flat_map(|&x| y.iter().map(move |&y| (x, y)))
+            .map(|(x, y)| DVec3::new(x, y, height(x, y)))
+            .collect();
+        let values = map.evaluate(&nodes.iter().map(|node| node.z).collect::<Vec<_>>());
+        Surface {
+            title: String::new(),
+            values: values.into(),
+            nodes: nodes.into(),
+            map,
+            quantity: Quantity::Height,
+            range: 4.0..=5.0,
+            mode,
+            colours: SequentialMap::default(),
+        }
+    }
+
+    fn sight(surface: &Surface, camera: OrbitCamera) -> (Sight, super::super::Dots) {
+        let drawing = surface.lay_out(
+            camera,
+            &Card {
+                bounds: Bounds {
+                    min: Vec2::new(10.0, 20.0),
+                    max: Vec2::new(370.0, 400.0),
+                },
+                measure: &|text| Vec2::new(6.0 * text.chars().count() as f32, 14.0),
+                colours: SequentialMap::default().colours(),
+            },
+        );
+        (drawing.sight, drawing.dots)
+    }
+
+    fn cameras() -> impl Iterator<Item = OrbitCamera> {
+        (0..24).map(|turn| {
+            let turned = OrbitCamera::default().dragged(61.0 * turn as f32, 11.0 * turn as f32 - 100.0);
+            turned.panned(0.1, -0.05).zoomed(1.0 + 0.1 * turn as f32)
+        })
+    }
+
+    /// The camera's limits let it look along the slopes, but not from below.
+    fn slope(x: f64, y: f64) -> f64 {
+        4.5 + 0.02 * (x - 10.0) - 0.03 * (y - 6.0)
+    }
+
+    #[test]
+    fn a_place_is_picked_where_it_is_seen() {
+        for (mode, camera) in cameras().flat_map(|camera| [(ViewMode::ThreeD, camera), (ViewMode::Top, camera)]) {
+            let surface = surface(mode, slope);
+            let (sight, dots) = sight(&surface, camera);
+            for step in 0..60 {
+                let (x, y) = (7.6 + 0.08 * f64::from(step), 2.1 + 0.129 * f64::from(step * 7 % 60));
+                let place = DVec3::new(x, y, slope(x, y));
+                let picked = surface.pick(&sight.ray(sight.point(place))).unwrap();
+                assert!(picked.distance(place) < 1e-9, "{picked} for {place}, {camera:?}");
+            }
+            // The sight is that of the picture.
+            for (node, place) in surface.nodes.iter().enumerate() {
+                let apart = sight.point(*place).as_vec2().distance(dots.position(node).unwrap());
+                assert!(apart < 0.02, "{apart} points at {camera:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn what_is_near_hides_what_is_far() {
+        // A ridge along y: beyond it lies a valley that the eye cannot see into from low above.
+        let ridge = surface(ViewMode::ThreeD, |x, _| if x == 10.0 { 5.0 } else { 4.0 });
+        let low = OrbitCamera {
+            yaw: 0.0,
+            pitch: 0.12,
+            ..OrbitCamera::default()
+        };
+        let (sight, _) = sight(&ridge, low);
+        let ray = sight.ray(sight.point(DVec3::new(9.0, 6.0, 4.0)));
+        let picked = ridge.pick(&ray).unwrap();
+        assert!(picked.x > 9.8, "the ridge hides the valley: {picked}");
+        let (eye, end) = (ray.from_mm, DVec3::new(9.0, 6.0, 4.0));
+        assert!(
+            (picked - eye).normalize().dot((end - eye).normalize()) > 1.0 - 1e-12,
+            "on the line of sight"
+        );
+        assert!(
+            ridge.pick(&sight.ray(DVec2::new(12.0, 22.0))).is_none(),
+            "beside the surface"
+        );
+    }
+
+    #[test]
+    fn gaps_are_no_place() {
+        let mut surface = surface(ViewMode::Top, slope);
+        let (sight, _) = sight(&surface, OrbitCamera::default());
+        let ray = sight.ray(sight.point(DVec3::new(10.0, 6.0, 4.5)));
+        assert!(surface.pick(&ray).is_some());
+        surface.values = surface.values.iter().map(|_| f64::NAN).collect();
+        assert!(surface.pick(&ray).is_none());
+        surface.values = Arc::new([]);
+        assert!(surface.pick(&ray).is_none());
+    }
+
+    #[test]
+    fn a_level_is_met_where_the_line_of_sight_is_at_that_height() {
+        for camera in cameras() {
+            let (sight, _) = sight(&surface(ViewMode::ThreeD, slope), camera);
+            let place = DVec3::new(9.3, 4.4, 4.25);
+            let met = sight.ray(sight.point(place)).at_level(4.25).unwrap();
+            assert!(met.distance(place) < 1e-9, "{met}");
+        }
+        let level = Ray {
+            from_mm: DVec3::ZERO,
+            direction: DVec3::X,
+        };
+        assert_eq!(level.at_level(1.0), None);
+        let away = Ray {
+            from_mm: DVec3::Z,
+            direction: DVec3::Z,
+        };
+        assert_eq!(away.at_level(5.0), Some(DVec3::new(0.0, 0.0, 5.0)));
+    }
+
+    #[test]
+    fn a_node_is_moved_to_the_height_of_the_pointer() {
+        let mut seen = 0;
+        for camera in cameras() {
+            let surface = surface(ViewMode::ThreeD, slope);
+            let (sight, _) = sight(&surface, camera);
+            let foot = DVec3::new(9.0, 7.0, 5.0);
+            for height_mm in [4.0, 4.37, 5.0] {
+                let at = sight.point(foot.with_z(height_mm));
+                let along = (sight.point(foot.with_z(4.0)) - sight.point(foot)).normalize();
+                // A pointer beside the line counts as on it.
+                for beside in [0.0, 9.0] {
+                    match sight.height_mm(foot, 1.0, at + beside * along.perp()) {
+                        Some(found_mm) => {
+                            assert!((found_mm - height_mm).abs() < 1e-9, "{found_mm} for {height_mm}");
+                            seen += 1;
+                        }
+                        None => assert!(camera.pitch > 1.2, "{camera:?}"),
+                    }
+                }
+            }
+        }
+        assert!(seen > 60, "{seen}");
+        let (above, _) = sight(&surface(ViewMode::Top, slope), OrbitCamera::default());
+        assert_eq!(above.height_mm(DVec3::new(9.0, 7.0, 5.0), 1.0, DVec2::ZERO), None);
+    }
+    #[test]
+    fn a_plateau_beyond_the_axis_is_picked_at_its_edge() {
+        let steep = |x: f64, _: f64| 4.5 + 0.6 * (x - 10.0);
+        let surface = surface(ViewMode::ThreeD, steep);
+        // From high enough to look down on it: the box ends at 3.92 and 5.08.
+        for camera in cameras().filter(|camera| camera.pitch > 0.6) {
+            let (sight, _) = sight(&surface, camera);
+            for step in 0..50 {
+                let place = DVec3::new(
+                    10.97 + 0.02 * f64::from(step),
+                    3.1 + 0.11 * f64::from(step * 7 % 50),
+                    5.08,
+                );
+                let picked = surface.pick(&sight.ray(sight.point(place))).unwrap();
+                assert!(picked.distance(place) < 1e-9, "{picked} for {place}, {camera:?}");
+            }
+        }
+    }
+}

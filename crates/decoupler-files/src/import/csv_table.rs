@@ -1,0 +1,287 @@
+use std::{
+    collections::HashMap,
+    io::{Cursor, Read},
+    path::Path,
+};
+
+use super::{
+    Cells, Column, Dialect, DialectChoice, Encoding, Fault, Format, Missing, Table, TableError,
+    column::{Labels, name_and_unit},
+    detection::{BEGINNING, detect},
+    number::{Cell, parse},
+    rows::Rows,
+    table::{Excess, Lines, stem},
+    utf16::Utf16,
+    watch::table_error,
+};
+use decoupler_core::text::clean_name;
+
+/// Largest number of rows: those of ten hours at 1 kHz, and more.
+const LARGEST_ROWS: usize = 50_000_000;
+/// Number of rows whose commonest length is the number of columns, if there is no header.
+const FIRST_ROWS: usize = 500;
+
+/// Columns that are read otherwise than as numbers, and what means missing in them.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Reading<'a> {
+    pub(super) choice: DialectChoice,
+    /// Rules of this file: the column, or none for all, and the text.
+    pub(super) missing: Vec<(Option<String>, &'a Missing)>,
+    /// Columns that hold labels.
+    pub(super) labels: Vec<String>,
+}
+
+/// Reads a table from text.
+pub(super) fn read(path: &Path, mut source: impl Read, reading: &Reading<'_>) -> Result<Table, TableError> {
+    let mut beginning = Vec::new();
+    (&mut source)
+        .take(BEGINNING as u64)
+        .read_to_end(&mut beginning)
+        .map_err(table_error)?;
+    let dialect = detect(&beginning, beginning.len() < BEGINNING, &reading.choice)?;
+    let whole = Cursor::new(beginning).chain(source);
+    match dialect.encoding {
+        Encoding::Utf8 | Encoding::Latin1 => read_rows(path, whole, dialect, reading),
+        Encoding::Utf16Le | Encoding::Utf16Be => {
+            let text = Utf16::new(whole, dialect.encoding == Encoding::Utf16Le);
+            read_rows(path, text, dialect, reading)
+        }
+    }
+}
+
+fn read_rows(path: &Path, text: impl Read, dialect: Dialect, reading: &Reading<'_>) -> Result<Table, TableError> {
+    let mut rows = Rows::new(text, dialect.separator, dialect.carriage_returns);
+    rows.skip(dialect.skipped_lines + usize::from(dialect.sep_line))?;
+    let mut headers = Vec::new();
+    if dialect.header && rows.advance()? {
+        headers = rows.cells().map(|cell| text_of(cell, dialect.encoding)).collect();
+    }
+    let mut body = Body::new(dialect, reading);
+    while rows.advance()? {
+        body.push(&rows, &headers)?;
+    }
+    body.finish(path, headers)
+}
+
+/// The rows after the header.
+struct Body<'a> {
+    dialect: Dialect,
+    reading: &'a Reading<'a>,
+    /// Rows that wait until the number of columns is known, with their lines.
+    first: Vec<(u64, Vec<Vec<u8>>)>,
+    builders: Vec<Builder<'a>>,
+    rows: usize,
+    lines: Lines,
+    too_long: Excess,
+    too_short: Excess,
+}
+
+struct Builder<'a> {
+    column: Column,
+    numbers: Vec<f64>,
+    labels: Option<Labels>,
+    missing: Vec<&'a Missing>,
+}
+
+impl<'a> Body<'a> {
+    fn new(dialect: Dialect, reading: &'a Reading<'a>) -> Self {
+        Self {
+            dialect,
+            reading,
+            first: Vec::new(),
+            builders: Vec::new(),
+            rows: 0,
+            lines: Lines::default(),
+            too_long: Excess::default(),
+            too_short: Excess::default(),
+        }
+    }
+
+    fn push<R: Read>(&mut self, rows: &Rows<R>, headers: &[String]) -> Result<(), TableError> {
+        if self.builders.is_empty() {
+            if headers.is_empty() && self.first.len() < FIRST_ROWS {
+                self.first
+                    .push((rows.line(), rows.cells().map(<[u8]>::to_vec).collect()));
+                return Ok(());
+            }
+            self.begin(headers)?;
+        }
+        self.add(rows.line(), rows.len(), rows.cells())
+    }
+
+    /// Makes the columns, and adds the rows that waited for them.
+    fn begin(&mut self, headers: &[String]) -> Result<(), TableError> {
+        let waiting = std::mem::take(&mut self.first);
+        let width = match headers.len() {
+            0 => commonest(waiting.iter().map(|(_, cells)| cells.len())),
+            width => width,
+        };
+        let empty_end = self.dialect.trailing_separator && headers.last().is_none_or(String::is_empty);
+        let width = width - usize::from(empty_end && width > 1);
+        self.builders = named(headers, width)
+            .into_iter()
+            .map(|column| Builder::new(column, self.reading))
+            .collect();
+        for (line, cells) in waiting {
+            self.add(line, cells.len(), cells.iter().map(Vec::as_slice))?;
+        }
+        Ok(())
+    }
+
+    fn add<'c>(
+        &mut self,
+        line: u64,
+        count: usize,
+        mut cells: impl Iterator<Item = &'c [u8]> + Clone,
+    ) -> Result<(), TableError> {
+        let width = self.builders.len();
+        // A separator at the end of a row begins no cell.
+        if count > width && (count > width + 1 || cells.clone().last().is_some_and(|cell| !cell.is_empty())) {
+            self.too_long.add(line);
+            return Ok(());
+        }
+        if count < width {
+            self.too_short.add(line);
+        }
+        if self.rows == LARGEST_ROWS {
+            return Err(TableError::Long(LARGEST_ROWS));
+        }
+        for builder in &mut self.builders {
+            builder.push(line, cells.next().unwrap_or_default(), &self.dialect);
+        }
+        self.lines.push(self.rows, line);
+        self.rows += 1;
+        Ok(())
+    }
+
+    fn finish(mut self, path: &Path, headers: Vec<String>) -> Result<Table, TableError> {
+        if self.builders.is_empty() {
+            self.begin(&headers)?;
+        }
+        if self.rows == 0 {
+            return Err(TableError::Empty);
+        }
+        Ok(Table {
+            stem: stem(path),
+            columns: self.builders.into_iter().map(Builder::finish).collect(),
+            rows: self.rows,
+            format: Format::Text(self.dialect),
+            notes: Vec::new(),
+            too_long: self.too_long,
+            too_short: self.too_short,
+            lines: self.lines,
+        })
+    }
+}
+
+impl<'a> Builder<'a> {
+    fn new(column: Column, reading: &Reading<'a>) -> Self {
+        let missing = reading.missing.iter();
+        let is_here = |name: &Option<String>| name.as_ref().is_none_or(|name| *name == column.name);
+        Self {
+            missing: missing
+                .filter(|(name, _)| is_here(name))
+                .map(|(_, missing)| *missing)
+                .collect(),
+            labels: reading.labels.contains(&column.name).then(Labels::default),
+            numbers: Vec::new(),
+            column,
+        }
+    }
+
+    fn push(&mut self, line: u64, cell: &[u8], dialect: &Dialect) {
+        let found = parse(cell, dialect.decimal);
+        let is_missing = found == Cell::Missing || self.missing.iter().any(|missing| missing.is(cell, found));
+        self.column.missing += usize::from(is_missing);
+        if let Some(labels) = &mut self.labels {
+            let text = text_of(cell, dialect.encoding);
+            let number = match found {
+                Cell::Number(number) => Some(number),
+                _ => None,
+            };
+            labels.push((!is_missing).then_some((&text, number)));
+            return;
+        }
+        self.numbers.push(match found {
+            Cell::Number(number) if !is_missing => number,
+            Cell::Text if !is_missing => {
+                let faults = &mut self.column.faults;
+                faults.count += 1;
+                faults.first.get_or_insert_with(|| Fault {
+                    line,
+                    text: excerpt(&text_of(cell, dialect.encoding)),
+                });
+                f64::NAN
+            }
+            _ => f64::NAN,
+        });
+    }
+
+    fn finish(self) -> Column {
+        Column {
+            cells: match self.labels {
+                Some(labels) => labels.into_cells(),
+                None => Cells::Numbers(self.numbers),
+            },
+            ..self.column
+        }
+    }
+}
+
+/// Returns `width` columns without cells, with names and units from the cells of the header, if there is one.
+pub(super) fn named(headers: &[String], width: usize) -> Vec<Column> {
+    let mut columns: Vec<Column> = Vec::new();
+    for index in 0..width {
+        let header = clean_name(headers.get(index).map_or("", String::as_str));
+        let (name, unit) = name_and_unit(&header);
+        let wanted = if name.is_empty() {
+            format!("c{}", index + 1)
+        } else {
+            name.to_owned()
+        };
+        columns.push(Column {
+            name: wanted,
+            unit: unit.map(str::to_owned),
+            ..Column::default()
+        });
+    }
+    name_apart(&mut columns);
+    columns
+}
+
+/// Gives columns of the same name a number each.
+fn name_apart(columns: &mut [Column]) {
+    let mut counts: HashMap<String, usize> = HashMap::new();
+    for column in columns {
+        let count = counts.entry(column.name.clone()).or_default();
+        *count += 1;
+        if *count > 1 {
+            column.name = format!("{}#{count}", column.name);
+        }
+    }
+}
+
+fn commonest(widths: impl Iterator<Item = usize>) -> usize {
+    let mut widths: Vec<usize> = widths.collect();
+    widths.sort_unstable();
+    let runs = widths.chunk_by(|a, b| a == b);
+    runs.max_by_key(|run| run.len()).map_or(0, |run| run[0])
+}
+
+/// Text of a cell. What is no UTF-8 is taken for Latin-1, whose characters are the first of Unicode.
+fn text_of(cell: &[u8], encoding: Encoding) -> String {
+    match std::str::from_utf8(cell) {
+        Ok(text) if encoding != Encoding::Latin1 => text.to_owned(),
+        _ => cell.iter().copied().map(char::from).collect(),
+    }
+}
+
+/// Text for a message: the first 40 characters, control characters escaped.
+fn excerpt(text: &str) -> String {
+    let text: String = text.chars().take(40).collect();
+    if text.contains(char::is_control) {
+        text.escape_debug().to_string()
+    } else {
+        text
+    }
+}

@@ -1,0 +1,238 @@
+use std::{io, path::PathBuf};
+
+use thiserror::Error;
+
+use super::{Cure, Format, InputError, PositionsError};
+use decoupler_core::{
+    dataset::{DatasetError, DivisionError},
+    text::system_cause,
+};
+
+/// Error of an import. Lines and columns are counted from 1.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum ImportError {
+    /// A file cannot be read.
+    #[error("cannot read '{}': {}", .path.display(), system_cause(.source))]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// Error of the operating system.
+        source: io::Error,
+    },
+    /// The contents of a file are not a table.
+    #[error("'{}': {source}", .path.display())]
+    File {
+        /// The file.
+        path: PathBuf,
+        /// Defect of its contents.
+        source: TableError,
+    },
+    /// A column is not in the files.
+    #[error("there is no column '{name}'; {near}")]
+    Unknown {
+        /// Name given.
+        name: String,
+        /// Names that are like it, or all names, in words.
+        near: String,
+    },
+    /// A name stands for several columns.
+    #[error("the name '{name}' stands for several columns: {candidates}; write one of them")]
+    Ambiguous {
+        /// Name given.
+        name: String,
+        /// Full names of the columns.
+        candidates: String,
+    },
+    /// The range of columns runs backwards, or over two files.
+    #[error(
+        "'{0}' is not a range of columns: write FIRST..LAST, both in one file and in its order, for example c2..c16"
+    )]
+    Range(String),
+    /// A column has two meanings.
+    #[error("column '{name}' is both {one} and {other}; give it one meaning")]
+    TwoMeanings {
+        /// Full name of the column.
+        name: String,
+        /// First meaning.
+        one: &'static str,
+        /// Second meaning.
+        other: &'static str,
+    },
+    /// Nothing is an input, or nothing a target.
+    #[error("no column is {0}; name at least one")]
+    NoColumns(&'static str),
+    /// A cell of a column that is used is no number.
+    #[error("'{}': line {line}, column {column} ('{name}'): '{text}' is not a finite number{others}; {}", .path.display(), Cure::CallMissing(.text.clone()))]
+    NotANumber {
+        /// The file.
+        path: PathBuf,
+        /// Line of the first such cell.
+        line: u64,
+        /// Column number in the file.
+        column: usize,
+        /// Full name of the column.
+        name: String,
+        /// Text of the cell.
+        text: String,
+        /// Number of further cells of this column that are no numbers, in words.
+        others: String,
+    },
+    /// The columns of a file are not the inputs of a network.
+    #[error("'{}': {source}", .path.display())]
+    Inputs {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with its columns.
+        source: InputError,
+    },
+    /// A reading that a network needs is missing.
+    #[error("'{}': line {line}: {name} is missing; a network needs all of its inputs, so leave the line out", .path.display())]
+    MissingInput {
+        /// The file.
+        path: PathBuf,
+        /// Line of the cell.
+        line: u64,
+        /// Name of the column.
+        name: String,
+    },
+    /// A condition cannot be understood.
+    #[error("the condition '{text}' is not understood: {reason}; write for example \"c4<145.1 and c5!=0\"")]
+    Condition {
+        /// The condition.
+        text: String,
+        /// The part at fault.
+        reason: String,
+    },
+    /// Two files cannot be joined.
+    #[error("'{}' cannot be joined: {reason}; {cure}", .path.display())]
+    Join {
+        /// The joined file.
+        path: PathBuf,
+        /// Cause.
+        reason: String,
+        /// Cure.
+        cure: Cure,
+    },
+    /// A file for the test is one of those that are trained on.
+    #[error("'{}' is trained on, so it cannot test: give another file for the test", .0.display())]
+    TrainedOn(PathBuf),
+    /// No row is left.
+    #[error("none of the {rows} rows is left: {reasons}")]
+    NoRows {
+        /// Number of rows read.
+        rows: usize,
+        /// Reasons for which rows were dropped, with their numbers.
+        reasons: String,
+    },
+    /// The column of row-wires does not hold numbers of row-wires.
+    #[error("'{name}': {value} is not the number of a row-wire; give whole numbers from 1 to 10000")]
+    RowWire {
+        /// Full name of the column.
+        name: String,
+        /// The first value at fault.
+        value: f64,
+    },
+    /// A file of positions cannot be used.
+    #[error("'{}': {source}", .path.display())]
+    Positions {
+        /// The file.
+        path: PathBuf,
+        /// Its defect.
+        source: PositionsError,
+    },
+    /// The samples do not make a set.
+    #[error(transparent)]
+    Dataset(#[from] DatasetError),
+    /// The samples cannot be divided.
+    #[error(transparent)]
+    Division(#[from] DivisionError),
+    /// The caller ended the import.
+    #[error("the import was cancelled")]
+    Cancelled,
+}
+
+impl ImportError {
+    /// The message with its cure in other words than the library's, which know no window and no arguments.
+    pub fn with_cure(&self, words: impl Fn(&Cure) -> String) -> String {
+        let text = self.to_string();
+        let cure = match self {
+            Self::NotANumber { text, .. } => Cure::CallMissing(text.clone()),
+            Self::Join { cure, .. } => cure.clone(),
+            _ => return text,
+        };
+        match text.strip_suffix(&cure.to_string()) {
+            Some(cause) => format!("{cause}{}", words(&cure)),
+            None => text,
+        }
+    }
+}
+
+/// Defect in the contents of a file. Lines and columns are counted from 1.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum TableError {
+    /// The file could not be read to its end.
+    #[error("{}", system_cause(.0))]
+    Io(#[from] io::Error),
+    /// The caller ended the reading.
+    #[error("the import was cancelled")]
+    Cancelled,
+    /// There is nothing in the file.
+    #[error("it has no rows; choose a file with a table of numbers")]
+    Empty,
+    /// The file holds other data than text.
+    #[error("it is not text: line {line} holds a zero byte; give {}", Format::NAMES)]
+    Binary {
+        /// Line of the first zero byte.
+        line: u64,
+    },
+    /// No row ends within the limit.
+    #[error("line {line}: no row ends within {} MiB; check its quotes and line breaks", .limit >> 20)]
+    Endless {
+        /// Line on which the row begins.
+        line: u64,
+        /// Largest length of a row in bytes.
+        limit: usize,
+    },
+    /// A quote opens and never closes.
+    #[error("line {line}: a quote opens here and never closes; close it, or remove it")]
+    Quote {
+        /// Line on which the row begins.
+        line: u64,
+    },
+    /// A row has too many cells.
+    #[error("line {line}: more than {limit} cells in a row; check the separator")]
+    Wide {
+        /// Line of the row.
+        line: u64,
+        /// Largest number of cells.
+        limit: usize,
+    },
+    /// A row has more cells than there are columns.
+    #[error("line {line}: it has more cells than there are columns; correct it")]
+    Uneven {
+        /// Line of the row.
+        line: u64,
+    },
+    /// More rows than a set may have.
+    #[error("it has more than {0} rows; take every second one, or a part")]
+    Long(usize),
+    /// A file of NumPy or MATLAB contradicts itself or has what is not read.
+    #[error("{what}: {reason}")]
+    Array {
+        /// The array or part of the file.
+        what: String,
+        /// Cause and cure.
+        reason: String,
+    },
+}
+
+impl TableError {
+    pub(super) fn array(what: impl Into<String>, reason: impl Into<String>) -> Self {
+        Self::Array {
+            what: what.into(),
+            reason: reason.into(),
+        }
+    }
+}

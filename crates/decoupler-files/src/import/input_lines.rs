@@ -1,0 +1,201 @@
+use thiserror::Error;
+
+use super::{InputColumns, InputError};
+use decoupler_core::{
+    evaluation::Channel,
+    text::{CsvFields, number},
+};
+
+/// Parser of lines of CSV that come one by one and hold the inputs of a network: under the names of a header or, without
+/// one, in their order, after the number of the row-wire where each row-wire has a network.
+#[derive(Debug)]
+pub struct InputLines {
+    inputs: Vec<Channel>,
+    /// Name of the column of row-wires.
+    row_wire: Option<String>,
+    /// Row-wires of the networks, from 0, if each has one.
+    row_wires: Option<Vec<usize>>,
+    fields: CsvFields,
+    /// Columns of the lines, by their header or else by the first line that was parsed.
+    columns: Option<InputColumns>,
+    /// Cells of the line as numbers, NaN where they are none.
+    cells: Vec<f64>,
+    readings: Vec<f64>,
+}
+
+/// A line that was parsed.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum InputLine<'a> {
+    /// It has the names of the columns, or nothing.
+    NoReadings,
+    /// It has the inputs of the network.
+    Readings {
+        /// Index of the network of its row-wire; 0 where there is one network.
+        row_index: usize,
+        /// Readings in the order of the inputs.
+        readings: &'a [f64],
+    },
+}
+
+/// Reason why a line has no readings.
+#[derive(Clone, Debug, PartialEq, Error)]
+#[non_exhaustive]
+pub enum InputLineError {
+    /// A header without the inputs of the network: no line after it can be read.
+    #[error(transparent)]
+    Header(InputError),
+    /// Another number of cells than inputs in the first line without a header.
+    #[error(transparent)]
+    Unnamed(InputError),
+    /// Another number of cells than before.
+    #[error("{found} cells where {expected} are needed")]
+    Cells {
+        /// Number of cells.
+        found: usize,
+        /// Number needed.
+        expected: usize,
+    },
+    /// A cell that is not a finite number.
+    #[error("cell {0} is not a finite number")]
+    NotFinite(usize),
+    /// A row-wire without a network.
+    #[error("there is no network for row {0}")]
+    NoNetwork(f64),
+}
+
+impl InputLineError {
+    /// Returns `true` if no line after this one can be read either.
+    pub fn is_final(&self) -> bool {
+        matches!(self, Self::Header(_))
+    }
+}
+
+impl InputLines {
+    /// A parser of `inputs`. `row_wire` names the column of row-wires, and `row_wires` are those of the networks, from 0, if
+    /// each has one.
+    pub fn new(inputs: Vec<Channel>, row_wire: Option<String>, row_wires: Option<Vec<usize>>) -> Self {
+        Self {
+            inputs,
+            row_wire,
+            row_wires,
+            fields: CsvFields::default(),
+            columns: None,
+            cells: Vec::new(),
+            readings: Vec::new(),
+        }
+    }
+
+    /// Parses the line of this number, from 1.
+    ///
+    /// # Errors
+    /// If the line has no readings.
+    pub fn parse(&mut self, line: u64, text: &[u8]) -> Result<InputLine<'_>, InputLineError> {
+        let byte_order_mark: &[u8] = if line == 1 { b"\xef\xbb\xbf" } else { b"" };
+        let text = text.strip_prefix(byte_order_mark).unwrap_or(text).trim_ascii();
+        if text.is_empty() {
+            return Ok(InputLine::NoReadings);
+        }
+        self.fields.split(text);
+        self.cells.clear();
+        self.cells
+            .extend(self.fields.iter().map(|field| number(field).unwrap_or(f64::NAN)));
+        let row_wire = self.row_wire.as_deref();
+        // Only a line that is not made of numbers, or the first, may be a header: the others need no strings.
+        if self.columns.is_none() || self.cells.iter().any(|value| value.is_nan()) {
+            let cells: Vec<String> = self
+                .fields
+                .iter()
+                .map(|field| String::from_utf8_lossy(field).into_owned())
+                .collect();
+            if InputColumns::is_header(&cells, &self.inputs, line == 1) {
+                let columns = InputColumns::of_header(&cells, &self.inputs, row_wire);
+                self.columns = Some(columns.map_err(InputLineError::Header)?);
+                return Ok(InputLine::NoReadings);
+            }
+        }
+        let has_rows = self.row_wires.is_some();
+        let columns = match &self.columns {
+            Some(columns) => columns,
+            None => {
+                let columns = InputColumns::unnamed(self.cells.len(), &self.inputs, row_wire, has_rows);
+                self.columns.insert(columns.map_err(InputLineError::Unnamed)?)
+            }
+        };
+        if self.cells.len() != columns.width {
+            let (found, expected) = (self.cells.len(), columns.width);
+            return Err(InputLineError::Cells { found, expected });
+        }
+        let used = columns
+            .inputs
+            .iter()
+            .chain(columns.row_wire.iter().filter(|_| has_rows));
+        if let Some(column) = used.copied().find(|&column| !self.cells[column].is_finite()) {
+            return Err(InputLineError::NotFinite(column + 1));
+        }
+        let row_index = match (&self.row_wires, columns.row_wire) {
+            (None, _) => 0,
+            (Some(read), Some(column)) => {
+                let row = self.cells[column];
+                let index = read.iter().position(|read| (*read + 1) as f64 == row);
+                index.ok_or(InputLineError::NoNetwork(row))?
+            }
+            (Some(_), None) => {
+                let name = row_wire.unwrap_or("row").to_owned();
+                let near = "it has the number of the row-wire, and there is a network for each".to_owned();
+                return Err(InputLineError::Header(InputError::Missing { name, near }));
+            }
+        };
+        self.readings.clear();
+        self.readings
+            .extend(columns.inputs.iter().map(|&column| self.cells[column]));
+        Ok(InputLine::Readings {
+            row_index,
+            readings: &self.readings,
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn channels(names: &[&str]) -> Vec<Channel> {
+        let channel = |name: &&str| Channel {
+            name: (*name).to_owned(),
+            unit: None,
+        };
+        names.iter().map(channel).collect()
+    }
+
+    fn readings(lines: &mut InputLines, line: u64, text: &str) -> Option<(usize, Vec<f64>)> {
+        match lines.parse(line, text.as_bytes()).unwrap() {
+            InputLine::NoReadings => None,
+            InputLine::Readings { row_index, readings } => Some((row_index, readings.to_vec())),
+        }
+    }
+
+    #[test]
+    fn inputs_are_found_by_their_names_or_in_their_order() {
+        let mut lines = InputLines::new(channels(&["u1", "u2"]), None, None);
+        assert_eq!(readings(&mut lines, 1, "time,u2,u1"), None);
+        assert_eq!(readings(&mut lines, 2, "0.1,2,1"), Some((0, vec![1.0, 2.0])));
+        assert_eq!(readings(&mut lines, 3, ""), None);
+        let error = lines.parse(4, b"0.2,?,1").unwrap_err();
+        assert_eq!(error, InputLineError::NotFinite(2));
+        assert!(!error.is_final());
+        let mut unnamed = InputLines::new(channels(&["u1", "u2"]), None, None);
+        assert_eq!(readings(&mut unnamed, 1, "1,2"), Some((0, vec![1.0, 2.0])));
+        let other = unnamed.parse(2, b"1,2,3").unwrap_err();
+        assert_eq!(other, InputLineError::Cells { found: 3, expected: 2 });
+        let missing = unnamed.parse(3, b"time,u1,v2").unwrap_err();
+        assert!(missing.is_final() && missing.to_string().contains("u2"), "{missing}");
+    }
+
+    #[test]
+    fn the_row_wire_chooses_the_network() {
+        let mut lines = InputLines::new(channels(&["u"]), Some("row".to_owned()), Some(vec![0, 2]));
+        assert_eq!(readings(&mut lines, 1, "row,u"), None);
+        assert_eq!(readings(&mut lines, 2, "3,5"), Some((1, vec![5.0])));
+        assert_eq!(lines.parse(3, b"2,5").unwrap_err(), InputLineError::NoNetwork(2.0));
+    }
+}

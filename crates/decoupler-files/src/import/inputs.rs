@@ -1,0 +1,219 @@
+use std::path::Path;
+
+use ndarray::Array2;
+use thiserror::Error;
+
+use super::{Column, ImportError, Recipe, TableError, Watch, column::name_and_unit, csv_table::named, names::Names};
+use decoupler_core::evaluation::Channel;
+
+/// Readings of a file for a network that was trained on others of its kind.
+#[derive(Clone, Debug)]
+pub struct InputTable {
+    /// Samples × inputs.
+    pub readings: Array2<f64>,
+    /// Row-wire of each sample, from 0, if the recipe names a column of them and the file has it.
+    pub row_wires: Option<Vec<usize>>,
+    /// Line of each sample, from 1.
+    pub lines: Vec<u64>,
+}
+
+/// Columns of a table that hold the inputs of a network.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct InputColumns {
+    /// Column index of each input, in the order of the network.
+    pub inputs: Vec<usize>,
+    /// Column index of the number of the row-wire, if there is such a column.
+    pub row_wire: Option<usize>,
+    /// Number of columns of the table.
+    pub width: usize,
+}
+
+/// Reason why the columns of a table are not the inputs of a network.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+#[non_exhaustive]
+pub enum InputError {
+    /// No column has the name of an input.
+    #[error("there is no column '{name}', which is an input of the network; {near}")]
+    Missing {
+        /// Name of the input.
+        name: String,
+        /// Names that are similar, or all names, in words.
+        near: String,
+    },
+    /// A column has another unit than the input.
+    #[error("column '{name}' is in {found}, and the network was trained on {expected}; convert it")]
+    Unit {
+        /// Name of the input.
+        name: String,
+        /// Unit in the header.
+        found: String,
+        /// Unit of the input.
+        expected: String,
+    },
+    /// There are no names, and the number of columns is another one.
+    #[error("{found} cells where {expected} are needed; give the inputs of the network in their order, or a header")]
+    Count {
+        /// Number of columns.
+        found: usize,
+        /// Number needed.
+        expected: usize,
+    },
+}
+
+impl InputColumns {
+    /// Finds the inputs, and the column called `row_wire`, under the cells of a header.
+    ///
+    /// # Errors
+    /// An input that no column has the name of, or that has another unit.
+    pub fn of_header(header: &[String], inputs: &[Channel], row_wire: Option<&str>) -> Result<Self, InputError> {
+        Self::find(&named(header, header.len()), inputs, row_wire)
+    }
+
+    /// Finds the inputs among `width` columns without names. They are called c1, c2, … as in a recording without a header;
+    /// if the inputs have other names, the columns are the inputs in their order, after the number of the row-wire if
+    /// `has_row_wire`.
+    ///
+    /// # Errors
+    /// Another number of columns.
+    pub fn unnamed(
+        width: usize,
+        inputs: &[Channel],
+        row_wire: Option<&str>,
+        has_row_wire: bool,
+    ) -> Result<Self, InputError> {
+        if let Ok(found) = Self::find(&named(&[], width), inputs, row_wire)
+            && found.row_wire.is_some() >= has_row_wire
+        {
+            return Ok(found);
+        }
+        let before = usize::from(has_row_wire);
+        let expected = before + inputs.len();
+        if width != expected {
+            return Err(InputError::Count { found: width, expected });
+        }
+        Ok(Self {
+            inputs: (before..width).collect(),
+            row_wire: has_row_wire.then_some(0),
+            width,
+        })
+    }
+
+    /// Returns `true` for cells that are names: of all inputs, or of some among other texts, or texts only and as many as
+    /// there are inputs. A single text is a name in the first line only: elsewhere it may be garbage.
+    pub fn is_header(cells: &[String], inputs: &[Channel], is_first_line: bool) -> bool {
+        let is_name = |cell: &String| inputs.iter().any(|input| input.name == name_and_unit(cell).0);
+        let is_text = |cell: &&String| !cell.trim().is_empty() && cell.trim().parse::<f64>().is_err();
+        let (names, texts) = (
+            cells.iter().filter(|cell| is_name(cell)).count(),
+            cells.iter().filter(is_text).count(),
+        );
+        let has_all = names >= inputs.len() && Self::of_header(cells, inputs, None).is_ok();
+        has_all
+            || (names > 0 && texts > 0)
+            || (texts == cells.len() && texts >= inputs.len() && (texts > 1 || is_first_line))
+    }
+
+    fn find(columns: &[Column], inputs: &[Channel], row_wire: Option<&str>) -> Result<Self, InputError> {
+        let names = Names::of_columns(&[columns], &[]);
+        let mut found = Vec::with_capacity(inputs.len());
+        for Channel { name, unit } in inputs {
+            let column = match names.find(name) {
+                Ok(id) => id.column,
+                Err(ImportError::Unknown { name, near }) => return Err(InputError::Missing { name, near }),
+                Err(error) => {
+                    let (name, near) = (name.clone(), error.to_string());
+                    return Err(InputError::Missing { name, near });
+                }
+            };
+            if let (Some(found), Some(expected)) = (&columns[column].unit, unit)
+                && found != expected
+            {
+                return Err(InputError::Unit {
+                    name: name.clone(),
+                    found: found.clone(),
+                    expected: expected.clone(),
+                });
+            }
+            found.push(column);
+        }
+        Ok(Self {
+            inputs: found,
+            row_wire: row_wire.and_then(|name| Some(names.find(name).ok()?.column)),
+            width: columns.len(),
+        })
+    }
+}
+
+impl Recipe {
+    /// Reads the inputs from the file at `path`: columns of their names or, without a header, as many columns as there are
+    /// inputs, after the number of the row-wire if `has_row_wire`.
+    ///
+    /// # Errors
+    /// If the file cannot be read, lacks a column or has it in another unit, or a cell is missing or no number.
+    pub fn read_inputs(
+        &self,
+        path: &Path,
+        inputs: &[Channel],
+        has_row_wire: bool,
+        watch: Watch<'_>,
+    ) -> Result<InputTable, ImportError> {
+        let file = (path.to_owned(), self.read(Path::new(""), 0, path, None, watch)?.1);
+        let table = &file.1;
+        if let Some(line) = table.too_long.first_line {
+            return Err(self.uneven(path, line));
+        }
+        let names = Names::of(&[table], &[]);
+        let has_header = table.dialect().is_none_or(|dialect| dialect.header);
+        let found = if has_header {
+            InputColumns::find(&table.columns, inputs, self.row_wire.as_deref())
+        } else {
+            InputColumns::unnamed(table.columns.len(), inputs, self.row_wire.as_deref(), has_row_wire)
+        };
+        let InputColumns {
+            inputs: columns,
+            row_wire,
+            ..
+        } = found.map_err(|source| ImportError::Inputs {
+            path: path.to_owned(),
+            source,
+        })?;
+        let files = [file];
+        for &column in columns.iter().chain(&row_wire) {
+            super::selection::not_a_number(&files, &names, super::names::ColumnId { file: 0, column })?;
+        }
+        let table = &files[0].1;
+        for &column in columns.iter().chain(&row_wire) {
+            let cells = &table.columns[column].cells;
+            if let Some(row) = (0..table.rows).find(|&row| cells.is_missing(row)) {
+                return Err(ImportError::MissingInput {
+                    path: path.to_owned(),
+                    line: table.line(row),
+                    name: table.columns[column].name.clone(),
+                });
+            }
+        }
+        let readings = Array2::from_shape_fn((table.rows, columns.len()), |(row, input)| {
+            table.columns[columns[input]].cells.number(row)
+        });
+        let row_wires = match row_wire {
+            None => None,
+            Some(column) => {
+                let name = &table.columns[column].name;
+                let of = |row| super::selection::row_wire(name, table.columns[column].cells.number(row));
+                Some((0..table.rows).map(of).collect::<Result<_, _>>()?)
+            }
+        };
+        Ok(InputTable {
+            readings,
+            row_wires,
+            lines: (0..table.rows).map(|row| table.line(row)).collect(),
+        })
+    }
+
+    fn uneven(&self, path: &Path, line: u64) -> ImportError {
+        ImportError::File {
+            path: path.to_owned(),
+            source: TableError::Uneven { line },
+        }
+    }
+}

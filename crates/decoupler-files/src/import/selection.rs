@@ -1,0 +1,258 @@
+use std::{collections::HashMap, path::PathBuf};
+
+use super::{
+    Cells, Dropped, FileReport, ImportError, JoinReport, Recipe, Table,
+    join::Partners,
+    meanings::Meanings,
+    names::{ColumnId, Names},
+};
+use decoupler_core::evaluation::Channel;
+
+/// Largest number of a row-wire.
+const LAST_ROW_WIRE: f64 = 10_000.0;
+
+/// Rows of the first file and their partners.
+pub(super) struct Rows<'a> {
+    pub(super) recipe: &'a Recipe,
+    pub(super) files: &'a [(PathBuf, Table)],
+    pub(super) names: &'a Names,
+    pub(super) meanings: &'a Meanings,
+    pub(super) joins: &'a [Option<Partners>],
+}
+
+impl Rows<'_> {
+    pub(super) fn check_numbers(&self) -> Result<(), ImportError> {
+        self.meanings
+            .used()
+            .try_for_each(|id| not_a_number(self.files, self.names, id))?;
+        let numbers = self.meanings.comparisons.iter().map(|(id, _)| *id);
+        for id in numbers.chain(self.meanings.time).chain(self.meanings.row_wire) {
+            if let Some(label) = self.column(id).wordy_label() {
+                let name = self.names.name(id);
+                return Err(ImportError::Condition {
+                    text: name.to_owned(),
+                    reason: format!("the label '{label}' is not a number"),
+                });
+            }
+        }
+        Ok(())
+    }
+
+    fn column(&self, id: ColumnId) -> &Cells {
+        &self.files[id.file].1.columns[id.column].cells
+    }
+
+    /// Row of a file that belongs to a row of the first; `None` without a partner.
+    fn partner(&self, file: usize, row: usize) -> Option<usize> {
+        match file.checked_sub(1).and_then(|joined| self.joins[joined].as_ref()) {
+            None => Some(row),
+            Some(partners) => partners.rows[row].map(|partner| partner as usize),
+        }
+    }
+
+    /// Cell of a row; NaN if it is missing, or the row has no partner.
+    pub(super) fn number(&self, id: ColumnId, row: usize) -> f64 {
+        self.partner(id.file, row)
+            .map_or(f64::NAN, |row| self.column(id).number(row))
+    }
+
+    fn is_missing(&self, id: ColumnId, row: usize) -> bool {
+        self.partner(id.file, row)
+            .is_none_or(|row| self.column(id).is_missing(row))
+    }
+
+    /// Rows that are samples, and the others by reason.
+    pub(super) fn select(&self) -> Result<(Vec<usize>, Vec<Dropped>), ImportError> {
+        let main = &self.files[0].1;
+        let mut used: Vec<ColumnId> = Vec::new();
+        self.meanings.used().for_each(|id| {
+            if !used.contains(&id) {
+                used.push(id);
+            }
+        });
+        let mut dropped = Counts::default();
+        if main.too_long.rows > 0 {
+            let reason = format!("more cells than the {} columns", main.columns.len());
+            let first_line = main.too_long.first_line.unwrap_or(1);
+            dropped.0.push((
+                Reason::TooLong,
+                Dropped {
+                    reason,
+                    rows: main.too_long.rows,
+                    first_line,
+                },
+            ));
+        }
+        let mut kept = Vec::new();
+        for row in 0..main.rows {
+            let lonely = self
+                .joins
+                .iter()
+                .position(|join| join.as_ref().is_some_and(|join| join.rows[row].is_none()));
+            if let Some(join) = lonely {
+                dropped.count(Reason::Lonely(join), main.line(row), || {
+                    let limit = self.joins[join].as_ref().map_or(f64::NAN, |join| join.limit);
+                    format!(
+                        "no row of '{}' within {limit} of its time",
+                        self.recipe.join[join].file.display()
+                    )
+                });
+                continue;
+            }
+            let missing = |id: &&ColumnId| self.is_missing(**id, row);
+            let compared = self.meanings.comparisons.iter();
+            let unmet = compared.clone().position(|(id, comparison)| {
+                let number = self.number(*id, row);
+                !number.is_nan() && !comparison.is_met(number)
+            });
+            if let Some(unmet) = unmet {
+                let comparison = &self.meanings.comparisons[unmet].1;
+                dropped.count(Reason::Unmet(unmet), main.line(row), || {
+                    format!("{comparison} is not met")
+                });
+            } else if let Some(id) = used.iter().find(missing) {
+                dropped.count(Reason::Missing(*id), main.line(row), || {
+                    format!("{} is missing", self.names.name(*id))
+                });
+            } else {
+                kept.push(row);
+            }
+        }
+        let dropped: Vec<Dropped> = dropped.0.into_iter().map(|(_, dropped)| dropped).collect();
+        if kept.is_empty() {
+            let reasons = dropped
+                .iter()
+                .map(|dropped| format!("{}: {}", dropped.rows, dropped.reason));
+            return Err(ImportError::NoRows {
+                rows: main.rows + main.too_long.rows,
+                reasons: reasons.collect::<Vec<_>>().join("; "),
+            });
+        }
+        Ok((kept, dropped))
+    }
+
+    /// Sorts the rows by their time; tells of rows that were not in this order.
+    pub(super) fn put_in_order(&self, time: ColumnId, kept: &mut [usize]) -> Option<String> {
+        let falls = |pair: &[usize]| self.number(time, pair[1]) < self.number(time, pair[0]);
+        let first = kept.windows(2).find(|pair| falls(pair))?[1];
+        let count = kept.windows(2).filter(|pair| falls(pair)).count();
+        kept.sort_by(|&one, &other| self.number(time, one).total_cmp(&self.number(time, other)));
+        Some(format!(
+            "the times run backwards {count} times, first on line {}; the samples are put in the order of their times",
+            self.files[0].1.line(first)
+        ))
+    }
+
+    /// Number of each sample's group, in the order in which groups first occur.
+    pub(super) fn groups(&self, kept: &[usize]) -> Vec<usize> {
+        let Some(id) = self.meanings.group else {
+            return (0..kept.len()).collect();
+        };
+        let mut known = HashMap::new();
+        let numbers = kept.iter().map(|&row| {
+            let next = known.len();
+            let key = self.partner(id.file, row).map(|row| self.column(id).group(row));
+            *known.entry(key).or_insert(next)
+        });
+        numbers.collect()
+    }
+
+    pub(super) fn row_wires(&self, kept: &[usize]) -> Result<Option<Vec<usize>>, ImportError> {
+        let Some(id) = self.meanings.row_wire else {
+            return Ok(None);
+        };
+        let of = |&row: &usize| row_wire(self.names.name(id), self.number(id, row));
+        kept.iter().map(of).collect::<Result<_, _>>().map(Some)
+    }
+
+    pub(super) fn channel(&self, id: ColumnId) -> Channel {
+        let column = &self.files[id.file].1.columns[id.column];
+        Channel {
+            name: self.names.name(id).to_owned(),
+            unit: self.meanings.units.get(&id).or(column.unit.as_ref()).cloned(),
+        }
+    }
+
+    pub(super) fn reports(&self) -> Vec<FileReport> {
+        let report = |(number, (path, table)): (usize, &(PathBuf, Table))| {
+            let join = number.checked_sub(1).and_then(|join| self.joins[join].as_ref());
+            FileReport {
+                path: path.clone(),
+                format: table.format.clone(),
+                rows: table.rows,
+                columns: table.columns.len(),
+                too_short: table.too_short,
+                join: join.map(|partners| {
+                    let mut is_used = vec![false; table.rows];
+                    partners
+                        .rows
+                        .iter()
+                        .flatten()
+                        .for_each(|&row| is_used[row as usize] = true);
+                    JoinReport {
+                        limit: partners.limit,
+                        without_partner: partners.rows.iter().filter(|partner| partner.is_none()).count(),
+                        unused: is_used.iter().filter(|is_used| !**is_used).count(),
+                        median_offset: partners.median_offset,
+                    }
+                }),
+            }
+        };
+        self.files.iter().enumerate().map(report).collect()
+    }
+}
+
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Reason {
+    TooLong,
+    Lonely(usize),
+    Unmet(usize),
+    Missing(ColumnId),
+}
+
+/// Rows dropped, by reason in the order of their first.
+#[derive(Default)]
+struct Counts(Vec<(Reason, Dropped)>);
+
+impl Counts {
+    fn count(&mut self, reason: Reason, line: u64, words: impl FnOnce() -> String) {
+        if let Some((_, dropped)) = self.0.iter_mut().find(|(other, _)| *other == reason) {
+            dropped.rows += 1;
+            return;
+        }
+        let dropped = Dropped {
+            reason: words(),
+            rows: 1,
+            first_line: line,
+        };
+        self.0.push((reason, dropped));
+    }
+}
+
+/// Refuses a column with cells that are neither numbers nor missing.
+pub(super) fn not_a_number(files: &[(PathBuf, Table)], names: &Names, id: ColumnId) -> Result<(), ImportError> {
+    let (path, table) = &files[id.file];
+    let faults = &table.columns[id.column].faults;
+    let Some(first) = &faults.first else { return Ok(()) };
+    Err(ImportError::NotANumber {
+        path: path.clone(),
+        line: first.line,
+        column: id.column + 1,
+        name: names.name(id).to_owned(),
+        text: first.text.clone(),
+        others: match faults.count {
+            1 => String::new(),
+            count => format!(", nor are {} other cells of the column", count - 1),
+        },
+    })
+}
+
+/// Index of the row-wire with the number `value`.
+pub(super) fn row_wire(name: &str, value: f64) -> Result<usize, ImportError> {
+    if value.fract() == 0.0 && (1.0..=LAST_ROW_WIRE).contains(&value) {
+        Ok(value as usize - 1)
+    } else {
+        let name = name.to_owned();
+        Err(ImportError::RowWire { name, value })
+    }
+}

@@ -1,0 +1,259 @@
+use std::{ops::ControlFlow, path::Path, sync::Arc};
+
+use thiserror::Error;
+
+use super::{ImportError, Plan, PlannedSets, Progress, Recorded, Recording};
+use decoupler_core::{
+    evaluation::{
+        Run, RunError, RunSets, RunSettings, SimulatedSettings, Source,
+        experiments::{ExperimentRecording, RecordedSamples, TrialSamples},
+    },
+    training::TrainerState,
+};
+
+/// Everything a run needs to be repeated: its settings and, if its source is a recording, the plan that reads it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Setup {
+    settings: RunSettings,
+    plan: Option<Plan>,
+}
+
+/// Sets of samples of a setup, and where recorded ones come from.
+#[derive(Clone, Debug)]
+pub struct SetupSets {
+    /// Sets of samples with the description of their channels.
+    pub sets: RunSets,
+    /// Recordings read; `None` for a simulated array.
+    pub recordings: Option<Recordings>,
+}
+
+/// Recordings out of which sets were made.
+#[derive(Clone, Debug)]
+pub struct Recordings {
+    /// Plan and checksums, to be saved with the run.
+    pub recorded: Recorded,
+    /// All samples but those of the test files.
+    pub training: Recording,
+    /// Samples of the test files, if there are any.
+    pub test: Option<Recording>,
+}
+
+/// Error of reading or drawing the samples of a setup.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum SetupError {
+    /// The recording cannot be read.
+    #[error(transparent)]
+    Import(#[from] ImportError),
+    /// The samples cannot be drawn or trained on.
+    #[error(transparent)]
+    Run(#[from] RunError),
+    /// The recording has changed.
+    #[error("'{0}' has other samples than when the run was saved; use the files of that time, or train again")]
+    OtherSamples(String),
+}
+
+impl From<SimulatedSettings> for Setup {
+    fn from(settings: SimulatedSettings) -> Self {
+        Self {
+            settings: settings.into(),
+            plan: None,
+        }
+    }
+}
+
+impl Setup {
+    /// Returns the setup of a recording, read by `plan`. The source of `settings` must be measured.
+    ///
+    /// # Panics
+    /// If the source of `settings` is simulated.
+    pub fn recording(settings: RunSettings, plan: Plan) -> Self {
+        assert!(
+            matches!(settings.source, Source::Measured(_)),
+            "the source is a recording"
+        );
+        Self {
+            settings,
+            plan: Some(plan),
+        }
+    }
+
+    /// Returns the setup with these settings and, for a measured source, this plan; `None` if one of both is missing.
+    pub fn of(settings: RunSettings, plan: Option<Plan>) -> Option<Self> {
+        let is_recording = matches!(settings.source, Source::Measured(_));
+        (is_recording == plan.is_some()).then_some(Self { settings, plan })
+    }
+
+    /// Settings of the run.
+    pub fn settings(&self) -> &RunSettings {
+        &self.settings
+    }
+
+    /// Returns the setup with other settings of the same source.
+    #[must_use]
+    pub fn with_settings(&self, settings: RunSettings) -> Self {
+        Self {
+            settings,
+            plan: self.plan.clone(),
+        }
+    }
+
+    /// Settings of a simulated run, if it is one.
+    pub fn simulated(&self) -> Option<SimulatedSettings> {
+        self.settings.simulated()
+    }
+
+    /// Plan by which a recording is read; `None` for a simulated array.
+    pub fn plan(&self) -> Option<&Plan> {
+        self.plan.as_ref()
+    }
+
+    /// Name of the source: the array scale, or the stem of the first file.
+    pub fn source_name(&self) -> String {
+        match (&self.plan, &self.settings.source) {
+            (Some(plan), _) => plan
+                .import
+                .data
+                .file_stem()
+                .unwrap_or_default()
+                .to_string_lossy()
+                .into_owned(),
+            (None, Source::Simulated(simulation)) => simulation.sensor.scale.to_string(),
+            (None, Source::Measured(_)) => String::new(),
+        }
+    }
+
+    /// Draws the samples of a simulated array, or reads those of a recording, whose paths are relative to `folder`. Returns
+    /// `None` once `is_cancelled`, which is called between the parts of the work; `on_progress` follows the reading of
+    /// files.
+    ///
+    /// # Errors
+    /// If the settings are invalid, or the files cannot be read or their samples not be divided.
+    pub fn sets(
+        &self,
+        folder: &Path,
+        is_cancelled: &dyn Fn() -> bool,
+        on_progress: &mut dyn FnMut(Progress),
+    ) -> Result<Option<SetupSets>, SetupError> {
+        let Some(plan) = &self.plan else {
+            let settings = self.settings.simulated().expect("a setup without a plan is simulated");
+            let sets = settings.checked_sets_unless(is_cancelled)?;
+            return Ok(sets.map(|sets| SetupSets { sets, recordings: None }));
+        };
+        let watch = &mut watch(is_cancelled, on_progress);
+        let planned = match plan.sets(folder, self.settings.seed, watch) {
+            Err(_) if is_cancelled() => return Ok(None),
+            planned => planned?,
+        };
+        let recorded = Recorded::of(plan.within(folder).absolute(), &planned)?;
+        let PlannedSets {
+            recording,
+            test_recording,
+            split,
+            test,
+        } = planned;
+        let sets = RunSets::new(split, test).described(recording.problem());
+        Ok(Some(SetupSets {
+            sets,
+            recordings: Some(Recordings {
+                recorded,
+                training: recording,
+                test: test_recording,
+            }),
+        }))
+    }
+}
+
+impl Setup {
+    /// Returns the recording for an experiment; `None` for a simulated array.
+    pub fn experiment_recording(&self) -> Option<ExperimentRecording> {
+        let plan = self.plan.as_ref()?;
+        Some(ExperimentRecording {
+            name: self.source_name(),
+            has_groups: plan.import.group.is_some(),
+            has_test_files: plan.test.is_some(),
+            division: plan.division,
+        })
+    }
+
+    /// Reads the samples for the trials of an experiment; those of a simulated array are drawn by each trial. Folder,
+    /// cancelling and progress are those of [`Self::sets`].
+    ///
+    /// # Errors
+    /// If the files cannot be read.
+    pub fn trial_samples(
+        &self,
+        folder: &Path,
+        is_cancelled: &dyn Fn() -> bool,
+        on_progress: &mut dyn FnMut(Progress),
+    ) -> Result<Option<TrialSamples>, SetupError> {
+        let Some(plan) = &self.plan else {
+            return Ok(Some(TrialSamples::Drawn));
+        };
+        let (recording, test) = match plan.recordings(folder, &mut watch(is_cancelled, on_progress)) {
+            Err(_) if is_cancelled() => return Ok(None),
+            read => read?,
+        };
+        Ok(Some(TrialSamples::Recorded(RecordedSamples {
+            problem: Arc::new(recording.problem()),
+            set: Arc::new(recording.set),
+            test: test.map(|test| Arc::new(test.set)),
+        })))
+    }
+}
+
+/// Passes on the progress of reading, and ends it once `is_cancelled`.
+fn watch(
+    is_cancelled: &dyn Fn() -> bool,
+    on_progress: &mut dyn FnMut(Progress),
+) -> impl FnMut(Progress) -> ControlFlow<()> {
+    move |progress| {
+        on_progress(progress);
+        if is_cancelled() {
+            ControlFlow::Break(())
+        } else {
+            ControlFlow::Continue(())
+        }
+    }
+}
+
+impl SetupSets {
+    /// Prepares a run of `setup` on these sets; returns `None` once `is_cancelled`.
+    ///
+    /// # Errors
+    /// As [`Run::on_sets`].
+    pub fn run(&self, setup: &Setup, is_cancelled: &dyn Fn() -> bool) -> Result<Option<Run>, RunError> {
+        Run::on_unless(setup.settings, self.sets.clone(), is_cancelled)
+    }
+
+    /// Resumes a run of `setup` on these sets from the states of its trainings; returns `None` once `is_cancelled`.
+    ///
+    /// # Errors
+    /// As [`Run::resume_on_sets`].
+    pub fn resume(
+        self,
+        setup: &Setup,
+        states: Vec<TrainerState>,
+        is_cancelled: &dyn Fn() -> bool,
+    ) -> Result<Option<Run>, RunError> {
+        Run::resume_unless(setup.settings, states, self.sets, is_cancelled)
+    }
+
+    /// Compares recorded samples with those that were `saved` with a run.
+    ///
+    /// # Errors
+    /// [`SetupError::OtherSamples`] if the recording has changed.
+    pub fn check_saved(&self, saved: Option<&Recorded>) -> Result<(), SetupError> {
+        match (saved, self.recorded()) {
+            (Some(saved), Some(found)) if saved.samples_crc32 != found.samples_crc32 => {
+                Err(SetupError::OtherSamples(saved.plan.import.data.display().to_string()))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// Origin of recorded samples, to be saved with the run; `None` for a simulated array.
+    pub fn recorded(&self) -> Option<&Recorded> {
+        self.recordings.as_ref().map(|recordings| &recordings.recorded)
+    }
+}

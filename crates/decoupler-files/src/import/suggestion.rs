@@ -1,0 +1,318 @@
+use std::path::Path;
+
+use super::{ColumnKind, ColumnSummary, InspectedFile, Joined, Meaning, Plan, Recipe, TestFiles, table::stem};
+use decoupler_core::dataset::{Division, SplitBy};
+
+/// Words in names of columns and files that speak for a target, and how strongly.
+const TARGET_WORDS: [(&str, i32); 27] = [
+    ("force", 3),
+    ("torque", 3),
+    ("target", 3),
+    ("label", 3),
+    ("truth", 3),
+    ("load", 3),
+    ("moment", 3),
+    ("state", 2),
+    ("probe", 2),
+    ("robot", 2),
+    ("pose", 2),
+    ("position", 2),
+    ("pos", 2),
+    ("depth", 2),
+    ("displacement", 2),
+    ("deflection", 2),
+    ("indentation", 2),
+    ("angle", 2),
+    ("roll", 2),
+    ("pitch", 2),
+    ("yaw", 2),
+    ("weight", 2),
+    ("stiffness", 2),
+    ("fx", 2),
+    ("fy", 2),
+    ("fz", 2),
+    ("output", 2),
+];
+
+/// Words that speak for an input.
+const INPUT_WORDS: [&str; 19] = [
+    "sensor",
+    "reading",
+    "readings",
+    "taxel",
+    "tactile",
+    "skin",
+    "channel",
+    "ch",
+    "adc",
+    "raw",
+    "mag",
+    "magnetometer",
+    "hall",
+    "resistance",
+    "voltage",
+    "capacitance",
+    "input",
+    "feature",
+    "pixel",
+];
+
+/// Units of what is to be told, and of what sensors give.
+const TARGET_UNITS: [&str; 22] = [
+    "m", "mm", "cm", "µm", "um", "n", "mn", "kn", "nm", "n·m", "n m", "nmm", "n·mm", "mnm", "kg", "g", "deg", "°",
+    "rad", "kpa", "pa", "mrad",
+];
+const INPUT_UNITS: [&str; 22] = [
+    "v", "mv", "µv", "uv", "ω", "ohm", "kω", "kohm", "mω", "t", "mt", "µt", "ut", "gauss", "pf", "nf", "a", "ma", "µa",
+    "counts", "lsb", "adc",
+];
+
+/// Names of columns whose equal values belong together.
+const GROUP_NAMES: [&str; 11] = [
+    "group",
+    "session",
+    "trial",
+    "press",
+    "run",
+    "episode",
+    "subject",
+    "block",
+    "recording",
+    "take",
+    "touch",
+];
+
+/// Guesses from names, units and numbers what inspected files are for: which one has the readings, how the others are
+/// joined to it, which of them are for the test, and what each column means. A guess to be looked at: names may lie.
+///
+/// Constant columns, texts and copies of other columns are not used.
+pub fn suggested_plan(files: &[InspectedFile]) -> Plan {
+    let (training, test) = apart(files);
+    let mut order: Vec<&InspectedFile> = training;
+    // The readings first: those that look least like targets, then the widest file.
+    order.sort_by_key(|file| (score_of_file(&file.path), usize::MAX - numeric(file).count()));
+    Plan {
+        test,
+        ..plan_of(&order)
+    }
+}
+
+/// As [`suggested_plan`], of files of which it is known that the first has the readings, to which the others are joined.
+pub fn suggested_plan_in_order(files: &[InspectedFile]) -> Plan {
+    plan_of(&Vec::from_iter(files))
+}
+
+/// Guesses what the columns are for, of the file with the readings and of those joined to it.
+fn plan_of(order: &[&InspectedFile]) -> Plan {
+    let Some((first, joined)) = order.split_first() else {
+        return Plan::default();
+    };
+    let by_time = joined.iter().all(|file| share_time(first, file));
+    let time_of = |file: &InspectedFile| time(file).filter(|_| by_time).map(|time| time.name.clone());
+    let recipe = Recipe {
+        data: first.path.clone(),
+        join: joined
+            .iter()
+            .map(|file| Joined {
+                file: file.path.clone(),
+                stem: own_stem(file),
+                time: time_of(file),
+                ..Joined::default()
+            })
+            .collect(),
+        ..Recipe::default()
+    };
+    let stems = recipe.stems();
+    let mut plan = Plan {
+        import: Recipe {
+            time: time_of(first),
+            ..recipe
+        },
+        ..Plan::default()
+    };
+    let first_meanings = guesses(first, joined.is_empty());
+    add(&mut plan.import, first, &first_meanings, None);
+    for (file, stem) in joined.iter().zip(&stems) {
+        // What comes with the readings is to be told from them, whatever its columns are called.
+        let meanings = guesses(file, false).into_iter().map(|meaning| match meaning {
+            Meaning::Input => Meaning::Target,
+            other => other,
+        });
+        add(&mut plan.import, file, &Vec::from_iter(meanings), Some(stem));
+    }
+    let Recipe { inputs, targets, .. } = &mut plan.import;
+    // Where the names do not tell them apart, the last column is the target, as in most tables of samples.
+    if inputs.is_empty() {
+        std::mem::swap(inputs, targets);
+    }
+    if targets.is_empty() && inputs.len() > 1 {
+        targets.extend(inputs.pop());
+    }
+    if plan.import.group.is_some() {
+        plan.division = Division {
+            by: SplitBy::Group,
+            ..plan.division
+        };
+    }
+    plan
+}
+
+/// Name in front of the columns of a joined file, if it is not made from the name of the file.
+fn own_stem(file: &InspectedFile) -> Option<String> {
+    let of_file = stem(&file.path);
+    let is_own = |given: &&String| given.split_once('#').map_or(given.as_str(), |(before, _)| before) != of_file;
+    file.stem.as_ref().filter(is_own).cloned()
+}
+
+/// Files for the training, and those for the test if there is one for each, as `trainPose` and `testPose`.
+fn apart(files: &[InspectedFile]) -> (Vec<&InspectedFile>, Option<TestFiles>) {
+    let all = || files.iter().collect::<Vec<_>>();
+    let is_test = |file: &&InspectedFile| stem(&file.path).to_lowercase().contains("test");
+    let (test, training): (Vec<_>, Vec<_>) = files.iter().partition(is_test);
+    if test.is_empty() || test.len() != training.len() {
+        return (all(), None);
+    }
+    let mut sorted = training.clone();
+    sorted.sort_by_key(|file| (score_of_file(&file.path), usize::MAX - numeric(file).count()));
+    let partner = |file: &&InspectedFile| {
+        let key = without_part(&file.path);
+        test.iter()
+            .find(|test| without_part(&test.path) == key)
+            .map(|test| test.path.clone())
+    };
+    let Some(mut partners) = sorted.iter().map(partner).collect::<Option<Vec<_>>>() else {
+        return (all(), None);
+    };
+    let data = partners.remove(0);
+    (training, Some(TestFiles { data, join: partners }))
+}
+
+/// Name of a file without the part that it is for.
+fn without_part(path: &Path) -> String {
+    let mut name = stem(path).to_lowercase();
+    for part in ["training", "train", "test"] {
+        name = name.replace(part, "");
+    }
+    name.chars().filter(|letter| letter.is_alphanumeric()).collect()
+}
+
+/// Columns of numbers.
+fn numeric(file: &InspectedFile) -> impl Iterator<Item = &ColumnSummary> {
+    file.inspection.columns.iter().filter(|column| is_numeric(column))
+}
+
+fn is_numeric(column: &ColumnSummary) -> bool {
+    matches!(column.kind, ColumnKind::Number | ColumnKind::Integer) && column.texts == 0
+}
+
+/// Column of times, if its name or unit speaks for it or it has no name: any input may always grow.
+fn time(file: &InspectedFile) -> Option<&ColumnSummary> {
+    let time = file.inspection.time.as_ref()?;
+    let column = file
+        .inspection
+        .columns
+        .iter()
+        .find(|column| column.name == time.column)?;
+    let name = column.name.to_lowercase();
+    let is_named = ["time", "stamp", "clock", "date", "index", "frame", "sample", "second"];
+    let has_unit = |unit: &String| ["s", "ms", "µs", "us", "min", "h"].contains(&unit.trim());
+    let is_time = is_named.iter().any(|word| name.contains(word))
+        || ["t", "c1"].contains(&name.as_str())
+        || column.unit.as_ref().is_some_and(has_unit);
+    is_time.then_some(column)
+}
+
+/// Tells whether both files have times, and these overlap.
+fn share_time(one: &InspectedFile, other: &InspectedFile) -> bool {
+    let range = |file: &InspectedFile| {
+        let column = time(file)?;
+        Some((column.min?, column.max?))
+    };
+    match (range(one), range(other)) {
+        (Some(one), Some(other)) => one.0 <= other.1 && other.0 <= one.1,
+        _ => false,
+    }
+}
+
+/// Points of a file's name for targets: negative for readings.
+fn score_of_file(path: &Path) -> i32 {
+    let name = stem(path).to_lowercase();
+    let targets = TARGET_WORDS
+        .iter()
+        .filter(|(word, _)| word.len() > 3 && name.contains(word));
+    let inputs = INPUT_WORDS.iter().filter(|word| word.len() > 2 && name.contains(*word));
+    targets.map(|(_, weight)| *weight).max().unwrap_or(0) - 4 * i32::from(inputs.count() > 0)
+}
+
+/// Guesses of the meaning of each column.
+fn guesses(file: &InspectedFile, is_alone: bool) -> Vec<Meaning> {
+    let inspection = &file.inspection;
+    let time = time(file).map(|time| time.name.as_str());
+    let mut has_group = false;
+    let guess = |column: &ColumnSummary| {
+        if time == Some(column.name.as_str()) {
+            return Meaning::Time;
+        }
+        let name = column.name.trim().to_lowercase();
+        if !has_group
+            && GROUP_NAMES
+                .iter()
+                .any(|group| name == *group || name == format!("{group}_id"))
+        {
+            has_group = true;
+            return Meaning::Group;
+        }
+        if column.is_constant || column.duplicate_of.is_some() || !is_numeric(column) {
+            return Meaning::Unused;
+        }
+        let is_row_wire = ["row_wire", "row-wire", "row wire", "rowwire", "row"].contains(&name.as_str());
+        if is_row_wire && column.kind == ColumnKind::Integer && column.min >= Some(1.0) {
+            return Meaning::RowWire;
+        }
+        // In one file the target stands among the inputs.
+        if is_alone && looks_like_target(&name, column.unit.as_deref()) {
+            Meaning::Target
+        } else {
+            Meaning::Input
+        }
+    };
+    inspection.columns.iter().map(guess).collect()
+}
+
+fn looks_like_target(name: &str, unit: Option<&str>) -> bool {
+    if let Some(unit) = unit.map(|unit| unit.trim().to_lowercase()) {
+        if INPUT_UNITS.contains(&unit.as_str()) {
+            return false;
+        }
+        if TARGET_UNITS.contains(&unit.as_str()) {
+            return true;
+        }
+    }
+    let words = || {
+        let words = name.split(|letter: char| !letter.is_alphanumeric());
+        words.map(|word| word.trim_end_matches(|letter: char| letter.is_ascii_digit()))
+    };
+    if words().any(|word| INPUT_WORDS.contains(&word)) {
+        return false;
+    }
+    ["x", "y", "z"].contains(&name) || words().any(|word| TARGET_WORDS.iter().any(|(target, _)| *target == word))
+}
+
+/// Adds the columns of a file to a recipe by their full names.
+fn add(recipe: &mut Recipe, file: &InspectedFile, meanings: &[Meaning], stem: Option<&String>) {
+    for (column, meaning) in file.inspection.columns.iter().zip(meanings) {
+        let name = match stem {
+            None => column.name.clone(),
+            Some(stem) => format!("{stem}.{}", column.name),
+        };
+        match meaning {
+            Meaning::Input => recipe.inputs.push(name),
+            Meaning::Target => recipe.targets.push(name),
+            Meaning::Group if recipe.group.is_none() => recipe.group = Some(name),
+            Meaning::RowWire if recipe.row_wire.is_none() => recipe.row_wire = Some(name),
+            // The first file alone has its time by then, if the files are joined by it.
+            Meaning::Time if stem.is_none() && recipe.join.is_empty() => recipe.time = Some(name),
+            _ => {}
+        }
+    }
+}

@@ -1,0 +1,13 @@
+//! Files of Decoupler, in and out.
+//!
+//! | module | contents |
+//! |---|---|
+//! | [`import`] | recordings out of files: tables, joins by time, meanings of columns, recipes |
+//! | [`figure`] | what a picture shows, for the window and for print |
+//! | [`export`] | network files, checkpoints, run folders, tables, reports; [`export::bundle`] writes decoders for other programs, [`export::figures`] draws |
+//!
+//! Numerics are in [`decoupler_core`]; each module uses only those before it.
+
+pub mod export;
+pub mod figure;
+pub mod import;

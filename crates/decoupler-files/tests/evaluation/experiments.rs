@@ -1,0 +1,555 @@
+//! The paper's experiments and sweeps.
+
+use std::{
+    fs,
+    num::NonZero,
+    ops::ControlFlow,
+    path::Path,
+    sync::{
+        Arc,
+        atomic::{AtomicUsize, Ordering},
+    },
+};
+
+use decoupler_core::{
+    dataset::{FoldUnit, Seed, SplitBy},
+    evaluation::{
+        CrossValidation, Measured, Run, RunSettings, SimulatedSettings, Simulation, TestErrors,
+        experiments::{
+            Axis, Bottleneck, Experiment, ExperimentError, ExperimentResults, SummaryErrors, Trial, TrialSamples,
+            run_experiments, verdicts,
+        },
+    },
+    scene::RowModel,
+    sensor::{ArrayScale, SensorModel},
+    training::Method,
+};
+use decoupler_files::{
+    export::{ExperimentTable, describe_conditions, describe_worse_than_mean, trials_table, write_experiment_markdown},
+    import::{Plan, Recipe, Setup},
+};
+
+/// Of a second at most: a small array, few samples, few epochs.
+fn small_settings() -> SimulatedSettings {
+    let mut base = SimulatedSettings {
+        source: Simulation {
+            sensor: SensorModel::new("4x2_1x6".parse().unwrap()),
+            samples: 40,
+            validation_samples: 12,
+            test_samples: 20,
+            ..Simulation::default()
+        },
+        hidden: 3,
+        starts: 2,
+        ..SimulatedSettings::default()
+    };
+    base.training.stopping.epochs = 8;
+    base
+}
+
+fn small(axis: Axis) -> Experiment {
+    Experiment {
+        base: small_settings().into(),
+        recording: None,
+        axis,
+        second_axis: None,
+        seeds: 3,
+        cross_validation: None,
+    }
+}
+
+fn cross_validated(unit: FoldUnit) -> Experiment {
+    Experiment {
+        cross_validation: Some(CrossValidation {
+            folds: 4,
+            repeats: 2,
+            unit,
+        }),
+        ..small(Axis::Samples(vec![40, 20]))
+    }
+}
+
+fn worst_mm(errors: &TestErrors) -> f64 {
+    errors.nodes().unwrap().worst_mm
+}
+
+fn threads(count: usize) -> NonZero<usize> {
+    NonZero::new(count).unwrap()
+}
+
+fn run(experiments: &[Experiment], thread_count: usize) -> Vec<ExperimentResults> {
+    let mut results: Vec<_> = experiments.iter().cloned().map(ExperimentResults::new).collect();
+    run_experiments(
+        experiments,
+        &TrialSamples::Drawn,
+        threads(thread_count),
+        || false,
+        |finished| {
+            results[finished.experiment].record(finished.cell, finished.outcome);
+        },
+    )
+    .unwrap();
+    results
+}
+
+/// The trials of every cell, without their times.
+fn timeless(results: &[ExperimentResults]) -> Vec<Vec<Trial>> {
+    let cells = results.iter().flat_map(|results| &results.cells);
+    let trials = cells.map(|cell| {
+        let timeless = |trial: &Trial| Trial {
+            seconds: 0.0,
+            least_epoch_seconds: 0.0,
+            states: Vec::new(),
+            ..trial.clone()
+        };
+        cell.trials.iter().map(timeless).collect()
+    });
+    trials.collect()
+}
+
+#[test]
+fn results_are_the_same_on_any_number_of_threads() {
+    let experiments = [
+        Experiment {
+            second_axis: Some(Axis::Method(Method::all()[..4].to_vec())),
+            ..small(Axis::Hidden(vec![2, 5]))
+        },
+        cross_validated(FoldUnit::Sample),
+        cross_validated(FoldUnit::Snapshot),
+    ];
+    let alone = run(&experiments, 1);
+    assert!(alone.iter().all(ExperimentResults::is_complete));
+    assert_eq!(timeless(&alone), timeless(&run(&experiments, 3)));
+    let counts: Vec<_> = timeless(&alone).iter().map(Vec::len).collect();
+    assert_eq!(counts, [vec![3; 8], vec![6; 4]].concat());
+}
+
+#[test]
+fn a_trial_is_the_run_that_its_settings_describe() {
+    let experiment = small(Axis::Hidden(vec![2, 4]));
+    for cell in &run(std::slice::from_ref(&experiment), 2)[0].cells {
+        let mut z_percent = Vec::new();
+        for (trial, seed) in cell.trials.iter().zip(0..3) {
+            let settings = SimulatedSettings {
+                seed: Seed(seed),
+                ..cell.cell.settings.simulated().unwrap()
+            };
+            let mut alone = Run::prepare(settings).unwrap();
+            while alone.step().is_none() {}
+            assert_eq!(trial.seed, Seed(seed));
+            assert_eq!(trial.errors, alone.scores().unwrap().network);
+            assert_eq!(trial.baselines, *alone.baselines().unwrap());
+            let taken_up = Run::resume(settings, trial.states.clone()).unwrap();
+            assert_eq!(taken_up.network(), alone.network());
+            assert_eq!(taken_up.stop_reason(), alone.stop_reason());
+            z_percent.push(alone.errors().percent().unwrap());
+        }
+        z_percent.sort_by(f64::total_cmp);
+        let summary = cell.summary();
+        let z = &summary.percent;
+        assert_eq!([z.min, z.median, z.max].map(Option::unwrap), z_percent[..]);
+        let median = cell.median_trial().unwrap();
+        assert_eq!(median.errors.percent(), Some(z_percent[1]));
+    }
+}
+
+#[test]
+fn cross_validation_decouples_every_sample_by_what_has_not_seen_it() {
+    for unit in [FoldUnit::Sample, FoldUnit::Snapshot] {
+        let mut experiment = cross_validated(unit);
+        // As many hidden nodes as coordinates vary: nothing is lost in them.
+        experiment.base.hidden = 6;
+        for cell in &run(&[experiment], 2)[0].cells {
+            for trial in &cell.trials {
+                // A sample left out would be decoupled as (0, 0, 0), 4 mm below any node.
+                assert!(worst_mm(&trial.baselines.mean) < 1.0, "{unit}: {trial:?}");
+                assert!(worst_mm(&trial.errors) < 4.0, "{unit}: {trial:?}");
+                assert!(
+                    worst_mm(trial.bottleneck.as_ref().unwrap()) < 1e-12,
+                    "{unit}: {trial:?}"
+                );
+                assert_eq!((trial.networks, trial.states.is_empty()), (4, true));
+            }
+            let [first, second] = [0, 1].map(|repeat| &cell.trials[repeat]);
+            assert_eq!(first.seed, second.seed);
+            assert_ne!(first.errors, second.errors, "each repeat deals anew");
+        }
+    }
+}
+
+#[test]
+fn cancelling_keeps_what_is_finished() {
+    let experiment = small(Axis::Hidden(vec![2, 3, 4]));
+    let trials_after = |asked_at_most: usize| {
+        let asked = AtomicUsize::new(0);
+        let mut results = ExperimentResults::new(experiment.clone());
+        let mut finished = 0;
+        run_experiments(
+            std::slice::from_ref(&experiment),
+            &TrialSamples::Drawn,
+            threads(1),
+            || asked.fetch_add(1, Ordering::Relaxed) >= asked_at_most,
+            |one| {
+                assert_eq!((one.trials, one.experiment), (9, 0));
+                finished += 1;
+                assert_eq!(one.done, finished);
+                results.record(one.cell, one.outcome);
+            },
+        )
+        .unwrap();
+        (results, finished, asked.into_inner())
+    };
+    let (whole, finished, asked) = trials_after(usize::MAX);
+    assert!(finished == 9 && whole.is_complete());
+    let (results, finished, _) = trials_after(asked / 2);
+    assert!((3..9).contains(&finished) && !results.is_complete());
+    let kept = timeless(std::slice::from_ref(&results));
+    assert_eq!(kept.iter().map(Vec::len).sum::<usize>(), finished);
+    for (kept, whole) in kept.iter().zip(&timeless(&[whole])) {
+        assert!(kept.iter().all(|trial| whole.contains(trial)));
+    }
+    assert!(
+        kept.iter().all(|trials| !trials.is_empty()),
+        "every cell is tried once before any twice"
+    );
+}
+
+#[test]
+fn cancelling_does_not_wait_for_a_training_to_end() {
+    let mut experiment = small(Axis::Hidden(vec![3]));
+    experiment.base.training.stopping.epochs = 1_000_000;
+    experiment.base.training.stopping.max_fail = 1_000_000;
+    experiment.base.training.method = Method::all()[8];
+    for experiment in [
+        experiment.clone(),
+        Experiment {
+            cross_validation: Some(CrossValidation::default()),
+            ..experiment
+        },
+    ] {
+        let asked = AtomicUsize::new(0);
+        let is_cancelled = || asked.fetch_add(1, Ordering::Relaxed) >= 50;
+        run_experiments(&[experiment], &TrialSamples::Drawn, threads(2), is_cancelled, |one| {
+            panic!("{one:?}")
+        })
+        .unwrap();
+        assert!((51..=60).contains(&asked.into_inner()));
+    }
+}
+
+#[test]
+fn a_cell_that_cannot_be_trained_says_why_and_the_others_go_on() {
+    let mut settings = small_settings();
+    settings.source.sensor = SensorModel::new("1x32_5x96".parse().unwrap());
+    let mut experiment = small(Axis::Hidden(vec![2, 512]));
+    experiment.base = settings.into();
+    experiment.base.starts = 1;
+    let by_name = |method: &Method| method.to_string().contains("Bayesian");
+    experiment.base.training.method = Method::all().into_iter().find(by_name).unwrap();
+    let results = &run(&[experiment], 2)[0];
+    assert!(results.is_complete());
+    assert_eq!((results.cells[0].trials.len(), results.cells[0].failures.len()), (3, 0));
+    assert_eq!((results.cells[1].trials.len(), results.cells[1].failures.len()), (0, 3));
+    let message = results.cells[1].failures[0].to_string();
+    assert!(
+        message.contains("seed 0") && message.contains("memory") && message.contains("hidden nodes"),
+        "{message}"
+    );
+    assert_eq!(results.cells[1].summary().percent.median, None);
+}
+
+#[test]
+fn cells_with_networks_worse_than_the_mean_are_named() {
+    let mut experiment = small(Axis::Epochs(vec![1, 60]));
+    let by_name = |method: &Method| method.short_name() == "gd";
+    experiment.base.training.method = Method::all().into_iter().find(by_name).unwrap();
+    let results = &run(&[experiment], 2)[0];
+    let z_mm = |errors: &TestErrors| errors.nodes().unwrap().z_mm;
+    let worse = |cell: usize| {
+        let trials = results.cells[cell].trials.iter();
+        trials
+            .filter(|trial| z_mm(&trial.errors) > z_mm(&trial.baselines.mean))
+            .count()
+    };
+    assert!(worse(0) > 0, "one epoch of gradient descent teaches little");
+    let told = describe_worse_than_mean(results);
+    assert_eq!(told.len(), (0..2).filter(|&cell| worse(cell) > 0).count());
+    let beginning = format!(
+        "At {}, {} of 3 are worse",
+        results.cell_labels(&results.cells[0]).join(", "),
+        worse(0)
+    );
+    assert!(told[0].starts_with(&beginning), "{told:?}");
+}
+
+/// Against the property itself: whatever is trained, and however well, the training error stays above.
+#[test]
+fn no_training_gets_below_the_bound_of_its_hidden_nodes() {
+    for seed in 0..4 {
+        for hidden in 1..=4 {
+            let mut settings = small_settings();
+            settings.hidden = hidden;
+            settings.seed = Seed(seed);
+            settings.source.sensor = SensorModel::new("3x3_2x9".parse().unwrap());
+            settings.source.samples = 12;
+            settings.source.validation_samples = 0;
+            settings.training.stopping.epochs = 200;
+            let (split, _) = settings.draw().unwrap();
+            let least = Bottleneck::fit(split.training.targets(), hidden).unwrap().least_mse();
+            let mut run = Run::prepare(settings).unwrap();
+            while run.step().is_none() {}
+            let reached = run.leader().best_mse();
+            assert!(
+                reached >= least * (1.0 - 1e-9),
+                "{hidden} hidden: {reached} below {least}"
+            );
+            if hidden < 4 {
+                assert!(
+                    reached < 1.2 * least,
+                    "{hidden} hidden: the bound {least} is far below {reached}"
+                );
+            }
+        }
+    }
+}
+
+/// A recording of two forces, read through four channels in nine presses, and the setup of runs on it.
+fn recording(folder: &Path) -> Setup {
+    let mut text = "press,a,b,c,d,fx,fz (N)\n".to_owned();
+    for sample in 0..72 {
+        let press = sample / 8;
+        let (x, z) = (
+            (0.7 * f64::from(sample)).sin(),
+            (0.31 * f64::from(sample)).cos() + 0.1 * f64::from(press),
+        );
+        let readings = [x + 0.2 * z * z, z - 0.3 * x * z, (x + z).tanh(), 0.5 * x - z];
+        let readings = readings.map(|reading| format!("{reading:.5}")).join(",");
+        text += &format!("{press},{readings},{x:.5},{z:.5}\n");
+    }
+    fs::write(folder.join("forces.csv"), text).unwrap();
+    let plan = Plan {
+        import: Recipe {
+            data: folder.join("forces.csv"),
+            inputs: ["a", "b", "c", "d"].map(str::to_owned).to_vec(),
+            targets: ["fx", "fz"].map(str::to_owned).to_vec(),
+            group: Some("press".to_owned()),
+            ..Recipe::default()
+        },
+        ..Plan::default()
+    };
+    let mut settings = RunSettings::from(Measured { rows: RowModel::Shared });
+    settings.hidden = 3;
+    settings.training.stopping.epochs = 6;
+    Setup::recording(settings, plan)
+}
+
+fn on_recording(setup: &Setup, axis: Axis, second_axis: Option<Axis>) -> Experiment {
+    Experiment {
+        base: *setup.settings(),
+        recording: setup.experiment_recording(),
+        axis,
+        second_axis,
+        seeds: 2,
+        cross_validation: None,
+    }
+}
+
+fn samples_of(setup: &Setup) -> TrialSamples {
+    let samples = setup.trial_samples(Path::new(""), &|| false, &mut |_| {}).unwrap();
+    samples.expect("nothing cancels it")
+}
+
+fn run_on(experiment: &Experiment, samples: &TrialSamples, thread_count: usize) -> ExperimentResults {
+    let mut results = ExperimentResults::new(experiment.clone());
+    run_experiments(
+        std::slice::from_ref(experiment),
+        samples,
+        threads(thread_count),
+        || false,
+        |finished| results.record(finished.cell, finished.outcome),
+    )
+    .unwrap();
+    results
+}
+
+#[test]
+fn a_trial_on_a_recording_is_the_run_that_its_settings_and_division_describe() {
+    let folder = tempfile::tempdir().unwrap();
+    let setup = recording(folder.path());
+    let method = |name: &str| {
+        Method::all()
+            .into_iter()
+            .find(|method| method.short_name() == name)
+            .unwrap()
+    };
+    let methods = Axis::Method(vec![Method::recorded_regularization(), method("lm")]);
+    let splits = Axis::Split(SplitBy::ALL.to_vec());
+    let experiment = on_recording(&setup, methods, Some(splits));
+    let results = run_on(&experiment, &samples_of(&setup), 2);
+    assert!(results.is_complete());
+    for (place, cell) in results.cells.iter().enumerate() {
+        assert!(cell.failures.is_empty(), "{:?}", cell.failures);
+        for (trial, seed) in cell.trials.iter().zip([Seed(0), Seed(1)]) {
+            let mut plan = setup.plan().unwrap().clone();
+            plan.division.by = SplitBy::ALL[place / 2];
+            // Levenberg-Marquardt needs samples for validation, Bayesian regularisation none.
+            plan.division.validation_fraction = [0.0, 0.2][place % 2];
+            let sets = plan
+                .sets(Path::new(""), seed, &mut |_| ControlFlow::Continue(()))
+                .unwrap();
+            assert_eq!(sets.split.validation.is_some(), place % 2 == 1);
+            let mut settings = *setup.settings();
+            settings.seed = seed;
+            settings.training.method = [Method::recorded_regularization(), method("lm")][place % 2];
+            let mut alone = Run::on_sets(settings, sets.split, sets.test).unwrap();
+            while alone.step().is_none() {}
+            assert_eq!(trial.seed, seed);
+            assert_eq!(trial.errors, alone.errors(), "cell {place}");
+            assert_eq!(trial.baselines, *alone.baselines().unwrap());
+            let sets = plan
+                .sets(Path::new(""), seed, &mut |_| ControlFlow::Continue(()))
+                .unwrap();
+            let taken_up = Run::resume_on_sets(settings, trial.states.clone(), sets.split, sets.test).unwrap();
+            assert_eq!(taken_up.network(), alone.network());
+        }
+        let summary = cell.summary();
+        let SummaryErrors::Targets { r2 } = &summary.errors else {
+            panic!("a recording has targets");
+        };
+        let mean_r2 = |trial: &Trial| {
+            let targets = trial.errors.targets();
+            Some((targets[0].r2.unwrap() + targets[1].r2.unwrap()) / 2.0)
+        };
+        assert_eq!(r2.values, cell.trials.iter().map(mean_r2).collect::<Vec<_>>());
+        assert_eq!(
+            summary.percent.values,
+            cell.trials
+                .iter()
+                .map(|trial| trial.errors.percent())
+                .collect::<Vec<_>>()
+        );
+    }
+    // The test samples of a split in time are the same for each seed, those of the others are drawn.
+    let ridge = |cell: usize| {
+        let trials = results.cells[cell].trials.iter();
+        trials.map(|trial| trial.baselines.linear.clone()).collect::<Vec<_>>()
+    };
+    assert_eq!(ridge(0)[0], ridge(0)[1]);
+    assert_ne!(ridge(2)[0], ridge(2)[1]);
+    assert_ne!(ridge(4)[0], ridge(4)[1]);
+    let again = run_on(&experiment, &samples_of(&setup), 3);
+    assert_eq!(timeless(&[results]), timeless(&[again]), "on any number of threads");
+}
+
+#[test]
+fn an_experiment_on_a_recording_that_is_cancelled_keeps_what_is_finished() {
+    let folder = tempfile::tempdir().unwrap();
+    let setup = recording(folder.path());
+    let experiment = on_recording(&setup, Axis::Hidden(vec![2, 3, 4]), None);
+    let samples = samples_of(&setup);
+    let trials_after = |asked_at_most: usize| {
+        let asked = AtomicUsize::new(0);
+        let mut results = ExperimentResults::new(experiment.clone());
+        run_experiments(
+            std::slice::from_ref(&experiment),
+            &samples,
+            threads(1),
+            || asked.fetch_add(1, Ordering::Relaxed) >= asked_at_most,
+            |one| results.record(one.cell, one.outcome),
+        )
+        .unwrap();
+        (results, asked.into_inner())
+    };
+    let (whole, asked) = trials_after(usize::MAX);
+    let (results, _) = trials_after(asked / 2);
+    let kept: usize = results.cells.iter().map(|cell| cell.trials.len()).sum();
+    assert!((2..5).contains(&kept) && whole.is_complete() && !results.is_complete());
+    for (kept, whole) in timeless(&[results]).iter().zip(&timeless(&[whole])) {
+        assert!(kept.iter().all(|trial| whole.contains(trial)));
+    }
+}
+
+#[test]
+fn axes_belong_to_their_source() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut setup = recording(folder.path());
+    let message = |experiment: &Experiment| experiment.check().unwrap_err().to_string();
+    for axis in [
+        Axis::Samples(vec![10]),
+        Axis::Noise(vec![0.1]),
+        Axis::Array(vec![ArrayScale::default()]),
+    ] {
+        let name = axis.name();
+        let expected = format!("recordings have no setting '{name}': vary another one");
+        assert_eq!(message(&on_recording(&setup, axis, None)), expected);
+    }
+    let split = Axis::Split(vec![SplitBy::Time, SplitBy::Group]);
+    let array = small(split.clone());
+    assert_eq!(
+        message(&array),
+        "simulated arrays have no setting 'split': vary another one"
+    );
+    let by_group = on_recording(&setup, split.clone(), None);
+    by_group.check().unwrap();
+    let mut plan = setup.plan().unwrap().clone();
+    plan.import.group = None;
+    setup = Setup::recording(*setup.settings(), plan);
+    assert!(message(&on_recording(&setup, split, None)).contains("no column of groups"));
+    let hidden = Axis::Hidden(vec![2]);
+    for (experiment, samples) in [
+        (on_recording(&setup, hidden.clone(), None), TrialSamples::Drawn),
+        (small(hidden), samples_of(&setup)),
+    ] {
+        let refused = run_experiments(&[experiment], &samples, threads(1), || false, |one| panic!("{one:?}"));
+        assert_eq!(refused, Err(ExperimentError::OtherSamples));
+    }
+}
+
+#[test]
+fn tables_of_a_recording_have_its_measures_and_the_names_of_its_targets() {
+    let folder = tempfile::tempdir().unwrap();
+    let setup = recording(folder.path());
+    let experiment = on_recording(&setup, Axis::Hidden(vec![2, 4]), None);
+    let samples = samples_of(&setup);
+    let mut results = run_on(&experiment, &samples, 2);
+    let TrialSamples::Recorded(recorded) = &samples else {
+        panic!("the samples are recorded");
+    };
+    results.problem = Some(Arc::clone(&recorded.problem));
+    let table = ExperimentTable::new(&results);
+    let headings: Vec<_> = table.columns.iter().map(|column| column.heading).collect();
+    assert_eq!(
+        headings,
+        [
+            "hidden nodes",
+            "error % median",
+            "min",
+            "max",
+            "R² median",
+            "mean %",
+            "ridge %",
+            "epochs",
+            "training"
+        ],
+        "two hidden nodes carry two targets: there is no bound"
+    );
+    assert!(table.rows.iter().all(|row| row.len() == headings.len()));
+    assert_eq!(
+        describe_conditions(&experiment),
+        "forces, Bayesian regularisation, 6 epochs, one start, 2 seeds from 0, the last 20 % of the samples for test"
+    );
+    let trials = trials_table(&results);
+    let fields: Vec<_> = trials.columns.iter().map(|column| column.field.as_str()).collect();
+    assert_eq!(
+        fields[..7],
+        ["split", "scaling", "hidden", "method", "epochs", "seed", "repeat"]
+    );
+    assert_eq!(fields[7..11], ["percent_of_range", "r2", "fx.rmse", "fx.mae"]);
+    assert_eq!(trials.rows.len(), 4);
+    let mut markdown = Vec::new();
+    let verdicts = verdicts(&results);
+    write_experiment_markdown("Forces", "", &results, &verdicts, &mut markdown).unwrap();
+    let markdown = String::from_utf8(markdown).unwrap();
+    assert!(markdown.contains("The network beats ridge regression") && markdown.contains("percent of the range"));
+    assert!(!markdown.contains("Z %"), "{markdown}");
+}

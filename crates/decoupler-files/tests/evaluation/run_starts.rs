@@ -1,0 +1,200 @@
+//! Several starts of one run: what they share, which one leads, and that neither threads nor pauses change a bit.
+
+use decoupler_core::{
+    dataset::Seed,
+    evaluation::{MOST_STARTS, Run, RunError, SimulatedSettings, Simulation, StartTrainer, Workload, best_start},
+    sensor::SensorModel,
+    training::{MachineMemory, Method, StopReason, StoppingRules, Trainer},
+};
+
+fn settings(starts: usize) -> SimulatedSettings {
+    let mut settings = SimulatedSettings {
+        source: Simulation {
+            sensor: SensorModel::new("10x6_3x18".parse().unwrap()),
+            samples: 100,
+            validation_samples: 40,
+            test_samples: 20,
+            ..Simulation::default()
+        },
+        hidden: 4,
+        starts,
+        seed: Seed(3),
+        ..SimulatedSettings::default()
+    };
+    settings.training.stopping.epochs = 12;
+    settings
+}
+
+fn trained(settings: SimulatedSettings) -> Run {
+    let mut run = Run::prepare(settings).unwrap();
+    while run.step().is_none() {}
+    run
+}
+
+/// Present and best weights of every start as bits, and its epochs.
+fn bits(run: &Run) -> Vec<(Vec<u64>, usize, Option<StopReason>)> {
+    let of = |trainer: &StartTrainer| {
+        let weights = |row: &Trainer| [row.present().weights(), row.best().weights()].concat();
+        let bits = trainer
+            .rows()
+            .iter()
+            .flat_map(weights)
+            .map(|weight| weight.to_bits())
+            .collect();
+        (bits, trainer.latest().epoch, trainer.stop_reason())
+    };
+    run.trainers().iter().map(of).collect()
+}
+
+#[test]
+fn the_first_start_is_the_run_of_one_start_and_the_others_differ() {
+    let (one, four) = (trained(settings(1)), trained(settings(4)));
+    assert_eq!(bits(&four)[0], bits(&one)[0]);
+    let mut distinct: Vec<_> = bits(&four).into_iter().map(|(weights, ..)| weights).collect();
+    distinct.sort();
+    distinct.dedup();
+    assert_eq!(distinct.len(), 4);
+    assert_eq!(four.baselines(), one.baselines(), "the same sets");
+    assert_eq!(
+        bits(&trained(settings(2)))[..],
+        bits(&four)[..2],
+        "more starts change none"
+    );
+}
+
+#[test]
+fn the_start_of_lowest_validation_error_leads() {
+    for validation_samples in [40, 0] {
+        let run = trained(SimulatedSettings {
+            source: Simulation {
+                validation_samples,
+                ..settings(4).source
+            },
+            ..settings(4)
+        });
+        let starts = run.starts();
+        let number = run.leader_number();
+        assert_eq!(Some(number), best_start(&starts));
+        let lowest = starts[number].deciding_mse();
+        assert!(starts.iter().all(|start| lowest <= start.deciding_mse()));
+        assert_eq!(starts[number].validation_mse.is_some(), validation_samples > 0);
+        assert!(
+            run.network()
+                .values()
+                .iter()
+                .map(|network| network.mlp())
+                .eq(run.trainers()[number].best())
+        );
+        assert_eq!(run.errors().percent(), starts[number].z_percent);
+        assert_eq!(run.stop_reason(), run.leader().stop_reason());
+    }
+}
+
+#[test]
+fn threads_change_no_bit() {
+    let on = |threads| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| bits(&trained(settings(5))))
+    };
+    let one = on(1);
+    assert_eq!(on(2), one);
+    assert_eq!(on(3), one);
+}
+
+#[test]
+fn neither_pauses_nor_taking_up_saved_states_change_a_bit() {
+    for method in Method::all() {
+        let mut settings = settings(3);
+        settings.training.method = method;
+        let whole = trained(settings);
+        let mut paused = Run::prepare(settings).unwrap();
+        for epoch in 0.. {
+            if paused.stop_reason().is_some() {
+                break;
+            }
+            if epoch % 5 == 2 {
+                let text = serde_json::to_string(&paused.states()).unwrap();
+                paused = Run::resume(settings, serde_json::from_str(&text).unwrap()).unwrap();
+            }
+            paused.step();
+        }
+        assert_eq!(bits(&paused), bits(&whole), "{method}");
+        let histories = |run: &Run| -> Vec<_> { run.trainers().iter().map(|t| t.history().to_vec()).collect() };
+        assert_eq!(histories(&paused), histories(&whole), "{method}");
+        assert_eq!(paused.starts(), whole.starts(), "{method}");
+    }
+}
+
+#[test]
+fn a_run_goes_on_until_every_start_has_ended_or_all_are_stopped() {
+    let mut settings = settings(6);
+    settings.training.stopping = StoppingRules {
+        epochs: 300,
+        max_fail: 2,
+        ..StoppingRules::default()
+    };
+    let mut run = Run::prepare(settings).unwrap();
+    let some_ended = |run: &Run| run.trainers().iter().any(|trainer| trainer.stop_reason().is_some());
+    while !some_ended(&run) {
+        assert_eq!(run.step(), None);
+    }
+    let ended = run.trainers().iter().position(|t| t.stop_reason().is_some()).unwrap();
+    let epochs = run.trainers()[ended].latest().epoch;
+    assert_eq!(run.step(), None);
+    assert_eq!(
+        run.trainers()[ended].latest().epoch,
+        epochs,
+        "what has ended stands still"
+    );
+    run.stop();
+    assert_eq!(run.stop_reason(), Some(StopReason::Stopped));
+    assert_ne!(run.trainers()[ended].stop_reason(), Some(StopReason::Stopped));
+}
+
+#[test]
+fn every_start_goes_on_with_another_method_and_keeps_counting() {
+    let mut settings = settings(2);
+    settings.training.method = Method::all()[8];
+    let mut run = Run::prepare(settings).unwrap();
+    (0..5).for_each(|_| {
+        run.step();
+    });
+    run.continue_with(Method::default()).unwrap();
+    while run.step().is_none() {}
+    for trainer in run.trainers() {
+        let stages: Vec<_> = trainer
+            .stages()
+            .iter()
+            .map(|s| (s.first_epoch, s.method.short_name()))
+            .collect();
+        assert_eq!(stages, [(0, "gd"), (6, "lm")]);
+        assert_eq!(trainer.latest().epoch, 12);
+        assert!(trainer.history()[12].training_mse < 0.5 * trainer.history()[5].training_mse);
+    }
+    assert_eq!(run.settings().training.method, Method::default());
+}
+
+#[test]
+fn too_many_starts_are_refused() {
+    for starts in [0, MOST_STARTS + 1] {
+        let message = Run::prepare(settings(starts)).err().unwrap().to_string();
+        assert!(
+            message.contains("starts") && message.contains("from 1 to 100"),
+            "{message}"
+        );
+    }
+    let wide = SimulatedSettings {
+        hidden: 512,
+        starts: 100,
+        ..settings(1)
+    };
+    if Workload::of(&wide).unwrap().bytes > MachineMemory::of_this_machine().bytes {
+        let error = Run::prepare(wide).err().unwrap();
+        assert!(matches!(error, RunError::Memory { .. }), "{error}");
+    }
+    let states = Run::prepare(settings(2)).unwrap().states();
+    assert!(matches!(
+        Run::resume(settings(3), states),
+        Err(RunError::Starts { found: 2, .. })
+    ));
+}

@@ -1,0 +1,225 @@
+//! Scenes from settings to answers: known rows, single rows, noise, sideways movement.
+
+use std::path::Path;
+
+use decoupler_core::{
+    dataset::Seed,
+    decoupling::{DecoderKind, Precision},
+    evaluation::{
+        DecoderSet, Outlook, Preset, Run, SimulatedSettings, Simulation, TradeOffPoint, fastest_under,
+        measure_trade_off, most_accurate_under,
+    },
+    scene::{Loading, Movement, Noise, Rows},
+    sensor::SensorModel,
+};
+use decoupler_files::{export::NetworkFile, import::Setup};
+
+/// Known rows of a small array, quick to train.
+fn small() -> SimulatedSettings {
+    let mut settings = SimulatedSettings {
+        source: Simulation {
+            sensor: SensorModel::new("3x4_2x12".parse().unwrap()),
+            samples: 900,
+            validation_samples: 90,
+            test_samples: 60,
+            ..Preset::Best.settings().source
+        },
+        hidden: 6,
+        ..Preset::Best.settings()
+    };
+    settings.training.stopping.epochs = 60;
+    settings
+}
+
+fn trained(settings: SimulatedSettings) -> Run {
+    let mut run = Run::prepare(settings).unwrap();
+    while run.step().is_none() {}
+    run
+}
+
+fn z_percent(run: &Run, kind: DecoderKind, precision: Precision) -> f64 {
+    let set = DecoderSet::new(&run.settings().simulated().unwrap(), Some(run.network())).unwrap();
+    let report = set.measure(kind, precision, run.test()).unwrap().unwrap();
+    report.errors.percent().unwrap()
+}
+
+#[test]
+fn knowing_the_row_makes_small_networks_accurate_and_newton_makes_them_exact() {
+    let run = trained(small());
+    assert_eq!(run.network().values().len(), 3);
+    let errors = *run.errors().nodes().unwrap();
+    assert!(errors.z_percent.unwrap() < 0.05, "{errors:?}");
+    assert_eq!(errors.x_percent, Some(0.0), "what does not vary is known");
+    let z = |kind, precision| z_percent(&run, kind, precision);
+    let network = z(DecoderKind::Network, Precision::Double);
+    assert!((network - errors.z_percent.unwrap()).abs() < 1e-6);
+    assert!(z(DecoderKind::Network, Precision::Single) < network + 0.01);
+    for kind in [DecoderKind::Newton, DecoderKind::Polish] {
+        let exact = z(kind, Precision::Double);
+        assert!(exact < 1e-9, "{kind}: {exact}");
+    }
+    for (kind, most) in [
+        (DecoderKind::Ridge, 1.0),
+        (DecoderKind::RadialBasis, 1.0),
+        (DecoderKind::Mean, 7.0),
+    ] {
+        let error = z(kind, Precision::Double);
+        assert!(error < most, "{kind}: {error}");
+    }
+    let again = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
+    assert_eq!(again.install(|| trained(small())).network(), run.network());
+}
+
+#[test]
+fn rows_that_are_not_known_are_found_out() {
+    let mut settings = small();
+    settings.source.scene.rows = Rows::All;
+    settings.training.stopping.epochs = 20;
+    let run = trained(settings);
+    assert_eq!(run.network().values().len(), 1);
+    assert!(z_percent(&run, DecoderKind::Newton, Precision::Double) < 1e-9);
+    settings.source.scene.noise = Noise::relative(1e-5);
+    let set = DecoderSet::new(&settings, None).unwrap();
+    let test = settings.draw_test().unwrap();
+    let report = set
+        .measure(DecoderKind::Newton, Precision::Double, &test)
+        .unwrap()
+        .unwrap();
+    assert_eq!(
+        report.errors.nodes().unwrap().x_percent,
+        Some(0.0),
+        "every row is the right one"
+    );
+    assert!(
+        set.decoder(DecoderKind::Polish, Precision::Double).unwrap().is_none(),
+        "it has no network"
+    );
+}
+
+#[test]
+fn one_row_is_all_that_is_drawn_and_modelled() {
+    let mut settings = small();
+    settings.source.scene.rows = Rows::One(2);
+    settings.source.samples = 300;
+    let run = trained(settings);
+    assert_eq!(run.test().row_count(), 1);
+    assert_eq!(run.test().samples(), 60);
+    assert!(run.test().targets().iter().step_by(3).all(|&x| x == 10.0));
+    let size = settings.source.model_size().unwrap();
+    assert_eq!((size.unknowns, size.equations, size.networks), (4, 12, 1));
+    assert!(z_percent(&run, DecoderKind::Polish, Precision::Double) < 1e-9);
+    let known = small().source.model_size().unwrap();
+    assert_eq!((known.unknowns, known.equations, known.networks), (12, 36, 3));
+    settings.source.scene.movement = Movement::SIDEWAYS;
+    assert_eq!(settings.source.model_size().unwrap().unknowns, 12);
+    settings.source.scene.rows = Rows::One(3);
+    assert!(Run::prepare(settings).is_err(), "there is no fourth row");
+}
+
+#[test]
+fn known_rows_go_on_from_saved_states_with_the_same_bits() {
+    let mut settings = SimulatedSettings { starts: 2, ..small() };
+    settings.training.stopping.epochs = 12;
+    settings.training.stopping.max_fail = 1;
+    let whole = trained(settings);
+    let mut paused = Run::prepare(settings).unwrap();
+    while paused.stop_reason().is_none() {
+        let text = serde_json::to_string(&paused.states()).unwrap();
+        paused = Run::resume(settings, serde_json::from_str(&text).unwrap()).unwrap();
+        paused.step();
+    }
+    assert_eq!(paused.network(), whole.network());
+    assert_eq!(paused.starts(), whole.starts());
+    for (start, other) in paused.trainers().iter().zip(whole.trainers()) {
+        assert_eq!(start.history(), other.history());
+        assert_eq!(start.rows().len(), 3);
+        let last = start.latest();
+        let mean = start.rows().iter().map(|row| row.latest().training_mse).sum::<f64>() / 3.0;
+        assert_eq!(last.training_mse, mean);
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("network.json");
+    let file = NetworkFile::from_run(&whole, None).unwrap();
+    file.save(&path).unwrap();
+    assert_eq!(NetworkFile::load(&path).unwrap(), file);
+    let mut other = file;
+    let mut settings = other.settings.simulated().unwrap();
+    settings.source.scene.rows = Rows::All;
+    other.settings = settings.into();
+    let message = other.save(&path).unwrap_err().to_string();
+    assert!(message.contains("3 of them"), "{message}");
+}
+
+/// With noise no decoder beats the reference, and the one that knows noise and prior comes close to it. Of a smooth field
+/// it knows mean and covariance only.
+#[test]
+fn with_noise_newton_comes_close_to_the_reference() {
+    let mut settings = small();
+    settings.source.test_samples = 300;
+    for (noise, loading) in [
+        (1e-3, Loading::RandomNodes),
+        (
+            1e-3,
+            Loading::SmoothField {
+                correlation_length_mm: 4.0,
+            },
+        ),
+    ] {
+        settings.source.scene.noise = Noise::relative(noise);
+        settings.source.scene.loading = loading;
+        settings.training.stopping.epochs = 20;
+        let run = trained(settings);
+        let limit = run.baselines().unwrap().reference.as_ref().unwrap().percent().unwrap();
+        for kind in [DecoderKind::Newton, DecoderKind::Polish] {
+            let ratio = z_percent(&run, kind, Precision::Double) / limit;
+            let most = if loading == Loading::RandomNodes { 1.1 } else { 1.4 };
+            assert!((0.95..most).contains(&ratio), "{kind} {loading}: {ratio}");
+        }
+        assert!(z_percent(&run, DecoderKind::Network, Precision::Double) > 0.95 * limit);
+    }
+}
+
+#[test]
+fn sideways_movement_is_said_to_be_badly_conditioned() {
+    let mut settings = Preset::Best.settings();
+    let upright = Outlook::of(&settings.source).unwrap();
+    assert!(upright.warnings.is_empty());
+    settings.source.scene.movement = Movement::SIDEWAYS;
+    let sideways = Outlook::of(&settings.source).unwrap();
+    assert!(sideways.worst_row.condition() > 1e3 * upright.worst_row.condition());
+    assert!(!sideways.warnings.is_empty());
+}
+
+#[test]
+fn a_trade_has_a_point_for_every_choice() {
+    let mut settings = SimulatedSettings {
+        source: Simulation {
+            samples: 90,
+            ..small().source
+        },
+        seed: Seed(3),
+        ..small()
+    };
+    settings.training.stopping.epochs = 3;
+    let mut points: Vec<TradeOffPoint> = Vec::new();
+    let keep = |_, point: Result<_, _>, _: Option<&_>| points.push(point.unwrap());
+    let sets = Setup::from(settings).sets(Path::new(""), &|| false, &mut |_| ());
+    let sets = sets.unwrap().unwrap().sets;
+    assert!(measure_trade_off(&settings.into(), &sets, &[2, 3], &DecoderKind::ALL, || false, keep).unwrap());
+    // Five without a network; network in two precisions and polish, each with two numbers of hidden nodes.
+    assert_eq!(points.len(), 5 + 2 * 3);
+    assert_eq!(points.iter().filter(|point| point.hidden() == Some(3)).count(), 3);
+    let best = most_accurate_under(&points, f64::INFINITY).unwrap();
+    assert!(matches!(best.report.kind, DecoderKind::Newton | DecoderKind::Polish));
+    assert!(fastest_under(&points, -1.0).is_none());
+    let fastest = fastest_under(&points, f64::INFINITY).unwrap();
+    assert!(
+        points
+            .iter()
+            .all(|point| fastest.report.cost.frame_us <= point.report.cost.frame_us)
+    );
+    let mut none = 0;
+    let count = |_, _: Result<_, _>, _: Option<&_>| none += 1;
+    assert!(!measure_trade_off(&settings.into(), &sets, &[2], &DecoderKind::ALL, || true, count).unwrap());
+    assert_eq!(none, 0);
+}

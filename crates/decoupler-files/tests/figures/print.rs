@@ -1,0 +1,297 @@
+//! Figures for print: what is drawn is what was given, on every machine alike.
+
+use decoupler_core::{
+    decoupling::{DecoderKind, Precision},
+    evaluation::{Preset, TradeOffLevel, TradeOffLimits, TradeOffPoint, measure_trade_off},
+};
+use decoupler_files::{
+    export::figures::{Picture, PictureFormat},
+    figure::{
+        Figure, HeatMap, Hue, Key, Look, Marker, Plot, PlotAxis, PlotFigure, SequentialMap, Series, node_figure,
+        trade_off_figure,
+    },
+    import::Setup,
+};
+use glam::DVec3;
+use image::GenericImageView as _;
+use ndarray::Array2;
+use resvg::usvg::roxmltree::{Document, Node};
+
+fn scatter(marker: Marker, values: &[(f64, f64)]) -> Series {
+    let points = values.iter().map(|&(x, y)| [x, y]);
+    Series::new("series", Look::marker(Hue::Blue, marker), points)
+}
+
+fn plot(y: PlotAxis, series: Vec<Series>) -> Picture {
+    let keys = series.iter().map(|series| Key::new(&series.name, series.look));
+    let figure = PlotFigure {
+        keys: keys.collect(),
+        plots: vec![Plot::new(PlotAxis::linear("across"), y, series)],
+        notes: Vec::new(),
+    };
+    Figure::from(figure).draw()
+}
+
+fn count(picture: &Picture, what: &str) -> usize {
+    picture.svg().matches(what).count()
+}
+
+/// Calls `read` with the elements of a kind.
+fn elements<T>(picture: &Picture, kind: &str, read: impl Fn(Node<'_, '_>) -> T) -> Vec<T> {
+    let document = Document::parse(picture.svg()).unwrap();
+    let elements = document.descendants().filter(|node| node.has_tag_name(kind));
+    elements.map(read).collect()
+}
+
+fn number(element: Node<'_, '_>, name: &str) -> f64 {
+    element.attribute(name).unwrap().parse().unwrap()
+}
+
+/// Centres of the circles, in points.
+fn discs(picture: &Picture) -> Vec<[f64; 2]> {
+    elements(picture, "circle", |circle| {
+        ["cx", "cy"].map(|name| number(circle, name))
+    })
+}
+
+fn texts(picture: &Picture) -> Vec<String> {
+    elements(picture, "text", |text| text.text().unwrap_or_default().to_owned())
+}
+
+#[test]
+fn points_stand_where_their_values_are() {
+    let picture = plot(
+        PlotAxis::linear("up"),
+        vec![scatter(Marker::Disc, &[(0.0, 1.0), (1.0, 2.0), (2.0, 4.0)])],
+    );
+    // The first disc is the sample in the legend.
+    let [_, a, b, c] = discs(&picture).try_into().unwrap();
+    assert!((b[0] - 0.5 * (a[0] + c[0])).abs() < 0.02, "evenly spaced across");
+    assert!(a[1] > b[1] && b[1] > c[1], "larger values are higher");
+    assert!(((b[1] - c[1]) / (a[1] - b[1]) - 2.0).abs() < 0.01);
+
+    let decades = [(0.0, 1e-4), (1.0, 1e-2), (2.0, 1.0)];
+    let picture = plot(PlotAxis::logarithmic("up"), vec![scatter(Marker::Disc, &decades)]);
+    let [_, a, b, c] = discs(&picture).try_into().unwrap();
+    assert!(((b[1] - c[1]) - (a[1] - b[1])).abs() < 0.02, "decades are equally high");
+}
+
+#[test]
+fn what_has_no_place_is_left_out() {
+    let values = [
+        (0.0, 1.0),
+        (1.0, f64::NAN),
+        (2.0, f64::INFINITY),
+        (3.0, -1.0),
+        (4.0, 0.0),
+    ];
+    let series = || vec![scatter(Marker::Disc, &values)];
+    assert_eq!(discs(&plot(PlotAxis::linear("up"), series())).len(), 3 + 1);
+    let picture = plot(PlotAxis::logarithmic("up"), series());
+    assert_eq!(discs(&picture).len(), 1 + 1);
+    assert_eq!(count(&picture, "NaN") + count(&picture, "inf"), 0);
+    // Nothing, one value, and values that differ by rounding only.
+    for values in [
+        &[][..],
+        &[(3.0, 0.2)],
+        &[(1.0, 0.1), (2.0, 0.1 + 1e-17)],
+        &[(0.0, 1e300), (1.0, -1e300)],
+    ] {
+        for y in [PlotAxis::linear("up"), PlotAxis::logarithmic("up")] {
+            let picture = plot(y, vec![scatter(Marker::Ring, values)]);
+            assert_eq!(count(&picture, "NaN") + count(&picture, "inf"), 0, "{values:?}");
+            picture.png().unwrap();
+        }
+    }
+}
+
+#[test]
+fn node_plots_have_a_square_and_a_disc_for_each_node_and_bars_on_demand() {
+    let nodes = |z_mm: [f64; 3]| z_mm.map(|z| DVec3::new(0.0, 0.0, z));
+    let (actual, decoupled) = (nodes([4.1, 4.5, 4.9]), nodes([4.2, 4.4, 4.9]));
+    let draw = |spread_mm| Figure::from(node_figure(&actual, Some(&decoupled), spread_mm, 3)).draw();
+    let plain = draw(None);
+    assert_eq!(discs(&plain).len(), 3 + 1);
+    for name in ["actual", "decoupled", "node, row by row", "z (mm)"] {
+        assert!(texts(&plain).iter().any(|text| text == name), "{name}");
+    }
+    // Below the bars the axis reaches further down, so its ticks may be others.
+    let lines = |picture: &Picture| {
+        let is_bar = |line: Node<'_, '_>| line.attribute("stroke-width") == Some("0.8");
+        elements(picture, "polyline", is_bar)
+            .into_iter()
+            .filter(|is_bar| *is_bar)
+            .count()
+    };
+    let with_bars = draw(Some(&[0.1, 0.2, 0.3]));
+    assert_eq!(
+        (lines(&plain), lines(&with_bars)),
+        (0, 3 * 3),
+        "a line and two ends each"
+    );
+}
+
+#[test]
+fn png_has_300_dots_an_inch_and_text_from_the_programs_own_fonts() {
+    let picture = plot(PlotAxis::linear("up"), vec![scatter(Marker::Square, &[(0.0, 1.0)])]);
+    let png = image::load_from_memory(&picture.png().unwrap()).unwrap();
+    assert_eq!(f64::from(png.width()), 510.0 / 72.0 * 300.0);
+    assert_eq!(png.get_pixel(0, 0).0, [255; 4], "the ground is white");
+    // The name of the x axis: ink in the lowest strip of the picture, where nothing but text is.
+    let strip = (png.height() - 80..png.height()).flat_map(|y| (0..png.width()).map(move |x| (x, y)));
+    let ink = strip.filter(|&(x, y)| png.get_pixel(x, y).0[0] < 100).count();
+    assert!(ink > 200, "{ink} dark pixels");
+}
+
+#[test]
+fn heat_maps_say_each_value_in_its_cell() {
+    let values = Array2::from_shape_vec((2, 2), vec![1.0, 2.5, f64::NAN, 4.0]).unwrap();
+    let map = HeatMap {
+        x_name: "hidden nodes".to_owned(),
+        y_name: "array".to_owned(),
+        columns: vec!["6".to_owned(), "8".to_owned()],
+        rows: vec!["a < b & c".to_owned(), "d".to_owned()],
+        values,
+        notes: Array2::default((2, 2)),
+        value_axis: PlotAxis::linear("Z error (%)"),
+        colours: SequentialMap::default(),
+    };
+    let empty = HeatMap {
+        columns: Vec::new(),
+        rows: Vec::new(),
+        values: Array2::zeros((0, 0)),
+        notes: Array2::default((0, 0)),
+        ..map.clone()
+    };
+    let picture = Figure::from(map).draw();
+    for word in ["1.00", "2.50", "–", "4.00", "a < b & c", "hidden nodes", "Z error (%)"] {
+        assert!(texts(&picture).iter().any(|text| text == word), "{word}");
+    }
+    picture.png().unwrap();
+    Figure::from(empty).draw().png().unwrap();
+}
+
+#[test]
+fn colours_of_a_heat_map_go_by_the_logarithm_if_told() {
+    let map = |values: [f64; 3], value_axis| HeatMap {
+        x_name: String::new(),
+        y_name: String::new(),
+        columns: vec![String::new(); 3],
+        rows: vec![String::new()],
+        values: Array2::from_shape_vec((1, 3), values.to_vec()).unwrap(),
+        notes: Array2::default((1, 3)),
+        value_axis,
+        colours: SequentialMap::default(),
+    };
+    let cells = |map: HeatMap| -> Vec<String> {
+        let svg = Figure::from(map).draw().svg().to_owned();
+        let fills = svg.split("<rect").skip(1).filter(|rect| rect.contains("fill=\"#"));
+        let fill = |rect: &str| rect.split("fill=\"").nth(1).unwrap()[..7].to_owned();
+        fills
+            .map(fill)
+            .skip_while(|colour| colour == "#ffffff")
+            .take(3)
+            .collect()
+    };
+    let even = cells(map([1.0, 2.0, 3.0], PlotAxis::linear("")));
+    let decades = cells(map([0.001, 0.1, 10.0], PlotAxis::logarithmic("")));
+    assert_eq!(even, decades);
+    assert_ne!(even, cells(map([0.001, 0.1, 10.0], PlotAxis::linear(""))));
+    // A zero has no logarithm, but is the least there is.
+    assert_eq!(cells(map([0.0, 1.0, 10.0], PlotAxis::logarithmic("")))[0], decades[0]);
+}
+
+#[test]
+fn the_name_of_the_file_tells_the_format() {
+    let folder = tempfile::tempdir().unwrap();
+    let picture = plot(PlotAxis::linear("up"), Vec::new());
+    for (name, format) in [("a.svg", PictureFormat::Svg), ("b.PNG", PictureFormat::Png)] {
+        let path = folder.path().join(name);
+        assert_eq!(PictureFormat::of_path(&path).unwrap(), format);
+        picture.save(format, &path).unwrap();
+        assert!(path.metadata().unwrap().len() > 100);
+    }
+    let error = PictureFormat::of_path("c.bmp".as_ref()).unwrap_err();
+    assert_eq!(
+        error.to_string(),
+        "cannot write 'c.bmp': give a name that ends in .png or .svg"
+    );
+}
+
+#[test]
+fn the_trade_off_tells_32_from_64_bits_and_hollow_marks_mean_nothing_else() {
+    let mut points = Vec::new();
+    for preset in Preset::ALL {
+        let mut settings = preset.settings();
+        settings.source.sensor.scale = "4x4_2x12".parse().unwrap();
+        (settings.source.samples, settings.source.validation_samples) = (100, 20);
+        (settings.source.test_samples, settings.training.stopping.epochs) = (20, 2);
+        let on_point = |_, point: Result<_, _>, _: Option<&_>| {
+            points.push(TradeOffPoint {
+                preset: Some(preset),
+                ..point.unwrap()
+            });
+        };
+        let kinds = [DecoderKind::Ridge, DecoderKind::Network];
+        let sets = Setup::from(settings).sets("".as_ref(), &|| false, &mut |_| ());
+        let sets = sets.unwrap().unwrap().sets;
+        measure_trade_off(&settings.into(), &sets, &[3], &kinds, || false, on_point).unwrap();
+    }
+    let is_single = |single: bool| {
+        let of_bits = points
+            .iter()
+            .filter(|point| (point.report.precision == Precision::Single) == single);
+        of_bits.count()
+    };
+    let (hollow, filled) = (is_single(true), is_single(false));
+    assert_eq!((hollow, filled), (2, 4));
+    // Limits out of reach: no answers, whose rings would be hollow too.
+    let limits = TradeOffLimits {
+        percent: 0.0,
+        microseconds: 0.0,
+    };
+    let level = TradeOffLevel {
+        noise: Some(0.0),
+        points,
+    };
+    let figure = trade_off_figure(&level, &limits);
+    for plot in &figure.plots {
+        let marked = plot.series.iter().filter(|series| series.look.marker.is_some());
+        let points: Vec<_> = marked.flat_map(|series| &series.points).collect();
+        for point in &points {
+            let is_beaten = points.iter().any(|other| {
+                let is_as_good = other.x <= point.x && other.y <= point.y;
+                is_as_good && (other.x < point.x || other.y < point.y)
+            });
+            assert_eq!(
+                point.label.is_some(),
+                !is_beaten,
+                "points of the front are named: {point:?}"
+            );
+        }
+    }
+    let picture = Figure::from(figure).draw();
+    let rings = elements(&picture, "circle", |circle| circle.attribute("fill") == Some("none"));
+    let hollow_discs = rings.iter().filter(|is_hollow| **is_hollow).count();
+    let is_closed = |line: Node<'_, '_>| {
+        let points: Vec<&str> = line.attribute("points").unwrap().split(' ').collect();
+        points.first() == points.last()
+    };
+    let closed = elements(&picture, "polyline", is_closed)
+        .into_iter()
+        .filter(|is_closed| *is_closed);
+    let frames = 2;
+    let hollow_diamonds = closed.count() - frames;
+    // Each in both plots, and one in the legend for both.
+    assert_eq!((hollow_discs, hollow_diamonds), (2 + 1, 2));
+    let filled_marks = (rings.len() - hollow_discs) + elements(&picture, "polygon", |_| ()).len();
+    // In the legend each decoder and each preset has one.
+    assert_eq!(filled_marks, 2 * filled + 2 + 2);
+    for name in ["Ridge", "Network", "paper preset", "best preset", "hollow: 32 bits"] {
+        assert!(
+            texts(&picture).iter().any(|text| text == name),
+            "{name}: {:?}",
+            texts(&picture)
+        );
+    }
+}

@@ -1,0 +1,369 @@
+//! Surfaces as a figure: where things lie, in which colours, and what print says of them.
+
+use std::sync::Arc;
+
+use decoupler_core::surface::SurfaceMap;
+use decoupler_files::{
+    export::figures::Picture,
+    figure::{
+        Figure, SequentialMap,
+        surface::{
+            Bounds, Card, Drawing, Line, OrbitCamera, Quantity, Section, SectionLine, Surface, SurfaceFigure, ViewMode,
+        },
+    },
+};
+use glam::{DVec3, Vec2};
+
+fn draw(figure: &SurfaceFigure) -> Picture {
+    Figure::from(figure.clone()).draw()
+}
+
+/// A surface over 4 × 5 nodes a millimetre apart.
+fn surface(title: &str, quantity: Quantity, value: impl Fn(f64, f64) -> f64) -> Surface {
+    over([4, 5], title, quantity, value)
+}
+
+fn over([rows, per_row]: [usize; 2], title: &str, quantity: Quantity, value: impl Fn(f64, f64) -> f64) -> Surface {
+    let places = |count: usize| -> Vec<f64> { (0..count).map(|at| at as f64).collect() };
+    let map = Arc::new(SurfaceMap::new(&places(rows), &places(per_row)).unwrap());
+    let nodes = (0..rows * per_row).map(|node| ((node / per_row) as f64, (node % per_row) as f64));
+    let nodes: Arc<[DVec3]> = nodes.map(|(x, y)| DVec3::new(x, y, value(x, y))).collect();
+    let values = map.evaluate(&nodes.iter().map(|node| node.z).collect::<Vec<_>>());
+    Surface {
+        title: title.to_owned(),
+        values: values.into(),
+        nodes,
+        map,
+        range: match quantity {
+            Quantity::Error => -0.5..=0.5,
+            _ => 4.0..=5.0,
+        },
+        quantity,
+        mode: ViewMode::ThreeD,
+        colours: SequentialMap::default(),
+    }
+}
+
+fn dent(title: &str) -> Surface {
+    surface(title, Quantity::Height, |x, y| {
+        5.0 - (-(x - 1.0).powi(2) - (y - 2.0).powi(2)).exp()
+    })
+}
+
+fn error() -> Surface {
+    surface("Error", Quantity::Error, |x, y| 0.1 * x - 0.1 * y)
+}
+
+fn from_above(surface: Surface) -> Surface {
+    Surface {
+        mode: ViewMode::Top,
+        ..surface
+    }
+}
+
+fn figure(surfaces: Vec<Surface>) -> SurfaceFigure {
+    SurfaceFigure {
+        surfaces,
+        camera: OrbitCamera::default(),
+        ..SurfaceFigure::default()
+    }
+}
+
+fn lay_out(surface: &Surface, camera: OrbitCamera) -> Drawing {
+    surface.lay_out(
+        camera,
+        &Card {
+            bounds: Bounds {
+                min: Vec2::ZERO,
+                max: Vec2::new(360.0, 400.0),
+            },
+            measure: &|text| Vec2::new(6.0 * text.chars().count() as f32, 14.0),
+            colours: SequentialMap::Viridis.colours(),
+        },
+    )
+}
+
+/// How often a picture says a text.
+fn says(picture: &Picture, text: &str) -> usize {
+    picture.svg().matches(&format!(">{text}</text>")).count()
+}
+
+#[test]
+fn contour_lines_of_a_slope_lie_where_it_has_their_heights() {
+    // 4.05 + 0.3 x reaches 4.1, 4.2 … at x = (level − 4.05) / 0.3, whatever y.
+    let slope = from_above(surface("", Quantity::Height, |x, _| 4.05 + 0.3 * x));
+    let drawing = lay_out(&slope, OrbitCamera::default());
+    let x_at = |node: usize| drawing.dots.position(node).unwrap().x;
+    let points_per_mm = (x_at(15) - x_at(0)) / 3.0;
+    let mut seen = [0; 10];
+    for (_, lines) in drawing.mesh.strips() {
+        for line in lines {
+            for end in [line.from, line.to] {
+                let height = 4.05 + 0.3 * f64::from((end.x - x_at(0)) / points_per_mm);
+                let level = (10.0 * height).round();
+                assert!((10.0 * height - level).abs() < 0.01, "a line at {height} mm");
+                seen[level as usize - 40] += 1;
+            }
+        }
+    }
+    // The line at 4.0 would lie in the margin; heights are cut at the ends of the scale.
+    assert!(seen[1..].iter().all(|ends| *ends > 20), "{seen:?}");
+}
+
+/// A slope leaves the axes, which have room for 3.92 to 5.08 mm, in the margin on both sides: at x = (level − 4.05) / 0.32.
+#[test]
+fn a_steep_surface_ends_along_the_ends_of_the_axis() {
+    let slope = |mode| Surface {
+        mode,
+        ..surface("", Quantity::Height, |x, _| 4.05 + 0.32 * x)
+    };
+    let [low, high] = [3.92, 5.08].map(|level| (level - 4.05) / 0.32);
+    let drawing = lay_out(&slope(ViewMode::Top), OrbitCamera::default());
+    let x_at = |node: usize| drawing.dots.position(node).unwrap().x;
+    let points_per_mm = f64::from(x_at(15) - x_at(0)) / 3.0;
+    let mut area = 0.0;
+    let (mut left, mut right) = (f64::MAX, f64::MIN);
+    for cell in drawing.mesh.strips().flat_map(|(cells, _)| cells) {
+        let corners = drawing
+            .mesh
+            .corners(*cell)
+            .map(|corner| drawing.mesh.vertices[corner].at.as_dvec2());
+        for corner in corners {
+            let x_mm = (corner.x - f64::from(x_at(0))) / points_per_mm;
+            (left, right) = (left.min(x_mm), right.max(x_mm));
+        }
+        let [a, b, c, d] = corners;
+        area += 0.5 * ((b - a).perp_dot(c - a) + (c - a).perp_dot(d - a)).abs();
+    }
+    assert!(
+        (left - low).abs() < 1e-3 && (right - high).abs() < 1e-3,
+        "{left} {right}"
+    );
+    // Along y the margin is half a pitch on both sides of the five nodes.
+    let expected = (high - low) * 5.0;
+    assert!((area / points_per_mm.powi(2) / expected - 1.0).abs() < 1e-3, "{area}");
+
+    // In space the same edges lie on the ceiling and on the floor of the box.
+    let drawing = lay_out(&slope(ViewMode::ThreeD), OrbitCamera::default());
+    for (x_mm, z_mm) in [(low, 3.92), (high, 5.08)] {
+        for y_mm in [0.3, 2.0, 3.7] {
+            let edge = drawing.sight.point(DVec3::new(x_mm, y_mm, z_mm));
+            let nearest = drawing
+                .mesh
+                .vertices
+                .iter()
+                .map(|vertex| vertex.at.as_dvec2().distance(edge));
+            assert!(nearest.fold(f64::MAX, f64::min) < 3.0, "the surface reaches {edge}");
+        }
+    }
+}
+
+/// The spline rises above the axis around a node: in space that is a plateau at the axis, which is told and marked.
+#[test]
+fn beyond_the_axis_a_surface_is_a_marked_plateau_and_a_map_has_no_holes() {
+    let peak = |mode| Surface {
+        mode,
+        ..surface(
+            "",
+            Quantity::Height,
+            |x, y| {
+                if (x, y) == (1.0, 2.0) { 5.4 } else { 4.4 }
+            },
+        )
+    };
+    let beyond = |mode| {
+        let surface = peak(mode);
+        let drawing = lay_out(&surface, OrbitCamera::default());
+        let grid = surface.map.grid();
+        let cells = drawing.mesh.strips().flat_map(|(cells, _)| cells);
+        // Corners beyond the grid are those of cut cells.
+        let corners = cells
+            .flat_map(|cell| drawing.mesh.corners(*cell))
+            .filter(|corner| surface.values.get(*corner).is_some_and(|height| *height > 5.08 + 1e-12));
+        let across = grid.y_mm().len();
+        let off_the_edge = corners.map(|corner| {
+            let (x_mm, y_mm) = (grid.x_mm()[corner / across], grid.y_mm()[corner % across]);
+            let at_edge = drawing.sight.point(DVec3::new(x_mm, y_mm, 5.08));
+            drawing.mesh.vertices[corner].at.as_dvec2().distance(at_edge)
+        });
+        let off_the_edge: Vec<f64> = off_the_edge.collect();
+        let furthest = off_the_edge.iter().fold(0.0_f64, |furthest, &off| furthest.max(off));
+        (off_the_edge.len(), furthest, drawing.note)
+    };
+    let (count, off_the_edge, note) = beyond(ViewMode::ThreeD);
+    assert!(count > 20 && off_the_edge < 0.01, "{count} {off_the_edge}");
+    assert_eq!(note.as_deref(), Some("Beyond the axes: hatched, 1 node"));
+    let (count, _, note) = beyond(ViewMode::Top);
+    assert!(count > 20, "{count}");
+    assert_eq!(note, None, "a map has no axis for heights");
+}
+
+#[test]
+fn from_above_x_runs_to_the_right_and_y_upwards_at_one_scale() {
+    let drawing = lay_out(&from_above(dent("")), OrbitCamera::default());
+    let [origin, along_y, along_x] = [0, 1, 5].map(|node| drawing.dots.position(node).unwrap());
+    let (right, up) = (along_x - origin, origin - along_y);
+    assert!(right.x > 10.0 && right.y.abs() < 1e-3 && up.x.abs() < 1e-3);
+    assert!((right.x - up.y).abs() < 1e-3, "a millimetre is as long on both axes");
+}
+
+#[test]
+fn the_camera_turns_what_is_in_space_and_nothing_else() {
+    let turned = OrbitCamera::default().dragged(60.0, 20.0);
+    let lines = |surface: &Surface, camera| -> Vec<Line> { lay_out(surface, camera).lines };
+    for (surface, is_turned) in [(dent(""), true), (from_above(dent("")), false)] {
+        assert_eq!(
+            lines(&surface, turned) != lines(&surface, OrbitCamera::default()),
+            is_turned
+        );
+        let seen = |camera| {
+            let surfaces = vec![surface.clone()];
+            draw(&SurfaceFigure {
+                camera,
+                ..figure(surfaces)
+            })
+        };
+        assert_eq!(seen(turned) != seen(OrbitCamera::default()), is_turned);
+    }
+}
+
+#[test]
+fn surfaces_of_one_scale_have_one_key_and_errors_their_own() {
+    let heights = figure(vec![dent("Actual"), dent("Decoupled")]);
+    let picture = draw(&heights);
+    assert_eq!(["Actual", "Decoupled"].map(|title| says(&picture, title)), [1, 1]);
+    assert_eq!(says(&picture, "z (mm)"), 3, "two axes and a key");
+    let note = "Between the nodes: thin-plate spline (the biharmonic spline with a plane).";
+    assert_eq!(says(&picture, note), 1);
+
+    let three = figure(vec![dent("Actual"), dent("Decoupled"), error()]);
+    let picture = draw(&three);
+    assert_eq!([says(&picture, "z (mm)"), says(&picture, "error (mm)")], [3, 2]);
+    let negative = picture.svg().matches(">−0.").count();
+    assert!(negative >= 2, "{negative} negative ticks on axis and key");
+}
+
+#[test]
+fn scales_are_made_common_by_quantity() {
+    let lower = Surface {
+        range: 3.0..=4.5,
+        ..dent("B")
+    };
+    let scales = figure(vec![dent("A"), lower, error()]).with_common_scales().scales();
+    let scales: Vec<_> = scales.into_iter().map(|scale| (scale.quantity, scale.range)).collect();
+    assert_eq!(scales, [(Quantity::Height, 3.0..=5.0), (Quantity::Error, -0.5..=0.5)]);
+}
+
+/// Fills of the cells of a picture, the most frequent first.
+fn fills(picture: &Picture) -> Vec<String> {
+    let mut counts = std::collections::BTreeMap::new();
+    for line in picture.svg().lines().filter(|line| line.starts_with("<path color")) {
+        *counts
+            .entry(line.split("color=\"").nth(1).unwrap()[..7].to_owned())
+            .or_insert(0) += 1;
+    }
+    let mut fills: Vec<_> = counts.into_iter().collect();
+    fills.sort_by_key(|(_, count)| std::cmp::Reverse(*count));
+    fills.into_iter().map(|(fill, _)| fill).collect()
+}
+
+#[test]
+fn a_height_has_one_colour_on_every_card_and_no_error_is_white() {
+    let level = |z: f64| from_above(surface("", Quantity::Height, |_, _| z));
+    let drawn = |surfaces| fills(&draw(&figure(surfaces)));
+    let [alone, both] = [vec![level(4.5)], vec![level(4.5), level(4.5)]].map(drawn);
+    assert_eq!((alone.len(), &alone), (1, &both));
+    let [red, green, blue] = SequentialMap::Viridis.colours().at(0.5);
+    assert_eq!(alone[0], format!("#{red:02x}{green:02x}{blue:02x}"));
+    let other = drawn(vec![level(4.5), level(5.0)]);
+    assert!(other.len() == 2 && other.contains(&alone[0]), "{other:?}");
+
+    let none = from_above(surface("", Quantity::Error, |_, _| 0.0));
+    assert_eq!(drawn(vec![none]), ["#ffffff"]);
+    let both_signs = drawn(vec![from_above(error())]);
+    assert!(both_signs.len() > 30, "{} colours", both_signs.len());
+}
+
+#[test]
+fn lit_nodes_the_section_and_the_chosen_colours_are_in_print() {
+    let figure = |change: &dyn Fn(&mut SurfaceFigure)| {
+        let mut figure = figure(vec![from_above(dent("Actual"))]);
+        change(&mut figure);
+        draw(&figure)
+    };
+    let plain = figure(&|_| ());
+    let circles = |picture: &Picture| picture.svg().matches("<circle").count();
+    let lit = figure(&|figure| figure.lit_nodes = vec![1, 5, 999]);
+    assert_eq!(circles(&lit), circles(&plain) + 4, "two rings around each of two nodes");
+    let section = |at_mm| {
+        figure(&|figure| {
+            figure.section = Some(Section {
+                line: SectionLine::RowWire(1),
+                at_mm,
+            });
+        })
+    };
+    assert_ne!(section(1.0).svg(), plain.svg());
+    assert_eq!(section(99.0).svg(), plain.svg(), "beside the surface");
+    let cividis = figure(&|figure| figure.surfaces[0].colours = SequentialMap::Cividis);
+    assert_ne!(cividis.svg(), plain.svg());
+}
+
+#[test]
+fn the_marked_node_is_marked_in_print() {
+    let marked = |marked_node| {
+        draw(&SurfaceFigure {
+            marked_node,
+            ..figure(vec![from_above(dent("Actual"))])
+        })
+    };
+    let circles = |picture: &Picture| picture.svg().matches("<circle").count();
+    let [plain, with_mark, no_such_node] = [None, Some(7), Some(999)].map(marked);
+    assert_eq!(circles(&with_mark), circles(&plain) + 3, "a disc and two rings");
+    assert_eq!(circles(&no_such_node), circles(&plain));
+}
+
+#[test]
+fn nodes_beyond_the_axes_are_named() {
+    let mut surface = from_above(dent("Actual"));
+    Arc::make_mut(&mut surface.nodes)[0].x = -7.0;
+    let picture = draw(&figure(vec![surface]));
+    assert_eq!(says(&picture, "1 node beyond the axes is drawn at their edge"), 1);
+}
+
+#[test]
+fn odd_surfaces_are_drawn() {
+    let mut gaps = dent("Actual");
+    Arc::make_mut(&mut gaps.values)[5000] = f64::NAN;
+    Arc::make_mut(&mut gaps.nodes)[3].z = f64::NAN;
+    let empty = Surface {
+        values: Arc::new([]),
+        ..dent("Actual")
+    };
+    let single = |scale| over(scale, "Actual", Quantity::Height, |_, _| 4.5);
+    let nothing = surface("Actual", Quantity::Height, |_, _| f64::NAN);
+    let odd = [
+        gaps,
+        empty,
+        nothing,
+        single([1, 1]),
+        single([2, 2]),
+        single([1, 9]),
+        single([30, 40]),
+    ];
+    for surface in odd {
+        for mode in [ViewMode::ThreeD, ViewMode::Top] {
+            for range in [4.0..=5.0, 5.0..=5.0, f64::NAN..=f64::NAN, 5.0..=4.0] {
+                let (range, surface) = (range, surface.clone());
+                let surface = Surface { mode, range, ..surface };
+                let picture = draw(&figure(vec![surface.clone(), surface]));
+                assert_eq!(
+                    picture.svg().matches("NaN").count() + picture.svg().matches("inf").count(),
+                    0
+                );
+                assert_eq!(says(&picture, "Actual"), 2);
+            }
+        }
+    }
+    draw(&figure(Vec::new())).png().unwrap();
+}

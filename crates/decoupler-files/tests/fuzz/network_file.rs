@@ -1,0 +1,112 @@
+use std::{fs, path::Path};
+
+use decoupler_core::network::DecouplingNetwork;
+use decoupler_files::export::NetworkFile;
+use rand::RngExt;
+
+use crate::{
+    corpus::replay,
+    mutation::{for_each_seed, mutated},
+    sealing::resealed,
+    trained::trained,
+};
+
+fn loaded(path: &Path, bytes: &[u8]) -> Option<NetworkFile> {
+    fs::write(path, bytes).unwrap();
+    match NetworkFile::load(path) {
+        Ok(file) => Some(file),
+        Err(error) => {
+            let message = error.to_string();
+            assert!(message.len() < 2000 && !message.contains('\n'), "{message}");
+            None
+        }
+    }
+}
+
+/// Files as they are on a disk that fails.
+#[test]
+fn no_damage_changes_a_number() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("network.json");
+    for run in trained() {
+        let file = NetworkFile::from_run(&run, None).unwrap();
+        file.save(&path).unwrap();
+        let valid = fs::read(&path).unwrap();
+        for_each_seed(400, |rng| {
+            let damaged = mutated(&valid, rng);
+            if let Some(mut read) = loaded(&path, &damaged) {
+                read.program.clone_from(&file.program);
+                assert_eq!(read, file, "{}", String::from_utf8_lossy(&damaged));
+            }
+        });
+    }
+}
+
+/// Files made to deceive, or damaged before there were checksums.
+#[test]
+fn what_is_accepted_answers_in_numbers_or_is_flagged() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("network.json");
+    let mut accepted = 0;
+    for run in trained() {
+        NetworkFile::from_run(&run, None).unwrap().save(&path).unwrap();
+        let valid = fs::read(&path).unwrap();
+        for_each_seed(300, |rng| {
+            let Some(damaged) = resealed(&mutated(&valid, rng)) else {
+                return;
+            };
+            accepted += usize::from(check(&path, &damaged, rng));
+        });
+    }
+    assert!(accepted > 20, "only {accepted} files reach the network");
+}
+
+/// True if the file is accepted; then it answers soundly, and is what it is when saved and loaded again.
+fn check(path: &Path, bytes: &[u8], rng: &mut impl RngExt) -> bool {
+    let Some(file) = loaded(path, bytes) else { return false };
+    let Some(simulation) = file.settings.source.simulation() else {
+        return true;
+    };
+    let height_mm = simulation.sensor.geometry.height_mm;
+    for network in file.network.values() {
+        let readings: Vec<f64> = (0..network.inputs().channels())
+            .map(|_| 10_f64.powf(rng.random_range(-3.0..4.0)))
+            .collect();
+        check_answer(network, &readings, height_mm);
+    }
+    file.save(path).unwrap();
+    let again = NetworkFile::load(path).unwrap();
+    assert_eq!((again.settings, again.network), (file.settings, file.network));
+    true
+}
+
+#[test]
+fn any_input() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("network.json");
+    replay!(|bytes: &[u8]| {
+        for_each_seed(1, |rng| {
+            check(&path, bytes, rng);
+            if let Some(sealed) = resealed(bytes) {
+                check(&path, &sealed, rng);
+            }
+        });
+    });
+}
+
+/// An answer is flagged, refused as not finite, or within a stroke of where nodes are.
+fn check_answer(network: &DecouplingNetwork, readings_ohm: &[f64], height_mm: f64) {
+    let readings = ndarray::ArrayView2::from_shape((1, readings_ohm.len()), readings_ohm).unwrap();
+    let answer = network.decouple(readings);
+    let answer = answer.as_slice().unwrap();
+    let is_flagged = network.outputs().far_outside(answer).next().is_some();
+    let is_refused = answer.iter().any(|coordinate| !coordinate.is_finite());
+    let is_near = || {
+        answer
+            .iter()
+            .skip(2)
+            .step_by(3)
+            .all(|z_mm| z_mm.abs() <= 5.0 * height_mm)
+    };
+    assert!(is_flagged || is_refused || is_near(), "{answer:?}");
+}

@@ -1,0 +1,75 @@
+use std::{collections::BTreeMap, fs, path::PathBuf, sync::Arc};
+
+use decoupler_files::export::{KeptRun, NetworkFile, RunFolder};
+
+use crate::{
+    corpus::replay,
+    mutation::{for_each_seed, mutated},
+    trained::trained,
+};
+
+#[test]
+fn damage_costs_the_damaged_file_only_and_changes_none() {
+    let folder = tempfile::tempdir().unwrap();
+    let (mut kept, _) = RunFolder::open(folder.path()).unwrap();
+    for run in trained() {
+        kept.keep(Arc::new(NetworkFile::from_run(&run, None).unwrap())).unwrap();
+    }
+    kept.pin([Some(kept.runs().runs[0].id), None]).unwrap();
+    let paths = fs::read_dir(folder.path()).unwrap().map(|entry| entry.unwrap().path());
+    let files: BTreeMap<PathBuf, Vec<u8>> = paths.map(|path| (path.clone(), fs::read(path).unwrap())).collect();
+    let same = |a: &KeptRun, b: &KeptRun| {
+        let parts = |file: &NetworkFile| (file.settings, file.network.clone(), file.scores.clone());
+        a.id == b.id && (Arc::ptr_eq(&a.file, &b.file) || parts(&a.file) == parts(&b.file))
+    };
+    for (path, valid) in &files {
+        for_each_seed(30, |rng| {
+            let damaged = mutated(valid, rng);
+            fs::write(path, &damaged).unwrap();
+            let (found, problems) = RunFolder::open(folder.path()).unwrap();
+            let text = || String::from_utf8_lossy(&damaged);
+            assert!(problems.len() <= 1, "{problems:?}");
+            assert!(
+                found.runs().runs.len() + problems.len() >= kept.runs().runs.len(),
+                "{}",
+                text()
+            );
+            for run in &found.runs().runs {
+                assert!(
+                    kept.runs().runs.iter().any(|original| same(original, run)),
+                    "{}",
+                    text()
+                );
+            }
+            assert_eq!(fs::read(path).unwrap(), damaged);
+        });
+        fs::write(path, valid).unwrap();
+    }
+    let (found, problems) = RunFolder::open(folder.path()).unwrap();
+    assert_eq!((found.runs(), problems), (kept.runs(), Vec::new()));
+}
+
+/// As a run, as what is pinned, and as a name.
+#[test]
+fn any_input() {
+    replay!(|bytes: &[u8]| {
+        for name in ["runs/run-1.json", "runs/run-1.name.json", "runs/pinned.json"] {
+            let folder = tempfile::tempdir().unwrap();
+            fs::create_dir(folder.path().join("runs")).unwrap();
+            let file = folder.path().join(name);
+            fs::write(&file, bytes).unwrap();
+            let Ok((found, problems)) = RunFolder::open(&folder.path().join("runs")) else {
+                continue;
+            };
+            assert!(
+                problems
+                    .iter()
+                    .all(|problem| problem.len() < 2000 && !problem.contains('\n')),
+                "{problems:?}"
+            );
+            assert_eq!(fs::read(&file).unwrap(), bytes, "{name} stays as it is");
+            let (again, _) = RunFolder::open(&folder.path().join("runs")).unwrap();
+            assert_eq!(again.runs(), found.runs(), "{name}");
+        }
+    });
+}

@@ -1,0 +1,10 @@
+//! Recordings and what stands beside them, from files to samples and networks.
+
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+mod networks;
+mod positions;
+mod recordings;
+mod samples;
+mod suggestions;
+mod test_files;

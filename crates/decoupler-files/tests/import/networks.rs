@@ -1,0 +1,398 @@
+//! Networks and checkpoints of recordings, the recordings they name, and recipes.
+
+use std::{
+    fs,
+    path::{Path, PathBuf},
+    sync::Arc,
+};
+
+use decoupler_core::{
+    dataset::{Division, Seed, SplitBy},
+    evaluation::{Measured, Run, RunSettings, SimulatedSettings, Simulation, TargetErrors, TestErrors},
+    scene::RowModel,
+    training::Method,
+};
+use decoupler_files::{
+    export::{
+        CheckpointFile, DocumentError, NetworkFile, RecipeFile, RecipeSource, RunFolder, describe_worse_than_ridge,
+    },
+    import::{Plan, Recipe, Setup, SetupError, SetupSets},
+};
+use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
+
+fn recipe(inputs: &[&str], target: &str) -> Recipe {
+    Recipe {
+        data: "data.csv".into(),
+        inputs: inputs.iter().map(|&name| name.to_owned()).collect(),
+        targets: vec![target.to_owned()],
+        ..Recipe::default()
+    }
+}
+
+/// A recording in `folder` whose target is a curved function of its two readings, and its plan.
+fn curved(folder: &Path) -> Plan {
+    let mut rng = ChaCha8Rng::seed_from_u64(1);
+    let mut line = || {
+        let (a, b): (f64, f64) = (rng.random_range(-1.0..1.0), rng.random_range(-1.0..1.0));
+        format!("{a},{b},{}\n", (2.0 * a).sin() + a * b)
+    };
+    let text: String = (0..200).map(|_| line()).collect();
+    fs::write(folder.join("data.csv"), format!("a,b,force (N)\n{text}")).unwrap();
+    Plan {
+        import: recipe(&["a", "b"], "force"),
+        ..Plan::default()
+    }
+}
+
+fn settings() -> RunSettings {
+    let mut settings = RunSettings::from(Measured { rows: RowModel::Shared });
+    settings.hidden = 5;
+    settings.training.stopping.epochs = 30;
+    // The correlation of neighbouring errors is measured on the way.
+    let mut measured_at = settings.training.method.settings();
+    let setting = measured_at
+        .iter_mut()
+        .find(|setting| setting.name == "correlation epoch");
+    *setting.unwrap().value = 10.0;
+    settings
+}
+
+/// A run on the recording in `folder`, with its sets.
+fn prepared(folder: &Path) -> (Run, SetupSets) {
+    let setup = Setup::recording(settings(), curved(folder));
+    let sets = setup.sets(folder, &|| false, &mut |_| ()).unwrap().unwrap();
+    let run = sets.run(&setup, &|| false).unwrap().unwrap();
+    (run, sets)
+}
+
+fn trained(folder: &Path) -> NetworkFile {
+    let (mut run, sets) = prepared(folder);
+    while run.step().is_none() {}
+    NetworkFile::from_run(&run, sets.recorded()).unwrap()
+}
+
+/// The checkpoint of a run on the recording in `folder` after seven epochs, and the network that it ends with.
+fn paused(folder: &Path) -> (CheckpointFile, NetworkFile) {
+    let (mut run, sets) = prepared(folder);
+    (0..7).for_each(|_| {
+        run.step();
+    });
+    let paused = CheckpointFile::from_run(&run, sets.recorded()).unwrap();
+    while run.step().is_none() {}
+    (paused, NetworkFile::from_run(&run, sets.recorded()).unwrap())
+}
+
+/// Two folders next to each other in one: for recordings, and for files that name them.
+fn folders(root: &Path) -> [PathBuf; 2] {
+    ["recordings", "networks"].map(|name| {
+        let folder = root.join(name);
+        fs::create_dir_all(&folder).unwrap();
+        folder
+    })
+}
+
+fn worse_than_ridge(file: &NetworkFile) -> Option<String> {
+    describe_worse_than_ridge(&file.problem, &file.scores, file.settings.training.method)
+}
+
+#[test]
+fn networks_of_recordings_are_saved_with_the_names_of_their_channels() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = trained(folder.path());
+    let [network, ridge] = [&file.scores.network, &file.scores.baselines.linear].map(|errors| errors.targets()[0]);
+    assert!(network.rmse < 0.2 * ridge.rmse, "{network:?} {ridge:?}");
+    let path = folder.path().join("network.json");
+    file.save(&path).unwrap();
+    let read = NetworkFile::load(&path).unwrap();
+    assert_eq!(read, file);
+    assert_eq!(read.problem.targets[0].title(), "force (N)");
+    assert_eq!(read.source_name(), "data");
+    let sets = read
+        .setup()
+        .sets(Path::new(""), &|| false, &mut |_| ())
+        .unwrap()
+        .unwrap();
+    let bits = |file: &NetworkFile| file.network.decouple(&sets.sets.test).mapv(f64::to_bits);
+    assert_eq!(bits(&read), bits(&file));
+    let test = read.test_set().unwrap();
+    assert_eq!(
+        TestErrors::of_targets(&test, read.network.decouple(&test).view()),
+        read.scores.network
+    );
+    let text = fs::read_to_string(&path).unwrap();
+    fs::write(&path, text.replacen("force", "farce", 1)).unwrap();
+    let error = NetworkFile::load(&path).unwrap_err().to_string();
+    assert!(error.contains("checksum"), "{error}");
+}
+
+#[test]
+fn the_cure_of_a_network_worse_than_ridge_is_not_the_method_that_it_was_trained_by() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut file = trained(folder.path());
+    let ridge = file.scores.baselines.linear.targets()[0];
+    let with_rmse = |rmse: f64| TestErrors::Targets(vec![TargetErrors { rmse, ..ridge }]);
+    file.scores.network = with_rmse(0.5 * ridge.rmse);
+    assert!(worse_than_ridge(&file).is_none());
+    file.scores.network = with_rmse((1.0 + 1e-7) * ridge.rmse);
+    let hardly = worse_than_ridge(&file).unwrap();
+    assert!(
+        hardly.contains("is no better than ridge regression for force (RMSE") && hardly.contains(" for both)"),
+        "{hardly}"
+    );
+    file.scores.network = with_rmse(2.0 * ridge.rmse);
+    for (method, is_advised) in [(Method::default(), true), (Method::recorded_regularization(), false)] {
+        file.settings.training.method = method;
+        let warning = worse_than_ridge(&file).unwrap();
+        assert_eq!(warning.contains("Bayesian"), is_advised, "{warning}");
+    }
+    // Five targets make one sentence that names three.
+    let ridge = TestErrors::Targets(vec![ridge; 5]);
+    file.problem.targets = vec![file.problem.targets[0].clone(); 5];
+    file.scores.network = TestErrors::Targets(vec![with_rmse(2.0 * ridge.targets()[0].rmse).targets()[0]; 5]);
+    file.scores.baselines.linear = ridge;
+    let warning = worse_than_ridge(&file).unwrap();
+    assert!(
+        warning.contains("worse than ridge regression for force (RMSE"),
+        "{warning}"
+    );
+    assert_eq!(
+        (warning.matches("force").count(), warning.contains(" and 2 more: ")),
+        (3, true),
+        "{warning}"
+    );
+}
+
+#[test]
+fn a_checkpoint_of_a_recording_resumes_with_the_same_bits_or_says_that_the_recording_has_changed() {
+    let folder = tempfile::tempdir().unwrap();
+    let (checkpoint, whole) = paused(folder.path());
+    let path = folder.path().join("run.checkpoint");
+    checkpoint.save(&path).unwrap();
+    let read = CheckpointFile::load(&path).unwrap();
+    assert_eq!(read, checkpoint);
+    let mut resumed = read.clone().resume().unwrap();
+    while resumed.step().is_none() {}
+    assert_eq!(resumed.network(), whole.network);
+    // Another digit of a sample.
+    let data = folder.path().join("data.csv");
+    fs::write(&data, fs::read_to_string(&data).unwrap().replacen("0.", "0.0", 1)).unwrap();
+    let error = whole.test_set().err().unwrap();
+    assert!(matches!(error, SetupError::OtherSamples(_)), "{error}");
+    let error = read.resume().err().unwrap();
+    assert!(matches!(error, SetupError::OtherSamples(_)), "{error}");
+    assert!(error.to_string().contains("data.csv' has other samples"), "{error}");
+}
+
+#[test]
+fn files_and_their_recording_move_together() {
+    let root = tempfile::tempdir().unwrap();
+    let [recordings, networks] = folders(&root.path().join("here"));
+    let (checkpoint, whole) = paused(&recordings);
+    checkpoint.save(&networks.join("run.checkpoint")).unwrap();
+    whole.save(&networks.join("network.json")).unwrap();
+    let check = |folder: &Path| {
+        let file = NetworkFile::load(&folder.join("network.json")).unwrap();
+        assert_eq!(
+            file.recorded.as_ref().unwrap().missing(),
+            Vec::<&Path>::new(),
+            "{folder:?}"
+        );
+        assert_eq!(file.network, whole.network);
+        let mut resumed = CheckpointFile::load(&folder.join("run.checkpoint"))
+            .unwrap()
+            .resume()
+            .unwrap();
+        while resumed.step().is_none() {}
+        assert_eq!(resumed.network(), whole.network, "{folder:?}");
+    };
+    check(&networks);
+    // Both folders, to another place.
+    fs::rename(root.path().join("here"), root.path().join("there")).unwrap();
+    let [recordings, networks] = folders(&root.path().join("there"));
+    check(&networks);
+    // All files into one folder, as in a message to a colleague.
+    let sent = root.path().join("sent");
+    fs::create_dir(&sent).unwrap();
+    for file in [
+        networks.join("run.checkpoint"),
+        networks.join("network.json"),
+        recordings.join("data.csv"),
+    ] {
+        fs::rename(&file, sent.join(file.file_name().unwrap())).unwrap();
+    }
+    check(&sent);
+}
+
+#[test]
+fn a_recording_that_is_missing_is_named_and_can_be_given_again() {
+    let root = tempfile::tempdir().unwrap();
+    let [recordings, networks] = folders(root.path());
+    let (checkpoint, whole) = paused(&recordings);
+    let path = networks.join("run.checkpoint");
+    checkpoint.save(&path).unwrap();
+    let (data, renamed) = (recordings.join("data.csv"), recordings.join("press.csv"));
+    fs::rename(&data, &renamed).unwrap();
+    let mut read = CheckpointFile::load(&path).unwrap();
+    assert_eq!(read.recorded.as_ref().unwrap().missing(), [data.as_path()]);
+    let error = read.clone().resume().err().unwrap().to_string();
+    assert!(error.contains("cannot read") && error.contains("data.csv"), "{error}");
+    read.recorded = read.recorded.map(|recorded| recorded.relocated(&data, &renamed));
+    assert_eq!(read.recorded.as_ref().unwrap().missing(), Vec::<&Path>::new());
+    let mut resumed = read.resume().unwrap();
+    while resumed.step().is_none() {}
+    assert_eq!(resumed.network(), whole.network);
+}
+
+#[test]
+fn no_saved_file_has_an_absolute_path() {
+    let root = tempfile::tempdir().unwrap();
+    let [recordings, networks] = folders(root.path());
+    let (checkpoint, whole) = paused(&recordings);
+    checkpoint.save(&networks.join("run.checkpoint")).unwrap();
+    whole.save(&networks.join("network.json")).unwrap();
+    let plan = &whole.recorded.as_ref().unwrap().plan;
+    assert!(plan.import.data.is_absolute());
+    RecipeFile::save(plan, &networks.join("recipe.json")).unwrap();
+    let (mut kept, _) = RunFolder::open(&networks.join("runs")).unwrap();
+    kept.keep(Arc::new(whole.clone())).unwrap();
+    let entries = [networks.clone(), networks.join("runs")].map(|folder| fs::read_dir(folder).unwrap());
+    let mut files = 0;
+    for entry in entries.into_iter().flatten() {
+        let path = entry.unwrap().path();
+        if path.is_file() {
+            let text = fs::read_to_string(&path).unwrap();
+            assert!(!text.contains(&*root.path().to_string_lossy()), "{path:?}: {text}");
+            let names_it = text.contains("../recordings/data.csv");
+            assert!(
+                names_it || path.to_string_lossy().ends_with(".name.json"),
+                "{path:?}: {text}"
+            );
+            files += 1;
+        }
+    }
+    assert_eq!(files, 5, "three files, and a run with its name");
+}
+
+#[test]
+fn a_run_folder_keeps_runs_of_both_sources() {
+    let root = tempfile::tempdir().unwrap();
+    let [recordings, runs] = folders(root.path());
+    let mut settings = SimulatedSettings::default();
+    settings.source.sensor.scale = "2x2_2x6".parse().unwrap();
+    (settings.source.samples, settings.source.test_samples) = (20, 8);
+    settings.training.stopping.epochs = 2;
+    let mut simulated = Run::prepare(settings).unwrap();
+    while simulated.step().is_none() {}
+    let files = [NetworkFile::from_run(&simulated, None).unwrap(), trained(&recordings)].map(Arc::new);
+    let (mut kept, _) = RunFolder::open(&runs).unwrap();
+    for file in &files {
+        kept.keep(Arc::clone(file)).unwrap();
+    }
+    let names = |folder: &RunFolder| Vec::from_iter(folder.runs().runs.iter().map(|run| run.name.clone()));
+    assert_eq!(names(&kept), ["2×2_2×6 h12 lm", "data h5 br"]);
+    let (mut other, problems) = RunFolder::open(&runs).unwrap();
+    assert_eq!((other.runs(), problems), (kept.runs(), Vec::new()));
+    let [first, second] = [0, 1].map(|place| kept.runs().runs[place].id);
+    other.rename(second, "press").unwrap();
+    other.pin([Some(second), Some(first)]).unwrap();
+    kept.remove(first).unwrap();
+    assert!(kept.look().is_empty() && other.look().is_empty());
+    assert_eq!(kept.runs(), other.runs());
+    assert_eq!(names(&kept), ["press"]);
+    assert_eq!(kept.runs().pinned, [Some(second), None]);
+    assert_eq!(*kept.runs().runs[0].file, *files[1]);
+}
+
+#[test]
+fn a_recipe_repeats_the_import_from_another_folder() {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("data.csv"), "t,x,y\n0,1,2\n1,3,4\n2,5,6\n3,7,8\n").unwrap();
+    let mut plan = Plan {
+        import: recipe(&["x"], "y"),
+        division: Division {
+            by: SplitBy::Random,
+            ..Division::default()
+        },
+        ..Plan::default()
+    };
+    plan.import.conditions = vec!["t>0".parse().unwrap()];
+    plan.import.missing = vec!["x=-1".parse().unwrap()];
+    let path = folder.path().join("import.json");
+    RecipeFile::save(&plan.within(folder.path()), &path).unwrap();
+    let text = fs::read_to_string(&path).unwrap();
+    assert!(
+        text.contains("\"data\": \"data.csv\"") && text.contains("\"t>0\""),
+        "{text}"
+    );
+    let read = RecipeFile::load_recording(&path).unwrap();
+    assert_eq!(read, plan.within(folder.path()));
+    assert_eq!(RecipeFile::load(&path).unwrap(), RecipeSource::Recording(read.clone()));
+    let sets = read
+        .sets(Path::new(""), Seed(0), &mut |_| std::ops::ControlFlow::Continue(()))
+        .unwrap();
+    assert_eq!(sets.recording.set.readings().column(0).to_vec(), [3.0, 5.0, 7.0]);
+    for (from, to, cause) in [
+        ("\"inputs\"", "\"imputs\"", "unknown field `imputs`"),
+        (
+            "\"recording\"",
+            "\"recorded\"",
+            "unknown variant `recorded`, expected `simulated` or `recording`",
+        ),
+        (
+            "decoupler recipe",
+            "decoupler network",
+            "its format is \"decoupler network\"",
+        ),
+    ] {
+        assert!(text.contains(from), "{from}");
+        fs::write(&path, text.replace(from, to)).unwrap();
+        let error = RecipeFile::load(&path).unwrap_err().to_string();
+        assert!(error.contains(cause), "{error}");
+    }
+}
+
+#[test]
+fn a_recipe_of_an_array_says_what_differs_from_the_papers() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("array.json");
+    let written = |source: &str| {
+        let text =
+            format!(r#"{{"format": "decoupler recipe", "version": 1, "program": "by hand", "source": {source}}}"#);
+        fs::write(&path, text).unwrap();
+        RecipeFile::load(&path)
+    };
+    assert_eq!(
+        written(r#"{"simulated": {}}"#).unwrap(),
+        RecipeSource::Simulated(Simulation::default())
+    );
+    let mut expected = Simulation::default();
+    expected.sensor.scale = "10x6_3x18".parse().unwrap();
+    expected.sensor.geometry.height_mm = 6.0;
+    expected.scene.noise.relative = 1e-3;
+    expected.samples = 500;
+    let text = r#"{"simulated": {"sensor": {"scale": "10x6_3x18", "geometry": {"height_mm": 6}},
+        "scene": {"noise": {"relative": 1e-3}}, "samples": 500}}"#;
+    assert_eq!(written(text).unwrap(), RecipeSource::Simulated(expected));
+    for (text, cause) in [
+        (r#"{"simulated": {"sample": 500}}"#, "unknown field `sample`"),
+        (
+            r#"{"simulated": {"samples": 0}}"#,
+            "training samples: 0 is not possible",
+        ),
+        (
+            r#"{"simulated": {"sensor": {"geometry": {"height_mm": -6}}}}"#,
+            "the height is -6 mm",
+        ),
+        (
+            r#"{"simulated": {"scene": {"largest_compression": 2}}}"#,
+            "the largest compression is 200 %",
+        ),
+    ] {
+        let error = written(text).unwrap_err().to_string();
+        assert!(error.contains(cause) && error.contains("array.json"), "{error}");
+    }
+    RecipeFile::save(expected, &path).unwrap();
+    assert_eq!(RecipeFile::load(&path).unwrap(), RecipeSource::Simulated(expected));
+    let error = RecipeFile::load_recording(&path).unwrap_err();
+    assert!(matches!(error, DocumentError::SimulatedRecipe(_)), "{error}");
+}

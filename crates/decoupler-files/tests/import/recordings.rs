@@ -1,0 +1,368 @@
+//! Files of recordings become samples: what is read is what the files say, and what is left out is said.
+
+use std::{fs, ops::ControlFlow, path::Path};
+
+use decoupler_files::import::{
+    Cells, ColumnKind, Decimal, DialectChoice, Encoding, Inspection, Joined, Progress, Recipe, Recording, Separator,
+    Table, read_table,
+};
+use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
+use tempfile::TempDir;
+
+fn go_on(_: Progress) -> ControlFlow<()> {
+    ControlFlow::Continue(())
+}
+
+fn read(path: &Path) -> Result<Table, String> {
+    read_table(path, DialectChoice::default(), &mut go_on).map_err(|error| error.to_string())
+}
+
+fn numbers(table: &Table) -> Vec<Vec<f64>> {
+    let column = |cells: &Cells| match cells {
+        Cells::Numbers(numbers) => numbers.clone(),
+        Cells::Labels { .. } => Vec::new(),
+    };
+    table.columns.iter().map(|found| column(&found.cells)).collect()
+}
+
+fn names(table: &Table) -> Vec<&str> {
+    table.columns.iter().map(|column| column.name.as_str()).collect()
+}
+
+fn folder(files: &[(&str, &str)]) -> TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    for (name, text) in files {
+        fs::write(folder.path().join(name), text).unwrap();
+    }
+    folder
+}
+
+fn words(text: &str) -> Vec<String> {
+    text.split_whitespace().map(str::to_owned).collect()
+}
+
+fn recipe(inputs: &str, targets: &str) -> Recipe {
+    Recipe {
+        data: "data.csv".into(),
+        inputs: words(inputs),
+        targets: words(targets),
+        ..Recipe::default()
+    }
+}
+
+fn import(recipe: &Recipe, folder: &TempDir) -> Result<Recording, String> {
+    recipe
+        .import(folder.path(), &mut go_on)
+        .map_err(|error| error.to_string())
+}
+
+#[test]
+fn every_layout_of_one_table_gives_the_same_numbers() {
+    let latin1 = "x (\u{b5}m);y\n1,5;-2\n3;4e-1\n"
+        .chars()
+        .map(|letter| letter as u8)
+        .collect::<Vec<u8>>();
+    let utf16 = |text: &str| text.encode_utf16().flat_map(u16::to_le_bytes).collect::<Vec<u8>>();
+    let layouts: Vec<Vec<u8>> = vec![
+        b"x (\xc2\xb5m),y\n1.5,-2\n3,4e-1\n".to_vec(),
+        b"\xef\xbb\xbfx (\xc2\xb5m),y\r\n1.5,-2\r\n3,4e-1".to_vec(),
+        latin1,
+        utf16("\u{feff}x (µm)\ty\r\n1,5\t-2\r\n3\t4e-1\r\n"),
+        b"sep=;\r\nx [\xc2\xb5m];y;\r\n1,5;-2;\r\n3;0,4;\r\n".to_vec(),
+        b"\"x (\xc2\xb5m)\"|\"y\"\n\"1.5\"|-2\n\n3|0.4\n".to_vec(),
+        b"x(\xc2\xb5m) y\n  1.5   -2\n  3.0  0.4\n".to_vec(),
+        b"x (\xc2\xb5m),y\r1.5,-2\r3,0.4\r".to_vec(),
+    ];
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("data.csv");
+    for bytes in layouts {
+        fs::write(&path, &bytes).unwrap();
+        let table = read(&path).unwrap();
+        let layout = String::from_utf8_lossy(&bytes);
+        assert_eq!(names(&table), ["x", "y"], "{layout}");
+        assert_eq!(table.columns[0].unit.as_deref(), Some("µm"), "{layout}");
+        assert_eq!(numbers(&table), [[1.5, 3.0], [-2.0, 0.4]], "{layout}");
+    }
+}
+
+#[test]
+fn what_the_user_says_of_the_layout_holds() {
+    let folder = folder(&[("data.csv", "note; of 2\n1,5\n2,5\n")]);
+    let path = folder.path().join("data.csv");
+    let choice = DialectChoice {
+        separator: Some(Separator::Semicolon),
+        decimal: Some(Decimal::Comma),
+        header: Some(false),
+        skip_lines: Some(1),
+        encoding: Some(Encoding::Latin1),
+    };
+    let table = read_table(&path, choice, &mut go_on).unwrap();
+    assert_eq!((names(&table), numbers(&table)), (vec!["c1"], vec![vec![1.5, 2.5]]));
+    assert_eq!(table.line(1), 3);
+}
+
+#[test]
+fn numbers_are_read_to_the_last_bit() {
+    let mut rng = ChaCha8Rng::seed_from_u64(0);
+    let expected: Vec<f64> = (0..2000)
+        .map(|_| f64::from_bits(rng.random()))
+        .filter(|number: &f64| number.is_finite())
+        .collect();
+    let text: String = expected.iter().map(|number| format!("{number:e},0\n")).collect();
+    let folder = folder(&[("data.csv", &text)]);
+    let found = numbers(&read(&folder.path().join("data.csv")).unwrap());
+    assert!(
+        found[0]
+            .iter()
+            .zip(&expected)
+            .all(|(one, other)| one.to_bits() == other.to_bits())
+    );
+    assert_eq!(found[0].len(), expected.len());
+}
+
+#[test]
+fn arrays_of_numpy_and_matlab_are_those_that_were_saved() {
+    let fixtures = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures/import");
+    let read = |name: &str| read(&fixtures.join(name));
+    let expected: Vec<Vec<f64>> = (0..3)
+        .map(|column| (0..5).map(|row| f64::from(row) + f64::from(column) / 4.0).collect())
+        .collect();
+    for name in ["f8.npy", "f4_columns_big.npy"] {
+        let table = read(name).unwrap();
+        assert_eq!(
+            (names(&table), numbers(&table)),
+            (vec!["c1", "c2", "c3"], expected.clone()),
+            "{name}"
+        );
+    }
+    assert_eq!(numbers(&read("i2.npy").unwrap()), [[-2.0, -1.0, 0.0, 1.0, 2.0]]);
+    for name in ["plain.npz", "deflated.npz", "plain.mat", "deflated.mat"] {
+        let table = read(name).unwrap();
+        let found =
+            |wanted: &str| numbers(&table)[names(&table).iter().position(|name| *name == wanted).unwrap()].clone();
+        for (column, expected) in expected.iter().enumerate() {
+            assert_eq!(&found(&format!("x.c{}", column + 1)), expected, "{name}");
+        }
+        assert_eq!(found("t"), [0.0, 1.0, 2.0, 3.0, 4.0], "{name}");
+    }
+    for (name, left_out) in [
+        ("plain.npz", "rate has 1 rows"),
+        ("plain.mat", "who is text"),
+        ("plain.mat", "s is a structure"),
+    ] {
+        let notes = read(name).unwrap().notes;
+        assert!(notes.iter().any(|note| note.contains(left_out)), "{name}: {notes:?}");
+    }
+    assert!(read("complex.npy").unwrap_err().contains("'<c16' is not read"));
+    assert!(read("level4.mat").unwrap_err().contains("-v7"));
+}
+
+#[test]
+fn cells_that_are_no_numbers_are_named_and_never_guessed() {
+    let folder = folder(&[("data.csv", "t,x,y\n0,1,2\n1,1.2.3,2\n2,,2\n3,1,n/a\n4,5,6\n")]);
+    let error = import(&recipe("x", "t"), &folder).unwrap_err();
+    assert!(
+        error.contains("line 3, column 2 ('x'): '1.2.3' is not a finite number"),
+        "{error}"
+    );
+    // A column that is not used does not matter.
+    let mut wanted = recipe("y", "t");
+    let error = import(&wanted, &folder).unwrap_err();
+    assert!(error.contains("line 5, column 3 ('y'): 'n/a'"), "{error}");
+    wanted.missing = vec!["n/a".parse().unwrap()];
+    let recording = import(&wanted, &folder).unwrap();
+    assert_eq!((recording.set.samples(), recording.rows), (4, 5));
+    assert_eq!(
+        (
+            recording.dropped[0].reason.as_str(),
+            recording.dropped[0].rows,
+            recording.dropped[0].first_line
+        ),
+        ("y is missing", 1, 5)
+    );
+}
+
+#[test]
+fn a_number_may_mean_missing_in_one_column_only() {
+    let folder = folder(&[("data.csv", "a,b\n-1,1\n2,-1.0\n3,3\n")]);
+    let mut wanted = recipe("a", "b");
+    wanted.missing = vec!["b=-1".parse().unwrap()];
+    let recording = import(&wanted, &folder).unwrap();
+    assert_eq!(recording.set.readings().column(0).to_vec(), [-1.0, 3.0]);
+    wanted.missing = vec!["-1".parse().unwrap()];
+    assert_eq!(
+        import(&wanted, &folder).unwrap().set.readings().column(0).to_vec(),
+        [3.0]
+    );
+    wanted.missing = vec!["d=-1".parse().unwrap()];
+    assert!(
+        import(&wanted, &folder)
+            .unwrap_err()
+            .contains("there is no column 'd'; there are a, b")
+    );
+}
+
+#[test]
+fn rows_of_other_lengths_are_counted() {
+    let folder = folder(&[("data.csv", "1,2,3\n1,2,3\n4,5\n6,7,8,9\n1,2,3,\n1,2,3\n")]);
+    let recording = import(&recipe("c1 c2", "c3"), &folder).unwrap();
+    assert_eq!((recording.set.samples(), recording.rows), (4, 6));
+    let dropped: Vec<(&str, usize, u64)> = recording
+        .dropped
+        .iter()
+        .map(|dropped| (dropped.reason.as_str(), dropped.rows, dropped.first_line))
+        .collect();
+    assert_eq!(
+        dropped,
+        [("more cells than the 3 columns", 1, 4), ("c3 is missing", 1, 3)]
+    );
+    assert_eq!(recording.warnings.len(), 2, "{:?}", recording.warnings);
+    // The cells that are there can be used.
+    assert_eq!(import(&recipe("c1", "c2"), &folder).unwrap().set.samples(), 5);
+}
+
+#[test]
+fn two_recordings_are_joined_by_the_nearest_time() {
+    let folder = folder(&[
+        ("data.csv", "0.0,10\n1.0,11\n2.0,12\n3.0,13\n9.0,19\n"),
+        ("states.csv", "2.1,102,7\n0.2,100,9\n1.1,101,8\n3.4,103,5\n"),
+    ]);
+    let mut wanted = recipe("c2", "states.c2");
+    wanted.join = vec![Joined {
+        file: "states.csv".into(),
+        ..Joined::default()
+    }];
+    wanted.time = Some("c1".into());
+    wanted.conditions = vec!["states.c3>5".parse().unwrap()];
+    let recording = import(&wanted, &folder).unwrap();
+    // The median interval of the states is 1.0, so the limit is 0.5; the last row has no partner.
+    assert_eq!(recording.set.readings().column(0).to_vec(), [10.0, 11.0, 12.0]);
+    assert_eq!(recording.set.targets().column(0).to_vec(), [100.0, 101.0, 102.0]);
+    assert_eq!(recording.times.unwrap(), [0.0, 1.0, 2.0]);
+    let join = recording.files[1].join.unwrap();
+    assert_eq!((join.without_partner, join.unused), (1, 0));
+    assert!((join.limit - 0.5).abs() < 1e-9, "{}", join.limit);
+    let reasons: Vec<&str> = recording
+        .dropped
+        .iter()
+        .map(|dropped| dropped.reason.as_str())
+        .collect();
+    assert_eq!(reasons[0], "states.c3>5 is not met");
+    assert!(
+        reasons[1].starts_with("no row of 'states.csv' within 0.5"),
+        "{reasons:?}"
+    );
+    // Without times rows belong together by their order, if there are as many.
+    wanted.time = None;
+    let error = import(&wanted, &folder).unwrap_err();
+    assert!(error.contains("it has 4 rows and the other file 5"), "{error}");
+}
+
+#[test]
+fn samples_stand_in_the_order_of_their_times() {
+    let folder = folder(&[("data.csv", "t,x,y\n3,30,1\n1,10,1\n2,20,1\n")]);
+    let mut wanted = recipe("x", "y");
+    wanted.time = Some("t".into());
+    let recording = import(&wanted, &folder).unwrap();
+    assert_eq!(recording.set.readings().column(0).to_vec(), [10.0, 20.0, 30.0]);
+    assert!(
+        recording.warnings[0].contains("backwards 1 times, first on line 3"),
+        "{:?}",
+        recording.warnings
+    );
+}
+
+#[test]
+fn columns_have_names_ranges_units_and_one_meaning() {
+    let folder = folder(&[(
+        "data.csv",
+        "row,press,x (mm),y,z [N]\n1,a,1,2,3\n2,a,4,5,6\n1,b,7,8,9\n",
+    )]);
+    let mut wanted = recipe("x..y", "z");
+    wanted.group = Some("press".into());
+    wanted.row_wire = Some("row".into());
+    wanted.units = [("y".to_owned(), "V".to_owned())].into();
+    let recording = import(&wanted, &folder).unwrap();
+    let titles = |channels: &[decoupler_core::evaluation::Channel]| {
+        channels.iter().map(|channel| channel.title()).collect::<Vec<_>>()
+    };
+    assert_eq!(titles(&recording.inputs), ["x (mm)", "y (V)"]);
+    assert_eq!(titles(&recording.targets), ["z (N)"]);
+    assert_eq!(recording.set.groups(), [0, 0, 1]);
+    assert_eq!(
+        (recording.set.row_wire(1), recording.set.row_wire(2)),
+        (Some(1), Some(0))
+    );
+    for (inputs, targets, cause) in [
+        ("x", "zz", "no column 'zz'; there are row, press, x, y, z"),
+        ("x y", "y", "'y' is both an input and a target"),
+        ("y..x", "z", "'y..x' is not a range"),
+        ("", "z", "no column is an input"),
+    ] {
+        let error = import(&recipe(inputs, targets), &folder).unwrap_err();
+        assert!(error.contains(cause), "{error}");
+    }
+    wanted.conditions = vec!["press<2".parse().unwrap()];
+    let error = import(&wanted, &folder).unwrap_err();
+    assert!(error.contains("the label 'a' is not a number"), "{error}");
+}
+
+#[test]
+fn no_row_left_is_an_error_that_counts_the_reasons() {
+    let folder = folder(&[("data.csv", "1,2\n3,\n")]);
+    let mut wanted = recipe("c1", "c2");
+    wanted.conditions = vec!["c1>2".parse().unwrap()];
+    let error = import(&wanted, &folder).unwrap_err();
+    assert!(
+        error.contains("none of the 2 rows is left: 1: c1>2 is not met; 1: c2 is missing"),
+        "{error}"
+    );
+}
+
+#[test]
+fn reading_is_cancelled_from_outside() {
+    let folder = folder(&[("data.csv", &"1,2\n".repeat(1_000_000))]);
+    let mut reports = 0;
+    let cancelled = read_table(
+        &folder.path().join("data.csv"),
+        DialectChoice::default(),
+        &mut |progress| {
+            reports += 1;
+            assert_eq!(progress.of, Some(4_000_000));
+            if progress.bytes > 2_000_000 {
+                ControlFlow::Break(())
+            } else {
+                ControlFlow::Continue(())
+            }
+        },
+    );
+    assert_eq!(cancelled.unwrap_err().to_string(), "the import was cancelled");
+    assert!((2..=4).contains(&reports), "{reports}");
+}
+
+#[test]
+fn an_inspection_tells_of_each_column() {
+    let folder = folder(&[(
+        "data.csv",
+        "time (s),a,b,c,d,e\n0,1.5,1,7,1,x\n1,,2,7,2,y\n2,2.5,3,7,3,z\n3,3,4,7,4,\n30,4,5,7,5,w\n",
+    )]);
+    let path = folder.path().join("data.csv");
+    let (found, _) = Inspection::read(&path, DialectChoice::default(), None, &mut go_on).unwrap();
+    let kinds: Vec<ColumnKind> = found.columns.iter().map(|column| column.kind).collect();
+    use ColumnKind::{Integer, Number, Text};
+    assert_eq!(kinds, [Integer, Number, Integer, Integer, Integer, Text]);
+    assert_eq!(
+        (found.columns[1].missing, found.columns[1].min, found.columns[1].max),
+        (1, Some(1.5), Some(4.0))
+    );
+    assert_eq!(found.columns[1].histogram.iter().sum::<usize>(), 4);
+    assert!(found.columns[3].is_constant && !found.columns[2].is_constant);
+    assert_eq!(found.columns[4].duplicate_of.as_deref(), Some("b"));
+    assert_eq!(found.columns[5].first_text, Some((2, "x".to_owned())));
+    let time = found.time.unwrap();
+    assert_eq!(
+        (time.column.as_str(), time.median_interval, time.gaps),
+        ("time", Some(1.0), 1)
+    );
+    assert_eq!((time.longest, time.longest_after_line), (Some(27.0), Some(5)));
+}

@@ -1,0 +1,206 @@
+//! Guesses of what files and columns are for.
+
+use std::{fs, ops::ControlFlow, path::Path};
+
+use decoupler_core::dataset::SplitBy;
+use decoupler_files::import::{Joined, Meaning, Missing, Plan, Recipe, suggested_plan};
+
+/// What is guessed of files with these names and contents.
+fn guessed(files: &[(&str, &str)]) -> Plan {
+    let folder = tempfile::tempdir().unwrap();
+    for (name, text) in files {
+        fs::write(folder.path().join(name), text).unwrap();
+    }
+    let recipe = Recipe {
+        data: files[0].0.into(),
+        join: files[1..]
+            .iter()
+            .map(|(name, _)| Joined {
+                file: name.into(),
+                ..Joined::default()
+            })
+            .collect(),
+        ..Recipe::default()
+    };
+    suggested_plan(
+        &recipe
+            .inspect(folder.path(), &mut |_| ControlFlow::Continue(()))
+            .unwrap(),
+    )
+}
+
+/// Rows of these columns, each a function of the row.
+fn table(header: Option<&str>, rows: usize, columns: &[fn(usize) -> f64]) -> String {
+    let mut text = header.map_or(String::new(), |header| format!("{header}\n"));
+    for row in 0..rows {
+        let cells: Vec<String> = columns.iter().map(|of| of(row).to_string()).collect();
+        text += &format!("{}\n", cells.join(","));
+    }
+    text
+}
+
+const VARYING: fn(usize) -> f64 = |row| ((row * 7 + 3) % 11) as f64 + 0.5;
+const OTHER: fn(usize) -> f64 = |row| ((row * 5 + 1) % 13) as f64 - 2.5;
+const THIRD: fn(usize) -> f64 = |row| ((row * 3 + 2) % 17) as f64 * 0.3;
+const CLOCK: fn(usize) -> f64 = |row| 100.0 + 0.1 * row as f64;
+
+#[test]
+fn columns_are_guessed_from_names_units_and_numbers() {
+    let three: &[fn(usize) -> f64] = &[VARYING, OTHER, THIRD];
+    for (sentence, header, inputs, targets) in [
+        ("names of targets", "r1,r2,force", "r1 r2", "force"),
+        ("units of what is pressed", "a (V),b (mm),c (N)", "a", "b c"),
+        ("units of sensors win over names", "a,load (mV),z", "a load", "z"),
+        ("coordinates with numbers are channels", "x1,y1,x", "x1 y1", "x"),
+        (
+            "words within names",
+            "hall_1,hall_2,probe_depth",
+            "hall_1 hall_2",
+            "probe_depth",
+        ),
+        (
+            "a sensor's own position is no target",
+            "sensor_x,sensor_y,x",
+            "sensor_x sensor_y",
+            "x",
+        ),
+        ("no name speaks: the last column", "a,b,c", "a b", "c"),
+        ("no header: the last column", "", "c1 c2", "c3"),
+        ("all look like targets: the last column", "x,y,z", "x y", "z"),
+    ] {
+        let header = (!header.is_empty()).then_some(header);
+        let plan = guessed(&[("press.csv", &table(header, 30, three))]);
+        assert_eq!(plan.import.inputs.join(" "), inputs, "{sentence}");
+        assert_eq!(plan.import.targets.join(" "), targets, "{sentence}");
+        assert_eq!(plan.division.by, SplitBy::Time, "{sentence}");
+    }
+}
+
+#[test]
+fn what_tells_nothing_is_not_used_and_time_group_and_row_wire_are_found() {
+    let columns: &[fn(usize) -> f64] = &[
+        CLOCK,
+        |row| (row / 10) as f64,
+        |row| (row % 3 + 1) as f64,
+        VARYING,
+        |_| 4.0,
+        VARYING,
+        OTHER,
+    ];
+    let header = "time,session,row_wire,u,constant,copy,force";
+    let plan = guessed(&[("press.csv", &table(Some(header), 40, columns))]);
+    let import = &plan.import;
+    assert_eq!(
+        (&import.inputs[..], &import.targets[..]),
+        (&["u".to_owned()][..], &["force".to_owned()][..])
+    );
+    assert_eq!(import.time.as_deref(), Some("time"));
+    assert_eq!(import.group.as_deref(), Some("session"));
+    assert_eq!(import.row_wire.as_deref(), Some("row_wire"));
+    assert_eq!(plan.division.by, SplitBy::Group, "groups divide the samples honestly");
+}
+
+#[test]
+fn a_column_that_always_grows_is_a_time_only_if_its_name_does_not_speak_against_it() {
+    let columns: &[fn(usize) -> f64] = &[CLOCK, VARYING, OTHER];
+    for (header, time, inputs) in [
+        (Some("u,v,force"), None, &["u", "v"][..]),
+        (Some("u (ms),v,force"), Some("u"), &["v"]),
+        (Some("Time stamp,v,force"), Some("Time stamp"), &["v"]),
+        (None, Some("c1"), &["c2"]),
+    ] {
+        let import = guessed(&[("press.csv", &table(header, 30, columns))]).import;
+        assert_eq!(import.time.as_deref(), time, "{header:?}");
+        assert_eq!(import.inputs, inputs, "{header:?}");
+    }
+}
+
+#[test]
+fn files_that_share_a_time_are_joined_to_the_readings() {
+    let states = table(None, 30, &[|row| CLOCK(row) + 0.01, VARYING, OTHER]);
+    let sensor = table(None, 30, &[CLOCK, OTHER, THIRD]);
+    for order in [[0, 1], [1, 0]] {
+        let files = [("states.csv", states.as_str()), ("sensor_post.csv", sensor.as_str())];
+        let import = guessed(&order.map(|number| files[number])).import;
+        assert_eq!(import.data, Path::new("sensor_post.csv"));
+        assert_eq!(import.inputs, ["c2", "c3"]);
+        assert_eq!(import.targets, ["states.c2", "states.c3"]);
+        assert_eq!(
+            (import.time.as_deref(), import.join[0].time.as_deref()),
+            (Some("c1"), Some("c1"))
+        );
+    }
+}
+
+#[test]
+fn files_without_a_common_time_are_joined_row_by_row_and_test_files_found() {
+    let of = |shift: usize| {
+        let text = |pick: fn(usize) -> f64| {
+            (0..20)
+                .map(|row| format!("{},{}\n", pick(row + shift), OTHER(row)))
+                .collect()
+        };
+        let (pose, force): (String, String) = (text(VARYING), text(THIRD));
+        (pose, force)
+    };
+    let ((pose, force), (test_pose, test_force)) = (of(0), of(5));
+    let plan = guessed(&[
+        ("testForce.csv", &test_force),
+        ("trainForce.csv", &force),
+        ("trainPose.csv", &pose),
+        ("testPose.csv", &test_pose),
+    ]);
+    assert_eq!(plan.import.data, Path::new("trainPose.csv"));
+    assert_eq!(plan.import.join[0].file, Path::new("trainForce.csv"));
+    assert_eq!((plan.import.time, &plan.import.join[0].time), (None, &None));
+    assert_eq!(plan.import.targets, ["trainForce.c1", "trainForce.c2"]);
+    let test = plan.test.unwrap();
+    assert_eq!(
+        (test.data.as_path(), &test.join[..]),
+        (Path::new("testPose.csv"), &["testForce.csv".into()][..])
+    );
+}
+
+#[test]
+fn a_recipe_is_looked_at_with_its_own_meanings_and_missing_cells() {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("a.csv"), "t,u,v,g\n1,5,-1,p\n2,6,7,p\n3,7,8,q\n").unwrap();
+    fs::write(folder.path().join("b.csv"), "t,f\n1,-1\n2,3\n3,4\n").unwrap();
+    let recipe = Recipe {
+        data: "a.csv".into(),
+        join: vec![Joined {
+            file: "b.csv".into(),
+            ..Joined::default()
+        }],
+        inputs: vec!["u..v".to_owned()],
+        targets: vec!["b.f".to_owned()],
+        time: Some("t".to_owned()),
+        group: Some("g".to_owned()),
+        missing: vec![Missing::from("v=-1".to_owned())],
+        ..Recipe::default()
+    };
+    let files = recipe
+        .inspect(folder.path(), &mut |_| ControlFlow::Continue(()))
+        .unwrap();
+    assert_eq!(
+        files[0].meanings,
+        [Meaning::Time, Meaning::Input, Meaning::Input, Meaning::Group]
+    );
+    assert_eq!(files[1].meanings, [Meaning::Time, Meaning::Target]);
+    let missing = |file: usize, column: usize| files[file].inspection.columns[column].missing;
+    assert_eq!((missing(0, 2), missing(1, 1)), (1, 0));
+    assert_eq!(
+        (files[1].full_name(1).as_str(), files[0].full_name(1).as_str()),
+        ("b.f", "u")
+    );
+    // A column that is not there is named.
+    let wrong = Recipe {
+        targets: vec!["b.force".to_owned()],
+        ..recipe
+    };
+    let error = wrong
+        .inspect(folder.path(), &mut |_| ControlFlow::Continue(()))
+        .unwrap_err()
+        .to_string();
+    assert!(error.contains("b.force"), "{error}");
+}

@@ -1,0 +1,142 @@
+//! Files written and read back.
+
+use std::sync::{Arc, LazyLock};
+
+use decoupler_core::{
+    dataset::Dataset,
+    evaluation::{Run, SimulatedSettings},
+    network::{DecouplingNetwork, Mlp},
+    text::ResistanceReader,
+    training::Method,
+};
+use decoupler_files::export::{CheckpointFile, NetworkFile, RunFolder, write_samples, write_samples_header};
+use ndarray::Array2;
+use proptest::prelude::*;
+
+use crate::cases;
+
+/// Readings of every magnitude, row-wires and snapshots of an array of three row-wires, two nodes and six columns.
+fn sets() -> impl Strategy<Value = Dataset> {
+    let sample = (prop::collection::vec(-30.0..30.0_f64, 6), 0..3_usize, 0..5_usize);
+    prop::collection::vec(sample, 1..20).prop_map(|samples| {
+        let readings = |(sample, column): (usize, usize)| 10_f64.powf(samples[sample].0[column]);
+        let row_wires: Vec<usize> = samples.iter().map(|sample| sample.1).collect();
+        let groups = samples.iter().map(|sample| sample.2).collect();
+        let targets = Array2::zeros((samples.len(), 6));
+        Dataset::new(
+            Array2::from_shape_fn((samples.len(), 6), readings),
+            targets,
+            Some(&row_wires),
+            groups,
+        )
+        .unwrap()
+    })
+}
+
+/// Settings of the smallest array with 2 hidden nodes.
+fn small(epochs: usize) -> SimulatedSettings {
+    let mut settings = SimulatedSettings::default();
+    settings.source.sensor.scale = "1x1_1x3".parse().unwrap();
+    (settings.source.samples, settings.source.test_samples) = (20, 10);
+    settings.hidden = 2;
+    settings.training.stopping.epochs = epochs;
+    settings
+}
+
+/// The file of a network of the smallest array with 2 hidden nodes.
+static TRAINED: LazyLock<NetworkFile> = LazyLock::new(|| {
+    let mut run = Run::prepare(small(1)).unwrap();
+    while run.step().is_none() {}
+    NetworkFile::from_run(&run, None).unwrap()
+});
+
+proptest! {
+    #![proptest_config(cases(64))]
+
+    #[test]
+    fn samples_are_read_as_they_were_written(set in sets(), most in 1..25_usize) {
+        let mut file = Vec::new();
+        write_samples_header("3x2_2x6".parse().unwrap(), false, &mut file).unwrap();
+        write_samples(&set, None, 1, &mut file).unwrap();
+        let mut reader = ResistanceReader::new(file.as_slice(), 6).unwrap().with_row_wires(3);
+        let mut sample = 0;
+        while let Some(reading) = reader.read(most).unwrap() {
+            for (index, resistances_ohm) in reading.resistances_ohm.outer_iter().enumerate() {
+                prop_assert_eq!(resistances_ohm.to_vec(), set.sample_readings(sample));
+                let row_wires = reading.row_wires.as_ref().unwrap();
+                prop_assert_eq!(Some(row_wires[index]), set.row_wire(sample));
+                sample += 1;
+            }
+        }
+        prop_assert_eq!(sample, set.samples());
+    }
+
+    #[test]
+    fn networks_are_read_with_the_bits_that_were_written(
+        weights in prop::collection::vec(
+            prop::num::f64::NORMAL | prop::num::f64::SUBNORMAL | prop::num::f64::ZERO,
+            TRAINED.network.at(0).mlp().weights().len(),
+        )
+    ) {
+        let mut file = TRAINED.clone();
+        let network = TRAINED.network.at(0);
+        let mlp = Mlp::from_weights(network.mlp().shape(), weights.clone());
+        *file.network.at_mut(0) = DecouplingNetwork::new(network.inputs().clone(), mlp, network.outputs().clone());
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("network.json");
+        file.save(&path).unwrap();
+        let read = NetworkFile::load(&path).unwrap();
+        prop_assert_eq!(&read, &file);
+        let bits = |weights: &[f64]| weights.iter().map(|weight| weight.to_bits()).collect::<Vec<_>>();
+        prop_assert_eq!(bits(read.network.at(0).mlp().weights()), bits(&weights));
+    }
+
+    /// A training written at any epoch and read again goes on as one that was never interrupted.
+    #[test]
+    fn trainings_are_read_with_the_bits_that_were_written(
+        method in prop::sample::select(Method::all().to_vec()),
+        before in 0..6_usize,
+        after in 0..6_usize,
+        starts in 1..3_usize,
+    ) {
+        let mut settings = small(12);
+        (settings.training.method, settings.starts) = (method, starts);
+        let mut whole = Run::prepare(settings).unwrap();
+        for _ in 0..before {
+            whole.step();
+        }
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("run.checkpoint");
+        CheckpointFile::from_run(&whole, None).unwrap().save(&path).unwrap();
+        let mut read = CheckpointFile::load(&path).unwrap().resume().unwrap();
+        prop_assert_eq!(read.states(), whole.states());
+        for _ in 0..after {
+            whole.step();
+            read.step();
+        }
+        let bits = |run: &Run| run.network().at(0).mlp().weights().iter().map(|weight| weight.to_bits()).collect::<Vec<_>>();
+        prop_assert_eq!(bits(&read), bits(&whole));
+    }
+
+    #[test]
+    fn run_lists_are_read_as_they_were_written(
+        names in prop::collection::vec("\\PC{0,20}", 0..4),
+        pinned in prop::sample::select(vec![None, Some(0_usize), Some(1)]),
+    ) {
+        let folder = tempfile::tempdir().unwrap();
+        let open = || RunFolder::open(folder.path()).unwrap();
+        let (mut kept, _) = open();
+        let file = Arc::new(TRAINED.clone());
+        for name in &names {
+            kept.keep(Arc::clone(&file)).unwrap();
+            let id = kept.runs().runs.last().map(|run| run.id).unwrap();
+            kept.rename(id, name).unwrap();
+        }
+        let pinned = pinned.and_then(|index| kept.runs().runs.get(index)).map(|run| run.id);
+        kept.pin([pinned, None]).unwrap();
+        let found = Vec::from_iter(kept.runs().runs.iter().map(|run| &run.name));
+        prop_assert_eq!(found, Vec::from_iter(&names));
+        let (again, problems) = open();
+        prop_assert_eq!((again.runs(), problems), (kept.runs(), Vec::new()));
+    }
+}

@@ -1,0 +1,222 @@
+//! Decoders and the reference in every situation, judged by the truth of the simulation.
+
+use decoupler_core::{
+    dataset::Dataset,
+    decoupling::{DecoderKind, Precision, decode_set},
+    evaluation::{DecoderReport, DecoderSet, Outlook, ReferenceNote, Run, RunFlaw, SimulatedSettings},
+    ndarray::Array2,
+    scene::{Loading, Noise, Rows},
+};
+
+use crate::{
+    judge::{Job, Verdict, agree, flagged, refused, wrong},
+    situations,
+};
+
+const ROOM: &str = "decoder";
+/// Factor that chance may put on an error that is the mean's, on a test set of so many nodes.
+fn by_chance(nodes: usize) -> f64 {
+    1.1 + 2.0 / (nodes as f64).sqrt()
+}
+
+/// Mean |decoded z − z|, summed here.
+fn z_mm(test: &Dataset, answers: &Array2<f64>) -> f64 {
+    let pairs = answers
+        .indexed_iter()
+        .zip(test.targets())
+        .filter(|(((_, channel), _), _)| channel % 3 == 2);
+    let errors: Vec<f64> = pairs.map(|((_, answer), truth)| (answer - truth).abs()).collect();
+    errors.iter().sum::<f64>() / errors.len() as f64
+}
+
+/// Error, as a factor on the mean's, up to which a warning of the scene explains it: readings that tell little leave a
+/// decoder near the mean, not far beyond it.
+const EXPLAINED: f64 = 3.0;
+
+/// The remark beside a decoder's figures, if the program makes one that explains an error of so many times the mean's.
+fn remark(report: &DecoderReport, times: f64, flaw: Option<&RunFlaw>, outlook: Option<&Outlook>) -> Option<String> {
+    if let Some(remark) = report.remarks.first() {
+        return Some(remark.to_string());
+    }
+    let of_network = flaw.filter(|_| matches!(report.kind, DecoderKind::Network | DecoderKind::Polish));
+    let of_scene = outlook
+        .and_then(|outlook| outlook.warnings.first())
+        .filter(|_| times <= EXPLAINED);
+    of_network
+        .map(ToString::to_string)
+        .or_else(|| of_scene.map(ToString::to_string))
+}
+
+struct Measured {
+    run: Run,
+    set: DecoderSet,
+    outlook: Option<Outlook>,
+    flaw: Option<RunFlaw>,
+    /// Error of always answering the mean of the training targets.
+    mean_mm: f64,
+}
+
+fn measured(settings: &SimulatedSettings) -> Result<Measured, Verdict> {
+    let mut run = Run::prepare(*settings).map_err(|error| refused(&error))?;
+    while run.step().is_none() {}
+    let set = DecoderSet::new(settings, Some(run.network())).map_err(|error| refused(&error))?;
+    let training = settings.draw().map_err(|error| refused(&error))?.0.training;
+    let mut answers = run.test().targets().to_owned();
+    let shared = settings.source.scene.rows == Rows::All;
+    for sample in 0..run.test().samples() {
+        let row = run.test().row_index(sample);
+        let of_row = if shared { training.clone() } else { training.of_row(row) };
+        let mean = of_row.targets().mean_axis(decoupler_core::ndarray::Axis(0)).unwrap();
+        answers.row_mut(sample).assign(&mean);
+    }
+    Ok(Measured {
+        mean_mm: z_mm(run.test(), &answers),
+        flaw: run.flaw(),
+        outlook: Outlook::of(&settings.source).ok(),
+        run,
+        set,
+    })
+}
+
+fn judge_decoder(seen: &Measured, settings: &SimulatedSettings, kind: DecoderKind, precision: Precision) -> Verdict {
+    let test = seen.run.test();
+    let mut decoder = match seen.set.decoder(kind, precision) {
+        Ok(Some(decoder)) => decoder,
+        Ok(None) => return Verdict::Refused("there is no such decoder here; choose another".to_owned()),
+        Err(error) => return refused(&error),
+    };
+    let answers = match decode_set(&mut *decoder, test) {
+        Ok(answers) => answers,
+        Err(error) => return refused(&error),
+    };
+    let report = match seen.set.measure(kind, precision, test) {
+        Ok(report) => report.expect("there is such a decoder"),
+        Err(error) => return refused(&error),
+    };
+    let errors = *report.errors.nodes().expect("the targets are nodes");
+    let found = z_mm(test, &answers);
+    let times = found / seen.mean_mm;
+    let remark = remark(&report, times, seen.flaw.as_ref(), seen.outlook.as_ref());
+    let or_flagged = |what: String| remark.as_ref().map_or_else(|| wrong(what), flagged);
+    if !found.is_finite() || !errors.z_mm.is_finite() {
+        return or_flagged(format!("{kind}: the error is {found}, without a reason"));
+    }
+    if !agree(found, errors.z_mm, 1e-9) {
+        return wrong(format!(
+            "{kind}: the error is {found:e} mm, told is {:e} mm",
+            errors.z_mm
+        ));
+    }
+    if found > by_chance(answers.len() / 3) * seen.mean_mm {
+        return or_flagged(format!(
+            "{kind}: {times:.1e} times the error of the mean, and nothing says so"
+        ));
+    }
+    let scene = settings.source.scene;
+    let is_exact = kind == DecoderKind::Newton && scene.noise.in_test().is_none() && scene.rows != Rows::All;
+    let stroke_mm = settings.source.stroke_mm();
+    if is_exact && errors.worst_mm > 1e-4 * stroke_mm {
+        let share = errors.worst_mm / stroke_mm;
+        return or_flagged(format!(
+            "{kind}: a row is off by {share:.1e} of the stroke without noise, and nothing says so"
+        ));
+    }
+    Verdict::Right
+}
+
+/// The reference is no worse than the mean, nobody beats it, and it claims no certainty that nobody has.
+fn judge_reference(seen: &Measured, settings: &SimulatedSettings) -> Verdict {
+    let scene = settings.source.scene;
+    let told = seen.run.baselines().and_then(|baselines| baselines.nodes()?.reference);
+    let unseen = seen
+        .outlook
+        .as_ref()
+        .is_some_and(|outlook| outlook.worst_row.condition().is_infinite());
+    let Some(reference) = told else {
+        let note = seen.run.baselines().and_then(ReferenceNote::of);
+        return note.map_or_else(|| wrong("there is no reference, and no reason"), |note| flagged(&note));
+    };
+    let (limit_mm, nodes) = (
+        reference.z_mm,
+        seen.run.test().samples() * settings.source.sensor.scale.nodes_per_row(),
+    );
+    if !limit_mm.is_finite() {
+        return wrong(format!("the reference is {limit_mm}"));
+    }
+    if limit_mm > by_chance(nodes) * seen.mean_mm {
+        let note = seen.run.baselines().and_then(ReferenceNote::of);
+        let times = limit_mm / seen.mean_mm;
+        return note.map_or_else(
+            || wrong(format!("the reference is {times:.2e} times the error of the mean")),
+            |note| flagged(&note),
+        );
+    }
+    let stroke_mm = settings.source.stroke_mm();
+    let is_independent = scene.loading == Loading::RandomNodes;
+    if unseen && is_independent && limit_mm < 1e-9 * stroke_mm {
+        return wrong("the reference claims certainty about deformations that no reading tells");
+    }
+    // A gain common to all readings is found from them.
+    let beside_drift = Noise {
+        drift: 0.0,
+        ..scene.noise
+    };
+    if !beside_drift.in_test().is_none() && limit_mm == 0.0 {
+        return wrong("the reference claims certainty in spite of noise");
+    }
+    // Every node's depth is uniform, so all that is known before is a quarter of the stroke on average.
+    let noise = scene.noise;
+    let hides_all = noise.additive_ohm > 1e4 * situations::resistance_ohm(&settings.source.sensor);
+    if hides_all && noise.in_test() == noise && is_independent && !(0.2..0.3).contains(&(limit_mm / stroke_mm)) {
+        return wrong(format!(
+            "noise hides everything, and the reference is {:.2e} of the stroke, not 0.25",
+            limit_mm / stroke_mm
+        ));
+    }
+    Verdict::Right
+}
+
+/// No decoder that knows the row and the range of every node does better than the reference.
+fn judge_limit(seen: &Measured, settings: &SimulatedSettings) -> Verdict {
+    let scene = settings.source.scene;
+    let nodes = seen.run.test().samples() * settings.source.sensor.scale.nodes_per_row();
+    let told = seen.run.baselines().and_then(|baselines| baselines.nodes()?.reference);
+    let Some(reference) = told.filter(|_| scene.loading == Loading::RandomNodes && nodes >= 300) else {
+        return Verdict::Right;
+    };
+    for kind in DecoderKind::ALL {
+        let Ok(Some(report)) = seen.set.measure(kind, Precision::Double, seen.run.test()) else {
+            continue;
+        };
+        let z_mm = report.errors.nodes().map_or(f64::NAN, |errors| errors.z_mm);
+        if z_mm < 0.85 * reference.z_mm {
+            let share = z_mm / reference.z_mm;
+            return wrong(format!(
+                "{kind} has {share:.2} times the reference, which calls itself the limit"
+            ));
+        }
+    }
+    Verdict::Right
+}
+
+fn judge(settings: &SimulatedSettings) -> Vec<(String, Verdict)> {
+    let seen = match measured(settings) {
+        Ok(seen) => seen,
+        Err(verdict) => return vec![("prepared".to_owned(), verdict)],
+    };
+    let mut cells = Vec::new();
+    for kind in DecoderKind::ALL {
+        for &precision in kind.precisions() {
+            let name = kind.name(precision).to_owned();
+            cells.push((name, judge_decoder(&seen, settings, kind, precision)));
+        }
+    }
+    cells.push(("reference".to_owned(), judge_reference(&seen, settings)));
+    cells.push(("limit".to_owned(), judge_limit(&seen, settings)));
+    cells
+}
+
+pub(crate) fn jobs() -> Vec<Job> {
+    let job = |(extreme, sentence, settings)| Job::new(ROOM, extreme, sentence, move || judge(&settings));
+    situations::all().into_iter().map(job).collect()
+}

@@ -1,0 +1,249 @@
+use std::{
+    error::Error as StdError,
+    fmt,
+    io::{self, ErrorKind},
+    path::PathBuf,
+};
+
+use thiserror::Error;
+
+use super::{interruption, specification_error::SpecificationError};
+use decoupler_core::{
+    dataset::{SimulationError, SplitBy},
+    evaluation::{RunError, experiments::ExperimentError},
+    live::{LineError, Source, SourceError},
+    scene::Rows,
+    sensor::{CalibrationError, SensorError},
+    text::{ReadError, system_cause},
+    training::SettingError,
+};
+use decoupler_files::{
+    export::{DocumentError, SweepFolderError, WriteError, bundle::BundleError, figures::PictureError},
+    import::{Cure, ImportError, InputLineError, SetupError},
+};
+
+/// Reasons for which a command fails.
+#[derive(Debug, Error)]
+pub(super) enum Failure {
+    #[error("{0}")]
+    Arguments(String),
+    #[error("{0}")]
+    Window(Box<dyn StdError>),
+    #[error(transparent)]
+    Run(#[from] RunError),
+    #[error(transparent)]
+    Simulation(#[from] SimulationError),
+    #[error(transparent)]
+    Document(#[from] DocumentError),
+    #[error(transparent)]
+    Bundle(#[from] BundleError),
+    #[error("'{}': {source}", .path.display())]
+    Resume { path: PathBuf, source: RunError },
+    #[error(transparent)]
+    Calibration(#[from] CalibrationError),
+    #[error("'{}': line {line}: {source} (--where)", .path.display())]
+    Press {
+        path: PathBuf,
+        line: u64,
+        source: CalibrationError,
+    },
+    #[error("{}", .0.with_cure(in_arguments))]
+    Import(#[from] ImportError),
+    #[error(transparent)]
+    Setup(SetupError),
+    #[error("'{}': its recording '{}' is missing; give --data FILE, where it is now", .checkpoint.display(), .recording.display())]
+    MissingRecording { checkpoint: PathBuf, recording: PathBuf },
+    #[error("'{}' is the network of a recording: {reason}", .path.display())]
+    NoArray { path: PathBuf, reason: &'static str },
+    #[error("{0}")]
+    Interrupted(Interruption),
+    #[error(
+        "interrupted during the second training; the first is complete, and how optimistic its random test samples are is not known: use --split {by}"
+    )]
+    InterruptedComparison { by: SplitBy },
+    #[error(transparent)]
+    Threads(ExperimentError),
+    #[error("interrupted after {done} of {trials} trials")]
+    InterruptedTrials { done: usize, trials: usize },
+    #[error("{place}: {cause}; only what was measured before is printed")]
+    TradeOff { place: String, cause: Box<Failure> },
+    #[error("interrupted after {done} points")]
+    InterruptedTrade { done: usize },
+    #[error("interrupted")]
+    InterruptedFollow,
+    #[error(transparent)]
+    Specification(#[from] SpecificationError),
+    #[error("interrupted after {done} of {trials} trials; the same command trains the rest")]
+    InterruptedSweep { done: usize, trials: usize, status: u8 },
+    #[error("{failed} of {trials} trials failed, for the reasons above; the others are kept")]
+    FailedTrials { failed: usize, trials: usize },
+    #[error(transparent)]
+    SweepFolder(#[from] SweepFolderError),
+    #[error("'{}' lacks trials: {missing} missing, {conflicting} conflicting, {unreadable} files unreadable; run the sweep again for missing ones, and delete the wrong file of those that conflict", .out.display())]
+    IncompleteSweep {
+        missing: usize,
+        conflicting: usize,
+        unreadable: usize,
+        out: PathBuf,
+    },
+    #[error(transparent)]
+    Source(SourceError),
+    #[error("cannot start to read: {}", system_cause(.0))]
+    Reader(io::Error),
+    #[error("{input} is lost: {}; connect it again", system_cause(.source))]
+    Lost { input: Source, source: io::Error },
+    #[error("{0}: {1}")]
+    Line(Source, LineError),
+    #[error("{input}: line {line}: {source}")]
+    OtherColumns {
+        input: Source,
+        line: u64,
+        source: InputLineError,
+    },
+    #[error("{input}: no line could be decoded: {reason}")]
+    NothingDecoded { input: Source, reason: String },
+    #[error(transparent)]
+    Sensor(SensorError),
+    #[error("cannot make the folder '{}': {}", .path.display(), system_cause(.source))]
+    MakeFolder { path: PathBuf, source: io::Error },
+    #[error(transparent)]
+    Write(#[from] WriteError),
+    #[error("{}", joined(.0))]
+    Files(Vec<PictureError>),
+    #[error("cannot write to standard output: {}", system_cause(.0))]
+    Output(io::Error),
+    #[error("cannot open '{}': {}", .path.display(), system_cause(.source))]
+    Open { path: PathBuf, source: io::Error },
+    #[error("'{}': {source}", .path.display())]
+    Resistances { path: PathBuf, source: ReadError },
+    #[error("'{}': line {line}: it belongs to row {row}, but the network reads only row {rows}", .path.display())]
+    OtherRow {
+        path: PathBuf,
+        line: u64,
+        row: usize,
+        rows: Rows,
+    },
+    #[error("'{}': line {line}: there is no network for row {row}; train with samples of it", .path.display())]
+    UnknownRow { path: PathBuf, line: u64, row: usize },
+    #[error("'{}': it has no column '{column}' with the number of each line's row-wire, and there is a network for each; add it", .path.display())]
+    NoRowWires { path: PathBuf, column: String },
+    #[error("'{}': {lines} lines are not a multiple of {rows} rows: each snapshot needs one line per row-wire; add the rest, or a column named row with the number of each line's row-wire", .path.display())]
+    PartOfSnapshot { path: PathBuf, lines: usize, rows: usize },
+    #[error("'{}': line {line}: the resistances are so far outside the training range that the network's output is not a finite number; check them", .path.display())]
+    NoAnswer { path: PathBuf, line: u64 },
+}
+
+/// A training that Ctrl-C has stopped.
+#[derive(Debug)]
+pub(super) struct Interruption {
+    /// Last epoch that was completed.
+    pub(super) epoch: usize,
+    /// Command that resumes the training.
+    pub(super) resume: Option<String>,
+}
+
+impl fmt::Display for Interruption {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "interrupted after epoch {}; ", self.epoch)?;
+        match &self.resume {
+            Some(command) => write!(f, "to resume: {command}"),
+            None => write!(f, "use --checkpoint FILE to be able to resume"),
+        }
+    }
+}
+
+fn joined(errors: &[PictureError]) -> String {
+    let told: Vec<_> = errors.iter().map(ToString::to_string).collect();
+    told.join("; ")
+}
+
+impl From<SettingError> for Failure {
+    fn from(error: SettingError) -> Self {
+        Self::Arguments(error.to_string())
+    }
+}
+
+impl From<SetupError> for Failure {
+    fn from(error: SetupError) -> Self {
+        match error {
+            SetupError::Import(error) => error.into(),
+            SetupError::Run(error) => error.into(),
+            error => Self::Setup(error),
+        }
+    }
+}
+
+impl From<ExperimentError> for Failure {
+    fn from(error: ExperimentError) -> Self {
+        match error {
+            ExperimentError::Threads(_) => Self::Threads(error),
+            _ => Self::Arguments(error.to_string()),
+        }
+    }
+}
+
+/// The cure of an import in arguments.
+fn in_arguments(cure: &Cure) -> String {
+    match cure {
+        Cure::CallMissing(text) => format!("correct it, or say that it means missing with --missing \"{text}\""),
+        Cure::NameTimes => "name the columns of their times with --time and --join-time".to_owned(),
+        Cure::NameJoinedTime => "name it with --join-time".to_owned(),
+        Cure::GiveLimit => "give the limit with --join-limit".to_owned(),
+        Cure::GiveTestFiles => "give one --test-join for each --join".to_owned(),
+        other => other.to_string(),
+    }
+}
+
+impl Failure {
+    /// Exit status of the program.
+    pub(super) fn status(&self) -> u8 {
+        match self {
+            Self::Arguments(_) | Self::Bundle(BundleError::Choice(_)) => 2,
+            Self::Specification(SpecificationError::Read { .. }) => 1,
+            Self::Specification(_) => 2,
+            Self::InterruptedSweep { status, .. } => *status,
+            Self::Import(
+                ImportError::Unknown { .. }
+                | ImportError::Ambiguous { .. }
+                | ImportError::Range(_)
+                | ImportError::TwoMeanings { .. }
+                | ImportError::NoColumns(_)
+                | ImportError::Condition { .. }
+                | ImportError::Division(_),
+            ) => 2,
+            Self::Run(error) if comes_of_arguments(error) => 2,
+            Self::Simulation(SimulationError::Count(_) | SimulationError::Scene(_)) => 2,
+            Self::Interrupted(_)
+            | Self::InterruptedComparison { .. }
+            | Self::InterruptedTrials { .. }
+            | Self::InterruptedTrade { .. }
+            | Self::InterruptedFollow => interruption::STATUS,
+            _ => 1,
+        }
+    }
+
+    /// Returns true if the reader of the output has closed it, which is no failure.
+    pub(super) fn is_broken_pipe(&self) -> bool {
+        match self {
+            Self::Output(error) | Self::Write(WriteError::Io { source: error, .. }) => {
+                error.kind() == ErrorKind::BrokenPipe
+            }
+            _ => false,
+        }
+    }
+}
+
+/// Returns true for arguments that are each possible, but not together: other arguments are the cure.
+fn comes_of_arguments(error: &RunError) -> bool {
+    matches!(
+        error,
+        RunError::Count(_)
+            | RunError::TooManySamples { .. }
+            | RunError::Scene(_)
+            | RunError::Simulation(SimulationError::Count(_) | SimulationError::Scene(_))
+            | RunError::Training(_)
+            | RunError::Memory { .. }
+            | RunError::Folds(_)
+            | RunError::Division(_)
+    )
+}

@@ -1,0 +1,424 @@
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+
+use super::{checkpointing::check_same, failure::Failure};
+use decoupler_core::dataset::{Division, SplitBy};
+use decoupler_files::{
+    export::{RecipeFile, RecipeSource},
+    import::{
+        Condition, Decimal, DialectChoice, Encoding, Joined, Missing, Plan, Recipe, Recorded, Separator, TestFiles,
+    },
+};
+
+// Layout of files of text, where it should not be found.
+#[derive(Args)]
+#[command(next_help_heading = "Files of text")]
+pub(super) struct DialectArguments {
+    /// Separator of the cells [default: found]
+    #[arg(long, value_name = "comma|semicolon|tab|bar|space")]
+    separator: Option<Separator>,
+    /// Decimal separator [default: found]
+    #[arg(long, value_name = "point|comma")]
+    decimal: Option<Decimal>,
+    /// yes if the first row has the names of the columns [default: found]
+    #[arg(long, value_name = "yes|no", value_parser = yes_or_no)]
+    header: Option<bool>,
+    /// Encoding [default: found]
+    #[arg(long, value_name = "utf-8|latin-1|utf-16le|utf-16be")]
+    encoding: Option<Encoding>,
+    /// Lines before the table, which are skipped [default: 0]
+    #[arg(long, value_name = "N")]
+    skip_lines: Option<usize>,
+}
+
+// A recording: files, meanings of their columns, and the split.
+#[derive(Args)]
+#[command(next_help_heading = "Recording")]
+pub(super) struct ImportArguments {
+    /// Use the samples of this file (CSV, .npy, .npz or .mat) instead of a simulated array
+    ///
+    /// A column is named as in the header, or c1, c2, … without one; c2..c16 is a range. --inputs and --targets name
+    /// columns, separated by commas.
+    #[arg(long, value_name = "FILE", conflicts_with = "recipe")]
+    pub(super) data: Option<PathBuf>,
+    /// Join this file: by time (nearest row), or row by row without --time; its columns get its stem in front, as in
+    /// states.c2; may be repeated
+    #[arg(long, value_name = "FILE", requires = "data")]
+    join: Vec<PathBuf>,
+    /// Column of the times of a joined file, without its stem; once, or once for each --join [default: as --time]
+    #[arg(long, value_name = "COLUMN", requires = "join")]
+    join_time: Vec<String>,
+    /// Largest time between a row and its partner [default: half the median interval of the joined file]
+    #[arg(long, value_name = "TIME", requires = "join", value_parser = positive)]
+    join_limit: Option<f64>,
+    /// Columns to be predicted from the inputs
+    #[arg(long, value_name = "COLUMNS", value_delimiter = ',', requires = "data")]
+    targets: Vec<String>,
+    /// Column of the times
+    #[arg(long, value_name = "COLUMN", requires = "data")]
+    pub(super) time: Option<String>,
+    /// Column whose equal values belong together, such as one press or session
+    #[arg(long, value_name = "COLUMN", requires = "data")]
+    group: Option<String>,
+    /// Column of the number of the row-wire, from 1
+    #[arg(long, value_name = "COLUMN", requires = "data")]
+    row_wire: Option<String>,
+    /// Use only rows that meet this, for example "c4<145.1 and c5!=0"; may be repeated
+    #[arg(long = "where", value_name = "CONDITION", requires = "data")]
+    conditions: Vec<Condition>,
+    /// A number or text that means missing, in all columns or in one, such as -1 or states.c5=-1; may be repeated
+    #[arg(long, value_name = "[COLUMN=]VALUE", requires = "data")]
+    missing: Vec<Missing>,
+    /// Unit of a column, such as states.c2=mm; may be repeated [default: from a header such as "x (mm)"]
+    #[arg(long, value_name = "COLUMN=UNIT", value_parser = assignment, requires = "data")]
+    unit: Vec<(String, String)>,
+    /// Positions of the targets on the skin, for surfaces in the window: a table with the columns target,x,y (mm)
+    #[arg(long, value_name = "FILE", requires = "data")]
+    positions: Option<PathBuf>,
+    /// Use the simulated array or the recording that --save-recipe wrote
+    #[arg(long, value_name = "FILE")]
+    recipe: Option<PathBuf>,
+    /// Write a file (JSON) by which --recipe repeats this array, or this recording and its split
+    #[arg(long, value_name = "FILE")]
+    save_recipe: Option<PathBuf>,
+    /// Samples of the test: the last in time, whole groups, or random ones [default: group with --group, else time]
+    #[arg(long, value_name = "time|group|random")]
+    split: Option<SplitBy>,
+    /// Share of the samples for the test [default: 0.2]
+    #[arg(long, value_name = "SHARE", value_parser = share, conflicts_with = "test_data")]
+    test_fraction: Option<f64>,
+    /// Share of the other samples that selects the best weights and ends the training; 0 for none [default: 0 with --method
+    /// br, the default; else 0.2]
+    #[arg(long, value_name = "SHARE", value_parser = share)]
+    validation_fraction: Option<f64>,
+    /// File of the test samples, with the columns of --data
+    #[arg(long, value_name = "FILE")]
+    test_data: Option<PathBuf>,
+    /// File joined to --test-data, in the place of that of --join; may be repeated
+    #[arg(long, value_name = "FILE", requires = "test_data")]
+    test_join: Vec<PathBuf>,
+    /// Test on every sample by cross-validation with this many folds, made as by --split
+    #[arg(long, value_name = "K", conflicts_with_all = ["test_fraction", "test_data"])]
+    pub(super) folds: Option<usize>,
+    #[command(flatten)]
+    pub(super) dialect: DialectArguments,
+}
+
+fn yes_or_no(text: &str) -> Result<bool, String> {
+    match text {
+        "yes" => Ok(true),
+        "no" => Ok(false),
+        _ => Err("give yes or no".to_owned()),
+    }
+}
+
+fn share(text: &str) -> Result<f64, String> {
+    let share = text.parse().ok().filter(|share| (0.0..1.0).contains(share));
+    share.ok_or_else(|| "give a number from 0 to below 1, for example 0.2".to_owned())
+}
+
+fn positive(text: &str) -> Result<f64, String> {
+    let number = text
+        .parse()
+        .ok()
+        .filter(|number: &f64| number.is_finite() && *number > 0.0);
+    number.ok_or_else(|| "give a number above 0, in the unit of the times".to_owned())
+}
+
+fn assignment(text: &str) -> Result<(String, String), String> {
+    let (column, unit) = text
+        .split_once('=')
+        .ok_or("write COLUMN=UNIT, for example states.c2=mm")?;
+    Ok((column.trim().to_owned(), unit.trim().to_owned()))
+}
+
+/// Refuses the first argument that is given.
+fn refuse(given: &[(bool, &str)], message: impl Fn(&str) -> String) -> Result<(), Failure> {
+    match given.iter().find(|(is_given, _)| *is_given) {
+        Some((_, argument)) => Err(Failure::Arguments(message(argument))),
+        None => Ok(()),
+    }
+}
+
+impl DialectArguments {
+    pub(super) fn choice(&self) -> DialectChoice {
+        DialectChoice {
+            encoding: self.encoding,
+            separator: self.separator,
+            decimal: self.decimal,
+            header: self.header,
+            skip_lines: self.skip_lines,
+        }
+    }
+}
+
+impl ImportArguments {
+    /// Returns `true` if the samples come from files.
+    pub(super) fn is_given(&self) -> bool {
+        self.data.is_some() || self.recipe.is_some()
+    }
+
+    /// Returns `true` if columns have meanings, so that there are samples.
+    pub(super) fn has_meanings(&self) -> bool {
+        !self.targets.is_empty() || self.recipe.is_some()
+    }
+
+    /// The file, where nothing is asked of its columns.
+    ///
+    /// # Errors
+    /// There is none, or an argument needs targets.
+    pub(super) fn only_file(&self) -> Result<&Path, Failure> {
+        let given = [
+            (!self.join.is_empty(), "--join"),
+            (self.group.is_some(), "--group"),
+            (self.row_wire.is_some(), "--row-wire"),
+            (!self.conditions.is_empty(), "--where"),
+            (!self.missing.is_empty(), "--missing"),
+            (!self.unit.is_empty(), "--unit"),
+            (self.positions.is_some(), "--positions"),
+            (self.save_recipe.is_some(), "--save-recipe"),
+            (self.split.is_some(), "--split"),
+            (self.test_fraction.is_some(), "--test-fraction"),
+            (self.validation_fraction.is_some(), "--validation-fraction"),
+            (self.test_data.is_some(), "--test-data"),
+            (self.folds.is_some(), "--folds"),
+        ];
+        refuse(&given, |argument| format!("{argument} needs --inputs and --targets"))?;
+        let message = "--data: name the file to inspect";
+        self.data
+            .as_deref()
+            .ok_or_else(|| Failure::Arguments(message.to_owned()))
+    }
+
+    /// Returns `true` if the share for validation is given, in an argument or a recipe.
+    pub(super) fn holds_out(&self) -> bool {
+        self.validation_fraction.is_some() || self.recipe.is_some()
+    }
+
+    /// Refuses arguments that have no meaning without a recording.
+    pub(super) fn check_unused(&self) -> Result<(), Failure> {
+        let given = [
+            (self.split.is_some(), "--split"),
+            (self.test_fraction.is_some(), "--test-fraction"),
+            (self.validation_fraction.is_some(), "--validation-fraction"),
+            (self.test_data.is_some(), "--test-data"),
+            (self.folds.is_some(), "--folds"),
+            (self.dialect.choice() != DialectChoice::default(), "the layout of files"),
+        ];
+        refuse(&given, |argument| format!("{argument} needs --data or --recipe"))
+    }
+
+    /// Refuses arguments that differ from the `saved` plan of a training that is resumed. Names of files are not compared: they
+    /// may be [elsewhere](Self::relocated) now.
+    pub(super) fn check_resumed(&self, saved: &Plan) -> Result<(), Failure> {
+        let (division, import) = (&saved.division, &saved.import);
+        check_same("split", self.split, division.by)?;
+        check_same("test-fraction", self.test_fraction, division.test_fraction)?;
+        check_same(
+            "validation-fraction",
+            self.validation_fraction,
+            division.validation_fraction,
+        )?;
+        let given = |columns: &[String]| (!columns.is_empty()).then(|| columns.join(","));
+        check_same("targets", given(&self.targets), import.targets.join(","))?;
+        for (argument, column, saved) in [
+            ("time", &self.time, &import.time),
+            ("group", &self.group, &import.group),
+            ("row-wire", &self.row_wire, &import.row_wire),
+        ] {
+            check_same(argument, column.as_ref(), saved.as_deref().unwrap_or("none"))?;
+        }
+        let given = [
+            (self.recipe.is_some(), "--recipe"),
+            (!self.join_time.is_empty(), "--join-time"),
+            (self.join_limit.is_some(), "--join-limit"),
+            (!self.conditions.is_empty(), "--where"),
+            (!self.missing.is_empty(), "--missing"),
+            (!self.unit.is_empty(), "--unit"),
+            (self.folds.is_some(), "--folds"),
+            (self.save_recipe.is_some(), "--save-recipe"),
+            (self.dialect.choice() != DialectChoice::default(), "the layout of files"),
+        ];
+        refuse(&given, |argument| {
+            format!(
+                "{argument}: the checkpoint has the columns and the division of the recording; leave it out to resume, or start \
+                 a new training with another --checkpoint"
+            )
+        })
+    }
+
+    /// Returns the origin of the samples of a checkpoint with its files where the arguments name them. A file is recognised by
+    /// its name; one of another name takes the place of the argument. Files that are still missing may be in the same folder.
+    pub(super) fn relocated(&self, saved: &Recorded) -> Result<Recorded, Failure> {
+        let mut found = saved.clone();
+        for (argument, given, place) in self.files(&saved.plan) {
+            let Some(place) = place else {
+                let message = format!("{argument}: the checkpoint has no such file; leave it out to resume");
+                return Err(Failure::Arguments(message));
+            };
+            let given = std::path::absolute(given).unwrap_or_else(|_| given.clone());
+            let is_named = |path: &PathBuf| path.file_name() == given.file_name();
+            let mut named = saved.plan.files().filter(|path| is_named(path));
+            let before = if is_named(place) {
+                place
+            } else {
+                named.next().unwrap_or(place)
+            };
+            found = found.relocated(before, &given);
+            let missing = Vec::from_iter(found.missing().into_iter().map(Path::to_owned));
+            for path in missing {
+                let near = path.file_name().map(|name| given.with_file_name(name));
+                if let Some(near) = near.filter(|near| *near != given && near.exists()) {
+                    found = found.relocated(&path, &near);
+                }
+            }
+        }
+        Ok(found)
+    }
+
+    /// Files given, with their arguments and the files of `saved` in their places.
+    fn files<'a>(&'a self, saved: &'a Plan) -> Vec<(&'static str, &'a PathBuf, Option<&'a PathBuf>)> {
+        let (import, test) = (&saved.import, saved.test.as_ref());
+        let joined = |place| import.join.get(place).map(|joined: &Joined| &joined.file);
+        let test_joined = |place| test.and_then(|test| test.join.get(place));
+        let data = self.data.iter().map(|file| ("--data", file, Some(&import.data)));
+        let join = self.join.iter().enumerate();
+        let join = join.map(|(place, file)| ("--join", file, joined(place)));
+        let positions = self.positions.iter();
+        let positions = positions.map(|file| ("--positions", file, import.positions.as_ref()));
+        let test_data = self.test_data.iter();
+        let test_data = test_data.map(|file| ("--test-data", file, test.map(|test| &test.data)));
+        let test_join = self.test_join.iter().enumerate();
+        let test_join = test_join.map(|(place, file)| ("--test-join", file, test_joined(place)));
+        data.chain(join)
+            .chain(positions)
+            .chain(test_data)
+            .chain(test_join)
+            .collect()
+    }
+
+    /// The plan of a recording as in [`Self::plan`]; `None` if the source is a simulated array.
+    pub(super) fn given(&self, inputs: &[String]) -> Result<Option<Plan>, Failure> {
+        if self.is_given() {
+            return self.plan(inputs).map(Some);
+        }
+        self.check_unused()?;
+        Ok(None)
+    }
+
+    /// The source of the samples: a recording, or the simulated array of a recipe; `None` for the array of the arguments.
+    pub(super) fn source(&self, inputs: &[String]) -> Result<Option<RecipeSource>, Failure> {
+        if let Some(path) = &self.recipe
+            && let simulated @ RecipeSource::Simulated(_) = RecipeFile::load(path)?
+        {
+            self.check_unused()?;
+            return Ok(Some(simulated));
+        }
+        if self.is_given() {
+            return Ok(Some(RecipeSource::Recording(self.plan(inputs)?)));
+        }
+        self.check_unused()?;
+        Ok(None)
+    }
+
+    /// The plan that the arguments describe, with paths relative to the working folder; `inputs` are the columns read.
+    pub(super) fn plan(&self, inputs: &[String]) -> Result<Plan, Failure> {
+        self.plan_of(inputs, &self.targets)
+    }
+
+    /// As [`Self::plan`], with these columns as the targets.
+    pub(super) fn plan_of(&self, inputs: &[String], targets: &[String]) -> Result<Plan, Failure> {
+        let plan = match &self.recipe {
+            Some(path) => {
+                if !inputs.is_empty() {
+                    let message = "--inputs: the recipe names the inputs; leave it out, or give --data";
+                    return Err(Failure::Arguments(message.to_owned()));
+                }
+                RecipeFile::load_recording(path)?
+            }
+            None => {
+                let mut plan = Plan {
+                    import: self.import(inputs, targets)?,
+                    ..Plan::default()
+                };
+                if self.group.is_some() {
+                    plan.division.by = SplitBy::Group;
+                }
+                plan
+            }
+        };
+        self.divided(plan)
+    }
+
+    /// Returns `plan` with the given split, shares and test files.
+    pub(super) fn divided(&self, mut plan: Plan) -> Result<Plan, Failure> {
+        let Division {
+            by,
+            test_fraction,
+            validation_fraction,
+        } = plan.division;
+        plan.division = Division {
+            by: self.split.unwrap_or(by),
+            test_fraction: self.test_fraction.unwrap_or(test_fraction),
+            validation_fraction: self.validation_fraction.unwrap_or(validation_fraction),
+        };
+        if let Some(data) = &self.test_data {
+            plan.test = Some(TestFiles {
+                data: data.clone(),
+                join: self.test_join.clone(),
+            });
+        }
+        if plan.division.by == SplitBy::Group && plan.import.group.is_none() {
+            let message = "--split group: say which column is the group with --group";
+            return Err(Failure::Arguments(message.to_owned()));
+        }
+        Ok(plan)
+    }
+
+    fn import(&self, inputs: &[String], targets: &[String]) -> Result<Recipe, Failure> {
+        for (argument, columns) in [("--inputs", inputs), ("--targets", targets)] {
+            if columns.is_empty() {
+                let message = format!("{argument}: name the columns; decoupler inspect --data FILE lists them");
+                return Err(Failure::Arguments(message));
+            }
+        }
+        if self.join_time.len() > 1 && self.join_time.len() != self.join.len() {
+            let message = "--join-time: give it once, or once for each --join";
+            return Err(Failure::Arguments(message.to_owned()));
+        }
+        let joined = |(number, file): (usize, &PathBuf)| Joined {
+            file: file.clone(),
+            stem: None,
+            time: self.join_time.get(number).or(self.join_time.first()).cloned(),
+            limit: self.join_limit,
+        };
+        Ok(Recipe {
+            data: self.data.clone().unwrap_or_default(),
+            join: self.join.iter().enumerate().map(joined).collect(),
+            dialect: self.dialect.choice(),
+            inputs: inputs.to_vec(),
+            targets: targets.to_vec(),
+            time: self.time.clone(),
+            group: self.group.clone(),
+            row_wire: self.row_wire.clone(),
+            conditions: self.conditions.clone(),
+            missing: self.missing.clone(),
+            units: self.unit.iter().cloned().collect(),
+            positions: self.positions.clone(),
+        })
+    }
+
+    /// The recipe that is repeated.
+    pub(super) fn recipe(&self) -> Option<&Path> {
+        self.recipe.as_deref()
+    }
+
+    /// Writes a recipe of `source`, if that is asked for.
+    pub(super) fn save_recipe(&self, source: impl Into<RecipeSource>) -> Result<(), Failure> {
+        match &self.save_recipe {
+            Some(path) => Ok(RecipeFile::save(source, path)?),
+            None => Ok(()),
+        }
+    }
+}

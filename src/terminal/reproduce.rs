@@ -1,0 +1,251 @@
+use std::{
+    fs,
+    io::Write,
+    path::{Path, PathBuf},
+    time::Instant,
+};
+
+use clap::{Args, ValueEnum};
+
+use super::{
+    failure::Failure,
+    interruption::Graceful,
+    output::progress_bar,
+    parsers::{count, seed},
+    reproduce_report::{Reproduced, print_json, print_text},
+};
+use decoupler_core::{
+    dataset::{FoldUnit, Seed},
+    evaluation::{
+        MOST_STARTS,
+        experiments::{
+            Axis, Experiment, ExperimentResults, PaperTable, TrialSamples, run_experiments, verdicts, worker_threads,
+        },
+    },
+    network::LARGEST_HIDDEN,
+    sensor::ArrayScale,
+    training::StoppingRules,
+};
+use decoupler_files::{
+    export::{
+        atomic_write, cells_table, check_writable, describe_conditions,
+        figures::{PictureError, PictureFormat},
+        format_duration, trials_table, write_experiment_markdown,
+    },
+    figure::experiment_figure,
+};
+
+/// Reproduce the paper's tables beside the published figures
+///
+/// Runs every cell with several seeds on all cores and prints the published error beside the median, least and largest
+/// of ours, the baselines, and which of the paper's claims hold in this run. Ctrl-C ends it and prints what is
+/// finished.
+#[derive(Args)]
+#[command(allow_negative_numbers = true)]
+pub(super) struct Reproduce {
+    /// Table to reproduce
+    #[arg(long, default_value = "all")]
+    table: Tables,
+    /// Number of consecutive seeds for each cell
+    #[arg(long, value_name = "N", default_value_t = 5, value_parser = count(1..=1000))]
+    seeds: usize,
+    /// First seed
+    #[arg(long, default_value_t = 0, value_parser = seed)]
+    seed: u64,
+    #[arg(long, value_name = "N", value_parser = count(1..=StoppingRules::MOST_EPOCHS), help = defaults_help("Maximum number of epochs", |experiment| experiment.base.training.stopping.epochs))]
+    epochs: Option<usize>,
+    #[arg(long, value_name = "N", value_parser = count(1..=MOST_STARTS), help = defaults_help("Trainings of each network from different random weights; the one with the lowest validation error is kept", |experiment| experiment.base.starts))]
+    starts: Option<usize>,
+    /// Hidden nodes of Table 1 [default: 6,8,10,12,14,16]
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = count(1..=LARGEST_HIDDEN))]
+    hidden: Vec<usize>,
+    /// Array scales of Table 3 [default: 10x6_3x18,10x8_4x24,10x10_5x30]
+    #[arg(long, value_name = "LIST", value_delimiter = ',')]
+    arrays: Vec<ArrayScale>,
+    /// Unit of the folds of Table 2: single samples, as in the paper, or whole snapshots, so that no training sample
+    /// is from the same moment as a test sample
+    #[arg(long, value_enum, default_value = "sample")]
+    folds: Unit,
+    /// Number of folds of Table 2
+    #[arg(long, value_name = "N", default_value_t = 10, value_parser = count(2..=1000))]
+    k: usize,
+    /// Shuffles of the samples of Table 2 into new folds, for each seed
+    #[arg(long, value_name = "N", default_value_t = 10, value_parser = count(1..=1000))]
+    repeats: usize,
+    /// Folder for each table as CSV and Markdown and its figure as SVG and PNG; created if missing
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Print one JSON object instead of text and progress
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum Tables {
+    #[value(name = "1")]
+    One,
+    #[value(name = "2")]
+    Two,
+    #[value(name = "3")]
+    Three,
+    All,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum Unit {
+    Sample,
+    Snapshot,
+}
+
+/// Help text that states the default of each table.
+fn defaults_help(what: &str, value: fn(&Experiment) -> usize) -> String {
+    let of = |table: PaperTable| format!("{} in Table {}", value(&table.experiment()), table.number());
+    let defaults = PaperTable::ALL.map(of).join(", ");
+    format!("{what} [default: {defaults}]")
+}
+
+impl Reproduce {
+    pub(super) fn run(self) -> Result<(), Failure> {
+        let tables = self.tables();
+        let experiments: Vec<Experiment> = tables.iter().map(|&table| self.experiment(table)).collect();
+        experiments.iter().try_for_each(Experiment::check)?;
+        if let Some(folder) = &self.out {
+            prepare_folder(folder, &tables)?;
+        }
+        let begun = Instant::now();
+        let mut results: Vec<_> = experiments.iter().cloned().map(ExperimentResults::new).collect();
+        let trials = results
+            .iter()
+            .flat_map(|results| &results.cells)
+            .map(|cell| cell.expected)
+            .sum();
+        let bar = progress_bar(
+            self.json,
+            trials,
+            "{bar:30} {pos} of {len} trials, {elapsed} elapsed, {msg}",
+        );
+        bar.set_message("estimating the time left");
+        let graceful = Graceful::begin();
+        let mut done = 0;
+        run_experiments(
+            &experiments,
+            &TrialSamples::Drawn,
+            worker_threads(false),
+            || graceful.is_end_requested(),
+            |finished| {
+                results[finished.experiment].record(finished.cell, finished.outcome);
+                done = finished.done;
+                bar.set_position(done as u64);
+                if let Some(time) = finished.time_left {
+                    bar.set_message(format!("about {} left", format_duration(time)));
+                }
+            },
+        )?;
+        bar.finish_and_clear();
+        drop(graceful);
+        let reproduced: Vec<Reproduced> = tables
+            .into_iter()
+            .zip(results)
+            .map(|(table, results)| Reproduced {
+                table,
+                verdicts: verdicts(&results),
+                results,
+            })
+            .collect();
+        // Whatever fails here, the figures are printed.
+        let folder = self.out.iter();
+        let written = folder.flat_map(|folder| reproduced.iter().flat_map(|table| write_files(folder, table)));
+        let unwritten: Vec<PictureError> = written.filter_map(Result::err).collect();
+        if self.json {
+            print_json(&reproduced, begun.elapsed())?;
+        } else {
+            print_text(&reproduced, begun.elapsed())?;
+        }
+        if !unwritten.is_empty() {
+            return Err(Failure::Files(unwritten));
+        }
+        if done < trials {
+            return Err(Failure::InterruptedTrials { done, trials });
+        }
+        Ok(())
+    }
+
+    fn tables(&self) -> Vec<PaperTable> {
+        match self.table {
+            Tables::One => vec![PaperTable::HiddenNodes],
+            Tables::Two => vec![PaperTable::CrossValidation],
+            Tables::Three => vec![PaperTable::ArrayScales],
+            Tables::All => PaperTable::ALL.to_vec(),
+        }
+    }
+
+    fn experiment(&self, table: PaperTable) -> Experiment {
+        let mut experiment = table.experiment();
+        experiment.seeds = self.seeds;
+        experiment.base.seed = Seed(self.seed);
+        if let Some(epochs) = self.epochs {
+            experiment.base.training.stopping.epochs = epochs;
+        }
+        if let Some(starts) = self.starts {
+            experiment.base.starts = starts;
+        }
+        match &mut experiment.axis {
+            Axis::Hidden(hidden) if !self.hidden.is_empty() => hidden.clone_from(&self.hidden),
+            Axis::Array(arrays) if !self.arrays.is_empty() => arrays.clone_from(&self.arrays),
+            _ => {}
+        }
+        if let Some(cross_validation) = &mut experiment.cross_validation {
+            cross_validation.folds = self.k;
+            cross_validation.repeats = self.repeats;
+            cross_validation.unit = match self.folds {
+                Unit::Sample => FoldUnit::Sample,
+                Unit::Snapshot => FoldUnit::Snapshot,
+            };
+        }
+        experiment
+    }
+}
+
+/// Paths of the files of a table: its cells, its trials, the table in Markdown, and the figure as SVG and PNG.
+fn files(folder: &Path, table: PaperTable) -> [PathBuf; 5] {
+    let number = table.number();
+    [
+        format!("table_{number}.csv"),
+        format!("table_{number}_trials.csv"),
+        format!("table_{number}.md"),
+        format!("table_{number}.svg"),
+        format!("table_{number}.png"),
+    ]
+    .map(|name| folder.join(name))
+}
+
+/// Creates the folder and checks that every file can be written, before the work begins.
+fn prepare_folder(folder: &Path, tables: &[PaperTable]) -> Result<(), Failure> {
+    fs::create_dir_all(folder).map_err(|source| Failure::MakeFolder {
+        path: folder.to_owned(),
+        source,
+    })?;
+    let paths = tables.iter().flat_map(|&table| files(folder, table));
+    Ok(paths.into_iter().try_for_each(|path| check_writable(&path))?)
+}
+
+/// Writes every file of a table, whatever becomes of the others.
+fn write_files(folder: &Path, reproduced: &Reproduced) -> [Result<(), PictureError>; 5] {
+    let Reproduced {
+        table,
+        results,
+        verdicts,
+    } = reproduced;
+    let [cells, trials, markdown, svg, png] = files(folder, *table);
+    let picture = experiment_figure(results).draw();
+    let (title, conditions) = (table.heading(), describe_conditions(&results.experiment));
+    let write_markdown =
+        |writer: &mut dyn Write| write_experiment_markdown(&title, &conditions, results, verdicts, writer);
+    [
+        atomic_write(&cells, |writer| cells_table(results).write_csv(writer)).map_err(PictureError::from),
+        atomic_write(&trials, |writer| trials_table(results).write_csv(writer)).map_err(PictureError::from),
+        atomic_write(&markdown, write_markdown).map_err(PictureError::from),
+        picture.save(PictureFormat::Svg, &svg),
+        picture.save(PictureFormat::Png, &png),
+    ]
+}

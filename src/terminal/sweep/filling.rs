@@ -1,0 +1,187 @@
+use std::{
+    collections::VecDeque,
+    io::{Write, stderr},
+    num::NonZero,
+    panic::resume_unwind,
+    path::Path,
+    sync::{
+        Mutex, PoisonError,
+        mpsc::{Sender, channel},
+    },
+    thread,
+    time::Duration,
+};
+
+use indicatif::ProgressBar;
+use rayon::{ThreadPool, ThreadPoolBuilder};
+
+use super::{
+    claim::{Claim, Claimed},
+    stop::Stop,
+    train_options::TrainOptions,
+    training::train,
+    trials::Trials,
+};
+use crate::terminal::failure::Failure;
+use decoupler_core::evaluation::experiments::ExperimentError;
+use decoupler_files::export::WriteError;
+
+/// Time between two looks at a trial that another program trains.
+const PATIENCE: Duration = Duration::from_millis(200);
+
+/// Numbers of trials in a folder after a call of [`fill`].
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Filled {
+    /// Results that were there, or that other programs have added.
+    pub(super) present: usize,
+    pub(super) trained: usize,
+    pub(super) failed: usize,
+}
+
+enum Event {
+    Present,
+    Trained,
+    /// A trial that cannot be trained, by position, and why.
+    Failed(usize, String),
+    /// Nothing can be written any more.
+    Ended(WriteError),
+}
+
+/// Adds to `folder` what is missing of the trials at `positions`, and waits for those that other programs train: if such
+/// a program ends without a result, the trial is trained here. Each trial is trained on a thread of its own.
+///
+/// # Errors
+/// Results cannot be written. A trial that cannot be trained is told on standard error, and the others go on.
+pub(super) fn fill(
+    folder: &Path,
+    trials: &Trials,
+    positions: Vec<usize>,
+    threads: NonZero<usize>,
+    bar: &ProgressBar,
+    stop: &Stop,
+) -> Result<Filled, Failure> {
+    let threads = threads.get().min(positions.len());
+    let pool = |_| {
+        ThreadPoolBuilder::new()
+            .num_threads(1)
+            .thread_name(|_| "trial".to_owned())
+            .build()
+    };
+    let pools: Result<Vec<ThreadPool>, _> = (0..threads).map(pool).collect();
+    let pools = pools.map_err(|error| Failure::Threads(ExperimentError::Threads(error.to_string())))?;
+    let worker = Worker {
+        folder,
+        trials,
+        beside: threads,
+        queue: &Mutex::new(Queue {
+            new: positions.into(),
+            others: VecDeque::new(),
+        }),
+        stop,
+    };
+    let (sender, receiver) = channel();
+    let mut filled = Filled::default();
+    let mut end = Ok(());
+    thread::scope(|scope| {
+        let workers = Vec::from_iter(pools.iter().map(|pool| {
+            let (sender, worker) = (sender.clone(), &worker);
+            scope.spawn(move || pool.install(|| worker.work(&sender)))
+        }));
+        drop(sender);
+        for event in receiver {
+            match event {
+                Event::Present => filled.present += 1,
+                Event::Trained => filled.trained += 1,
+                Event::Failed(position, failure) => {
+                    filled.failed += 1;
+                    let told = format!("warning: {}: {failure}; the others go on", trials.describe(position));
+                    // Nobody is left to tell if this fails.
+                    bar.suspend(|| drop(writeln!(stderr(), "{told}")));
+                }
+                Event::Ended(failure) => {
+                    stop.fail();
+                    end = Err(failure.into());
+                    continue;
+                }
+            }
+            bar.inc(1);
+        }
+        for worker in workers {
+            // The scope itself would panic without the reason.
+            worker.join().unwrap_or_else(|panic| resume_unwind(panic));
+        }
+    });
+    end.map(|()| filled)
+}
+
+/// Positions of trials that are neither done nor trained here.
+struct Queue {
+    new: VecDeque<usize>,
+    /// Those that other programs train.
+    others: VecDeque<usize>,
+}
+
+struct Worker<'a> {
+    folder: &'a Path,
+    trials: &'a Trials,
+    /// Number of trials at the same time.
+    beside: usize,
+    queue: &'a Mutex<Queue>,
+    stop: &'a Stop,
+}
+
+impl Worker<'_> {
+    /// Trains until nothing is left.
+    fn work(&self, events: &Sender<Event>) {
+        let mut options = TrainOptions::new();
+        while !self.stop.is_requested() {
+            let Some((position, is_waiting)) = self.next() else {
+                return;
+            };
+            if is_waiting {
+                thread::sleep(PATIENCE);
+            }
+            let Some(event) = self.attempt(position, &mut options) else {
+                continue;
+            };
+            // The receiver is gone only if the calling thread panicked.
+            if events.send(event).is_err() {
+                return;
+            }
+        }
+    }
+
+    /// A position to look at, and whether another program was at it.
+    fn next(&self) -> Option<(usize, bool)> {
+        let mut queue = self.queue.lock().unwrap_or_else(PoisonError::into_inner);
+        let new = queue.new.pop_front().map(|position| (position, false));
+        new.or_else(|| Some((queue.others.pop_front()?, true)))
+    }
+
+    /// Trains the trial at `position` unless that is done or being done. Returns none if it is not done yet.
+    fn attempt(&self, position: usize, options: &mut TrainOptions) -> Option<Event> {
+        let claim = match Claim::take(self.folder, self.trials.plan().trials[position]) {
+            Ok(Claimed::Ours(claim)) => claim,
+            Ok(Claimed::Done) => return Some(Event::Present),
+            Ok(Claimed::Theirs) => {
+                let mut queue = self.queue.lock().unwrap_or_else(PoisonError::into_inner);
+                queue.others.push_back(position);
+                return None;
+            }
+            Err(error) => return Some(Event::Ended(error)),
+        };
+        let trained = self.trials.get(position, options).map_err(Failure::from);
+        let trained = trained.and_then(|trial| train(&trial, &claim, self.beside, || self.stop.is_requested()));
+        let trial = match trained {
+            Ok(trial) => trial?,
+            Err(failure) => return Some(Event::Failed(position, failure.to_string())),
+        };
+        match trial.save_in(self.folder) {
+            Ok(()) => {
+                claim.finish();
+                Some(Event::Trained)
+            }
+            Err(error) => Some(Event::Ended(error)),
+        }
+    }
+}

@@ -1,0 +1,228 @@
+use std::{
+    collections::HashMap,
+    path::{Path, PathBuf},
+    sync::{Mutex, PoisonError},
+};
+
+use super::{specification::Specification, train_options::TrainOptions};
+use crate::terminal::{failure::Failure, specification_error::SpecificationError};
+use decoupler_core::{decoupling::DecoderKind, evaluation::Workload};
+use decoupler_files::{
+    export::{
+        PlanAxis, SweepPlan, Trial, TrialId, TrialOptions, WriteError, decoders_in_order, recording_options,
+        train_options,
+    },
+    import::{FileChecksum, ImportError, Plan, Setup, file_crc32, stored},
+};
+
+/// All trials of a specification, each of which `train` accepts and none of which is there twice.
+pub(super) struct Trials {
+    specification: Specification,
+    plan: SweepPlan,
+    /// CRC-32 of the files of recordings, as hexadecimal digits.
+    checksums: Mutex<HashMap<PathBuf, String>>,
+}
+
+/// A trial to be trained.
+pub(super) struct PlannedTrial {
+    pub(super) id: TrialId,
+    pub(super) setup: Setup,
+    /// CRC-32 of the files of the recording, in the order of the plan.
+    pub(super) crc32: Vec<String>,
+    pub(super) decoders: Vec<DecoderKind>,
+    pub(super) options: TrialOptions,
+}
+
+impl Trials {
+    /// Reads the specification at `path`.
+    pub(super) fn read(path: &Path) -> Result<Self, SpecificationError> {
+        let mut train = TrainOptions::new();
+        let specification = Specification::read(path, &mut train)?;
+        Self::of(specification, &mut train)
+    }
+
+    /// Plans the trials of `specification`.
+    pub fn of(specification: Specification, train: &mut TrainOptions) -> Result<Self, SpecificationError> {
+        let axes = specification.axes.iter().map(|axis| PlanAxis {
+            option: axis.option.clone(),
+            values: axis.values.iter().map(|value| value.value.clone()).collect(),
+        });
+        let mut trials = Self {
+            plan: SweepPlan {
+                axes: axes.collect(),
+                trials: Vec::new(),
+                recordings: Vec::new(),
+            },
+            checksums: Mutex::default(),
+            specification,
+        };
+        let mut positions = HashMap::new();
+        for position in 0..trials.specification.count()? {
+            let trial = trials.parsed(position, train);
+            let trial = trial.map_err(|failure| trials.error(position, failure.to_string()))?;
+            if let Some(first) = positions.insert(trial.id, position) {
+                let first = trials.describe(first);
+                let message = format!("the same options as {first}; leave one of the values out");
+                return Err(trials.error(position, message));
+            }
+            trials.plan.trials.push(trial.id);
+        }
+        Ok(trials)
+    }
+
+    fn parsed(&self, position: usize, train: &mut TrainOptions) -> Result<PlannedTrial, Failure> {
+        let words = self.specification.words_at(position);
+        let arguments = train.parse(words).map_err(Failure::Arguments)?;
+        let setup = arguments.setup(self.specification.recording.as_ref())?;
+        if let Some(settings) = setup.simulated() {
+            // The array has the rows of the scene.
+            Workload::of(&settings)?;
+        }
+        let decoders = decoders_in_order(&arguments.decoders(&setup));
+        let mut options = train_options(setup.settings(), &decoders);
+        let crc32 = setup.plan().map_or(Ok(Vec::new()), |plan| self.crc32(plan))?;
+        options.extend(
+            setup
+                .plan()
+                .map(|plan| recording_options(plan, &crc32))
+                .unwrap_or_default(),
+        );
+        Ok(PlannedTrial {
+            id: Trial::id_of(&options),
+            setup,
+            crc32,
+            decoders,
+            options,
+        })
+    }
+
+    /// Checksums of the files of `plan`, each read once.
+    fn crc32(&self, plan: &Plan) -> Result<Vec<String>, ImportError> {
+        let mut checksums = self.checksums.lock().unwrap_or_else(PoisonError::into_inner);
+        let of_file = |path: &PathBuf| match checksums.get(path) {
+            Some(crc32) => Ok(crc32.clone()),
+            None => {
+                let crc32 = file_crc32(path).map_err(|source| ImportError::Read {
+                    path: path.clone(),
+                    source,
+                })?;
+                checksums.insert(path.clone(), crc32.clone());
+                Ok(crc32)
+            }
+        };
+        plan.files().map(of_file).collect()
+    }
+
+    /// Writes the plan of the sweep to `folder`.
+    pub fn save_plan(&self, folder: &Path) -> Result<(), WriteError> {
+        let checksums = self.checksums.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut recordings = Vec::from_iter(checksums.iter().map(|(path, crc32)| FileChecksum {
+            path: stored(path, folder),
+            crc32: crc32.clone(),
+        }));
+        recordings.sort_by(|one, other| one.path.cmp(&other.path));
+        let plan = SweepPlan {
+            recordings,
+            ..self.plan.clone()
+        };
+        plan.save_in(folder)
+    }
+
+    /// The trial at `position`.
+    pub(super) fn get(&self, position: usize, train: &mut TrainOptions) -> Result<PlannedTrial, SpecificationError> {
+        let trial = self.parsed(position, train);
+        trial.map_err(|failure| self.error(position, failure.to_string()))
+    }
+
+    pub(super) fn count(&self) -> usize {
+        self.plan.trials.len()
+    }
+
+    pub(super) fn plan(&self) -> &SweepPlan {
+        &self.plan
+    }
+
+    /// Number of a trial, from 1, and what is special about it.
+    pub(super) fn describe(&self, position: usize) -> String {
+        format!("trial {} ({})", position + 1, self.plan.describe(position))
+    }
+
+    fn error(&self, position: usize, message: String) -> SpecificationError {
+        self.specification.error(self.describe(position), message)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::{collections::BTreeSet, fs};
+
+    use super::*;
+    use decoupler_core::{
+        dataset::Seed,
+        evaluation::{
+            RunSettings,
+            experiments::{Axis, Experiment, PaperTable},
+        },
+        scene::Noise,
+        training::Method,
+    };
+    use decoupler_files::export::sweep_specification;
+
+    /// The trials of a specification that the window writes are those that the window runs.
+    #[test]
+    fn an_experiment_of_the_window_is_specified_trial_by_trial() {
+        let mut template = PaperTable::HiddenNodes.experiment();
+        let mut base = template.base.simulated().unwrap();
+        base.source.scene.noise = Noise::relative(1e-3);
+        base.seed = Seed(7);
+        template.base = base.into();
+        let experiments = [
+            (Axis::Hidden(vec![3, 5]), Some(Axis::Samples(vec![40, 60]))),
+            (
+                Axis::Method(Method::all()[..3].to_vec()),
+                Some(Axis::Epochs(vec![2, 3])),
+            ),
+            (Axis::Array(vec!["4x3_2x6".parse().unwrap()]), None),
+            (Axis::Seed(vec![Seed(1), Seed(u64::MAX)]), None),
+        ];
+        for (axis, second_axis) in experiments {
+            let experiment = Experiment {
+                axis,
+                second_axis,
+                seeds: 2,
+                ..template.clone()
+            };
+            let folder = tempfile::tempdir().unwrap();
+            let path = folder.path().join("sweep.json");
+            fs::write(&path, sweep_specification(&experiment, None).unwrap().to_string()).unwrap();
+            let trials = Trials::read(&path).unwrap();
+            let mut train = TrainOptions::new();
+            let specified = (0..trials.count()).map(|position| trials.get(position, &mut train).unwrap().setup);
+            let specified: Vec<_> = specified.collect();
+            let run: Vec<_> = experiment
+                .cells()
+                .into_iter()
+                .flat_map(|cell| {
+                    let seeds = experiment.seeds_of(&cell.settings);
+                    seeds.map(move |seed| Setup::of(RunSettings { seed, ..cell.settings }, None).unwrap())
+                })
+                .collect();
+            let texts =
+                |setups: &[Setup]| -> BTreeSet<String> { setups.iter().map(|setup| format!("{setup:?}")).collect() };
+            assert_eq!(specified.len(), run.len());
+            assert_eq!(texts(&specified), texts(&run), "{:?}", experiment.axis);
+        }
+    }
+
+    #[test]
+    fn experiments_that_the_terminal_cannot_sweep_say_why() {
+        let folds = sweep_specification(&PaperTable::CrossValidation.experiment(), None);
+        assert!(folds.unwrap_err().to_string().contains("no cross-validation"));
+        let mut squeezed = PaperTable::HiddenNodes.experiment();
+        let mut base = squeezed.base.simulated().unwrap();
+        base.source.scene.largest_compression = 0.3;
+        squeezed.base = base.into();
+        let message = sweep_specification(&squeezed, None).unwrap_err().to_string();
+        assert!(message.contains("the largest compression"), "{message}");
+    }
+}

@@ -1,0 +1,353 @@
+use clap::Args;
+
+use super::{
+    failure::Failure,
+    import_arguments::ImportArguments,
+    interruption::Graceful,
+    output::progress_bar,
+    parsers::{count, number, seed},
+    samples::{announce_workload, following, working_folder},
+    scene_arguments::SceneArguments,
+    trade_command::command,
+    trade_report::{Limits, MeasuredLevel, PointTraining, RecordedSource, TradeOff, TradeSource},
+    training_arguments::{method, refuse_with_recordings},
+};
+use decoupler_core::{
+    dataset::{Dataset, LARGEST_SAMPLES, Seed},
+    decoupling::DecoderKind,
+    evaluation::{Preset, RunError, RunSets, SimulatedSettings, TradeOffPoint, Workload, measure_trade_off},
+    network::LARGEST_HIDDEN,
+    sensor::{ArrayScale, SensorModel},
+    training::{Method, StoppingRules},
+};
+use decoupler_files::import::{Plan, Recordings, Setup, SetupSets};
+
+/// Measure speed against accuracy of every decoder
+///
+/// Trains networks of both presets with several numbers of hidden nodes, at several levels of noise, and prints for each
+/// decoder its error, its time for a frame (median of many, one thread) and its training time, with the choices that no
+/// other beats, and the command for each choice asked for. With --data it does so on the samples of a recording, for the
+/// decoders that need no model of the sensor.
+#[derive(Args)]
+#[command(allow_negative_numbers = true)]
+pub(super) struct Trade {
+    #[command(flatten)]
+    scene: SceneArguments,
+    #[command(flatten)]
+    import: ImportArguments,
+    /// Array scale M1xM2_M3xM4: rows x nodes on each, nodes on each column x columns [default: 10x10_5x30]
+    #[arg(long, value_name = "SCALE")]
+    array: Option<ArrayScale>,
+    /// Hidden nodes of the networks
+    #[arg(long, value_name = "LIST", value_delimiter = ',', default_value = "6,12", value_parser = count(1..=LARGEST_HIDDEN))]
+    hidden: Vec<usize>,
+    /// Training methods of the networks, of a recording [default: br]; a simulated array has those of its presets
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = method())]
+    method: Vec<Method>,
+    /// Maximum number of epochs [default: those of the preset; 300 for a recording]
+    #[arg(long, value_name = "N", value_parser = count(1..=StoppingRules::MOST_EPOCHS))]
+    epochs: Option<usize>,
+    /// Training samples [default: those of the preset]
+    #[arg(long, value_name = "N", value_parser = count(1..=LARGEST_SAMPLES))]
+    samples: Option<usize>,
+    /// Test samples, on which the errors are measured [default: 100]
+    #[arg(long, value_name = "N", value_parser = count(1..=LARGEST_SAMPLES))]
+    test_samples: Option<usize>,
+    /// Seed of all random numbers
+    #[arg(long, default_value_t = 0, value_parser = seed)]
+    seed: u64,
+    /// Also print the fastest decoder whose error is at most this many percent: of z, or of the ranges of a recording's targets
+    #[arg(long, value_name = "PERCENT", value_parser = number)]
+    under_percent: Option<f64>,
+    /// Also print the most accurate decoder that takes at most this many microseconds for a frame
+    #[arg(long, value_name = "US", value_parser = number)]
+    under_us: Option<f64>,
+    /// Print one JSON object instead of text and progress
+    #[arg(long)]
+    json: bool,
+}
+
+/// A network to be measured with the decoders that need one, or all decoders.
+struct Case {
+    /// Relative noise, if it is simulated.
+    noise: Option<f64>,
+    preset: Option<Preset>,
+    setup: Setup,
+    decoders: Vec<DecoderKind>,
+}
+
+impl Case {
+    /// Name among all cases.
+    fn name(&self) -> String {
+        match (self.noise, self.preset) {
+            (Some(noise), Some(preset)) => format!("noise {noise}, preset {preset}"),
+            _ => format!("method {}", self.setup.settings().training.method.short_name()),
+        }
+    }
+}
+
+impl Trade {
+    pub(super) fn run(self) -> Result<(), Failure> {
+        let cases = self.cases()?;
+        let mut trade_off = TradeOff {
+            source: TradeSource::Array(self.array.unwrap_or_default()),
+            levels: Vec::new(),
+        };
+        let bar = progress_bar(self.json, cases.len(), "{bar:30} {pos} of {len}, {msg}, {elapsed}");
+        let graceful = Graceful::begin();
+        let mut recordings: Option<Recordings> = None;
+        let (levels, end) = measure_levels(&cases, |case, level| {
+            let is_cancelled = || graceful.is_end_requested();
+            let sets = match (&recordings, case.setup.plan()) {
+                (Some(recordings), Some(plan)) => divided(recordings, plan, case.setup.settings().seed)?,
+                _ => {
+                    let SetupSets { sets, recordings: read } = following(&case.setup, self.json, |on_progress| {
+                        case.setup.sets(working_folder(), &|| false, on_progress)
+                    })?;
+                    if let Some(read) = &read {
+                        self.import.save_recipe(&case.setup)?;
+                        trade_off.source = TradeSource::Recording(Box::new(RecordedSource::new(&sets, read)));
+                    }
+                    recordings = read;
+                    sets
+                }
+            };
+            let samples = [
+                sets.split.training.samples(),
+                sets.split.validation.as_ref().map_or(0, Dataset::samples),
+            ];
+            bar.set_message(case.name());
+            let settings = case.setup.settings();
+            let on_point = |kind, point: Result<TradeOffPoint, RunError>, _: Option<&_>| match point {
+                Ok(point) => {
+                    let point = TradeOffPoint {
+                        preset: case.preset,
+                        ..point
+                    };
+                    level.trainings.push(PointTraining {
+                        samples,
+                        command: command(&point, case.setup.plan(), &self.import),
+                    });
+                    level.level.points.push(point);
+                }
+                Err(error) => level.refused.push(format!("{kind}: {error}")),
+            };
+            let is_whole = measure_trade_off(settings, &sets, &self.hidden, &case.decoders, is_cancelled, on_point)?;
+            bar.inc(1);
+            Ok(is_whole)
+        });
+        bar.finish_and_clear();
+        drop(graceful);
+        let done = levels.iter().map(|level| level.level.points.len()).sum();
+        trade_off.levels = levels;
+        if end.is_ok() || done > 0 {
+            trade_off.print(self.limits(), self.json)?;
+        }
+        if end? {
+            return Ok(());
+        }
+        Err(Failure::InterruptedTrade { done })
+    }
+
+    fn limits(&self) -> Limits {
+        Limits {
+            percent: self.under_percent,
+            microseconds: self.under_us,
+        }
+    }
+
+    /// What is to be measured: both presets at every level of noise, or a recording with every method.
+    fn cases(&self) -> Result<Vec<Case>, Failure> {
+        if self.import.folds.is_some() {
+            let message = "--folds: the decoders are measured on the test samples; leave it out";
+            return Err(Failure::Arguments(message.to_owned()));
+        }
+        match self.import.given(self.scene.columns())? {
+            Some(plan) => self.cases_of_recording(&plan),
+            None => self.cases_of_array(),
+        }
+    }
+
+    fn cases_of_array(&self) -> Result<Vec<Case>, Failure> {
+        if !self.method.is_empty() {
+            let message = "--method: the presets name the methods of a simulated array; leave it out, or give --data";
+            return Err(Failure::Arguments(message.to_owned()));
+        }
+        let noises = match &self.scene.noise[..] {
+            [] => vec![0.0, 1e-4, 1e-3, 1e-2],
+            given => given.to_vec(),
+        };
+        let presets = match self.scene.preset {
+            Some(preset) => vec![preset],
+            None => Preset::ALL.to_vec(),
+        };
+        let decoders = self.scene.decoders();
+        let mut cases = Vec::new();
+        for &noise in &noises {
+            for &preset in &presets {
+                let settings = self.settings(preset, noise)?;
+                // Noise hardly changes the work.
+                if noise == noises[0] {
+                    announce_workload(&Workload::of_trade_off(&settings, &self.hidden, &decoders)?)?;
+                }
+                cases.push(Case {
+                    noise: Some(noise),
+                    preset: Some(preset),
+                    setup: settings.into(),
+                    decoders: decoders.clone(),
+                });
+            }
+        }
+        Ok(cases)
+    }
+
+    fn settings(&self, preset: Preset, noise: f64) -> Result<SimulatedSettings, Failure> {
+        let mut settings = self.scene.settings_at(preset, Some(noise))?;
+        settings.source.sensor = SensorModel::new(self.array.unwrap_or_default());
+        settings.source.samples = self.samples.unwrap_or(settings.source.samples);
+        settings.source.test_samples = self.test_samples.unwrap_or(settings.source.test_samples);
+        settings.seed = Seed(self.seed);
+        let stopping = &mut settings.training.stopping;
+        stopping.epochs = self.epochs.unwrap_or(stopping.epochs);
+        Ok(settings)
+    }
+
+    fn cases_of_recording(&self, plan: &Plan) -> Result<Vec<Case>, Failure> {
+        let mut settings = self.scene.recorded(plan.import.row_wire.is_some())?;
+        refuse_with_recordings([
+            self.array.is_some(),
+            self.samples.is_some(),
+            self.test_samples.is_some(),
+            false,
+        ])?;
+        settings.seed = Seed(self.seed);
+        let training = &mut settings.training;
+        training.stopping.epochs = self.epochs.unwrap_or(training.stopping.epochs);
+        let default = training.method;
+        let mut decoders = self.scene.decoders();
+        decoders.retain(|kind| !kind.needs_sensor());
+        let methods = if self.method.is_empty() {
+            vec![default]
+        } else {
+            self.method.clone()
+        };
+        let case = |(number, method): (usize, &Method)| {
+            let mut settings = settings;
+            // The default method has settings that suit recordings.
+            if method.short_name() != default.short_name() {
+                settings.training.method = *method;
+            }
+            let mut plan = plan.clone();
+            if !self.import.holds_out() {
+                plan.division.validation_fraction = settings.validation_fraction();
+            }
+            let mut decoders = decoders.clone();
+            // The others do not depend on the method.
+            decoders.retain(|kind| number == 0 || kind.needs_network());
+            Case {
+                noise: None,
+                preset: None,
+                setup: Setup::recording(settings, plan),
+                decoders,
+            }
+        };
+        Ok(methods.iter().enumerate().map(case).collect())
+    }
+}
+
+/// Divides recordings that were read before by another plan.
+fn divided(recordings: &Recordings, plan: &Plan, seed: Seed) -> Result<RunSets, Failure> {
+    let (split, test) = plan.divide(&recordings.training, recordings.test.as_ref(), seed)?;
+    Ok(RunSets::new(split, test).described(recordings.training.problem()))
+}
+
+/// Measures every case, up to the first that fails. Returns the levels that have points, and whether all cases were measured to
+/// their end.
+fn measure_levels(
+    cases: &[Case],
+    mut measure: impl FnMut(&Case, &mut MeasuredLevel) -> Result<bool, Failure>,
+) -> (Vec<MeasuredLevel>, Result<bool, Failure>) {
+    let mut levels: Vec<MeasuredLevel> = Vec::new();
+    let mut end = Ok(true);
+    for case in cases {
+        let mut level = match levels.pop_if(|level| level.level.noise == case.noise) {
+            Some(level) => level,
+            None => MeasuredLevel::new(case.noise),
+        };
+        let measured = measure(case, &mut level);
+        if !level.level.points.is_empty() || (measured.is_ok() && case.noise.is_none()) {
+            levels.push(level);
+        }
+        match measured {
+            Ok(true) => {}
+            Ok(false) => {
+                end = Ok(false);
+                break;
+            }
+            // Nothing is lost that would need words.
+            Err(cause) if levels.is_empty() => return (levels, Err(cause)),
+            Err(cause) => {
+                let (place, cause) = (case.name(), Box::new(cause));
+                return (levels, Err(Failure::TradeOff { place, cause }));
+            }
+        }
+    }
+    (levels, end)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::terminal::samples::sets;
+
+    #[test]
+    fn what_was_measured_before_a_failure_is_kept_and_the_failure_names_its_place() {
+        let mut settings = SimulatedSettings::default();
+        settings.source.sensor.scale = "1x1_1x3".parse().unwrap();
+        (settings.source.samples, settings.source.test_samples) = (8, 4);
+        let cases = Vec::from_iter([0.0, 0.01, 0.1].into_iter().flat_map(|noise| {
+            Preset::ALL.map(|preset| Case {
+                noise: Some(noise),
+                preset: Some(preset),
+                setup: settings.into(),
+                decoders: vec![DecoderKind::Mean],
+            })
+        }));
+        let measure_until = |fails_at: (f64, Preset)| {
+            measure_levels(&cases, |case, level| {
+                if (case.noise, case.preset) == (Some(fails_at.0), Some(fails_at.1)) {
+                    return Err(Failure::Arguments("too wide".to_owned()));
+                }
+                let sets = sets(&case.setup, true)?.sets;
+                let keep =
+                    |_, point: Result<TradeOffPoint, RunError>, _: Option<&_>| level.level.points.push(point.unwrap());
+                Ok(measure_trade_off(
+                    case.setup.settings(),
+                    &sets,
+                    &[],
+                    &case.decoders,
+                    || false,
+                    keep,
+                )?)
+            })
+        };
+        for (place, preset) in Preset::ALL.into_iter().enumerate() {
+            let (levels, end) = measure_until((0.01, preset));
+            let points = levels.iter().map(|level| (level.level.noise, level.level.points.len()));
+            assert_eq!(
+                Vec::from_iter(points),
+                [(Some(0.0), 2), (Some(0.01), place)][..1 + place]
+            );
+            let failure = end.unwrap_err();
+            assert_eq!(failure.status(), 1);
+            let message = failure.to_string();
+            let expected = format!("noise 0.01, preset {preset}: too wide");
+            assert!(message.starts_with(&expected), "{message}");
+        }
+        let (levels, end) = measure_until((0.0, Preset::ALL[0]));
+        assert!(levels.is_empty());
+        assert_eq!(end.unwrap_err().status(), 2, "an argument is wrong and nothing is lost");
+        let (levels, end) = measure_until((1.0, Preset::ALL[0]));
+        assert_eq!((levels.len(), end.unwrap()), (3, true));
+    }
+}

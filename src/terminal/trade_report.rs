@@ -1,0 +1,372 @@
+use std::io::{self, Write};
+
+use serde::Serialize;
+
+use super::{
+    errors_report::ErrorsReport,
+    failure::Failure,
+    output::{print, print_object},
+    recording_report::{RecordingReport, import_warnings, write_warnings},
+};
+use decoupler_core::{
+    dataset::SplitBy,
+    decoupling::Precision,
+    evaluation::{
+        ErrorTable, Problem, RunSets, TradeOffCost, TradeOffLevel, TradeOffPoint, decoded_unit, fastest_under,
+        most_accurate_under,
+    },
+    sensor::ArrayScale,
+};
+use decoupler_files::{
+    export::{Table, TableColumn, error_table, format_number, trade_off_summary},
+    figure::trade_words::point_name,
+    import::Recordings,
+};
+
+/// Limits for which the best decoder is to be found.
+#[derive(Clone, Copy)]
+pub(super) struct Limits {
+    pub(super) percent: Option<f64>,
+    pub(super) microseconds: Option<f64>,
+}
+
+/// Decoders measured at every level of noise, or on a recording.
+pub(super) struct TradeOff {
+    pub(super) source: TradeSource,
+    pub(super) levels: Vec<MeasuredLevel>,
+}
+
+/// Source of the samples.
+pub(super) enum TradeSource {
+    Array(ArrayScale),
+    Recording(Box<RecordedSource>),
+}
+
+/// A recording on which decoders are measured.
+pub(super) struct RecordedSource {
+    report: RecordingReport,
+    /// Unit that is decoded: "a sample", "a frame of 4 row-wires".
+    decoded: String,
+    problem: Problem,
+    warnings: Vec<String>,
+}
+
+/// Points of a level with what they were trained on.
+pub(super) struct MeasuredLevel {
+    pub(super) level: TradeOffLevel,
+    /// Of each point.
+    pub(super) trainings: Vec<PointTraining>,
+    /// Decoders that cannot be used with these samples, and why.
+    pub(super) refused: Vec<String>,
+}
+
+/// Training behind a point.
+pub(super) struct PointTraining {
+    /// Numbers of training and validation samples.
+    pub(super) samples: [usize; 2],
+    /// Command that trains it, if there is one.
+    pub(super) command: Option<String>,
+}
+
+/// Legend of the marks behind the lines of the table.
+const FRONTS: &str = "* no other decodes as fast with as little error; + no other is trained as fast with as little error\n\
+                      Training time is the sum over all rows and starts.";
+
+/// The object printed by `trade --json`.
+#[derive(Serialize)]
+#[serde(untagged)]
+enum Report<'a> {
+    Array {
+        array: ArrayScale,
+        levels: Vec<LevelReport<'a>>,
+    },
+    Recording {
+        #[serde(flatten)]
+        recording: &'a RecordingReport,
+        decoded: &'a str,
+        #[serde(flatten)]
+        level: LevelReport<'a>,
+        warnings: Vec<String>,
+    },
+}
+
+#[derive(Serialize)]
+struct LevelReport<'a> {
+    #[serde(skip_serializing_if = "Option::is_none")]
+    noise: Option<f64>,
+    points: Vec<PointReport<'a>>,
+    fastest_under: Option<Choice>,
+    most_accurate_under: Option<Choice>,
+    /// Decoders of an array that cannot be used, and why.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    refused: Vec<String>,
+}
+
+#[derive(Serialize)]
+struct PointReport<'a> {
+    decoder: String,
+    precision: &'static str,
+    hidden: Option<usize>,
+    #[serde(flatten)]
+    errors: ErrorsReport<'a>,
+    #[serde(flatten)]
+    source: PointSource,
+    frame_us: f64,
+    training_s: f64,
+    /// Remarks on the figures, with cause and cure.
+    remarks: Vec<String>,
+    on_decoding_front: bool,
+    on_training_front: bool,
+    command: Option<&'a str>,
+}
+
+/// Figures that only one kind of source has.
+#[derive(Serialize)]
+#[serde(untagged)]
+enum PointSource {
+    Array {
+        preset: Option<String>,
+        /// Root mean square of m/R − 1; none if the decoded deformation has no resistance.
+        residual: Option<f64>,
+        reference_z_percent: Option<f64>,
+        reference_z_mm: Option<f64>,
+        to_reference: Option<f64>,
+    },
+    Recording {
+        method: Option<&'static str>,
+        samples: usize,
+        validation_samples: usize,
+    },
+}
+
+/// The best point within a limit.
+#[derive(Serialize)]
+struct Choice {
+    limit: f64,
+    /// Index of the point; none if no point is within the limit.
+    point: Option<usize>,
+    command: Option<String>,
+}
+
+impl RecordedSource {
+    pub(super) fn new(sets: &RunSets, recordings: &Recordings) -> Self {
+        let plan = &recordings.recorded.plan;
+        let mut warnings = import_warnings(recordings);
+        if plan.division.by == SplitBy::Random && recordings.test.is_none() {
+            let message = "random test samples are optimistic when neighbouring rows of a recording are similar; decoupler \
+                           train measures by how much, and --split group or time avoids it";
+            warnings.push(message.to_owned());
+        }
+        Self {
+            report: RecordingReport::new(sets, recordings),
+            decoded: decoded_unit(&sets.test),
+            problem: Problem::clone(&sets.problem),
+            warnings,
+        }
+    }
+}
+
+impl MeasuredLevel {
+    pub(super) fn new(noise: Option<f64>) -> Self {
+        Self {
+            level: TradeOffLevel {
+                noise,
+                points: Vec::new(),
+            },
+            trainings: Vec::new(),
+            refused: Vec::new(),
+        }
+    }
+
+    /// For each point, true if it is on the Pareto front of decoding time and on that of training time.
+    fn fronts(&self) -> Vec<(bool, bool)> {
+        let decoding = self.level.front(TradeOffCost::Decoding).into_iter();
+        decoding.zip(self.level.front(TradeOffCost::Training)).collect()
+    }
+
+    /// The fastest and the most accurate point within `limits`, for those given.
+    fn choices(&self, limits: Limits) -> [Option<Choice>; 2] {
+        let points = &self.level.points;
+        let choice = |limit: Option<f64>, choose: fn(&[TradeOffPoint], f64) -> Option<&TradeOffPoint>| {
+            let limit = limit?;
+            let chosen = choose(points, limit);
+            let is_chosen = |point: &TradeOffPoint| chosen.is_some_and(|chosen| std::ptr::eq(point, chosen));
+            let point = points.iter().position(is_chosen);
+            Some(Choice {
+                limit,
+                point,
+                command: point.and_then(|place| self.trainings[place].command.clone()),
+            })
+        };
+        [
+            choice(limits.percent, fastest_under),
+            choice(limits.microseconds, most_accurate_under),
+        ]
+    }
+
+    fn report<'a>(&'a self, source: &'a TradeSource, limits: Limits) -> LevelReport<'a> {
+        let channels = match source {
+            TradeSource::Array(_) => &[][..],
+            TradeSource::Recording(recording) => &recording.problem.targets,
+        };
+        let point = |((point, training), (on_decoding_front, on_training_front)): (
+            (&TradeOffPoint, &'a PointTraining),
+            (bool, bool),
+        )| PointReport {
+            decoder: point.report.kind.to_string(),
+            precision: match point.report.precision {
+                Precision::Double => "f64",
+                Precision::Single => "f32",
+            },
+            hidden: point.hidden(),
+            errors: ErrorsReport::new(channels, &point.report.errors),
+            source: match source {
+                TradeSource::Array(_) => PointSource::Array {
+                    preset: point.preset.map(|preset| preset.to_string()),
+                    residual: point.report.residual.filter(|residual| residual.is_finite()),
+                    reference_z_percent: point.reference.and_then(|errors| errors.z_percent),
+                    reference_z_mm: point.reference.map(|errors| errors.z_mm),
+                    to_reference: point.to_reference(),
+                },
+                TradeSource::Recording(_) => PointSource::Recording {
+                    method: point.method().map(|method| method.short_name()),
+                    samples: training.samples[0],
+                    validation_samples: training.samples[1],
+                },
+            },
+            frame_us: point.report.cost.frame_us,
+            training_s: point.training_seconds,
+            remarks: point.report.remarks.iter().map(ToString::to_string).collect(),
+            on_decoding_front,
+            on_training_front,
+            command: training.command.as_deref(),
+        };
+        let points = self.level.points.iter().zip(&self.trainings).zip(self.fronts());
+        let [fastest_under, most_accurate_under] = self.choices(limits);
+        LevelReport {
+            noise: self.level.noise,
+            points: points.map(point).collect(),
+            fastest_under,
+            most_accurate_under,
+            refused: if self.level.noise.is_some() {
+                self.refused.clone()
+            } else {
+                Vec::new()
+            },
+        }
+    }
+
+    /// The table of the points, fastest first, with marks of those on the Pareto fronts.
+    fn table(&self) -> Table {
+        let mut table = trade_off_summary(&self.level);
+        let mut points = Vec::from_iter(self.level.points.iter().zip(self.fronts()));
+        points.sort_by(|(one, _), (other, _)| one.report.cost.frame_us.total_cmp(&other.report.cost.frame_us));
+        table.columns.push(TableColumn::field(""));
+        for (row, (_, (is_on_decoding_front, is_on_training_front))) in table.rows.iter_mut().zip(points) {
+            let marks = [(is_on_decoding_front, "*"), (is_on_training_front, "+")];
+            row.push(
+                marks
+                    .map(|(is_on, mark)| if is_on { mark } else { " " })
+                    .concat()
+                    .into(),
+            );
+        }
+        table
+    }
+
+    fn write(&self, limits: Limits, out: &mut dyn Write) -> io::Result<()> {
+        if let Some(noise) = self.level.noise {
+            write!(out, "\nNoise {noise}")?;
+            if let Some(reference) = self.level.points.first().and_then(|point| point.reference) {
+                let (percent, mm) = (format_number(reference.z_percent), format_number(reference.z_mm));
+                write!(out, ", reference {percent} % ({mm} mm)")?;
+                if reference.is_rounding() {
+                    write!(out, ", nothing but rounding")?;
+                }
+            }
+        }
+        write!(out, "\n{}", self.table().aligned())?;
+        for point in &self.level.points {
+            for remark in &point.report.remarks {
+                writeln!(out, "Warning: {}: {remark}", point_name(point))?;
+            }
+        }
+        write_warnings(&self.refused, out)?;
+        let [fastest, most_accurate] = self.choices(limits);
+        let choices = [
+            fastest.map(|choice| (format!("Fastest under {} %", choice.limit), choice)),
+            most_accurate.map(|choice| (format!("Most accurate under {} us", choice.limit), choice)),
+        ];
+        for (what, choice) in choices.into_iter().flatten() {
+            let decoder = choice.point.map(|place| point_name(&self.level.points[place]));
+            let answer = choice.command.or(decoder).unwrap_or_else(|| "none".to_owned());
+            writeln!(out, "{what}: {answer}")?;
+        }
+        Ok(())
+    }
+
+    /// Errors of each point, target by target.
+    fn target_table(&self, problem: &Problem) -> Table {
+        let points = &self.level.points;
+        let errors = points.iter().map(|point| ("", &point.report.errors));
+        let mut table = error_table(&ErrorTable::new(problem, &Vec::from_iter(errors)));
+        // The rows of each target are the points in their order.
+        for (row, point) in table.rows.iter_mut().zip(points.iter().cycle()) {
+            row[1] = point_name(point).into();
+        }
+        table
+    }
+}
+
+impl TradeOff {
+    pub(super) fn print(&self, limits: Limits, is_json: bool) -> Result<(), Failure> {
+        if is_json {
+            print_object(&self.report(limits))
+        } else {
+            print(|out| self.write(limits, out))
+        }
+    }
+
+    fn report(&self, limits: Limits) -> Report<'_> {
+        let mut levels = Vec::from_iter(self.levels.iter().map(|level| level.report(&self.source, limits)));
+        match &self.source {
+            TradeSource::Array(array) => Report::Array { array: *array, levels },
+            TradeSource::Recording(recording) => {
+                let refused = self.levels.iter().flat_map(|level| level.refused.iter().cloned());
+                Report::Recording {
+                    recording: &recording.report,
+                    decoded: &recording.decoded,
+                    level: levels.pop().expect("a recording has one level"),
+                    warnings: recording.warnings.iter().cloned().chain(refused).collect(),
+                }
+            }
+        }
+    }
+
+    fn write(&self, limits: Limits, out: &mut dyn Write) -> io::Result<()> {
+        match &self.source {
+            TradeSource::Array(array) => writeln!(
+                out,
+                "{array}: time for a frame (one thread) and training time against the error of z"
+            )?,
+            TradeSource::Recording(recording) => {
+                recording.report.write(out)?;
+                writeln!(
+                    out,
+                    "\nTime to decode {} (one thread) and training time against the error (MAE in % of range, mean of the \
+                     targets)",
+                    recording.decoded
+                )?;
+            }
+        }
+        self.levels.iter().try_for_each(|level| level.write(limits, out))?;
+        writeln!(out, "\n{FRONTS}")?;
+        if let TradeSource::Recording(recording) = &self.source {
+            for level in &self.levels {
+                write!(out, "\n{}", level.target_table(&recording.problem).aligned())?;
+            }
+            write_warnings(&recording.warnings, out)?;
+        }
+        Ok(())
+    }
+}

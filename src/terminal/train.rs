@@ -1,0 +1,316 @@
+use std::{
+    io::{Write, stderr},
+    path::{Path, PathBuf},
+};
+
+use clap::Args;
+use indicatif::ProgressBar;
+
+use super::{
+    checkpointing::{CheckpointArguments, Checkpointing},
+    failure::{Failure, Interruption},
+    import_arguments::ImportArguments,
+    interruption::Graceful,
+    output::progress_bar,
+    samples::{announce, following, sets},
+    train_report::Trained,
+    training_arguments::TrainingArguments,
+};
+use decoupler_core::{
+    decoupling::DecoderKind,
+    evaluation::{DecoderReport, DecoderSet, Run, RunError, Source},
+    training::TrainingSettings,
+};
+use decoupler_files::{
+    export::{
+        CheckpointFile, NetworkFile, SensorFile, check_writable, format_number, is_same,
+        report::{RunReport, quoted},
+    },
+    import::{Setup, SetupError, SetupSets},
+};
+
+/// Train a network and print its errors
+///
+/// Draws samples of the array, trains, and compares the network on its test samples with the mean of the training
+/// set, with the best linear map, with other decoders, with the least error possible in the scene (the reference), and
+/// with the published figures where there are any. With --data it trains on the samples of a recording, and compares the
+/// network with the mean, with ridge regression and with other decoders, target by target. Ctrl-C stops after the epoch,
+/// keeps the best network so far, and ends with status 130; a second Ctrl-C ends at once.
+#[derive(Args)]
+#[command(allow_negative_numbers = true)]
+pub(super) struct Train {
+    #[command(flatten)]
+    pub(super) training: TrainingArguments,
+    #[command(flatten)]
+    pub(super) import: ImportArguments,
+    #[command(flatten)]
+    pub(super) checkpoint: CheckpointArguments,
+    /// Sensor model written by calibrate, in the place of --array
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["array", "resume", "data", "recipe"])]
+    sensor: Option<PathBuf>,
+    /// File for the network, to be opened in the window or given to decode
+    #[arg(long, value_name = "FILE")]
+    pub(super) out: Option<PathBuf>,
+    /// File for a report with errors, figures, settings and the command that repeats the run, as one HTML page
+    #[arg(long, value_name = "FILE")]
+    pub(super) report: Option<PathBuf>,
+    /// Print one JSON object instead of text and progress
+    #[arg(long)]
+    pub(super) json: bool,
+}
+
+impl Train {
+    pub(super) fn run(self) -> Result<(), Failure> {
+        self.checkpoint.check()?;
+        self.check_paths()?;
+        let resumed = self.checkpoint.checkpoint.as_ref().filter(|_| self.checkpoint.resume);
+        let (mut run, sets) = match resumed {
+            Some(path) => self.resume(path)?,
+            None => {
+                let setup = self.setup()?;
+                if let Some(folds) = self.import.folds {
+                    return self.cross_validate(&setup, folds);
+                }
+                let sets = sets(&setup, self.json)?;
+                self.import.save_recipe(&setup)?;
+                let run = sets.run(&setup, &|| false)?.expect("nothing cancels it");
+                (run, sets)
+            }
+        };
+        let mut end = self.train(&mut run, self.checkpoint.checkpointing(sets.recorded()));
+        let file = NetworkFile::from_run(&run, sets.recorded())?;
+        // Whatever fails now, the figures are printed.
+        let saved = self.out.as_ref().map_or(Ok(()), |path| file.save(path));
+        let (mut decoders, mut optimism, mut measured) = (Vec::new(), Vec::new(), Ok(()));
+        if !matches!(end, Err(Failure::Interrupted(_))) {
+            measured = measure_decoders(&self.decoders(&run), &file, &sets, &mut decoders);
+        }
+        if end.is_ok() {
+            match self.optimism(&run, &sets) {
+                Ok(sentences) => optimism = sentences,
+                Err(failure) => end = Err(failure),
+            }
+        }
+        let flaw = run.flaw();
+        let reported = self.report.as_ref().map_or(Ok(()), |path| {
+            let report = RunReport {
+                name: None,
+                file: &file,
+                flaw: flaw.as_ref(),
+                decoders: &decoders,
+                test: run.test(),
+            };
+            report.save(path)
+        });
+        let trained = Trained {
+            run: &run,
+            file: &file,
+            sets: &sets,
+            decoders: &decoders,
+            optimism: &optimism,
+        };
+        trained.print(self.json)?;
+        measured?;
+        first_failure([saved.map_err(Failure::from), reported.map_err(Failure::from), end])
+    }
+
+    /// Setup of a new run.
+    fn setup(&self) -> Result<Setup, Failure> {
+        let source = self.import.source(self.training.scene.columns())?;
+        let setup = self.training.setup(source, self.import.holds_out())?;
+        match (&self.sensor, setup.simulated()) {
+            (Some(path), Some(mut settings)) => {
+                settings.source.sensor = SensorFile::load(path)?;
+                Ok(settings.into())
+            }
+            _ => Ok(setup),
+        }
+    }
+
+    /// Decoders to measure: those given, by default all of a simulated array and none of a recording.
+    fn decoders(&self, run: &Run) -> Vec<DecoderKind> {
+        match run.settings().source {
+            Source::Simulated(_) => self.training.scene.decoders(),
+            Source::Measured(_) => self.training.scene.decoder.clone(),
+        }
+    }
+
+    /// Checks that every file has a path of its own that can be written.
+    fn check_paths(&self) -> Result<(), Failure> {
+        let files = [
+            ("--out", &self.out),
+            ("--report", &self.report),
+            ("--checkpoint", &self.checkpoint.checkpoint),
+        ];
+        let files: Vec<_> = files
+            .iter()
+            .filter_map(|(name, path)| Some((name, path.as_ref()?)))
+            .collect();
+        for (number, (name, path)) in files.iter().enumerate() {
+            if let Some((other, _)) = files[number + 1..].iter().find(|(_, other)| is_same(path, other)) {
+                let message = format!("{name} and {other} name the same file: give each its own");
+                return Err(Failure::Arguments(message));
+            }
+        }
+        files.iter().try_for_each(|(_, path)| Ok(check_writable(path)?))
+    }
+
+    /// Resumes the training of a checkpoint.
+    fn resume(&self, path: &Path) -> Result<(Run, SetupSets), Failure> {
+        let mut file = CheckpointFile::load(path)?;
+        let saved = file.setup();
+        match saved.plan() {
+            Some(plan) => self.import.check_resumed(plan)?,
+            None if self.import.is_given() => {
+                let message = "--data: the checkpoint is of a simulated array; leave it out to resume";
+                return Err(Failure::Arguments(message.to_owned()));
+            }
+            None => {
+                self.import.check_unused()?;
+                self.import.save_recipe(&saved)?;
+            }
+        }
+        let training = self.training.resumed(&saved)?;
+        if let Some(recorded) = &mut file.recorded {
+            *recorded = self.import.relocated(recorded)?;
+            if let Some(missing) = recorded.missing().first() {
+                return Err(Failure::MissingRecording {
+                    checkpoint: path.to_owned(),
+                    recording: missing.to_path_buf(),
+                });
+            }
+        }
+        announce(&file.settings)?;
+        let resumed = following(&saved, self.json, |on_progress| {
+            file.resume_unless(&|| false, on_progress)
+        });
+        let (mut run, sets) = resumed.map_err(|error| match error {
+            SetupError::Run(source) => Failure::Resume {
+                path: path.to_owned(),
+                source,
+            },
+            error => error.into(),
+        })?;
+        self.continue_run(&mut run, saved.settings().training, training)?;
+        Ok((run, sets))
+    }
+
+    /// Gives a resumed run the method and stopping rules asked for, where they differ from those `saved`.
+    fn continue_run(&self, run: &mut Run, saved: TrainingSettings, training: TrainingSettings) -> Result<(), Failure> {
+        run.set_stopping(training.stopping)?;
+        if training.method != saved.method {
+            run.continue_with(training.method)?;
+            if run.stop_reason().is_some() {
+                let epochs = training.stopping.epochs;
+                return Err(Failure::Arguments(format!(
+                    "the checkpoint has run all of its {epochs} epochs: give more with --epochs to continue with another method"
+                )));
+            }
+        }
+        Ok(())
+    }
+
+    /// Trains to the end, or to the first epoch after Ctrl-C. The progress bar is shown only if standard error is a
+    /// terminal.
+    fn train(&self, run: &mut Run, checkpointing: Option<Checkpointing>) -> Result<(), Failure> {
+        let bar = progress_bar(
+            self.json,
+            run.settings().training.stopping.epochs,
+            "{bar:30} epoch {pos} of {len}, {msg}, at most {eta} left",
+        );
+        bar.set_position(furthest(run) as u64);
+        // The time left is reckoned from the epochs of this session only.
+        bar.reset_eta();
+        let graceful = Graceful::begin();
+        let mut checkpointing = checkpointing;
+        while run.stop_reason().is_none() && !graceful.is_end_requested() {
+            if let Some(checkpointing) = &mut checkpointing {
+                checkpointing.save_if_due(run);
+            }
+            run.step();
+            if !bar.is_hidden() {
+                show(run, &bar);
+            }
+        }
+        bar.finish_and_clear();
+        let is_interrupted = run.stop_reason().is_none();
+        run.stop();
+        if let Some(checkpointing) = &checkpointing {
+            checkpointing.save(run)?;
+        }
+        drop(graceful);
+        if is_interrupted {
+            let resume = self
+                .checkpoint
+                .checkpoint
+                .as_deref()
+                .map(|path| self.resume_command(path));
+            let epoch = furthest(run);
+            return Err(Failure::Interrupted(Interruption { epoch, resume }));
+        }
+        Ok(())
+    }
+
+    /// Command that resumes the training.
+    fn resume_command(&self, checkpoint: &Path) -> String {
+        let mut command = format!("decoupler train --checkpoint {} --resume", quoted(checkpoint));
+        if let Some(path) = &self.out {
+            command += &format!(" --out {}", quoted(path));
+        }
+        if let Some(path) = &self.report {
+            command += &format!(" --report {}", quoted(path));
+        }
+        if self.json {
+            command += " --json";
+        }
+        command
+    }
+}
+
+/// Returns the first failure, and prints the others.
+fn first_failure(ends: impl IntoIterator<Item = Result<(), Failure>>) -> Result<(), Failure> {
+    let mut failures = ends.into_iter().filter_map(Result::err);
+    let Some(first) = failures.next() else { return Ok(()) };
+    for other in failures {
+        // There is no one to report to if this fails.
+        let _ = writeln!(stderr(), "{other}");
+    }
+    Err(first)
+}
+
+/// Measures decoders of these kinds on the test samples of `sets`, next to the network of `file`.
+pub(super) fn measure_decoders(
+    kinds: &[DecoderKind],
+    file: &NetworkFile,
+    sets: &SetupSets,
+    reports: &mut Vec<DecoderReport>,
+) -> Result<(), RunError> {
+    if kinds.is_empty() {
+        return Ok(());
+    }
+    let training = sets.sets.split.training.clone();
+    let set = DecoderSet::on_set(file.settings, training, Some(file.network.clone()));
+    for kind in kinds {
+        for &precision in kind.precisions() {
+            reports.extend(set.measure(*kind, precision, &sets.sets.test)?);
+        }
+    }
+    Ok(())
+}
+
+/// Largest epoch among the starts.
+fn furthest(run: &Run) -> usize {
+    let epochs = run.trainers().iter().map(|trainer| trainer.latest().epoch);
+    epochs.max().unwrap_or(0)
+}
+
+fn show(run: &Run, bar: &ProgressBar) {
+    bar.set_position(furthest(run) as u64);
+    let mse = format_number(run.leader().latest().training_mse);
+    let ended = run.trainers().iter().filter(|trainer| trainer.stop_reason().is_some());
+    let starts = match run.trainers().len() {
+        1 => String::new(),
+        starts => format!(", {} of {starts} starts ended", ended.count()),
+    };
+    bar.set_message(format!("mse {mse}{starts}"));
+}

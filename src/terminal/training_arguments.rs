@@ -1,0 +1,331 @@
+use clap::{
+    Args,
+    builder::{PossibleValuesParser, TypedValueParser},
+};
+
+use super::{
+    checkpointing::check_same,
+    failure::Failure,
+    parsers::{count, number, seed},
+    scene_arguments::SceneArguments,
+};
+use decoupler_core::{
+    dataset::{LARGEST_SAMPLES, Seed},
+    evaluation::{MOST_STARTS, RunSettings, SimulatedSettings, Simulation, Source},
+    network::LARGEST_HIDDEN,
+    sensor::{ArrayScale, SensorModel},
+    training::{Method, StoppingRules, TrainingSettings},
+};
+use decoupler_files::{export::RecipeSource, import::Setup};
+
+// The run to train. Arguments that are not given have their default or the checkpoint's value.
+#[derive(Args)]
+pub(super) struct TrainingArguments {
+    #[command(flatten)]
+    pub(super) scene: SceneArguments,
+    /// Array scale M1xM2_M3xM4: rows x nodes on each, nodes on each column x columns [default: 10x10_5x30]
+    #[arg(long, value_name = "SCALE")]
+    array: Option<ArrayScale>,
+    /// Hidden nodes [default: 12]
+    #[arg(long, value_name = "N", value_parser = count(1..=LARGEST_HIDDEN))]
+    hidden: Option<usize>,
+    /// Number of trainings from different random weights; the one with the lowest validation error is kept [default: 1]
+    #[arg(long, value_name = "N", value_parser = count(1..=MOST_STARTS))]
+    starts: Option<usize>,
+    /// Training method [default: lm; br for a recording]
+    #[arg(long, value_parser = method())]
+    method: Option<Method>,
+    #[arg(long = "set", value_name = "NAME=VALUE", value_parser = assignment, help = settings_help())]
+    set: Vec<(String, f64)>,
+    /// Maximum number of epochs [default: 1000; 300 for a recording]
+    #[arg(long, value_name = "N", value_parser = count(1..=StoppingRules::MOST_EPOCHS))]
+    epochs: Option<usize>,
+    /// Training error (mse, scaled) at which training ends [default: 0]
+    #[arg(long, value_name = "MSE", value_parser = number)]
+    goal: Option<f64>,
+    /// Validation failures, epochs without a new best validation error, that end training [default: 6]
+    #[arg(long, value_name = "N", value_parser = count(1..=StoppingRules::MOST_EPOCHS))]
+    max_fail: Option<usize>,
+    /// Norm of the gradient below which training ends [default: 1e-7]
+    #[arg(long, value_name = "LENGTH", value_parser = number)]
+    min_gradient: Option<f64>,
+    /// Training samples; this and the next two are rounded up to whole snapshots of all rows [default: 1000]
+    #[arg(long, value_name = "N", value_parser = count(1..=LARGEST_SAMPLES))]
+    samples: Option<usize>,
+    /// Test samples, on which the printed errors are measured [default: 100]
+    #[arg(long, value_name = "N", value_parser = count(1..=LARGEST_SAMPLES))]
+    test_samples: Option<usize>,
+    /// Validation samples, which select the best weights and end the training; 0 for none [default: 200]
+    #[arg(long, value_name = "N", value_parser = count(0..=LARGEST_SAMPLES))]
+    validation_samples: Option<usize>,
+    /// Seed of all random numbers [default: 0]
+    #[arg(long, value_parser = seed)]
+    seed: Option<u64>,
+}
+
+impl TrainingArguments {
+    /// Settings of a new run on a simulated array.
+    pub(super) fn settings(&self) -> Result<SimulatedSettings, Failure> {
+        self.settings_on(None)
+    }
+
+    /// Settings of a new run on this simulated array, by default that of the preset, with the arguments given.
+    fn settings_on(&self, simulation: Option<Simulation>) -> Result<SimulatedSettings, Failure> {
+        self.scene.check_one_noise()?;
+        let default = match simulation {
+            Some(simulation) => self.scene.settings_on(simulation)?,
+            None => self.scene.settings()?,
+        };
+        let source = default.source;
+        Ok(SimulatedSettings {
+            source: Simulation {
+                sensor: self.sensor().unwrap_or(source.sensor),
+                samples: self.samples.unwrap_or(source.samples),
+                validation_samples: self.validation_samples.unwrap_or(source.validation_samples),
+                test_samples: self.test_samples.unwrap_or(source.test_samples),
+                ..source
+            },
+            hidden: self.hidden.unwrap_or(default.hidden),
+            starts: self.starts.unwrap_or(default.starts),
+            training: self.training(default.training)?,
+            seed: self.seed.map_or(default.seed, Seed),
+            ..default
+        })
+    }
+
+    /// Setup of a new run on samples of `source`, or else of the array that the arguments describe. `holds_out` is true if the
+    /// share of a recording for validation is stated; otherwise the method determines it.
+    pub(super) fn setup(&self, source: Option<RecipeSource>, holds_out: bool) -> Result<Setup, Failure> {
+        let mut plan = match source {
+            None => return Ok(self.settings()?.into()),
+            Some(RecipeSource::Simulated(simulation)) => return Ok(self.settings_on(Some(simulation))?.into()),
+            Some(RecipeSource::Recording(plan)) => plan,
+        };
+        let settings = self.recorded(plan.import.row_wire.is_some())?;
+        if !holds_out {
+            plan.division.validation_fraction = settings.validation_fraction();
+        }
+        Ok(Setup::recording(settings, plan))
+    }
+
+    /// Settings of a new run on a recording.
+    fn recorded(&self, has_row_wires: bool) -> Result<RunSettings, Failure> {
+        let default = self.recorded_source(has_row_wires)?;
+        Ok(RunSettings {
+            hidden: self.hidden.unwrap_or(default.hidden),
+            starts: self.starts.unwrap_or(default.starts),
+            training: self.training(default.training)?,
+            seed: self.seed.map_or(default.seed, Seed),
+            ..default
+        })
+    }
+
+    /// Default settings with the row model and scaling given.
+    ///
+    /// # Errors
+    /// Names the first argument given that is for a simulated array only.
+    fn recorded_source(&self, has_row_wires: bool) -> Result<RunSettings, Failure> {
+        let settings = self.scene.recorded(has_row_wires)?;
+        refuse_with_recordings([
+            self.array.is_some(),
+            self.samples.is_some(),
+            self.test_samples.is_some(),
+            self.validation_samples.is_some(),
+        ])?;
+        Ok(settings)
+    }
+
+    /// The sensor, if an array scale is given.
+    pub(super) fn sensor(&self) -> Option<SensorModel> {
+        self.array.map(SensorModel::new)
+    }
+
+    /// Training settings with which the run of the setup `saved` is resumed.
+    ///
+    /// # Errors
+    /// Names the first argument given that differs.
+    pub(super) fn resumed(&self, saved: &Setup) -> Result<TrainingSettings, Failure> {
+        let settings = saved.settings();
+        match (&settings.source, saved.plan()) {
+            (Source::Simulated(source), _) => {
+                let simulated = saved.simulated().expect("the source is simulated");
+                if let Some(what) = self.scene.difference(&simulated)? {
+                    return Err(Failure::Arguments(format!(
+                        "the checkpoint has another choice of {what}: leave it out to resume, or start a new training \
+                         with another --checkpoint"
+                    )));
+                }
+                check_same("array", self.array, source.sensor.scale)?;
+                check_same("samples", self.samples, source.samples)?;
+                check_same("test-samples", self.test_samples, source.test_samples)?;
+                check_same("validation-samples", self.validation_samples, source.validation_samples)?;
+            }
+            (Source::Measured(_), plan) => {
+                let import = plan.map(|plan| &plan.import);
+                self.recorded_source(import.is_some_and(|import| import.row_wire.is_some()))?;
+                self.scene.check_resumed(settings)?;
+                let columns = self.scene.columns();
+                let given = (!columns.is_empty()).then(|| columns.join(","));
+                check_same(
+                    "inputs",
+                    given,
+                    import.map_or(String::new(), |import| import.inputs.join(",")),
+                )?;
+            }
+        }
+        check_same("hidden", self.hidden, settings.hidden)?;
+        check_same("starts", self.starts, settings.starts)?;
+        check_same("seed", self.seed, settings.seed)?;
+        self.training(settings.training)
+    }
+
+    /// The given method and stopping rules; those not given are as in `present`.
+    pub(super) fn training(&self, present: TrainingSettings) -> Result<TrainingSettings, Failure> {
+        // The present settings of the method are those that suit the samples.
+        let same = |method: &Method| method.short_name() == present.method.short_name();
+        let mut method = self.method.filter(|method| !same(method)).unwrap_or(present.method);
+        for (name, value) in &self.set {
+            let short_name = method.short_name();
+            let mut settings = method.settings();
+            let names = settings.iter().map(|setting| dashed(setting.name)).collect::<Vec<_>>();
+            match settings.iter_mut().find(|setting| dashed(setting.name) == *name) {
+                Some(setting) => *setting.value = *value,
+                None => {
+                    let names = names.join(", ");
+                    let message = format!("--set {name}: {short_name} has no such setting; it has {names}");
+                    return Err(Failure::Arguments(message));
+                }
+            }
+        }
+        let rules = present.stopping;
+        let training = TrainingSettings {
+            method,
+            stopping: StoppingRules {
+                epochs: self.epochs.unwrap_or(rules.epochs),
+                goal_mse: self.goal.unwrap_or(rules.goal_mse),
+                min_gradient: self.min_gradient.unwrap_or(rules.min_gradient),
+                max_fail: self.max_fail.unwrap_or(rules.max_fail),
+            },
+        };
+        training.check()?;
+        Ok(training)
+    }
+}
+
+/// Refuses arguments of a simulated array next to a recording, given in this order: array, training, test and validation
+/// samples.
+pub(super) fn refuse_with_recordings(are_given: [bool; 4]) -> Result<(), Failure> {
+    let arguments = [
+        ("--array", "a recording (--data) has no array; leave it out"),
+        (
+            "--samples",
+            "all rows of a recording (--data) are used; choose some with --where",
+        ),
+        (
+            "--test-samples",
+            "a share of a recording (--data) is held out for testing; give --test-fraction or --test-data",
+        ),
+        (
+            "--validation-samples",
+            "a share of a recording (--data) is held out for validation; give --validation-fraction",
+        ),
+    ];
+    match arguments.iter().zip(are_given).find(|(_, is_given)| *is_given) {
+        Some(((argument, reason), _)) => Err(Failure::Arguments(format!("{argument}: {reason}"))),
+        None => Ok(()),
+    }
+}
+
+pub(super) fn method() -> impl TypedValueParser<Value = Method> {
+    let names = Method::all().map(|method| method.short_name());
+    PossibleValuesParser::new(names).map(|name| {
+        let mut methods = Method::all().into_iter();
+        methods.find(|method| method.short_name() == name).unwrap_or_default()
+    })
+}
+
+fn assignment(text: &str) -> Result<(String, f64), String> {
+    let (name, value) = text.split_once('=').ok_or("write NAME=VALUE, for example mu=0.01")?;
+    let value = value.trim().parse().map_err(|_| format!("'{value}' is not a number"))?;
+    Ok((name.trim().to_owned(), value))
+}
+
+/// Name of a setting in the terminal.
+fn dashed(name: &str) -> String {
+    name.replace(' ', "-")
+}
+
+fn settings_help() -> String {
+    let of = |mut method: Method| {
+        let settings = method.settings();
+        let list = settings
+            .iter()
+            .map(|setting| format!("{} (default {})", dashed(setting.name), setting.default));
+        let list = list.collect::<Vec<_>>().join(", ");
+        format!("{} has {list}", method.short_name())
+    };
+    let methods = Method::all().map(of).join("; ");
+    format!("Change a setting of the method; may be repeated: {methods}")
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::{Command, FromArgMatches};
+
+    use super::*;
+    use decoupler_core::{evaluation::Measured, scene::RowModel};
+    use decoupler_files::export::report::train_command;
+
+    fn parsed(line: &str) -> TrainingArguments {
+        let command = TrainingArguments::augment_args(Command::new("train"));
+        let matches = command.get_matches_from(line.split(' '));
+        TrainingArguments::from_arg_matches(&matches).unwrap()
+    }
+
+    #[test]
+    fn the_defaults_in_the_help_are_those_of_the_library() {
+        assert_eq!(parsed("train").settings().unwrap(), SimulatedSettings::default());
+        let told = "train --preset paper --rows all --axes z --loading random --inputs resistance --scaling minmax \
+                    --noise 0 --noise-in both --array 10x10_5x30 --hidden 12 --starts 1 --method lm --epochs 1000 \
+                    --goal 0 --max-fail 6 --min-gradient 1e-7 --samples 1000 --test-samples 100 --validation-samples \
+                    200 --seed 0";
+        assert_eq!(parsed(told).settings().unwrap(), SimulatedSettings::default());
+    }
+
+    #[test]
+    fn recordings_have_the_defaults_of_the_library() {
+        let recorded = |line: &str| parsed(line).recorded(false).unwrap();
+        let default = RunSettings::from(Measured { rows: RowModel::Shared });
+        assert_eq!(recorded("train"), default);
+        // Naming the default method keeps what suits recordings.
+        assert_eq!(recorded("train --method br"), default);
+        let given = recorded(
+            "train --method br --set correlation-epoch=0 --set groups-of-weights=1 --epochs 7 --starts 2 --hidden 3 --seed 4",
+        );
+        assert_eq!(
+            (given.training.stopping.epochs, given.starts, given.hidden, given.seed),
+            (7, 2, 3, Seed(4))
+        );
+        assert_eq!(given.training.method, Method::bayesian_regularization());
+    }
+
+    #[test]
+    fn the_command_in_a_report_gives_the_settings_of_the_run() {
+        let lines = [
+            "train",
+            "train --preset best --array 10x6_3x18 --hidden 7 --seed 18446744073709551615",
+            "train --rows 3 --axes xyz --loading smooth:2.5 --noise 1e-3 --noise-ohm 0.1 --adc-bits 12 --drift 0.0123 \
+             --noise-in training --inputs log --scaling whiten --starts 4",
+            "train --loading indenter:flat-punch --method gdm --set learning-rate=0.3 --epochs 77 --goal 1e-5 \
+             --max-fail 9 --min-gradient 0 --samples 123 --test-samples 17 --validation-samples 0",
+        ];
+        for line in lines {
+            let settings = parsed(&line.split_whitespace().collect::<Vec<_>>().join(" "))
+                .settings()
+                .unwrap();
+            let command = train_command(&settings.into(), None).unwrap();
+            let command = command.strip_prefix("decoupler ").unwrap();
+            assert_eq!(parsed(command).settings().unwrap(), settings, "{command}");
+        }
+    }
+}

@@ -1,0 +1,349 @@
+use std::{
+    path::PathBuf,
+    sync::{Arc, mpsc::channel},
+};
+
+use super::{DecouplerWindow, copying::ToCopy, path_look::Found, remembered::is_within_limits, save_form::Saving};
+use crate::window::{
+    preview,
+    shared::{
+        Effect, FileInUse, FileTask, Look, Matter, Offers, Phase, Purpose, RecordingDraft, RunView, SourceKind,
+        refuse_in_use,
+    },
+    test_view::HeightScale,
+    theme,
+    training_worker::{Inspection, LOST, Request, Worker},
+    views::CHECKPOINT,
+};
+use decoupler_core::evaluation::SimulatedSettings;
+use decoupler_files::{figure::SequentialMap, import::Setup};
+
+impl DecouplerWindow {
+    /// Does what a view asks for.
+    pub fn apply(&mut self, effect: Effect) {
+        let shared = &mut self.shared;
+        match effect {
+            Effect::Configure(draft) => self.configure(*draft),
+            Effect::ConfigureRecording(settings) => {
+                shared.recording.settings = *settings;
+                self.notices.settle(Matter::Settings);
+            }
+            Effect::Import(plan) => shared.recording.plan = plan,
+            Effect::ChooseSource(source) if !shared.phase.is_busy() => self.choose_source(source),
+            Effect::ChooseSource(_) => {}
+            Effect::TakeSetup(setup) => self.take_setup(&setup),
+            Effect::ShowTraining => self.show(0),
+            Effect::Train => {
+                self.opened = None;
+                match shared.setup() {
+                    Ok(setup) => self.prepare(Request::Train(Box::new(setup))),
+                    Err(obstacle) => self.notices.fail(Matter::Settings, obstacle),
+                }
+            }
+            // A training may have begun in the same frame.
+            Effect::OpenTraining(_) | Effect::TakeUp(..) if shared.phase.is_busy() => {}
+            Effect::OpenTraining(path) => self.open_training(path),
+            Effect::TakeUp(setup, states) => {
+                self.opened = None;
+                self.take_setup(&setup);
+                self.prepare(Request::TakeUp(setup, states));
+            }
+            Effect::Pause => {
+                shared.phase = Phase::Paused;
+                self.worker.ask(Request::Pause);
+            }
+            Effect::Resume => {
+                // The settings on the left are always those that are trained with.
+                if let Some(run) = &mut shared.run {
+                    run.is_saved = false;
+                    let training = run.asked.settings().training;
+                    shared.set_training(training);
+                }
+                shared.phase = Phase::Training;
+                self.worker.ask(Request::Resume);
+            }
+            Effect::Continue if shared.can_continue() => {
+                shared.phase = Phase::Training;
+                self.notices.settle(Matter::Training);
+                self.notices.settle(Matter::Settings);
+                self.worker.ask(Request::Continue(shared.settings().training));
+            }
+            Effect::Continue => {}
+            Effect::Stop => {
+                self.worker.ask(Request::Stop);
+                // What was being prepared does not begin; the training before it stays.
+                if shared.phase == Phase::Preparing {
+                    shared.phase = shared.phase_at_rest();
+                }
+            }
+            Effect::Look(look) => self.look(look),
+            Effect::Watch(snapshot) => self.worker.watch(snapshot),
+            Effect::ChooseFile(task) => {
+                if !self.dialogs.ask(&task, Arc::clone(&self.wake)) {
+                    self.type_path(task);
+                }
+            }
+            Effect::TypePath(task) => self.type_path(task),
+            Effect::Copy { text, notice } => self.copy_text(text, notice),
+            Effect::CopyPicture { figure, notice } => self.copying.start(ToCopy::Picture(figure), notice),
+            Effect::KeepRun(file) => self.runs.keep(*file),
+            Effect::RenameRun(id, name) => shared.runs.rename(id, &name, &self.runs),
+            Effect::PinRun(place, id) => shared.runs.pin(place, id, &self.runs),
+            Effect::RemoveRun(id) => shared.runs.remove(id, &self.runs),
+            Effect::Tell(matter, notice) => self.notices.tell(matter, notice),
+            Effect::Settle(matter) => self.notices.settle(matter),
+        }
+    }
+
+    /// Asks for another training than the one on show.
+    fn prepare(&mut self, request: Request) {
+        self.shared.phase = Phase::Preparing;
+        self.notices.settle(Matter::Training);
+        self.notices.settle(Matter::Settings);
+        self.worker.ask(request);
+    }
+
+    /// Takes up the training saved in this checkpoint.
+    fn open_training(&mut self, path: PathBuf) {
+        self.opened = Some(path.clone());
+        self.prepare(Request::Open(path));
+    }
+
+    /// Shows the view in this place.
+    pub(super) fn show(&mut self, place: usize) {
+        self.shown = place;
+        // Another window may have been at work.
+        self.runs.look();
+        self.views.all()[place].enter(&self.shared);
+    }
+
+    /// Shows and remembers the theme that the user chose.
+    pub(super) fn choose_theme(&mut self, is_dark: bool) {
+        self.set_dark(is_dark);
+        self.remembered.is_dark = Some(is_dark);
+    }
+
+    /// Draws all surfaces so, and remembers the colours that the user chose.
+    fn look(&mut self, look: Look) {
+        if look.colours != self.shared.look.colours {
+            self.remembered.colours = Some(look.colours);
+        }
+        self.shared.look = look;
+    }
+
+    /// Offers the colours of values, and to lock or free what they span.
+    pub(super) fn offer_colours(&mut self, offers: &mut Offers<'_>) {
+        let look = self.shared.look;
+        for colours in SequentialMap::ALL {
+            if offers.offer(format!("Colours: {}", colours.name()), colours != look.colours) {
+                self.look(Look { colours, ..look });
+            }
+        }
+        let (name, heights) = match look.heights {
+            HeightScale::Stroke => ("Free the scale of heights", HeightScale::Fitted),
+            HeightScale::Fitted => ("Lock the scale of heights", HeightScale::Stroke),
+        };
+        if offers.offer(name, true) {
+            self.look(Look { heights, ..look });
+        }
+        if offers.offer("Free the scale of errors", look.error_limit_mm.is_some()) {
+            let error_limit_mm = None;
+            self.look(Look { error_limit_mm, ..look });
+        }
+    }
+
+    pub(super) fn set_dark(&mut self, is_dark: bool) {
+        self.shared.look.is_dark = is_dark;
+        theme::apply(&self.ctx, is_dark);
+    }
+
+    /// Asks for a path in the window itself; the one last typed is offered again for the same file.
+    pub(super) fn type_path(&mut self, task: FileTask) {
+        let is_same = |typed: &&Saving| typed.task.is_same_file(&task);
+        let path = match self.typed.as_ref().filter(is_same) {
+            Some(typed) => typed.path.clone(),
+            None => task.suggested_path().display().to_string(),
+        };
+        self.saving = Some(Saving::new(task, path));
+    }
+
+    /// Takes the path typed in the form. What exists there is found out first, unless the file is read or its contents
+    /// replace nothing.
+    pub(super) fn take_typed(&mut self, path: PathBuf) {
+        let Some(task) = self.saving.as_ref().map(|saving| saving.task.clone()) else {
+            return;
+        };
+        // A folder is only ever filled anew.
+        if task.is_read() || task.words.extensions.is_empty() {
+            return self.take_path(path);
+        }
+        // What is on its way there exists as good as already.
+        let found = self.files.paths().any(|other| other == path).then_some(Found::File);
+        let used = self.files_in_use(&task);
+        if let Some(saving) = &mut self.saving {
+            saving.wait_for_look();
+            match found {
+                Some(found) => {
+                    saving.take(&path, found);
+                }
+                None => self.looks.start(path, used),
+            }
+        }
+        self.ctx.request_repaint();
+    }
+
+    /// Takes what was found at typed paths.
+    pub(super) fn take_looks(&mut self) {
+        while let Some((path, found)) = self.looks.next_found() {
+            if self.saving.as_mut().is_some_and(|saving| saving.take(&path, found)) {
+                self.take_path(path);
+            }
+        }
+    }
+
+    /// Closes the form and does with the file in `path` what it was asked for.
+    pub(super) fn take_path(&mut self, path: PathBuf) {
+        self.typed = self.saving.take();
+        if let Some(typed) = self.typed.clone() {
+            self.answer(typed.task, path);
+        }
+    }
+
+    /// Files that the program needs, over which the file of `task` must not be saved.
+    fn files_in_use(&mut self, task: &FileTask) -> Vec<FileInUse> {
+        let mut used: Vec<FileInUse> = self.views.all().iter().flat_map(|view| view.files_in_use()).collect();
+        used.extend(self.opened.clone().map(FileInUse::Checkpoint));
+        // A checkpoint may be saved over the one before it.
+        let is_checkpoint = task.words.kind == CHECKPOINT.kind;
+        used.retain(|used| !(is_checkpoint && matches!(used, FileInUse::Checkpoint(_))));
+        used.extend(self.shared.runs.path.clone().map(FileInUse::Kept));
+        used
+    }
+
+    /// Does with the file in `path` what it was asked for.
+    pub(super) fn answer(&mut self, task: FileTask, path: PathBuf) {
+        // A dialog of the desktop has asked whether a file is to be replaced, but does not know what is in use.
+        let used = self.files_in_use(&task);
+        if !self.take_path_on_closing(&task, &path) {
+            return;
+        }
+        match task.purpose {
+            Purpose::SaveTraining(run, contents) => {
+                let (send, taken) = channel();
+                let inspection = Inspection::new(move |run| {
+                    let taken = run.map_err(str::to_owned).and_then(|run| contents.take(run));
+                    // Who asked waits for it.
+                    let _ = send.send(taken);
+                });
+                self.worker.ask(Request::Inspect(run, inspection));
+                self.files.write(path, move |path| {
+                    refuse_in_use(path, &used)?;
+                    let taken = taken.recv().unwrap_or_else(|_| Err(LOST.to_owned()));
+                    taken?.write(path)
+                });
+            }
+            Purpose::Save(contents) => self.files.write(path, move |path| {
+                refuse_in_use(path, &used)?;
+                contents.write(path)
+            }),
+            Purpose::Choose(chosen) => {
+                // A view that has asked for another file since has no use for this one.
+                let _ = chosen.send(path);
+                self.ctx.request_repaint();
+            }
+            // A training may have begun while the desktop's dialog was open.
+            Purpose::Open if self.shared.phase.is_busy() => {}
+            Purpose::Open => self.open_training(path),
+        }
+    }
+
+    /// Starts the worker again after it died.
+    pub(super) fn restart_worker(&mut self) {
+        self.worker = Worker::start(Arc::clone(&self.wake));
+        self.shared.phase = self.shared.phase_at_rest();
+        self.notices.settle(Matter::Training);
+    }
+
+    /// Takes new settings; if they change the test set, shows that of the new ones.
+    pub(super) fn configure(&mut self, draft: SimulatedSettings) {
+        let before = std::mem::replace(&mut self.shared.draft, draft);
+        self.notices.settle(Matter::Preview);
+        if is_within_limits(&draft) {
+            self.notices.settle(Matter::Settings);
+        }
+        let run = self.shared.run.as_ref();
+        if run.is_some_and(|run| is_of_test_set(run, &draft)) {
+            self.shared.preview = None;
+        } else if !have_same_sets(&before, &draft) {
+            self.ask_for_what_is_missing();
+        }
+    }
+
+    /// Trains on a source of this kind from now on.
+    pub(super) fn choose_source(&mut self, source: SourceKind) {
+        self.shared.source = source;
+        self.notices.settle(Matter::Settings);
+        if source == SourceKind::Array {
+            self.configure(self.shared.draft);
+            self.ask_for_what_is_missing();
+        }
+    }
+
+    /// Makes the setup of another run that of the next training.
+    pub(super) fn take_setup(&mut self, setup: &Setup) {
+        match (setup.simulated(), setup.plan()) {
+            (Some(settings), _) => {
+                self.shared.source = SourceKind::Array;
+                self.configure(settings);
+            }
+            (None, Some(plan)) => {
+                self.shared.source = SourceKind::Recording;
+                let plan = plan.absolute();
+                self.views.open_plan(&plan);
+                self.shared.recording = RecordingDraft {
+                    settings: *setup.settings(),
+                    plan: Ok(Arc::new(plan)),
+                };
+            }
+            (None, None) => {}
+        }
+    }
+
+    /// Asks for what the settings are to show before a training and the window does not know yet.
+    pub(super) fn ask_for_what_is_missing(&mut self) {
+        let shared = &self.shared;
+        let draft = shared.draft;
+        match (&shared.preview, &shared.run) {
+            (Some(preview), _) if have_same_test_set(&preview.settings, &draft) => {
+                preview::compare(&mut self.previews, draft);
+            }
+            (None, Some(run)) if is_of_test_set(run, &draft) => {}
+            _ => preview::draw(&mut self.previews, draft),
+        }
+    }
+}
+
+/// Returns true if `run` is on a simulated array with the test set of these settings.
+pub(super) fn is_of_test_set(run: &RunView, settings: &SimulatedSettings) -> bool {
+    run.simulated()
+        .is_some_and(|of_run| have_same_test_set(&of_run, settings))
+}
+
+/// Returns true if both draw the same test set.
+pub(super) fn have_same_test_set(a: &SimulatedSettings, b: &SimulatedSettings) -> bool {
+    let test_set = |settings: &SimulatedSettings| {
+        (
+            settings.source.sensor,
+            settings.source.scene,
+            settings.source.test_samples,
+            settings.seed,
+        )
+    };
+    test_set(a) == test_set(b)
+}
+
+/// Returns true if both draw the same samples, trained on or not.
+pub(super) fn have_same_sets(a: &SimulatedSettings, b: &SimulatedSettings) -> bool {
+    let samples = |settings: &SimulatedSettings| (settings.source.samples, settings.source.validation_samples);
+    have_same_test_set(a, b) && samples(a) == samples(b)
+}

@@ -1,0 +1,312 @@
+use std::{path::PathBuf, sync::Arc, time::Duration};
+
+use eframe::egui::{self, Context, Frame as PanelFrame, Margin, Panel, Ui};
+
+use super::{
+    actions::Overlay,
+    clipboard::Clipboard,
+    closing::Closing,
+    columns::{edge_ui, widths_points},
+    copying::{Copying, copy_menu_ui},
+    desktop::Desktop,
+    dialogs::Dialogs,
+    export_menu::export_menu_ui,
+    files::Files,
+    frames::changes_something,
+    interface_scale::SCALES,
+    memory::Memory,
+    notice::{self, notice_ui},
+    notices::Notices,
+    path_look::PathLooks,
+    remembered::{Remembered, WindowFile},
+    save_form::{self, Saving, save_form_ui},
+    top_bar::{Reach, top_bar_ui},
+    tour::{self, Tour, tour_ui},
+    undoing::Undoing,
+};
+use crate::window::{
+    job::{Job, Wake},
+    preview::PreviewEvent,
+    shared::{Action, Effect, Matter, Notice, Phase, RunsWorker, Shared},
+    theme::{self, Theme, space},
+    training_worker::Worker,
+    views::Views,
+};
+
+/// The window: what is shared, the views, and the one place where what they ask for is done.
+pub struct DecouplerWindow {
+    pub(super) shared: Shared,
+    pub(super) views: Views,
+    /// Places and names of the views.
+    pub(super) names: Vec<(usize, &'static str)>,
+    /// The place of the view on show among all.
+    pub(super) shown: usize,
+    pub(super) notices: Notices,
+    /// A file waiting for its path.
+    pub(super) saving: Option<Saving>,
+    /// The path last typed, offered again for the same file.
+    pub(super) typed: Option<Saving>,
+    pub(super) looks: PathLooks,
+    /// The checkpoint that the training of the Train view was opened from.
+    pub(super) opened: Option<PathBuf>,
+    pub(super) worker: Worker,
+    pub(super) previews: Job<PreviewEvent>,
+    pub(super) runs: RunsWorker,
+    pub(super) files: Files,
+    pub(super) copying: Copying,
+    pub(super) dialogs: Dialogs,
+    pub(super) closing: Option<Closing>,
+    /// A list that lies over the window.
+    pub(super) overlay: Overlay,
+    /// The tour, unless it has ended.
+    pub(super) tour: Option<Tour>,
+    /// The name of the action picked from the list, to be done in the next frame.
+    pub(super) picked: Option<String>,
+    pub(super) undoing: Undoing,
+    pub(super) remembered: Remembered,
+    /// The file that keeps it, if there is one.
+    pub(super) memory: Option<Memory>,
+    pub(super) wake: Wake,
+    pub(super) ctx: Context,
+}
+
+impl DecouplerWindow {
+    /// Opens as the last window was left that kept `file`, and keeps it from now on. Without a file it opens on the default
+    /// array.
+    pub fn new(ctx: &Context, desktop: Desktop, file: Option<WindowFile>) -> Self {
+        let woken = ctx.clone();
+        Self::woken_by(Arc::new(move || woken.request_repaint()), ctx, desktop, file)
+    }
+
+    /// As [`Self::new`]; `wake` is called whenever there is news to take.
+    pub(super) fn woken_by(wake: Wake, ctx: &Context, desktop: Desktop, file: Option<WindowFile>) -> Self {
+        let remembered = file.as_ref().map(|file| file.remembered.clone()).unwrap_or_default();
+        let is_dark = remembered
+            .is_dark
+            .unwrap_or(ctx.system_theme() != Some(egui::Theme::Light));
+        theme::install(ctx, is_dark);
+        // Ours keep to sizes at which the window is whole.
+        ctx.options_mut(|options| options.zoom_with_keyboard = false);
+        let mut views = Views::new(&wake);
+        let names = views.all().into_iter().map(|view| view.name()).enumerate();
+        let mut window = Self {
+            names: names.collect(),
+            shared: Shared::new(is_dark),
+            views,
+            shown: 0,
+            notices: Notices::default(),
+            saving: None,
+            typed: None,
+            looks: PathLooks::new(Arc::clone(&wake)),
+            opened: None,
+            worker: Worker::start(Arc::clone(&wake)),
+            previews: Job::new("preview", Arc::clone(&wake)),
+            runs: RunsWorker::start(Arc::clone(&wake)),
+            files: Files::new(Arc::clone(&wake)),
+            copying: Copying::new(Clipboard::of(desktop), Arc::clone(&wake)),
+            dialogs: Dialogs::new(desktop),
+            closing: None,
+            overlay: Overlay::None,
+            // A window that cannot remember its end would begin it at every start.
+            tour: (file.is_some() && remembered.has_toured != Some(true)).then(Tour::default),
+            picked: None,
+            undoing: Undoing::default(),
+            memory: file.map(|file| Memory::new(file, Arc::clone(&wake))),
+            remembered,
+            wake,
+            ctx: ctx.clone(),
+        };
+        if let Some(scale) = window.remembered.scale.filter(|scale| SCALES.contains(scale)) {
+            window.set_scale(scale);
+        }
+        if let Some(colours) = window.remembered.colours {
+            window.shared.look.colours = colours;
+        }
+        if let Some(draft) = window.remembered.draft {
+            window.shared.draft = draft;
+        }
+        if let Some(settings) = window.remembered.recording {
+            window.shared.recording.settings = settings;
+        }
+        window.shared.source = window.remembered.source.unwrap_or_default();
+        if let Some(plan) = window.remembered.plan.clone() {
+            window.views.open_plan(&plan);
+            window.shared.recording.plan = Ok(Arc::new(plan));
+        }
+        if let Some(place) = window.place_of(window.remembered.view.as_deref()) {
+            window.show(place);
+        }
+        window.ask_for_what_is_missing();
+        window
+    }
+
+    /// Shows the runs in the folder `path`, and keeps finished trainings there from now on. Without it they are gone when
+    /// the window closes.
+    #[must_use]
+    pub fn keeping_runs(self, path: PathBuf) -> Self {
+        self.runs.open(path);
+        self
+    }
+
+    /// State that all views read.
+    pub fn shared(&self) -> &Shared {
+        &self.shared
+    }
+
+    /// The views, on show or not.
+    pub fn views(&self) -> &Views {
+        &self.views
+    }
+
+    /// The name of the view on show.
+    pub fn shown(&self) -> &'static str {
+        self.names[self.shown].1
+    }
+
+    /// Newest notice that is shown to the user.
+    pub fn notice(&self) -> Option<&Notice> {
+        self.notices.newest()
+    }
+
+    /// Lays out the window and does what the user meant.
+    pub fn show_ui(&mut self, ui: &mut Ui) {
+        // Another window may have been at work.
+        if ui.input(|input| input.events.contains(&egui::Event::WindowFocused(true))) {
+            self.runs.look();
+        }
+        let mut effects = Vec::new();
+        let actions = self.offer_actions(ui.ctx(), &mut effects);
+        self.take_dropped(ui.ctx(), &mut effects);
+        let is_asked = self.is_asked();
+        let (view, shared) = (&mut *self.views.all()[self.shown], &self.shared);
+        if !is_asked {
+            view.take_pointer(ui.ctx(), shared);
+        }
+        let palette = Theme::of(ui).palette;
+        let panel = |margin: Margin| PanelFrame::new().fill(palette.panel).inner_margin(margin);
+        let window_width = ui.available_width();
+        let columns = view.columns(window_width);
+        let [form_width, report_width] = widths_points(&columns, &self.remembered, window_width);
+        // The strip of the scroll bar is the margin on the right.
+        let side = Margin {
+            left: 12,
+            right: 2,
+            top: 4,
+            bottom: 4,
+        };
+        let top_bar = Panel::top("top bar")
+            .exact_size(space(11))
+            .frame(panel(Margin::symmetric(8, 0)))
+            .show(ui, |ui| {
+                top_bar_ui(ui, &self.names, self.shown, &actions, |ui| {
+                    export_menu_ui(ui, || view.exports(shared), &mut effects);
+                    view.tools_ui(ui, shared, &mut effects);
+                })
+            });
+        Panel::bottom("status line")
+            .exact_size(space(7))
+            .frame(panel(Margin::symmetric(12, 0)))
+            .show(ui, |ui| view.status_ui(ui, shared));
+        let form = Panel::left("configuration")
+            .exact_size(form_width)
+            .resizable(false)
+            .frame(panel(side))
+            .show(ui, |ui| view.form_ui(ui, shared, &mut effects));
+        let report = columns.has_report.then(|| {
+            Panel::right("report")
+                .exact_size(report_width)
+                .resizable(false)
+                .frame(panel(side))
+                .show(ui, |ui| view.report_ui(ui, shared, &mut effects))
+        });
+        if let Some(seconds) = self.notices.pass(ui.input(|input| input.time)) {
+            ui.ctx().request_repaint_after(Duration::from_secs_f64(seconds));
+        }
+        let background = PanelFrame::new().fill(palette.background).inner_margin(Margin::same(8));
+        let replies = egui::CentralPanel::default().frame(background).show(ui, |ui| {
+            let mut replies = Vec::new();
+            for (place, (matter, notice)) in self.notices.iter().enumerate() {
+                let can_restart = matter == Matter::Training && shared.phase == Phase::Died;
+                replies.extend(notice_ui(ui, notice, can_restart).map(|reply| (place, reply)));
+            }
+            view.body_ui(ui, shared, &mut effects);
+            replies
+        });
+        for part in [Some(&replies.response), report.as_ref().map(|report| &report.response)]
+            .into_iter()
+            .flatten()
+        {
+            copy_menu_ui(part, || view.exports(shared), &mut effects);
+        }
+        let remembered = &mut self.remembered;
+        let (form, report) = (form.response.rect, report.map(|report| report.response.rect));
+        edge_ui(ui, "Width of the left column", form, true, &mut remembered.form_points);
+        if let Some(report) = report {
+            edge_ui(
+                ui,
+                "Width of the right column",
+                report,
+                false,
+                &mut remembered.report_points,
+            );
+        }
+        if changes_something(ui.ctx()) || !effects.is_empty() {
+            self.ctx.request_repaint();
+        }
+        // Before anything changes the places.
+        for (place, reply) in replies.inner {
+            match reply {
+                notice::Reply::Dismiss => self.notices.dismiss(place),
+                notice::Reply::Restart => self.restart_worker(),
+            }
+        }
+        self.apply_all(effects);
+        match top_bar.inner {
+            Some(Reach::View(place)) => self.show(place),
+            Some(Reach::Action(name)) => {
+                self.picked = Some(name);
+                self.ctx.request_repaint();
+            }
+            None => {}
+        }
+        self.undoing.follow(ui.input(|input| input.time), &self.shared);
+        self.overlay_ui(ui, &actions);
+        self.dropping_ui(ui);
+        self.tour_ui(ui, &actions);
+        self.ask_for_path(ui);
+        self.remember();
+        // What was begun in this frame must be finished too.
+        self.take_close_request();
+        self.closing_ui(ui);
+    }
+
+    /// Does what views ask for.
+    pub(super) fn apply_all(&mut self, effects: Vec<Effect>) {
+        for effect in effects {
+            self.apply(effect);
+        }
+    }
+
+    /// Shows the tour where nothing lies over the window, and does what the user wants of it.
+    fn tour_ui(&mut self, ui: &Ui, actions: &[Action]) {
+        let Some(tour) = self.tour.filter(|_| !self.is_asked()) else {
+            return;
+        };
+        match tour_ui(ui, tour, actions) {
+            Some(tour::Reply::Show(tour)) => self.tour = Some(tour),
+            Some(tour::Reply::Do(name)) => self.picked = Some(name.to_owned()),
+            Some(tour::Reply::End) => self.end_tour(),
+            None => return,
+        }
+        self.ctx.request_repaint();
+    }
+
+    fn ask_for_path(&mut self, ui: &mut Ui) {
+        match self.saving.as_mut().and_then(|saving| save_form_ui(ui, saving)) {
+            Some(save_form::Reply::Path(path)) => self.take_typed(path),
+            Some(save_form::Reply::Replace(path)) => self.take_path(path),
+            Some(save_form::Reply::Cancel) => self.saving = None,
+            None => {}
+        }
+    }
+}

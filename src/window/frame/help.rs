@@ -1,0 +1,140 @@
+use eframe::egui::{Frame, Id, Margin, Modal, RichText, ScrollArea, TextEdit, Ui, WidgetInfo, accesskit::Role, vec2};
+
+use crate::window::{
+    glossary::{self, Term},
+    shared::Action,
+    theme::{Theme, semibold, space, type_size},
+    widgets::{
+        ColumnWidth, TableCell, TableColumn, TableRow, TableView, dim_ui, ghost_button, section_heading_ui, tabs_ui,
+    },
+};
+
+/// Keys that the part of the window in focus hears.
+const IN_FOCUS: [(&str, &str); 8] = [
+    ("Turn a surface", "Arrows"),
+    ("Zoom a surface", "+ and −"),
+    ("Usual camera", "Home"),
+    ("Set a field to its usual value", "Double-click"),
+    ("Copy a value, a table or a picture", "Right click"),
+    ("Next control", "Tab"),
+    ("Previous control", "Shift+Tab"),
+    ("Close what lies above the window", "Escape"),
+];
+
+/// Page of the help.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) enum Page {
+    /// The list of all keys.
+    #[default]
+    Keys,
+    /// The list of all terms.
+    Glossary,
+}
+
+/// The help, open.
+#[derive(Debug, Default)]
+pub(super) struct Help {
+    pub(super) page: Page,
+    /// Text that the terms on show contain.
+    pub(super) typed: String,
+}
+
+/// Answer of the user to the help.
+#[derive(Debug, PartialEq, Eq)]
+pub(super) enum Reply {
+    /// Close it.
+    Close,
+    /// Take the tour.
+    Tour,
+}
+
+/// Shows the keys or the glossary over the window.
+pub(super) fn help_ui(ui: &Ui, help: &mut Help, actions: &[Action]) -> Option<Reply> {
+    let mut reply = None;
+    let frame = Frame::popup(ui.style()).inner_margin(Margin::same(16));
+    let modal = Modal::new(Id::unique("help")).frame(frame).show(ui.ctx(), |ui| {
+        ui.set_width(space(120));
+        ui.horizontal(|ui| {
+            let pages = [(Page::Keys, "Keys"), (Page::Glossary, "Glossary")];
+            help.page = tabs_ui(ui, "Help", &pages, help.page).unwrap_or(help.page);
+            ui.with_layout(eframe::egui::Layout::right_to_left(eframe::egui::Align::Center), |ui| {
+                let tour = ui.add(ghost_button("Take the tour"));
+                if tour.on_hover_text("Five steps through the Train view.").clicked() {
+                    reply = Some(Reply::Tour);
+                }
+            });
+        });
+        ui.add_space(space(2));
+        match help.page {
+            Page::Keys => keys_ui(ui, actions),
+            Page::Glossary => glossary_ui(ui, &mut help.typed),
+        }
+    });
+    if modal.should_close() {
+        reply = Some(Reply::Close);
+    }
+    reply
+}
+
+fn keys_ui(ui: &mut Ui, actions: &[Action]) {
+    let scroll = ScrollArea::vertical()
+        .max_height(space(120))
+        .min_scrolled_height(space(120));
+    scroll.auto_shrink([false, true]).show(ui, |ui| {
+        let dim = Theme::of(ui).palette.dim;
+        let row = |name: &str, keys: &str| TableRow::new([TableCell::new(name), TableCell::new(keys).colour(dim)]);
+        let of_actions = actions.iter().filter_map(|action| {
+            let keys = ui.ctx().format_shortcut(&action.keys?);
+            Some(row(&action.name, &keys))
+        });
+        let in_focus = IN_FOCUS.map(|(name, keys)| row(name, keys));
+        let rows = of_actions.chain(in_focus).collect();
+        let columns = [
+            TableColumn::text("Action"),
+            TableColumn::text("Keys").width(ColumnWidth::Rest),
+        ];
+        TableView::new("keys", &columns).show_all(ui, rows);
+    });
+}
+
+/// The terms that contain what is typed, under the headings of their groups.
+fn glossary_ui(ui: &mut Ui, typed: &mut String) {
+    let field = TextEdit::singleline(typed)
+        .hint_text("Search terms")
+        .margin(vec2(space(2), space(2)))
+        .desired_width(f32::INFINITY);
+    let field = ui.add(field);
+    field.widget_info(|| WidgetInfo::labeled(Role::SearchInput, true, "Term"));
+    field.request_focus();
+    ui.add_space(space(1));
+    let scroll = ScrollArea::vertical()
+        .max_height(space(112))
+        .min_scrolled_height(space(112));
+    scroll.auto_shrink([false, true]).show(ui, |ui| {
+        let mut is_any = false;
+        for group in glossary::groups() {
+            let found: Vec<&Term> = group.terms.iter().filter(|term| term.matches(typed)).collect();
+            if found.is_empty() {
+                continue;
+            }
+            is_any = true;
+            section_heading_ui(ui, group.heading);
+            for term in found {
+                term_ui(ui, term);
+            }
+        }
+        if !is_any {
+            dim_ui(ui, "No term is called so.");
+        }
+    });
+}
+
+fn term_ui(ui: &mut Ui, term: &Term) {
+    let palette = Theme::of(ui).palette;
+    ui.label(RichText::new(term.name).font(semibold(type_size().body)));
+    ui.label(RichText::new(term.definition).size(type_size().note).color(palette.dim));
+    if !term.equation.is_empty() {
+        ui.label(RichText::new(term.equation).size(type_size().note));
+    }
+    ui.add_space(space(2));
+}

@@ -1,0 +1,174 @@
+use super::{
+    DecouplerWindow,
+    applying::{have_same_sets, have_same_test_set, is_of_test_set},
+    dialogs::Answer,
+};
+use crate::window::{
+    preview::PreviewEvent,
+    shared::{Matter, Notice, Phase, Preview, RunView},
+    training_worker::Event,
+};
+use decoupler_core::evaluation::RunSettings;
+
+impl DecouplerWindow {
+    /// Takes what the threads and the dialogs have to tell.
+    pub fn take_news(&mut self) {
+        self.take_copied();
+        while let Some(event) = self.worker.next_event() {
+            self.take_event(event);
+        }
+        while let Some(event) = self.previews.next_event() {
+            self.take_preview(event);
+        }
+        if let Some(notice) = self.shared.runs.take_news(&self.runs) {
+            self.notices.tell(Matter::RunList, notice);
+        }
+        while let Some(written) = self.files.next_written() {
+            self.tell_written(written);
+        }
+        while let Some((task, answer)) = self.dialogs.next_answer() {
+            match answer {
+                Answer::Chosen(path) => self.answer(task, path),
+                Answer::NoDialog => self.type_path(task),
+                Answer::Cancelled => {}
+            }
+        }
+        self.take_looks();
+        let mut effects = Vec::new();
+        let mut working = Vec::new();
+        for view in self.views.all() {
+            view.take_news(&self.shared, &mut effects);
+            working.extend(view.is_working().then(|| view.name()));
+        }
+        self.shared.working = working;
+        self.apply_all(effects);
+        self.take_close_request();
+    }
+
+    /// A training could not begin: the one before stays. What came of the settings meanwhile was not taken.
+    fn refuse(&mut self, matter: Matter, reason: String) {
+        self.shared.phase = self.shared.phase_at_rest();
+        self.notices.fail(matter, reason);
+        self.ask_for_what_is_missing();
+    }
+
+    fn tell_written(&mut self, written: Result<String, String>) {
+        let notice = match written {
+            Ok(told) => {
+                self.typed = None;
+                Notice::Done(told)
+            }
+            Err(reason) => {
+                // The user has to see this.
+                self.closing = None;
+                Notice::Failed(reason)
+            }
+        };
+        self.notices.tell(Matter::File, notice);
+    }
+
+    pub(super) fn take_preview(&mut self, event: PreviewEvent) {
+        let shared = &mut self.shared;
+        match event {
+            // Settings that have moved on meanwhile have asked for another test set, or need none.
+            PreviewEvent::Drawn(settings, _) if !have_same_test_set(&settings, &shared.draft) => {}
+            // A training has begun meanwhile, and shows the same.
+            PreviewEvent::Drawn(settings, _)
+                if shared.run.as_ref().is_some_and(|run| is_of_test_set(run, &settings)) => {}
+            PreviewEvent::Drawn(settings, Ok(test)) => {
+                shared.preview = Some(Preview {
+                    settings: *settings,
+                    test,
+                    baselines: None,
+                });
+                self.ask_for_what_is_missing();
+            }
+            PreviewEvent::Drawn(_, Err(error)) => self.notices.fail(Matter::Preview, error),
+            PreviewEvent::Compared(settings, baselines) => {
+                if let Some(preview) = &mut shared.preview
+                    && have_same_sets(&settings, &shared.draft)
+                {
+                    preview.baselines = baselines;
+                }
+            }
+            PreviewEvent::Failed(error) => self.notices.fail(Matter::Preview, error),
+        }
+    }
+
+    fn take_event(&mut self, event: Event) {
+        let shared = &mut self.shared;
+        if !matches!(event, Event::Reading(_)) {
+            shared.reading = None;
+        }
+        match event {
+            Event::Began(Ok(began)) => {
+                shared.preview = None;
+                shared.run = Some(RunView::new(*began));
+                shared.phase = Phase::Training;
+            }
+            Event::Began(Err(error)) => self.refuse(Matter::Settings, error.to_string()),
+            Event::Opened(Ok(began)) => {
+                let setup = began.setup.clone();
+                shared.preview = None;
+                shared.run = Some(RunView {
+                    is_saved: true,
+                    ..RunView::new(*began)
+                });
+                self.take_setup(&setup);
+                let shared = &mut self.shared;
+                self.typed = None;
+                // If it has ended, the news of it say so.
+                shared.phase = Phase::Paused;
+            }
+            Event::Opened(Err(reason)) => {
+                self.refuse(Matter::Training, reason);
+                if let Some(path) = self.opened.clone() {
+                    self.views.look_for_recordings(path);
+                }
+            }
+            Event::Continued(Ok(settings)) => {
+                let training = shared.settings().training;
+                if let Some(run) = &mut shared.run {
+                    run.asked = run.asked.with_settings(RunSettings {
+                        training,
+                        ..*run.asked.settings()
+                    });
+                    run.setup = run.setup.with_settings(*settings);
+                    run.is_saved = false;
+                    run.stop_reason = None;
+                }
+                shared.phase = Phase::Training;
+            }
+            Event::Continued(Err(error)) => {
+                shared.phase = match shared.phase_at_rest() {
+                    Phase::Idle => Phase::Paused,
+                    ended => ended,
+                };
+                self.notices.fail(Matter::Training, error);
+            }
+            Event::Reading(progress) => shared.reading = Some(progress),
+            Event::Progressed(progress) => {
+                if let Some(reason) = progress.stop_reason {
+                    shared.phase = Phase::Ended(reason);
+                }
+                if let Some(run) = &mut shared.run {
+                    run.progress(*progress);
+                }
+            }
+            Event::Finished(Ok(file)) => self.runs.keep(*file),
+            Event::Finished(Err(reason)) => self.notices.fail(Matter::Training, reason),
+            Event::Died(reason) => {
+                shared.phase = Phase::Died;
+                let reason = reason.map(|error| format!(" ({error})")).unwrap_or_default();
+                let text = format!("The training ended unexpectedly{reason}. The results shown remain available.");
+                self.notices.fail(Matter::Training, text);
+            }
+            // The worker keeps these to itself.
+            Event::Abandoned => {}
+        }
+        if self.worker.is_preparing() {
+            // This was news of the training before.
+            self.shared.phase = Phase::Preparing;
+        }
+    }
+}

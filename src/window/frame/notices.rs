@@ -1,0 +1,142 @@
+use crate::window::shared::{Matter, Notice};
+
+/// Most notices at a time: they take their room from the view below.
+const MOST: usize = 4;
+
+/// Time after which a notice that something worked closes by itself, from when it was first shown.
+const DONE_SECONDS: f64 = 10.0;
+
+/// Notices to the user, from oldest to newest.
+#[derive(Debug, Default)]
+pub(super) struct Notices(Vec<Told>);
+
+#[derive(Debug)]
+struct Told {
+    matter: Matter,
+    notice: Notice,
+    /// Time of the first frame that shows it, in seconds.
+    since: Option<f64>,
+}
+
+impl Told {
+    fn is_done(&self) -> bool {
+        matches!(self.notice, Notice::Done(_))
+    }
+}
+
+impl Notices {
+    /// Tells the user. What worked takes the place of all that was told about the same; a failure only that of the news
+    /// that it worked, or of the same words.
+    pub(super) fn tell(&mut self, matter: Matter, notice: Notice) {
+        let works = matches!(notice, Notice::Done(_));
+        let told = &mut self.0;
+        told.retain(|old| old.matter != matter || !(works || old.is_done() || old.notice == notice));
+        told.push(Told {
+            matter,
+            notice,
+            since: None,
+        });
+        if told.len() > MOST {
+            // The newest is never the one to go.
+            let oldest = told[..MOST].iter().position(Told::is_done).unwrap_or(0);
+            told.remove(oldest);
+        }
+    }
+
+    /// Tells that it failed.
+    pub(super) fn fail(&mut self, matter: Matter, reason: impl ToString) {
+        self.tell(matter, Notice::Failed(reason.to_string()));
+    }
+
+    /// Takes away all that was told about this.
+    pub(super) fn settle(&mut self, matter: Matter) {
+        self.0.retain(|told| told.matter != matter);
+    }
+
+    /// Takes away the one in this place.
+    pub(super) fn dismiss(&mut self, place: usize) {
+        self.0.remove(place);
+    }
+
+    /// The newest.
+    pub(super) fn newest(&self) -> Option<&Notice> {
+        self.0.last().map(|told| &told.notice)
+    }
+
+    /// All, with what they are about.
+    pub(super) fn iter(&self) -> impl Iterator<Item = (Matter, &Notice)> {
+        self.0.iter().map(|told| (told.matter, &told.notice))
+    }
+
+    /// Closes what has been shown long enough at the time `now`, that of a frame. Returns the seconds until the next
+    /// closes, if one does by itself.
+    pub(super) fn pass(&mut self, now: f64) -> Option<f64> {
+        let remaining = |told: &Told| DONE_SECONDS - (now - told.since.unwrap_or(now));
+        self.0.retain(|told| !told.is_done() || remaining(told) > 0.0);
+        for told in &mut self.0 {
+            told.since.get_or_insert(now);
+        }
+        let closing = self.0.iter().filter(|told| told.is_done());
+        closing.map(remaining).min_by(f64::total_cmp)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn texts(notices: &Notices) -> Vec<&str> {
+        let all = notices.0.iter();
+        all.map(|told| match &told.notice {
+            Notice::Done(text) | Notice::Failed(text) => text.as_str(),
+        })
+        .collect()
+    }
+
+    fn done(text: &str) -> Notice {
+        Notice::Done(text.to_owned())
+    }
+
+    #[test]
+    fn what_works_takes_its_failures_along_and_no_others() {
+        let mut notices = Notices::default();
+        notices.fail(Matter::File, "no folder");
+        notices.fail(Matter::File, "no folder");
+        notices.fail(Matter::File, "read-only");
+        notices.fail(Matter::RunList, "unreadable");
+        assert_eq!(texts(&notices), ["no folder", "read-only", "unreadable"]);
+        notices.tell(Matter::File, done("saved"));
+        assert_eq!(texts(&notices), ["unreadable", "saved"]);
+        notices.fail(Matter::File, "full");
+        assert_eq!(texts(&notices), ["unreadable", "full"]);
+        notices.settle(Matter::RunList);
+        assert_eq!(texts(&notices), ["full"]);
+    }
+
+    #[test]
+    fn what_works_closes_by_itself_and_what_failed_does_not() {
+        let mut notices = Notices::default();
+        notices.tell(Matter::File, done("saved"));
+        notices.fail(Matter::RunList, "unreadable");
+        // It is told long before it is shown.
+        assert_eq!(notices.pass(1000.0), Some(10.0));
+        assert_eq!(notices.pass(1004.0), Some(6.0));
+        assert_eq!(notices.pass(1010.0), None);
+        assert_eq!(texts(&notices), ["unreadable"]);
+        assert_eq!(notices.pass(1e9), None);
+        assert_eq!(texts(&notices), ["unreadable"]);
+    }
+
+    #[test]
+    fn the_list_stays_short_and_keeps_failures_longest() {
+        let mut notices = Notices::default();
+        notices.fail(Matter::RunList, "0");
+        notices.tell(Matter::Training, done("1"));
+        for number in 2..5 {
+            notices.fail(Matter::File, number);
+        }
+        assert_eq!(texts(&notices), ["0", "2", "3", "4"]);
+        notices.tell(Matter::Memory, done("5"));
+        assert_eq!(texts(&notices), ["2", "3", "4", "5"]);
+    }
+}

@@ -1,0 +1,200 @@
+use std::{
+    fs,
+    path::{Path, PathBuf},
+};
+
+use serde::{Deserialize, Deserializer, Serialize, de::DeserializeOwned};
+
+use crate::window::shared::SourceKind;
+use decoupler_core::evaluation::{RunSettings, SimulatedSettings, Workload};
+use decoupler_files::{
+    export::{WriteError, atomic_write},
+    figure::SequentialMap,
+    import::Plan,
+};
+
+/// The size of a window that remembers none, in points.
+const DEFAULT_SIZE_POINTS: [f32; 2] = [1440.0, 900.0];
+
+/// The least size of a window, in points.
+pub(super) const LEAST_SIZE_POINTS: [f32; 2] = [960.0, 640.0];
+
+/// State of a window that the next one finds again: each value only once the user has had it so.
+///
+/// In the file, a value that cannot be read or is out of its limits counts as missing.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub(super) struct Remembered {
+    /// The theme, if the user has chosen one.
+    #[serde(deserialize_with = "if_readable")]
+    pub(super) is_dark: Option<bool>,
+    /// True once the user has ended the tour.
+    #[serde(deserialize_with = "if_readable")]
+    pub(super) has_toured: Option<bool>,
+    /// Colours of values, if the user has chosen them.
+    #[serde(deserialize_with = "if_readable")]
+    pub(super) colours: Option<SequentialMap>,
+    /// The name of the view on show.
+    #[serde(deserialize_with = "if_readable")]
+    pub(super) view: Option<String>,
+    /// The settings of the next training.
+    #[serde(deserialize_with = "if_readable")]
+    pub(super) draft: Option<SimulatedSettings>,
+    /// Source of the next training.
+    #[serde(deserialize_with = "if_readable")]
+    pub(super) source: Option<SourceKind>,
+    /// Settings of the next training on a recording.
+    #[serde(deserialize_with = "if_readable")]
+    pub(super) recording: Option<RunSettings>,
+    /// Plan of the recording that is open, with absolute paths.
+    #[serde(deserialize_with = "if_readable")]
+    pub(super) plan: Option<Plan>,
+    /// Width and height of the window.
+    #[serde(deserialize_with = "if_readable")]
+    pub(super) size_points: Option<[f32; 2]>,
+    /// Size of text and controls as a share of the usual one, if the user has chosen one.
+    #[serde(deserialize_with = "if_readable")]
+    pub(super) scale: Option<f32>,
+    /// Width of the column on the left, if the user has drawn it wider or narrower.
+    #[serde(deserialize_with = "if_readable")]
+    pub(super) form_points: Option<f32>,
+    /// As for the column on the right.
+    #[serde(deserialize_with = "if_readable")]
+    pub(super) report_points: Option<f32>,
+}
+
+/// The file in which a window remembers how it was left, as it is at the start.
+#[derive(Clone, Debug)]
+pub struct WindowFile {
+    pub(super) path: PathBuf,
+    pub(super) remembered: Remembered,
+}
+
+impl WindowFile {
+    /// Reads the file at `path`; one that is missing or of another kind tells nothing.
+    pub fn read(path: PathBuf) -> Self {
+        let remembered = Remembered::read(&path);
+        Self { path, remembered }
+    }
+}
+
+impl Remembered {
+    fn read(path: &Path) -> Self {
+        let text = fs::read_to_string(path).unwrap_or_default();
+        let mut read: Self = serde_json::from_str(&text).unwrap_or_default();
+        read.draft = read.draft.filter(is_within_limits);
+        read
+    }
+
+    /// Writes the file at `path`, whose folder is made if it is missing.
+    pub(super) fn write(&self, path: &Path) -> Result<(), WriteError> {
+        if let Some(folder) = path.parent() {
+            fs::create_dir_all(folder).map_err(|source| WriteError::io(folder, source))?;
+        }
+        atomic_write(path, |file| {
+            serde_json::to_writer_pretty(file, self).map_err(Into::into)
+        })
+    }
+
+    /// Width and height with which the window opens; the window system keeps them to the screen.
+    pub(super) fn opening_size_points(&self) -> [f32; 2] {
+        let is_possible = |size: &[f32; 2]| {
+            let mut sides = size.iter().zip(LEAST_SIZE_POINTS);
+            sides.all(|(side, least)| side.is_finite() && *side >= least)
+        };
+        self.size_points.filter(is_possible).unwrap_or(DEFAULT_SIZE_POINTS)
+    }
+
+    /// Takes the size of a window.
+    pub(super) fn take_size_points(&mut self, size: [f32; 2]) {
+        self.size_points = Some(size.map(f32::round));
+    }
+}
+
+/// The value, or none if it is of another kind than this program writes.
+fn if_readable<'de, D: Deserializer<'de>, T: DeserializeOwned>(deserializer: D) -> Result<Option<T>, D::Error> {
+    let value = serde_json::Value::deserialize(deserializer)?;
+    Ok(serde_json::from_value(value).ok())
+}
+
+/// Returns `true` if the settings could be trained with on this machine.
+pub(super) fn is_within_limits(settings: &SimulatedSettings) -> bool {
+    settings.check_counts().is_ok()
+        && settings.training.check().is_ok()
+        && settings.source.sensor.check().is_ok()
+        && settings.source.scene.check().is_ok()
+        && Workload::of(settings).is_ok_and(|workload| workload.check_memory().is_ok())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Reads a file with this text in it.
+    fn read(text: &str) -> Remembered {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("window.json");
+        fs::write(&path, text).unwrap();
+        Remembered::read(&path)
+    }
+
+    #[test]
+    fn what_is_written_is_read_again_bit_by_bit() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("not yet there").join("window.json");
+        let mut draft = SimulatedSettings::default();
+        draft.source.scene.largest_compression = 0.1 + 0.2;
+        let mut written = Remembered {
+            is_dark: Some(false),
+            view: Some("Compare".to_owned()),
+            draft: Some(draft),
+            ..Remembered::default()
+        };
+        written.take_size_points([1203.4, 800.0]);
+        written.write(&path).unwrap();
+        assert_eq!(Remembered::read(&path), written);
+        assert_eq!(written.opening_size_points(), [1203.0, 800.0]);
+    }
+
+    #[test]
+    fn a_value_that_cannot_be_read_is_forgotten_and_the_others_are_not() {
+        for text in ["", "[]", "{", "{}", "\u{0}"] {
+            assert_eq!(read(text), Remembered::default(), "{text}");
+        }
+        let text = r#"{"is_dark": false, "view": 3, "draft": {"hidden": 5}, "size_points": "large", "later": 1}"#;
+        let expected = Remembered {
+            is_dark: Some(false),
+            ..Remembered::default()
+        };
+        assert_eq!(read(text), expected);
+    }
+
+    #[test]
+    fn settings_out_of_limits_are_forgotten() {
+        let change: [fn(&mut SimulatedSettings); 6] = [
+            |draft| draft.hidden = 0,
+            |draft| draft.source.samples = usize::MAX,
+            |draft| draft.source.test_samples = 0,
+            |draft| draft.source.scene.largest_compression = 2.0,
+            |draft| draft.training.stopping.goal_mse = f64::NAN,
+            |draft| draft.source.sensor.geometry.height_mm = -1.0,
+        ];
+        for (number, change) in change.into_iter().enumerate() {
+            let mut draft = SimulatedSettings::default();
+            change(&mut draft);
+            let text = serde_json::to_string(&Remembered {
+                draft: Some(draft),
+                ..Remembered::default()
+            });
+            assert_eq!(read(&text.unwrap()).draft, None, "change {number}");
+        }
+    }
+
+    #[test]
+    fn a_window_opens_neither_too_small_nor_without_a_size() {
+        for text in ["[0, 0]", "[-1440, 900]", "[1440]", "[1e99, 900]", "[959, 900]"] {
+            let read = read(&format!(r#"{{"size_points": {text}}}"#));
+            assert_eq!(read.opening_size_points(), DEFAULT_SIZE_POINTS, "{text}");
+        }
+    }
+}

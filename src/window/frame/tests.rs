@@ -1,0 +1,218 @@
+use std::{
+    ops::{Deref, DerefMut},
+    path::PathBuf,
+    sync::{
+        Arc,
+        mpsc::{Receiver, channel},
+    },
+    time::Duration,
+};
+
+use eframe::egui::Context;
+
+use super::{DecouplerWindow, Desktop};
+use crate::window::{
+    preview::PreviewEvent,
+    shared::{Contents, Effect, FileTask, FileWords, Matter, Notice, Phase},
+    test_view::TestView,
+    training_worker::Worker,
+};
+use decoupler_files::export::NetworkFile;
+
+/// A window, and the news of its threads.
+struct Opened {
+    window: DecouplerWindow,
+    woken: Receiver<()>,
+}
+
+impl Opened {
+    fn new() -> Self {
+        let (wake, woken) = channel();
+        let wake = Arc::new(move || {
+            // At the end of a test the threads outlive the receiver.
+            let _ = wake.send(());
+        });
+        let window = DecouplerWindow::woken_by(wake, &Context::default(), Desktop::None, None);
+        Self { window, woken }
+    }
+
+    /// A window with a small network, trained.
+    fn trained() -> Self {
+        let mut window = Self::new();
+        window.wait(|window| window.shared.test().is_some());
+        let mut small = window.shared.draft;
+        small.source.sensor.scale = "4x4_2x12".parse().unwrap();
+        (small.hidden, small.source.samples, small.training.stopping.epochs) = (3, 40, 5);
+        window.apply(Effect::Configure(Box::new(small)));
+        window.apply(Effect::Train);
+        window.wait(|window| matches!(window.shared.phase, Phase::Ended(_)));
+        window
+    }
+
+    /// Takes news until `holds`; each may take a minute.
+    #[track_caller]
+    fn wait(&mut self, holds: impl Fn(&DecouplerWindow) -> bool) {
+        loop {
+            self.window.take_news();
+            if holds(&self.window) {
+                return;
+            }
+            let news = self.woken.recv_timeout(Duration::from_secs(60));
+            assert!(news.is_ok(), "it never came: {:?}", self.window.shared);
+        }
+    }
+}
+
+impl Deref for Opened {
+    type Target = DecouplerWindow;
+
+    fn deref(&self) -> &DecouplerWindow {
+        &self.window
+    }
+}
+
+impl DerefMut for Opened {
+    fn deref_mut(&mut self) -> &mut DecouplerWindow {
+        &mut self.window
+    }
+}
+
+/// Saves the network on show.
+fn export(window: &mut DecouplerWindow, path: PathBuf) {
+    let task = save_task(window);
+    window.answer(task, path);
+}
+
+/// Returns the task of saving the network on show.
+fn save_task(window: &DecouplerWindow) -> FileTask {
+    let words = FileWords {
+        kind: "network",
+        description: "",
+        extensions: &["json"],
+    };
+    let run = window.shared.run.as_ref().unwrap().id;
+    FileTask::save_run(words, "network", run, |run| {
+        let file = run.network_file()?;
+        Ok(Contents::new(move |path| file.save(path)))
+    })
+}
+
+#[test]
+fn a_worker_that_died_takes_no_results_with_it_also_when_another_is_started() {
+    let mut window = Opened::trained();
+    let ended = window.shared.phase;
+    window.worker = Worker::dying(Arc::clone(&window.wake));
+    window.wait(|window| window.shared.phase == Phase::Died);
+    assert!(window.shared.result().is_some());
+    window.restart_worker();
+    assert_eq!((window.shared.phase, window.notice()), (ended, None));
+    assert!(window.shared.result().is_some());
+
+    export(&mut window, "network.json".into());
+    window.wait(|window| window.notice().is_some());
+    let lost = "the network was lost when the training thread ended: train again";
+    assert_eq!(window.notice(), Some(&Notice::Failed(lost.to_owned())));
+    assert_eq!(
+        window.shared.phase, ended,
+        "the new worker has nothing to tell of the old one"
+    );
+    window.apply(Effect::Settle(Matter::File));
+    window.apply(Effect::Continue);
+    window.wait(|window| window.notice().is_some());
+    assert_eq!(window.notice(), Some(&Notice::Failed(lost.to_owned())));
+    assert_eq!(window.shared.phase, ended);
+    window.apply(Effect::Train);
+    window.wait(|window| matches!(window.shared.phase, Phase::Ended(_)));
+}
+
+#[test]
+fn a_picture_that_died_with_the_worker_is_drawn_by_the_next() {
+    let mut window = Opened::new();
+    window.worker = Worker::dying(Arc::clone(&window.wake));
+    window.wait(|window| window.shared.phase == Phase::Died);
+    window.restart_worker();
+    window.wait(|window| {
+        window
+            .shared
+            .preview
+            .as_ref()
+            .is_some_and(|preview| preview.baselines.is_some())
+    });
+}
+
+#[test]
+fn a_test_set_drawn_late_does_not_hide_the_training_that_shows_it() {
+    let mut window = Opened::trained();
+    let settings = window.shared.draft;
+    let drawn = TestView::draw(&settings);
+    window.take_preview(PreviewEvent::Drawn(Box::new(settings), drawn));
+    assert!(window.shared.preview.is_none() && window.shared.result().is_some());
+}
+
+#[test]
+fn a_training_that_cannot_begin_leaves_the_one_before_to_be_exported() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("network.json");
+    let mut window = Opened::trained();
+    let (ended, shown) = (window.shared.phase, window.shared.draft);
+    let mut impossible = shown;
+    impossible.training.stopping.goal_mse = f64::NAN;
+    window.apply(Effect::Configure(Box::new(impossible)));
+    window.apply(Effect::Train);
+    window.wait(|window| window.notice().is_some());
+    assert!(matches!(window.notice(), Some(Notice::Failed(_))));
+    assert_eq!(window.shared.phase, ended, "the training on show has ended so");
+    assert!(window.shared.result().is_some());
+
+    window.apply(Effect::Settle(Matter::Settings));
+    export(&mut window, path.clone());
+    window.wait(|window| window.notice().is_some());
+    assert_eq!(
+        window.notice(),
+        Some(&Notice::Done(format!("Saved {}", path.display())))
+    );
+    let file = NetworkFile::load(&path).unwrap();
+    assert_eq!(file.settings.hidden, shown.hidden);
+}
+
+#[test]
+fn a_file_asked_for_before_another_training_began_is_refused_not_written_about_the_other() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("network.json");
+    let mut window = Opened::trained();
+    // The desktop's dialog is open.
+    let task = save_task(&window);
+    let mut other = window.shared.draft;
+    other.hidden = 4;
+    window.apply(Effect::Configure(Box::new(other)));
+    window.apply(Effect::Train);
+    window.wait(|window| {
+        matches!(window.shared.phase, Phase::Ended(_)) && window.shared.run.as_ref().unwrap().settings().hidden == 4
+    });
+    window.answer(task, path.clone());
+    window.wait(|window| window.notice().is_some());
+    let Some(Notice::Failed(reason)) = window.notice() else {
+        panic!("{:?}", window.notice())
+    };
+    assert!(reason.contains("another training has replaced"), "{reason}");
+    assert!(!path.exists());
+}
+
+#[test]
+fn a_training_that_cannot_begin_leaves_the_settings_own_test_set_on_show() {
+    let mut window = Opened::new();
+    window.wait(|window| window.shared.test().is_some());
+    let mut impossible = window.shared.draft;
+    impossible.source.sensor.scale = "4x4_2x12".parse().unwrap();
+    impossible.training.stopping.goal_mse = f64::NAN;
+    window.apply(Effect::Configure(Box::new(impossible)));
+    // Before the new test set is there.
+    window.apply(Effect::Train);
+    window.wait(|window| window.notice().is_some());
+    window.wait(|window| {
+        window
+            .shared
+            .test()
+            .is_some_and(|test| test.sensor == impossible.source.sensor)
+    });
+}

@@ -1,0 +1,282 @@
+//! A plot drawn with `egui_plot`, in the places of its axes: a logarithmic axis is linear in the logarithm.
+
+use std::ops::RangeInclusive;
+
+use eframe::egui::{
+    Color32, FontId, Id, Rangef, Response, RichText, Stroke, Ui, Vec2, WidgetInfo, accesskit::Role, pos2,
+};
+use egui_plot::{
+    AxisHints, Bar, BarChart, BoxElem, BoxPlot, BoxSpread, GridInput, GridMark, HLine, HoverPosition, Line,
+    LineStyle as DrawnStyle, MarkerShape, PlotPoint as Place, PlotPoints, PlotTransform, PlotUi, Points, Span, VLine,
+};
+use glam::DVec2;
+
+use super::{colours::hue_colour, line_labels::labels_ui, per_pixel::per_pixel, plot_figure::Pointer};
+use crate::window::{
+    theme::{Palette, Theme, type_size},
+    widgets::focus_ring_ui,
+};
+use decoupler_files::figure::{
+    Hue, LineAt, LineStyle, Marker, Plot, PlotAxis, PointLabel, Series, along, place_labels,
+};
+
+/// Opacity of the tint of a span of an axis.
+const SPAN_TINT: f32 = 0.12;
+/// Width of a tick's number with the room around it, in points.
+const NUMBER_WIDTH: f64 = 50.0;
+const NUMBER_HEIGHT: f64 = 16.0;
+/// The least distance of grid lines, in points; the plot tells its scale by it.
+const LEAST_GRID: f32 = 8.0;
+/// Points of a stepped line closer than this part of an axis are one: a sharp turn between them would be a spike.
+const COINCIDENT: f64 = 5e-4;
+
+/// Draws the plot over the space of `ui`; `id` tells it apart from others in the window.
+pub(super) fn plot_ui(ui: &mut Ui, id: Id, plot: &Plot, pointer: Pointer) -> (PlotTransform, Response) {
+    let palette = Theme::of(ui).palette;
+    let [x, y] = plot.ranges();
+    let space = ui.available_size();
+    let axis_hints = |hints: AxisHints<'static>, axis: &PlotAxis, apart: f32| {
+        let described = axis.clone();
+        hints
+            .label(RichText::new(&axis.name).size(type_size().small).color(palette.dim))
+            .formatter(move |mark, _| described.tick_text(mark.value, mark.step_size))
+            // Numbers are as bright as they come wherever they fit.
+            .label_spacing(Rangef::new(apart, apart + 1.0))
+            .tick_label_color(palette.dim)
+            .tick_label_font(FontId::proportional(type_size().small))
+    };
+    let may_move = pointer == Pointer::Moves;
+    let shown = egui_plot::Plot::new(id)
+        .id(id)
+        .width(space.x)
+        .height(space.y)
+        .custom_x_axes(vec![axis_hints(AxisHints::new_x(), &plot.x, 24.0)])
+        .custom_y_axes(vec![axis_hints(AxisHints::new_y(), &plot.y, 12.0)])
+        .x_grid_spacer(|input| marks(&plot.x, &input, NUMBER_WIDTH))
+        .y_grid_spacer(|input| marks(&plot.y, &input, NUMBER_HEIGHT))
+        .grid_spacing(Rangef::new(LEAST_GRID, 300.0))
+        .show_background(false)
+        .grid_color(palette.line)
+        .allow_scroll(false)
+        .allow_drag(may_move)
+        .allow_zoom(may_move)
+        .allow_boxed_zoom(may_move)
+        .show_crosshair(false)
+        .label_formatter(|position| words_under(plot, position).filter(|_| may_move))
+        .set_margin_fraction(Vec2::ZERO)
+        .include_x(*x.start())
+        .include_x(*x.end())
+        .include_y(*y.start())
+        .include_y(*y.end());
+    let shown = if plot.has_equal_scales {
+        shown.data_aspect(1.0)
+    } else {
+        shown
+    };
+    let shown = shown.show(ui, |plot_ui| {
+        lines_behind(plot_ui, plot, &palette);
+        let transform = *plot_ui.transform();
+        let pixels = f64::from(transform.frame().width() * plot_ui.ctx().pixels_per_point());
+        let column = transform.bounds().width() / pixels;
+        for series in &plot.series {
+            draw_series(plot_ui, plot, series, ([&x, &y], column), &palette);
+        }
+    });
+    shown.response.widget_info(|| {
+        let names: Vec<&str> = plot.series.iter().map(|series| &*series.name).collect();
+        let label = format!("{} against {}: {}", plot.y.name, plot.x.name, names.join(", "));
+        WidgetInfo::labeled(Role::Image, true, label)
+    });
+    ui.ctx()
+        .accesskit_node_builder(shown.response.id, |node| node.set_description(plot.summary()));
+    focus_ring_ui(ui, &shown.response);
+    labels_ui(ui, plot, &shown.transform, id);
+    point_labels_ui(ui, plot, &shown.transform);
+    (shown.transform, shown.response)
+}
+
+/// The ticks in view.
+fn marks(axis: &PlotAxis, input: &GridInput, number: f64) -> Vec<GridMark> {
+    // What a number takes on the axis.
+    let apart = input.base_step_size * number / f64::from(LEAST_GRID);
+    let ticks = axis.ticks(&(input.bounds.0..=input.bounds.1), apart);
+    let step_size = ticks.step;
+    let mark = |value| GridMark { value, step_size };
+    ticks.places.into_iter().map(mark).collect()
+}
+
+/// The words of the point under the pointer.
+fn words_under(plot: &Plot, position: &HoverPosition<'_>) -> Option<String> {
+    let HoverPosition::NearDataPoint {
+        plot_name, position, ..
+    } = position
+    else {
+        return None;
+    };
+    // Items are named by the number of their series.
+    let series = plot.series.get(plot_name.parse::<usize>().ok()?)?;
+    let distance = |[x, y]: [f64; 2]| (x - position.x).abs() + (y - position.y).abs();
+    let placed = plot.placed(series);
+    let (point, _) = placed.min_by(|a, b| distance(a.1).total_cmp(&distance(b.1)))?;
+    Some(plot.words(series, point))
+}
+
+fn stroke(hue: Hue, style: LineStyle, palette: &Palette) -> (Stroke, DrawnStyle) {
+    let colour = hue_colour(hue, palette);
+    match style {
+        LineStyle::Solid => (Stroke::new(1.8, colour), DrawnStyle::Solid),
+        LineStyle::Dashed => (Stroke::new(1.4, colour), DrawnStyle::dashed_dense()),
+        LineStyle::Dotted => (Stroke::new(1.0, colour.gamma_multiply(0.7)), DrawnStyle::dotted_dense()),
+        LineStyle::Fine => (Stroke::new(1.0, colour.gamma_multiply(0.55)), DrawnStyle::Solid),
+    }
+}
+
+/// Spans and reference lines.
+fn lines_behind(plot_ui: &mut PlotUi<'_>, plot: &Plot, palette: &Palette) {
+    for span in &plot.spans {
+        if let [Some(from), Some(to)] = [span.range.start(), span.range.end()].map(|end| plot.x.place(*end)) {
+            let fill = hue_colour(span.hue, palette).gamma_multiply(SPAN_TINT);
+            let drawn = Span::new(&*span.name, from..=to).fill(fill);
+            plot_ui.span(drawn.border_color(Color32::TRANSPARENT));
+        }
+    }
+    for (number, line) in plot.lines.iter().enumerate() {
+        let (stroke, style) = stroke(line.hue, line.style, palette);
+        let name = format!("{} {number}", line.name);
+        match line.at {
+            LineAt::X(value) => {
+                if let Some(place) = plot.x.place(value) {
+                    plot_ui.vline(VLine::new(name, place).stroke(stroke).style(style));
+                }
+            }
+            LineAt::Y(value) => {
+                if let Some(place) = plot.y.place(value) {
+                    plot_ui.hline(HLine::new(name, place).stroke(stroke).style(style));
+                }
+            }
+        }
+    }
+}
+
+fn draw_series(
+    plot_ui: &mut PlotUi<'_>,
+    plot: &Plot,
+    series: &Series,
+    (ranges, column): ([&RangeInclusive<f64>; 2], f64),
+    palette: &Palette,
+) {
+    // The words under the pointer are found by it.
+    let number = plot.series.iter().position(|other| std::ptr::eq(other, series));
+    let name = number.unwrap_or_default().to_string();
+    let colour = hue_colour(series.look.hue, palette);
+    let width = |range: &RangeInclusive<f64>| range.end() - range.start();
+    if let Some(bar_width) = series.bar_width {
+        let placed: Vec<_> = plot.placed(series).collect();
+        let bars = placed.iter().map(|(_, [x, y])| Bar::new(*x, *y).width(bar_width));
+        let words: Vec<(f64, String)> = placed
+            .iter()
+            .map(|(point, [x, _])| (*x, plot.words(series, point)))
+            .collect();
+        let chart = BarChart::new(&*name, bars.collect()).color(colour);
+        plot_ui.bar_chart(chart.element_formatter(Box::new(move |bar, _| {
+            let words = words.iter().find(|(x, _)| *x == bar.argument);
+            words.map(|(_, words)| words.clone()).unwrap_or_default()
+        })));
+    }
+    if let Some(style) = series.look.line {
+        let (stroke, style) = stroke(series.look.hue, style, palette);
+        let places = series.points.iter().map(|point| plot.place(point.x, point.y));
+        let places: Vec<Option<[f64; 2]>> = places.collect();
+        // A missing point leaves a gap.
+        for (part, stretch) in places
+            .split(Option::is_none)
+            .filter(|stretch| stretch.len() > 1)
+            .enumerate()
+        {
+            let mut stretch: Vec<[f64; 2]> = stretch.iter().copied().flatten().collect();
+            let is_stepped = stretch.windows(2).any(|ends| ends[0][0] == ends[1][0]);
+            if is_stepped {
+                let near = |a: f64, b: f64, range| (a - b).abs() < COINCIDENT * width(range);
+                stretch.dedup_by(|a, b| near(a[0], b[0], ranges[0]) && near(a[1], b[1], ranges[1]));
+            }
+            let is_ascending = stretch.windows(2).all(|ends| ends[0][0] <= ends[1][0]);
+            if is_ascending && !is_stepped {
+                stretch = per_pixel(stretch, column);
+            }
+            let line = Line::new(&*name, PlotPoints::from(stretch)).id((&name, part));
+            // A band would make slopes of steps.
+            plot_ui.line(line.stroke(stroke).style(style).allow_band(!is_stepped));
+        }
+    }
+    let bars = plot.placed(series).filter_map(|(point, [x, y])| {
+        let [low, high] = plot.bar_ends(point.bar?, ranges[1]);
+        let spread = BoxSpread::new(low, y, y, y, high);
+        let bar = BoxElem::new(x, spread)
+            .box_width(0.0)
+            .whisker_width(0.01 * width(ranges[0]));
+        Some(bar.fill(colour).stroke(Stroke::new(1.2, colour.gamma_multiply(0.7))))
+    });
+    let bars: Vec<BoxElem> = bars.collect();
+    if !bars.is_empty() {
+        plot_ui.box_plot(
+            BoxPlot::new(&*name, bars)
+                .id((&name, "bars"))
+                .color(colour)
+                .allow_hover(false),
+        );
+    }
+    let Some(marker) = series.look.marker else { return };
+    let (shape, is_filled, radius) = match marker {
+        Marker::Dot => (MarkerShape::Circle, true, 1.6),
+        Marker::Disc => (MarkerShape::Circle, true, 3.2),
+        Marker::Ring => (MarkerShape::Circle, false, 3.6),
+        Marker::Halo => (MarkerShape::Circle, false, 9.0),
+        Marker::Square => (MarkerShape::Square, false, 4.5),
+        Marker::Diamond => (MarkerShape::Diamond, true, 5.0),
+        Marker::HollowDiamond => (MarkerShape::Diamond, false, 5.0),
+    };
+    let places: Vec<[f64; 2]> = plot.placed(series).map(|(_, place)| place).collect();
+    let points = Points::new(&*name, places)
+        .id((&name, "points"))
+        .shape(shape)
+        .filled(is_filled);
+    plot_ui.points(points.radius(radius).color(colour));
+}
+
+/// The words beside points.
+fn point_labels_ui(ui: &Ui, plot: &Plot, transform: &PlotTransform) {
+    let palette = Theme::of(ui).palette;
+    let frame = *transform.frame();
+    let painter = ui.painter().with_clip_rect(frame);
+    // Most plots have none.
+    if !plot.has_point_labels() {
+        return;
+    }
+    let (mut labels, mut galleys, mut marks) = (Vec::new(), Vec::new(), Vec::new());
+    let position = |[x, y]: [f64; 2]| {
+        let at = transform.position_from_point(&Place::new(x, y));
+        DVec2::new(f64::from(at.x), f64::from(at.y))
+    };
+    for series in &plot.series {
+        if series.look.line.is_some() {
+            let line: Vec<DVec2> = plot.placed(series).map(|(_, place)| position(place)).collect();
+            marks.extend(along(&line));
+        }
+        for (point, place) in plot.placed(series).filter(|_| series.look.marker.is_some()) {
+            let at = position(place);
+            marks.push(at);
+            let Some(label) = &point.label else { continue };
+            let font = FontId::proportional(type_size().small);
+            let galley = painter.layout_no_wrap(label.clone(), font, palette.text);
+            let size = DVec2::new(f64::from(galley.size().x), f64::from(galley.size().y));
+            labels.push(PointLabel { at, size });
+            galleys.push(galley);
+        }
+    }
+    let [low, high] = [frame.min, frame.max].map(|corner| DVec2::new(f64::from(corner.x), f64::from(corner.y)));
+    for (corner, galley) in place_labels(&labels, &marks, (low, high)).into_iter().zip(galleys) {
+        if let Some(corner) = corner {
+            painter.galley(pos2(corner.x as f32, corner.y as f32), galley, palette.text);
+        }
+    }
+}

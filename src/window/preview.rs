@@ -1,0 +1,62 @@
+//! Preview of settings before a training: their test set and the baselines.
+
+use super::{
+    job::{Job, JobError},
+    test_view::{TestView, TestViewError},
+};
+use decoupler_core::{
+    evaluation::{Baselines, Run, SimulatedSettings},
+    training::{GradientDescentSettings, Method, TrainingSettings},
+};
+
+/// Message of the thread to the window.
+#[derive(Debug)]
+pub enum PreviewEvent {
+    /// The test set of these settings.
+    Drawn(Box<SimulatedSettings>, Result<TestView, TestViewError>),
+    /// Baselines of these settings; none where they take long or are impossible, which a training would explain.
+    Compared(Box<SimulatedSettings>, Option<Baselines>),
+    /// Neither.
+    Failed(JobError),
+}
+
+/// Draws the test set of these settings. Only the newest request counts.
+pub fn draw(job: &mut Job<PreviewEvent>, settings: SimulatedSettings) {
+    job.start(
+        move |_| PreviewEvent::Drawn(Box::new(settings), TestView::draw(&settings)),
+        |drawn| drawn.unwrap_or_else(PreviewEvent::Failed),
+    );
+}
+
+/// Measures what will stand beside the network of these settings. Only the newest request counts.
+pub fn compare(job: &mut Job<PreviewEvent>, settings: SimulatedSettings) {
+    job.start(
+        move |report| PreviewEvent::Compared(Box::new(settings), baselines(&settings, &|| report.is_cancelled())),
+        |compared| compared.unwrap_or_else(PreviewEvent::Failed),
+    );
+}
+
+/// Returns the baselines of the settings; none where measuring them would keep the next request waiting.
+fn baselines(settings: &SimulatedSettings, is_cancelled: &dyn Fn() -> bool) -> Option<Baselines> {
+    /// About a tenth of a second.
+    const MOST_TERMS: usize = 50_000_000;
+    let scale = settings.source.sensor.scale;
+    let samples = settings.source.samples + settings.source.validation_samples + settings.source.test_samples;
+    let resistances = scale.nodes_per_row() * scale.nodes_per_column() * scale.columns();
+    let linear_map = scale.columns() * (scale.columns() + scale.coordinates_per_row());
+    if samples.saturating_mul(resistances + linear_map) > MOST_TERMS {
+        return None;
+    }
+    // They depend on neither the network nor its method, so the cheapest ones do.
+    let training = TrainingSettings {
+        method: Method::GradientDescent(GradientDescentSettings::default()),
+        ..TrainingSettings::default()
+    };
+    let cheapest = SimulatedSettings {
+        hidden: 1,
+        starts: 1,
+        training,
+        ..*settings
+    };
+    Run::prepare_unless(cheapest, is_cancelled).ok()??.baselines().cloned()
+}

@@ -1,0 +1,107 @@
+use eframe::egui::Ui;
+
+use crate::window::{
+    glossary,
+    theme::Theme,
+    widgets::{TableColumn, TableRow, TableView},
+};
+use decoupler_core::{
+    decoupling::DecoderKind,
+    evaluation::{ErrorMeasure, ErrorRow, ErrorTable},
+};
+use decoupler_files::export::format_number;
+
+/// Name of the network's row.
+const NETWORK: &str = "network";
+
+/// Measures of error that the table shows: all but the worst node, which is shown below.
+fn is_in_table(measure: ErrorMeasure) -> bool {
+    measure != ErrorMeasure::WorstMm
+}
+
+fn column(measure: ErrorMeasure) -> TableColumn<'static> {
+    let term = match measure {
+        ErrorMeasure::ZPercent => Some(glossary::Z_PERCENT),
+        ErrorMeasure::XPercent => Some(glossary::X_PERCENT),
+        ErrorMeasure::YPercent => Some(glossary::Y_PERCENT),
+        ErrorMeasure::ZMm => Some(glossary::Z_MM),
+        ErrorMeasure::ZStrokePercent => Some(glossary::STROKE_PERCENT),
+        _ => None,
+    };
+    let heading = match measure {
+        ErrorMeasure::RangePercent => "% of range",
+        measure => measure.heading().0,
+    };
+    match term {
+        Some(term) => TableColumn::figure(term.name).meaning(term.hint),
+        None => TableColumn::figure(heading).meaning(measure.definition()),
+    }
+}
+
+/// Lays out an error table: rows of baselines, network, reference and published figures, for recordings target by target.
+pub fn error_table_ui(ui: &mut Ui, table: &ErrorTable) {
+    let palette = Theme::of(ui).palette;
+    let shown = Vec::from_iter((0..table.measures.len()).filter(|&place| is_in_table(table.measures[place])));
+    let measures = shown.iter().map(|&place| column(table.measures[place]));
+    let columns = Vec::from_iter(std::iter::once(TableColumn::text("")).chain(measures));
+    // The error by which the network is judged.
+    let judged = table
+        .measures
+        .iter()
+        .position(|measure| matches!(measure, ErrorMeasure::ZMm | ErrorMeasure::Rmse));
+    let mut rows = Vec::new();
+    for block in &table.blocks {
+        let judged = |row: &ErrorRow| judged.and_then(|place| row.errors.get(place).copied().flatten());
+        let of_network = block.rows.iter().find(|row| row.name == NETWORK).and_then(judged);
+        let row = |row: &ErrorRow| {
+            let name = match &block.target {
+                Some(target) => format!("{}, {}", target.title(), row.name),
+                None => row.name.to_owned(),
+            };
+            TableRow::figures(row.name, shown.iter().map(|&place| format_number(row.errors[place])))
+                .named(name)
+                .meaning(row_meaning(row.name))
+                .colour(match row.name {
+                    NETWORK => palette.accent,
+                    "published" | "reference" => palette.dim,
+                    _ => palette.text,
+                })
+                .strong(row.name == NETWORK)
+                .mark(if beats(row.name, judged(row), of_network) {
+                    BETTER
+                } else {
+                    ""
+                })
+        };
+        rows.extend(block.target.as_ref().map(|target| TableRow::section(target.title())));
+        rows.extend(block.rows.iter().map(row));
+    }
+    TableView::new("errors", &columns).show_all(ui, rows);
+}
+
+/// Definition of a row of the error table.
+fn row_meaning(name: &str) -> &'static str {
+    match name {
+        "training mean" => DecoderKind::Mean.meaning(),
+        "linear map" => glossary::LINEAR_MAP.hint,
+        "ridge" => DecoderKind::Ridge.meaning(),
+        NETWORK => {
+            "The network with the lowest validation error so far; with the lowest training error if nothing is held out"
+        }
+        "reference" => glossary::REFERENCE.hint,
+        "published" => glossary::PUBLISHED.hint,
+        _ => "",
+    }
+}
+
+/// Meaning of the mark at a baseline.
+const BETTER: &str = "Better than the network.";
+
+/// Returns true for a baseline with a smaller error than the network.
+fn beats(name: &str, error: Option<f64>, of_network: Option<f64>) -> bool {
+    let is_baseline = ["training mean", "linear map", "ridge"].contains(&name);
+    is_baseline
+        && error
+            .zip(of_network)
+            .is_some_and(|(baseline, network)| baseline < network)
+}

@@ -1,0 +1,247 @@
+use std::{borrow::Cow, fmt, path::Path};
+
+use super::{Contents, Effect, FileTask, FileWords};
+use decoupler_core::training::EpochRecord;
+use decoupler_files::{
+    export::{
+        Table, TableForm, atomic_write,
+        figures::{PictureError, PictureFormat},
+        write_loss_curves,
+    },
+    figure::Figure,
+};
+
+/// A thing that a view can hand out, in one form, or the reason why it cannot now.
+pub struct Export<'a> {
+    /// Part of the menu.
+    pub group: ExportGroup,
+    /// Name of the thing: "Error table".
+    pub name: String,
+    /// Its form: "CSV".
+    pub form: String,
+    /// Description of the form in a sentence or two.
+    pub description: &'static str,
+    /// Asks the window for it, or the reason for which it cannot be had now.
+    pub ask: Result<Ask<'a>, String>,
+}
+
+/// Makes the request to the window, which may copy what is to be exported.
+pub type Ask<'a> = Box<dyn FnOnce() -> Effect + 'a>;
+
+/// Parts of the Export menu.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum ExportGroup {
+    /// The network of a past epoch that is on show.
+    NetworkOnShow(usize),
+    /// The best network of a training, of this epoch.
+    BestNetwork(usize),
+    /// Networks for other programs.
+    Network,
+    /// The report of a run.
+    Report,
+    /// Pictures.
+    Figures,
+    /// Tables as files.
+    Tables,
+    /// Tables to the clipboard.
+    Copies,
+    /// Files from which this program goes on.
+    Training,
+}
+
+impl ExportGroup {
+    /// Heading of the part.
+    pub fn heading(self) -> Cow<'static, str> {
+        let heading = match self {
+            Self::NetworkOnShow(epoch) => return format!("Network on show, epoch {epoch}").into(),
+            Self::BestNetwork(epoch) => return format!("Best network, epoch {epoch}").into(),
+            Self::Network => "Network",
+            Self::Report => "Report",
+            Self::Figures => "Figures",
+            Self::Tables => "Tables",
+            Self::Copies => "Copy table as",
+            Self::Training => "Training",
+        };
+        heading.into()
+    }
+}
+
+/// Form of a picture on the clipboard.
+const COPY: &str = "Copy";
+
+impl Export<'_> {
+    /// Returns the name of the action: "Export chart, SVG", "Copy error table as LaTeX".
+    pub fn action(&self) -> String {
+        if self.is_copy() {
+            self.label()
+        } else {
+            format!("Export {}", self.label())
+        }
+    }
+
+    /// Returns true for what goes to the clipboard.
+    pub fn is_copy(&self) -> bool {
+        self.group == ExportGroup::Copies || self.form == COPY
+    }
+
+    /// Returns the whole name: "Error table, CSV", "Copy error table as LaTeX".
+    pub fn label(&self) -> String {
+        match self.group {
+            ExportGroup::Figures if self.form == COPY => format!("Copy {} as a picture", self.name.to_lowercase()),
+            ExportGroup::Copies => format!("Copy {} as {}", self.name.to_lowercase(), self.form),
+            _ => format!("{}, {}", self.name, self.form),
+        }
+    }
+}
+
+impl fmt::Debug for Export<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let reason = self.ask.as_ref().err();
+        f.debug_tuple("Export").field(&self.label()).field(&reason).finish()
+    }
+}
+
+/// The picture as SVG and as PNG, in files named after `stem`, and to the clipboard; `figure` gives it, or the reason why there is none.
+pub fn picture_exports<'a>(
+    name: &str,
+    stem: String,
+    figure: Result<impl Fn() -> Figure + Clone + 'a, String>,
+) -> impl Iterator<Item = Export<'a>> {
+    let words = |format| match format {
+        PictureFormat::Svg => FileWords {
+            kind: "picture as SVG",
+            description: "The picture as shown, on a light background at publication size: lines and text, sharp at \
+                          any size.",
+            extensions: &["svg"],
+        },
+        PictureFormat::Png => FileWords {
+            kind: "picture as PNG",
+            description: "The picture as shown, on a light background at publication size: pixels, 300 to the inch.",
+            extensions: &["png"],
+        },
+    };
+    let name = name.to_owned();
+    let copied = Export {
+        group: ExportGroup::Figures,
+        name: name.clone(),
+        form: COPY.to_owned(),
+        description: "Copies the picture as shown, on a light background: pixels, 300 to the inch.",
+        ask: figure.clone().map(|figure| -> Ask<'a> {
+            let notice = format!("Copied the {} as a picture", name.to_lowercase());
+            Box::new(move || Effect::CopyPicture {
+                figure: Box::new(figure()),
+                notice,
+            })
+        }),
+    };
+    let files = [PictureFormat::Svg, PictureFormat::Png].into_iter().map(move |format| {
+        let words: FileWords = words(format);
+        let stem = stem.clone();
+        Export {
+            group: ExportGroup::Figures,
+            name: name.clone(),
+            form: format.extension().to_uppercase(),
+            description: words.description,
+            ask: figure.clone().map(|figure| -> Ask<'a> {
+                Box::new(move || {
+                    let figure = figure();
+                    let write = move |path: &Path| -> Result<(), PictureError> {
+                        figure.draw().save(PictureFormat::of_path(path)?, path)
+                    };
+                    Effect::ChooseFile(FileTask::save(words, &stem, Contents::new(write)))
+                })
+            }),
+        }
+    });
+    files.chain([copied])
+}
+
+/// The table to the clipboard, in every form; `table` gives it, or the reason why there is none.
+pub fn copy_exports<'a>(
+    name: &str,
+    table: Result<impl Fn() -> Table + Clone + 'a, String>,
+) -> impl Iterator<Item = Export<'a>> {
+    let name = name.to_owned();
+    TableForm::ALL.into_iter().map(move |form| {
+        let copied = format!("Copied the {} as {form}", name.to_lowercase());
+        Export {
+            group: ExportGroup::Copies,
+            name: name.clone(),
+            form: form.to_string(),
+            description: match form {
+                TableForm::Markdown => "Copies the table as Markdown, numbers with three significant digits.",
+                TableForm::Latex => {
+                    "Copies the table as LaTeX for the packages booktabs and siunitx, numbers with three significant \
+                     digits, aligned at the decimal point."
+                }
+                TableForm::TabSeparated => {
+                    "Copies the table with tabs between its columns, numbers with every digit: for spreadsheets."
+                }
+                TableForm::Json => {
+                    "Copies the table as a JSON array with an object for each row, numbers with every digit."
+                }
+            },
+            ask: table.clone().map(|table| -> Ask<'a> {
+                Box::new(move || Effect::Copy {
+                    text: table().text(form),
+                    notice: copied,
+                })
+            }),
+        }
+    })
+}
+
+/// The errors on show as a CSV file named after `stem`; `table` gives them, or the reason why there are none.
+pub fn error_table_export<'a>(stem: String, table: Result<impl Fn() -> Table + 'a, String>) -> Export<'a> {
+    let words = FileWords {
+        kind: "error table",
+        description: "The table of errors with every digit, as CSV.",
+        extensions: &["csv"],
+    };
+    csv_export("Error table", words, stem, table)
+}
+
+/// The loss curves as a CSV file named after `stem`, or the reason why there are none.
+pub fn loss_export<'a>(stem: String, history: Result<&'a [EpochRecord], String>) -> Export<'a> {
+    let words = FileWords {
+        kind: "loss curves",
+        description: "Training, validation and test error of every epoch with every digit, as CSV.",
+        extensions: &["csv"],
+    };
+    Export {
+        group: ExportGroup::Tables,
+        name: "Loss curves".to_owned(),
+        form: "CSV".to_owned(),
+        description: words.description,
+        ask: history.map(|history| -> Ask<'a> {
+            Box::new(move || {
+                let history = history.to_vec();
+                let contents =
+                    Contents::new(move |path| atomic_write(path, |writer| write_loss_curves(&history, writer)));
+                Effect::ChooseFile(FileTask::save(words, &stem, contents))
+            })
+        }),
+    }
+}
+
+/// The table as a CSV file; `table` gives it, or the reason why there is none.
+pub fn csv_export<'a>(
+    name: &str,
+    words: FileWords,
+    stem: String,
+    table: Result<impl Fn() -> Table + 'a, String>,
+) -> Export<'a> {
+    Export {
+        group: ExportGroup::Tables,
+        name: name.to_owned(),
+        form: "CSV".to_owned(),
+        description: words.description,
+        ask: table.map(|table| -> Ask<'a> {
+            Box::new(move || {
+                let table = table();
+                let contents = Contents::new(move |path| atomic_write(path, |writer| table.write_csv(writer)));
+                Effect::ChooseFile(FileTask::save(words, &stem, contents))
+            })
+        }),
+    }
+}

@@ -1,0 +1,271 @@
+//! Networks and the reports of their runs as exports, of the training on show or of a kept run.
+
+use std::{path::Path, sync::Arc};
+
+use super::{Ask, Contents, Effect, Export, ExportGroup, FileTask, FileWords};
+use crate::window::training_worker::{RunId, TrainedRun};
+use decoupler_core::{
+    decoupling::DecoderKind,
+    evaluation::{DecoderReport, PastNetworks, Run},
+};
+use decoupler_files::{
+    export::{
+        NetworkFile,
+        bundle::{BundleDecoder, BundleError, BundleFormat, BundlePrecision, BundleReport, export_bundle},
+        format_number,
+        report::RunReport,
+    },
+    import::Setup,
+};
+
+const NETWORK: BundleDecoder = BundleDecoder::Kind(DecoderKind::Network);
+
+/// A trained network that can be exported.
+#[derive(Clone, Debug)]
+pub enum NetworkSource {
+    /// Of the training on show, which the worker has.
+    Training(RunId, Box<Setup>),
+    /// Of a past epoch of the training on show.
+    Past(RunId, Box<Setup>, usize, PastNetworks),
+    /// Of a kept run with this name.
+    Kept(String, Arc<NetworkFile>),
+}
+
+impl NetworkSource {
+    /// The file that `contents` makes of the network and its record.
+    pub(super) fn task(
+        &self,
+        words: FileWords,
+        what: &str,
+        contents: impl Fn(Arc<NetworkFile>, Option<&Run>) -> Contents + Send + Sync + 'static,
+    ) -> FileTask {
+        match self {
+            Self::Training(run, setup) => {
+                let take = move |trained: &TrainedRun| {
+                    let file = trained.network_file()?;
+                    Ok(contents(Arc::new(file), Some(&trained.run)))
+                };
+                FileTask::save_run(words, &file_stem(what, setup), *run, take)
+            }
+            Self::Past(run, setup, epoch, past) => {
+                let (epoch, past) = (*epoch, past.clone());
+                let take = move |trained: &TrainedRun| {
+                    let (run, recorded) = (&trained.run, trained.recorded.as_ref());
+                    let network = past.at(epoch, &run.network());
+                    let network =
+                        network.ok_or_else(|| format!("the network of epoch {epoch} is not kept any more"))?;
+                    let file = NetworkFile::from_past(run, recorded, &network).map_err(|error| error.to_string())?;
+                    Ok(contents(Arc::new(file), None))
+                };
+                let stem = format!("{}-epoch{epoch}", file_stem(what, setup));
+                FileTask::save_run(words, &stem, *run, take)
+            }
+            Self::Kept(_, file) => {
+                let stem = file_stem(what, &file.setup());
+                FileTask::save(words, &stem, contents(Arc::clone(file), None))
+            }
+        }
+    }
+}
+
+/// The network in every form and the report of its run; `source` gives it, or the reason why there is none. `prefix`
+/// stands before every name.
+pub fn network_exports<'a>(
+    prefix: &str,
+    source: &Result<NetworkSource, String>,
+    decoders: impl Fn() -> Vec<DecoderReport> + Clone + 'a,
+) -> Vec<Export<'a>> {
+    let ask = |task: Box<dyn FnOnce(NetworkSource) -> FileTask + 'a>| {
+        source
+            .clone()
+            .map(|source| -> Ask<'a> { Box::new(move || Effect::ChooseFile(task(source))) })
+    };
+    let mut exports: Vec<Export<'a>> = bundles()
+        .map(|(format, precision)| {
+            let task = move |source| bundle_task(&source, format, precision);
+            bundle_export(
+                prefix,
+                (format, precision),
+                bundle_words(format, NETWORK),
+                ask(Box::new(task)),
+            )
+        })
+        .collect();
+    exports.push(Export {
+        group: ExportGroup::Report,
+        name: format!("{prefix}Report"),
+        form: "HTML".to_owned(),
+        description: REPORT.description,
+        ask: ask(Box::new(move |source| report_task(&source, decoders()))),
+    });
+    exports
+}
+
+/// Every form of a network with its precisions.
+pub(super) fn bundles() -> impl Iterator<Item = (BundleFormat, BundlePrecision)> {
+    BundleFormat::ALL.into_iter().flat_map(|format| {
+        let precisions = format.precisions().iter();
+        precisions.map(move |&precision| (format, precision))
+    })
+}
+
+fn bundle_export<'a>(
+    prefix: &str,
+    (format, precision): (BundleFormat, BundlePrecision),
+    words: FileWords,
+    ask: Result<Ask<'a>, String>,
+) -> Export<'a> {
+    Export {
+        group: ExportGroup::Network,
+        name: format!("{prefix}{}", bundle_name(format)),
+        form: match format {
+            BundleFormat::Json => "JSON".to_owned(),
+            _ => precision.to_string(),
+        },
+        description: words.description,
+        ask,
+    }
+}
+
+/// The contents that `export` writes and verifies.
+fn bundle_contents(export: impl Fn(&Path) -> Result<BundleReport, BundleError> + Send + Sync + 'static) -> Contents {
+    Contents::telling(move |path| {
+        export(path)
+            .map(|report| said_of(&report))
+            .map_err(|error| error.to_string())
+    })
+}
+
+pub(super) fn bundle_name(format: BundleFormat) -> &'static str {
+    match format {
+        BundleFormat::Onnx => "ONNX",
+        BundleFormat::C99 => "C99",
+        BundleFormat::Matlab => "MATLAB/Octave",
+        BundleFormat::NumPy => "NumPy",
+        BundleFormat::Json => "Network file",
+    }
+}
+
+/// Words for a network or another decoder in a format.
+pub(super) fn bundle_words(format: BundleFormat, decoder: BundleDecoder) -> FileWords {
+    let is_network = decoder.is_network();
+    let (kind, description) = match (format, is_network) {
+        (BundleFormat::Onnx, true) => (
+            "network as ONNX",
+            "A folder with the network as an ONNX graph (opset 13) and golden vectors: readings in, targets out.",
+        ),
+        (BundleFormat::Onnx, false) => (
+            "decoder as ONNX",
+            "A folder with the decoder as an ONNX graph (opset 13) and golden vectors: readings in, targets out.",
+        ),
+        (BundleFormat::C99, true) => (
+            "network as C99",
+            "A folder with one header and one source in C99 and a self-test: readings in, targets out. fixed16 computes in whole \
+             numbers only, for microcontrollers.",
+        ),
+        (BundleFormat::C99, false) => (
+            "decoder as C99",
+            "A folder with one header and one source in C99 and a self-test: readings in, targets out.",
+        ),
+        (BundleFormat::Matlab, _) => (
+            if is_network {
+                "network for MATLAB and Octave"
+            } else {
+                "decoder for MATLAB and Octave"
+            },
+            "A folder with one function file for MATLAB and GNU Octave and golden vectors: readings in, targets out.",
+        ),
+        (BundleFormat::NumPy, _) => (
+            if is_network {
+                "network for NumPy"
+            } else {
+                "decoder for NumPy"
+            },
+            "A folder with the weights as .npz, a short decode.py and golden vectors: readings in, targets out.",
+        ),
+        (BundleFormat::Json, true) => (
+            "network",
+            "Layers, scaling, array, geometry, training record and errors, as JSON; the terminal commands decode and \
+             export read it.",
+        ),
+        (BundleFormat::Json, false) => ("decoder", "The numbers of the decoder as JSON, with what they mean."),
+    };
+    FileWords {
+        kind,
+        description,
+        extensions: if format == BundleFormat::Json { &["json"] } else { &[] },
+    }
+}
+
+fn bundle_task(source: &NetworkSource, format: BundleFormat, precision: BundlePrecision) -> FileTask {
+    let words = bundle_words(format, NETWORK);
+    if format == BundleFormat::Json {
+        return source.task(words, "network", |file, _| Contents::new(move |path| file.save(path)));
+    }
+    source.task(words, &format!("{format}-{precision}"), move |file, _| {
+        bundle_contents(move |path| export_bundle(&*file, format, precision, path))
+    })
+}
+
+/// Returns a sentence about a bundle that was written.
+pub(super) fn said_of(report: &BundleReport) -> String {
+    let deviation = match report.output_range_mm {
+        Some(range_mm) => format!("{} mm", format_number(report.deviation() * range_mm)),
+        None => format!("{:.1e} of the range of a target", report.deviation()),
+    };
+    let mut text = format!(
+        "{} written and read back: largest deviation {deviation}. Saved {}",
+        bundle_name(report.format),
+        report.path.display()
+    );
+    for remark in &report.remarks {
+        text += &format!(". Note: {remark}");
+    }
+    text
+}
+
+const REPORT: FileWords = FileWords {
+    kind: "report",
+    description: "Settings, errors, figures, remarks and the terminal command that repeats the run, in one file for any \
+                  browser.",
+    extensions: &["html"],
+};
+
+fn report_task(source: &NetworkSource, decoders: Vec<DecoderReport>) -> FileTask {
+    let name = match source {
+        NetworkSource::Training(..) => None,
+        NetworkSource::Past(_, _, epoch, _) => Some(format!("epoch {epoch}")),
+        NetworkSource::Kept(name, _) => Some(name.clone()),
+    };
+    source.task(REPORT, "report", move |file, run| {
+        let flaw = run.and_then(Run::flaw);
+        let test = run.map(|run| Arc::clone(run.test()));
+        let (name, decoders) = (name.clone(), decoders.clone());
+        Contents::new(move |path: &Path| {
+            let test = match &test {
+                Some(test) => Arc::clone(test),
+                None => file.test_set().map_err(|error| error.to_string())?,
+            };
+            let report = RunReport {
+                name: name.as_deref(),
+                file: &file,
+                flaw: flaw.as_ref(),
+                decoders: &decoders,
+                test: &test,
+            };
+            report.save(path).map_err(|error| error.to_string())
+        })
+    })
+}
+
+/// A name that tells the files of different runs apart: what the file holds, and of which run. Without extension.
+pub fn file_stem(what: &str, setup: &Setup) -> String {
+    let source = setup.source_name().replace('×', "x");
+    let settings = setup.settings();
+    let (hidden, method) = (settings.hidden, settings.training.method.short_name());
+    let starts = match settings.starts {
+        1 => String::new(),
+        starts => format!("-starts{starts}"),
+    };
+    format!("{what}-{source}-h{hidden}-{method}{starts}-seed{}", settings.seed)
+}

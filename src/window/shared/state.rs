@@ -1,0 +1,219 @@
+use super::{Look, RunList, RunResult, RunView, opening_settings};
+use std::sync::Arc;
+
+use serde::{Deserialize, Serialize};
+
+use crate::window::test_view::{HeightScale, RecordedTest, TestView};
+use decoupler_core::{
+    evaluation::{Baselines, Measured, RunSettings, SimulatedSettings},
+    scene::RowModel,
+    training::{StopReason, TrainingSettings},
+};
+use decoupler_files::{
+    figure::{
+        SequentialMap,
+        surface::{OrbitCamera, ViewMode},
+    },
+    import::{Plan, Progress, Setup},
+};
+
+/// State that all views read.
+#[derive(Debug)]
+pub struct Shared {
+    /// Source of the next training.
+    pub source: SourceKind,
+    /// Settings of the next training on a simulated array.
+    pub draft: SimulatedSettings,
+    /// Settings of the next training on a recording.
+    pub recording: RecordingDraft,
+    /// State of the worker.
+    pub phase: Phase,
+    /// Facts about the draft before it is trained.
+    pub preview: Option<Preview>,
+    /// Progress of reading a recording before a training.
+    pub reading: Option<Progress>,
+    /// The present or last training.
+    pub run: Option<RunView>,
+    /// The run list.
+    pub runs: RunList,
+    /// Camera and mode of surfaces.
+    pub look: Look,
+    /// The names of the views whose threads compute.
+    pub working: Vec<&'static str>,
+}
+
+/// Kinds of source.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum SourceKind {
+    /// Samples drawn from the model of an array.
+    #[default]
+    Array,
+    /// Samples read from files.
+    Recording,
+}
+
+/// Settings of a training on a recording, and the plan that reads it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RecordingDraft {
+    /// Settings; their source is measured.
+    pub settings: RunSettings,
+    /// Plan of the import with absolute paths, or what is missing and what to do.
+    pub plan: Result<Arc<Plan>, String>,
+}
+
+impl RecordingDraft {
+    /// Reason for which there is no plan before a file is opened.
+    pub const NOTHING_OPEN: &str = "Open a recording first: drop files on the window.";
+}
+
+impl Default for RecordingDraft {
+    fn default() -> Self {
+        Self {
+            settings: RunSettings::from(Measured { rows: RowModel::Shared }),
+            plan: Err(Self::NOTHING_OPEN.to_owned()),
+        }
+    }
+}
+
+/// State of the worker.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Phase {
+    /// Waiting for the user.
+    Idle,
+    /// Drawing samples and starting the network.
+    Preparing,
+    /// Stepping.
+    Training,
+    /// Held.
+    Paused,
+    /// Ended, and why.
+    Ended(StopReason),
+    /// The worker is gone.
+    Died,
+}
+
+impl Phase {
+    /// Returns true while a training is running or paused; its settings cannot change then.
+    pub fn is_busy(self) -> bool {
+        matches!(self, Self::Preparing | Self::Training | Self::Paused)
+    }
+}
+
+/// Facts about settings before a training.
+#[derive(Debug)]
+pub struct Preview {
+    /// The settings.
+    pub settings: SimulatedSettings,
+    /// Their test set.
+    pub test: TestView,
+    /// Baselines, once they are measured.
+    pub baselines: Option<Baselines>,
+}
+
+impl Shared {
+    /// As the window opens.
+    pub fn new(is_dark: bool) -> Self {
+        Self {
+            source: SourceKind::default(),
+            draft: opening_settings(),
+            recording: RecordingDraft::default(),
+            phase: Phase::Idle,
+            preview: None,
+            reading: None,
+            run: None,
+            runs: RunList::default(),
+            look: Look {
+                camera: OrbitCamera::default(),
+                mode: ViewMode::ThreeD,
+                is_dark,
+                colours: SequentialMap::default(),
+                heights: HeightScale::default(),
+                error_limit_mm: None,
+            },
+            working: Vec::new(),
+        }
+    }
+
+    /// Settings of the next training.
+    pub fn settings(&self) -> RunSettings {
+        match self.source {
+            SourceKind::Array => self.draft.into(),
+            SourceKind::Recording => self.recording.settings,
+        }
+    }
+
+    /// Sets the training settings of the next training.
+    pub fn set_training(&mut self, training: TrainingSettings) {
+        match self.source {
+            SourceKind::Array => self.draft.training = training,
+            SourceKind::Recording => self.recording.settings.training = training,
+        }
+    }
+
+    /// Setup of the next training.
+    ///
+    /// # Errors
+    /// What is missing, and what to do.
+    pub fn setup(&self) -> Result<Setup, String> {
+        match self.source {
+            SourceKind::Array => Ok(self.draft.into()),
+            SourceKind::Recording => {
+                let plan = self.recording.plan.clone()?;
+                Ok(Setup::recording(self.recording.settings, Plan::clone(&plan)))
+            }
+        }
+    }
+
+    /// Nodes of the test set on show: the training's, or the draft's if that has moved on; none of a recording.
+    pub fn test(&self) -> Option<&TestView> {
+        match &self.preview {
+            Some(preview) if self.source == SourceKind::Array => Some(&preview.test),
+            _ => self.shown_run().and_then(|run| run.test.array()),
+        }
+    }
+
+    /// Test samples on show of a recording.
+    pub fn recorded_test(&self) -> Option<&RecordedTest> {
+        self.shown_run().and_then(|run| run.test.recording())
+    }
+
+    /// The training on show: none if it is of the other source, or the draft has moved on to another test set.
+    pub fn shown_run(&self) -> Option<&RunView> {
+        let run = self.run.as_ref()?;
+        let is_recording = run.setup.plan().is_some();
+        let is_shown = match self.source {
+            SourceKind::Array => !is_recording && self.preview.is_none(),
+            SourceKind::Recording => is_recording,
+        };
+        is_shown.then_some(run)
+    }
+
+    /// Returns the phase of an idle worker: that of the ended training, or idle before the first.
+    pub fn phase_at_rest(&self) -> Phase {
+        let ended = self.run.as_ref().and_then(|run| run.stop_reason);
+        ended.map_or(Phase::Idle, Phase::Ended)
+    }
+
+    /// Returns true if the training on show can continue from its present weights with the draft: its sets and networks
+    /// must be the same. A paused training is resumed instead, unless the method or the stopping rules change.
+    pub fn can_continue(&self) -> bool {
+        let Some(run) = self.shown_run() else { return false };
+        let may_go_on = match self.phase {
+            Phase::Paused => self.settings().training != run.asked.settings().training,
+            Phase::Ended(reason) => reason != StopReason::Diverged,
+            _ => false,
+        };
+        let Ok(setup) = self.setup() else { return false };
+        let fixed = setup.with_settings(RunSettings {
+            training: run.asked.settings().training,
+            ..*setup.settings()
+        });
+        may_go_on && fixed == run.asked
+    }
+
+    /// The result on show.
+    pub fn result(&self) -> Option<&RunResult> {
+        self.shown_run().and_then(|run| run.result.as_ref())
+    }
+}

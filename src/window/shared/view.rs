@@ -1,0 +1,85 @@
+use std::{fmt::Debug, path::PathBuf};
+
+use eframe::egui::{Context, Ui};
+
+use super::{Effect, Export, FileInUse, Offers, Shared, Unfinished, training_status_ui};
+use crate::window::theme::space;
+
+/// One of the views. It owns what only it shows and the handles of its own threads; it reads what is shared, and asks the
+/// window for everything else.
+pub trait View: Debug {
+    /// Its name in the top bar.
+    fn name(&self) -> &'static str;
+
+    /// It comes on show.
+    fn enter(&mut self, _shared: &Shared) {}
+
+    /// Takes what its threads have to tell and follows what is shared, also while another view is on show.
+    fn take_news(&mut self, _shared: &Shared, _effects: &mut Vec<Effect>) {}
+
+    /// Returns true while its threads compute.
+    fn is_working(&self) -> bool {
+        false
+    }
+
+    /// Takes files dropped on the window; false if they are not for it.
+    fn take_files(&mut self, _paths: &[PathBuf], _shared: &Shared, _effects: &mut Vec<Effect>) -> bool {
+        false
+    }
+
+    /// Returns the work that closing the window would cut short, also while it is being prepared.
+    fn unfinished(&self, _shared: &Shared) -> Vec<Unfinished> {
+        Vec::new()
+    }
+
+    /// Returns the files that it needs, over which nothing is to be saved.
+    fn files_in_use(&self) -> Vec<FileInUse> {
+        Vec::new()
+    }
+
+    /// Offers what can be done in it, and does what the user wants of that.
+    fn offer_actions(&mut self, _offers: &mut Offers<'_>, _shared: &Shared, _effects: &mut Vec<Effect>) {}
+
+    /// Does what the pointer means before anything is drawn, so that all of the window shows it in the same frame.
+    fn take_pointer(&mut self, _ctx: &Context, _shared: &Shared) {}
+
+    /// Returns the columns of a window of this width in points.
+    fn columns(&self, _window_width: f32) -> Columns {
+        Columns {
+            form_width: space(68),
+            has_report: false,
+        }
+    }
+
+    /// Its tools at the right of the top bar, from right to left.
+    fn tools_ui(&mut self, _ui: &mut Ui, _shared: &Shared, _effects: &mut Vec<Effect>) {}
+
+    /// Returns everything that it can hand out, and what it cannot now with the reason. The order is that of the menu;
+    /// forms of one thing follow each other.
+    fn exports<'a>(&'a self, _shared: &'a Shared) -> Vec<Export<'a>> {
+        Vec::new()
+    }
+
+    /// Its column on the left.
+    fn form_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>);
+
+    /// Its column on the right, where [`Self::columns`] has one.
+    fn report_ui(&mut self, _ui: &mut Ui, _shared: &Shared, _effects: &mut Vec<Effect>) {}
+
+    /// Its middle.
+    fn body_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>);
+
+    /// Shows the status line at the bottom: that of the training, unless the view has one of its own.
+    fn status_ui(&self, ui: &mut Ui, shared: &Shared) {
+        training_status_ui(ui, shared);
+    }
+}
+
+/// The columns beside the middle of a view.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Columns {
+    /// Width of the one on the left, in points.
+    pub form_width: f32,
+    /// True if there is a column on the right.
+    pub has_report: bool,
+}

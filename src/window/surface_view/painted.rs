@@ -1,0 +1,189 @@
+//! A surface as it is painted, kept from frame to frame: a pointer that moves changes none of it.
+
+use std::sync::Arc;
+
+use eframe::egui::{Color32, FontId, Mesh, Painter, Pos2, Rect, Response, Shape, Stroke, Ui};
+use glam::Vec2;
+
+use super::ribbon;
+use crate::window::theme::{Palette, Theme, rgb, type_size};
+use decoupler_files::figure::surface::{
+    self, Bounds, Card, Disc, Dots, Ink, Line, OrbitCamera, Section, Sight, Surface, Text, ViewMode,
+};
+
+/// A laid-out surface and what it was made of.
+pub(super) struct Painted {
+    surface: Surface,
+    camera: OrbitCamera,
+    rect: Rect,
+    pixels_per_point: f32,
+    is_dark: bool,
+    lines: Vec<Line>,
+    texts: Vec<Text>,
+    mesh: Arc<Mesh>,
+    pub(super) dots: Dots,
+    pub(super) sight: Sight,
+    pub(super) note: Option<String>,
+}
+
+impl Painted {
+    /// Returns what the last frame painted if nothing has changed, or paints it anew.
+    pub(super) fn of(surface: &Surface, camera: OrbitCamera, theme: &Theme, ui: &Ui, response: &Response) -> Arc<Self> {
+        let (id, rect) = (response.id, response.rect);
+        let kept: Option<Arc<Self>> = ui.data(|data| data.get_temp(id));
+        let camera = match surface.mode {
+            ViewMode::ThreeD => camera,
+            ViewMode::Top => OrbitCamera::default(),
+        };
+        let place = (camera, rect, ui.pixels_per_point(), theme.is_dark);
+        let is_same = |kept: &Arc<Self>| {
+            (kept.camera, kept.rect, kept.pixels_per_point, kept.is_dark) == place && kept.surface.looks_like(surface)
+        };
+        kept.filter(is_same).unwrap_or_else(|| {
+            let painted = Arc::new(Self::new(surface, theme, ui, rect, camera));
+            ui.data_mut(|data| data.insert_temp(id, Arc::clone(&painted)));
+            painted
+        })
+    }
+
+    fn new(surface: &Surface, theme: &Theme, ui: &Ui, rect: Rect, camera: OrbitCamera) -> Self {
+        let drawing = surface.lay_out(
+            camera,
+            &Card {
+                bounds: bounds(rect),
+                measure: &|text| measure(ui.painter(), text),
+                colours: theme.colours(&surface.quantity, surface.colours),
+            },
+        );
+        Self {
+            surface: surface.clone(),
+            camera,
+            rect,
+            pixels_per_point: ui.pixels_per_point(),
+            is_dark: theme.is_dark,
+            lines: drawing.lines,
+            texts: drawing.texts,
+            mesh: Arc::new(mesh(&drawing.mesh)),
+            dots: drawing.dots,
+            sight: drawing.sight,
+            note: drawing.note,
+        }
+    }
+
+    /// The frame with its labels, the surface, the line of its section, and the dots with one of them marked and some lit.
+    pub(super) fn paint(
+        &self,
+        painter: &Painter,
+        palette: &Palette,
+        section: Option<&Section>,
+        (marked, lit): (Option<usize>, &[usize]),
+    ) {
+        paint_frame(painter, palette, &self.lines, &self.texts);
+        painter.add(Shape::Mesh(Arc::clone(&self.mesh)));
+        for piece in section
+            .map(|section| section.pieces(&self.surface, &self.sight))
+            .unwrap_or_default()
+        {
+            let points: Vec<Pos2> = piece.iter().map(|at| to_egui(at.as_vec2())).collect();
+            for (width, colour) in [(3.5, palette.panel.gamma_multiply(0.7)), (1.8, palette.warning)] {
+                painter.add(Shape::line(points.clone(), Stroke::new(width, colour)));
+            }
+        }
+        for Disc {
+            at,
+            radius,
+            ring,
+            ink,
+            opacity,
+        } in self.dots.discs(marked, lit)
+        {
+            let (at, colour) = (to_egui(at), colour(ink, palette).gamma_multiply(opacity));
+            match ring {
+                Some(width) => painter.circle_stroke(at, radius, Stroke::new(width, colour)),
+                None => painter.circle_filled(at, radius, colour),
+            };
+        }
+    }
+}
+
+/// Lines, and texts on whole pixels, which keep small text crisp.
+pub(super) fn paint_frame(painter: &Painter, palette: &Palette, lines: &[Line], texts: &[Text]) {
+    for line in lines {
+        let ends = [line.from, line.to].map(to_egui);
+        painter.line_segment(ends, Stroke::new(1.0, colour(line.ink, palette)));
+    }
+    let pixel = painter.pixels_per_point();
+    for Text { bounds, text } in texts {
+        let corner = to_egui((bounds.min * pixel).round() / pixel);
+        let galley = painter.layout_no_wrap(text.clone(), label_font(), palette.dim);
+        painter.galley(corner, galley, palette.dim);
+    }
+}
+
+/// Size of a label.
+pub(super) fn measure(painter: &Painter, text: &str) -> Vec2 {
+    let galley = painter.layout_no_wrap(text.to_owned(), label_font(), Color32::WHITE);
+    Vec2::new(galley.size().x, galley.size().y)
+}
+
+fn label_font() -> FontId {
+    FontId::proportional(type_size().small)
+}
+
+fn mesh(drawn: &surface::Mesh) -> Mesh {
+    let [cells, lines] = drawn.counts();
+    let mut mesh = Mesh::default();
+    mesh.reserve_vertices(drawn.vertices.len() + ribbon::VERTICES * lines);
+    mesh.reserve_triangles(2 * cells + ribbon::TRIANGLES * lines);
+    for vertex in &drawn.vertices {
+        let colour = rgb(vertex.colour);
+        let colour = if vertex.opacity < 1.0 {
+            colour.gamma_multiply(vertex.opacity)
+        } else {
+            colour
+        };
+        mesh.colored_vertex(to_egui(vertex.at), colour);
+    }
+    for (cells, lines) in drawn.strips() {
+        for &cell in cells {
+            let [a, b, c, d] = drawn.corners(cell).map(|corner| corner as u32);
+            mesh.add_triangle(a, b, c);
+            mesh.add_triangle(a, c, d);
+        }
+        for line in lines {
+            let colour = if line.is_black { Color32::BLACK } else { Color32::WHITE };
+            let colour = colour.gamma_multiply(line.opacity);
+            ribbon::line(&mut mesh, to_egui(line.from), to_egui(line.to), colour);
+        }
+    }
+    mesh
+}
+
+fn colour(ink: Ink, palette: &Palette) -> Color32 {
+    match ink {
+        Ink::Grid => palette.line,
+        Ink::Edge => palette.line.lerp_to_gamma(palette.dim, 0.45),
+        Ink::Label => palette.dim,
+        Ink::Text => palette.text,
+        Ink::Ground => palette.panel,
+        Ink::Node => Color32::WHITE,
+        Ink::Rim => Color32::BLACK,
+        Ink::Warning => palette.warning,
+        Ink::Accent => palette.accent,
+    }
+}
+
+pub(super) fn bounds(rect: Rect) -> Bounds {
+    Bounds {
+        min: to_glam(rect.min),
+        max: to_glam(rect.max),
+    }
+}
+
+pub(super) fn to_egui(point: Vec2) -> Pos2 {
+    Pos2::new(point.x, point.y)
+}
+
+pub(super) fn to_glam(point: Pos2) -> Vec2 {
+    Vec2::new(point.x, point.y)
+}

@@ -1,0 +1,212 @@
+//! The widget.
+
+use eframe::egui::{
+    self, EventFilter, Key, Label, Modifiers, PointerButton, Pos2, Rect, RectAlign, Response, RichText, Sense, Stroke,
+    StrokeKind, Tooltip, Ui, Vec2, WidgetInfo,
+};
+
+use super::painted::{Painted, to_egui, to_glam};
+use crate::window::theme::{Theme, type_size};
+use decoupler_files::{
+    export::format_number,
+    figure::{
+        surface::{OrbitCamera, Section, Sight, Surface, ViewMode},
+        ticks::tick_text,
+    },
+};
+
+/// A surface plot that fills the space it is given.
+#[derive(Clone, Debug)]
+pub struct SurfaceView<'a> {
+    /// Name for assistive technology and tests, and the id among its siblings: "Actual surface".
+    pub label: &'a str,
+    /// Surface that is drawn.
+    pub surface: &'a Surface,
+    /// A node to mark, for instance the one hovered in a neighbouring view.
+    pub marked_node: Option<usize>,
+    /// Nodes that are lit, for instance those of a chosen bar.
+    pub lit_nodes: &'a [usize],
+    /// Line along which a figure beside it cuts the surface.
+    pub section: Option<&'a Section>,
+    /// Dark or light.
+    pub theme: &'a Theme,
+}
+
+/// Response of a [`SurfaceView`] to the pointer.
+#[derive(Clone, Debug)]
+pub struct SurfaceViewResponse {
+    /// The camera, turned by drags, scrolling and keys.
+    pub camera: OrbitCamera,
+    /// The node under the pointer.
+    pub hovered_node: Option<usize>,
+    /// Position of that node on the screen.
+    pub hovered_at: Option<Pos2>,
+    /// The way back from points on the screen; `None` where there is no room for a picture.
+    pub sight: Option<Sight>,
+    /// Of the whole card.
+    pub response: Response,
+}
+
+impl SurfaceViewResponse {
+    /// Shows a tooltip above the hovered node, if there is one: `content` gets the node's index. Above, because what
+    /// the surface rises to is the node itself; beside it where the window ends.
+    pub fn node_tooltip_ui(&self, content: impl FnOnce(&mut Ui, usize)) {
+        if let (Some(node), Some(at)) = (self.hovered_node, self.hovered_at) {
+            let anchor = Rect::from_center_size(at, Vec2::splat(20.0));
+            let (ctx, layer) = (self.response.ctx.clone(), self.response.layer_id);
+            let mut tooltip = Tooltip::always_open(ctx, layer, self.response.id.with("node"), anchor).gap(12.0);
+            let beside = &[RectAlign::RIGHT, RectAlign::LEFT, RectAlign::BOTTOM];
+            tooltip.popup = tooltip.popup.align(RectAlign::TOP).align_alternatives(beside);
+            tooltip.show(|ui| content(ui, node));
+        }
+    }
+}
+
+impl SurfaceView<'_> {
+    /// Draws the surface in the space that is left and lets the user turn it.
+    pub fn show(self, ui: &mut Ui, camera: OrbitCamera) -> SurfaceViewResponse {
+        self.show_with(ui, camera, Hand::Turns)
+    }
+
+    /// As [`Self::show`], but the primary button, scrolling and the keys are left to the caller: drags with shift or another
+    /// button turn.
+    pub fn show_touched(self, ui: &mut Ui, camera: OrbitCamera) -> SurfaceViewResponse {
+        self.show_with(ui, camera, Hand::Touches)
+    }
+
+    fn show_with(self, ui: &mut Ui, camera: OrbitCamera, hand: Hand) -> SurfaceViewResponse {
+        let (rect, response) = ui.allocate_exact_size(ui.available_size(), Sense::click_and_drag());
+        let camera = match self.surface.mode {
+            ViewMode::ThreeD => operate(ui, &response, camera, hand),
+            ViewMode::Top => camera,
+        };
+        self.describe(ui, &response);
+        let mut shown = SurfaceViewResponse {
+            camera,
+            hovered_node: None,
+            hovered_at: None,
+            sight: None,
+            response,
+        };
+        if ui.is_rect_visible(rect) && rect.width() > 60.0 && rect.height() > 60.0 {
+            self.paint(ui, rect, &mut shown);
+        }
+        if shown.response.has_focus() {
+            let stroke = Stroke::new(1.0, self.theme.palette.accent.gamma_multiply(0.6));
+            ui.painter().rect_stroke(
+                rect,
+                f32::from(crate::window::theme::radius()),
+                stroke,
+                StrokeKind::Inside,
+            );
+        }
+        shown
+    }
+
+    fn paint(&self, ui: &mut Ui, rect: Rect, shown: &mut SurfaceViewResponse) {
+        let painter = ui.painter_at(rect);
+        let painted = Painted::of(self.surface, shown.camera, self.theme, ui, &shown.response);
+        shown.sight = Some(painted.sight);
+        let is_idle = !shown.response.is_pointer_button_down_on();
+        let pointer = shown.response.hover_pos().filter(|_| is_idle);
+        shown.hovered_node = pointer.and_then(|pointer| painted.dots.nearest(to_glam(pointer)));
+        shown.hovered_at = shown
+            .hovered_node
+            .and_then(|node| painted.dots.position(node))
+            .map(to_egui);
+        let nodes = (shown.hovered_node.or(self.marked_node), self.lit_nodes);
+        painted.paint(&painter, &self.theme.palette, self.section, nodes);
+        if let Some(note) = &painted.note {
+            // Below the axes, partly in the margin of the card, so that the picture keeps its size.
+            let size = type_size().small;
+            let line = Rect::from_x_y_ranges(rect.x_range(), rect.bottom() - 5.0..=rect.bottom() + size);
+            let text = RichText::new(note.as_str())
+                .size(size)
+                .color(self.theme.palette.warning);
+            ui.put(line, Label::new(text).truncate());
+        }
+    }
+
+    /// Tells assistive technology what is seen: "z 4.0 to 5.0 mm".
+    fn describe(&self, ui: &Ui, response: &Response) {
+        response.widget_info(|| WidgetInfo::labeled(egui::accesskit::Role::Image, true, self.label));
+        ui.ctx().accesskit_node_builder(response.id, |node| {
+            node.set_description(self.surface.summary());
+            let values = self.surface.nodes.iter().map(|node| node.z);
+            let finite = values.filter(|value| value.is_finite());
+            let (low, high) = finite.fold((f64::MAX, f64::MIN), |(low, high), z| (low.min(z), high.max(z)));
+            let millimetres = |value: f64| tick_text(value, 0.01);
+            node.set_value(if low <= high {
+                let quantity = &self.surface.quantity;
+                quantity.range_text((low, high), millimetres, format_number)
+            } else {
+                "no values".to_owned()
+            });
+        });
+    }
+}
+
+/// Work of the primary button on a surface.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Hand {
+    /// It turns the surface.
+    Turns,
+    /// It does what the caller makes of it.
+    Touches,
+}
+
+/// Drags turn, drags with shift or another button shift, scrolling zooms, a double click goes back to the start.
+/// With the focus: arrow keys, plus, minus, Home.
+fn operate(ui: &Ui, response: &Response, camera: OrbitCamera, hand: Hand) -> OrbitCamera {
+    let mut camera = camera.clamped();
+    if response.clicked() || response.drag_started() {
+        response.request_focus();
+    }
+    let drag = response.drag_delta();
+    if response.dragged() && drag != Vec2::ZERO {
+        let is_shift = ui.input(|input| input.modifiers.shift);
+        let is_primary = response.dragged_by(PointerButton::Primary);
+        camera = match hand {
+            Hand::Touches if is_primary && !is_shift => camera,
+            Hand::Turns if is_shift || !is_primary => {
+                camera.panned(drag.x / response.rect.width(), drag.y / response.rect.height())
+            }
+            _ => camera.dragged(drag.x, drag.y),
+        };
+    }
+    if response.contains_pointer() {
+        let (scroll, pinch) = ui.input_mut(|input| {
+            // Taken, so that no scroll area around the view scrolls as well.
+            let scroll = std::mem::take(&mut input.smooth_scroll_delta);
+            (scroll.y, input.zoom_delta())
+        });
+        if scroll != 0.0 || pinch != 1.0 {
+            camera = camera.scrolled(scroll).zoomed(pinch);
+        }
+    }
+    if response.has_focus() {
+        let arrows = EventFilter {
+            horizontal_arrows: true,
+            vertical_arrows: true,
+            ..EventFilter::default()
+        };
+        ui.memory_mut(|memory| memory.set_focus_lock_filter(response.id, arrows));
+        ui.input_mut(|input| {
+            let mut presses = |key| input.count_and_consume_key(Modifiers::NONE, key) as f32;
+            let right = presses(Key::ArrowRight) - presses(Key::ArrowLeft);
+            let down = presses(Key::ArrowDown) - presses(Key::ArrowUp);
+            let nearer = presses(Key::Plus) + presses(Key::Equals) - presses(Key::Minus);
+            if right != 0.0 || down != 0.0 || nearer != 0.0 {
+                camera = camera.stepped(right, down).zoomed_by_keys(nearer);
+            }
+            if presses(Key::Home) > 0.0 {
+                camera = OrbitCamera::default();
+            }
+        });
+    }
+    if response.double_clicked() && hand == Hand::Turns {
+        OrbitCamera::default()
+    } else {
+        camera
+    }
+}

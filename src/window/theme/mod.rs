@@ -1,0 +1,76 @@
+//! The look of the window: tokens, colour maps, fonts, egui's visuals, and the few components egui lacks.
+//!
+//! Panels take colours, sizes and distances from here and write none of their own.
+
+#[cfg(test)]
+mod contrast;
+mod fonts;
+mod style;
+mod tokens;
+
+pub use fonts::{font_definitions, semibold};
+pub use style::{apply, install};
+pub use tokens::{Palette, SPACE, TypeSizes, radius, space, type_size};
+
+use std::sync::OnceLock;
+
+use eframe::egui::Color32;
+
+use decoupler_files::figure::{ColourMap, Rgb, SequentialMap, surface::Quantity};
+
+/// Everything that depends on dark or light.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Theme {
+    /// Light text on dark panels.
+    pub is_dark: bool,
+    /// Named colours.
+    pub palette: Palette,
+    /// Colours of errors: diverging, zero in the colour of the panel.
+    pub errors: ColourMap,
+}
+
+impl Theme {
+    /// The dark theme.
+    pub fn dark() -> &'static Self {
+        static DARK: OnceLock<Theme> = OnceLock::new();
+        DARK.get_or_init(|| Self::new(true))
+    }
+
+    /// The light theme.
+    pub fn light() -> &'static Self {
+        static LIGHT: OnceLock<Theme> = OnceLock::new();
+        LIGHT.get_or_init(|| Self::new(false))
+    }
+
+    /// The theme that `ui` is drawn in.
+    pub fn of(ui: &eframe::egui::Ui) -> &'static Self {
+        if ui.visuals().dark_mode {
+            Self::dark()
+        } else {
+            Self::light()
+        }
+    }
+
+    fn new(is_dark: bool) -> Self {
+        let palette = if is_dark { Palette::DARK } else { Palette::LIGHT };
+        Self {
+            is_dark,
+            palette,
+            errors: ColourMap::diverging(palette.error_stops.map(|stop| [stop.r(), stop.g(), stop.b()])),
+        }
+    }
+
+    /// Colours of the values of a surface; `sequential` are those of values that do not diverge.
+    pub fn colours(&self, quantity: &Quantity, sequential: SequentialMap) -> &ColourMap {
+        if quantity.is_diverging() {
+            &self.errors
+        } else {
+            sequential.colours()
+        }
+    }
+}
+
+/// An opaque colour.
+pub fn rgb([red, green, blue]: Rgb) -> Color32 {
+    Color32::from_rgb(red, green, blue)
+}

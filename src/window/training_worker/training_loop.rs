@@ -1,0 +1,380 @@
+use std::{
+    path::Path,
+    sync::{
+        Arc,
+        atomic::{AtomicU64, AtomicUsize, Ordering},
+        mpsc::{Receiver, TryRecvError},
+    },
+    time::{Duration, Instant},
+};
+
+use ndarray::Array2;
+
+use super::{
+    Began, Event, Progress as Advance, Request, RunId, RunResult, TrainedRun,
+    continuation::{continue_run, furthest_epoch},
+};
+use crate::window::{
+    job::Report,
+    test_view::{TestSet, TestViewError},
+};
+use decoupler_core::{
+    evaluation::{PastNetworks, Run, RunError, Scores, TestErrors, network_frame_time, recorded::Determination},
+    training::TrainingSettings,
+};
+use decoupler_files::{
+    export::{CheckpointFile, NetworkFile, describe_standings, describe_worse_than_ridge},
+    import::{Progress, Setup, SetupSets},
+};
+
+/// The shortest time between two reports of a training. Each makes the window draw a frame, so this leaves time
+/// between them in which the user is answered at once, also where frames are drawn without a graphics card.
+const REPORT_INTERVAL: Duration = Duration::from_millis(100);
+
+/// The shortest time between two looks at all starts, each of which costs a decoupling of the test set.
+const STARTS_INTERVAL: Duration = Duration::from_millis(500);
+
+/// The thread's own state.
+pub(super) struct TrainingLoop<'a> {
+    report: &'a Report<Event>,
+    /// The last preparation that is cancelled.
+    cancelled: &'a AtomicU64,
+    /// The snapshot on show.
+    snapshot: &'a AtomicUsize,
+    /// Preparations so far.
+    preparations: u64,
+    run: Option<TrainedRun>,
+    /// Its test set, as it is drawn.
+    test: Option<TestSet>,
+    /// Networks of its past epochs.
+    past: PastNetworks,
+    /// Identity of the training `run`.
+    id: Option<RunId>,
+    is_paused: bool,
+    /// True once the window was told the result of the run that is to be kept.
+    is_kept: bool,
+    /// The start last reported, and how many of its epochs.
+    reported: (usize, usize),
+    next_report: Instant,
+    next_starts: Instant,
+}
+
+impl<'a> TrainingLoop<'a> {
+    pub(super) fn new(report: &'a Report<Event>, cancelled: &'a AtomicU64, snapshot: &'a AtomicUsize) -> Self {
+        Self {
+            report,
+            cancelled,
+            snapshot,
+            preparations: 0,
+            run: None,
+            test: None,
+            past: PastNetworks::default(),
+            id: None,
+            is_paused: false,
+            is_kept: false,
+            reported: (0, 0),
+            next_report: Instant::now(),
+            next_starts: Instant::now(),
+        }
+    }
+
+    /// Answers requests and trains until there is no window.
+    pub(super) fn run(&mut self, requests: &Receiver<Request>) {
+        while !self.report.is_cancelled() {
+            let request = if self.is_training() {
+                requests.try_recv()
+            } else {
+                requests.recv().map_err(TryRecvError::from)
+            };
+            match request {
+                Ok(request) => self.answer(request),
+                Err(TryRecvError::Empty) => self.train_one_epoch(),
+                Err(TryRecvError::Disconnected) => return,
+            }
+        }
+    }
+
+    fn is_training(&self) -> bool {
+        let unfinished = self
+            .run
+            .as_ref()
+            .is_some_and(|trained| trained.run.stop_reason().is_none());
+        unfinished && !self.is_paused
+    }
+
+    fn answer(&mut self, request: Request) {
+        match request {
+            Request::Train(setup) => {
+                let prepared = self.prepare_setup(&setup, |sets, is_cancelled| sets.run(&setup, is_cancelled));
+                self.begin(prepared, false, Event::Began);
+            }
+            Request::Open(path) => {
+                let prepared = CheckpointFile::load(&path).map_err(|error| error.to_string());
+                let prepared = prepared.and_then(|file| {
+                    let prepared = self.prepare(|is_cancelled, on_progress| {
+                        let resumed = file.resume_unless(is_cancelled, on_progress)?;
+                        Ok(resumed.map(|(run, sets)| TrainedRun::new(run, &sets)))
+                    });
+                    prepared.map_err(|error| format!("'{}': {error}", path.display()))
+                });
+                self.begin(prepared, true, Event::Opened);
+            }
+            Request::TakeUp(setup, states) => {
+                let resume =
+                    |sets: SetupSets, is_cancelled: &dyn Fn() -> bool| sets.resume(&setup, states, is_cancelled);
+                let prepared = self.prepare_setup(&setup, resume);
+                self.begin(prepared.map_err(|error| error.to_string()), true, Event::Opened);
+            }
+            Request::Continue(training) => self.go_on(training),
+            Request::Pause => {
+                self.is_paused = true;
+                self.report_progress();
+            }
+            Request::Resume => self.is_paused = false,
+            Request::Stop => {
+                if let Some(trained) = self.run.as_mut().filter(|trained| trained.run.stop_reason().is_none()) {
+                    trained.run.stop();
+                    self.report_progress();
+                }
+            }
+            Request::Inspect(id, inspection) => inspection.inspect(match &self.run {
+                Some(run) if self.id == Some(id) => Ok(run),
+                Some(_) => Err(REPLACED),
+                // The window offers no export before a training, so there was one.
+                None => Err(LOST),
+            }),
+        }
+    }
+
+    /// Draws or reads the samples of `setup` and starts its networks; `None` once that is cancelled.
+    fn prepare_setup(
+        &self,
+        setup: &Setup,
+        run: impl FnOnce(SetupSets, &dyn Fn() -> bool) -> Result<Option<Run>, RunError>,
+    ) -> Result<Option<(TrainedRun, Box<Began>)>, TestViewError> {
+        self.prepare(|is_cancelled, on_progress| {
+            let Some(sets) = setup.sets(Path::new(""), is_cancelled, on_progress)? else {
+                return Ok(None);
+            };
+            let recorded = sets.recorded().cloned();
+            Ok(run(sets, is_cancelled)?.map(|run| TrainedRun { run, recorded }))
+        })
+    }
+
+    /// Gets a run by `get`, which may be cancelled and reports how far a recording has been read; `None` once that is
+    /// cancelled.
+    fn prepare(
+        &self,
+        get: impl FnOnce(&dyn Fn() -> bool, &mut dyn FnMut(Progress)) -> Result<Option<TrainedRun>, TestViewError>,
+    ) -> Result<Option<(TrainedRun, Box<Began>)>, TestViewError> {
+        let (number, cancelled, report) = (self.preparations + 1, self.cancelled, self.report);
+        let is_cancelled = || cancelled.load(Ordering::Relaxed) >= number || report.is_cancelled();
+        let trained = get(&is_cancelled, &mut |progress| {
+            report.progress(Event::Reading(progress), |_, _| ());
+        })?;
+        Ok(trained.map(begun).transpose()?.filter(|_| !is_cancelled()))
+    }
+
+    /// Puts a new run in the place of an older one, which stays, with its files, where the new one is impossible.
+    fn begin<X>(
+        &mut self,
+        prepared: Result<Option<(TrainedRun, Box<Began>)>, X>,
+        is_paused: bool,
+        event: fn(Result<Box<Began>, X>) -> Event,
+    ) {
+        self.preparations += 1;
+        let (trained, began) = match prepared {
+            Ok(Some(prepared)) => prepared,
+            Ok(None) => return self.report.send(Event::Abandoned),
+            Err(error) => return self.report.send(event(Err(error))),
+        };
+        // What had ended before it was saved was kept when it ended.
+        self.is_kept = trained.run.stop_reason().is_some();
+        self.past = PastNetworks::default();
+        self.past.record(&trained.run);
+        (self.run, self.id, self.test) = (Some(trained), Some(began.id), Some(began.test.clone()));
+        self.is_paused = is_paused;
+        self.reported = (0, 0);
+        self.next_starts = Instant::now();
+        self.report.send(event(Ok(began)));
+        self.report_progress();
+    }
+
+    fn go_on(&mut self, training: TrainingSettings) {
+        let continued = match &mut self.run {
+            Some(TrainedRun { run, .. }) => continue_run(run, training)
+                .map(|()| *run.settings())
+                .map_err(|error| error.to_string()),
+            None => Err(LOST.to_owned()),
+        };
+        let has_failed = continued.is_err();
+        self.report.send(Event::Continued(continued.map(Box::new)));
+        if !has_failed {
+            (self.is_paused, self.is_kept) = (false, false);
+            self.report_progress();
+        }
+    }
+
+    fn train_one_epoch(&mut self) {
+        let Some(TrainedRun { run, .. }) = &mut self.run else {
+            return;
+        };
+        let ended = run.step().is_some();
+        self.past.record(run);
+        if ended || Instant::now() >= self.next_report {
+            self.report_progress();
+        }
+    }
+
+    fn report_progress(&mut self) {
+        let Some(TrainedRun { run, .. }) = &self.run else {
+            return;
+        };
+        let begun = Instant::now();
+        let number = run.leader_number();
+        let trainer = &run.trainers()[number];
+        let networks = run.network();
+        let answers = networks.decouple(run.test());
+        let errors = run.errors_of(&answers);
+        let test = self.test.as_ref();
+        let frame = test.and_then(TestSet::array).map(|test| {
+            let snapshot = test.nearest_snapshot(self.snapshot.load(Ordering::Relaxed));
+            (snapshot, test.frame(answers.view(), snapshot))
+        });
+        let charts = test
+            .and_then(TestSet::recording)
+            .map(|test| Arc::new(test.charts(&answers)));
+        let cost = begun.elapsed();
+        let has_several = run.trainers().len() > 1;
+        let is_standing = self.is_paused || run.stop_reason().is_some();
+        let starts = (has_several && (is_standing || begun >= self.next_starts)).then(|| run.starts());
+        if starts.is_some() {
+            // At most a tenth of the time.
+            self.next_starts = Instant::now() + STARTS_INTERVAL.max(9 * (begun.elapsed() - cost));
+        }
+        let reported = match self.reported {
+            (leader, epochs) if leader == number => epochs,
+            _ => 0,
+        };
+        let progress = Box::new(Advance {
+            epochs: trainer.history().get(reported..).unwrap_or_default().to_vec(),
+            stages: trainer.stages().to_vec(),
+            starts,
+            past: self.past.clone(),
+            result: RunResult {
+                remarks: if is_standing {
+                    self.remarks(&answers, &errors)
+                } else {
+                    Vec::new()
+                },
+                answers: Arc::new(answers),
+                charts,
+                frame,
+                errors,
+                best_epoch: trainer.best_epoch(),
+                flaw: run.flaw(),
+                epochs_run: furthest_epoch(run),
+                starts_ended: run
+                    .trainers()
+                    .iter()
+                    .filter(|start| start.stop_reason().is_some())
+                    .count(),
+                wall_time: run.wall_time(),
+                frame_time: is_standing.then(|| network_frame_time(run)).flatten(),
+                is_standing,
+                networks: Arc::new(networks),
+            },
+            stop_reason: run.stop_reason(),
+        });
+        self.report.progress(Event::Progressed(progress), |older, newer| {
+            if let (Event::Progressed(older), Event::Progressed(newer)) = (older, newer) {
+                newer.replace(*older);
+            }
+        });
+        self.reported = (number, trainer.history().len());
+        // A large test set takes long to decouple; let it take at most a fifth of the time.
+        self.next_report = Instant::now() + REPORT_INTERVAL.max(4 * cost);
+        self.report_finished();
+    }
+
+    /// Remarks on these answers to the test samples of a recording.
+    fn remarks(&self, answers: &Array2<f64>, errors: &TestErrors) -> Vec<String> {
+        let recorded = self
+            .run
+            .as_ref()
+            .and_then(|trained| Some((trained, trained.recorded.as_ref()?)));
+        let Some((trained, recorded)) = recorded else {
+            return Vec::new();
+        };
+        let run = &trained.run;
+        let determined = Determination::measure(run.test(), answers.view(), recorded.plan.division.by);
+        let mut remarks = describe_standings(&run.problem().targets, &determined);
+        if let Some(baselines) = run.baselines() {
+            let scores = Scores {
+                network: errors.clone(),
+                baselines: baselines.clone(),
+            };
+            let method = run.settings().training.method;
+            remarks.extend(describe_worse_than_ridge(run.problem(), &scores, method));
+        }
+        remarks
+    }
+
+    /// Hands over, once, what is to be kept of a run that has ended.
+    fn report_finished(&mut self) {
+        let Some(trained) = self.run.as_ref().filter(|trained| trained.run.stop_reason().is_some()) else {
+            return;
+        };
+        if std::mem::replace(&mut self.is_kept, true) {
+            return;
+        }
+        let file = trained.network_file();
+        let sound = file.and_then(|file| file.flaw().map_or(Ok(Box::new(file)), Err));
+        let finished = sound.map_err(|flaw| format!("This training is not kept in the run list: {flaw}"));
+        self.report.send(Event::Finished(finished));
+    }
+}
+
+/// Message where the training on show is not in the worker: only a worker that died lost it.
+pub const LOST: &str = "the network was lost when the training thread ended: train again";
+
+/// Message where a file was asked for before another training began.
+const REPLACED: &str = "the file was not written, for another training has replaced the one to be saved; finished \
+                        trainings are in the run list of the Compare view";
+
+/// A run, and what the window is to know of it.
+fn begun(trained: TrainedRun) -> Result<(TrainedRun, Box<Began>), TestViewError> {
+    let run = &trained.run;
+    let plan = trained.recorded.as_ref().map(|recorded| recorded.plan.clone());
+    let began = Began {
+        id: RunId::new(),
+        setup: Setup::of(*run.settings(), plan).expect("a recorded run has its plan"),
+        problem: Arc::clone(run.problem()),
+        weights: run.leader().weights(),
+        test: TestSet::of(run)?,
+        baselines: run
+            .baselines()
+            .cloned()
+            .expect("the baselines of a whole run are measured"),
+    };
+    Ok((trained, Box::new(began)))
+}
+
+impl TrainedRun {
+    fn new(run: Run, sets: &SetupSets) -> Self {
+        Self {
+            run,
+            recorded: sets.recorded().cloned(),
+        }
+    }
+
+    /// Takes the best network so far, with its record and errors.
+    pub fn network_file(&self) -> Result<NetworkFile, String> {
+        NetworkFile::from_run(&self.run, self.recorded.as_ref()).map_err(|error| error.to_string())
+    }
+
+    /// Takes the present state, to be resumed.
+    pub fn checkpoint_file(&self) -> Result<CheckpointFile, String> {
+        CheckpointFile::from_run(&self.run, self.recorded.as_ref()).map_err(|error| error.to_string())
+    }
+}

@@ -1,0 +1,249 @@
+use std::{fmt, path::Path, sync::Arc};
+
+use ndarray::Array2;
+
+use crate::window::{
+    job::{Job, Wake},
+    shared::{Effect, RightCard, RunList},
+    test_view::{Frame, Positions, RecordedTest, TargetCharts, TestSet, TestView},
+};
+use decoupler_files::{export::NetworkFile, figure::surface::Surface, import::Recorded};
+
+/// The Compare view.
+pub struct CompareView {
+    /// Contents of the two places.
+    pub places: [Place; 2],
+    /// Snapshot of both test sets.
+    pub snapshot: usize,
+    /// Surface shown of both networks.
+    pub card: RightCard,
+    /// The run that the user is asked about before it is removed.
+    pub removing: Option<u64>,
+    /// Number of runs with which its places were last filled, until both are.
+    pub(super) opened_with: Option<usize>,
+    /// The node under the pointer, lit on both surfaces.
+    pub node: Option<usize>,
+    wake: Wake,
+}
+
+/// One of the two places.
+#[derive(Debug, Default)]
+pub struct Place {
+    /// The run in it.
+    id: Option<u64>,
+    /// Test set of the run and the answers of its network, once they are there.
+    pub compared: Option<Compared>,
+    /// Reason for which they cannot be had.
+    pub problem: Option<String>,
+    /// Target of a recording whose regression is shown.
+    pub target: usize,
+    /// Job that prepares them.
+    job: Option<Job<Result<Box<Compared>, String>>>,
+}
+
+/// A run as it is drawn.
+#[derive(Clone, Debug)]
+pub struct Compared {
+    /// Its test set.
+    pub test: TestSet,
+    /// Answers of its network: samples × targets.
+    pub answers: Arc<Array2<f64>>,
+    /// What is drawn of them.
+    pub drawn: Drawn,
+}
+
+/// What is drawn of a test set.
+#[derive(Clone, Debug)]
+pub enum Drawn {
+    /// Nodes of an array at the snapshot on show: actual, decoupled, difference.
+    Frames(Box<[Frame; 3]>),
+    /// Surfaces through the targets of a recording at the sample on show: actual, decoded, difference.
+    Surfaces(Box<[Surface; 3]>),
+    /// Regression of each target of a recording, whose targets have no surface.
+    Regression(Arc<TargetCharts>),
+}
+
+impl Place {
+    /// Returns true if a surface is drawn in it.
+    pub(super) fn has_surface(&self) -> bool {
+        let compared = self.compared.as_ref();
+        compared.is_some_and(|compared| !matches!(compared.drawn, Drawn::Regression(_)))
+    }
+}
+
+impl Compared {
+    /// Draws the test set of a run again, or reads it from the files of its recording; `None` once cancelled.
+    fn new(file: &NetworkFile, is_cancelled: &dyn Fn() -> bool) -> Result<Option<Self>, String> {
+        let test = match (file.settings.simulated(), &file.recorded) {
+            (Some(settings), _) => TestSet::Array(TestView::draw(&settings).map_err(|error| error.to_string())?),
+            (None, Some(recorded)) => match recorded_test(file, recorded, is_cancelled)? {
+                Some(test) => TestSet::Recording(test),
+                None => return Ok(None),
+            },
+            (None, None) => return Err("This run has no test samples.".to_owned()),
+        };
+        let answers = Arc::new(file.network.decouple(test.set()));
+        let drawn = drawn(&test, &answers, 0);
+        Ok(Some(Self { test, answers, drawn }))
+    }
+
+    /// Draws `snapshot`, or the last one if there are fewer.
+    fn show(&mut self, snapshot: usize) {
+        if !matches!(self.drawn, Drawn::Regression(_)) {
+            self.drawn = drawn(&self.test, &self.answers, snapshot);
+        }
+    }
+}
+
+/// Reads the test samples with which the network was tested again.
+fn recorded_test(
+    file: &NetworkFile,
+    recorded: &Recorded,
+    is_cancelled: &dyn Fn() -> bool,
+) -> Result<Option<RecordedTest>, String> {
+    if let [missing, ..] = recorded.missing()[..] {
+        return Err(format!(
+            "The recording '{}' is not there any more, so its test samples cannot be shown. Put the file back to see them; \
+             errors, loss and settings are kept with the run.",
+            missing.display()
+        ));
+    }
+    let sets = file.setup().sets(Path::new(""), is_cancelled, &mut |_| ());
+    let Some(sets) = sets.map_err(|error| error.to_string())? else {
+        return Ok(None);
+    };
+    let is_same = sets
+        .recorded()
+        .is_some_and(|now| now.samples_crc32 == recorded.samples_crc32);
+    if !is_same {
+        let data = recorded.plan.import.data.display();
+        return Err(format!(
+            "'{data}' has other samples than when this network was trained, so they are not shown. Use the file of that \
+             time, or train again."
+        ));
+    }
+    let test = RecordedTest::new(Arc::clone(&sets.sets.test), Arc::new(file.problem.clone()));
+    Ok(Some(test))
+}
+
+/// Draws `snapshot` of a test set, or the last one if there are fewer.
+fn drawn(test: &TestSet, answers: &Array2<f64>, snapshot: usize) -> Drawn {
+    match test {
+        TestSet::Array(test) => {
+            let snapshot = test.nearest_snapshot(snapshot);
+            let actual = test.frame(test.set.targets(), snapshot);
+            let decoupled = test.frame(answers.view(), snapshot);
+            let error = actual.error_of(&decoupled);
+            Drawn::Frames(Box::new([actual, decoupled, error]))
+        }
+        TestSet::Recording(test) => match &test.positions {
+            Positions::Surface(through) => {
+                let sample = snapshot.min(test.set.samples().saturating_sub(1));
+                let actual = test.set.targets().row(sample).to_vec();
+                let decoded = answers.row(sample).to_vec();
+                let range = through.range_of(&test.ranges);
+                Drawn::Surfaces(Box::new(through.surfaces(&actual, &decoded, range)))
+            }
+            Positions::None | Positions::NoSurface(_) => Drawn::Regression(Arc::new(test.charts(answers))),
+        },
+    }
+}
+
+impl CompareView {
+    /// Nothing compared yet. `wake` is called when there is something to be drawn.
+    pub fn new(wake: Wake) -> Self {
+        Self {
+            places: Default::default(),
+            snapshot: 0,
+            card: RightCard::default(),
+            removing: None,
+            opened_with: None,
+            node: None,
+            wake,
+        }
+    }
+
+    /// Shows this snapshot of both test sets.
+    pub(super) fn show_snapshot(&mut self, snapshot: usize) {
+        self.snapshot = snapshot;
+        for compared in self.places.iter_mut().filter_map(|place| place.compared.as_mut()) {
+            compared.show(snapshot);
+        }
+    }
+
+    /// Returns the number of snapshots of the larger of the two test sets.
+    pub(super) fn snapshots(&self) -> usize {
+        let drawn = self.places.iter().filter(|place| place.has_surface());
+        drawn
+            .filter_map(|place| place.compared.as_ref())
+            .map(|compared| compared.test.snapshots())
+            .max()
+            .unwrap_or(0)
+    }
+
+    /// Fills empty places with the newest runs as the view opens, the older one first, and as runs arrive until both are
+    /// filled.
+    pub(super) fn fill_places(&mut self, runs: &RunList, effects: &mut Vec<Effect>) {
+        let count = runs.workspace.runs.len();
+        if self.opened_with.is_none_or(|seen| seen == count) {
+            return;
+        }
+        let pinned = runs.workspace.pinned;
+        let empty: Vec<usize> = (0..pinned.len()).filter(|&place| pinned[place].is_none()).collect();
+        let others = runs.workspace.runs.iter().rev().map(|run| run.id);
+        let others = others.filter(|id| !pinned.contains(&Some(*id)));
+        let mut newest: Vec<u64> = others.take(empty.len()).collect();
+        self.opened_with = (newest.len() < empty.len()).then_some(count);
+        newest.reverse();
+        let filled = empty.into_iter().zip(newest);
+        effects.extend(filled.map(|(place, id)| Effect::PinRun(place, Some(id))));
+    }
+
+    /// Prepares what is to be drawn in the two places on threads, and takes what they have prepared.
+    pub(super) fn follow(&mut self, runs: &RunList) {
+        for (number, place) in self.places.iter_mut().enumerate() {
+            let run = runs.pinned(number);
+            if place.id != run.map(|run| run.id) {
+                *place = Place::default();
+                if let Some(run) = run {
+                    (place.id, place.job) = (Some(run.id), Some(prepare(&run.file, &self.wake)));
+                }
+            }
+            let Some(prepared) = place.job.as_ref().and_then(Job::next_event) else {
+                continue;
+            };
+            place.job = None;
+            match prepared {
+                Ok(mut compared) => {
+                    if self.snapshot > 0 {
+                        compared.show(self.snapshot);
+                    }
+                    place.compared = Some(*compared);
+                }
+                Err(reason) => place.problem = Some(reason),
+            }
+        }
+    }
+}
+
+/// Prepares the test set of a run and the answers of its network in the background.
+fn prepare(file: &Arc<NetworkFile>, wake: &Wake) -> Job<Result<Box<Compared>, String>> {
+    let mut job = Job::new("compared run", Arc::clone(wake));
+    let file = Arc::clone(file);
+    job.start(
+        move |report| Compared::new(&file, &|| report.is_cancelled()),
+        |prepared| match prepared {
+            Ok(Ok(Some(compared))) => Ok(Box::new(compared)),
+            Ok(Ok(None)) => Err("The test samples were not read to the end.".to_owned()),
+            Ok(Err(reason)) => Err(reason),
+            Err(error) => Err(format!("The test samples of this run could not be prepared: {error}")),
+        },
+    );
+    job
+}
+
+impl fmt::Debug for CompareView {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("CompareView").finish_non_exhaustive()
+    }
+}

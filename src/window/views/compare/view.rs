@@ -1,0 +1,249 @@
+use eframe::egui::{Align, Layout, Rect, RichText, Sense, Ui, Vec2};
+
+use super::{
+    CompareView, Compared, exports::compare_exports, figures_table::figures_ui, list::run_list_ui, state::Drawn,
+};
+use crate::window::{
+    plotting::{Pointer, plots_ui, titled_plots_ui},
+    shared::{
+        Effect, Export, Look, PLACES, RightCard, RunList, Shared, View, colour_scale_ui, follow_surface,
+        target_choice_ui, view_mode_ui,
+    },
+    surface_view::{ColourBar, SurfaceView},
+    test_view::TestSet,
+    theme::{Theme, semibold, space, type_size},
+    widgets::{card_ui, note_ui, placeholder_ui, scrolled_ui, section_heading_ui, segmented_ui, snapshot_ui},
+};
+use decoupler_files::figure::{
+    PlotFigure, compared_losses_figure,
+    surface::{Surface, SurfaceFigure},
+    target_regression_figure,
+};
+
+impl View for CompareView {
+    fn name(&self) -> &'static str {
+        "Compare"
+    }
+
+    fn enter(&mut self, _shared: &Shared) {
+        self.opened_with = Some(0);
+    }
+
+    fn take_news(&mut self, shared: &Shared, _effects: &mut Vec<Effect>) {
+        self.follow(&shared.runs);
+    }
+
+    fn tools_ui(&mut self, ui: &mut Ui, _shared: &Shared, _effects: &mut Vec<Effect>) {
+        if let Some(snapshot) = snapshot_ui(ui, "snapshot", self.snapshot, self.snapshots()) {
+            self.show_snapshot(snapshot);
+        }
+    }
+
+    fn exports<'a>(&'a self, shared: &'a Shared) -> Vec<Export<'a>> {
+        compare_exports(self, shared)
+    }
+
+    fn form_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) {
+        self.fill_places(&shared.runs, effects);
+        run_list_ui(ui, shared, &mut self.removing, effects);
+    }
+
+    /// The surfaces of both runs above, their curves and figures below.
+    fn body_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) {
+        let whole = ui.available_rect_before_wrap();
+        let gap = space(2);
+        let lower_height = (0.42 * whole.height()).clamp(space(50), space(96));
+        let (upper, lower) = whole.split_top_bottom_at_y(whole.bottom() - lower_height);
+        let upper = upper.with_max_y(upper.max.y - gap);
+        let (cards, scale) = upper.split_left_right_at_x(upper.right() - ColourBar::WIDTH);
+        let width = 0.5 * (cards.width() - gap);
+        let figure = self.figure(shared);
+        let mut surfaces = figure.surfaces.iter();
+        for place in 0..2 {
+            let surface = self.places[place].has_surface().then(|| surfaces.next()).flatten();
+            let left = cards.left() + (width + gap) * place as f32;
+            let card = Rect::from_min_size([left, cards.top()].into(), Vec2::new(width, cards.height()));
+            card_ui(ui, card, |ui| self.side_ui(ui, shared, place, surface, effects));
+        }
+        if let [colours, ..] = &figure.scales()[..] {
+            let slot = scale.shrink2(Vec2::new(0.0, space(4)));
+            colour_scale_ui(ui, slot, colours, &figure.note(), shared.look, effects);
+        }
+        let figures_width = (0.42 * lower.width()).clamp(space(80), space(120));
+        let (left, right) = lower.split_left_right_at_x(lower.right() - figures_width);
+        let losses = losses(&shared.runs);
+        card_ui(ui, left.with_max_x(left.max.x - gap), |ui| match &losses {
+            Some(losses) => titled_plots_ui(ui, "Loss", losses),
+            None => placeholder_ui(ui, "The errors of each epoch of both runs appear here, in one chart."),
+        });
+        card_ui(ui, right, |ui| {
+            scrolled_ui(ui, "compared figures", |ui| {
+                section_heading_ui(ui, "Errors on the test sets");
+                figures_ui(ui, &shared.runs);
+            });
+        });
+        ui.allocate_rect(whole, Sense::hover());
+    }
+}
+
+impl CompareView {
+    /// Decoded against actual values of the target on show in this place, if it has no surface.
+    pub(super) fn regression(&self, place: usize) -> Option<PlotFigure> {
+        let place = &self.places[place];
+        let Compared { test, answers, drawn } = place.compared.as_ref()?;
+        let (Drawn::Regression(charts), Some(test)) = (drawn, test.recording()) else {
+            return None;
+        };
+        let target = place.target.min(charts.lines.len().checked_sub(1)?);
+        let channel = test.problem.targets.get(target)?;
+        let pair = |sample| (test.set.targets()[[sample, target]], answers[[sample, target]]);
+        Some(target_regression_figure(
+            (test.set.samples(), &pair),
+            &charts.lines[target],
+            &channel.name,
+            channel.unit.as_deref(),
+        ))
+    }
+
+    /// The surfaces of the runs that are prepared, with one scale.
+    pub(super) fn figure(&self, shared: &Shared) -> SurfaceFigure {
+        let look = shared.look;
+        let surface = |place: usize| {
+            let Compared { test, drawn, .. } = self.places[place].compared.as_ref()?;
+            let name = shared.runs.pinned(place).map_or("", |run| &run.name);
+            let (letter, style) = (PLACES[place], look.style());
+            match (drawn, test) {
+                (Drawn::Frames(frames), TestSet::Array(test)) => {
+                    let [_, decoupled, error] = &**frames;
+                    Some(match self.card {
+                        RightCard::Decoupled => test.heights(format!("{letter}: {name}, decoupled"), decoupled, style),
+                        RightCard::Error => test.errors(format!("{letter}: {name}, error"), error, style),
+                    })
+                }
+                (Drawn::Surfaces(surfaces), _) => {
+                    let [_, decoded, error] = &**surfaces;
+                    let (surface, what) = match self.card {
+                        RightCard::Decoupled => (decoded, "decoded"),
+                        RightCard::Error => (error, "error"),
+                    };
+                    Some(Surface {
+                        title: format!("{letter}: {name}, {what}"),
+                        mode: look.mode,
+                        colours: look.colours,
+                        ..surface.clone()
+                    })
+                }
+                _ => None,
+            }
+        };
+        SurfaceFigure {
+            surfaces: (0..self.places.len()).filter_map(surface).collect(),
+            camera: look.camera,
+            marked_node: self.node,
+            ..SurfaceFigure::default()
+        }
+        .with_common_scales()
+    }
+
+    fn side_ui(
+        &mut self,
+        ui: &mut Ui,
+        shared: &Shared,
+        place: usize,
+        surface: Option<&Surface>,
+        effects: &mut Vec<Effect>,
+    ) {
+        let theme = Theme::of(ui);
+        let (runs, look) = (&shared.runs, shared.look);
+        ui.horizontal(|ui| {
+            ui.set_min_height(space(7));
+            let colour = [theme.palette.accent, theme.palette.warning][place];
+            ui.label(
+                RichText::new(PLACES[place])
+                    .font(semibold(type_size().title))
+                    .color(colour),
+            );
+            ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
+                // What holds for both is asked for once.
+                match place {
+                    0 => view_mode_ui(ui, look, effects),
+                    _ => {
+                        let cards = [(RightCard::Decoupled, "Decoupled"), (RightCard::Error, "Error")];
+                        let picked = segmented_ui(ui, "Displayed surface", &cards, self.card, false);
+                        self.card = picked.unwrap_or(self.card);
+                    }
+                }
+                if let Some(run) = runs.pinned(place) {
+                    ui.with_layout(Layout::left_to_right(Align::Center), |ui| {
+                        let name = RichText::new(&run.name).font(semibold(type_size().title));
+                        ui.add(eframe::egui::Label::new(name).truncate());
+                    });
+                }
+            });
+        });
+        let regression = self.regression(place);
+        let of_place = &mut self.places[place];
+        match (surface, regression, &of_place.problem) {
+            (Some(surface), ..) => surface_ui(ui, place, surface, look, &mut self.node, effects),
+            (None, Some(regression), _) => {
+                let test = of_place
+                    .compared
+                    .as_ref()
+                    .and_then(|compared| compared.test.recording());
+                if let Some(test) = test {
+                    let id = ["target of A", "target of B"][place];
+                    target_choice_ui(ui, "Target", id, &test.problem.targets, &mut of_place.target);
+                }
+                plots_ui(
+                    ui,
+                    ["Regression of A", "Regression of B"][place],
+                    &regression,
+                    Pointer::Moves,
+                );
+            }
+            (None, None, Some(problem)) => {
+                note_ui(ui, problem);
+            }
+            _ if runs.workspace.pinned[place].is_some() => placeholder_ui(ui, "Its test samples are being prepared."),
+            _ => {
+                let text = match runs.workspace.runs.len() {
+                    0 => "Two finished trainings appear here side by side.".to_owned(),
+                    1 => "Train a second network to compare it with the first.".to_owned(),
+                    _ => format!("Press {} next to a run in the list to show it here.", PLACES[place]),
+                };
+                placeholder_ui(ui, &text);
+            }
+        }
+    }
+}
+
+fn surface_ui(
+    ui: &mut Ui,
+    place: usize,
+    surface: &Surface,
+    look: Look,
+    node: &mut Option<usize>,
+    effects: &mut Vec<Effect>,
+) {
+    let view = SurfaceView {
+        label: ["Surface of A", "Surface of B"][place],
+        surface,
+        marked_node: *node,
+        lit_nodes: &[],
+        section: None,
+        theme: Theme::of(ui),
+    };
+    let shown = view.show(ui, look.camera);
+    // The node of the same number is lit on the other surface.
+    follow_surface(&shown, look, node, effects);
+}
+
+/// The errors of each epoch of the runs that are chosen.
+pub(super) fn losses(runs: &RunList) -> Option<PlotFigure> {
+    let [a, b] = [0, 1].map(|place| {
+        let run = runs.pinned(place)?;
+        Some((format!("{}: {}", PLACES[place], run.name), &*run.file.training.history))
+    });
+    let runs = [&a, &b].map(|run| run.as_ref().map(|(name, history)| (&**name, *history)));
+    (a.is_some() || b.is_some()).then(|| compared_losses_figure(runs))
+}

@@ -1,0 +1,365 @@
+use std::{
+    collections::HashMap,
+    sync::Arc,
+    time::{Duration, Instant},
+};
+
+use serde_json::Value;
+
+use super::{
+    Form,
+    sweep_folder::{OpenFolder, SweepFolder},
+    worker::{self, ExperimentEvent},
+};
+use crate::window::{
+    job::{Job, Wake},
+    shared::{Effect, Matter},
+    widgets::SortBy,
+};
+use decoupler_core::{
+    evaluation::{
+        Problem,
+        experiments::{CellSummary, Experiment, ExperimentResults, Finished, PaperTable, Trial, Verdict, verdicts},
+    },
+    training::EpochRecord,
+};
+use decoupler_files::{
+    export::{ExperimentTable, sweep_specification},
+    figure::{Figure, experiment_figure},
+    import::Plan,
+};
+
+/// Experiment of the view: a table of the paper, or a sweep.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Topic {
+    /// A table of the paper.
+    Table(PaperTable),
+    /// Two axes of one's own.
+    Sweep,
+}
+
+impl Topic {
+    /// In the order offered.
+    pub const ALL: [Self; 4] = [
+        Self::Table(PaperTable::HiddenNodes),
+        Self::Table(PaperTable::CrossValidation),
+        Self::Table(PaperTable::ArrayScales),
+        Self::Sweep,
+    ];
+
+    /// In a word or two.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Table(PaperTable::HiddenNodes) => "Table 1",
+            Self::Table(PaperTable::CrossValidation) => "Table 2",
+            Self::Table(PaperTable::ArrayScales) => "Table 3",
+            Self::Sweep => "Sweep",
+        }
+    }
+
+    /// The title of its results.
+    pub fn heading(self) -> String {
+        match self {
+            Self::Table(table) => table.heading(),
+            Self::Sweep => "Sweep over two axes".to_owned(),
+        }
+    }
+}
+
+/// The Experiments view.
+#[derive(Debug)]
+pub struct ExperimentsView {
+    /// Experiment on show.
+    pub topic: Topic,
+    /// Ordering and marked cell of the table.
+    pub look: ExperimentLook,
+    /// Experiment that is running.
+    pub running: Option<Running>,
+    pub(super) job: Job<ExperimentEvent>,
+    pub(super) folder: SweepFolder,
+    forms: HashMap<Topic, CheckedForm>,
+    outcomes: HashMap<Topic, Outcome>,
+}
+
+/// State of the display of an experiment.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct ExperimentLook {
+    /// The cell marked in table and picture.
+    pub marked: Option<usize>,
+    /// The order of the table.
+    pub sort: SortBy,
+}
+
+#[derive(Debug)]
+struct CheckedForm {
+    form: Form,
+    /// Number of trials, or the reason for which the form is no experiment.
+    checked: Result<usize, String>,
+    /// Results to be filled in, with the published figures.
+    preview: Option<Outcome>,
+    /// The file with which the terminal sweeps it, or the reason for which it cannot.
+    specification: Result<Value, String>,
+}
+
+/// The most memory that the finished trainings of one experiment may take. Those of later trials are not kept: they
+/// are trained again when they are to be seen.
+const MOST_KEPT_BYTES: usize = 400_000_000;
+
+/// An experiment under way.
+#[derive(Clone, Copy, Debug)]
+pub struct Running {
+    /// Which.
+    pub topic: Topic,
+    /// Trials finished.
+    pub done: usize,
+    /// Trials there are.
+    pub trials: usize,
+    /// Estimated time of the remaining trials, once there is one.
+    pub time_left: Option<Duration>,
+    /// When it began.
+    pub begun: Instant,
+}
+
+/// Ending of an experiment.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Ending {
+    /// Every trial has come to something.
+    Complete,
+    /// By the user, or by an accident that was told.
+    Cut,
+}
+
+/// Results of an experiment so far.
+#[derive(Debug)]
+pub struct Outcome {
+    /// Everything; shared with a file being written.
+    pub results: Arc<ExperimentResults>,
+    /// Plan by which its recording is read, if it is on one.
+    pub plan: Option<Plan>,
+    /// For reading.
+    pub table: ExperimentTable,
+    /// For looking at.
+    pub figure: Figure,
+    /// The figures behind it.
+    pub summaries: Vec<CellSummary>,
+    /// Verdicts on the paper's claims.
+    pub verdicts: Vec<Verdict>,
+    /// Ending of the experiment, once it has ended.
+    pub ending: Option<Ending>,
+    /// Time it took, once it has ended.
+    pub took: Option<Duration>,
+    kept_bytes: usize,
+}
+
+impl Outcome {
+    fn new(experiment: Experiment, plan: Option<Plan>) -> Self {
+        let results = ExperimentResults::new(experiment);
+        Self {
+            table: ExperimentTable::new(&results),
+            figure: experiment_figure(&results),
+            summaries: results.summaries(),
+            verdicts: Vec::new(),
+            results: Arc::new(results),
+            plan,
+            ending: None,
+            took: None,
+            kept_bytes: 0,
+        }
+    }
+
+    /// Trials finished and trials asked for.
+    pub fn trials(&self) -> (usize, usize) {
+        let cells = self.results.cells.iter();
+        cells.fold((0, 0), |(done, all), cell| {
+            (done + cell.trials.len() + cell.failures.len(), all + cell.expected)
+        })
+    }
+
+    fn record(&mut self, finished: Finished) {
+        let results = Arc::make_mut(&mut self.results);
+        let settings = results.cells[finished.cell].cell.settings;
+        let problem = results.problem.clone();
+        let outcome = finished.outcome.map(|mut trial| {
+            let bytes = bytes_of(&trial, settings.hidden, problem.as_deref());
+            if self.kept_bytes + bytes > MOST_KEPT_BYTES {
+                trial.states = Vec::new();
+            } else {
+                self.kept_bytes += bytes;
+            }
+            trial
+        });
+        results.record(finished.cell, outcome);
+    }
+
+    fn refresh(&mut self) {
+        self.table = ExperimentTable::new(&self.results);
+        self.figure = experiment_figure(&self.results);
+        self.summaries = self.results.summaries();
+        self.verdicts = verdicts(&self.results);
+    }
+}
+
+impl ExperimentsView {
+    /// Every form as the paper has it, nothing run. `wake` is called when there is news.
+    pub fn new(wake: Wake) -> Self {
+        let mut state = Self {
+            topic: Topic::ALL[0],
+            look: ExperimentLook::default(),
+            running: None,
+            folder: SweepFolder::new(Arc::clone(&wake)),
+            job: Job::new("experiments", wake),
+            forms: HashMap::new(),
+            outcomes: HashMap::new(),
+        };
+        for topic in Topic::ALL {
+            state.topic = topic;
+            state.edit(Form::new(topic));
+        }
+        state.topic = Topic::ALL[0];
+        state
+    }
+
+    /// Looks at another experiment.
+    pub fn choose(&mut self, topic: Topic) {
+        self.topic = topic;
+        self.look = ExperimentLook::default();
+    }
+
+    /// The form of what is looked at.
+    pub fn form(&self) -> &Form {
+        &self.forms[&self.topic].form
+    }
+
+    /// Returns the number of trials of the form, or the reason for which it cannot be run.
+    pub fn checked(&self) -> &Result<usize, String> {
+        &self.forms[&self.topic].checked
+    }
+
+    /// Returns the file with which the terminal sweeps the form, or the reason for which it cannot.
+    pub(super) fn specification(&self) -> &Result<Value, String> {
+        &self.forms[&self.topic].specification
+    }
+
+    /// Takes a changed form of what is looked at.
+    pub fn edit(&mut self, form: Form) {
+        let (checked, preview, specification) = match form.experiment() {
+            Ok(experiment) => {
+                let specification = sweep_specification(&experiment, form.plan.as_ref()).map_err(|gap| gap.to_string());
+                let preview = Outcome::new(experiment, form.plan.clone());
+                (Ok(preview.trials().1), Some(preview), specification)
+            }
+            Err(error) => {
+                let none = Err("The values above cannot be run yet.".to_owned());
+                (Err(error.to_string()), None, none)
+            }
+        };
+        let checked = CheckedForm {
+            form,
+            checked,
+            preview,
+            specification,
+        };
+        self.forms.insert(self.topic, checked);
+    }
+
+    /// Returns true if the experiment on show can be run now.
+    pub fn can_run(&self) -> bool {
+        self.running.is_none() && self.checked().is_ok()
+    }
+
+    /// Runs what is looked at.
+    pub(super) fn run(&mut self, effects: &mut Vec<Effect>) {
+        let (Ok(experiment), Some(setup)) = (self.form().experiment(), self.form().setup()) else {
+            return;
+        };
+        effects.push(Effect::Settle(Matter::Experiments));
+        if self.topic == Topic::Sweep {
+            // It would stand in the place of the results.
+            self.folder.close();
+        }
+        self.begin(experiment.clone(), setup.plan().cloned());
+        worker::run(&mut self.job, experiment, setup);
+    }
+
+    /// Ends the one that runs; what is finished stays.
+    pub(super) fn cancel(&mut self) {
+        self.job.abandon();
+        self.end(Instant::now());
+    }
+
+    /// Makes room for the results of `experiment`.
+    fn begin(&mut self, experiment: Experiment, plan: Option<Plan>) {
+        let outcome = Outcome::new(experiment, plan);
+        self.running = Some(Running {
+            topic: self.topic,
+            done: 0,
+            trials: outcome.trials().1,
+            time_left: None,
+            begun: Instant::now(),
+        });
+        self.look = ExperimentLook::default();
+        self.outcomes.insert(self.topic, outcome);
+    }
+
+    /// Takes the description of a recording that was read for the experiment under way.
+    pub(super) fn describe(&mut self, problem: Arc<Problem>) {
+        let running = self.running.as_ref();
+        if let Some(outcome) = running.and_then(|running| self.outcomes.get_mut(&running.topic)) {
+            Arc::make_mut(&mut outcome.results).problem = Some(problem);
+        }
+    }
+
+    /// Adds trials that have come to something.
+    pub fn record(&mut self, finished: Vec<Finished>) {
+        let Some(running) = &mut self.running else { return };
+        let Some(outcome) = self.outcomes.get_mut(&running.topic) else {
+            return;
+        };
+        for finished in finished {
+            running.done = finished.done;
+            running.time_left = finished.time_left;
+            outcome.record(finished);
+        }
+        outcome.refresh();
+    }
+
+    /// The one that ran has ended.
+    pub fn end(&mut self, at: Instant) {
+        let Some(running) = self.running.take() else { return };
+        let Some(outcome) = self.outcomes.get_mut(&running.topic) else {
+            return;
+        };
+        outcome.refresh();
+        outcome.took = Some(at - running.begun);
+        outcome.ending = Some(if outcome.results.is_complete() {
+            Ending::Complete
+        } else {
+            Ending::Cut
+        });
+    }
+
+    /// Returns the sweep folder on show, in whose place no experiment is.
+    pub(super) fn shown_folder(&self) -> Option<&OpenFolder> {
+        self.folder.shown().filter(|_| self.topic == Topic::Sweep)
+    }
+
+    /// Returns the results of the experiment on show.
+    pub fn outcome(&self) -> Option<&Outcome> {
+        self.outcomes.get(&self.topic)
+    }
+
+    /// Returns the results to show: those of the experiment or, before it is run, the published figures.
+    pub fn shown(&self) -> Option<&Outcome> {
+        self.outcome().or(self.forms[&self.topic].preview.as_ref())
+    }
+}
+
+/// About how much memory the finished training of a trial takes.
+fn bytes_of(trial: &Trial, hidden: usize, problem: Option<&Problem>) -> usize {
+    let weights = problem.map_or(0, |problem| {
+        hidden * (problem.inputs.len() + 1) + (hidden + 1) * problem.targets.len()
+    });
+    // The present and the best weights, and up to as many numbers of the method's own.
+    let of_start = 4 * weights * size_of::<f64>();
+    trial.states.len() * of_start + trial.epochs * size_of::<EpochRecord>()
+}

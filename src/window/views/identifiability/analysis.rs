@@ -1,0 +1,301 @@
+use std::sync::Arc;
+
+use glam::DVec3;
+use thiserror::Error;
+
+use crate::window::test_view::Frame;
+use decoupler_core::{
+    evaluation::SimulatedSettings,
+    scene::{RelativeNoise, RowModel, Scene, SceneError},
+    sensor::{Identifiability, IdentifiabilityError, IdentifiabilityWarning, RowPair, SensorError, SensorModel},
+    surface::{SurfaceError, SurfaceMap},
+};
+
+/// Question to be analysed: a sensor, its scene, and the compression of its nodes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Question {
+    /// The sensor.
+    pub sensor: SensorModel,
+    /// The rows that are read, the movement, and the noise of the readings.
+    pub scene: Scene,
+    /// The even compression at which the Jacobian is taken, as a fraction of the height.
+    pub compression: f64,
+}
+
+impl Question {
+    /// Sensor and scene of a training, pressed half as far as the scene presses.
+    pub fn of(settings: &SimulatedSettings) -> Self {
+        Self {
+            sensor: settings.source.sensor,
+            scene: settings.source.scene,
+            compression: 0.5 * settings.source.scene.largest_compression,
+        }
+    }
+}
+
+/// Identifiability of an array: what its readings determine.
+#[derive(Clone, Debug)]
+pub struct Analysis {
+    /// Question that was analysed.
+    pub question: Question,
+    /// Each row-wire that is read.
+    pub rows: Vec<Identifiability>,
+    /// The place in [`Self::rows`] of the row with the smallest singular value.
+    pub worst: usize,
+    /// Relative error of a reading (one standard deviation), from all sources of the scene.
+    pub noise: RelativeNoise,
+    /// Spread of each unknown before reading (one standard deviation): that of an even distribution over the stroke.
+    pub prior_mm: f64,
+    /// The most similar rows, if a decoder must tell them apart.
+    pub alike: Option<RowPair>,
+    /// Warnings, worst first.
+    pub warnings: Vec<IdentifiabilityWarning>,
+    /// The surface through the nodes.
+    pub surface: Arc<SurfaceMap>,
+    /// For each axis that moves, the worst-seen pattern of every row, the largest deflection 1.
+    pub patterns: Vec<Frame>,
+    /// For each axis that moves, the sensitivity of every node in 1/mm.
+    pub sensitivities: Vec<Frame>,
+}
+
+/// Reasons for which a question has no answer.
+#[derive(Clone, Debug, PartialEq, Error)]
+#[non_exhaustive]
+pub enum AnalysisError {
+    /// An impossible scene.
+    #[error(transparent)]
+    Scene(#[from] SceneError),
+    /// An impossible sensor.
+    #[error(transparent)]
+    Sensor(#[from] SensorError),
+    /// The singular values are not known.
+    #[error(transparent)]
+    Identifiability(#[from] IdentifiabilityError),
+    /// No surface can be laid through the nodes.
+    #[error(transparent)]
+    Surface(#[from] SurfaceError),
+}
+
+impl Analysis {
+    /// Looks at every row that is read; `None` once it `is_abandoned`. The surface of the last analysis is taken over
+    /// where its nodes are the same.
+    ///
+    /// # Errors
+    /// An impossible sensor or scene, with the reason.
+    pub fn new(
+        question: &Question,
+        last: Option<&Self>,
+        is_abandoned: impl Fn() -> bool,
+    ) -> Result<Option<Self>, AnalysisError> {
+        let Question { sensor, scene, .. } = question;
+        sensor.check()?;
+        scene.check()?;
+        let read = scene.rows.read(sensor.scale.rows())?;
+        let depth_mm = question.compression * sensor.geometry.height_mm;
+        let displacements_mm = vec![DVec3::Z * depth_mm; sensor.scale.nodes_per_row()];
+        let axes = scene.movement.axes();
+        let mut rows = Vec::with_capacity(read.len());
+        for row in read {
+            if is_abandoned() {
+                return Ok(None);
+            }
+            rows.push(Identifiability::of_row(sensor, row, &displacements_mm, axes)?);
+        }
+        align(&mut rows);
+        let smallest = |seen: &Identifiability| seen.singular_values_per_mm.last().copied().unwrap_or(0.0);
+        let worst = (0..rows.len()).min_by(|&a, &b| smallest(&rows[a]).total_cmp(&smallest(&rows[b])));
+        let worst = worst.unwrap_or(0);
+        let noise = RelativeNoise::of(scene.noise, sensor, &[rows[worst].row], depth_mm)?;
+        if noise.common > 0.0 {
+            for seen in &mut rows {
+                *seen = Identifiability::of_row_with_gain(sensor, seen.row, &displacements_mm, axes, noise)?;
+            }
+            align(&mut rows);
+        }
+        let alike = match scene.rows.model() {
+            RowModel::Shared => Some(Identifiability::most_alike_rows(sensor, noise)?),
+            RowModel::Each => None,
+        };
+        let prior_mm = scene.stroke_mm(&sensor.geometry) / 12.0_f64.sqrt();
+        let surface = match last {
+            Some(last) if lattice(&last.question.sensor) == lattice(sensor) && last.rows.len() == rows.len() => {
+                Arc::clone(&last.surface)
+            }
+            _ => {
+                let x_mm: Vec<f64> = rows.iter().map(|seen| sensor.geometry.row_x_mm(seen.row)).collect();
+                Arc::new(SurfaceMap::new(&x_mm, &lattice(sensor).1)?)
+            }
+        };
+        let alike = alike.flatten();
+        let frames = |value: fn(&Identifiability, usize) -> DVec3, scale: f64| -> Vec<Frame> {
+            let of_axis = |&axis: &usize| frame(sensor, &rows, &surface, |seen, node| scale * value(seen, node)[axis]);
+            axes.indices().iter().map(of_axis).collect()
+        };
+        let deflections = rows.iter().flat_map(|seen| &seen.worst_pattern);
+        let largest = deflections.map(|u| u.abs().max_element()).fold(0.0, f64::max);
+        Ok(Some(Self {
+            question: *question,
+            worst,
+            noise,
+            prior_mm,
+            alike,
+            warnings: rows[worst].warnings(noise.own, prior_mm, alike),
+            patterns: frames(|seen, node| seen.worst_pattern[node], largest.recip()),
+            sensitivities: frames(|seen, node| seen.sensitivity_per_mm[node], 1.0),
+            surface,
+            rows,
+        }))
+    }
+
+    /// The row that sees its worst pattern least.
+    pub fn worst_row(&self) -> &Identifiability {
+        &self.rows[self.worst]
+    }
+
+    /// The singular value at which noise hides as much as the prior leaves open: patterns below it are not seen.
+    pub fn hidden_below_per_mm(&self) -> f64 {
+        self.noise.own / self.prior_mm
+    }
+
+    /// Number of deformation patterns of the worst row above the noise.
+    pub fn patterns_seen(&self) -> usize {
+        let values = self.worst_row().singular_values_per_mm.iter();
+        values.filter(|&&value| value > self.hidden_below_per_mm()).count()
+    }
+}
+
+/// Turns each pattern like that of its neighbour, as the sign of one means nothing, so that a surface through all of them
+/// shows their shape.
+fn align(rows: &mut [Identifiability]) {
+    for row in 1..rows.len() {
+        let (before, after) = rows.split_at_mut(row);
+        let (before, after) = (&before[row - 1].worst_pattern, &mut after[0].worst_pattern);
+        let along: f64 = before.iter().zip(after.iter()).map(|(a, b)| a.dot(*b)).sum();
+        if along < 0.0 {
+            after.iter_mut().for_each(|u| *u = -*u);
+        }
+    }
+}
+
+/// x of the row-wires, y of the nodes on each.
+fn lattice(sensor: &SensorModel) -> (Vec<f64>, Vec<f64>) {
+    let x_mm = (0..sensor.scale.rows()).map(|row| sensor.geometry.row_x_mm(row));
+    let nodes = 0..sensor.scale.nodes_per_row();
+    let y_mm = nodes.map(|node| sensor.geometry.node_y_mm(sensor.scale, node));
+    (x_mm.collect(), y_mm.collect())
+}
+
+fn frame(
+    sensor: &SensorModel,
+    rows: &[Identifiability],
+    surface: &SurfaceMap,
+    value: impl Fn(&Identifiability, usize) -> f64,
+) -> Frame {
+    let nodes = 0..sensor.scale.nodes_per_row();
+    let nodes_mm = rows.iter().flat_map(|seen| {
+        let at = |node| sensor.geometry.row_node_mm(sensor.scale, seen.row, node);
+        nodes.clone().map(move |node| (seen, node, at(node)))
+    });
+    let nodes_mm: Vec<DVec3> = nodes_mm.map(|(seen, node, at)| at.with_z(value(seen, node))).collect();
+    let values: Vec<f64> = nodes_mm.iter().map(|node| node.z).collect();
+    Frame {
+        grid_mm: surface.evaluate(&values).into(),
+        nodes_mm: nodes_mm.into(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use decoupler_core::scene::{Movement, Noise, Rows};
+
+    fn analysis(question: &Question) -> Analysis {
+        Analysis::new(question, None, || false).unwrap().unwrap()
+    }
+
+    #[test]
+    fn the_worst_row_is_the_one_that_sees_least_and_each_node_has_its_value() {
+        let question = Question::of(&SimulatedSettings::default());
+        let found = analysis(&question);
+        assert_eq!((found.rows.len(), found.patterns.len()), (10, 1));
+        for row in 0..10 {
+            let pressed = vec![DVec3::Z * 0.5; 10];
+            let alone = Identifiability::of_row(&question.sensor, row, &pressed, found.rows[row].axes).unwrap();
+            assert_eq!(alone.singular_values_per_mm, found.rows[row].singular_values_per_mm);
+            let (least, worst) = (
+                alone.singular_values_per_mm[9],
+                found.worst_row().singular_values_per_mm[9],
+            );
+            assert!(worst <= least);
+            let shown = &found.sensitivities[0].nodes_mm[10 * row..10 * row + 10];
+            assert!(shown.iter().zip(&alone.sensitivity_per_mm).all(|(a, b)| a.z == b.z));
+        }
+        let largest = found.patterns[0]
+            .nodes_mm
+            .iter()
+            .map(|node| node.z.abs())
+            .fold(0.0, f64::max);
+        assert!((largest - 1.0).abs() < 1e-12);
+        assert_eq!(found.noise.total(), 0.0);
+        assert_eq!(found.patterns_seen(), 10);
+    }
+
+    #[test]
+    fn neighbours_point_the_same_way() {
+        let found = analysis(&Question::of(&SimulatedSettings::default()));
+        let nodes = &found.patterns[0].nodes_mm;
+        for row in 1..10 {
+            let along: f64 = (0..10)
+                .map(|node| nodes[10 * row + node].z * nodes[10 * row - 10 + node].z)
+                .sum();
+            assert!(along >= 0.0, "row {row}");
+        }
+    }
+
+    #[test]
+    fn every_source_of_noise_counts() {
+        let mut question = Question::of(&SimulatedSettings::default());
+        question.scene.noise = Noise {
+            relative: 3e-3,
+            drift: 4e-3,
+            ..Noise::default()
+        };
+        assert!((analysis(&question).noise.total() - 5e-3).abs() < 1e-15);
+        question.scene.noise = Noise {
+            converter_bits: Some(8),
+            ..Noise::default()
+        };
+        assert!(analysis(&question).noise.total() > 1e-4);
+    }
+
+    #[test]
+    fn a_mirrored_layout_is_told_unless_the_row_is_known() {
+        let mut question = Question::of(&SimulatedSettings::default());
+        question.sensor = SensorModel::new("10x6_3x18".parse().unwrap());
+        // Column nodes at 7.5, 12.5 and 17.5 mirror the rows about x = 12.5.
+        question.sensor.geometry.column_node_x0_mm = 7.5;
+        let is_alike = |found: &Analysis| {
+            let warnings = found.warnings.iter();
+            warnings
+                .clone()
+                .any(|warning| matches!(warning, IdentifiabilityWarning::RowsAlike { .. }))
+        };
+        assert!(is_alike(&analysis(&question)));
+        question.scene.rows = Rows::Known;
+        assert!(!is_alike(&analysis(&question)));
+    }
+
+    #[test]
+    fn each_axis_that_moves_has_its_pictures_and_impossible_questions_their_reason() {
+        let mut question = Question::of(&SimulatedSettings::default());
+        question.scene.movement = Movement::SIDEWAYS;
+        let found = analysis(&question);
+        assert_eq!((found.patterns.len(), found.sensitivities.len()), (3, 3));
+        assert!(Analysis::new(&question, Some(&found), || true).unwrap().is_none());
+        question.sensor.geometry.height_mm = -1.0;
+        let message = Analysis::new(&question, Some(&found), || false)
+            .unwrap_err()
+            .to_string();
+        assert!(message.contains("height"), "{message}");
+    }
+}

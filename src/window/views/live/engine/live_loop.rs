@@ -1,0 +1,111 @@
+use std::{
+    sync::mpsc::{Receiver, RecvTimeoutError, TryRecvError},
+    time::{Duration, Instant},
+};
+
+use super::{
+    message::{Command, LiveEvent, LivePlan, LiveShown},
+    session::Session,
+    target_session::TargetSession,
+};
+use crate::window::job::Report;
+
+/// Shortest time between frames that are shown.
+const BETWEEN_SHOWN: Duration = Duration::from_micros(16_600);
+/// Longest wait for a line of a device between looks at commands.
+const BETWEEN_LOOKS: Duration = Duration::from_millis(20);
+/// Longest wait for a command of a source that stands still.
+const LONGEST_WAIT: Duration = Duration::from_secs(60);
+
+/// A source under way and what decodes it.
+pub(super) trait LiveSession {
+    /// When the next frame is due, of a source that keeps time: `None` while it stands still.
+    fn due(&self, now: Instant) -> Option<Instant>;
+
+    /// Returns `true` for a source that comes by itself, and so may fall silent.
+    fn is_stream(&self) -> bool;
+
+    /// Returns `true` if something has come that the window does not know.
+    fn has_news(&self) -> bool;
+
+    /// Takes what the source has, waiting for a stream at most until `latest`. Returns the end of the source once it
+    /// comes.
+    fn take_next(&mut self, latest: Instant, send: &dyn Fn(LiveEvent)) -> Option<Result<(), String>>;
+
+    /// Obeys a command.
+    fn obey(&mut self, command: Command, send: &dyn Fn(LiveEvent)) -> Result<(), String>;
+
+    /// Ends the recording, if there is one.
+    fn end_recording(&mut self, reason: Option<String>, send: &dyn Fn(LiveEvent));
+
+    /// The last frame with an answer, and how decoding stands, to be shown now.
+    fn show(&mut self) -> LiveShown;
+}
+
+/// Decodes what `plan` says until its source ends, the sender of the commands is gone, or the work is cancelled.
+///
+/// # Errors
+/// If decoding cannot begin or go on, with the reason.
+pub fn run(plan: LivePlan, commands: &Receiver<Command>, report: &Report<LiveEvent>) -> Result<(), String> {
+    let send = |event| report.send(event);
+    let source = plan.source.looked_up();
+    send(LiveEvent::Source(source.clone()));
+    let plan = LivePlan { source, ..plan };
+    let is_wanted = || !report.is_cancelled();
+    let session: Option<Box<dyn LiveSession>> = match plan.settings {
+        Some(settings) => Session::open(plan, &settings, &is_wanted)?.map(|session| Box::new(session) as _),
+        None => TargetSession::open(&plan, &is_wanted)?.map(|session| Box::new(session) as _),
+    };
+    let Some(mut session) = session else { return Ok(()) };
+    let end = decode(&mut *session, commands, report);
+    session.end_recording(None, &send);
+    // What came last stays in view.
+    show(&mut *session, report);
+    end
+}
+
+fn decode(
+    session: &mut dyn LiveSession,
+    commands: &Receiver<Command>,
+    report: &Report<LiveEvent>,
+) -> Result<(), String> {
+    let send = |event| report.send(event);
+    let mut is_drawn = true;
+    let mut shown = Instant::now().checked_sub(BETWEEN_SHOWN);
+    while !report.is_cancelled() {
+        let now = Instant::now();
+        let may_show_at = shown.map_or(now, |shown| shown + BETWEEN_SHOWN);
+        if session.has_news() && is_drawn && may_show_at <= now {
+            show(session, report);
+            (is_drawn, shown) = (false, Some(now));
+        }
+        let mut until = session.due(now).unwrap_or(now + LONGEST_WAIT);
+        if session.has_news() && is_drawn {
+            until = until.min(may_show_at);
+        }
+        // A stream waits for its lines instead.
+        let command = if until <= now || session.is_stream() {
+            commands.try_recv().map_err(|error| match error {
+                TryRecvError::Empty => RecvTimeoutError::Timeout,
+                TryRecvError::Disconnected => RecvTimeoutError::Disconnected,
+            })
+        } else {
+            commands.recv_timeout(until - now)
+        };
+        match command {
+            Ok(Command::Drawn) => is_drawn = true,
+            Ok(command) => session.obey(command, &send)?,
+            Err(RecvTimeoutError::Timeout) => {
+                if let Some(end) = session.take_next(now + BETWEEN_LOOKS, &send) {
+                    return end;
+                }
+            }
+            Err(RecvTimeoutError::Disconnected) => break,
+        }
+    }
+    Ok(())
+}
+
+fn show(session: &mut dyn LiveSession, report: &Report<LiveEvent>) {
+    report.progress(LiveEvent::Shown(Box::new(session.show())), |_, _| {});
+}

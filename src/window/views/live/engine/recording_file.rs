@@ -1,0 +1,121 @@
+use std::{
+    fs::{self, File, OpenOptions},
+    io::{self, ErrorKind},
+    path::{Path, PathBuf},
+};
+
+use super::message::Recorded;
+use decoupler_core::{live::Recorder, text::system_cause};
+
+/// A recording under way: every frame is in the file as soon as it has come.
+#[derive(Debug)]
+pub(super) struct RecordingFile {
+    path: PathBuf,
+    recorder: Recorder<File>,
+    frames: u64,
+    /// Times of the first and the last frame in seconds.
+    span_s: Option<(f64, f64)>,
+}
+
+impl RecordingFile {
+    /// Creates a file with a name of its own in `folder`, which is made if it is missing.
+    ///
+    /// # Errors
+    /// If there can be no such file, with the reason.
+    pub(super) fn create(folder: &Path, rows: &[usize], columns: usize) -> Result<Self, String> {
+        let created = fs::create_dir_all(folder).and_then(|()| new_file(folder));
+        let refused = |error: io::Error| {
+            let (folder, cause) = (folder.display(), system_cause(&error));
+            format!("cannot record to the folder '{folder}': {cause}")
+        };
+        let (path, file) = created.map_err(refused)?;
+        let recorder = Recorder::new(file, rows, columns).map_err(refused)?;
+        Ok(Self {
+            path,
+            recorder,
+            frames: 0,
+            span_s: None,
+        })
+    }
+
+    pub(super) fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Writes a frame.
+    ///
+    /// # Errors
+    /// If it cannot be written, with the reason; the frames before stay in the file.
+    pub(super) fn record(&mut self, time_s: f64, frame_ohm: &[f64]) -> Result<(), String> {
+        self.recorder.record(time_s, frame_ohm).map_err(|error| {
+            let (path, cause) = (self.path.display(), system_cause(&error));
+            format!("the recording '{path}' has ended: {cause}; the frames before are kept")
+        })?;
+        self.frames += 1;
+        self.span_s = Some((self.span_s.map_or(time_s, |(first_s, _)| first_s), time_s));
+        Ok(())
+    }
+
+    /// Number of frames, and time from the first to the last in seconds.
+    pub(super) fn length(&self) -> (u64, f64) {
+        (
+            self.frames,
+            self.span_s.map_or(0.0, |(first_s, last_s)| last_s - first_s),
+        )
+    }
+
+    /// Ends the recording.
+    pub(super) fn end(self) -> Recorded {
+        let (frames, seconds) = self.length();
+        Recorded {
+            path: self.path,
+            frames,
+            seconds,
+        }
+    }
+}
+
+fn new_file(folder: &Path) -> io::Result<(PathBuf, File)> {
+    let mut number = 1_u64;
+    loop {
+        let path = folder.join(format!("recording-{number:04}.csv"));
+        match OpenOptions::new().write(true).create_new(true).open(&path) {
+            Ok(file) => return Ok((path, file)),
+            Err(error) if error.kind() == ErrorKind::AlreadyExists => number += 1,
+            Err(error) => return Err(error),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::io::BufReader;
+
+    use super::*;
+    use decoupler_core::live::Recording;
+
+    #[test]
+    fn every_recording_has_a_file_of_its_own_that_is_whole_after_each_frame() {
+        let folder = tempfile::tempdir().unwrap();
+        let folder = folder.path().join("not yet there");
+        let [mut first, second] = [0, 1].map(|_| RecordingFile::create(&folder, &[0], 2).unwrap());
+        assert_ne!(first.path(), second.path());
+        for frame in 1..=3 {
+            first.record(0.5 * f64::from(frame), &[1.0, f64::from(frame)]).unwrap();
+            let file = BufReader::new(File::open(first.path()).unwrap());
+            let recording = Recording::read(file, &[0], 1, 2).unwrap();
+            assert_eq!(recording.times_s().len(), frame as usize);
+        }
+        let recorded = first.end();
+        assert_eq!((recorded.frames, recorded.seconds), (3, 1.0));
+    }
+
+    #[test]
+    fn a_folder_that_cannot_be_made_is_told() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("file");
+        fs::write(&file, "").unwrap();
+        let message = RecordingFile::create(&file.join("recordings"), &[0], 2).unwrap_err();
+        assert!(message.starts_with("cannot record to the folder"), "{message}");
+    }
+}

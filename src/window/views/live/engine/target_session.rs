@@ -1,0 +1,283 @@
+use std::{collections::VecDeque, sync::Arc, time::Instant};
+
+use super::{
+    counts::Tally,
+    frame_source::Next,
+    live_loop::LiveSession,
+    message::{Arrived, Command, LiveEvent, LivePlan, LiveShown, LiveTargets},
+    target_source::TargetSource,
+};
+use decoupler_core::{
+    decoupling::{CompiledNetworks, Decoder},
+    evaluation::Problem,
+};
+use decoupler_files::{export::NetworkFile, figure::TargetSurface};
+
+/// Length of the history in seconds.
+const HISTORY_S: f64 = 20.0;
+/// Most values in the history, over all targets.
+const MOST_VALUES: usize = 20_000;
+
+/// A source of samples, and the network of a recording that decodes them.
+#[derive(Debug)]
+pub(super) struct TargetSession {
+    network: Arc<NetworkFile>,
+    problem: Arc<Problem>,
+    surface: Option<Arc<TargetSurface>>,
+    compiled: CompiledNetworks<f64>,
+    source: TargetSource,
+    tally: Tally,
+    /// The last sample as it came: index of its network, then the readings.
+    sample: Vec<f64>,
+    answer: Vec<f64>,
+    history: VecDeque<(f64, Arc<[f64]>)>,
+    ranges: Vec<(f64, f64)>,
+    outside: (Option<usize>, usize),
+    has_news: bool,
+}
+
+impl TargetSession {
+    /// Prepares to decode what `plan` says; `None` if that is no longer wanted.
+    pub(super) fn open(plan: &LivePlan, is_wanted: &dyn Fn() -> bool) -> Result<Option<Self>, String> {
+        let Some(source) = TargetSource::open(plan, is_wanted)? else {
+            return Ok(None);
+        };
+        let (network, problem) = (Arc::clone(&plan.network), Arc::new(plan.network.problem.clone()));
+        let surface = TargetSurface::new(&problem.positions, &problem.targets);
+        let surface = surface.ok().filter(|_| !problem.positions.is_empty());
+        Ok(Some(Self {
+            compiled: CompiledNetworks::new(&network.network, network.network.values().len()),
+            source,
+            tally: Tally::new(Instant::now()),
+            sample: vec![0.0; 1 + problem.inputs.len()],
+            answer: vec![0.0; problem.targets.len()],
+            history: VecDeque::new(),
+            ranges: vec![(f64::INFINITY, f64::NEG_INFINITY); problem.targets.len()],
+            outside: (None, 0),
+            has_news: false,
+            surface: surface.map(Arc::new),
+            network,
+            problem,
+        }))
+    }
+
+    fn decode(&mut self, arrived: Arrived) {
+        self.has_news = true;
+        let (row_index, readings) = (self.sample[0] as usize, &self.sample[1..]);
+        let is_answered = self.compiled.decode_row(row_index, readings, &mut self.answer) == Ok(());
+        if !is_answered || self.answer.iter().any(|value| !value.is_finite()) {
+            let reason = "readings so far from the training range that the network has no answer";
+            self.tally.bad(format!("sample at {:.3} s: {reason}", arrived.time_s));
+            return;
+        }
+        let network = self.network.network.at(row_index);
+        let inputs = network.inputs();
+        let readings = inputs.range();
+        let readings = readings.map(|range| range.outside(inputs.quantity(), &self.sample[1..]).count());
+        self.outside = (readings, network.outputs().far_outside(&self.answer).count());
+        for ((low, high), &value) in self.ranges.iter_mut().zip(&self.answer) {
+            (*low, *high) = (low.min(value), high.max(value));
+        }
+        // A replay that went back begins its history again.
+        if self.history.back().is_some_and(|(time_s, _)| *time_s > arrived.time_s) {
+            self.history.clear();
+        }
+        self.history.push_back((arrived.time_s, self.answer.as_slice().into()));
+        let most = (MOST_VALUES / self.answer.len().max(1)).max(2);
+        let is_old = |(time_s, _): &(f64, Arc<[f64]>)| *time_s < arrived.time_s - HISTORY_S;
+        while self.history.len() > most || self.history.front().is_some_and(is_old) {
+            self.history.pop_front();
+        }
+        self.tally.good(arrived.read_at, Instant::now(), None);
+    }
+}
+
+impl LiveSession for TargetSession {
+    fn due(&self, now: Instant) -> Option<Instant> {
+        match &self.source {
+            TargetSource::Replay(replay) => replay.due(now),
+            TargetSource::Stream(_) => Some(now),
+        }
+    }
+
+    fn is_stream(&self) -> bool {
+        matches!(self.source, TargetSource::Stream(_))
+    }
+
+    fn has_news(&self) -> bool {
+        self.has_news
+    }
+
+    fn take_next(&mut self, latest: Instant, _send: &dyn Fn(LiveEvent)) -> Option<Result<(), String>> {
+        let patience = latest.saturating_duration_since(Instant::now());
+        match self.source.next(patience, &mut self.sample, &mut self.tally) {
+            Next::Frame(arrived) => self.decode(arrived),
+            Next::Bad(reason) => {
+                self.tally.bad(reason);
+                self.has_news = true;
+            }
+            Next::Nothing if self.is_stream() => self.has_news |= self.tally.falls_silent(Instant::now()),
+            Next::Nothing => {}
+            Next::End(Ok(())) if self.tally.counts().decoded == 0 => {
+                let reason = self.tally.counts().last_bad;
+                let reason = reason.unwrap_or_else(|| "it has no line of readings".to_owned());
+                return Some(Err(format!("no line could be decoded: {reason}")));
+            }
+            Next::End(end) => return Some(end),
+        }
+        None
+    }
+
+    /// Re-zero, faults and recordings of frames need the model of an array.
+    fn obey(&mut self, command: Command, _send: &dyn Fn(LiveEvent)) -> Result<(), String> {
+        if let TargetSource::Replay(replay) = &mut self.source {
+            let now = Instant::now();
+            match command {
+                Command::Seek(at_s) => replay.seek(at_s, now),
+                Command::Speed(speed) => replay.set_speed(speed, now),
+                Command::Play(is_playing) => replay.play(is_playing, now),
+                _ => return Ok(()),
+            }
+            self.has_news = true;
+        }
+        Ok(())
+    }
+
+    fn end_recording(&mut self, _reason: Option<String>, _send: &dyn Fn(LiveEvent)) {}
+
+    fn show(&mut self) -> LiveShown {
+        self.has_news = false;
+        let latest = self.history.back().map(|(time_s, _)| *time_s);
+        LiveShown {
+            frame: None,
+            targets: latest.map(|_| LiveTargets {
+                problem: Arc::clone(&self.problem),
+                surface: self.surface.clone(),
+                ranges: self.ranges.clone(),
+                history: self.history.iter().cloned().collect(),
+                readings_outside: self.outside.0,
+                targets_outside: self.outside.1,
+            }),
+            counts: self.tally.counts(),
+            recording: None,
+            replay: match (&self.source, latest) {
+                (TargetSource::Replay(replay), Some(time_s)) => Some(replay.state(time_s)),
+                _ => None,
+            },
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::{fmt::Write as _, fs, path::Path, sync::mpsc::channel};
+
+    use super::*;
+    use crate::window::{
+        job::Job,
+        views::live::engine::{SourcePlan, run},
+    };
+    use decoupler_core::{
+        evaluation::{Measured, RunSettings},
+        scene::RowModel,
+    };
+    use decoupler_files::import::{Plan, Recipe, Setup};
+
+    /// A network of a recording, and the file that it was trained on.
+    fn network(folder: &Path) -> (Arc<NetworkFile>, std::path::PathBuf) {
+        let mut text = "time,u1,u2,x (mm)\n".to_owned();
+        for row in 0..40 {
+            let (u1, u2) = (f64::from(row % 7), f64::from(row % 5));
+            writeln!(text, "{row},{u1},{u2},{}", u1 + 2.0 * u2).unwrap();
+        }
+        let path = folder.join("press.csv");
+        fs::write(&path, text).unwrap();
+        let plan = Plan {
+            import: Recipe {
+                data: path.clone(),
+                inputs: vec!["u1".to_owned(), "u2".to_owned()],
+                targets: vec!["x".to_owned()],
+                time: Some("time".to_owned()),
+                ..Recipe::default()
+            },
+            ..Plan::default()
+        };
+        let mut settings = RunSettings::from(Measured { rows: RowModel::Shared });
+        settings.training.stopping.epochs = 3;
+        let setup = Setup::recording(settings, plan);
+        let sets = setup.sets(Path::new(""), &|| false, &mut |_| ()).unwrap().unwrap();
+        let mut run = sets.run(&setup, &|| false).unwrap().unwrap();
+        while run.step().is_none() {}
+        let file = NetworkFile::from_run(&run, sets.recorded()).unwrap();
+        (Arc::new(file), path)
+    }
+
+    fn plan(network: &Arc<NetworkFile>, path: &Path) -> LivePlan {
+        LivePlan {
+            network: Arc::clone(network),
+            settings: None,
+            source: SourcePlan::Replay {
+                path: path.to_owned(),
+                at_s: 0.0,
+                speed: 1.0,
+                is_playing: false,
+            },
+            noise: 0.0,
+            zero: None,
+            recordings: std::path::PathBuf::new(),
+        }
+    }
+
+    #[test]
+    fn a_replayed_file_is_decoded_by_the_names_of_its_columns() {
+        let folder = tempfile::tempdir().unwrap();
+        let (network, _) = network(folder.path());
+        // Other columns before and between, in another order.
+        let path = folder.path().join("other.csv");
+        fs::write(&path, "note,u2,u1\n1,2,3\n1,4,6\n").unwrap();
+        let mut session = TargetSession::open(&plan(&network, &path), &|| true).unwrap().unwrap();
+        assert!(session.take_next(Instant::now(), &|_| ()).is_none());
+        let shown = session.show();
+        let mut expected = [0.0];
+        let mut compiled = CompiledNetworks::<f64>::new(&network.network, 1);
+        compiled.decode_row(0, &[3.0, 2.0], &mut expected).unwrap();
+        let targets = shown.targets.unwrap();
+        assert_eq!(targets.values(), expected);
+        assert_eq!(targets.problem.targets[0].title(), "x (mm)");
+        assert_eq!((shown.counts.decoded, shown.replay.unwrap().length_s), (1, 0.02));
+    }
+
+    #[test]
+    fn a_file_without_an_input_is_refused_by_its_name() {
+        let folder = tempfile::tempdir().unwrap();
+        let (network, _) = network(folder.path());
+        let path = folder.path().join("other.csv");
+        fs::write(&path, "u2,v\n1,2\n").unwrap();
+        let message = TargetSession::open(&plan(&network, &path), &|| true).unwrap_err();
+        assert!(message.contains("u1"), "{message}");
+    }
+
+    #[test]
+    fn the_loop_decodes_a_network_of_a_recording() {
+        let folder = tempfile::tempdir().unwrap();
+        let (network, path) = network(folder.path());
+        let plan = plan(&network, &path);
+        let (commands, incoming) = channel();
+        let (woke, wakes) = channel();
+        let mut job: Job<LiveEvent> = Job::prompt("live", Arc::new(move || woke.send(()).unwrap_or(())));
+        job.start(
+            move |report| run(plan, &incoming, report),
+            |ended| LiveEvent::Ended(ended.unwrap_or_else(|error| Err(error.to_string()))),
+        );
+        let shown = loop {
+            match job.next_event() {
+                Some(LiveEvent::Shown(shown)) if shown.has_answer() => break shown,
+                Some(LiveEvent::Ended(ended)) => panic!("{ended:?}"),
+                Some(_) => {}
+                None => wakes.recv_timeout(std::time::Duration::from_secs(60)).unwrap(),
+            }
+        };
+        assert!(shown.frame.is_none() && shown.targets.unwrap().values().len() == 1);
+        drop(commands);
+    }
+}

@@ -1,0 +1,224 @@
+use eframe::egui::{RichText, Ui};
+
+use super::{
+    LiveView,
+    engine::{LiveFrame, Recorded, Watched},
+    files::{save_recording, save_zero},
+};
+use crate::window::{
+    glossary,
+    shared::{Effect, Shared},
+    theme::{Theme, space, type_size},
+    widgets::{coloured_fact_ui, dim_ui, fact_ui, fields::capitalised, ghost_button, note_ui, section_heading_ui},
+};
+use decoupler_core::{
+    live::{FaultyWire, ZeroGains},
+    text::counted,
+};
+use decoupler_files::export::{format_duration, format_number, format_percent};
+
+/// Confidence, faults, the stream, the unloaded state and the recording.
+pub fn figures_ui(ui: &mut Ui, view: &mut LiveView, shared: &Shared, effects: &mut Vec<Effect>) {
+    let Some(frame) = view.shown.frame.clone() else { return };
+    warnings_ui(ui, &frame);
+    section_heading_ui(ui, "Confidence");
+    confidence_ui(ui, view, &frame, shared);
+    section_heading_ui(ui, "Stream");
+    stream_ui(ui, view);
+    section_heading_ui(ui, "Zero");
+    zero_ui(ui, view, effects);
+    section_heading_ui(ui, "Recording");
+    recording_ui(ui, view, shared, effects);
+    ui.add_space(space(2));
+}
+
+/// Warnings, above everything else.
+fn warnings_ui(ui: &mut Ui, frame: &LiveFrame) {
+    match &frame.watched {
+        Watched::Named(diagnosis) => {
+            let its = match diagnosis.wire {
+                FaultyWire::Row(_) | FaultyWire::Column(_) => "Its readings are left out",
+                FaultyWire::Rows(_) | FaultyWire::Columns(_) => "Their readings are left out",
+            };
+            let text = capitalised(&diagnosis.to_string());
+            note_ui(
+                ui,
+                &format!("{text}. {its}, and the others decoded by Gauss-Newton steps on Eq. (2)."),
+            );
+        }
+        Watched::Unexplained => {
+            note_ui(
+                ui,
+                "The readings contradict Eq. (2), and no fault of a single wire explains them: the answers may be wrong. \
+                 Check the wiring, the geometry, the order of the rows, and the relative noise on the left.",
+            );
+        }
+        Watched::Off(_) | Watched::Sound => {}
+    }
+}
+
+/// Rate, latency and losses of the stream.
+pub fn stream_ui(ui: &mut Ui, view: &LiveView) {
+    let counts = &view.shown.counts;
+    let rate = if counts.is_waiting {
+        "waiting".to_owned()
+    } else {
+        format!("{:.0} frames a second", counts.frames_per_second)
+    };
+    fact_ui(ui, "Rate", "Frames per second (recent).", &rate);
+    let latency = counts.latency.map_or_else(
+        || format_number(None),
+        |[median, high]| format!("p50 {}, p99 {}", format_duration(median), format_duration(high)),
+    );
+    let hint = "Time from reading a frame to its answer: median, and the 99th percentile, which one frame in a hundred \
+                exceeds.";
+    fact_ui(ui, "Latency", hint, &latency);
+    fact_ui(
+        ui,
+        "Decoded",
+        "Frames decoded since the start.",
+        &counts.decoded.to_string(),
+    );
+    let hint = "Frames (of a device: lines) that came faster than they could be decoded: the latest wins.";
+    fact_ui(ui, "Dropped", hint, &counts.dropped.to_string());
+    let hint = "Lines that were no frame, and frames without an answer.";
+    fact_ui(ui, "Bad", hint, &counts.bad.to_string());
+    if let Some(reason) = &counts.last_bad {
+        dim_ui(ui, &format!("Last: {reason}"));
+    }
+}
+
+fn confidence_ui(ui: &mut Ui, view: &LiveView, frame: &LiveFrame, shared: &Shared) {
+    let noise = view.network.network(&shared.runs);
+    let noise = noise.and_then(|(_, file)| Some(view.source.noise(&file.settings.simulated()?)));
+    let mut residual = format_percent(100.0 * frame.residual);
+    if let Some(noise) = noise.filter(|noise| *noise > 0.0 && frame.residual.is_finite()) {
+        residual += &format!(" ({} × noise)", format_number(frame.residual / noise));
+    }
+    let hint = format!(
+        "{}\n\nIt is as small as the noise of a reading if the answer explains everything.",
+        glossary::RESIDUAL.hint
+    );
+    fact_ui(ui, "Residual of Eq. (2)", &hint, &residual);
+    outside_ui(ui, frame);
+    let hint = glossary::WIRE_FAULT.hint;
+    match &frame.watched {
+        Watched::Off(reason) => {
+            dim_ui(ui, &format!("Faults of wires are {reason}."));
+        }
+        Watched::Sound => fact_ui(ui, "Fault", hint, "none"),
+        Watched::Unexplained => fact_ui(ui, "Fault", hint, "of no single wire"),
+        Watched::Named(diagnosis) => fact_ui(ui, "Fault", hint, &diagnosis.wire.to_string()),
+    }
+    let Some(errors) = frame.errors else { return };
+    let in_mm = |mm: Option<f64>| match mm {
+        Some(mm) => format!("{} mm", format_number(mm)),
+        None => format_number(None),
+    };
+    let hint = "Mean |error| of z over all nodes against the simulated truth, lately.";
+    fact_ui(ui, "Error", hint, &in_mm(errors.shown_mm));
+    if let Some([by_all, left_out]) = errors.since_named_mm {
+        let hint = "Mean |error| of z since the fault was named, by the network with all wires.";
+        fact_ui(ui, "Error with all wires", hint, &in_mm(Some(by_all)));
+        let hint = "Mean |error| of z since the fault was named, without the wires at fault.";
+        fact_ui(ui, "Error without the fault", hint, &in_mm(Some(left_out)));
+    }
+}
+
+fn outside_ui(ui: &mut Ui, frame: &LiveFrame) {
+    let (readings, coordinates) = (frame.readings_outside, frame.coordinates_outside);
+    let hint = "Readings beyond the range seen in training by more than a tenth of it, and coordinates beyond by more \
+                than all of it. There the network extrapolates: check these readings, or train with a scene that covers \
+                them, for the simulated source with an indenter as the loading.";
+    let value = match readings {
+        None => "readings not known".to_owned(),
+        Some(0) if coordinates == 0 => "none".to_owned(),
+        Some(readings) => format!("{} of {}", counted(readings, "reading"), frame.drops_percent.len()),
+    };
+    let is_outside = readings.unwrap_or(0) + coordinates > 0;
+    let value = match coordinates {
+        0 => value,
+        number => format!("{value}, {}", counted(number, "coordinate")),
+    };
+    let palette = Theme::of(ui).palette;
+    let colour = if is_outside { palette.warning } else { palette.text };
+    coloured_fact_ui(ui, "Outside training", hint, &value, colour);
+}
+
+fn zero_ui(ui: &mut Ui, view: &mut LiveView, effects: &mut Vec<Effect>) {
+    if let Some(problem) = &view.zero_problem {
+        note_ui(ui, &format!("Not re-zeroed: {problem}."));
+    }
+    let Some(zero) = view.zero.clone() else {
+        dim_ui(
+            ui,
+            "Readings are compared with the model at rest. Re-zero takes the array as it is now instead.",
+        );
+        return;
+    };
+    let hint = "Smallest and largest gain: reading in the unloaded state over the resistance of the model at rest.";
+    fact_ui(ui, "Gains", hint, &gains_in_words(&zero));
+    let hint =
+        "Rows on which something was held: they took the gains of their columns only, so that the contact stays.";
+    let touched = zero.in_contact.iter().filter(|touched| **touched).count();
+    fact_ui(
+        ui,
+        "Rows in contact",
+        hint,
+        &format!("{touched} of {}", zero.in_contact.len()),
+    );
+    ui.horizontal(|ui| {
+        let task = save_zero(&zero);
+        let save = ui.add(ghost_button("Save zero…"));
+        if save.on_hover_text(task.words.description).clicked() {
+            effects.push(Effect::ChooseFile(task));
+        }
+        let clear = ui.add(ghost_button("Clear zero"));
+        if clear
+            .on_hover_text("Compares readings with the model at rest again.")
+            .clicked()
+        {
+            view.clear_zero();
+        }
+    });
+}
+
+fn gains_in_words(zero: &ZeroGains) -> String {
+    let (low, high) = (zero.gains.iter()).fold((f64::MAX, f64::MIN), |(low, high), &gain| {
+        (low.min(gain), high.max(gain))
+    });
+    format!("{low:.4} to {high:.4}")
+}
+
+fn recording_ui(ui: &mut Ui, view: &mut LiveView, shared: &Shared, effects: &mut Vec<Effect>) {
+    if let Some((frames, seconds)) = view.shown.recording.filter(|_| view.recording.is_some()) {
+        let palette = Theme::of(ui).palette;
+        let text = format!("● {}, {seconds:.1} s", counted(frames, "frame"));
+        ui.label(RichText::new(text).size(type_size().note).color(palette.bad));
+        return;
+    }
+    let Some(recorded) = view.recorded.clone() else {
+        dim_ui(
+            ui,
+            "Record keeps every frame with its time, to be replayed with any network.",
+        );
+        return;
+    };
+    let Recorded { path, frames, seconds } = &recorded;
+    dim_ui(ui, &format!("Recorded {}, {seconds:.1} s.", counted(*frames, "frame")))
+        .on_hover_text(path.display().to_string());
+    ui.horizontal(|ui| {
+        let replay = ui.add_enabled(*frames > 0, ghost_button("Replay recording"));
+        if replay
+            .on_hover_text("Replays it with the network on the left.")
+            .clicked()
+        {
+            view.replay_recorded(shared, effects);
+        }
+        let task = save_recording(&recorded);
+        let save = ui.add(ghost_button("Save recording…"));
+        if save.on_hover_text(task.words.description).clicked() {
+            effects.push(Effect::ChooseFile(task));
+        }
+    });
+}

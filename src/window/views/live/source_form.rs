@@ -1,0 +1,254 @@
+use std::{
+    path::PathBuf,
+    sync::mpsc::{Receiver, channel},
+};
+
+use eframe::egui::{TextEdit, Ui, vec2};
+
+use super::{engine::SourcePlan, files::LiveFile};
+use crate::window::{
+    shared::Effect,
+    theme::space,
+    widgets::{
+        dim_ui,
+        fields::{count_ui, quantity_ui},
+        ghost_button, segmented_ui,
+    },
+};
+use decoupler_core::{
+    evaluation::SimulatedSettings,
+    live::{Motion, Source},
+    scene::Fault,
+};
+
+/// The source of the frames, as the user sets it up.
+#[derive(Debug)]
+pub struct SourceForm {
+    /// Kind of source.
+    pub kind: SourceKind,
+    /// Motion of the simulated indenter.
+    pub motion: Motion,
+    /// File to be replayed, as typed.
+    pub path: String,
+    /// Recorded seconds per second.
+    pub speed: f64,
+    frames_per_second: f64,
+    /// Noise of a reading, if it is another than that of the network's scene.
+    noise: Option<f64>,
+    port: String,
+    baud: usize,
+    address: String,
+    chosen: Option<Receiver<PathBuf>>,
+}
+
+/// Kind of source.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum SourceKind {
+    /// Without hardware.
+    Simulated,
+    /// A recording, or another file of frames.
+    Replay,
+    /// A serial port.
+    Serial,
+    /// A socket.
+    Tcp,
+}
+
+/// Noise of a reading of a real source where the network's scene has none.
+const USUAL_NOISE: f64 = 1e-3;
+
+/// The same of the simulated source: a network trained without noise amplifies more than this beyond recognition.
+const SLIGHT_NOISE: f64 = 1e-5;
+
+impl Default for SourceForm {
+    fn default() -> Self {
+        Self {
+            kind: SourceKind::Simulated,
+            motion: Motion::Wandering,
+            path: String::new(),
+            speed: 1.0,
+            frames_per_second: 50.0,
+            noise: None,
+            port: "/dev/ttyUSB0".to_owned(),
+            baud: 115_200,
+            address: "localhost:5000".to_owned(),
+            chosen: None,
+        }
+    }
+}
+
+impl SourceForm {
+    /// Noise of a reading, relative to it, for a network of these settings.
+    pub fn noise(&self, settings: &SimulatedSettings) -> f64 {
+        let noise = settings.source.scene.noise.in_test();
+        let of_scene = match self.kind {
+            _ if !noise.is_none() => noise.relative,
+            SourceKind::Simulated => SLIGHT_NOISE,
+            SourceKind::Replay | SourceKind::Serial | SourceKind::Tcp => USUAL_NOISE,
+        };
+        self.noise.unwrap_or(of_scene)
+    }
+
+    /// The source; that of a file begins at `at_s`. Asked in every frame, it asks no file system.
+    ///
+    /// # Errors
+    /// If something is still to be filled in, with what to do.
+    pub fn plan(&self, fault: Option<Fault>, at_s: f64) -> Result<SourcePlan, String> {
+        let filled = |text: &str, todo: &str| match text.trim() {
+            "" => Err(todo.to_owned()),
+            text => Ok(text.to_owned()),
+        };
+        Ok(match self.kind {
+            SourceKind::Simulated => SourcePlan::Simulated {
+                frames_per_second: self.frames_per_second,
+                motion: self.motion,
+                fault,
+            },
+            SourceKind::Replay => {
+                let path = PathBuf::from(filled(&self.path, "Choose a file of frames, or record one.")?);
+                SourcePlan::Replay {
+                    path,
+                    at_s,
+                    speed: self.speed,
+                    is_playing: true,
+                }
+            }
+            SourceKind::Serial => SourcePlan::Stream(Source::Serial {
+                path: filled(
+                    &self.port,
+                    "Give the name of the serial port, for example /dev/ttyUSB0 or COM3.",
+                )?,
+                baud: u32::try_from(self.baud).unwrap_or(u32::MAX),
+            }),
+            SourceKind::Tcp => {
+                let address = filled(
+                    &self.address,
+                    "Give the address as HOST:PORT, for example localhost:5000.",
+                )?;
+                let source: Result<Source, _> = format!("tcp:{address}").parse();
+                SourcePlan::Stream(source.map_err(|error| error.to_string())?)
+            }
+        })
+    }
+
+    /// Takes the file that the user has chosen; returns `true` if there is one.
+    pub fn take_news(&mut self) -> bool {
+        let path = self.chosen.as_ref().and_then(|chosen| chosen.try_recv().ok());
+        let Some(path) = path else { return false };
+        self.chosen = None;
+        self.path = path.display().to_string();
+        true
+    }
+
+    /// Shows the form; `settings` are those of the network, if one of an array is chosen, and `has_sensor` is false for one
+    /// of a recording. What begins with the source can be changed only while none is running.
+    pub fn form_ui(
+        &mut self,
+        ui: &mut Ui,
+        (settings, has_sensor): (Option<&SimulatedSettings>, bool),
+        is_running: bool,
+        effects: &mut Vec<Effect>,
+    ) {
+        ui.add_enabled_ui(!is_running, |ui| {
+            let kinds = [
+                (SourceKind::Simulated, "Simulated"),
+                (SourceKind::Replay, "Replay"),
+                (SourceKind::Serial, "Serial"),
+                (SourceKind::Tcp, "TCP"),
+            ];
+            let kinds = if has_sensor { &kinds[..] } else { &kinds[1..] };
+            self.kind = segmented_ui(ui, "Source", kinds, self.kind, false).unwrap_or(self.kind);
+            ui.add_space(space(1));
+            match self.kind {
+                SourceKind::Simulated => {
+                    let hint = "Rate at which the simulated array is read.";
+                    let rate = &mut self.frames_per_second;
+                    quantity_ui(ui, "Frames a second", hint, rate, 0.1..=10_000.0, "Hz");
+                }
+                SourceKind::Replay => self.file_ui(ui, has_sensor, effects),
+                SourceKind::Serial => {
+                    let hint = "Name of the port: /dev/ttyUSB0, /dev/ttyACM0, COM3.";
+                    text_ui(ui, "Port", hint, &mut self.port);
+                    let hint = "Bits a second, as the device sends: 8 data bits, no parity, 1 stop bit.";
+                    count_ui(ui, "Baud", hint, &mut self.baud, 1..=100_000_000);
+                    dim_ui(ui, if has_sensor { LINES } else { INPUT_LINES });
+                }
+                SourceKind::Tcp => {
+                    let hint = "Host and port of the sender, as HOST:PORT.";
+                    text_ui(ui, "Address", hint, &mut self.address);
+                    dim_ui(ui, if has_sensor { LINES } else { INPUT_LINES });
+                }
+            }
+            self.noise_ui(ui, settings);
+        });
+        if self.kind == SourceKind::Simulated && has_sensor {
+            let motions = [
+                (Motion::Wandering, "Wander"),
+                (Motion::Held, "Hold"),
+                (Motion::Lifted, "Lift"),
+            ];
+            ui.label("Indenter");
+            self.motion = segmented_ui(ui, "Indenter", &motions, self.motion, true).unwrap_or(self.motion);
+        }
+    }
+
+    fn noise_ui(&mut self, ui: &mut Ui, settings: Option<&SimulatedSettings>) {
+        let Some(settings) = settings else { return };
+        let hint = match self.kind {
+            SourceKind::Simulated => {
+                "Noise of a simulated reading, relative to the reading (standard deviation). Faults are judged by it."
+            }
+            _ => {
+                "Noise of a reading of your device, relative to the reading (standard deviation). Faults and contacts \
+                 are judged by it: too small a value finds faults that are none."
+            }
+        };
+        let before = self.noise(settings);
+        let mut noise = before;
+        quantity_ui(ui, "Relative noise", hint, &mut noise, 0.0..=1.0, "");
+        if noise != before {
+            self.noise = Some(noise);
+        }
+    }
+
+    fn file_ui(&mut self, ui: &mut Ui, has_sensor: bool, effects: &mut Vec<Effect>) {
+        let hint = if has_sensor {
+            "CSV of frames: a recording made here, or lines of resistances in ohm as the terminal command decode reads them."
+        } else {
+            "File with the inputs of the network under their names, such as the recording that it was trained on."
+        };
+        text_ui(ui, "Frames", hint, &mut self.path);
+        let file = LiveFile::Frames;
+        if ui
+            .add(ghost_button(file.button()))
+            .on_hover_text(file.words().description)
+            .clicked()
+        {
+            let (send, chosen) = channel();
+            self.chosen = Some(chosen);
+            effects.push(Effect::ChooseFile(file.choose(send)));
+        }
+        dim_ui(
+            ui,
+            if has_sensor {
+                "Frames without a column time_s come 50 times a second."
+            } else {
+                "Samples come 50 times a second."
+            },
+        );
+    }
+}
+
+const LINES: &str = "Lines of CSV: the number of the row-wire and its resistances in ohm, or a whole snapshot in one \
+                     line, row by row.";
+
+const INPUT_LINES: &str = "Lines of CSV: the inputs of the network in their order, after the number of the row-wire if there is a \
+                           network for each, or under their names in a header.";
+
+fn text_ui(ui: &mut Ui, name: &str, hint: &str, text: &mut String) {
+    let label = ui.label(name).on_hover_text(hint);
+    let edit = TextEdit::singleline(text)
+        .desired_width(f32::INFINITY)
+        .margin(vec2(space(2), space(1)));
+    ui.add(edit).labelled_by(label.id).on_hover_text(hint);
+}

@@ -1,0 +1,315 @@
+use std::{
+    path::PathBuf,
+    sync::{
+        Arc,
+        mpsc::{Sender, channel},
+    },
+};
+
+use super::{
+    drop_scale::DropScale,
+    engine::{Command, LiveEvent, LivePlan, LiveShown, Recorded, SourcePlan, run},
+    fault_form::FaultForm,
+    network_choice::NetworkChoice,
+    sample::Sample,
+    source_form::{SourceForm, SourceKind},
+};
+use crate::window::{
+    job::{Job, Wake},
+    shared::{Effect, Matter, Notice, Shared},
+};
+use decoupler_core::live::ZeroGains;
+
+/// Reason for which a network of a recording has no simulated source.
+const NOTHING_TO_SIMULATE: &str = "A network of a recording decodes a file, a serial port or a TCP address: there is no sensor \
+                                   model to simulate. Choose one of them as the source.";
+
+/// The Live view.
+#[derive(Debug)]
+pub struct LiveView {
+    /// The latest frame, and how decoding stands; it stays in view after the end.
+    pub shown: LiveShown,
+    /// Decoding under way. It is dropped before the job, which then ends at once.
+    pub running: Option<Running>,
+    /// Gains of the unloaded state by which readings are divided.
+    pub zero: Option<ZeroGains>,
+    /// Reason for which there are none.
+    pub zero_problem: Option<String>,
+    /// File of the recording under way.
+    pub recording: Option<PathBuf>,
+    /// The last recording that is whole.
+    pub recorded: Option<Recorded>,
+    pub(super) network: NetworkChoice,
+    pub(super) sample: Sample,
+    pub(super) source: SourceForm,
+    pub(super) fault: FaultForm,
+    pub(super) drops: DropScale,
+    /// True if the readings' card shows the gains of the unloaded state.
+    pub(super) shows_zero: bool,
+    /// The node under the pointer, marked on both surfaces.
+    pub(super) node: Option<usize>,
+    /// True if the window has a frame that the thread does not know to be drawn.
+    is_to_be_drawn: bool,
+    job: Job<LiveEvent>,
+}
+
+/// Decoding under way.
+#[derive(Debug)]
+pub struct Running {
+    /// Name of the network.
+    pub network: String,
+    /// Source of the frames.
+    pub source: SourcePlan,
+    commands: Sender<Command>,
+}
+
+impl LiveView {
+    /// Nothing decoded yet. `wake` is called when there is news.
+    pub fn new(wake: Wake) -> Self {
+        Self {
+            shown: LiveShown::default(),
+            running: None,
+            zero: None,
+            zero_problem: None,
+            recording: None,
+            recorded: None,
+            network: NetworkChoice::new(Arc::clone(&wake)),
+            sample: Sample::new(Arc::clone(&wake)),
+            source: SourceForm::default(),
+            fault: FaultForm::default(),
+            drops: DropScale::default(),
+            shows_zero: false,
+            node: None,
+            is_to_be_drawn: false,
+            job: Job::prompt("live", wake),
+        }
+    }
+
+    /// The plan of decoding as it is set up now.
+    ///
+    /// # Errors
+    /// If there is no network, or something is to be filled in; with what to do.
+    fn plan(&self, shared: &Shared, at_s: f64) -> Result<(String, LivePlan), String> {
+        let (name, network) = self
+            .network
+            .network(&shared.runs)
+            .ok_or("Train a network, or open a network file.")?;
+        let Some(settings) = network.settings.simulated() else {
+            if self.source.kind == SourceKind::Simulated {
+                return Err(NOTHING_TO_SIMULATE.to_owned());
+            }
+            let plan = LivePlan {
+                network: Arc::clone(network),
+                settings: None,
+                source: self.source.plan(None, at_s)?,
+                noise: 0.0,
+                zero: None,
+                recordings: PathBuf::new(),
+            };
+            return Ok((name.to_owned(), plan));
+        };
+        let scale = settings.source.sensor.scale;
+        let read = settings.source.scene.rows.read(scale.rows()).unwrap_or_default();
+        let fault = self
+            .fault
+            .fault(scale)
+            .filter(|_| self.fault.problem(scale, &read).is_none());
+        let plan = LivePlan {
+            source: self.source.plan(fault, at_s)?,
+            noise: self.source.noise(&settings),
+            zero: self
+                .zero
+                .clone()
+                .filter(|zero| zero.is_sound(read.len(), scale.columns())),
+            recordings: folder(shared).join("recordings"),
+            network: Arc::clone(network),
+            settings: Some(settings),
+        };
+        Ok((name.to_owned(), plan))
+    }
+
+    /// Returns true if the network is that of an array, whose sensor model simulates, re-zeroes and finds faults.
+    pub(super) fn has_sensor(&self, shared: &Shared) -> bool {
+        let network = self.network.network(&shared.runs);
+        network.is_none_or(|(_, file)| file.settings.source.simulation().is_some())
+    }
+
+    /// Reason for which decoding cannot begin, with what to do.
+    pub(super) fn obstacle(&self, shared: &Shared) -> Option<String> {
+        self.plan(shared, 0.0).err()
+    }
+
+    /// Begins to decode.
+    pub(super) fn start(&mut self, shared: &Shared, effects: &mut Vec<Effect>) {
+        let Ok((network, plan)) = self.plan(shared, 0.0) else {
+            return;
+        };
+        effects.push(Effect::Settle(Matter::Live));
+        self.shown = LiveShown::default();
+        self.begin(network, plan);
+    }
+
+    /// Lays out the sample recording and its network, to be played as soon as they are there.
+    pub(super) fn ask_for_sample(&mut self, shared: &Shared) {
+        self.sample.lay_out(folder(shared).join("samples"));
+    }
+
+    /// Plays the sample once it is there.
+    pub(super) fn take_sample(&mut self, shared: &Shared, effects: &mut Vec<Effect>) {
+        match self.sample.next() {
+            Some(Ok(sample)) => {
+                self.network.take(sample.name, Arc::from(sample.network));
+                self.source.kind = SourceKind::Replay;
+                self.source.path = sample.recording.display().to_string();
+                self.start(shared, effects);
+            }
+            Some(Err(reason)) => effects.push(Effect::Tell(Matter::Live, Notice::Failed(reason))),
+            None => {}
+        }
+    }
+
+    /// Goes on with the network that is chosen now, where a replay stands.
+    pub(super) fn start_again(&mut self, shared: &Shared) {
+        let replay = self.shown.replay;
+        let Ok((network, mut plan)) = self.plan(shared, replay.map_or(0.0, |replay| replay.at_s)) else {
+            return;
+        };
+        if let (SourcePlan::Replay { is_playing, .. }, Some(replay)) = (&mut plan.source, replay) {
+            *is_playing = replay.is_playing;
+        } else {
+            self.shown = LiveShown::default();
+        }
+        self.begin(network, plan);
+    }
+
+    fn begin(&mut self, network: String, plan: LivePlan) {
+        self.keep_recording();
+        self.zero.clone_from(&plan.zero);
+        self.shows_zero &= self.zero.is_some();
+        self.zero_problem = None;
+        self.drops = DropScale::default();
+        self.node = None;
+        self.is_to_be_drawn = false;
+        let (commands, incoming) = channel();
+        self.running = Some(Running {
+            network,
+            source: plan.source.clone(),
+            commands,
+        });
+        self.job.start(
+            move |report| run(plan, &incoming, report),
+            |ended| LiveEvent::Ended(ended.unwrap_or_else(|error| Err(error.to_string()))),
+        );
+    }
+
+    /// Ends decoding; what was shown last stays.
+    pub(super) fn stop(&mut self) {
+        // The thread ends once nobody commands it.
+        self.running = None;
+    }
+
+    /// Tells the thread, if it runs.
+    pub(super) fn command(&self, command: Command) {
+        if let Some(running) = &self.running {
+            // A thread that has just ended has nothing to change.
+            let _ = running.commands.send(command);
+        }
+    }
+
+    /// Asks for the unloaded state in the latest frames.
+    pub(super) fn re_zero(&mut self) {
+        self.zero_problem = None;
+        self.command(Command::Zero);
+    }
+
+    /// Divides readings by no gains any more.
+    pub(super) fn clear_zero(&mut self) {
+        (self.zero, self.zero_problem, self.shows_zero) = (None, None, false);
+        self.command(Command::UseZero(None));
+    }
+
+    /// Returns true if the frames that come can be recorded.
+    pub(super) fn can_record(&self) -> bool {
+        let is_replay = |running: &Running| matches!(running.source, SourcePlan::Replay { .. });
+        // Frames of an array are recorded; samples of other sensors have columns of their own.
+        let is_array = self.shown.targets.is_none();
+        is_array && self.running.as_ref().is_some_and(|running| !is_replay(running))
+    }
+
+    /// Begins a recording, or ends it.
+    pub(super) fn toggle_recording(&self) {
+        self.command(match self.recording {
+            None => Command::Record,
+            Some(_) => Command::EndRecording,
+        });
+    }
+
+    /// Replays the last recording.
+    pub(super) fn replay_recorded(&mut self, shared: &Shared, effects: &mut Vec<Effect>) {
+        if let Some(recorded) = &self.recorded {
+            self.source.kind = SourceKind::Replay;
+            self.source.path = recorded.path.display().to_string();
+            self.start(shared, effects);
+        }
+    }
+
+    /// The recording of a thread that is heard no more.
+    fn keep_recording(&mut self) {
+        let Some(path) = self.recording.take() else { return };
+        let (frames, seconds) = self.shown.recording.unwrap_or_default();
+        self.recorded = Some(Recorded { path, frames, seconds });
+    }
+
+    /// Takes what the thread has to tell.
+    pub(super) fn follow(&mut self, effects: &mut Vec<Effect>) {
+        let mut tell = |notice| effects.push(Effect::Tell(Matter::Live, notice));
+        while let Some(event) = self.job.next_event() {
+            match event {
+                LiveEvent::Source(source) => {
+                    if let Some(running) = &mut self.running {
+                        running.source = source;
+                    }
+                }
+                LiveEvent::Shown(shown) => {
+                    if let Some(frame) = &shown.frame {
+                        self.drops.take(frame);
+                    }
+                    self.shown = *shown;
+                    self.is_to_be_drawn = true;
+                }
+                LiveEvent::Zeroed(Ok(gains)) => (self.zero, self.zero_problem) = (Some(gains), None),
+                LiveEvent::Zeroed(Err(reason)) => self.zero_problem = Some(reason),
+                LiveEvent::Recording(path) => self.recording = Some(path),
+                LiveEvent::NotRecorded(reason) => tell(Notice::Failed(reason)),
+                LiveEvent::Recorded(recorded, reason) => {
+                    (self.recording, self.recorded) = (None, Some(recorded));
+                    if let Some(reason) = reason {
+                        tell(Notice::Failed(reason));
+                    }
+                }
+                LiveEvent::Ended(end) => {
+                    let running = self.running.take();
+                    self.keep_recording();
+                    match end {
+                        Err(reason) => tell(Notice::Failed(reason)),
+                        Ok(()) if running.is_some() => tell(Notice::Done("The source has ended.".to_owned())),
+                        Ok(()) => {}
+                    }
+                }
+            }
+        }
+    }
+
+    /// The frame is on the screen: the thread may show the next.
+    pub(super) fn tell_drawn(&mut self) {
+        if std::mem::take(&mut self.is_to_be_drawn) {
+            self.command(Command::Drawn);
+        }
+    }
+}
+
+/// The folder for files of this view: beside the runs, or for this session.
+fn folder(shared: &Shared) -> PathBuf {
+    let beside = shared.runs.path.as_ref().and_then(|runs| runs.parent());
+    beside.map_or_else(std::env::temp_dir, PathBuf::from)
+}

@@ -1,0 +1,147 @@
+use eframe::egui::{Align, Layout, Rect, RichText, Ui};
+
+use super::{LiveView, engine::LiveTargets, figures_card::stream_ui};
+use crate::window::{
+    plotting::titled_plots_ui,
+    shared::{Effect, Look, Shared, colour_scale_ui, follow_surface, view_mode_ui},
+    surface_view::{ColourBar, SurfaceView},
+    test_view::HeightScale,
+    theme::{Theme, semibold, space, type_size},
+    widgets::{card_ui, coloured_fact_ui, fact_ui, scrolled_ui, section_heading_ui},
+};
+use decoupler_core::text::counted;
+use decoupler_files::{
+    export::format_number,
+    figure::{
+        PlotFigure,
+        surface::{Surface, SurfaceFigure},
+        targets_over_time_figure,
+    },
+};
+
+/// Targets of a recording as they are decoded: their surface if they have positions, their values over time, the latest
+/// values, and the stream.
+pub fn targets_ui(ui: &mut Ui, whole: Rect, view: &mut LiveView, shared: &Shared, effects: &mut Vec<Effect>) {
+    let Some(targets) = view.shown.targets.clone() else {
+        return;
+    };
+    let gap = space(2);
+    let lower_height = (0.4 * whole.height()).clamp(space(50), space(90));
+    let (upper, lower) = whole.split_top_bottom_at_y(whole.bottom() - lower_height);
+    let mut upper = upper.with_max_y(upper.bottom() - gap);
+    if let Some(figure) = surface_figure(&targets, view.node, shared.look) {
+        let (left, right) = upper.split_left_right_at_x(upper.center().x);
+        card_ui(ui, left.with_max_x(left.right() - gap), |ui| {
+            surface_ui(ui, &figure, &targets, shared.look, &mut view.node, effects);
+        });
+        upper = right;
+    }
+    card_ui(ui, upper, |ui| titled_plots_ui(ui, "Decoded values", &chart(&targets)));
+    let (left, right) = lower.split_left_right_at_x(lower.center().x);
+    card_ui(ui, left.with_max_x(left.right() - gap), |ui| {
+        scrolled_ui(ui, "live targets", |ui| {
+            section_heading_ui(ui, "Targets");
+            for (target, value) in targets.problem.targets.iter().zip(targets.values()) {
+                fact_ui(ui, &target.title(), "Latest decoded value.", &format_number(*value));
+            }
+        });
+    });
+    card_ui(ui, right, |ui| {
+        scrolled_ui(ui, "live stream", |ui| {
+            section_heading_ui(ui, "Confidence");
+            outside_ui(ui, &targets);
+            section_heading_ui(ui, "Stream");
+            stream_ui(ui, view);
+        });
+    });
+}
+
+/// Values of all targets over time.
+pub fn chart(targets: &LiveTargets) -> PlotFigure {
+    targets_over_time_figure(&targets.problem.targets, &targets.history)
+}
+
+/// The surface through the latest values; `None` if the targets have no positions.
+pub fn surface_figure(targets: &LiveTargets, marked_node: Option<usize>, look: Look) -> Option<SurfaceFigure> {
+    let through = targets.surface.as_ref()?;
+    let values = targets.values();
+    let range = match look.heights {
+        HeightScale::Stroke => through.range_of(&targets.ranges),
+        HeightScale::Fitted => through.range_of(&Vec::from_iter(values.iter().map(|&value| (value, value)))),
+    };
+    let [_, decoded, _] = through.surfaces(values, values, range);
+    let surface = Surface {
+        mode: look.mode,
+        colours: look.colours,
+        ..decoded
+    };
+    Some(SurfaceFigure {
+        surfaces: vec![surface],
+        camera: look.camera,
+        marked_node,
+        ..SurfaceFigure::default()
+    })
+}
+
+fn surface_ui(
+    ui: &mut Ui,
+    figure: &SurfaceFigure,
+    targets: &LiveTargets,
+    look: Look,
+    node: &mut Option<usize>,
+    effects: &mut Vec<Effect>,
+) {
+    let [surface] = &figure.surfaces[..] else { return };
+    ui.horizontal(|ui| {
+        ui.set_min_height(space(7));
+        ui.label(RichText::new(&surface.title).font(semibold(type_size().title)));
+        ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
+            view_mode_ui(ui, look, effects);
+        });
+    });
+    let place = ui.available_rect_before_wrap();
+    let (picture, scale) = place.split_left_right_at_x(place.right() - ColourBar::WIDTH);
+    let mut slot = ui.new_child(eframe::egui::UiBuilder::new().max_rect(picture));
+    let shown = SurfaceView {
+        label: "Live decoded surface",
+        surface,
+        marked_node: *node,
+        lit_nodes: &[],
+        section: None,
+        theme: Theme::of(ui),
+    }
+    .show(&mut slot, look.camera);
+    follow_surface(&shown, look, node, effects);
+    shown.node_tooltip_ui(|ui, node| {
+        let at = targets.surface.as_ref().and_then(|through| through.nodes().get(node));
+        let target = at.and_then(|at| {
+            Some((
+                targets.problem.targets.get(at.target)?,
+                targets.values().get(at.target)?,
+            ))
+        });
+        if let Some((target, value)) = target {
+            ui.label(RichText::new(target.title()).font(semibold(type_size().note)));
+            ui.label(RichText::new(format_number(*value)).size(type_size().note));
+        }
+    });
+    colour_scale_ui(ui, scale, &surface.scale(), &figure.note(), look, effects);
+}
+
+fn outside_ui(ui: &mut Ui, targets: &LiveTargets) {
+    let hint = "Readings beyond the range seen in training by more than a tenth of it, and targets beyond by more than all \
+                of it. There the network extrapolates: check these readings, or train on a recording that covers them.";
+    let readings = match targets.readings_outside {
+        None => "readings not known".to_owned(),
+        Some(0) if targets.targets_outside == 0 => "none".to_owned(),
+        Some(readings) => format!("{} of {}", counted(readings, "reading"), targets.problem.inputs.len()),
+    };
+    let value = match targets.targets_outside {
+        0 => readings,
+        number => format!("{readings}, {}", counted(number, "target")),
+    };
+    let is_outside = targets.readings_outside.unwrap_or(0) + targets.targets_outside > 0;
+    let palette = Theme::of(ui).palette;
+    let colour = if is_outside { palette.warning } else { palette.text };
+    coloured_fact_ui(ui, "Outside training", hint, &value, colour);
+}

@@ -1,0 +1,152 @@
+use eframe::egui::{RichText, Sense, Ui};
+
+use super::{
+    LiveView,
+    cards::surfaces_ui,
+    engine::{SourcePlan, Watched},
+    exports::live_exports,
+    figures_card::figures_ui,
+    form,
+    invitation::invitation_ui,
+    readings_card::readings_ui,
+    replay_bar::{REPLAY_BAR_HEIGHT, replay_bar_ui},
+    targets_card::targets_ui,
+    tools,
+};
+use crate::window::{
+    shared::{Effect, Export, FileInUse, Offers, Shared, View},
+    theme::{Theme, space, type_size},
+    widgets::{card_ui, scrolled_ui, state_ui},
+};
+use decoupler_core::text::counted;
+
+impl View for LiveView {
+    fn name(&self) -> &'static str {
+        "Live"
+    }
+
+    fn take_news(&mut self, shared: &Shared, effects: &mut Vec<Effect>) {
+        self.follow(effects);
+        if self.network.take_news() && self.running.is_some() {
+            self.start_again(shared);
+        }
+        self.source.take_news();
+        self.take_sample(shared, effects);
+    }
+
+    fn is_working(&self) -> bool {
+        self.running.is_some()
+    }
+
+    fn files_in_use(&self) -> Vec<FileInUse> {
+        let replayed = self.running.as_ref().and_then(|running| match &running.source {
+            SourcePlan::Replay { path, .. } => Some(FileInUse::Recording(path.clone())),
+            _ => None,
+        });
+        let recorded = self.recording.clone().map(FileInUse::Recorded);
+        replayed.into_iter().chain(recorded).collect()
+    }
+
+    fn offer_actions(&mut self, offers: &mut Offers<'_>, shared: &Shared, effects: &mut Vec<Effect>) {
+        tools::offer_actions(self, offers, shared, effects);
+    }
+
+    fn tools_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) {
+        tools::tools_ui(ui, self, shared, effects);
+    }
+
+    fn exports<'a>(&'a self, shared: &'a Shared) -> Vec<Export<'a>> {
+        live_exports(self, shared)
+    }
+
+    fn form_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) {
+        form::form_ui(ui, self, shared, effects);
+    }
+
+    fn body_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) {
+        live_ui(ui, self, shared, effects);
+        self.tell_drawn();
+    }
+
+    fn status_ui(&self, ui: &mut Ui, _shared: &Shared) {
+        status_ui(ui, self);
+    }
+}
+
+/// Surfaces above, readings and figures below, and where a recording is replayed its bar at the bottom.
+fn live_ui(ui: &mut Ui, view: &mut LiveView, shared: &Shared, effects: &mut Vec<Effect>) {
+    let whole = ui.available_rect_before_wrap();
+    if !view.shown.has_answer() {
+        card_ui(ui, whole, |ui| invitation_ui(ui, view, shared, effects));
+        ui.allocate_rect(whole, Sense::hover());
+        return;
+    }
+    let gap = space(2);
+    let mut cards = whole;
+    if view.shown.replay.is_some() {
+        let (rest, bar) = whole.split_top_bottom_at_y(whole.bottom() - REPLAY_BAR_HEIGHT);
+        card_ui(ui, bar, |ui| replay_bar_ui(ui, view));
+        cards = rest.with_max_y(rest.bottom() - gap);
+    }
+    if view.shown.targets.is_some() {
+        targets_ui(ui, cards, view, shared, effects);
+        ui.allocate_rect(whole, Sense::hover());
+        return;
+    }
+    let lower_height = (0.46 * cards.height()).clamp(space(60), space(100));
+    let (upper, lower) = cards.split_top_bottom_at_y(cards.bottom() - lower_height);
+    surfaces_ui(ui, upper.with_max_y(upper.bottom() - gap), view, shared, effects);
+    let figures_width = (0.42 * lower.width()).clamp(space(75), space(110));
+    let (left, right) = lower.split_left_right_at_x(lower.right() - figures_width);
+    card_ui(ui, left.with_max_x(left.right() - gap), |ui| {
+        readings_ui(ui, view, shared.look.colours);
+    });
+    card_ui(ui, right, |ui| {
+        scrolled_ui(ui, "live figures", |ui| figures_ui(ui, view, shared, effects));
+    });
+    ui.allocate_rect(whole, Sense::hover());
+}
+
+/// Shows the state of the stream in the line at the bottom.
+fn status_ui(ui: &mut Ui, view: &LiveView) {
+    let palette = Theme::of(ui).palette;
+    let counts = &view.shown.counts;
+    let watched = view.shown.frame.as_ref().map(|frame| &frame.watched);
+    let (colour, text) = match (&view.running, watched) {
+        (None, _) if counts.decoded > 0 => (
+            palette.dim,
+            format!("Stopped after {}", counted(counts.decoded, "frame")),
+        ),
+        (None, _) => (palette.dim, "Ready: press Start".to_owned()),
+        (Some(_), _) if !view.shown.has_answer() => (palette.accent, "Waiting for the first frame".to_owned()),
+        (Some(_), _) if counts.is_waiting => (palette.warning, "No frame for two seconds".to_owned()),
+        (Some(_), Some(Watched::Named(diagnosis))) => (palette.warning, format!("Fault: {}", diagnosis.wire)),
+        (Some(_), Some(Watched::Unexplained)) => (palette.warning, "The readings contradict Eq. (2)".to_owned()),
+        (Some(running), _) => match (&running.source, view.shown.replay) {
+            (SourcePlan::Replay { .. }, Some(replay)) if !replay.is_playing => {
+                (palette.dim, "Replay paused".to_owned())
+            }
+            (SourcePlan::Replay { .. }, _) => (palette.good, "Replaying".to_owned()),
+            _ => (palette.good, "Live".to_owned()),
+        },
+    };
+    ui.horizontal_centered(|ui| {
+        state_ui(ui, colour, &text);
+        let dim = |ui: &mut Ui, text: String| ui.label(RichText::new(text).size(type_size().note).color(palette.dim));
+        if let Some(running) = &view.running {
+            let source = match &running.source {
+                SourcePlan::Simulated { .. } => "simulated".to_owned(),
+                SourcePlan::Replay { path, .. } => path.file_name().unwrap_or_default().to_string_lossy().into_owned(),
+                SourcePlan::Stream(source) => source.to_string(),
+            };
+            dim(ui, format!("{}, {source}", running.network));
+            if counts.decoded > 0 {
+                dim(ui, format!("{:.0} frames a second", counts.frames_per_second));
+            }
+        }
+        if let Some((frames, seconds)) = view.shown.recording.filter(|_| view.recording.is_some()) {
+            let text = format!("● Recording: {}, {seconds:.1} s", counted(frames, "frame"));
+            ui.label(RichText::new(text).size(type_size().note).color(palette.bad));
+        }
+    });
+}

@@ -1,0 +1,85 @@
+//! The views, one room each; none knows another.
+//!
+//! A new view is a room of its own whose main type is a [`View`], and a field and a line in [`Views`] below. What it asks
+//! of the window is an [`Effect`](crate::window::shared::Effect); only if it needs what no view has asked for yet,
+//! `shared/effect.rs` gets a variant, and `window/applying.rs` says what it does.
+
+mod compare;
+mod experiments;
+mod identifiability;
+mod live;
+mod trade_off;
+mod train;
+
+use std::{path::PathBuf, sync::Arc};
+
+use super::{job::Wake, shared::View};
+use decoupler_files::import::Plan;
+
+pub use identifiability::{Analysis, Question};
+pub use trade_off::{PlannedLevel, PlannedRun, TradeOffEnding, TradeOffPlan};
+pub(super) use train::CHECKPOINT;
+pub use train::{BottomTab, DecoderResult};
+
+use self::{
+    compare::CompareView, experiments::ExperimentsView, identifiability::IdentifiabilityView, live::LiveView,
+    trade_off::TradeOffView, train::TrainView,
+};
+
+/// All views.
+#[derive(Debug)]
+pub struct Views {
+    /// One training and what it makes of the sensor.
+    pub train: TrainView,
+    /// The paper's tables and sweeps.
+    pub experiments: ExperimentsView,
+    /// Two finished trainings side by side.
+    pub compare: CompareView,
+    /// View of what the readings determine.
+    pub identifiability: IdentifiabilityView,
+    /// View of the speed and the accuracy of each decoder.
+    pub trade_off: TradeOffView,
+    /// View of frames decoded as they come.
+    pub live: LiveView,
+}
+
+impl Views {
+    /// As the window opens. `wake` is called whenever a view has news.
+    pub fn new(wake: &Wake) -> Self {
+        Self {
+            train: TrainView::new(Arc::clone(wake)),
+            experiments: ExperimentsView::new(Arc::clone(wake)),
+            compare: CompareView::new(Arc::clone(wake)),
+            identifiability: IdentifiabilityView::new(Arc::clone(wake)),
+            trade_off: TradeOffView::new(Arc::clone(wake)),
+            live: LiveView::new(Arc::clone(wake)),
+        }
+    }
+
+    /// Opens the recordings of this plan in the Train view.
+    pub fn open_plan(&mut self, plan: &Plan) {
+        self.train.recording.open_plan(plan);
+    }
+
+    /// Looks for the recordings of the checkpoint at `path`, which could not be resumed.
+    pub fn look_for_recordings(&mut self, path: PathBuf) {
+        self.train.recording.look_for_recordings(path);
+    }
+
+    /// Returns true if the user has opened a recording, also one whose files are missing.
+    pub fn has_recording(&self) -> bool {
+        !self.train.recording.is_empty()
+    }
+
+    /// In the order of the top bar. The first is the one that trains.
+    pub fn all(&mut self) -> [&mut dyn View; 6] {
+        [
+            &mut self.train,
+            &mut self.experiments,
+            &mut self.compare,
+            &mut self.identifiability,
+            &mut self.trade_off,
+            &mut self.live,
+        ]
+    }
+}

@@ -1,0 +1,414 @@
+use std::{ops::RangeInclusive, str::FromStr};
+
+use thiserror::Error;
+
+use super::{
+    TradeOffPlan,
+    plan::{PlannedLevel, PlannedRun},
+};
+use decoupler_core::{
+    dataset::LARGEST_SAMPLES,
+    decoupling::DecoderKind,
+    evaluation::{Preset, RunSettings, SimulatedSettings},
+    network::LARGEST_HIDDEN,
+    scene::{Noise, Scene},
+    training::{Method, StoppingRules},
+};
+use decoupler_files::import::{Plan, Setup};
+
+/// A measurement as the user sets it up.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TradeOffForm {
+    /// Relative errors of a reading, as typed.
+    pub noises: String,
+    /// Hidden nodes, as typed.
+    pub hidden: String,
+    /// Presets on which the settings of the networks of an array are based.
+    pub presets: WhichPresets,
+    /// Training methods of the networks of a recording, in the order of [`Method::all`].
+    pub methods: Vec<bool>,
+    /// Ways of decoding, in the order of [`DecoderKind::ALL`].
+    pub decoders: [bool; DecoderKind::ALL.len()],
+    /// Length of the trainings.
+    pub thoroughness: Thoroughness,
+    /// The most training samples of a quick look.
+    pub samples: usize,
+    /// The most epochs of a quick look.
+    pub epochs: usize,
+    /// Number of samples on which the errors are measured.
+    pub test_samples: usize,
+}
+
+/// Presets that are measured.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum WhichPresets {
+    /// Both.
+    Both,
+    /// One of them.
+    Only(Preset),
+}
+
+/// Length of the trainings.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Thoroughness {
+    /// With few samples and epochs: a first look within a minute.
+    Quick,
+    /// As the presets say, or for a recording the Train view.
+    Full,
+}
+
+/// Reasons for which a form is not yet a measurement.
+#[derive(Clone, Debug, PartialEq, Error)]
+#[non_exhaustive]
+pub enum TradeOffFormError {
+    /// Something that is no number.
+    #[error("{what}: '{text}' is not a number; write a list such as {example}")]
+    NotANumber {
+        /// The list.
+        what: &'static str,
+        /// Text that was typed.
+        text: String,
+        /// A list that can be understood.
+        example: &'static str,
+    },
+    /// A number out of its range.
+    #[error("{what}: {value} is not possible, give from {least} to {most}")]
+    Range {
+        /// The list.
+        what: &'static str,
+        /// Text that was typed.
+        value: String,
+        /// The smallest.
+        least: String,
+        /// The largest.
+        most: String,
+    },
+    /// An empty list.
+    #[error("{what}: there are no values; write a list such as {example}")]
+    Empty {
+        /// The list.
+        what: &'static str,
+        /// A list that can be understood.
+        example: &'static str,
+    },
+    /// More than can be looked at.
+    #[error("{0} points are more than can be looked at: give fewer values, at most {MOST_POINTS} points")]
+    TooMany(usize),
+    /// No decoder.
+    #[error("no decoder is chosen: choose at least one")]
+    NoDecoder,
+    /// No training method of the networks of a recording.
+    #[error("no training method is chosen: choose at least one, or leave out the networks")]
+    NoMethod,
+}
+
+/// The most points of one measurement.
+const MOST_POINTS: usize = 1000;
+
+const NOISES: &str = "0, 1e-4, 1e-3, 1e-2";
+const HIDDEN: &str = "6, 12";
+/// Methods chosen at first for a recording.
+const USUAL_METHODS: [&str; 2] = ["br", "lm"];
+
+impl Default for TradeOffForm {
+    fn default() -> Self {
+        Self {
+            noises: NOISES.to_owned(),
+            hidden: HIDDEN.to_owned(),
+            presets: WhichPresets::Both,
+            methods: Method::all()
+                .iter()
+                .map(|method| USUAL_METHODS.contains(&method.short_name()))
+                .collect(),
+            decoders: [true; DecoderKind::ALL.len()],
+            thoroughness: Thoroughness::Quick,
+            samples: 2000,
+            epochs: 60,
+            test_samples: 100,
+        }
+    }
+}
+
+impl TradeOffForm {
+    /// The measurement on the source of `base`, sound as far as can be known before it is run.
+    ///
+    /// # Errors
+    /// If the form is not a possible measurement.
+    pub fn plan(&self, base: &Setup) -> Result<TradeOffPlan, TradeOffFormError> {
+        let has_sensor = base.simulated().is_some();
+        let chosen = DecoderKind::ALL.into_iter().zip(self.decoders);
+        let decoders: Vec<_> = chosen
+            .filter(|(kind, is_chosen)| *is_chosen && (has_sensor || !kind.needs_sensor()))
+            .map(|(kind, _)| kind)
+            .collect();
+        if decoders.is_empty() {
+            return Err(TradeOffFormError::NoDecoder);
+        }
+        let levels = match (base.simulated(), base.plan()) {
+            (Some(settings), _) => self.levels_of_array(&settings, &decoders)?,
+            (None, Some(plan)) => vec![self.level_of_recording(base.settings(), plan, &decoders)?],
+            (None, None) => Vec::new(),
+        };
+        let plan = TradeOffPlan {
+            levels,
+            hidden: list("Hidden nodes", &self.hidden, HIDDEN, 1..=LARGEST_HIDDEN)?,
+        };
+        match plan.points() {
+            points if points > MOST_POINTS => Err(TradeOffFormError::TooMany(points)),
+            _ => Ok(plan),
+        }
+    }
+
+    /// A level for each noise, in the sensor and the scene of `base`.
+    fn levels_of_array(
+        &self,
+        base: &SimulatedSettings,
+        decoders: &[DecoderKind],
+    ) -> Result<Vec<PlannedLevel>, TradeOffFormError> {
+        let presets = match self.presets {
+            WhichPresets::Both => Preset::ALL.to_vec(),
+            WhichPresets::Only(preset) => vec![preset],
+        };
+        let noises = list("Noise levels", &self.noises, NOISES, 0.0..=1.0)?;
+        let level = |noise: f64| {
+            let run = |&preset: &Preset| PlannedRun {
+                preset: Some(preset),
+                setup: self.settings(base, preset, noise).into(),
+                decoders: decoders.to_vec(),
+            };
+            PlannedLevel {
+                noise: Some(noise),
+                runs: presets.iter().map(run).collect(),
+            }
+        };
+        Ok(noises.into_iter().map(level).collect())
+    }
+
+    /// The settings of a preset at a level of noise, in the sensor and the scene of `base`. Which rows are read, and what
+    /// networks are given of the readings, is the preset's.
+    fn settings(&self, base: &SimulatedSettings, preset: Preset, noise: f64) -> SimulatedSettings {
+        let noise = Noise {
+            relative: noise,
+            ..base.source.scene.noise
+        };
+        let mut settings = preset.settings_in(noise);
+        settings.source.sensor = base.source.sensor;
+        settings.seed = base.seed;
+        settings.source.scene = Scene {
+            rows: settings.source.scene.rows,
+            noise,
+            ..base.source.scene
+        };
+        settings.source.test_samples = self.test_samples.clamp(1, LARGEST_SAMPLES);
+        if self.thoroughness == Thoroughness::Quick {
+            let source = &mut settings.source;
+            source.samples = source.samples.min(self.samples.clamp(1, LARGEST_SAMPLES));
+            source.validation_samples = source.validation_samples.min(source.samples.div_ceil(5));
+            let stopping = &mut settings.training.stopping;
+            stopping.epochs = stopping.epochs.min(self.most_epochs());
+        }
+        settings
+    }
+
+    /// A run for each method, on the recording that `plan` reads. Decoders without a network do not depend on the method,
+    /// so the first run measures them.
+    fn level_of_recording(
+        &self,
+        base: &RunSettings,
+        plan: &Plan,
+        decoders: &[DecoderKind],
+    ) -> Result<PlannedLevel, TradeOffFormError> {
+        let chosen = Method::all().into_iter().zip(&self.methods);
+        let mut methods = Vec::from_iter(chosen.filter(|(_, is_chosen)| **is_chosen).map(|(method, _)| method));
+        if decoders.iter().all(|kind| !kind.needs_network()) {
+            methods = vec![base.training.method];
+        } else if methods.is_empty() {
+            return Err(TradeOffFormError::NoMethod);
+        }
+        let run = |(place, method): (usize, &Method)| {
+            let mut settings = *base;
+            // The method of the Train view has its settings there.
+            if method.short_name() != base.training.method.short_name() {
+                let recorded = Method::recorded_regularization();
+                let is_recorded = method.short_name() == recorded.short_name();
+                settings.training.method = if is_recorded { recorded } else { *method };
+            }
+            if self.thoroughness == Thoroughness::Quick {
+                let stopping = &mut settings.training.stopping;
+                stopping.epochs = stopping.epochs.min(self.most_epochs());
+            }
+            let mut plan = plan.clone();
+            // A share of the user stays.
+            if plan.division.validation_fraction == base.validation_fraction() {
+                plan.division.validation_fraction = settings.validation_fraction();
+            }
+            let of_run = decoders.iter().filter(|kind| place == 0 || kind.needs_network());
+            PlannedRun {
+                preset: None,
+                setup: Setup::recording(settings, plan),
+                decoders: of_run.copied().collect(),
+            }
+        };
+        Ok(PlannedLevel {
+            noise: None,
+            runs: methods.iter().enumerate().map(run).collect(),
+        })
+    }
+
+    fn most_epochs(&self) -> usize {
+        self.epochs.clamp(1, StoppingRules::MOST_EPOCHS)
+    }
+}
+
+/// The values of a list, each once, in their order.
+fn list<N>(
+    what: &'static str,
+    text: &str,
+    example: &'static str,
+    possible: RangeInclusive<N>,
+) -> Result<Vec<N>, TradeOffFormError>
+where
+    N: FromStr + PartialOrd + ToString,
+{
+    let mut values: Vec<N> = Vec::new();
+    let words = text.split(|letter: char| letter == ',' || letter == ';' || letter.is_whitespace());
+    for word in words.filter(|word| !word.is_empty()) {
+        let value: N = word.parse().map_err(|_| TradeOffFormError::NotANumber {
+            what,
+            text: word.to_owned(),
+            example,
+        })?;
+        if !possible.contains(&value) {
+            return Err(TradeOffFormError::Range {
+                what,
+                value: word.to_owned(),
+                least: possible.start().to_string(),
+                most: possible.end().to_string(),
+            });
+        }
+        if !values.contains(&value) {
+            values.push(value);
+        }
+    }
+    if values.is_empty() {
+        return Err(TradeOffFormError::Empty { what, example });
+    }
+    Ok(values)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use decoupler_core::{
+        evaluation::Measured,
+        scene::{RowModel, Rows},
+    };
+
+    fn array() -> Setup {
+        SimulatedSettings::default().into()
+    }
+
+    /// The settings of the run of a preset at the first level.
+    fn settings(plan: &TradeOffPlan, level: usize, preset: Preset) -> SimulatedSettings {
+        let mut runs = plan.levels[level].runs.iter();
+        let run = runs.find(|run| run.preset == Some(preset)).unwrap();
+        run.setup.simulated().unwrap()
+    }
+
+    #[test]
+    fn the_form_begins_with_a_quick_look_at_everything() {
+        let plan = TradeOffForm::default().plan(&array()).unwrap();
+        // Five without a network, then two sizes with two precisions and polish.
+        assert_eq!(plan.points(), 4 * 2 * (5 + 2 * 3));
+        let best = settings(&plan, 2, Preset::Best);
+        assert_eq!((best.source.samples, best.training.stopping.epochs), (2000, 60));
+        assert_eq!(
+            (best.source.scene.rows, best.source.scene.noise.relative),
+            (Rows::Known, 1e-3)
+        );
+    }
+
+    #[test]
+    fn a_thorough_measurement_is_the_presets_own_in_the_scene_at_hand() {
+        let mut base = SimulatedSettings::default();
+        base.source.scene.largest_compression = 0.1;
+        base.source.sensor.geometry.height_mm = 4.0;
+        let form = TradeOffForm {
+            thoroughness: Thoroughness::Full,
+            presets: WhichPresets::Only(Preset::Best),
+            ..TradeOffForm::default()
+        };
+        let plan = form.plan(&base.into()).unwrap();
+        let (settings, preset) = (settings(&plan, 0, Preset::Best), Preset::Best.settings());
+        assert_eq!(
+            (settings.source.samples, settings.training),
+            (preset.source.samples, preset.training)
+        );
+        assert_eq!(settings.source.sensor, base.source.sensor);
+        assert_eq!(settings.source.scene.largest_compression, 0.1);
+    }
+
+    #[test]
+    fn networks_of_a_recording_are_trained_by_each_method_and_other_decoders_once() {
+        let base = RunSettings::from(Measured { rows: RowModel::Shared });
+        let recording = |plan: &Plan| Setup::recording(base, plan.clone());
+        let plan = TradeOffForm::default().plan(&recording(&Plan::default())).unwrap();
+        let [level] = &plan.levels[..] else {
+            panic!("{:?}", plan.levels);
+        };
+        assert_eq!(level.noise, None, "no noise is simulated");
+        // Mean, ridge, radial basis and fuzzy rules once; two methods with two sizes in two precisions.
+        assert_eq!(plan.points(), 4 + 2 * 2 * 2);
+        let all = level.runs.iter().flat_map(|run| &run.decoders);
+        assert!(all.clone().all(|kind| !kind.needs_sensor()), "{level:?}");
+        let held_out = |plan: &TradeOffPlan| {
+            let runs = plan.levels[0].runs.iter();
+            let held_out = |run: &PlannedRun| {
+                let settings = run.setup.settings();
+                assert_eq!(settings.training.stopping.epochs, 60);
+                (
+                    settings.training.method.short_name(),
+                    run.setup.plan().unwrap().division.validation_fraction,
+                )
+            };
+            let mut held_out = Vec::from_iter(runs.map(held_out));
+            held_out.sort_by_key(|(name, _)| *name);
+            held_out
+        };
+        assert_eq!(held_out(&plan), [("br", 0.0), ("lm", 0.2)]);
+        // A share that the user has chosen holds for every method.
+        let mut chosen = Plan::default();
+        chosen.division.validation_fraction = 0.3;
+        let plan = TradeOffForm::default().plan(&recording(&chosen)).unwrap();
+        assert_eq!(held_out(&plan), [("br", 0.3), ("lm", 0.3)]);
+        let mut form = TradeOffForm::default();
+        form.methods.fill(false);
+        let message = form.plan(&recording(&chosen)).unwrap_err().to_string();
+        assert!(message.contains("training method"), "{message}");
+    }
+
+    #[test]
+    fn what_cannot_be_measured_says_why() {
+        let base = array();
+        let error = |form: TradeOffForm| form.plan(&base).unwrap_err().to_string();
+        let with_noises = |text: &str| TradeOffForm {
+            noises: text.to_owned(),
+            ..TradeOffForm::default()
+        };
+        assert!(error(with_noises("0, much")).contains("'much' is not a number"));
+        assert!(error(with_noises("2")).contains("give from 0 to 1"));
+        assert!(error(with_noises("NaN")).contains("give from 0 to 1"));
+        assert!(error(with_noises(" , ")).contains("there are no values"));
+        let none = TradeOffForm {
+            decoders: [false; DecoderKind::ALL.len()],
+            ..TradeOffForm::default()
+        };
+        assert!(error(none).contains("choose at least one"));
+        let many: Vec<String> = (1..=200).map(|hidden| hidden.to_string()).collect();
+        let many = TradeOffForm {
+            hidden: many.join(" "),
+            ..TradeOffForm::default()
+        };
+        assert!(error(many).contains("give fewer values"));
+    }
+}

@@ -1,0 +1,255 @@
+use std::time::Instant;
+
+use eframe::egui::{Align, ComboBox, Key, Layout, Modifiers, RichText, Sense, Ui};
+
+use super::{
+    PointWish, TradeOffEnding, TradeOffLook, TradeOffOutcome, TradeOffView, chart::charts_ui, choices::choices_ui,
+    exports::trade_off_exports, names::noise_name, panel, table::table_ui, worker::TradeOffEvent,
+};
+use crate::window::{
+    plotting::legend_ui,
+    shared::{Effect, Export, Matter, Notice, Offers, Shared, SourceKind, Unfinished, View, sentence},
+    theme::{Theme, semibold, space, type_size},
+    widgets::{card_ui, dim_ui, invitation_ui, note_ui, placeholder_ui, scrolled_ui, segmented_ui, state_ui},
+};
+use decoupler_core::text::counted;
+use decoupler_files::{export::format_duration, figure::trade_off_figure};
+
+impl View for TradeOffView {
+    fn name(&self) -> &'static str {
+        "Trade-off"
+    }
+
+    fn take_news(&mut self, _shared: &Shared, effects: &mut Vec<Effect>) {
+        while let Some(event) = self.job.next_event() {
+            match event {
+                TradeOffEvent::Samples { decoded, recorded } => {
+                    if let Some(outcome) = &mut self.outcome {
+                        (outcome.decoded, outcome.recorded) = (Some(decoded), recorded);
+                    }
+                }
+                TradeOffEvent::Measured(level, point, file) => self.record(level, *point, file),
+                TradeOffEvent::Refused(level, reason) => {
+                    if let Some(outcome) = &mut self.outcome {
+                        outcome.refused.push((level, reason));
+                    }
+                }
+                TradeOffEvent::Ended(result) => {
+                    self.end(Instant::now());
+                    effects.extend(
+                        result
+                            .err()
+                            .map(|reason| Effect::Tell(Matter::TradeOff, Notice::Failed(reason))),
+                    );
+                }
+            }
+        }
+    }
+
+    fn is_working(&self) -> bool {
+        self.running.is_some()
+    }
+
+    fn unfinished(&self, _shared: &Shared) -> Vec<Unfinished> {
+        let outcome = self.outcome.iter().filter(|_| self.running.is_some());
+        let unfinished = outcome.map(|outcome| {
+            let (done, all) = outcome.points();
+            Unfinished::discarded("Measurement", format!("{done} of {} measured", counted(all, "point")))
+        });
+        unfinished.collect()
+    }
+
+    fn offer_actions(&mut self, offers: &mut Offers<'_>, shared: &Shared, effects: &mut Vec<Effect>) {
+        if offers.offer_keys(
+            "Measure trade-off",
+            Modifiers::COMMAND,
+            Key::Enter,
+            self.can_measure(shared),
+        ) {
+            self.measure(shared, effects);
+        }
+        if offers.offer_keys(
+            "Cancel measuring",
+            Modifiers::COMMAND,
+            Key::Period,
+            self.running.is_some(),
+        ) {
+            self.cancel();
+        }
+    }
+
+    fn exports<'a>(&'a self, _shared: &'a Shared) -> Vec<Export<'a>> {
+        trade_off_exports(self)
+    }
+
+    fn form_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) {
+        panel::form_ui(ui, self, shared, effects);
+    }
+
+    fn body_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) {
+        trade_ui(ui, self, shared, effects);
+    }
+
+    fn status_ui(&self, ui: &mut Ui, _shared: &Shared) {
+        status_ui(ui, self);
+    }
+}
+
+/// Both charts above, the table and the choices below.
+fn trade_ui(ui: &mut Ui, trade: &mut TradeOffView, shared: &Shared, effects: &mut Vec<Effect>) {
+    let can_load = !shared.phase.is_busy();
+    let whole = ui.available_rect_before_wrap();
+    let (Some(outcome), Some(level)) = (&trade.outcome, trade.shown()) else {
+        let text = match (shared.source, shared.setup()) {
+            (SourceKind::Array, _) => {
+                "The error, the time for a frame and the training time of every decoder at several noise levels, measured \
+                 on this machine."
+                    .to_owned()
+            }
+            (SourceKind::Recording, Ok(_)) => {
+                "The error, the decoding time and the training time of every decoder on the test samples of the recording, \
+                 measured on this machine."
+                    .to_owned()
+            }
+            (SourceKind::Recording, Err(obstacle)) => obstacle,
+        };
+        let mut is_wanted = false;
+        card_ui(ui, whole, |ui| {
+            is_wanted = invitation_ui(ui, &text, "Measure now", trade.can_measure(shared));
+        });
+        if is_wanted {
+            trade.measure(shared, effects);
+        }
+        return;
+    };
+    let mut look = trade.look;
+    let mut asked = None;
+    let source = |point| outcome.source_of(trade.look.level, point);
+    let gap = space(2);
+    let lower_height = (0.38 * whole.height()).clamp(space(50), space(85));
+    let (upper, lower) = whole.split_top_bottom_at_y(whole.bottom() - lower_height);
+    card_ui(ui, upper.with_max_y(upper.max.y - gap), |ui| {
+        head_ui(ui, outcome, &mut look);
+        if level.points.is_empty() {
+            placeholder_ui(ui, waiting(trade.running.is_some()));
+            return;
+        }
+        let figure = trade_off_figure(level, &look.limits);
+        legend_ui(ui, &figure.keys);
+        asked = charts_ui(ui, (level, &figure), &mut look.marked, can_load, source);
+    });
+    let choices_width = (0.4 * lower.width()).clamp(space(76), space(105));
+    let (left, right) = lower.split_left_right_at_x(lower.right() - choices_width);
+    card_ui(ui, left.with_max_x(left.max.x - gap), |ui| {
+        let mut refused = outcome.refused.iter().filter(|(of, _)| *of == look.level).peekable();
+        if refused.peek().is_some() {
+            let reasons = Vec::from_iter(refused.map(|(_, reason)| sentence(reason)));
+            note_ui(ui, &reasons.join("\n"));
+        }
+        table_ui(ui, level, &mut look.marked);
+    });
+    card_ui(ui, right, |ui| {
+        scrolled_ui(ui, "trade choices", |ui| {
+            asked = asked.take().or(choices_ui(ui, level, &mut look, can_load, source));
+        });
+    });
+    ui.allocate_rect(whole, Sense::hover());
+    let level = trade.look.level;
+    match asked {
+        Some(PointWish::Load(point)) => {
+            if let Some(setup) = outcome.setup_of(level, point) {
+                effects.extend([Effect::TakeSetup(Box::new(setup)), Effect::ShowTraining]);
+            }
+        }
+        Some(PointWish::Export(task)) => effects.push(Effect::ChooseFile(*task)),
+        None => {}
+    }
+    trade.look = look;
+}
+
+fn head_ui(ui: &mut Ui, outcome: &TradeOffOutcome, look: &mut TradeOffLook) {
+    ui.horizontal(|ui| {
+        ui.set_min_height(space(7));
+        ui.label(RichText::new("Speed against accuracy").font(semibold(type_size().title)));
+        ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
+            level_ui(ui, outcome, look);
+        });
+    });
+}
+
+/// Few levels are next to each other, many in a list; a recording has only one, without a name.
+fn level_ui(ui: &mut Ui, outcome: &TradeOffOutcome, look: &mut TradeOffLook) {
+    let noises = outcome.levels.iter().filter_map(|level| level.noise);
+    let names: Vec<String> = noises.map(noise_name).collect();
+    if names.is_empty() {
+        return;
+    }
+    let picked = if names.len() <= 5 {
+        let options: Vec<_> = names
+            .iter()
+            .enumerate()
+            .map(|(level, name)| (level, name.as_str()))
+            .collect();
+        segmented_ui(ui, "Displayed noise level", &options, look.level, false)
+    } else {
+        let mut picked = None;
+        let combo = ComboBox::from_id_salt("noise on show").selected_text(&names[look.level]);
+        combo.show_ui(ui, |ui| {
+            for (level, name) in names.iter().enumerate() {
+                if ui.selectable_label(level == look.level, name).clicked() {
+                    picked = Some(level);
+                }
+            }
+        });
+        picked
+    };
+    if let Some(level) = picked {
+        (look.level, look.marked) = (level, None);
+    }
+    dim_ui(ui, "Noise");
+}
+
+/// Returns the hint shown while a noise level has no points.
+fn waiting(is_running: bool) -> &'static str {
+    if is_running {
+        "The points appear here as they are measured."
+    } else {
+        "The measurement ended before the first point."
+    }
+}
+
+/// Returns true for a simulated array.
+fn has_noise(outcome: &TradeOffOutcome) -> bool {
+    outcome.levels.iter().any(|level| level.noise.is_some())
+}
+
+/// Shows the state of the measurement in the line at the bottom.
+fn status_ui(ui: &mut Ui, trade: &TradeOffView) {
+    let palette = Theme::of(ui).palette;
+    let (colour, text) = match (&trade.running, &trade.outcome) {
+        (Some(_), Some(outcome)) => {
+            let (done, all) = outcome.points();
+            (palette.accent, format!("Measuring: {done} of {all} points"))
+        }
+        (_, Some(outcome)) => {
+            let (done, all) = outcome.points();
+            let took = outcome
+                .took
+                .map_or_else(String::new, |took| format!(" in {}", format_duration(took)));
+            match outcome.ending {
+                Some(TradeOffEnding::Complete) => (palette.good, format!("Measured {all} points{took}")),
+                _ => (palette.warning, format!("Ended early: {done} of {all} points{took}")),
+            }
+        }
+        (_, None) => (palette.dim, "Ready: press Measure".to_owned()),
+    };
+    ui.horizontal_centered(|ui| {
+        state_ui(ui, colour, &text);
+        if let Some(outcome) = &trade.outcome {
+            let unit = outcome.decoded.as_deref().filter(|_| !has_noise(outcome));
+            let unit = unit.map_or_else(String::new, |unit| format!(", times of {unit}"));
+            let text = format!("{}, one thread, median of many{unit}", outcome.plan.source_name());
+            ui.label(RichText::new(text).size(type_size().note).color(palette.dim));
+        }
+    });
+}

@@ -1,0 +1,226 @@
+use eframe::egui::Ui;
+
+use super::{
+    choices::{array_choice_ui, hidden_choice_ui, workload_ui},
+    network_section::{array_inputs_ui, recording_inputs_ui},
+    preset_section::{applied, present, preset_section_ui},
+    scene_choice::scene_choice_ui,
+    scene_section::{outlook_notes_ui, samples_section_ui, scene_section_ui},
+    sensor_section::geometry_ui,
+    summaries,
+};
+use crate::window::{
+    shared::{Effect, Phase, Shared, SourceKind, method_choice_ui, method_settings_ui, stopping_ui},
+    theme::space,
+    views::train::{paper_figure::PaperFigure, recording::RecordingEditor},
+    widgets::{Landmark, explained_options_ui, fold_ui, ghost_button, scrolled_ui},
+};
+use decoupler_core::{
+    evaluation::{Measured, Outlook, RunSettings, SimulatedSettings},
+    scene::RowModel,
+};
+
+/// The source and the settings of the next training. Returns the paper's figure that is to be shown, if the user picked
+/// one.
+pub fn configuration_ui(
+    ui: &mut Ui,
+    recording: &mut RecordingEditor,
+    shared: &Shared,
+    effects: &mut Vec<Effect>,
+) -> Option<PaperFigure> {
+    let mut picked = None;
+    scrolled_ui(ui, "configuration", |ui| {
+        ui.add_space(space(2));
+        ui.add_enabled_ui(!shared.phase.is_busy(), |ui| {
+            source_choice_ui(ui, shared.source, effects);
+        });
+        ui.add_space(space(2));
+        match shared.source {
+            SourceKind::Array => picked = array_ui(ui, shared, effects),
+            SourceKind::Recording => recording_ui(ui, recording, shared, effects),
+        }
+        ui.add_space(space(4));
+    });
+    picked
+}
+
+/// The choice between the simulated array and a recording.
+fn source_choice_ui(ui: &mut Ui, source: SourceKind, effects: &mut Vec<Effect>) {
+    let options = [
+        (
+            SourceKind::Array,
+            "Simulated array",
+            "Samples are drawn from the resistance model of a row-column array.",
+        ),
+        (
+            SourceKind::Recording,
+            "Recording",
+            "Samples are read from files with readings and measured targets.",
+        ),
+    ];
+    if let Some(source) = explained_options_ui(ui, "Source", &options, source, true) {
+        effects.push(Effect::ChooseSource(source));
+    }
+}
+
+/// Settings of a training on a simulated array. Returns the paper's figure that the user picked.
+fn array_ui(ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) -> Option<PaperFigure> {
+    let mut draft = shared.draft;
+    let mut picked = None;
+    let is_busy = shared.phase.is_busy();
+    let scene = draft.source.scene;
+    let followed = present(&draft);
+    let top = ui.cursor().top();
+    ui.add_enabled_ui(!is_busy, |ui| {
+        array_choice_ui(ui, &mut draft.source.sensor.scale);
+        let scale = draft.source.sensor.scale;
+        hidden_choice_ui(
+            ui,
+            &mut draft.hidden,
+            Some((scale.columns(), scale.coordinates_per_row())),
+        );
+        workload_ui(ui, &draft);
+    });
+    method_ui(ui, &mut draft, shared.phase);
+    Landmark::Choices.stands_at(ui, ui.min_rect().with_min_y(top));
+    ui.add_enabled_ui(!is_busy, |ui| {
+        preset_section_ui(ui, &mut draft);
+        scene_choice_ui(ui, &mut draft);
+        ui.add_space(space(2));
+        ui.separator();
+        outlook_notes_ui(ui, &draft, outlook(shared));
+        fold_ui(ui, "Scene", &summaries::of_scene(&draft), |ui| {
+            scene_section_ui(ui, &mut draft, outlook(shared));
+        });
+        // How many samples are best depends on whether there is noise.
+        if let Some(preset) = followed.filter(|_| draft.source.scene.noise != scene.noise) {
+            draft = applied(preset, &draft);
+        }
+        fold_ui(ui, "Samples", &summaries::of_samples(&draft), |ui| {
+            samples_section_ui(ui, &mut draft);
+        });
+        let geometry = summaries::of_geometry(&draft.source.sensor.geometry);
+        fold_ui(ui, "Geometry", &geometry, |ui| geometry_ui(ui, &mut draft));
+        fold_ui(ui, "Network inputs", &summaries::of_inputs(&draft.inputs), |ui| {
+            array_inputs_ui(ui, &mut draft);
+        });
+    });
+    training_ui(ui, &mut draft, shared.phase);
+    ui.add_enabled_ui(!is_busy && shared.phase != Phase::Died, |ui| {
+        fold_ui(ui, "Figures of the paper", "", |ui| picked = paper_section_ui(ui));
+    });
+    let (text, hint) = (
+        "Reset to the paper's settings",
+        "10×10_5×30, 12 hidden nodes, 1000 training and 100 test samples",
+    );
+    reset_ui(ui, text, hint, &mut draft, SimulatedSettings::default(), is_busy);
+    if draft != shared.draft {
+        effects.push(Effect::Configure(Box::new(draft)));
+    }
+    picked
+}
+
+/// Files and settings of a training on a recording.
+fn recording_ui(ui: &mut Ui, recording: &mut RecordingEditor, shared: &Shared, effects: &mut Vec<Effect>) {
+    let mut settings = shared.recording.settings;
+    let is_busy = shared.phase.is_busy();
+    let top = ui.cursor().top();
+    ui.add_enabled_ui(!is_busy, |ui| recording.files_ui(ui, shared, effects));
+    recording.columns_button_ui(ui, shared);
+    ui.add_space(space(2));
+    ui.separator();
+    ui.add_enabled_ui(!is_busy, |ui| {
+        hidden_choice_ui(ui, &mut settings.hidden, recording.channels());
+    });
+    method_ui(ui, &mut settings, shared.phase);
+    Landmark::Choices.stands_at(ui, ui.min_rect().with_min_y(top));
+    ui.add_space(space(2));
+    ui.separator();
+    ui.add_enabled_ui(!is_busy, |ui| {
+        recording.folds_ui(ui, &mut settings, effects);
+        fold_ui(ui, "Network inputs", &summaries::of_inputs(&settings.inputs), |ui| {
+            let has_row_wires = recording.has_row_wires();
+            recording_inputs_ui(ui, &mut settings, recording.channels(), has_row_wires);
+        });
+    });
+    training_ui(ui, &mut settings, shared.phase);
+    let usual = RunSettings::from(Measured { rows: RowModel::Shared });
+    let hint = "Bayesian regularisation for recordings, 12 hidden nodes, 300 epochs";
+    reset_ui(ui, "Reset to the default settings", hint, &mut settings, usual, is_busy);
+    if settings != shared.recording.settings {
+        effects.push(Effect::ConfigureRecording(Box::new(settings)));
+    }
+}
+
+/// The method. A paused training can be continued with another one.
+fn method_ui<S>(ui: &mut Ui, settings: &mut RunSettings<S>, phase: Phase) {
+    ui.add_space(space(1));
+    ui.add_enabled_ui(!phase.is_busy() || phase == Phase::Paused, |ui| {
+        method_choice_ui(ui, &mut settings.training.method);
+    });
+}
+
+/// The folded settings of the training.
+fn training_ui<S>(ui: &mut Ui, settings: &mut RunSettings<S>, phase: Phase) {
+    ui.add_enabled_ui(!phase.is_busy() || phase == Phase::Paused, |ui| {
+        fold_ui(ui, "When to stop", &summaries::of_stopping(&settings.training), |ui| {
+            stopping_ui(ui, &mut settings.training.stopping);
+        });
+        fold_ui(ui, "Method settings", &summaries::of_method(settings), |ui| {
+            method_settings_ui(
+                ui,
+                &mut settings.training.method,
+                &mut settings.starts,
+                !phase.is_busy(),
+            );
+        });
+    });
+}
+
+/// The button that sets `settings` to `usual`.
+fn reset_ui<S: Copy + PartialEq>(
+    ui: &mut Ui,
+    text: &str,
+    hint: &str,
+    settings: &mut RunSettings<S>,
+    usual: RunSettings<S>,
+    is_busy: bool,
+) {
+    ui.add_space(space(4));
+    let can_reset = !is_busy && *settings != usual;
+    let reset = ui.add_enabled(can_reset, eframe::egui::Button::new(text));
+    if reset.on_hover_text(hint).clicked() {
+        *settings = usual;
+    }
+}
+
+/// Returns the outlook of the scene of the draft, where it is known.
+fn outlook(shared: &Shared) -> Option<&Outlook> {
+    let (settings, test) = match (&shared.preview, &shared.run) {
+        (Some(preview), _) => (preview.settings, &preview.test),
+        (None, Some(run)) => (run.simulated()?, run.test.array()?),
+        (None, None) => return None,
+    };
+    let is_same =
+        (settings.source.sensor, settings.source.scene) == (shared.draft.source.sensor, shared.draft.source.scene);
+    test.outlook.as_ref().filter(|_| is_same)
+}
+
+/// The paper's figures of single networks, one click each.
+fn paper_section_ui(ui: &mut Ui) -> Option<PaperFigure> {
+    const GAP: f32 = space(1);
+    let mut picked = None;
+    let width = 0.5 * (ui.available_width() - GAP);
+    ui.spacing_mut().item_spacing = [GAP, GAP].into();
+    for pair in PaperFigure::ALL.chunks(2) {
+        ui.horizontal(|ui| {
+            for figure in pair {
+                let button = ghost_button(figure.name()).min_size([width, space(7)].into());
+                if ui.add(button).on_hover_text(figure.description()).clicked() {
+                    picked = Some(*figure);
+                }
+            }
+        });
+    }
+    picked
+}

@@ -1,0 +1,157 @@
+//! Measures decoders in the background. It ends after the last, or after the one in hand when nobody waits for more.
+
+use std::{path::Path, sync::Arc};
+
+use super::{DecoderResult, DecodersState};
+use crate::window::{
+    job::{Job, JobError, Report, Wake},
+    shared::{Phase, Shared},
+    training_worker::RunId,
+};
+use decoupler_core::{
+    dataset::Dataset,
+    evaluation::{DecoderReport, DecoderSet},
+    network::Networks,
+};
+use decoupler_files::import::Setup;
+
+/// Message of the thread to the window.
+enum News {
+    /// Report of the decoder at this place in the list.
+    Measured(usize, Result<DecoderReport, String>),
+    /// Nothing more will come.
+    Ended(Result<(), JobError>),
+}
+
+/// The window's end of the thread.
+#[derive(Debug)]
+pub struct DecoderMeasuring {
+    job: Job<News>,
+    /// The training whose networks are measured, and how many epochs had been run.
+    of: Option<(RunId, usize)>,
+}
+
+impl DecoderMeasuring {
+    /// Nothing measured yet. `wake` is called after each decoder and at the end.
+    pub fn new(wake: Wake) -> Self {
+        Self {
+            job: Job::new("decoders", wake),
+            of: None,
+        }
+    }
+
+    /// Takes news, forgets what is of a network that is another one by now, and measures the networks on show once they
+    /// stand still and their table is unfolded.
+    pub fn follow(&mut self, shared: &Shared, state: &mut DecodersState) {
+        self.take_news(state);
+        let standing = shared.run.as_ref().and_then(|run| {
+            let result = run.result.as_ref()?;
+            result
+                .is_standing
+                .then_some((run, (run.id, result.epochs_run), &result.networks))
+        });
+        let is_other = standing.is_some_and(|(_, of, _)| self.of.is_some_and(|measured| measured != of));
+        if is_other || shared.phase == Phase::Training {
+            self.forget(state);
+        }
+        let is_wanted = state.is_open && state.measured.is_none();
+        if let (true, Phase::Paused | Phase::Ended(_), Some((run, of, networks))) = (is_wanted, shared.phase, standing)
+        {
+            self.of = Some(of);
+            state.measured = Some(DecoderResult::pending(&run.settings().source));
+            self.begin(run.setup.clone(), (**networks).clone(), Arc::clone(run.test.set()));
+        }
+    }
+
+    fn forget(&mut self, state: &mut DecodersState) {
+        self.job.abandon();
+        (self.of, state.measured) = (None, None);
+    }
+
+    /// Measures all decoders of `setup` with their trained `networks` on `test`.
+    fn begin(&mut self, setup: Setup, networks: Networks, test: Arc<Dataset>) {
+        self.job
+            .start(move |report| measure_all(&setup, networks, &test, report), News::Ended);
+    }
+
+    /// Takes what the thread has to tell.
+    fn take_news(&mut self, state: &mut DecodersState) {
+        while let Some(news) = self.job.next_event() {
+            match news {
+                News::Measured(place, report) => state.take(place, report),
+                News::Ended(Ok(())) => {}
+                News::Ended(Err(error)) => state.end(&format!("{error}: close the table and open it again")),
+            }
+        }
+    }
+}
+
+fn measure_all(setup: &Setup, networks: Networks, test: &Dataset, report: &Report<News>) {
+    let is_cancelled = || report.is_cancelled();
+    let sets = setup.sets(Path::new(""), &is_cancelled, &mut |_| ());
+    let set = match sets {
+        Ok(None) => return,
+        Ok(Some(sets)) => Ok(DecoderSet::on_set(
+            *setup.settings(),
+            sets.sets.split.training,
+            Some(networks),
+        )),
+        Err(error) => Err(error.to_string()),
+    };
+    for (place, wanted) in DecoderResult::pending(&setup.settings().source).into_iter().enumerate() {
+        if is_cancelled() {
+            return;
+        }
+        let measure = |set: &DecoderSet| match set.measure(wanted.kind, wanted.precision, test) {
+            Ok(report) => report.ok_or_else(|| "it needs a trained network".to_owned()),
+            Err(error) => Err(error.to_string()),
+        };
+        report.send(News::Measured(
+            place,
+            set.as_ref().map_err(String::clone).and_then(measure),
+        ));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::mpsc::channel;
+
+    use super::*;
+    use decoupler_core::evaluation::{Run, SimulatedSettings, Simulation};
+
+    #[test]
+    fn decoders_that_cannot_be_measured_say_why_and_none_is_left_waiting() {
+        let mut settings = SimulatedSettings {
+            hidden: 2,
+            ..SimulatedSettings::default()
+        };
+        settings.source = Simulation {
+            samples: 20,
+            validation_samples: 0,
+            test_samples: 4,
+            ..settings.source
+        };
+        settings.source.sensor.scale = "2x3_2x9".parse().unwrap();
+        let run = Run::prepare(settings).unwrap();
+        let (waking, woken) = channel();
+        let wake = move || waking.send(()).unwrap_or(());
+        let (mut measuring, mut state) = (DecoderMeasuring::new(Arc::new(wake)), DecodersState::default());
+        state.measured = Some(DecoderResult::pending(&run.settings().source));
+        assert!(state.is_measuring());
+        let mut impossible = settings;
+        impossible.source.samples = 0;
+        measuring.begin(impossible.into(), run.network(), Arc::clone(run.test()));
+        while state.is_measuring() {
+            woken.recv().unwrap();
+            measuring.take_news(&mut state);
+        }
+        assert!(!state.is_measuring());
+        for result in state.measured.iter().flatten() {
+            let reason = result.report.clone().unwrap().unwrap_err();
+            assert!(reason.contains("training samples"), "{reason}");
+        }
+        measuring.forget(&mut state);
+        assert!(state.measured.is_none());
+    }
+}

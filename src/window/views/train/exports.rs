@@ -1,0 +1,171 @@
+//! Exports of the training on show.
+
+use super::{
+    bottom_tab::has_target_surface,
+    chart::{all_targets_figure, chart},
+    state::TrainView,
+    surfaces::surface_figure,
+};
+use crate::window::shared::{
+    Ask, Contents, Effect, Export, ExportGroup, FileTask, FileWords, NetworkSource, Phase, Purpose, RunResult, RunView,
+    Shared, SourceKind, copy_exports, csv_export, error_table_export, file_stem, loss_export, network_exports,
+    picture_exports,
+};
+use decoupler_core::evaluation::DecoderReport;
+use decoupler_files::{
+    export::{decoder_table, error_table},
+    figure::{Figure, surface::ViewMode},
+};
+
+/// A saved training to go on from.
+pub const CHECKPOINT: FileWords = FileWords {
+    kind: "checkpoint",
+    description: "The training as it stands, paused or ended. Resumed here or in a terminal (train --checkpoint FILE \
+                  --resume), it gives bit-identical results.",
+    extensions: &["checkpoint"],
+};
+
+const OPENED: FileWords = FileWords {
+    description: "Opens a training saved here or by train --checkpoint in a terminal, with its settings and its \
+                  history, and pauses it. A resumed training gives bit-identical results.",
+    ..CHECKPOINT
+};
+
+const DECODERS: FileWords = FileWords {
+    kind: "decoder table",
+    description: "Errors and times of the measured decoders with every digit, as CSV.",
+    extensions: &["csv"],
+};
+
+/// Task of saving the checkpoint of `run`.
+pub(super) fn checkpoint_task(run: &RunView) -> FileTask {
+    FileTask::save_run(CHECKPOINT, &file_stem("training", &run.setup), run.id, |run| {
+        let file = run.checkpoint_file()?;
+        Ok(Contents::new(move |path| file.save(path)))
+    })
+}
+
+/// Task of opening a checkpoint.
+pub(super) fn open_task(shared: &Shared) -> FileTask {
+    let setup = shared
+        .run
+        .as_ref()
+        .map_or_else(|| shared.draft.into(), |run| run.setup.clone());
+    FileTask {
+        words: OPENED,
+        suggestion: OPENED.file_name(&file_stem("training", &setup)),
+        purpose: Purpose::Open,
+    }
+}
+
+/// Everything that can be exported of the training on show.
+pub(super) fn train_exports<'a>(view: &'a TrainView, shared: &'a Shared) -> Vec<Export<'a>> {
+    let shown = shared.shown_run().and_then(|run| Some((run, run.result.as_ref()?)));
+    let shown = shown.ok_or_else(|| "Nothing is trained yet: press Train first.".to_owned());
+    let run = shown.clone().map(|(run, _)| run);
+    let stem = |what: &str| {
+        run.as_ref()
+            .map_or_else(|_| String::new(), |run| file_stem(what, &run.setup))
+    };
+    let mut exports = networks(view, &shown);
+    let (name, what) = match shared.look.mode {
+        _ if shared.source == SourceKind::Recording && !has_target_surface(shared) => ("Sample", "sample"),
+        ViewMode::ThreeD => ("Surfaces", "surfaces"),
+        ViewMode::Top => ("Surfaces", "surfaces-top"),
+    };
+    let surfaces = run.clone().map(|_| || upper_figure(view, shared));
+    exports.extend(picture_exports(name, stem(what), surfaces));
+    let chart = run.clone().and_then(|_| {
+        let figure = Figure::from(chart(view, shared).ok_or("This chart has nothing to show yet.")?);
+        Ok(move || figure.clone())
+    });
+    exports.extend(picture_exports("Chart", stem(view.tab.file_word()), chart));
+    let errors = shown.clone().map(|(run, latest)| {
+        let result = view.result(shared).unwrap_or(latest);
+        move || error_table(&run.error_table(result))
+    });
+    let of_epoch = view.scrub.result().map(|past| format!("-epoch{}", past.epochs_run));
+    let of_errors = stem("errors") + &of_epoch.unwrap_or_default();
+    exports.push(error_table_export(of_errors, errors.clone()));
+    exports.push(loss_export(stem("loss"), run.clone().map(|run| run.history.as_slice())));
+    exports.extend(copy_exports("Error table", errors));
+    let decoders = shown.map(|(run, _)| run).and_then(|run| {
+        let reports = measured(view);
+        if reports.is_empty() {
+            return Err("No decoder is measured yet: unfold “More decoders”.".to_owned());
+        }
+        Ok(move || decoder_table(&run.problem, &reports, run.baselines.reference.as_ref()))
+    });
+    exports.push(csv_export(
+        "Decoder table",
+        DECODERS,
+        stem("decoders"),
+        decoders.clone(),
+    ));
+    exports.extend(copy_exports("Decoder table", decoders));
+    let standing = run.and_then(|run| match shared.phase {
+        Phase::Paused | Phase::Ended(_) => Ok(run),
+        Phase::Died => Err("The training was lost with its thread: train again.".to_owned()),
+        _ => Err("A training under way cannot be saved: pause it first.".to_owned()),
+    });
+    exports.push(Export {
+        group: ExportGroup::Training,
+        name: "Checkpoint".to_owned(),
+        form: "resumable".to_owned(),
+        description: CHECKPOINT.description,
+        ask: standing.map(|run| -> Ask<'a> { Box::new(|| Effect::ChooseFile(checkpoint_task(run))) }),
+    });
+    exports
+}
+
+/// What is drawn above the charts: the surfaces, or all targets of a sample.
+fn upper_figure(view: &TrainView, shared: &Shared) -> Figure {
+    let surfaces = surface_figure(view, shared);
+    match all_targets_figure(view, shared) {
+        Some(targets) if surfaces.surfaces.is_empty() => targets.into(),
+        _ => surfaces.into(),
+    }
+}
+
+/// The best network, and before it that of a past epoch while it is on show.
+fn networks<'a>(view: &'a TrainView, shown: &Result<(&'a RunView, &'a RunResult), String>) -> Vec<Export<'a>> {
+    let source = shown
+        .as_ref()
+        .map(|(run, _)| NetworkSource::Training(run.id, Box::new(run.setup.clone())));
+    let mut exports = network_exports("", &source.map_err(String::clone), move || measured(view));
+    let Ok((run, latest)) = shown else { return exports };
+    let in_group = |group: ExportGroup| {
+        move |mut export: Export<'a>| {
+            if export.group == ExportGroup::Network {
+                export.group = group;
+            }
+            export
+        }
+    };
+    exports = exports
+        .into_iter()
+        .map(in_group(ExportGroup::BestNetwork(latest.best_epoch)))
+        .collect();
+    if let Some(epoch) = view.scrub.result().map(|past| past.epochs_run) {
+        let source = NetworkSource::Past(run.id, Box::new(run.setup.clone()), epoch, run.past.clone());
+        // The decoders were measured beside the best network.
+        let past = network_exports("", &Ok(source), Vec::new).into_iter();
+        let past = past
+            .map(in_group(ExportGroup::NetworkOnShow(epoch)))
+            .map(|export| Export {
+                name: format!("{} of epoch {epoch}", export.name),
+                ..export
+            });
+        exports.extend(past);
+        // Each part of the menu for itself.
+        exports.sort_by_key(|export| export.group);
+    }
+    exports
+}
+
+/// Reports of the decoders measured so far.
+fn measured(view: &TrainView) -> Vec<DecoderReport> {
+    let results = view.decoders.measured.iter().flatten();
+    let reports = results.filter_map(|result| result.report.as_ref()?.as_ref().ok());
+    reports.cloned().collect()
+}

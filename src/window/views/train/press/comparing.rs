@@ -1,0 +1,207 @@
+use std::sync::Arc;
+
+use super::{shown::Shown, subject::Subject};
+use crate::window::job::{Job, JobError, Report, Wake};
+use decoupler_core::{
+    decoupling::{Decoder, DecoderKind, Precision},
+    evaluation::{DecoderSet, Pressed, PressedAnswer},
+};
+
+/// Decoders beside the network.
+const KINDS: [DecoderKind; 5] = [
+    DecoderKind::Mean,
+    DecoderKind::Ridge,
+    DecoderKind::RadialBasis,
+    DecoderKind::Polish,
+    DecoderKind::Newton,
+];
+
+/// A decoder as it stands.
+#[derive(Debug)]
+pub(super) struct Compared {
+    pub(super) kind: DecoderKind,
+    /// Its latest answer or why it has none; `None` before the first.
+    pub(super) answer: Option<Result<PressedAnswer, String>>,
+    /// True if that is the answer to what is pressed now.
+    pub(super) is_present: bool,
+}
+
+type Fitted = (DecoderKind, Box<dyn Decoder>);
+
+/// News of the thread that fits decoders.
+enum FitNews {
+    Fitted(DecoderKind, Result<Box<dyn Decoder>, String>),
+    Ended(Result<(), JobError>),
+}
+
+/// The decoders, handed back, with the answers of those that had the time.
+struct Decoded {
+    decoders: Vec<Fitted>,
+    answers: Vec<(DecoderKind, Result<PressedAnswer, String>)>,
+}
+
+/// The other decoders under the finger: fitted in the background once somebody presses, and asked there one touch at a
+/// time; the newest touch wins.
+pub(super) struct Comparing {
+    fits: Job<FitNews>,
+    decoding: Job<Result<Decoded, JobError>>,
+    of: Option<Subject>,
+    decoders: Vec<Fitted>,
+    rows: Vec<Compared>,
+    /// The touch being decoded or decoded last.
+    asked: Option<Arc<Pressed>>,
+}
+
+impl Comparing {
+    pub(super) fn new(wake: &Wake) -> Self {
+        Self {
+            fits: Job::new("fits", Arc::clone(wake)),
+            decoding: Job::prompt("comparison", Arc::clone(wake)),
+            of: None,
+            decoders: Vec::new(),
+            rows: Vec::new(),
+            asked: None,
+        }
+    }
+
+    /// The decoders in the order of the table; none while the network still learns.
+    pub(super) fn rows(&self) -> &[Compared] {
+        &self.rows
+    }
+
+    /// Takes news, and asks the decoders for what is pressed now.
+    pub(super) fn follow(&mut self, shown: Option<&Shown>) {
+        self.take_news();
+        let Some(shown) = shown else { return };
+        let subject = shown.question.subject.as_ref().filter(|subject| subject.is_standing);
+        let is_same = match (&self.of, subject) {
+            (Some(of), Some(subject)) => of.is(subject),
+            (of, subject) => of.is_none() && subject.is_none(),
+        };
+        if !is_same {
+            self.begin(subject.cloned());
+        }
+        let is_new = !self
+            .asked
+            .as_ref()
+            .is_some_and(|asked| Arc::ptr_eq(asked, &shown.pressed));
+        if is_new {
+            self.rows.iter_mut().for_each(|row| row.is_present = false);
+        }
+        let is_answered = !is_new && self.rows.iter().all(|row| row.is_present || !self.has(row.kind));
+        if self.decoding.is_under_way() {
+            if is_new {
+                // Whoever is slow leaves it; the answers that are there come, and then this touch is asked.
+                self.decoding.cancel();
+            }
+        } else if !self.decoders.is_empty() && !is_answered {
+            self.ask(Arc::clone(&shown.pressed));
+        }
+    }
+
+    fn has(&self, kind: DecoderKind) -> bool {
+        self.decoders.iter().any(|(other, _)| *other == kind)
+    }
+
+    /// Fits the decoders for another network.
+    fn begin(&mut self, subject: Option<Subject>) {
+        self.fits.abandon();
+        self.decoding.abandon();
+        (self.decoders, self.asked) = (Vec::new(), None);
+        self.of.clone_from(&subject);
+        let Some(subject) = subject else {
+            self.rows.clear();
+            return;
+        };
+        self.rows = KINDS
+            .map(|kind| Compared {
+                kind,
+                answer: None,
+                is_present: false,
+            })
+            .into();
+        self.fits.start(move |report| fit_all(&subject, report), FitNews::Ended);
+    }
+
+    fn ask(&mut self, pressed: Arc<Pressed>) {
+        let mut decoders = std::mem::take(&mut self.decoders);
+        self.asked = Some(Arc::clone(&pressed));
+        self.decoding.start(
+            move |report| {
+                let mut answers = Vec::new();
+                for (kind, decoder) in &mut decoders {
+                    match pressed.answer(&mut **decoder, &|| report.is_cancelled()) {
+                        Ok(Some(answer)) => answers.push((*kind, Ok(answer))),
+                        Ok(None) => break,
+                        Err(error) => answers.push((*kind, Err(error.to_string()))),
+                    }
+                }
+                Decoded { decoders, answers }
+            },
+            |decoded| decoded,
+        );
+    }
+
+    fn take_news(&mut self) {
+        while let Some(news) = self.fits.next_event() {
+            match news {
+                FitNews::Fitted(kind, Ok(decoder)) => self.decoders.push((kind, decoder)),
+                FitNews::Fitted(kind, Err(reason)) => self.fail(|other| other == kind, &reason),
+                FitNews::Ended(Ok(())) => {}
+                FitNews::Ended(Err(error)) => self.fail(|_| true, &error.to_string()),
+            }
+        }
+        while let Some(decoded) = self.decoding.next_event() {
+            match decoded {
+                Ok(Decoded { decoders, answers }) => {
+                    // Those fitted meanwhile stand behind.
+                    let newer = std::mem::replace(&mut self.decoders, decoders);
+                    self.decoders.extend(newer);
+                    for (kind, mut answer) in answers {
+                        if let Some(row) = self.rows.iter_mut().find(|row| row.kind == kind) {
+                            // A touch that was left too soon for a time leaves that of the one before.
+                            if let (Ok(answer), Some(Ok(before))) = (&mut answer, &row.answer) {
+                                answer.time = answer.time.or(before.time);
+                            }
+                            (row.answer, row.is_present) = (Some(answer), true);
+                        }
+                    }
+                }
+                Err(error) => self.fail(|_| true, &error.to_string()),
+            }
+        }
+    }
+
+    fn fail(&mut self, is_it: impl Fn(DecoderKind) -> bool, reason: &str) {
+        for row in self
+            .rows
+            .iter_mut()
+            .filter(|row| row.answer.is_none() && is_it(row.kind))
+        {
+            row.answer = Some(Err(reason.to_owned()));
+        }
+    }
+}
+
+/// Fits one decoder after the other, the fastest first.
+fn fit_all(subject: &Subject, report: &Report<FitNews>) {
+    let set = DecoderSet::new(&subject.settings, Some((*subject.networks).clone())).map_err(|error| error.to_string());
+    for kind in KINDS {
+        if report.is_cancelled() {
+            return;
+        }
+        let fit = |set: &DecoderSet| match set.decoder(kind, Precision::Double) {
+            Ok(decoder) => decoder.ok_or_else(|| "it needs a trained network".to_owned()),
+            Err(error) => Err(error.to_string()),
+        };
+        report.send(FitNews::Fitted(kind, set.as_ref().map_err(String::clone).and_then(fit)));
+    }
+}
+
+impl std::fmt::Debug for Comparing {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Comparing")
+            .field("rows", &self.rows)
+            .finish_non_exhaustive()
+    }
+}

@@ -1,0 +1,201 @@
+use eframe::egui::{Context, Key, Modifiers, PointerButton, Pos2, Response};
+use glam::{DVec2, DVec3};
+
+use super::{
+    finger::{Hand, Tool},
+    state::PressState,
+    target::{Grip, Target},
+};
+use crate::window::{test_view::TestView, views::train::drawn::Frames};
+use decoupler_core::scene::Touch;
+
+/// Deeper by a turn of the wheel of so many points: the whole stroke in about ten turns of a usual wheel.
+const SHARE_PER_POINT: f64 = 0.002;
+/// Deeper by a press of a key.
+const SHARE_PER_KEY: f64 = 0.05;
+/// Points by which a node seen from above is dragged through the whole stroke.
+const POINTS_PER_STROKE: f64 = 120.0;
+
+impl PressState {
+    /// Does what mouse and keys mean in this frame, before anything of it is drawn. `frames` are those on show, and `lit` is
+    /// the node that the pointer lights up.
+    pub fn take_pointer(&mut self, ctx: &Context, test: Option<&TestView>, frames: &Frames, lit: Option<usize>) {
+        let nobody_types = ctx.memory(|memory| memory.focused().is_none())
+            || self
+                .target
+                .as_ref()
+                .is_some_and(|target| ctx.memory(|memory| memory.has_focus(target.id)));
+        if self.is_pressing() && nobody_types && ctx.input_mut(|input| input.consume_key(Modifiers::NONE, Key::Escape))
+        {
+            self.let_go();
+        }
+        let (Some(target), Some(test)) = (self.target.clone(), test) else {
+            return;
+        };
+        let Some(response) = ctx.read_response(target.id).filter(|_| self.hand == Hand::Press) else {
+            self.grip = None;
+            return;
+        };
+        self.take_button(ctx, &response, &target, test, (frames, lit));
+        self.take_wheel_and_keys(ctx, &response, &target, test);
+    }
+
+    fn take_button(
+        &mut self,
+        ctx: &Context,
+        response: &Response,
+        target: &Target,
+        test: &TestView,
+        seen: (&Frames, Option<usize>),
+    ) {
+        let is_held = ctx.input(|input| input.pointer.button_down(PointerButton::Primary) && !input.modifiers.shift);
+        let at = response.interact_pointer_pos();
+        let Some(at) = at.filter(|_| is_held && response.is_pointer_button_down_on()) else {
+            self.grip = None;
+            return;
+        };
+        match self.grip {
+            None => self.grip = Some(self.take_hold(target, test, seen, at)),
+            Some(Grip::Level(z_mm)) => {
+                if let Some(met) = target.sight.ray(points(at)).at_level(z_mm) {
+                    self.print_at(within(target, met), test.stroke_mm);
+                }
+            }
+            Some(Grip::Node { node, above_mm, begin }) => {
+                let height_mm = height_mm(target, test, node, at).map(|height_mm| height_mm + above_mm);
+                let dragged = f64::from(at.y - begin.1) / POINTS_PER_STROKE * test.stroke_mm;
+                self.move_node(test, node, height_mm.unwrap_or(begin.0 - dragged));
+            }
+            Some(Grip::Missed) => {}
+        }
+    }
+
+    /// The button went down.
+    fn take_hold(
+        &mut self,
+        target: &Target,
+        test: &TestView,
+        (frames, lit): (&Frames, Option<usize>),
+        at: Pos2,
+    ) -> Grip {
+        let ray = target.sight.ray(points(at));
+        let nodes_mm = &frames.actual.nodes_mm;
+        let lit = lit.and_then(|node| Some((node, *nodes_mm.get(node)?)));
+        // Beside a lit node on a crest the line of sight may miss the surface, or meet it far behind: the node is meant.
+        let beside = lit.and_then(|(_, place)| ray.at_level(place.z));
+        let met = match (target.surface.pick(&ray), beside, lit) {
+            (Some(picked), Some(beside), Some((_, place))) if beside.distance(place) < picked.distance(place) => beside,
+            (Some(picked), _, _) => picked,
+            (None, Some(beside), _) => beside,
+            (None, None, _) => return Grip::Missed,
+        };
+        if self.finger.tool != Tool::OneNode {
+            self.print_at(within(target, met), test.stroke_mm);
+            return Grip::Level(met.z);
+        }
+        let distance = |node: &DVec3| node.truncate().distance_squared(met.truncate());
+        let nearest = || {
+            let nodes = nodes_mm.iter().copied().enumerate();
+            nodes.min_by(|(_, a), (_, b)| distance(a).total_cmp(&distance(b)))
+        };
+        let Some((node, place)) = lit.or_else(nearest) else {
+            return Grip::Missed;
+        };
+        if self.touch.is_none() {
+            self.touch = Some(of_frame(test, frames));
+        }
+        let pointer_mm = height_mm(target, test, node, at);
+        Grip::Node {
+            node,
+            above_mm: pointer_mm.map_or(0.0, |pointer_mm| place.z - pointer_mm),
+            begin: (place.z, at.y),
+        }
+    }
+
+    fn move_node(&mut self, test: &TestView, node: usize, height_mm: f64) {
+        let Some((address, rest)) = at_rest(test, node) else {
+            return;
+        };
+        let depth_mm = (rest.z - height_mm).clamp(0.0, test.stroke_mm);
+        if let Some(touch) = &mut self.touch {
+            touch.nodes_mm.insert(address, depth_mm);
+        }
+    }
+
+    fn take_wheel_and_keys(&mut self, ctx: &Context, response: &Response, target: &Target, test: &TestView) {
+        let before = self.finger;
+        if response.contains_pointer() {
+            // Taken, so that nothing else scrolls or zooms; with Ctrl it zooms as ever.
+            let points = ctx.input_mut(|input| std::mem::take(&mut input.smooth_scroll_delta).y);
+            self.finger.deepen(-SHARE_PER_POINT * f64::from(points));
+        }
+        if response.has_focus() {
+            let presses = |key| ctx.input_mut(|input| input.count_and_consume_key(Modifiers::NONE, key)) as f64;
+            let deeper = presses(Key::Plus) + presses(Key::Equals) - presses(Key::Minus);
+            let step = DVec2::new(
+                presses(Key::ArrowRight) - presses(Key::ArrowLeft),
+                presses(Key::ArrowUp) - presses(Key::ArrowDown),
+            );
+            self.finger.deepen(SHARE_PER_KEY * deeper);
+            if step != DVec2::ZERO {
+                self.step(target, test, step);
+            }
+        }
+        if self.finger != before {
+            self.follow_finger(test.stroke_mm);
+        }
+    }
+
+    /// Moves the finger by half a pitch of the nodes; the first step puts it onto the middle.
+    fn step(&mut self, target: &Target, test: &TestView, step: DVec2) {
+        let place_mm = self.touch.as_ref().and_then(|touch| Some(touch.print?.place_mm));
+        let Some(place_mm) = place_mm else {
+            return self.press_middle(test);
+        };
+        let geometry = &test.sensor.geometry;
+        let pitch_mm = DVec2::new(geometry.row_pitch_mm, geometry.node_pitch_mm).abs();
+        let moved = place_mm + 0.5 * step * pitch_mm;
+        self.print_at(within(target, moved.extend(0.0)), test.stroke_mm);
+    }
+}
+
+fn points(at: Pos2) -> DVec2 {
+    DVec2::new(f64::from(at.x), f64::from(at.y))
+}
+
+/// The nearest place that is drawn.
+fn within(target: &Target, place_mm: DVec3) -> DVec2 {
+    let grid = target.surface.map.grid();
+    let ends = |axis: &[f64]| (axis[0], axis[axis.len() - 1]);
+    let ((x0, x1), (y0, y1)) = (ends(grid.x_mm()), ends(grid.y_mm()));
+    place_mm.truncate().clamp(DVec2::new(x0, y0), DVec2::new(x1, y1))
+}
+
+/// Row-wire and number of a node drawn, and its place at rest.
+fn at_rest(test: &TestView, node: usize) -> Option<((usize, usize), DVec3)> {
+    let per_row = test.sensor.scale.nodes_per_row();
+    let (row, node) = (*test.rows.get(node / per_row)?, node % per_row);
+    Some((
+        (row, node),
+        test.sensor.geometry.row_node_mm(test.sensor.scale, row, node),
+    ))
+}
+
+/// The height to which the pointer lifts or lowers a node, where that can be seen.
+fn height_mm(target: &Target, test: &TestView, node: usize, at: Pos2) -> Option<f64> {
+    let (_, rest) = at_rest(test, node)?;
+    target.sight.height_mm(rest, test.stroke_mm, points(at))
+}
+
+/// The touch that leaves every node at its height.
+fn of_frame(test: &TestView, frames: &Frames) -> Touch {
+    let nodes = frames.actual.nodes_mm.iter().enumerate();
+    let depths = nodes.filter_map(|(node, place)| {
+        let (address, rest) = at_rest(test, node)?;
+        Some((address, rest.z - place.z))
+    });
+    Touch {
+        print: None,
+        nodes_mm: depths.collect(),
+    }
+}

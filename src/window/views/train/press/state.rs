@@ -1,0 +1,211 @@
+use std::sync::Arc;
+
+use glam::DVec2;
+
+use super::{
+    comparing::{Compared, Comparing},
+    finger::{Finger, Hand, Tool},
+    ready::ReadyNetwork,
+    shown::{Question, Shown},
+    subject::Subject,
+    target::{Grip, Target},
+};
+use crate::window::{
+    job::{Job, JobError, Wake},
+    shared::{RunResult, Shared, SourceKind},
+    surface_view::SurfaceViewResponse,
+    test_view::TestView,
+    views::train::drawn::Frames,
+};
+use decoupler_core::scene::Touch;
+use decoupler_files::figure::surface::Surface;
+
+/// The touch, and everything known of it.
+#[derive(Debug)]
+pub struct PressState {
+    /// Work of the pointer on the actual surface.
+    pub hand: Hand,
+    /// The finger that presses.
+    pub finger: Finger,
+    /// The touch; `None` while the test set is on show.
+    pub(super) touch: Option<Touch>,
+    /// Hold of the pointer, while its button is down.
+    pub(super) grip: Option<Grip>,
+    /// The actual surface as last drawn.
+    pub(super) target: Option<Target>,
+    pub(super) ready: ReadyNetwork,
+    /// True once somebody was about to press.
+    pub(super) is_wanted: bool,
+    shown: Option<Shown>,
+    comparing: Comparing,
+    /// Answers that take longer than a frame.
+    answering: Job<Result<Result<Shown, String>, JobError>>,
+    /// The question that could not be answered, and why.
+    failed: Option<(Question, String)>,
+}
+
+impl PressState {
+    /// Nothing pressed. `wake` is called when something was computed in the background.
+    pub fn new(wake: &Wake) -> Self {
+        Self {
+            hand: Hand::default(),
+            finger: Finger::default(),
+            touch: None,
+            grip: None,
+            target: None,
+            ready: ReadyNetwork::new(Arc::clone(wake)),
+            is_wanted: false,
+            shown: None,
+            comparing: Comparing::new(wake),
+            answering: Job::prompt("press", Arc::clone(wake)),
+            failed: None,
+        }
+    }
+
+    /// Returns true while something is pressed.
+    pub fn is_pressing(&self) -> bool {
+        self.touch.is_some()
+    }
+
+    /// The touch; `None` while the test set is on show.
+    pub fn touch(&self) -> Option<&Touch> {
+        self.touch.as_ref()
+    }
+
+    /// The part of the touch that is shown; `None` while the test set is on show, or before the first answer.
+    pub fn shown(&self) -> Option<&Shown> {
+        self.shown.as_ref().filter(|_| self.is_pressing())
+    }
+
+    /// Surfaces of the touch.
+    pub fn frames(&self) -> Option<&Frames> {
+        self.shown().map(|shown| &shown.frames)
+    }
+
+    /// The other decoders under the finger.
+    pub(super) fn compared(&self) -> &[Compared] {
+        self.comparing.rows()
+    }
+
+    /// Reason why nothing is shown of the touch.
+    pub(super) fn failure(&self) -> Option<&str> {
+        let failed = self.failed.as_ref().filter(|_| self.is_pressing())?;
+        Some(&failed.1)
+    }
+
+    /// Goes back to the test set.
+    pub fn let_go(&mut self) {
+        (self.touch, self.grip, self.shown, self.failed) = (None, None, None, None);
+    }
+
+    /// Presses the finger onto the middle of the nodes.
+    pub fn press_middle(&mut self, test: &TestView) {
+        if self.finger.tool == Tool::OneNode {
+            self.finger.tool = Tool::default();
+        }
+        let last = test.sensor.scale.nodes_per_row() - 1;
+        let corner = |row: Option<&usize>, node| {
+            let row = row.copied().unwrap_or(0);
+            test.sensor.geometry.row_node_mm(test.sensor.scale, row, node)
+        };
+        let (first, last) = (corner(test.rows.first(), 0), corner(test.rows.last(), last));
+        self.print_at(0.5 * (first + last).truncate(), test.stroke_mm);
+    }
+
+    /// Presses the finger onto a place.
+    pub(super) fn print_at(&mut self, place_mm: DVec2, stroke_mm: f64) {
+        self.touch = Some(Touch {
+            print: self.finger.print(place_mm, stroke_mm),
+            ..Touch::default()
+        });
+    }
+
+    /// Lets what is pressed follow a finger that has changed.
+    pub(super) fn follow_finger(&mut self, stroke_mm: f64) {
+        if let Some(print) = self.touch.as_mut().and_then(|touch| touch.print.as_mut())
+            && let Some(changed) = self.finger.print(print.place_mm, stroke_mm)
+        {
+            *print = changed;
+        }
+    }
+
+    /// Takes the actual surface as it was drawn.
+    pub fn take_target(&mut self, drawn: &SurfaceViewResponse, surface: &Surface) {
+        self.target = drawn.sight.map(|sight| Target {
+            id: drawn.response.id,
+            rect: drawn.response.rect,
+            sight,
+            surface: surface.clone(),
+        });
+        self.is_wanted |= self.hand == Hand::Press && drawn.response.hovered();
+    }
+
+    /// Answers what is pressed; `result` is that of the network on show.
+    pub fn follow(&mut self, shared: &Shared, result: Option<&RunResult>) {
+        self.ready.take_news();
+        if shared.source == SourceKind::Recording {
+            // There is no sensor model to press.
+            self.let_go();
+            (self.target, self.is_wanted) = (None, false);
+            return;
+        }
+        let has_network = shared.shown_run().is_some() && result.is_some();
+        if (self.is_wanted || self.is_pressing()) && !has_network {
+            self.ready.ask(shared);
+        }
+        let Some((touch, test)) = self.touch.as_ref().zip(shared.test()) else {
+            return;
+        };
+        if self.shown.as_ref().is_some_and(|shown| !shown.question.is_of(test)) {
+            // Another array, or another scene.
+            self.let_go();
+            return;
+        }
+        let question = Question {
+            touch: touch.clone(),
+            test: test.clone(),
+            subject: self.subject(shared, result),
+        };
+        self.ask(question);
+        self.comparing.follow(self.shown.as_ref());
+    }
+
+    /// The network on show, whose result is `result`; before there is one, the ready-made one.
+    fn subject(&self, shared: &Shared, result: Option<&RunResult>) -> Option<Subject> {
+        match shared.shown_run().zip(result) {
+            Some((run, result)) => Some(Subject {
+                networks: Arc::clone(&result.networks),
+                settings: run.simulated()?,
+                is_ready_made: false,
+                is_standing: result.is_standing,
+            }),
+            None => self.ready.subject(shared),
+        }
+    }
+
+    /// Answers a question in this frame if it is light, otherwise behind it, one at a time.
+    fn ask(&mut self, question: Question) {
+        while let Some(answered) = self.answering.next_event() {
+            let answered = answered.unwrap_or_else(|error| Err(error.to_string()));
+            self.take_answer(&question, answered);
+        }
+        let is_answered = self.shown.as_ref().is_some_and(|shown| shown.question.is(&question))
+            || self.failed.as_ref().is_some_and(|(failed, _)| failed.is(&question));
+        if is_answered {
+            return;
+        }
+        if question.is_light() {
+            let answered = question.clone().answer();
+            self.take_answer(&question, answered);
+        } else if !self.answering.is_under_way() {
+            self.answering.start(move |_| question.answer(), |answered| answered);
+        }
+    }
+
+    fn take_answer(&mut self, question: &Question, answered: Result<Shown, String>) {
+        match answered {
+            Ok(shown) => (self.shown, self.failed) = (Some(shown), None),
+            Err(reason) => self.failed = Some((question.clone(), reason)),
+        }
+    }
+}

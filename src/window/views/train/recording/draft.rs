@@ -1,0 +1,444 @@
+use std::{
+    cell::RefCell,
+    collections::BTreeMap,
+    path::{Path, PathBuf},
+    sync::Arc,
+};
+
+use super::{
+    planned::{MadeOf, PlanCache},
+    renaming::Renaming,
+};
+use decoupler_core::dataset::SplitBy;
+use decoupler_files::import::{Condition, InspectedFile, Joined, Meaning, Missing, Plan, TestFiles};
+
+/// A column by its file and its name there, which stay where another file becomes the first.
+pub(super) type ColumnKey = (PathBuf, String);
+
+/// An import as the user has it now: the files, what each column means, and how the samples are divided.
+#[derive(Clone, Debug)]
+pub(super) struct Draft {
+    /// The files, the first with the rows to which the others are joined.
+    pub(super) files: Vec<InspectedFile>,
+    /// Everything but the meanings and units of the columns, the conditions, the missing cells and the test files.
+    pub(super) plan: Plan,
+    /// Conditions as typed.
+    pub(super) conditions: String,
+    /// Cells that mean missing, as typed, with commas between them.
+    pub(super) missing: String,
+    /// Meanings that the user or a recipe has chosen, also of columns that another layout hides.
+    chosen: BTreeMap<ColumnKey, Meaning>,
+    /// Units that the user or a recipe has given, likewise.
+    units: BTreeMap<ColumnKey, String>,
+    /// Rule of division that the user or a recipe has chosen; without one it follows from the groups.
+    split: Option<SplitBy>,
+    /// Files of test samples by the recordings in whose place they are read.
+    tests: BTreeMap<PathBuf, PathBuf>,
+    /// The plan of the recipe in its own words, and the same plan as this import writes it.
+    of_recipe: Option<Box<[Plan; 2]>>,
+    cache: RefCell<PlanCache>,
+}
+
+impl Draft {
+    /// The import of a plan, whose files were looked at.
+    pub(super) fn new(mut plan: Plan, files: Vec<InspectedFile>) -> Self {
+        let import = &mut plan.import;
+        let (conditions, missing) = (joined(&import.conditions, " and "), joined(&import.missing, ", "));
+        let mut units = BTreeMap::new();
+        for file in &files {
+            for (column, summary) in file.inspection.columns.iter().enumerate() {
+                if let Some(unit) = import.units.remove(&file.full_name(column)) {
+                    units.insert((file.path.clone(), summary.name.clone()), unit);
+                }
+            }
+        }
+        let of_tests = plan.test.take();
+        let of_tests = of_tests
+            .iter()
+            .flat_map(|test| std::iter::once(&test.data).chain(&test.join));
+        // The meanings of the columns stand beside the columns.
+        (import.time, import.group, import.row_wire) = (None, None, None);
+        (import.inputs, import.targets) = (Vec::new(), Vec::new());
+        let paths = files.iter().map(|file| file.path.clone());
+        Self {
+            conditions,
+            missing,
+            tests: paths.zip(of_tests.cloned()).collect(),
+            files,
+            plan,
+            chosen: BTreeMap::new(),
+            units,
+            split: None,
+            of_recipe: None,
+            cache: RefCell::default(),
+        }
+    }
+
+    /// The import of a recipe, whose files were looked at: nothing in it is a guess.
+    pub(super) fn of_recipe(plan: Plan, files: Vec<InspectedFile>) -> Self {
+        let mut draft = Self::new(plan.clone(), files);
+        draft.split = Some(plan.division.by);
+        for file in &draft.files {
+            for (column, meaning) in file.inspection.columns.iter().zip(&file.meanings) {
+                draft.chosen.insert((file.path.clone(), column.name.clone()), *meaning);
+            }
+        }
+        draft.of_recipe = draft.made_plan().ok().map(|own| Box::new([plan, own]));
+        draft
+    }
+
+    /// This import with what the user has chosen in an older one, as far as it fits the files.
+    pub(super) fn keeping(mut self, older: &Self) -> Self {
+        let stems = self
+            .files
+            .iter()
+            .map(|file| (file.path.as_path(), file.stem.as_deref()));
+        let renaming = Renaming::new(&older.files, stems);
+        self.conditions = renaming.conditions(&older.conditions);
+        self.missing = renaming.missing(&older.missing);
+        for (name, unit) in &older.plan.import.units {
+            self.plan
+                .import
+                .units
+                .entry(name.clone())
+                .or_insert_with(|| unit.clone());
+        }
+        for joined in &mut self.plan.import.join {
+            let before = older.plan.import.join.iter().find(|before| before.file == joined.file);
+            joined.limit = joined.limit.or(before.and_then(|before| before.limit));
+        }
+        if self.plan.import.positions.is_none() {
+            self.plan.import.positions.clone_from(&older.plan.import.positions);
+        }
+        // Test files among those that were just opened come first.
+        if self.tests.is_empty() {
+            self.tests.clone_from(&older.tests);
+            self.tests
+                .retain(|recording, _| self.files.iter().any(|file| file.path == *recording));
+        }
+        self.units.extend(older.units.clone());
+        self.chosen.clone_from(&older.chosen);
+        for ((path, name), meaning) in &older.chosen {
+            let file = self.files.iter().position(|file| file.path == *path);
+            let columns = |file: usize| &self.files[file].inspection.columns;
+            let place =
+                file.and_then(|file| Some((file, columns(file).iter().position(|column| column.name == *name)?)));
+            if let Some((file, column)) = place {
+                self.give(file, column, *meaning);
+            }
+        }
+        self.plan.division = older.plan.division;
+        self.split = older.split;
+        self.settle_split();
+        self
+    }
+
+    /// Gives a column a meaning; another column that had it gives it up where only one can have it.
+    pub(super) fn choose(&mut self, file: usize, column: usize, meaning: Meaning) {
+        let had_group = self.has(Meaning::Group);
+        for path in self.give(file, column, meaning) {
+            self.chosen.insert(path, Meaning::Unused);
+        }
+        let key = self.key(file, column);
+        // Columns that another layout hides give it up too.
+        for ((path, _), other) in &mut self.chosen {
+            if *other == meaning && is_taken(meaning, *path == key.0) {
+                *other = Meaning::Unused;
+            }
+        }
+        self.chosen.insert(key, meaning);
+        if meaning == Meaning::Group && !had_group {
+            self.split = None;
+        }
+        self.settle_split();
+    }
+
+    /// Gives a column a meaning, and returns the columns that had to give it up.
+    fn give(&mut self, file: usize, column: usize, meaning: Meaning) -> Vec<ColumnKey> {
+        let mut given_up = Vec::new();
+        for (number, other) in self.files.iter_mut().enumerate() {
+            if !is_taken(meaning, number == file) {
+                continue;
+            }
+            for (index, found) in other.meanings.iter_mut().enumerate() {
+                if *found == meaning && (number, index) != (file, column) {
+                    *found = Meaning::Unused;
+                    let name = other.inspection.columns[index].name.clone();
+                    given_up.push((other.path.clone(), name));
+                }
+            }
+        }
+        self.files[file].meanings[column] = meaning;
+        given_up
+    }
+
+    /// Gives all inputs, targets and unused columns of a file this meaning, but for those that hold no numbers.
+    pub(super) fn choose_all(&mut self, file: usize, meaning: Meaning) {
+        for column in 0..self.files[file].meanings.len() {
+            let of_column = &self.files[file].inspection.columns[column];
+            let may_be_used = of_column.min.is_some() && of_column.texts == 0 && !of_column.is_constant;
+            let is_plain =
+                [Meaning::Input, Meaning::Target, Meaning::Unused].contains(&self.files[file].meanings[column]);
+            if is_plain && (may_be_used || meaning == Meaning::Unused) {
+                self.choose(file, column, meaning);
+            }
+        }
+    }
+
+    /// Divides the samples by this rule from now on, as far as there are groups for it.
+    pub(super) fn split_by(&mut self, by: SplitBy) {
+        self.split = Some(by);
+        self.settle_split();
+    }
+
+    /// The rule of division: that of the user, or by groups where there are any.
+    fn settle_split(&mut self) {
+        self.plan.division.by = match (self.split, self.has(Meaning::Group)) {
+            (Some(SplitBy::Group), false) | (None, false) => SplitBy::Time,
+            (None, true) => SplitBy::Group,
+            (Some(by), _) => by,
+        };
+    }
+
+    /// Tells whether a column of any file has this meaning.
+    pub(super) fn has(&self, meaning: Meaning) -> bool {
+        self.files.iter().any(|file| file.meanings.contains(&meaning))
+    }
+
+    /// Number of columns of this meaning.
+    pub(super) fn count(&self, meaning: Meaning) -> usize {
+        let meanings = self.files.iter().flat_map(|file| &file.meanings);
+        meanings.filter(|other| **other == meaning).count()
+    }
+
+    fn key(&self, file: usize, column: usize) -> ColumnKey {
+        let file = &self.files[file];
+        (file.path.clone(), file.inspection.columns[column].name.clone())
+    }
+
+    /// Unit of a column as typed or in the header.
+    pub(super) fn unit(&self, file: usize, column: usize) -> String {
+        let given = self.units.get(&self.key(file, column));
+        let found = self.files[file].inspection.columns[column].unit.as_ref();
+        given.or(found).cloned().unwrap_or_default()
+    }
+
+    /// Gives a column a unit; none if it is empty or that of the header.
+    pub(super) fn set_unit(&mut self, file: usize, column: usize, unit: &str) {
+        let key = self.key(file, column);
+        let unit = unit.trim();
+        let of_header = self.files[file].inspection.columns[column].unit.as_deref();
+        if unit.is_empty() || of_header == Some(unit) {
+            self.units.remove(&key);
+        } else {
+            self.units.insert(key, unit.to_owned());
+        }
+    }
+
+    /// Paths of the files, but for those of the test.
+    pub(super) fn paths(&self) -> Vec<PathBuf> {
+        self.files.iter().map(|file| file.path.clone()).collect()
+    }
+
+    /// Files for the test, each with the recording in whose place it is read.
+    pub(super) fn tests(&self) -> impl Iterator<Item = (&Path, &Path)> {
+        let found = self
+            .files
+            .iter()
+            .filter_map(|file| self.tests.get_key_value(&file.path));
+        found.map(|(recording, test)| (recording.as_path(), test.as_path()))
+    }
+
+    /// Tells whether the test samples have files of their own.
+    pub(super) fn has_tests(&self) -> bool {
+        !self.tests.is_empty()
+    }
+
+    /// Adds a file of test samples, for the first recording that has none. The one of a single recording is replaced.
+    ///
+    /// # Errors
+    /// If it cannot be one; with what to do.
+    pub(super) fn add_test_file(&mut self, path: PathBuf) -> Result<(), String> {
+        let name = file_name(&path);
+        let lacking = self.files.iter().find(|file| !self.tests.contains_key(&file.path));
+        let recording = match (lacking, &self.files[..]) {
+            (Some(file), _) | (None, [file]) => file.path.clone(),
+            _ => {
+                return Err(format!(
+                    "{name} is not opened: each of the {} recordings has its file for the test. To use others, close \
+                     those files first.",
+                    self.files.len()
+                ));
+            }
+        };
+        // A file joined to both may be the same: its times tell its rows apart.
+        if recording == path && self.files.first().is_some_and(|first| first.path == path) {
+            return Err(format!(
+                "{name} is trained on, so it cannot be a test file: choose a recording of its own for the test."
+            ));
+        }
+        self.tests.insert(recording, path);
+        Ok(())
+    }
+
+    /// Closes the file that is read for the test in the place of this recording.
+    pub(super) fn close_test_file(&mut self, recording: &Path) {
+        self.tests.remove(recording);
+    }
+
+    /// Plan of the import with absolute paths.
+    ///
+    /// # Errors
+    /// If a text cannot be understood, or a file for the test is missing; with what to do.
+    pub(super) fn planned(&self) -> Result<Arc<Plan>, String> {
+        self.cache.borrow_mut().planned(self)
+    }
+
+    /// As [`Self::planned`], with the paths of the draft and not cached.
+    pub(super) fn made_plan(&self) -> Result<Plan, String> {
+        let mut plan = self.plan.clone();
+        let import = &mut plan.import;
+        import.conditions = match self.conditions.trim() {
+            "" => Vec::new(),
+            text => vec![text.parse::<Condition>().map_err(|error| error.to_string())?],
+        };
+        import.missing = missing(&self.missing);
+        let of = |meaning: Meaning| -> Vec<String> {
+            let of_file = |file: &InspectedFile| -> Vec<String> {
+                let columns = file.meanings.iter().enumerate().filter(|(_, other)| **other == meaning);
+                columns.map(|(column, _)| file.full_name(column)).collect()
+            };
+            self.files.iter().flat_map(of_file).collect()
+        };
+        import.inputs = of(Meaning::Input);
+        import.targets = of(Meaning::Target);
+        import.group = of(Meaning::Group).pop();
+        import.row_wire = of(Meaning::RowWire).pop();
+        for file in self.files.iter().filter(|_| !self.units.is_empty()) {
+            for (column, summary) in file.inspection.columns.iter().enumerate() {
+                let unit = self.units.get(&(file.path.clone(), summary.name.clone()));
+                import
+                    .units
+                    .extend(unit.map(|unit| (file.full_name(column), unit.clone())));
+            }
+        }
+        // Without times in every file, rows belong together by their numbers.
+        let times: Option<Vec<String>> = self.files.iter().map(time).collect();
+        import.time = match &times {
+            Some(times) => times.first().cloned(),
+            None => None,
+        };
+        for (number, joined) in import.join.iter_mut().enumerate() {
+            joined.time = times.as_ref().map(|times| times[number + 1].clone());
+        }
+        plan.test = self.test_files()?;
+        // What has not changed keeps its words, such as ranges of columns.
+        match self.of_recipe.as_deref() {
+            Some([recipe, own]) if *own == plan => Ok(recipe.clone()),
+            _ => Ok(plan),
+        }
+    }
+
+    fn test_files(&self) -> Result<Option<TestFiles>, String> {
+        if self.tests.is_empty() {
+            return Ok(None);
+        }
+        let mut files = Vec::new();
+        for file in &self.files {
+            files.push(self.tests.get(&file.path).cloned().ok_or_else(|| {
+                format!(
+                    "{} has no file for the test yet: choose it with “Test file…” under “Samples”, or close the other \
+                     files of the test.",
+                    file_name(&file.path)
+                )
+            })?);
+        }
+        let mut files = files.into_iter();
+        Ok(files.next().map(|data| TestFiles {
+            data,
+            join: files.collect(),
+        }))
+    }
+
+    /// Everything that a plan is made of and that can change: the recipe and the files stay.
+    pub(super) fn made_of(&self) -> MadeOf {
+        MadeOf {
+            plan: self.plan.clone(),
+            texts: [self.conditions.clone(), self.missing.clone()],
+            units: self.units.clone(),
+            tests: self.tests.clone(),
+            meanings: self.files.iter().map(|file| file.meanings.clone()).collect(),
+        }
+    }
+
+    /// Tells whether [`Self::made_of`] is still this.
+    pub(super) fn is_made_of(&self, made_of: &MadeOf) -> bool {
+        let MadeOf {
+            plan,
+            texts,
+            units,
+            tests,
+            meanings,
+        } = made_of;
+        let [conditions, missing] = texts;
+        let now = self.files.iter().map(|file| &file.meanings);
+        (&self.plan, &self.conditions, &self.missing) == (plan, conditions, missing)
+            && (&self.units, &self.tests) == (units, tests)
+            && now.eq(meanings)
+    }
+
+    /// Reason for which there is nothing to train on yet, with what to do.
+    pub(super) fn obstacle(&self) -> Option<String> {
+        self.planned().err().or_else(|| self.lack())
+    }
+
+    /// Says which meaning no column has yet.
+    pub(super) fn lack(&self) -> Option<String> {
+        let needed = [(Meaning::Input, "an input"), (Meaning::Target, "a target")];
+        let lacking = needed.into_iter().find(|(meaning, _)| !self.has(*meaning));
+        lacking.map(|(_, what)| format!("No column is {what}: choose one in the table of columns."))
+    }
+
+    /// The files joined, with their number in the list of files.
+    pub(super) fn joined(&mut self) -> &mut [Joined] {
+        &mut self.plan.import.join
+    }
+}
+
+/// Tells whether a column of the same file or of another one must give up a meaning that a column gets.
+fn is_taken(meaning: Meaning, is_same_file: bool) -> bool {
+    match meaning {
+        Meaning::Time => is_same_file,
+        Meaning::Group | Meaning::RowWire => true,
+        Meaning::Input | Meaning::Target | Meaning::Unused => false,
+    }
+}
+
+/// Name of the column of times of a file, without its stem.
+fn time(file: &InspectedFile) -> Option<String> {
+    let column = file.meanings.iter().position(|meaning| *meaning == Meaning::Time)?;
+    Some(file.inspection.columns[column].name.clone())
+}
+
+/// Cells that mean missing, as typed.
+pub(super) fn missing(text: &str) -> Vec<Missing> {
+    let texts = text.split(',').map(str::trim).filter(|text| !text.is_empty());
+    texts.map(|text| Missing::from(text.to_owned())).collect()
+}
+
+/// The items as typed.
+pub(super) fn joined<T: ToString>(items: &[T], separator: &str) -> String {
+    items
+        .iter()
+        .map(ToString::to_string)
+        .collect::<Vec<_>>()
+        .join(separator)
+}
+
+/// Name of a file without its folder.
+pub(super) fn file_name(path: &Path) -> String {
+    path.file_name().map_or_else(
+        || path.display().to_string(),
+        |name| name.to_string_lossy().into_owned(),
+    )
+}

@@ -1,0 +1,214 @@
+use std::path::PathBuf;
+
+use eframe::egui::{Align, Label, Layout, Ui, WidgetInfo, accesskit::Role};
+
+use super::{
+    draft::{Draft, file_name},
+    editor::RecordingEditor,
+};
+use crate::window::{
+    shared::{Effect, FileTask, FileWords, Shared, sentence},
+    widgets::{dim_ui, ghost_button, note_ui, progress_bar_ui, section_heading_ui},
+};
+use decoupler_core::text::counted;
+
+/// Files that can be opened.
+pub(super) const FILES: FileWords = FileWords {
+    kind: "recording",
+    description: "A table of readings and targets (CSV or other text, .npy, .npz, .mat), a recipe, a network or a \
+                  checkpoint.",
+    extensions: &["csv", "txt", "tsv", "dat", "npy", "npz", "mat", "json", "checkpoint"],
+};
+
+/// An open file by its use.
+#[derive(Clone)]
+enum OpenFile {
+    /// A recording by its number: the first, or one that is joined to it.
+    Recording(usize),
+    /// A file for the test, by the recording in whose place it is read.
+    Test(PathBuf),
+    /// Positions of targets.
+    Positions,
+}
+
+impl RecordingEditor {
+    /// Returns the task of opening a file.
+    pub fn open_task(&self) -> FileTask {
+        self.recordings.task(FILES, String::new())
+    }
+
+    /// Shows the files of the recording, and opens and closes them.
+    pub fn files_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) {
+        section_heading_ui(ui, "Files");
+        self.missing_ui(ui, effects);
+        if let Some(file) = self.draft.as_ref().and_then(|draft| open_files_ui(ui, draft)) {
+            self.close_file(file);
+        }
+        for name in &self.changed {
+            note_ui(ui, &format!("{name} has other contents than when the run was saved."));
+        }
+        self.samples_line_ui(ui);
+        if let Some((name, progress)) = &self.opening.under_way {
+            dim_ui(ui, &format!("Reading {name}…"));
+            let share = progress.and_then(|progress| Some(progress.bytes as f32 / progress.of?.max(1) as f32));
+            if let Some(share) = share {
+                progress_bar_ui(ui, "Reading", share, &format!("{:.0} %", 100.0 * share));
+            }
+        }
+        self.buttons_ui(ui, effects);
+        if self.is_empty() {
+            let button = ui.add(ghost_button("Open the sample recording"));
+            let hint = "Simulated readings of a soft skin with the force on it and its place: a recording to try the \
+                        program with.";
+            if button.on_hover_text(hint).clicked() {
+                let beside = shared.runs.path.as_ref().and_then(|runs| runs.parent());
+                let folder = beside.map_or_else(std::env::temp_dir, PathBuf::from);
+                self.open_sample(folder.join("samples"));
+            }
+        }
+    }
+
+    /// Missing files, each with the way to find it.
+    fn missing_ui(&mut self, ui: &mut Ui, effects: &mut Vec<Effect>) {
+        let Some(reopened) = &self.missing else { return };
+        let missing: Vec<PathBuf> = reopened.missing().into_iter().map(PathBuf::from).collect();
+        let is_training = reopened.checkpoint.is_some();
+        for path in missing {
+            let name = file_name(&path);
+            note_ui(ui, &format!("{name} is missing.")).on_hover_text(path.display().to_string());
+            ui.horizontal(|ui| {
+                let find = ui.add(ghost_button("Find…"));
+                find.widget_info(|| WidgetInfo::labeled(Role::Button, true, format!("Find {name}")));
+                let find = find.on_hover_text("Chooses the file at its new place. Its contents are compared.");
+                let typed = ui.add(ghost_button("Type path…"));
+                typed.widget_info(|| WidgetInfo::labeled(Role::Button, true, format!("Type the path of {name}")));
+                if !find.clicked() && !typed.clicked() {
+                    return;
+                }
+                let (_, paths) = self
+                    .finding
+                    .insert((path.clone(), super::editor::ChosenPaths::default()));
+                let task = paths.task(FILES, name.clone());
+                effects.push(if find.clicked() {
+                    Effect::ChooseFile(task)
+                } else {
+                    Effect::TypePath(task)
+                });
+            });
+        }
+        if is_training {
+            dim_ui(ui, "The training is resumed once its recording is found.");
+        }
+    }
+
+    fn close_file(&mut self, file: OpenFile) {
+        match (file, &mut self.draft) {
+            (OpenFile::Recording(number), _) => self.close(number),
+            (OpenFile::Test(recording), Some(draft)) => draft.close_test_file(&recording),
+            (OpenFile::Positions, Some(draft)) => draft.plan.import.positions = None,
+            (_, None) => {}
+        }
+    }
+
+    /// Numbers of channels and samples, or what is wrong with the import.
+    fn samples_line_ui(&self, ui: &mut Ui) {
+        let Some(draft) = &self.draft else { return };
+        if let Some(reason) = draft.obstacle() {
+            note_ui(ui, &sentence(&reason));
+            return;
+        }
+        let channels = self.channels().map(|(inputs, targets)| {
+            let inputs = counted(inputs, "input");
+            format!("{inputs}, {}", counted(targets, "target"))
+        });
+        let samples = match &self.checking.checked {
+            Some(Ok(checked)) => counted(checked.samples.iter().sum::<usize>(), "sample"),
+            Some(Err(reason)) => {
+                note_ui(ui, &sentence(reason));
+                return;
+            }
+            None if self.checking.is_under_way() => "checking the import…".to_owned(),
+            None => return,
+        };
+        dim_ui(ui, &format!("{}, {samples}", channels.unwrap_or_default()));
+    }
+
+    fn buttons_ui(&mut self, ui: &mut Ui, effects: &mut Vec<Effect>) {
+        ui.horizontal_wrapped(|ui| {
+            let text = if self.draft.is_some() {
+                "Add file…"
+            } else {
+                "Open file…"
+            };
+            if ui.add(ghost_button(text)).on_hover_text(FILES.description).clicked() {
+                effects.push(Effect::ChooseFile(self.open_task()));
+            }
+            let typed = ui.add(ghost_button("Type path…"));
+            typed.widget_info(|| WidgetInfo::labeled(Role::Button, true, "Type the path of a recording"));
+            let typed = typed.on_hover_text("Type the path instead of choosing the file.");
+            if typed.clicked() {
+                effects.push(Effect::TypePath(self.open_task()));
+            }
+            if self.opening.under_way.is_some() {
+                if ui.add(ghost_button("Cancel")).clicked() {
+                    self.opening.cancel();
+                }
+            } else if !self.is_empty() {
+                let clear = ui.add(ghost_button("Clear"));
+                if clear.on_hover_text("Closes all files.").clicked() {
+                    self.close_all();
+                }
+            }
+        });
+    }
+
+    /// The button that shows the columns in place of the results.
+    pub fn columns_button_ui(&mut self, ui: &mut Ui, shared: &Shared) {
+        if self.draft.is_some() && !self.is_on_show(shared) {
+            let button = ui.add(ghost_button("Columns…"));
+            let hint = "Shows the columns of the files, and what they mean, in place of the results.";
+            if button.on_hover_text(hint).clicked() {
+                self.shows_columns = true;
+                ui.request_repaint();
+            }
+        }
+    }
+}
+
+/// Lists the open files. Returns the one to be closed.
+fn open_files_ui(ui: &mut Ui, draft: &Draft) -> Option<OpenFile> {
+    let mut closed = None;
+    let recordings = draft.paths().into_iter().enumerate();
+    let recordings = recordings.map(|(number, path)| (OpenFile::Recording(number), path));
+    let tests = draft.tests();
+    let tests = tests.map(|(recording, test)| (OpenFile::Test(recording.to_owned()), test.to_owned()));
+    let positions = draft.plan.import.positions.iter();
+    let positions = positions.map(|path| (OpenFile::Positions, path.clone()));
+    for (file, path) in recordings.chain(tests).chain(positions) {
+        let name = file_name(&path);
+        let what = match &file {
+            OpenFile::Recording(0) => String::new(),
+            OpenFile::Recording(_) => ", joined".to_owned(),
+            OpenFile::Test(recording) if draft.files.len() > 1 => {
+                format!(", for the test of {}", file_name(recording))
+            }
+            OpenFile::Test(_) => ", for the test".to_owned(),
+            OpenFile::Positions => ", positions".to_owned(),
+        };
+        ui.horizontal(|ui| {
+            ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
+                let close = ui.small_button("×");
+                close.widget_info(|| WidgetInfo::labeled(Role::Button, true, format!("Close {name}")));
+                if close.on_hover_text("Closes this file.").clicked() {
+                    closed = Some(file);
+                }
+                ui.with_layout(Layout::left_to_right(Align::Center), |ui| {
+                    let text = format!("{name}{what}");
+                    ui.add(Label::new(text).truncate())
+                        .on_hover_text(path.display().to_string());
+                });
+            });
+        });
+    }
+    closed
+}

@@ -1,0 +1,317 @@
+//! Files opened in the background: recordings, recipes, networks and checkpoints.
+
+use std::{
+    ops::ControlFlow,
+    path::{Path, PathBuf},
+};
+
+use super::{
+    draft::{Draft, file_name, missing},
+    missing::Reopened,
+    remarks::in_window,
+    renaming::Renaming,
+    sample::write_sample,
+};
+use crate::window::job::{Job, JobError, Report, Wake};
+use decoupler_core::evaluation::Simulation;
+use decoupler_files::{
+    export::{CheckpointFile, DocumentKind, NetworkFile, RecipeFile, RecipeSource},
+    import::{
+        InspectedFile, Joined, Plan, Progress, Recipe, Watch, holds_positions, suggested_plan, suggested_plan_in_order,
+    },
+};
+
+/// Files to be opened.
+#[derive(Clone, Debug)]
+pub(super) enum ToOpen {
+    /// Recordings, or a file of this program.
+    Files(Files),
+    /// Files of a plan.
+    Import(Box<Reopened>),
+    /// As [`Self::Import`], after the missing file at the first path was found at the second.
+    Found(Box<Reopened>, PathBuf, PathBuf),
+    /// Recordings of a checkpoint that the worker could not resume.
+    Missing(PathBuf),
+    /// The sample recording, to be written into this folder.
+    Sample(PathBuf),
+}
+
+/// Recordings to be opened.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Files {
+    /// Files to be opened: one may be a recipe, a network or a checkpoint.
+    pub(super) new: Vec<PathBuf>,
+    /// Files that are open, to which recordings are added.
+    pub(super) open: Vec<PathBuf>,
+    /// The import with them, whose choices the new one keeps.
+    pub(super) older: Option<Box<Draft>>,
+}
+
+/// Contents of a file that was opened.
+#[derive(Debug)]
+pub(super) enum Opened {
+    /// Recordings with the suggested meanings of their columns.
+    Recordings(Box<Draft>),
+    /// A file with positions of targets, for the recordings that are open.
+    Positions(PathBuf),
+    /// Import of the recipe of a recording.
+    Recipe(Box<Draft>),
+    /// Recipe of a simulated array.
+    Simulation(Box<Simulation>),
+    /// Import of a plan.
+    Import(Box<Draft>, Box<Reopened>),
+    /// Import of a plan of which files are missing.
+    Missing(Box<Reopened>),
+    /// A network, and its import or the reason for which there is none; `None` for a simulated array.
+    Network(Box<NetworkFile>, Option<Result<Box<Opened>, String>>),
+    /// A checkpoint, which is for the worker.
+    Checkpoint(PathBuf),
+    /// No file is missing.
+    Nothing,
+}
+
+/// Event of files being opened.
+#[derive(Debug)]
+pub(super) enum OpeningEvent {
+    /// Progress of reading this file.
+    Reading(Progress),
+    /// The files, or the reason for which they cannot be opened.
+    Opened(Result<Opened, String>),
+}
+
+/// Files under way.
+#[derive(Debug)]
+pub(super) struct Opening {
+    job: Job<OpeningEvent>,
+    /// Names of the files under way, and the progress of reading them.
+    pub(super) under_way: Option<(String, Option<Progress>)>,
+    /// True while the files of a plan are being opened.
+    pub(super) is_reopening: bool,
+}
+
+impl Opening {
+    pub(super) fn new(wake: Wake) -> Self {
+        Self {
+            job: Job::prompt("opening", wake),
+            under_way: None,
+            is_reopening: false,
+        }
+    }
+
+    /// Opens files; those still being opened are abandoned.
+    pub(super) fn start(&mut self, to_open: ToOpen) {
+        let paths = match &to_open {
+            ToOpen::Files(files) if files.new.is_empty() => files.open.clone(),
+            ToOpen::Files(files) => files.new.clone(),
+            ToOpen::Import(reopened) | ToOpen::Found(reopened, ..) => vec![reopened.recorded.plan.import.data.clone()],
+            ToOpen::Missing(path) => vec![path.clone()],
+            ToOpen::Sample(_) => vec![PathBuf::from("sample recording")],
+        };
+        self.is_reopening = matches!(to_open, ToOpen::Import(_) | ToOpen::Found(..) | ToOpen::Missing(_));
+        let names: Vec<String> = paths.iter().map(|path| file_name(path)).collect();
+        self.under_way = Some((names.join(", "), None));
+        self.job.start(
+            move |report| open(to_open, report),
+            |opened: Result<_, JobError>| OpeningEvent::Opened(opened.unwrap_or_else(|error| Err(error.to_string()))),
+        );
+    }
+
+    /// Opens them no longer.
+    pub(super) fn cancel(&mut self) {
+        self.job.abandon();
+        (self.under_way, self.is_reopening) = (None, false);
+    }
+
+    /// Returns the contents of the files once they are read.
+    pub(super) fn next_opened(&mut self) -> Option<Result<Opened, String>> {
+        while let Some(event) = self.job.next_event() {
+            match event {
+                OpeningEvent::Reading(progress) => {
+                    if let Some((_, latest)) = &mut self.under_way {
+                        *latest = Some(progress);
+                    }
+                }
+                OpeningEvent::Opened(opened) => {
+                    (self.under_way, self.is_reopening) = (None, false);
+                    return Some(opened);
+                }
+            }
+        }
+        None
+    }
+}
+
+fn open(to_open: ToOpen, report: &Report<OpeningEvent>) -> Result<Opened, String> {
+    let mut watch = |progress| {
+        report.progress(OpeningEvent::Reading(progress), |_, _| ());
+        if report.is_cancelled() {
+            ControlFlow::Break(())
+        } else {
+            ControlFlow::Continue(())
+        }
+    };
+    let files = match to_open {
+        ToOpen::Import(reopened) => return reopen(*reopened, &mut watch),
+        ToOpen::Found(mut reopened, missing, found) => {
+            reopened.relocate(&missing, &found)?;
+            return reopen(*reopened, &mut watch);
+        }
+        // The window has reported what is wrong with the file.
+        ToOpen::Missing(path) => return Ok(missing_of_checkpoint(&path).unwrap_or(Opened::Nothing)),
+        ToOpen::Sample(folder) => Files {
+            new: vec![write_sample(&folder)?],
+            ..Files::default()
+        },
+        ToOpen::Files(files) => files,
+    };
+    for path in &files.new {
+        match (DocumentKind::of_file(path), files.new.len()) {
+            (None, _) => {}
+            (Some(kind), 1) => return open_document(kind, path, &mut watch),
+            (Some(kind), _) => {
+                return Err(format!("'{}' is a {kind}: open it without other files", path.display()));
+            }
+        }
+    }
+    let of_test = files.older.as_ref().and_then(|older| older.tests().next());
+    let is_test = |path: &&PathBuf| of_test.is_some_and(|(_, test)| test == *path);
+    if let Some(path) = files.new.iter().find(is_test) {
+        return Err(format!(
+            "'{}' is a file for the test, so it cannot be trained on: close it under “Files” first",
+            path.display()
+        ));
+    }
+    let (positions, recordings): (Vec<PathBuf>, Vec<PathBuf>) =
+        files.new.into_iter().partition(|path| holds_positions(path));
+    let positions = match (&positions[..], files.open.is_empty() && recordings.is_empty()) {
+        ([], _) => None,
+        ([path], false) => Some(path.clone()),
+        ([path, ..], true) => {
+            let path = path.display();
+            return Err(format!(
+                "'{path}' has positions of targets: open their recording first, or with it"
+            ));
+        }
+        ([one, other, ..], _) => {
+            let (one, other) = (one.display(), other.display());
+            return Err(format!(
+                "'{one}' and '{other}' both have positions of targets: open one of them"
+            ));
+        }
+    };
+    if let (Some(path), []) = (&positions, &recordings[..]) {
+        return Ok(Opened::Positions(path.clone()));
+    }
+    let is_same_files = recordings.is_empty();
+    let mut paths = files.open;
+    for path in recordings {
+        if !paths.contains(&path) {
+            paths.push(path);
+        }
+    }
+    let recipe = to_look_at(paths, files.older.as_deref());
+    let inspected_files = recipe.inspect(Path::new(""), &mut watch);
+    let inspected_files = inspected_files.map_err(|error| in_window(&error))?;
+    // Which file has the readings is guessed only where there are others than before.
+    let mut plan = if is_same_files {
+        suggested_plan_in_order(&inspected_files)
+    } else {
+        suggested_plan(&inspected_files)
+    };
+    plan.import.dialect = recipe.dialect;
+    plan.import.missing = match &files.older {
+        Some(older) => {
+            let stems = plan.import.stems();
+            let joined = plan.import.join.iter().zip(&stems);
+            let joined = joined.map(|(joined, stem)| (joined.file.as_path(), Some(stem.as_str())));
+            let all = std::iter::once((plan.import.data.as_path(), None)).chain(joined);
+            missing(&Renaming::new(&older.files, all).missing(&older.missing))
+        }
+        None => recipe.missing,
+    };
+    plan.import.positions = positions;
+    Ok(Opened::Recordings(inspected(plan, Draft::new, &mut watch)?))
+}
+
+/// The recipe by which recordings are looked at for the first time: laid out as those of an older import, whose stems they
+/// keep. Cells that mean missing in a column are left out, as its name may change.
+fn to_look_at(paths: Vec<PathBuf>, older: Option<&Draft>) -> Recipe {
+    let of_older = |file: &PathBuf| {
+        let mut joined = older.iter().flat_map(|older| &older.plan.import.join);
+        joined.find(|joined| joined.file == *file)?.stem.clone()
+    };
+    let missing = older.map(|older| missing(&older.missing)).unwrap_or_default();
+    let mut paths = paths.into_iter();
+    Recipe {
+        data: paths.next().unwrap_or_default(),
+        join: paths
+            .map(|file| Joined {
+                stem: of_older(&file),
+                file,
+                ..Joined::default()
+            })
+            .collect(),
+        dialect: older.map(|older| older.plan.import.dialect).unwrap_or_default(),
+        missing: missing.into_iter().filter(|missing| missing.column.is_none()).collect(),
+        ..Recipe::default()
+    }
+}
+
+/// The import of a plan.
+fn inspected(plan: Plan, draft: fn(Plan, Vec<InspectedFile>) -> Draft, watch: Watch<'_>) -> Result<Box<Draft>, String> {
+    let files = plan.import.inspect(Path::new(""), watch);
+    Ok(Box::new(draft(plan, files.map_err(|error| in_window(&error))?)))
+}
+
+/// Opens the files of an import again, if all are there.
+fn reopen(mut reopened: Reopened, watch: Watch<'_>) -> Result<Opened, String> {
+    if !reopened.missing().is_empty() {
+        return Ok(Opened::Missing(Box::new(reopened)));
+    }
+    reopened.compare()?;
+    let draft = inspected(reopened.recorded.plan.clone(), Draft::of_recipe, watch)?;
+    Ok(Opened::Import(draft, Box::new(reopened)))
+}
+
+fn open_document(kind: DocumentKind, path: &Path, watch: Watch<'_>) -> Result<Opened, String> {
+    match kind {
+        DocumentKind::Recipe => {
+            let plan = match RecipeFile::load(path).map_err(|error| error.to_string())? {
+                RecipeSource::Recording(plan) => plan,
+                RecipeSource::Simulated(simulation) => return Ok(Opened::Simulation(Box::new(simulation))),
+            };
+            match reopen(Reopened::from(plan), watch)? {
+                Opened::Import(draft, _) => Ok(Opened::Recipe(draft)),
+                opened => Ok(opened),
+            }
+        }
+        DocumentKind::Network => {
+            let file = NetworkFile::load(path).map_err(|error| error.to_string())?;
+            let recorded = file.recorded.clone();
+            let import = recorded.map(|recorded| reopen(Reopened::from(recorded), watch).map(Box::new));
+            Ok(Opened::Network(Box::new(file), import))
+        }
+        DocumentKind::Checkpoint => match missing_of_checkpoint(path) {
+            Ok(opened @ Opened::Missing(_)) => Ok(opened),
+            // The worker reports what is wrong with the file.
+            _ => Ok(Opened::Checkpoint(path.to_owned())),
+        },
+        other => Err(format!(
+            "'{}' is a {other}: open a recording (CSV, .npy, .npz or .mat), a recipe, a network or a checkpoint",
+            path.display()
+        )),
+    }
+}
+
+/// Returns the recordings that are missing for the training in the checkpoint at `path`.
+fn missing_of_checkpoint(path: &Path) -> Result<Opened, String> {
+    let file = CheckpointFile::load(path).map_err(|error| error.to_string())?;
+    let reopened = file.recorded.clone().map(|recorded| Reopened {
+        checkpoint: Some(Box::new(file)),
+        ..Reopened::from(recorded)
+    });
+    Ok(match reopened {
+        Some(reopened) if !reopened.missing().is_empty() => Opened::Missing(Box::new(reopened)),
+        _ => Opened::Nothing,
+    })
+}

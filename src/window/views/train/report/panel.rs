@@ -1,0 +1,285 @@
+use std::time::Duration;
+
+use eframe::egui::{Align, Layout, RichText, Ui, WidgetInfo, accesskit::Role};
+
+use super::{conditioning::conditioning_ui, spread::spread_ui};
+use crate::window::{
+    glossary,
+    shared::{
+        DecoderSource, Effect, NetworkSource, Phase, RunResult, RunView, Shared, SourceKind, error_table_ui, sentence,
+    },
+    theme::{space, type_size},
+    views::train::{
+        decoders::decoders_ui, exports::open_task, inspect::TestPlace, press::press_section_ui, recording::bias,
+        state::TrainView,
+    },
+    widgets::{Landmark, dim_ui, fields::capitalised, ghost_button, note_ui, scrolled_ui, section_heading_ui},
+};
+use decoupler_core::{
+    dataset::SplitBy,
+    evaluation::{
+        Baselines, ErrorTable, Errors, NodeAddress, ReferenceNote, Scores, SimulatedSettings, TestErrors, error_remarks,
+    },
+    training::StopReason,
+};
+use decoupler_files::{
+    export::{format_duration, format_number},
+    figure::trade_words::frame_time,
+};
+
+/// The error table, what can be opened, and what it cost. Before a training, what the network has to beat.
+pub fn report_ui(ui: &mut Ui, view: &mut TrainView, shared: &Shared, effects: &mut Vec<Effect>) {
+    scrolled_ui(ui, "report", |ui| {
+        press_section_ui(ui, &mut view.press, shared);
+        let heading = section_heading_ui(ui, "Errors on the test set");
+        let result = view.result(shared).cloned();
+        let shown = shared.shown_run().zip(result.as_ref());
+        if let Some((run, result)) = shown {
+            let baselines = &run.baselines;
+            error_table_ui(ui, &run.error_table(result));
+            match view.scrub.epoch() {
+                Some(_) => {
+                    dim_ui(ui, &format!("Of the network of epoch {}.", result.epochs_run));
+                }
+                None => verdict_ui(ui, shared, run, result),
+            }
+            if let Some(test) = run.test.array() {
+                conditioning_ui(ui, test);
+            }
+            if let Some(note) = ReferenceNote::of(baselines) {
+                note_ui(ui, &note.to_string());
+            }
+            if let (Some(worst), Some(test)) = (worst_node_ui(ui, result), run.test.array()) {
+                view.go_to(TestPlace::of_node(worst, test));
+            }
+            let limit = baselines.reference.as_ref().and_then(TestErrors::nodes);
+            let measured = (&*run.problem, limit);
+            let is_open = view.decoders.is_open;
+            let run_source = || NetworkSource::Training(run.id, Box::new(run.setup.clone()));
+            let source = is_open.then(|| DecoderSource::Run(run_source()));
+            let (decoders, target) = (&mut view.decoders, &mut view.target);
+            let asked = decoders_ui(ui, decoders, shared.phase, measured, target, source.as_ref());
+            effects.extend(asked.map(Effect::ChooseFile));
+            effective_parameters_ui(ui, run, result);
+            spread_ui(ui, &run.problem, &run.starts);
+        } else {
+            expectation_ui(ui, shared);
+        }
+        Landmark::Errors.stands_at(ui, ui.min_rect().with_min_y(heading.rect.top()));
+        section_heading_ui(ui, "Open");
+        let can_open = !shared.phase.is_busy() && shared.phase != Phase::Died;
+        ui.add_enabled_ui(can_open, |ui| open_ui(ui, shared, effects));
+        if let Some((run, result)) = shown {
+            section_heading_ui(ui, "Cost");
+            cost_ui(ui, run, run.result.as_ref().unwrap_or(result));
+        }
+    });
+}
+
+/// The table with the network's row still empty.
+fn expectation_ui(ui: &mut Ui, shared: &Shared) {
+    if shared.source == SourceKind::Recording {
+        dim_ui(
+            ui,
+            "Press Train: the errors of each target appear here, next to those of the mean and of ridge regression.",
+        );
+        return;
+    }
+    let known = shared.preview.as_ref();
+    if let Some((preview, baselines)) = known.and_then(|preview| Some((preview, preview.baselines.clone()?))) {
+        // The settings may have moved on to a scene whose figures are still to come.
+        let (of_preview, of_draft) = (&preview.settings.source, &shared.draft.source);
+        let is_of_draft = (of_preview.sensor, of_preview.scene) == (of_draft.sensor, of_draft.scene);
+        let published = shared.draft.published().filter(|_| is_of_draft);
+        let scores = Scores {
+            network: baselines.mean.clone(),
+            baselines,
+        };
+        let mut table = ErrorTable::of_scores(&preview.settings.source.problem(), &scores, published.as_ref());
+        let rows = table.blocks.iter_mut().flat_map(|block| &mut block.rows);
+        for row in rows.filter(|row| row.name == NETWORK) {
+            row.errors.fill(None);
+        }
+        error_table_ui(ui, &table);
+        conditioning_ui(ui, &preview.test);
+        ui.add_space(space(2));
+    }
+    let text = "Press Train to fill in the network's row.";
+    // The paper's own network, not only its scene.
+    if shared.draft.published().is_some() {
+        dim_ui(ui, &format!("{text} The paper's network takes a few seconds."));
+    } else {
+        dim_ui(ui, text);
+    }
+}
+
+/// The name of the network's row.
+const NETWORK: &str = "network";
+
+/// Reports where the network loses and what would help, or by how much it wins; nothing while it is being trained.
+fn verdict_ui(ui: &mut Ui, shared: &Shared, run: &RunView, result: &RunResult) {
+    let Some(reason) = run.stop_reason else { return };
+    ui.add_space(space(2));
+    match (run.simulated(), result.errors.nodes(), run.baselines.nodes()) {
+        (Some(settings), Some(errors), Some(baselines)) => {
+            verdict_on_nodes_ui(ui, (run, result, reason), &settings, errors, &baselines);
+        }
+        _ => verdict_on_targets_ui(ui, run, result),
+    }
+    if shared.setup().is_ok_and(|setup| setup != run.asked) {
+        dim_ui(ui, "The settings have changed since this training.");
+    }
+}
+
+/// What the errors of a recording do not show, or by how much the network is better than ridge regression.
+fn verdict_on_targets_ui(ui: &mut Ui, run: &RunView, result: &RunResult) {
+    let flaw = result.flaw.as_ref().map(|flaw| capitalised(&flaw.to_string()));
+    for remark in flaw.iter().chain(&result.remarks) {
+        note_ui(ui, &sentence(remark));
+    }
+    let (network, ridge) = (result.errors.targets(), run.baselines.linear.targets());
+    let ratios = network
+        .iter()
+        .zip(ridge)
+        .map(|(network, ridge)| ridge.rmse / network.rmse);
+    let ratios = Vec::from_iter(ratios.filter(|ratio| ratio.is_finite()));
+    let extreme = |pick: fn(f64, f64) -> f64| ratios.iter().copied().reduce(pick).map(format_number);
+    if let (true, Some(low), Some(high)) = (flaw.is_none(), extreme(f64::min), extreme(f64::max))
+        && ratios.iter().all(|ratio| *ratio > 1.0)
+    {
+        let times = if low == high { low } else { format!("{low} to {high}") };
+        dim_ui(ui, &format!("{times} times as accurate as ridge regression."));
+    }
+    let plan = run.setup.plan();
+    if plan.is_some_and(|plan| plan.test.is_none() && plan.division.by == SplitBy::Random) {
+        note_ui(ui, bias(SplitBy::Random));
+    }
+}
+
+fn verdict_on_nodes_ui(
+    ui: &mut Ui,
+    (run, result, reason): (&RunView, &RunResult, StopReason),
+    settings: &SimulatedSettings,
+    errors: &Errors,
+    baselines: &Baselines<Errors>,
+) {
+    let remarks = error_remarks(settings, &run.scores(result), Some(reason));
+    let of_network = remarks.iter().find(|(row, _)| *row == NETWORK);
+    let fault = if let Some(flaw) = &result.flaw {
+        Some(flaw.to_string())
+    } else if let Some((row, remark)) = of_network {
+        Some(format!("{row}: {remark}"))
+    } else if errors.z_mm > baselines.linear.z_mm {
+        let remedy = reason.remedy(&settings.training.method);
+        Some(format!(
+            "a linear map of the resistances is better on z than this network: {remedy}"
+        ))
+    } else {
+        None
+    };
+    if let Some(fault) = fault {
+        note_ui(ui, &sentence(&capitalised(&fault)));
+    } else if errors.z_mm > 0.0 {
+        let times = format_number(baselines.linear.z_mm / errors.z_mm);
+        let to_limit = baselines.reference.and_then(|limit| errors.times(&limit));
+        let text = match to_limit.map(format_number) {
+            None => format!("On z {times} times as accurate as the linear map."),
+            Some(ratio) => {
+                format!("On z {times} times as accurate as the linear map; {ratio} times the limit that noise sets.")
+            }
+        };
+        dim_ui(ui, &text);
+    }
+}
+
+/// Returns the worst node, if the user wants to see it.
+fn worst_node_ui(ui: &mut Ui, result: &RunResult) -> Option<NodeAddress> {
+    let mut is_wanted = false;
+    let errors = result.errors.nodes()?;
+    let worst = errors.worst_node;
+    ui.add_space(space(1));
+    ui.horizontal(|ui| {
+        let text = format!("Worst node {} mm", format_number(errors.worst_mm));
+        ui.label(RichText::new(text).size(type_size().note))
+            .on_hover_text(glossary::WORST_NODE.hint);
+        ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
+            let place = format!(
+                "snapshot {}, row {}, node {}",
+                worst.snapshot + 1,
+                worst.row + 1,
+                worst.node + 1
+            );
+            let show = ui.small_button("Show").on_hover_text(format!("Go to {place}"));
+            is_wanted = show.clicked();
+        });
+    });
+    is_wanted.then_some(worst)
+}
+
+/// Shows the number of weights that the data determine, where the method estimates it.
+fn effective_parameters_ui(ui: &mut Ui, run: &RunView, result: &RunResult) {
+    let best = run.history.get(result.best_epoch);
+    let Some(effective) = best.and_then(|epoch| epoch.effective_parameters) else {
+        return;
+    };
+    let text = format!(
+        "Effective parameters {} of {} weights",
+        format_number(effective),
+        run.weights
+    );
+    ui.label(RichText::new(text).size(type_size().note))
+        .on_hover_text(glossary::EFFECTIVE_PARAMETERS.hint);
+}
+
+fn cost_ui(ui: &mut Ui, run: &RunView, result: &RunResult) {
+    let epochs = result.epochs_run;
+    let training = if run.settings().starts > 1 {
+        "Training, all starts"
+    } else {
+        "Training"
+    };
+    let told = |time: Option<Duration>| time.map_or_else(|| "–".to_owned(), format_duration);
+    let mut rows = vec![(training, told(result.wall_time))];
+    if epochs > 0 {
+        let an_epoch = result.wall_time.map(|time| time.div_f64(epochs as f64));
+        rows.push(("An epoch", told(an_epoch)));
+    }
+    rows.push(("Best epoch", result.best_epoch.to_string()));
+    if let Some(time) = result.frame_time {
+        let decoding = if run.problem.has_nodes {
+            "Decoding a snapshot"
+        } else {
+            "Decoding a sample"
+        };
+        rows.push((decoding, frame_time(1e6 * time.as_secs_f64())));
+    }
+    for (name, value) in rows {
+        ui.horizontal(|ui| {
+            ui.label(name);
+            ui.with_layout(Layout::right_to_left(Align::Center), |ui| ui.label(value));
+        });
+    }
+}
+
+const PATH_BUTTON_WIDTH: f32 = space(24);
+
+/// Two buttons that ask for the path of a checkpoint.
+fn open_ui(ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) {
+    ui.horizontal(|ui| {
+        let width = ui.available_width() - PATH_BUTTON_WIDTH - space(2);
+        let button = ghost_button("Open checkpoint…").min_size([width, space(7)].into());
+        let task = open_task(shared);
+        if ui.add(button).on_hover_text(task.words.description).clicked() {
+            effects.push(Effect::ChooseFile(task.clone()));
+        }
+        let path = ui.add(ghost_button("Type path…").min_size([PATH_BUTTON_WIDTH, space(7)].into()));
+        let is_enabled = path.enabled();
+        path.widget_info(|| WidgetInfo::labeled(Role::Button, is_enabled, "Type the path of a checkpoint"));
+        if path
+            .on_hover_text("Type the path instead of choosing the file.")
+            .clicked()
+        {
+            effects.push(Effect::TypePath(task));
+        }
+    });
+}

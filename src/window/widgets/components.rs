@@ -1,0 +1,340 @@
+//! The few components that egui lacks, each reachable by its label.
+
+use eframe::egui::{
+    self, Align, Button, Color32, Frame, Id, Label, Layout, Margin, ProgressBar, Rect, Response, RichText, ScrollArea,
+    Sense, Stroke, Ui, UiBuilder, Vec2, Widget, WidgetInfo, WidgetText, accesskit::Role, vec2,
+};
+
+use crate::window::theme::{Theme, radius, semibold, space, type_size};
+
+/// The head of a section, in small capitals: "SENSOR ARRAY".
+pub fn section_heading_ui(ui: &mut Ui, text: &str) -> Response {
+    ui.add_space(space(2));
+    let text = RichText::new(text.to_uppercase())
+        .font(semibold(type_size().small))
+        .extra_letter_spacing(0.6);
+    let response = Label::new(text.color(Theme::of(ui).palette.dim))
+        .selectable(false)
+        .ui(ui);
+    ui.add_space(space(1));
+    response
+}
+
+/// Contents that scroll up and down where they are higher than their place; the scroll bar has a strip of its own beside
+/// them.
+pub fn scrolled_ui(ui: &mut Ui, id: &str, contents: impl FnOnce(&mut Ui)) {
+    let strip = Margin {
+        right: 10,
+        ..Margin::ZERO
+    };
+    ScrollArea::vertical().id_salt(id).auto_shrink(false).show(ui, |ui| {
+        Frame::new().inner_margin(strip).show(ui, |ui| {
+            contents(ui);
+            follow_focus(ui);
+        });
+    });
+}
+
+/// Scrolls what has just got the focus into sight.
+fn follow_focus(ui: &Ui) {
+    let focused = ui.memory(|memory| memory.focused());
+    let response = focused.and_then(|id| ui.ctx().read_response(id));
+    if let Some(response) = response.filter(Response::gained_focus)
+        && response.layer_id == ui.layer_id()
+        && ui.min_rect().contains_rect(response.rect)
+    {
+        ui.scroll_to_rect(response.rect, None);
+    }
+}
+
+/// A card on the background that fills `rect`.
+pub fn card_ui(ui: &mut Ui, rect: Rect, contents: impl FnOnce(&mut Ui)) {
+    let mut card = ui.new_child(UiBuilder::new().max_rect(rect).layout(Layout::top_down(Align::Min)));
+    card.set_clip_rect(rect.intersect(ui.clip_rect()));
+    let frame = Frame::new()
+        .fill(Theme::of(ui).palette.panel)
+        .corner_radius(radius())
+        .inner_margin(Margin::same(12));
+    frame.show(&mut card, |ui| {
+        ui.set_min_size(ui.available_size());
+        contents(ui);
+    });
+}
+
+/// The one button that matters most.
+#[must_use = "a button shows only where it is added"]
+pub struct PrimaryButton {
+    text: String,
+    min_size: Vec2,
+}
+
+impl PrimaryButton {
+    /// At least this large.
+    pub fn min_size(mut self, min_size: Vec2) -> Self {
+        self.min_size = min_size;
+        self
+    }
+}
+
+impl Widget for PrimaryButton {
+    fn ui(self, ui: &mut Ui) -> Response {
+        let palette = Theme::of(ui).palette;
+        let coloured = |ui: &mut Ui| {
+            let widgets = &mut ui.visuals_mut().widgets;
+            widgets.inactive.weak_bg_fill = palette.accent;
+            widgets.hovered.weak_bg_fill = palette.accent_hovered;
+            widgets.active.weak_bg_fill = palette.accent_hovered;
+            // On the accent its own colour could not be seen.
+            widgets.active.bg_stroke.color = palette.text;
+            let text = RichText::new(self.text)
+                .font(semibold(type_size().body))
+                .color(palette.on_accent);
+            ui.add(Button::new(text).min_size(self.min_size))
+        };
+        ui.scope(coloured).inner
+    }
+}
+
+/// The one button that matters most.
+pub fn primary_button(text: impl Into<String>) -> PrimaryButton {
+    PrimaryButton {
+        text: text.into(),
+        min_size: vec2(0.0, space(7)),
+    }
+}
+
+/// A button as high as [`primary_button`], in the colour of controls.
+pub fn ghost_button(text: impl Into<WidgetText>) -> Button<'static> {
+    Button::new(text.into()).min_size(vec2(0.0, space(7)))
+}
+
+/// A tinted note: something the user should weigh.
+pub fn note_ui(ui: &mut Ui, text: &str) -> Response {
+    let palette = &Theme::of(ui).palette;
+    Frame::new()
+        .fill(palette.warning_tint)
+        .stroke(Stroke::new(1.0, palette.warning.gamma_multiply(0.3)))
+        .corner_radius(radius())
+        .inner_margin(Margin::symmetric(8, 8))
+        .show(ui, |ui| {
+            ui.set_width(ui.available_width());
+            ui.label(RichText::new(text).size(type_size().note).color(palette.warning));
+        })
+        .response
+}
+
+/// A row of options of which one is selected, filling the available width if `fill_width`. Returns the option the
+/// user has newly picked. `label` names the group for assistive technology; each option is found by its own text.
+pub fn segmented_ui<T: Copy + PartialEq>(
+    ui: &mut Ui,
+    label: &str,
+    options: &[(T, &str)],
+    selected: T,
+    fill_width: bool,
+) -> Option<T> {
+    let options: Vec<_> = options.iter().map(|&(option, text)| (option, text, "")).collect();
+    explained_options_ui(ui, label, &options, selected, fill_width)
+}
+
+/// As [`segmented_ui`], each option with its meaning, which shows under the pointer.
+pub fn explained_options_ui<T: Copy + PartialEq>(
+    ui: &mut Ui,
+    label: &str,
+    options: &[(T, &str, &str)],
+    selected: T,
+    fill_width: bool,
+) -> Option<T> {
+    let palette = Theme::of(ui).palette;
+    let padding = 2.0;
+    let width = (ui.available_width() - 2.0 * padding) / options.len().max(1) as f32;
+    let mut picked = None;
+    let group = Frame::new()
+        .fill(palette.raised)
+        .corner_radius(radius())
+        .inner_margin(Margin::same(padding as i8));
+    let response = group
+        .show(ui, |ui| {
+            ui.spacing_mut().item_spacing.x = 0.0;
+            // Options are flat until the pointer is on them.
+            ui.visuals_mut().widgets.inactive.weak_bg_fill = Color32::TRANSPARENT;
+            ui.visuals_mut().widgets.inactive.fg_stroke.color = palette.dim;
+            ui.horizontal(|ui| {
+                for &(option, text, meaning) in reading_order(ui, options) {
+                    let is_selected = option == selected;
+                    let min_width = if fill_width { width.floor() } else { 0.0 };
+                    let button = Button::selectable(is_selected, text)
+                        .frame_when_inactive(true)
+                        .corner_radius(radius() - 1)
+                        .min_size(vec2(min_width, space(6)));
+                    let mut response = ui.add(button);
+                    if !meaning.is_empty() {
+                        response = response.on_hover_text(meaning);
+                    }
+                    let clicked = response.clicked();
+                    if clicked && !is_selected {
+                        picked = Some(option);
+                    }
+                }
+            });
+        })
+        .response;
+    name_group(ui, response.id, label);
+    picked
+}
+
+/// Tabs: the selected one is underlined. Returns the tab the user has newly picked.
+pub fn tabs_ui<T: Copy + PartialEq>(ui: &mut Ui, label: &str, tabs: &[(T, &str)], selected: T) -> Option<T> {
+    let palette = Theme::of(ui).palette;
+    let mut picked = None;
+    let response = ui
+        .horizontal(|ui| {
+            // As wide as when selected, so that no tab moves; nearer to each other where there is little room.
+            let width = |text: &str| {
+                let galley = ui
+                    .painter()
+                    .layout_no_wrap(text.to_owned(), semibold(type_size().body), palette.text);
+                galley.size().x
+            };
+            let widths: Vec<f32> = tabs.iter().map(|(_, text)| width(text)).collect();
+            let spare = ui.available_width() - widths.iter().sum::<f32>();
+            let padding = (0.5 * spare / tabs.len() as f32)
+                .floor()
+                .clamp(0.5 * space(1), space(2) + 2.0);
+            ui.spacing_mut().item_spacing.x = 0.0;
+            ui.spacing_mut().button_padding.x = padding;
+            for (&(tab, text), width) in tabs.iter().zip(widths) {
+                let is_selected = tab == selected;
+                let colour = if is_selected { palette.text } else { palette.dim };
+                let text = RichText::new(text).color(colour);
+                let text = if is_selected {
+                    text.font(semibold(type_size().body))
+                } else {
+                    text
+                };
+                let button = Button::new(text)
+                    .fill(Color32::TRANSPARENT)
+                    .stroke(Stroke::NONE)
+                    .min_size(vec2(width + 2.0 * padding, 0.0));
+                let tab_response = ui.add(button);
+                tab_response.widget_info(|| {
+                    egui::WidgetInfo::selected(egui::accesskit::Role::Tab, true, is_selected, tabs_text(tabs, tab))
+                });
+                if is_selected {
+                    let line = tab_response.rect.x_range().shrink(padding);
+                    ui.painter()
+                        .hline(line, tab_response.rect.bottom() + 1.0, Stroke::new(2.0, palette.accent));
+                } else if tab_response.hovered() {
+                    let line = tab_response.rect.x_range().shrink(padding);
+                    ui.painter()
+                        .hline(line, tab_response.rect.bottom() + 1.0, Stroke::new(2.0, palette.line));
+                }
+                if tab_response.clicked() && !is_selected {
+                    picked = Some(tab);
+                }
+            }
+        })
+        .response;
+    name_group(ui, response.id, label);
+    picked
+}
+
+/// From left to right also where the layout runs from right to left, as at the right end of a title.
+fn reading_order<'a, T>(ui: &Ui, options: &'a [T]) -> Vec<&'a T> {
+    if ui.layout().prefer_right_to_left() {
+        options.iter().rev().collect()
+    } else {
+        options.iter().collect()
+    }
+}
+
+fn tabs_text<'a, T: PartialEq>(tabs: &[(T, &'a str)], tab: T) -> &'a str {
+    tabs.iter()
+        .find(|(other, _)| *other == tab)
+        .map_or("", |(_, text)| text)
+}
+
+fn name_group(ui: &Ui, id: Id, label: &str) {
+    ui.ctx().accesskit_node_builder(id, |node| {
+        node.set_role(egui::accesskit::Role::Group);
+        node.set_label(label);
+    });
+}
+
+/// Text of second rank, in the size of notes.
+pub fn dim_ui(ui: &mut Ui, text: &str) -> Response {
+    let dim = Theme::of(ui).palette.dim;
+    ui.label(RichText::new(text).size(type_size().note).color(dim))
+}
+
+/// Shows a state behind a dot of its colour; what follows in the line keeps its distance.
+pub fn state_ui(ui: &mut Ui, colour: Color32, text: &str) {
+    ui.spacing_mut().item_spacing.x = space(4);
+    let (dot, _) = ui.allocate_exact_size(Vec2::splat(space(2)), Sense::hover());
+    ui.painter().circle_filled(dot.center(), 4.0, colour);
+    ui.label(RichText::new(text).size(type_size().note));
+}
+
+/// Shows the progress of work over the available width: `name` is the work, `text` is written into the bar.
+pub fn progress_bar_ui(ui: &mut Ui, name: &str, share: f32, text: &str) -> Response {
+    let palette = &Theme::of(ui).palette;
+    let label = format!("{name}: {text}");
+    let text = RichText::new(text).size(type_size().small).color(palette.text);
+    let bar = ProgressBar::new(share)
+        .desired_height(space(4))
+        .corner_radius(radius() - 2)
+        .fill(palette.selected)
+        .text(text);
+    let response = ui
+        .scope(|ui| {
+            ui.visuals_mut().extreme_bg_color = palette.raised;
+            ui.add(bar)
+        })
+        .inner;
+    response.widget_info(|| {
+        let mut info = WidgetInfo::labeled(Role::ProgressIndicator, true, &label);
+        info.value = Some(f64::from(100.0 * share.clamp(0.0, 1.0)).floor());
+        info
+    });
+    response
+}
+
+/// Shows the progress of work in percent at the right end of a status line.
+pub fn status_progress_ui(ui: &mut Ui, name: &str, share: f32) {
+    ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
+        ui.set_max_width(space(40).min(ui.available_width()));
+        progress_bar_ui(ui, name, share, &percent(share));
+    });
+}
+
+fn percent(share: f32) -> String {
+    format!("{:.0} %", 100.0 * share.clamp(0.0, 1.0))
+}
+
+/// A sentence in the middle of an empty card: why there is nothing, and what to do.
+pub fn placeholder_ui(ui: &mut Ui, text: &str) {
+    let dim = Theme::of(ui).palette.dim;
+    let text = RichText::new(text).color(dim);
+    let width = ui.available_width().min(space(80));
+    let galley_height = 3.0 * type_size().body;
+    ui.vertical_centered(|ui| {
+        ui.add_space((0.5 * (ui.available_height() - galley_height)).max(0.0));
+        ui.set_max_width(width);
+        ui.label(text);
+    });
+}
+
+/// A sentence in the middle of an empty card: what would be there, and the one click that brings it. Returns true if the
+/// user wants that.
+pub fn invitation_ui(ui: &mut Ui, text: &str, button: &str, is_possible: bool) -> bool {
+    let dim = Theme::of(ui).palette.dim;
+    let width = ui.available_width().min(space(80));
+    let height = 3.0 * type_size().body + space(10);
+    let invited = ui.vertical_centered(|ui| {
+        ui.add_space((0.5 * (ui.available_height() - height)).max(0.0));
+        ui.set_max_width(width);
+        ui.label(RichText::new(text).color(dim));
+        ui.add_space(space(2));
+        ui.add_enabled(is_possible, ghost_button(button)).clicked()
+    });
+    invited.inner
+}
