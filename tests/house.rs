@@ -7,7 +7,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-/// The rooms of `src/app`, each of which uses only those before it.
+/// The rooms of `src/window`, each of which uses only those before it.
 const ORDER: [&str; 12] = [
     "theme",
     "glossary",
@@ -20,12 +20,12 @@ const ORDER: [&str; 12] = [
     "training_worker",
     "shared",
     "views",
-    "window",
+    "frame",
 ];
 
 #[test]
 fn no_room_of_the_window_uses_one_above_it_and_no_view_another() {
-    let app = Path::new(env!("CARGO_MANIFEST_DIR")).join("src/app");
+    let app = Path::new(env!("CARGO_MANIFEST_DIR")).join("src/window");
     let mut faults = Vec::new();
     for file in sources(&app) {
         let path: Vec<&str> = file
@@ -64,7 +64,7 @@ fn sources(folder: &Path) -> Vec<PathBuf> {
     files.collect()
 }
 
-/// What a file of the window uses of the window, from `src/app` on.
+/// What a file of the window uses of the window, from `src/window` on.
 fn uses(text: &str, file: &[&str]) -> Vec<Vec<String>> {
     let mut home: Vec<String> = ["crate", "app"]
         .into_iter()

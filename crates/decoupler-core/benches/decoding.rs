@@ -1,4 +1,4 @@
-//! How fast frames are decoded: `cargo bench --no-default-features --bench decoding`.
+//! How fast frames are decoded: `cargo bench -p decoupler-core --bench decoding`.
 //!
 //! One thread; medians of many frames, taken in turns within one run. Only ratios are worth remembering: what the
 //! arithmetic alone takes, divisions, square roots, hyperbolic tangents and multiplications in plain loops of the same

@@ -1,4 +1,4 @@
-//! Large arrays and many samples: `cargo bench --no-default-features --bench scale`, or a part of it with its name behind
+//! Large arrays and many samples: `cargo bench -p decoupler-core --bench scale`, or a part of it with its name behind
 //! `--`: `arrays`, `growth` or `samples`.
 //!
 //! One thread; medians. Only ratios and exponents are worth remembering.

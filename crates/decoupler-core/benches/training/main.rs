@@ -1,4 +1,4 @@
-//! Speed of training: `cargo bench --no-default-features --bench training`, or a part of it with its name behind
+//! Speed of training: `cargo bench -p decoupler-core --bench training`, or a part of it with its name behind
 //! `--`: `epoch`, `dense`, `sizes`, `growth` or `methods`.
 //!
 //! Every figure is a median. Figures that are compared are measured in turns within one run, since a machine's speed

@@ -62,6 +62,7 @@ impl CsvFields {
         self.text[start..ends[index]].trim_ascii()
     }
 
+    /// Iterates over the fields of the line.
     pub fn iter(&self) -> impl Iterator<Item = &[u8]> {
         (0..self.count).map(|index| self.get(index))
     }

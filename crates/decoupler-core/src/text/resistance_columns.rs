@@ -109,6 +109,7 @@ fn excerpt(field: &[u8]) -> String {
     }
 }
 
+/// Parses a number; `None` if the field is none.
 pub fn number(field: &[u8]) -> Option<f64> {
     std::str::from_utf8(field).ok()?.trim().parse().ok()
 }

@@ -6,7 +6,9 @@ const GAP: f64 = 5.0;
 /// A label to be placed: the point that it is of, and its width and height.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PointLabel {
+    /// Position of the point.
     pub at: DVec2,
+    /// Width and height of the label.
     pub size: DVec2,
 }
 

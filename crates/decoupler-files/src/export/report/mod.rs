@@ -7,8 +7,7 @@ mod pictures;
 mod settings;
 
 #[cfg(test)]
-pub mod tests;
+mod tests;
 
-pub use command::quoted;
-pub use command::{CommandGap, train_command};
+pub use command::{CommandGap, quoted, train_command};
 pub use contents::RunReport;

@@ -37,6 +37,7 @@ pub struct MergedSweep {
     pub conflicting: Vec<String>,
     /// Files that cannot be read.
     pub damaged: Vec<String>,
+    /// Rows of the trials, in order.
     pub trials: Vec<SweepRow>,
 }
 

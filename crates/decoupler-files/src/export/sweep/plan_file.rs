@@ -30,7 +30,9 @@ pub struct SweepPlan {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct PlanAxis {
+    /// Option of the command that is varied.
     pub option: String,
+    /// Its values, in order.
     pub values: Vec<Value>,
 }
 

@@ -13,6 +13,7 @@ const TIMES: [&str; 4] = ["epoch_ms", "frame_us", "fit_seconds", "training_secon
 pub struct SweepRow {
     pub(crate) trial: TrialId,
     pub(crate) program: String,
+    /// Options that differ between the trials.
     pub options: TrialOptions,
     /// The report without its times.
     pub result: Value,

@@ -28,6 +28,10 @@ impl SweepTableFormat {
         }
     }
 
+    /// Writes the rows of a sweep as a table.
+    ///
+    /// # Errors
+    /// If the writer fails.
     pub fn write(self, merged: &MergedSweep, writer: &mut dyn Write) -> io::Result<()> {
         match self {
             Self::Csv => write_csv(merged, writer),
