@@ -46,7 +46,11 @@ impl SimulatedSettings {
         Ok(self.checked_sets_unless(&|| false)?.expect("nothing cancels it"))
     }
 
-    /// As [`Self::sets_unless`], after a check that they fit into memory.
+    /// Draws the sets of these settings, after a check that they fit into memory; returns `None` once `is_cancelled`, which is
+    /// called between the parts of the work.
+    ///
+    /// # Errors
+    /// If the settings are invalid, or the samples do not fit into memory.
     pub fn checked_sets_unless(&self, is_cancelled: &dyn Fn() -> bool) -> Result<Option<RunSets>, RunError> {
         Workload::of(self)?.check_memory()?;
         self.sets_unless(is_cancelled)

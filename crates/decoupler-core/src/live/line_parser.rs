@@ -140,7 +140,7 @@ impl LineParser {
         let is_first = self.layout.is_none();
         let layout = self
             .layout
-            .get_or_insert_with(|| Layout::unnamed(self.fields.len(), self.scale, self.read.len()));
+            .get_or_insert_with(|| Layout::unnamed(self.fields.count(), self.scale, self.read.len()));
         self.readings_ohm.clear();
         let columns = &layout.columns;
         let read = columns.read(number, &self.fields, &mut self.readings_ohm);
@@ -167,7 +167,7 @@ impl LineParser {
         let channels = self.scale.columns();
         let is_text = |field: &[u8]| !field.is_empty() && parsed_number(field).is_none();
         ResistanceColumns::has_name(&self.fields, channels)
-            || (self.fields.len() >= channels.max(2) && self.fields.iter().all(is_text))
+            || (self.fields.count() >= channels.max(2) && self.fields.iter().all(is_text))
     }
 
     /// A line that is no frame takes the turn of one, for there is nothing better to assume.

@@ -48,7 +48,7 @@ impl CsvFields {
     }
 
     /// Number of fields.
-    pub fn len(&self) -> usize {
+    pub fn count(&self) -> usize {
         self.count
     }
 

@@ -32,7 +32,7 @@ impl ResistanceColumns {
                 .map(|(index, column)| column.ok_or_else(|| missing(index)))
                 .collect::<Result<_, _>>()?,
             row: names.iter().position(|name| name == b"row"),
-            width: names.len(),
+            width: names.count(),
         })
     }
 
@@ -61,7 +61,7 @@ impl ResistanceColumns {
     /// # Errors
     /// If the line has another number of columns, or a field is not a resistance.
     pub fn read(&self, line: u64, fields: &CsvFields, resistances_ohm: &mut Vec<f64>) -> Result<(), ReadError> {
-        let (found, expected) = (fields.len(), self.width);
+        let (found, expected) = (fields.count(), self.width);
         if found != expected {
             return Err(ReadError::Width { line, found, expected });
         }

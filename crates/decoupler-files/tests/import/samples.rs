@@ -12,7 +12,7 @@ use decoupler_files::export::NetworkFile;
 
 fn sample(name: &str) -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR"))
-        .join("assets/samples")
+        .join("../../assets/samples")
         .join(name)
 }
 
