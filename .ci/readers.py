@@ -27,7 +27,7 @@ NETWORKS = {
     "sharp": "--preset best --samples 1000 --epochs 100",
 }
 MAGNIFYING = {"long", "sharp"}
-# Other decoders that leave beside the networks, as "network:decoder". Equations are solved in double precision only.
+# Other decoders that leave next to the networks, as "network:decoder". Equations are solved in double precision only.
 LAYERED = ["paper:ridge", "paper:linear", "paper:rbf", "paper:fuzzy", "paper:mean", "known:ridge", "known:rbf", "known:fuzzy"]
 EQUATIONS = ["paper:newton", "paper:polish", "sharp:newton", "sharp:polish"]
 # Trained on a recording of its own: readings of any sign, targets of very different sizes.

@@ -44,7 +44,7 @@ fn two_views(bencher: Bencher<'_, '_>, mode: ViewMode) {
     frames(bencher, mode, |camera| camera);
 }
 
-/// Every frame is drawn anew.
+/// Every frame is drawn again.
 #[divan::bench(args = [ViewMode::ThreeD, ViewMode::Top])]
 fn two_views_turned(bencher: Bencher<'_, '_>, mode: ViewMode) {
     frames(bencher, mode, |camera| camera.dragged(1.0, 0.0));

@@ -1,4 +1,4 @@
-//! The rooms of the window stand in one order, and no view knows another.
+//! The rooms of the window are in one order, and no view knows another.
 
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 

@@ -19,7 +19,7 @@ from screen import Window, quantiles, shell
 MOVEMENTS = 60
 FRAMES_S = 10.0
 CANCELS = 10
-# Where the pointer lights up the button Search, and its left, right, top and bottom beside the pointer, in pixels.
+# Where the pointer lights up the button Search, and its left, right, top and bottom next to the pointer, in pixels.
 SEARCH = (1334, 42)
 SEARCH_BESIDE = (1300, 1308, 34, 52)
 # Where the edge of the left column is taken, how far it is drawn, and the headings that move with it, in pixels.
@@ -56,7 +56,7 @@ def hover(window):
 
 
 def frames(window):
-    """Draws the left column wider and narrower for `FRAMES_S` seconds; returns how often the headings beside it move."""
+    """Draws the left column wider and narrower for `FRAMES_S` seconds; returns how often the headings next to it move."""
     window.move(EDGE)
     time.sleep(0.5)
     window.press()

@@ -212,7 +212,7 @@ fn main() {
             [grid.x_mm().len(), grid.y_mm().len()]
         });
         let name = |what: &str| format!("{scale}, surfaces of {}×{}: {what}", points[0], points[1]);
-        bench.measure(&name("at rest, drawn anew"), |_| Vec::new());
+        bench.measure(&name("at rest, drawn again"), |_| Vec::new());
         bench.measure(&name("pointer moves"), over_the_surfaces);
         bench.window.apply(Effect::Train);
         bench.wait(|state| state.result().is_some());

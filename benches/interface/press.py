@@ -70,7 +70,7 @@ def hover(window, place):
     pointer's own."""
     window.move((ACTUAL[0] + 20, ACTUAL[2] - 60))
     time.sleep(0.3 + 0.1 * random.random())
-    # Beside the pointer, where the body's outline is drawn.
+    # Next to the pointer, where the body's outline is drawn.
     area = (ACTUAL[0], place[0] - POINTER, ACTUAL[2], ACTUAL[3])
     before = window.screen.pixels(area)
     window.move(place)

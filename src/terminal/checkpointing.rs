@@ -25,7 +25,7 @@ pub(super) struct CheckpointArguments {
     /// Resume the training saved in --checkpoint, with bit-identical results
     ///
     /// All settings come from the file. --epochs, --goal, --max-fail and --min-gradient change when to stop; another
-    /// --method (or --set) continues from the present weights with that method. All other arguments must be as in
+    /// --method (or --set) continues from the current weights with that method. All other arguments must be as in
     /// the file.
     #[arg(long, requires = "checkpoint")]
     pub(super) resume: bool,
@@ -104,7 +104,7 @@ impl Checkpointing {
         }
     }
 
-    /// Saves `run` if it is due. A failure is reported once and the next attempt is made as usual: training goes on.
+    /// Saves `run` if it is due. A failure is reported once and the next attempt is made as usual: training continues.
     pub(super) fn save_if_due(&mut self, run: &Run) {
         let begun = Instant::now();
         if begun < self.next {

@@ -267,9 +267,9 @@ impl<'a> Target<'a> {
             r2: r2(best.map(|(_, determination)| determination)),
             better: best.map(|(model, _)| name_of(model)),
             standing: best.map(|(_, determination)| match determination.standing() {
-                Standing::Told => "told",
-                Standing::HardlyTold => "hardly told",
-                Standing::NotTold => "not told",
+                Standing::Told => "determined",
+                Standing::HardlyTold => "weakly determined",
+                Standing::NotTold => "not determined",
             }),
             sentence: describe_target(name, of),
             r2_network: r2(of.network),

@@ -8,10 +8,10 @@ use decoupler_core::{
     scene::Noise,
 };
 
-/// Looks for faults in the frames that lines make up, and tells of them.
+/// Looks for faults in the frames that lines make up, and reports them.
 pub(super) struct Faults {
     watch: Option<Watch>,
-    /// `true` once it was told that lines do not say their row-wire.
+    /// `true` once it was informed that lines do not say their row-wire.
     is_told: bool,
 }
 

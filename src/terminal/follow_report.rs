@@ -49,7 +49,7 @@ impl Report {
         self.latencies.add(latency);
     }
 
-    /// Counts a bad line and tells of it, unless many were told.
+    /// Counts a bad line and reports it, unless many were told.
     pub(super) fn bad(&mut self, reason: &dyn Display) {
         self.bad += 1;
         self.first_bad.get_or_insert_with(|| reason.to_string());
@@ -59,7 +59,7 @@ impl Report {
         }
         self.last_told = Instant::now();
         let mut stderr = stderr().lock();
-        // Nobody is left to tell if writing fails.
+        // There is no one to report to if writing fails.
         let _ = match self.untold {
             0 => writeln!(stderr, "warning: {reason}"),
             untold => writeln!(

@@ -18,7 +18,7 @@ static REQUESTED: AtomicBool = AtomicBool::new(false);
 pub(super) fn install() {
     // Where interruptions are ignored, as by a script that runs us in the background, they stay so.
     let _ = ctrlc::try_set_handler(|| {
-        // Nobody is left to tell if writing fails.
+        // There is no one to report to if writing fails.
         if GRACEFUL.load(Ordering::SeqCst) && !REQUESTED.swap(true, Ordering::SeqCst) {
             let _ = writeln!(stderr(), "stopping; press Ctrl-C again to end at once");
             return;

@@ -21,7 +21,7 @@ pub(super) fn print(write: impl FnOnce(&mut io::StdoutLock) -> io::Result<()>) -
     write(&mut stdout().lock()).map_err(Failure::Output)
 }
 
-/// A progress bar of `steps`, drawn by this template; hidden beside JSON and where standard error is no terminal.
+/// A progress bar of `steps`, drawn by this template; hidden next to JSON and where standard error is no terminal.
 pub(super) fn progress_bar(is_hidden: bool, steps: usize, template: &str) -> ProgressBar {
     if is_hidden {
         return ProgressBar::hidden();

@@ -35,9 +35,9 @@ use decoupler_files::{
     figure::experiment_figure,
 };
 
-/// Reproduce the paper's tables beside the published figures
+/// Reproduce the paper's tables next to the published figures
 ///
-/// Runs every cell with several seeds on all cores and prints the published error beside the median, least and largest
+/// Runs every cell with several seeds on all cores and prints the published error next to the median, least and largest
 /// of ours, the baselines, and which of the paper's claims hold in this run. Ctrl-C ends it and prints what is
 /// finished.
 #[derive(Args)]

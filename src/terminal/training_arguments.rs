@@ -181,7 +181,7 @@ impl TrainingArguments {
 
     /// The given method and stopping rules; those not given are as in `present`.
     pub(super) fn training(&self, present: TrainingSettings) -> Result<TrainingSettings, Failure> {
-        // The present settings of the method are those that suit the samples.
+        // The current settings of the method are those that suit the samples.
         let same = |method: &Method| method.short_name() == present.method.short_name();
         let mut method = self.method.filter(|method| !same(method)).unwrap_or(present.method);
         for (name, value) in &self.set {

@@ -1,4 +1,4 @@
-//! The window. Its rooms stand in this order, and each uses only those before it:
+//! The window. Its rooms are in this order, and each uses only those before it:
 //!
 //! | room | what it holds |
 //! |---|---|
@@ -10,7 +10,7 @@
 //! | `job` | background work |
 //! | `test_view`, `preview` | a test set ready to be drawn; what settings show before a training |
 //! | `training_worker` | the thread that trains |
-//! | `shared` | what all views read: settings, training on show, run list, look; and what a view may ask for |
+//! | `shared` | what all views read: settings, current training, run list, look; and what a view may ask for |
 //! | `views` | one room each, none knows another |
 //! | `frame` | lays the views out and applies what they ask for |
 

@@ -28,7 +28,7 @@ pub fn draw(job: &mut Job<PreviewEvent>, settings: SimulatedSettings) {
     );
 }
 
-/// Measures what will stand beside the network of these settings. Only the newest request counts.
+/// Measures what will are next to the network of these settings. Only the newest request counts.
 pub fn compare(job: &mut Job<PreviewEvent>, settings: SimulatedSettings) {
     job.start(
         move |report| PreviewEvent::Compared(Box::new(settings), baselines(&settings, &|| report.is_cancelled())),

@@ -1,4 +1,4 @@
-//! What fails in the terminal says what, where, and how to mend it; wrong arguments end with status 2.
+//! What fails in the terminal says what, where, and how to repair it; wrong arguments end with status 2.
 
 use std::fs;
 

@@ -331,7 +331,7 @@ fn a_socket_is_read_until_it_closes_and_says_which_row() {
     assert_eq!(running.line(), "");
     assert!(running.child.wait().unwrap().success());
     assert!(running.stderr().contains("40 lines decoded"));
-    // Without the number, nobody knows which row a device begins with.
+    // Without the number, no one knows which row a device begins with.
     let mut running = Running::new(&arguments, &folder);
     let (mut stream, _) = listener.accept().unwrap();
     stream

@@ -185,7 +185,7 @@ fn whole_numbers_have_units_of_their_own_for_each_column() {
             let list = line.split_once('{').unwrap().1.trim_end_matches(['}', ' ']);
             list.split(',').map(|unit| unit.trim().parse().unwrap()).collect()
         };
-        // Readings up to 1000, 1.3 and 6, and a tenth of the range beside them, in 30 bits.
+        // Readings up to 1000, 1.3 and 6, and a tenth of the range next to them, in 30 bits.
         assert_eq!(units("WHOLE_READING_UNITS"), [1e-5, 1e-8, 1e-8]);
         assert_eq!(units("WHOLE_TARGET_UNITS"), [1e-3, 1e-9]);
         for expected in ["force (N)", "hall, a (µT)", "int32_t readings[WHOLE_CHANNELS]"] {

@@ -78,7 +78,7 @@ fn each_decoder_has_its_errors_times_and_place_on_the_fronts() {
             (&point["samples"], &point["validation_samples"]),
             (&(160 - held_out).into(), &held_out.into())
         );
-        // No other is faster with as little error: written out anew.
+        // No other is faster with as little error: written out again.
         for (front, cost) in [("on_decoding_front", "frame_us"), ("on_training_front", "training_s")] {
             let of = |point: &Value| (number(point, cost), number(point, "percent_of_range"));
             let (own_cost, own_error) = of(point);

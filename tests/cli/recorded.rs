@@ -106,7 +106,7 @@ fn networks_are_compared_with_ridge_and_with_a_random_split() {
 fn a_random_split_says_by_how_much_it_flatters() {
     let folder = tempfile::tempdir().unwrap();
     let mut rng = ChaCha8Rng::seed_from_u64(6);
-    // A target that drifts with the time, which the reading tells only as long as it does not go on.
+    // A target that drifts with the time, which the reading determines only as long as it does not go on.
     let lines = (0..200).map(|frame| {
         let time = f64::from(frame) / 20.0;
         format!("{time},{}\n", (1.3 * time).sin() + 0.02 * rng.random_range(-1.0..1.0))

@@ -1,6 +1,6 @@
 //! Replaying a corpus of inputs.
 
-/// Feeds `$check` with every file of the corpus of the test it stands in: `__fuzz__/<module>__<test>/corpus`.
+/// Feeds `$check` with every file of the corpus of the test it is in: `__fuzz__/<module>__<test>/corpus`.
 ///
 /// Nothing random is added, so the same files give the same result. `cargo bolero test <module>::<test>` (libFuzzer, by
 /// hand) changes them with regard to what code they reach, and adds what it finds.

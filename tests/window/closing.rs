@@ -152,7 +152,7 @@ fn a_training_that_ends_while_it_is_asked_about_moves_no_button_and_closes_nothi
     let latest = Instant::now() + PATIENCE;
     while !driver.says("has ended") {
         driver.wait_for_frame("the end", latest);
-        assert!(!asked(&mut driver, &ViewportCommand::Close), "nobody has answered");
+        assert!(!asked(&mut driver, &ViewportCommand::Close), "no one has answered");
     }
     driver.harness().run_steps(5);
     assert!(!asked(&mut driver, &ViewportCommand::Close));

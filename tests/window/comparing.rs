@@ -281,7 +281,7 @@ fn pictures_in_view_are_saved_as_their_names_end() {
         assert!(svg.starts_with("<svg ") && !svg.contains("NaN"), "{tab}");
         pictures.push(svg);
     }
-    // The nodes: a square and a disc each, and one of both beside the plot.
+    // The nodes: a square and a disc each, and one of both next to the plot.
     assert_eq!(pictures[4].matches("<circle").count(), 60 + 1);
     driver.save(CHART, &at("nodes.bmp"));
     assert!(driver.says("give a name that ends in .png or .svg"));

@@ -45,7 +45,7 @@ fn momentum(epochs: usize) -> SimulatedSettings {
     settings
 }
 
-/// Begins a training that goes on for as long as one looks.
+/// Begins a training that continues for as long as one looks.
 fn start_endless(driver: &mut Driver) {
     driver.configure_small();
     choose_method(driver, "Momentum, Eq. (11)");
@@ -246,7 +246,7 @@ fn a_checkpoint_shows_the_time_by_the_clock_of_all_starts_or_none() {
             result.is_some_and(|result| result.wall_time == file.wall_time)
         });
         let texts = driver.texts();
-        for (name, value) in [("Training, all starts", all), ("An epoch", an_epoch)] {
+        for (name, value) in [("Training, all starts", all), ("Time per epoch", an_epoch)] {
             let place = texts.iter().rposition(|text| text == name).unwrap();
             assert_eq!(texts[place + 1], value, "{texts:#?}");
         }
@@ -327,7 +327,7 @@ fn levenberg_marquardt_goes_on_where_momentum_ended() {
     assert!(driver.says(" from epoch 15"));
 
     driver.enter("Hidden nodes", "7");
-    assert!(!driver.has("Continue"), "another network begins anew");
+    assert!(!driver.has("Continue"), "another network begins again");
 }
 
 #[test]

@@ -168,12 +168,12 @@ impl Driver {
         self.window().views()
     }
 
-    /// What the user is told.
+    /// The message shown.
     pub(crate) fn notice(&self) -> Option<&Notice> {
         self.window().notice()
     }
 
-    /// The name of the view on show.
+    /// The name of the current view.
     pub(crate) fn shown(&self) -> &'static str {
         self.window().shown()
     }
@@ -218,7 +218,7 @@ impl Driver {
         self.harness.step();
     }
 
-    /// Whether the window comes to draw no more frames: it asks for none, at no delay. A thread that has news meanwhile may
+    /// Whether the window comes to draw no more frames: it asks for none, at no delay. A thread that has events meanwhile may
     /// ask for one; a window that does not rest asks in every frame.
     pub(crate) fn comes_to_rest(&mut self) -> bool {
         const MOST_NEWS: usize = 20;
@@ -314,7 +314,7 @@ impl Driver {
         self.harness.step();
     }
 
-    /// Clicks the button that asks for a path until the form is there: news from the worker may move it away from
+    /// Clicks the button that asks for a path until the form is there: events from the worker may move it away from
     /// under the pointer.
     #[track_caller]
     pub(crate) fn open_form(&mut self, button: &str) {
@@ -337,7 +337,7 @@ impl Driver {
         }
     }
 
-    /// Asks for the export of this name in the menu, "Error table, CSV", until its form is there: news may move the menu's
+    /// Asks for the export of this name in the menu, "Error table, CSV", until its form is there: events may move the menu's
     /// items away from under the pointer.
     #[track_caller]
     pub(crate) fn export(&mut self, name: &str) {
@@ -355,7 +355,7 @@ impl Driver {
     /// Types `path` into the form of the export of this name and saves; waits for the answer.
     #[track_caller]
     pub(crate) fn save(&mut self, name: &str, path: &Path) {
-        // What is told of an earlier file is no answer.
+        // What is informed of an earlier file is no answer.
         for _ in 0..5 {
             let buttons = self.harness.query_all_by_label(DISMISS);
             let Some(newest) = buttons.last() else { break };
@@ -486,13 +486,13 @@ impl Driver {
         self.wait("more epochs", |driver| driver.epochs() >= wanted);
     }
 
-    /// Epochs of the training on show.
+    /// Epochs of the current training.
     pub(crate) fn epochs(&self) -> usize {
         let latest = self.state().run.as_ref().and_then(|run| run.latest());
         latest.map_or(0, |latest| latest.epoch)
     }
 
-    /// The cells of the error table that is on show: `network, Z %: 2.28`.
+    /// The cells of the error table that is displayed: `network, Z %: 2.28`.
     pub(crate) fn table(&self) -> Vec<String> {
         let is_cell = |text: &String| ROWS.iter().any(|row| text.starts_with(&format!("{row}, ")));
         self.texts().into_iter().filter(is_cell).collect()

@@ -145,7 +145,7 @@ fn before_it_is_run_a_table_shows_the_published_figures() {
     let mut driver = open();
     assert!(driver.has("12, Z % publ.: 2.28"), "{:#?}", driver.texts());
     assert!(driver.has("12, Z % median: –"), "{:#?}", driver.texts());
-    assert!(driver.says("Our figures appear beside"));
+    assert!(driver.says("Our figures appear next to"));
     assert!(!driver.is_enabled(OPEN));
     driver.open_menu();
     assert!(!driver.is_enabled("Figure, SVG") && driver.says("No trial has finished yet"));
@@ -181,7 +181,7 @@ fn a_cancelled_experiment_keeps_what_is_finished() {
     driver.settle();
     // The other experiments have nothing to show, and this one still has.
     driver.click("Table 3");
-    assert!(driver.says("Our figures appear beside"));
+    assert!(driver.says("Our figures appear next to"));
     driver.click("Table 1");
     assert_eq!(driver.views().experiments.outcome().unwrap().trials().0, done);
 }
@@ -330,7 +330,7 @@ fn a_sweep_of_the_window_is_trained_by_the_terminal_and_seen_to_grow() {
     driver.wait("the end of the experiment", |driver| {
         driver.views().experiments.running.is_none()
     });
-    assert!(!driver.has("Close folder"), "results stand in the place of the folder");
+    assert!(!driver.has("Close folder"), "results are in the place of the folder");
 
     driver.click("Open sweep folder…");
     driver.type_into("File", &home.path().display().to_string());

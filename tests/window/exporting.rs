@@ -340,7 +340,7 @@ fn export_says_which_network_it_takes_and_offers_the_epoch_on_show() {
     assert!(driver.has(&heading) && !driver.says("ON SHOW"), "{:#?}", driver.texts());
     driver.press(Key::Escape);
 
-    driver.get("Epoch of the network on show").focus();
+    driver.get("Epoch of the displayed network").focus();
     driver.harness().run_steps(2);
     while driver.views().train.scrub.epoch().unwrap_or(15) > 4 {
         driver.press(Key::ArrowLeft);
@@ -375,6 +375,6 @@ fn export_says_which_network_it_takes_and_offers_the_epoch_on_show() {
     let z_percent = file.scores.network.percent().unwrap().to_string();
     assert!(
         table.contains(&z_percent),
-        "the table of the network on show, {z_percent}: {table}"
+        "the table of the displayed network, {z_percent}: {table}"
     );
 }

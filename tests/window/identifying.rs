@@ -1,4 +1,4 @@
-//! What readings can tell at all: figures, warnings, and the way back to the Train view.
+//! What the readings determine at all: figures, warnings, and the way back to the Train view.
 
 use std::{fmt::Write as _, fs, ops::ControlFlow, path::Path};
 
@@ -30,7 +30,7 @@ fn open() -> Driver {
     driver
 }
 
-/// Waits for the answer to the question as it stands.
+/// Waits for the answer to the question as it is.
 fn wait_for_the_answer(driver: &mut Driver) {
     driver.wait("the answer", |driver| {
         let shown = &driver.views().identifiability;

@@ -190,7 +190,7 @@ fn a_recording_that_was_changed_is_said_to_be_another() {
         driver.says("changed.csv has other contents than when the training was saved")
     });
     assert!(resumed.has("press.csv is missing.") && resumed.state().run.is_none());
-    // With the right file it goes on where it was; that one lies elsewhere.
+    // With the right file it continues where it was; that one lies elsewhere.
     let found = written(&folder, "found.csv", &recording(60));
     type_path(&mut resumed, "Type the path of press.csv", &found);
     resumed.wait("the training", |driver| driver.state().result().is_some());
@@ -214,7 +214,7 @@ fn a_checkpoint_goes_on_as_if_it_had_never_stopped() {
     other.wait("the training", |driver| driver.state().result().is_some());
     other.wait("its recording", |driver| driver.state().can_continue());
     other.settle();
-    assert!(!other.has("Meaning of u1"), "the results are on show");
+    assert!(!other.has("Meaning of u1"), "the results are displayed");
     other.limit_epochs("2");
     other.click_button("Continue");
     other.wait("the end", |driver| {
@@ -428,7 +428,7 @@ fn bad_cells_are_listed_by_line_and_column_and_can_be_called_missing() {
     driver.wait("the columns", |driver| driver.has("Meaning of v"));
     driver.settle();
     assert!(
-        driver.says("line 3, column 2: 'n.d.' is no number"),
+        driver.says("line 3, column 2: 'n.d.' is not a number"),
         "{:#?}",
         driver.texts()
     );

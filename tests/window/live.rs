@@ -63,7 +63,7 @@ fn wait_for_frames(driver: &mut Driver, more: u64) {
     driver.wait("more frames", |driver| decoded(driver) >= wanted);
 }
 
-/// Time and nodes of the frame on show.
+/// Time and nodes of the displayed frame.
 fn on_show(driver: &Driver) -> Option<(f64, Vec<DVec3>)> {
     let frame = driver.views().live.shown.frame.as_ref()?;
     Some((frame.time_s, frame.decoupled.nodes_mm.to_vec()))
@@ -249,7 +249,7 @@ fn a_recording_is_replayed_with_the_same_answers_and_by_any_network() {
         replay.is_some_and(|replay| !replay.is_playing)
     };
     let replayed = collect(&mut driver, "the end of the replay", ended);
-    assert!(driver.comes_to_rest(), "a replay that stands still");
+    assert!(driver.comes_to_rest(), "a replay that is paused");
     let file = network(&driver, 1);
     let answers = recording.times_s().iter().enumerate().map(|(frame, time_s)| {
         let frame_ohm: Vec<f64> = recording.frame_ohm(frame).iter().copied().collect();
@@ -353,7 +353,7 @@ fn a_socket_is_decoded_its_bad_lines_told_and_its_end() {
     writeln!(sender, "{line}").unwrap();
     driver.wait("both frames", |driver| driver.has("Decoded: 2"));
     assert_eq!(on_show(&driver).unwrap().1, by_library(&file, &frame_ohm));
-    assert!(!driver.has("Live actual surface"), "nobody knows it");
+    assert!(!driver.has("Live actual surface"), "no one knows it");
     driver.wait("silence", |driver| driver.has("No frame for two seconds"));
     assert!(driver.comes_to_rest(), "nothing comes");
     drop(sender);

@@ -90,11 +90,11 @@ fn the_buttons_that_run_the_training_stand_apart() {
 #[test]
 fn an_idle_window_draws_nothing() {
     let mut driver = Driver::open();
-    driver.wait("the last news", |driver| !driver.table().is_empty());
+    driver.wait("the last events", |driver| !driver.table().is_empty());
     assert!(driver.comes_to_rest(), "before a training");
     driver.configure_small();
     driver.train();
-    driver.wait("the last news", |driver| {
+    driver.wait("the last events", |driver| {
         driver
             .state()
             .result()
@@ -111,7 +111,7 @@ fn buttons_answer_the_pointer() {
     let mut driver = Driver::open();
     for theme in ["Light theme", "Dark theme"] {
         for button in ["▶ Train", theme, "Best", "Type the path of a checkpoint"] {
-            // Inside the edge, beside the text.
+            // Inside the edge, next to the text.
             let place = driver.get(button).rect().left_center() + vec2(3.0, 0.0);
             let colour = |driver: &mut Driver| {
                 driver.harness().run_steps(2);

@@ -23,7 +23,7 @@ fn file() -> (tempfile::TempDir, PathBuf) {
     (folder, path)
 }
 
-/// The figures of the baselines that the library gives for `settings` are those of the table on show.
+/// The figures of the baselines that the library gives for `settings` are those of the displayed table.
 #[track_caller]
 fn shows_the_baselines_of(driver: &Driver, settings: SimulatedSettings) {
     let run = Run::prepare(settings).unwrap();
@@ -199,9 +199,9 @@ fn every_term_stands_in_the_glossary_and_under_the_pointer_in_the_same_words() {
     driver.type_into("Term", "whitening");
     assert!(!driver.has(DEFINITION) && driver.has("component / √(σ² + noise²)"));
     driver.type_into("Term", "no such term");
-    assert!(driver.has("No term is called so."));
+    assert!(driver.has("No matches"));
     driver.press(Key::Escape);
-    assert!(!driver.has("No term is called so."));
+    assert!(!driver.has("No matches"));
 }
 
 #[test]

@@ -37,7 +37,7 @@ fn a_file_that_exists_is_replaced_only_if_the_user_says_so() {
     assert!(!driver.has("File") && driver.notice().is_none());
     assert_eq!(fs::read_to_string(&path).unwrap(), "mine");
 
-    // Another name is asked about anew.
+    // Another name is asked about again.
     ask(&mut driver, RECIPE, &path);
     driver.wait("the question", |driver| driver.has("Replace"));
     let other = folder.path().join("other.json");

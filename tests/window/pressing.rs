@@ -214,7 +214,7 @@ fn a_newcomer_presses_before_any_training_and_a_small_network_answers() {
     let text = driver.texts().into_iter().find(|text| text.starts_with(start)).unwrap();
     let worst_mm: f64 = text[start.len()..].parse().unwrap();
     assert!(worst_mm < rest_mm, "{text}");
-    assert!(driver.state().run.is_none(), "nothing was trained on show");
+    assert!(driver.state().run.is_none(), "nothing was trained displayed");
 
     // One's own network takes over.
     driver.train();
@@ -268,7 +268,7 @@ fn a_single_node_is_dragged_up_and_down_within_the_stroke() {
     driver.click("Next snapshot");
     assert!(
         !driver.views().train.press.is_pressing(),
-        "the test set is on show again"
+        "the test set is displayed again"
     );
 }
 

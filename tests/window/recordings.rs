@@ -84,7 +84,7 @@ impl Driver {
         }
     }
 
-    /// Limits the training to so many epochs.
+    /// Limits the training to this many epochs.
     #[track_caller]
     pub(crate) fn limit_epochs(&mut self, epochs: &str) {
         self.unfold_to("When to stop", "Epochs");

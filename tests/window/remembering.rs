@@ -16,7 +16,7 @@ fn file() -> (tempfile::TempDir, PathBuf) {
     (folder, path)
 }
 
-/// The paper's settings but for the loading.
+/// The paper's settings except for the loading.
 fn is_a_print(settings: &SimulatedSettings) -> bool {
     let mut papers = *settings;
     papers.source.scene.loading = Loading::RandomNodes;
@@ -74,11 +74,11 @@ fn a_window_that_remembers_comes_to_rest() {
     let (_folder, path) = file();
     drop(Driver::open_remembering(&path));
     let mut driver = Driver::open_remembering(&path);
-    driver.wait("the last news", |driver| !driver.table().is_empty());
+    driver.wait("the last events", |driver| !driver.table().is_empty());
     assert!(driver.comes_to_rest());
 }
 
-/// Drags the edge of a column by so many points.
+/// Drags the edge of a column by this many points.
 fn drag(driver: &mut Driver, edge: &str, points: f32) {
     let from = driver.get(edge).rect().center();
     let harness = driver.harness();

@@ -16,7 +16,7 @@ fn choose(driver: &mut Driver, list: &str, option: &str) {
     driver.click_leftmost_button(option);
 }
 
-/// Waits until the test set of the draft is on show.
+/// Waits until the test set of the draft is displayed.
 fn wait_for_scene(driver: &mut Driver) {
     driver.wait("the scene's test set", |driver| {
         let (state, draft) = (driver.state(), driver.state().draft);

@@ -7,7 +7,7 @@ use crate::{
     sources::{BOTH, Opened, begun, network_figures, run_of, trained_small, with_epochs},
 };
 
-const SLIDER: &str = "Epoch of the network on show";
+const SLIDER: &str = "Epoch of the displayed network";
 
 fn pairs(driver: &Driver) -> Vec<(f64, f64)> {
     driver.views().train.drawn.pairs().unwrap().to_vec()

@@ -1,8 +1,8 @@
 //! The committed look of every view in both themes. What the eye would notice fails a test; the new picture and one of
-//! the differences are left beside the committed one. `UPDATE_SNAPSHOTS=1 cargo test --test window snapshots` takes
+//! the differences are left next to the committed one. `UPDATE_SNAPSHOTS=1 cargo test --test window snapshots` takes
 //! what is drawn now for right, after a look at it.
 //!
-//! Times differ from run to run and from machine to machine: they are covered, wherever they stand.
+//! Times differ from run to run and from machine to machine: they are covered, wherever they are.
 
 use eframe::egui::{Rect, vec2};
 use egui_kittest::{SnapshotOptions, SnapshotResults, image_snapshot_options, try_image_snapshot_options};

@@ -117,7 +117,7 @@ fn every_picture_of_a_trained_network_can_be_looked_at() {
     }
 }
 
-/// A training that goes on for as long as one looks.
+/// A training that continues for as long as one looks.
 pub(crate) fn endless() -> SimulatedSettings {
     let mut settings = small();
     settings.training.method = Method::Momentum(MomentumSettings::default());

@@ -137,10 +137,10 @@ fn a_double_click_sets_every_slider_to_its_usual_value() {
     double_click_slider(&mut driver, "Hidden nodes slider");
     assert_eq!(driver.state().draft.hidden, 12);
 
-    driver.get("Epoch of the network on show").focus();
+    driver.get("Epoch of the displayed network").focus();
     driver.press(Key::ArrowLeft);
     assert!(driver.views().train.scrub.epoch().is_some());
-    double_click_slider(&mut driver, "Epoch of the network on show");
+    double_click_slider(&mut driver, "Epoch of the displayed network");
     assert_eq!(driver.views().train.scrub.epoch(), None, "the latest");
 
     driver.enter("Depth", "0.2");

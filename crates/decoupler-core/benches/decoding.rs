@@ -2,7 +2,7 @@
 //!
 //! One thread; medians of many frames, taken in turns within one run. Only ratios are worth remembering: what the
 //! arithmetic alone takes, divisions, square roots, hyperbolic tangents and multiplications in plain loops of the same
-//! number, is measured beside.
+//! number, is measured next to.
 #![expect(clippy::print_stdout, reason = "a benchmark's result is what it prints")]
 #![allow(missing_docs, clippy::unwrap_used)]
 

@@ -1,5 +1,5 @@
 //! Breaks wires of a simulated array at random, and prints how often the right one is named and what leaving it out is
-//! worth: `cargo run --release --example faults -- [FAULTS [SOUND-FRAMES [ARRAY]]]`; 1000 faults and 100 000 sound frames
+//! worth: `cargo run --release --example faults -- [FAULTS [SOUND-FRAMES [ARRAY]]]`; 1000 faults and 100 000 frames without a fault
 //! take a few minutes.
 #![expect(clippy::print_stdout, reason = "an example's result is what it prints")]
 
@@ -33,7 +33,7 @@ struct Tally {
     right: usize,
     wrong: usize,
     frames: usize,
-    /// Sums of absolute errors in mm: sound frames, faulty ones by the network, and with the wire left out.
+    /// Sums of absolute errors in mm: frames without a fault, faulty ones by the network, and with the wire left out.
     errors_mm: [f64; 3],
     values: usize,
 }
@@ -78,7 +78,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let right: usize = tallies.iter().map(|tally| tally.right).sum();
     println!("right wire named: {right} of {faults}");
     let alarms = false_alarms(&settings, sound_frames)?;
-    println!("false alarms: {alarms} in {sound_frames} sound frames");
+    println!("false alarms: {alarms} in {sound_frames} frames without a fault");
     Ok(())
 }
 

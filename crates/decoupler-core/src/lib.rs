@@ -2,7 +2,7 @@
 //!
 //! A tactile skin of conductive rubber is read through crossed row-wires and column-wires. Every reading is the
 //! parallel connection of many electrode nodes; *decoupling* recovers the deformation of each node from the
-//! row-column resistances. The modules tell that story in order, and each uses only the ones before it:
+//! row-column resistances. The modules report that story in order, and each uses only the ones before it:
 //!
 //! | module | contents |
 //! |---|---|

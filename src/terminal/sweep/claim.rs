@@ -28,7 +28,7 @@ impl Claim {
         let result = Trial::path(folder, id);
         let path = folder.join(format!("{id}.claim"));
         if result.exists() {
-            // A program that was killed just then has left its claim beside the result; one that still runs holds it.
+            // A program that was killed just then has left its claim next to the result; one that still runs holds it.
             if let Ok(file) = File::options().write(true).open(&path)
                 && file.try_lock().is_ok()
             {
@@ -46,7 +46,7 @@ impl Claim {
         }
         let claim = Self { path, _file: file };
         // Its last holder may have finished it before the lock was free. The file is removed only when the result is
-        // there, so nobody can hold another lock of the same name and find no result.
+        // there, so no one can hold another lock of the same name and find no result.
         if result.exists() {
             claim.finish();
             return Ok(Claimed::Done);

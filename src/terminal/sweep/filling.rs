@@ -95,7 +95,7 @@ pub(super) fn fill(
                 Event::Failed(position, failure) => {
                     filled.failed += 1;
                     let told = format!("warning: {}: {failure}; the others go on", trials.describe(position));
-                    // Nobody is left to tell if this fails.
+                    // There is no one to report to if this fails.
                     bar.suspend(|| drop(writeln!(stderr(), "{told}")));
                 }
                 Event::Ended(failure) => {

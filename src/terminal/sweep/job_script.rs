@@ -21,7 +21,7 @@ impl Engine {
     /// Most jobs of a script unless asked for: Slurm's own limit on arrays, in its default configuration.
     pub(super) const MOST_JOBS: usize = 1000;
 
-    /// Script that has this engine train the trials of `specification` in so many jobs, each of one thread.
+    /// Script that has this engine train the trials of `specification` in this many jobs, each of one thread.
     pub(super) fn script(
         self,
         specification: &Path,

@@ -1,5 +1,5 @@
 //! `decoupler sweep`: trains every combination of options. A trial is determined by its options and the program, its file
-//! is named by their hash and written whole or not at all, and whoever trains it holds a lock: so any number of programs,
+//! is named by their hash and written whole or not at all, and anyone who trains it holds a lock: so any number of programs,
 //! on any machines that see the folder, may fill it together, end at any moment and be started again.
 
 mod arguments;

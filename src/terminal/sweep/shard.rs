@@ -15,7 +15,7 @@ impl Default for Shard {
 }
 
 impl Shard {
-    /// Positions of its trials among so many.
+    /// Positions of its trials among this many.
     pub(super) fn positions(self, trials: usize) -> impl Iterator<Item = usize> {
         (self.index..trials).step_by(self.count)
     }

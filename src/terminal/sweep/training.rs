@@ -18,7 +18,7 @@ use decoupler_files::{
 /// Time between two checkpoints of a trial: what a killed program loses at most.
 const CHECKPOINT_INTERVAL: Duration = Duration::from_secs(10);
 
-/// Trains the trial of `claim` and measures it as `train` does, beside so many others. Returns none if it was stopped,
+/// Trains the trial of `claim` and measures it as `train` does, next to this many others. Returns none if it was stopped,
 /// with a checkpoint from which it is resumed with the same bits.
 pub(super) fn train(
     trial: &PlannedTrial,

@@ -35,7 +35,7 @@ const VIEW_KEYS: [Key; 9] = [
 ];
 
 impl DecouplerWindow {
-    /// Offers what can be done now, by the view on show and by the window, and does what the user wants of that.
+    /// Offers what can be done now, by the current view and by the window, and does what the user wants of that.
     pub(super) fn offer_actions(&mut self, ctx: &Context, effects: &mut Vec<Effect>) -> Vec<Action> {
         // A question is to be answered first.
         let hears_keys = !self.is_asked();

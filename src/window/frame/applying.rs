@@ -95,7 +95,7 @@ impl DecouplerWindow {
         }
     }
 
-    /// Asks for another training than the one on show.
+    /// Asks for another training than the displayed one.
     fn prepare(&mut self, request: Request) {
         self.shared.phase = Phase::Preparing;
         self.notices.settle(Matter::Training);
@@ -173,7 +173,7 @@ impl DecouplerWindow {
         let Some(task) = self.saving.as_ref().map(|saving| saving.task.clone()) else {
             return;
         };
-        // A folder is only ever filled anew.
+        // A folder is only ever filled again.
         if task.is_read() || task.words.extensions.is_empty() {
             return self.take_path(path);
         }

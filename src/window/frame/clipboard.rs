@@ -44,7 +44,7 @@ impl Clipboard {
         }
     }
 
-    /// Puts `content` on the clipboard. Returns what the toolkit has to copy, and what the user is told then: `notice` if
+    /// Puts `content` on the clipboard. Returns what the toolkit has to copy, and the message for the user then: `notice` if
     /// the clipboard has it.
     pub(super) fn take(&self, content: Content, notice: String) -> (Option<Content>, Notice) {
         match self {

@@ -38,7 +38,7 @@ fn drawn(width: Option<f32>, limits: &RangeInclusive<f32>, room: f32) -> Option<
     Some(width?.clamp(least, room.clamp(least, most)))
 }
 
-/// The edge of a column, to be dragged: `panel` stands at the left of the window or at the right. A double click gives
+/// The edge of a column, to be dragged: `panel` is at the left of the window or at the right. A double click gives
 /// the column its usual width, which is none of its own.
 pub(super) fn edge_ui(ui: &Ui, label: &str, panel: Rect, is_left: bool, width: &mut Option<f32>) {
     let edge = if is_left { panel.right() } else { panel.left() };

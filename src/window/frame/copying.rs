@@ -35,7 +35,7 @@ impl ToCopy {
     }
 }
 
-/// Outcome of copying: what the toolkit still has to copy, if anything, and what the user is told then.
+/// Outcome of copying: what the toolkit still has to copy, if anything, and the message for the user then.
 type Copied = (Option<Content>, Notice);
 
 /// What is on its way to the clipboard; the newest wins.
@@ -53,7 +53,7 @@ impl Copying {
         }
     }
 
-    /// Copies `to_copy`; `notice` is what the user is told once the clipboard has it.
+    /// Copies `to_copy`; `notice` is the message for the user once the clipboard has it.
     pub(super) fn start(&mut self, to_copy: ToCopy, notice: String) {
         let clipboard = self.clipboard.clone();
         self.job.abandon();
@@ -73,7 +73,7 @@ pub(super) fn not_copied(reason: &str) -> Notice {
 }
 
 impl DecouplerWindow {
-    /// Copies text; `notice` is what the user is told once the clipboard has it.
+    /// Copies text; `notice` is the message for the user once the clipboard has it.
     pub(super) fn copy_text(&mut self, text: String, notice: String) {
         match &self.copying.clipboard {
             // There is nothing to wait for.
@@ -105,7 +105,7 @@ impl DecouplerWindow {
 }
 
 /// The menu at a right click on a part of the window: to copy the value under the pointer, and the pictures and tables of
-/// the view on show.
+/// the current view.
 pub(super) fn copy_menu_ui<'a>(part: &Response, exports: impl FnOnce() -> Vec<Export<'a>>, effects: &mut Vec<Effect>) {
     let id = Id::unique("value to copy");
     let is_asked = part.container_secondary_clicked();

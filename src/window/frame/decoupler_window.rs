@@ -39,7 +39,7 @@ pub struct DecouplerWindow {
     pub(super) views: Views,
     /// Places and names of the views.
     pub(super) names: Vec<(usize, &'static str)>,
-    /// The place of the view on show among all.
+    /// The place of the current view among all.
     pub(super) shown: usize,
     pub(super) notices: Notices,
     /// A file waiting for its path.
@@ -78,7 +78,7 @@ impl DecouplerWindow {
         Self::woken_by(Arc::new(move || woken.request_repaint()), ctx, desktop, file)
     }
 
-    /// As [`Self::new`]; `wake` is called whenever there is news to take.
+    /// As [`Self::new`]; `wake` is called whenever there is events to take.
     pub(super) fn woken_by(wake: Wake, ctx: &Context, desktop: Desktop, file: Option<WindowFile>) -> Self {
         let remembered = file.as_ref().map(|file| file.remembered.clone()).unwrap_or_default();
         let is_dark = remembered
@@ -153,12 +153,12 @@ impl DecouplerWindow {
         &self.shared
     }
 
-    /// The views, on show or not.
+    /// The views, displayed or not.
     pub fn views(&self) -> &Views {
         &self.views
     }
 
-    /// The name of the view on show.
+    /// The name of the current view.
     pub fn shown(&self) -> &'static str {
         self.names[self.shown].1
     }

@@ -1,4 +1,4 @@
-//! The Export menu: everything that the view on show can hand out, drawn from one list.
+//! The Export menu: everything that the current view can export, drawn from one list.
 
 use eframe::egui::{
     Align, Button, Frame, Layout, Margin, RichText, ScrollArea, TextWrapMode, Ui, WidgetInfo, accesskit::Role,

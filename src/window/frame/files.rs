@@ -12,7 +12,7 @@ use crate::window::job::{Job, JobError, Wake};
 /// Longest time that dropping waits for a file. What takes longer is removed when the program ends.
 const LONGEST_WAIT: Duration = Duration::from_secs(5);
 
-/// Sentence that tells of a file, or the reason why it was not written, unless the thread failed.
+/// Sentence that reports a file, or the reason why it was not written, unless the thread failed.
 type Written = Result<Result<String, String>, JobError>;
 
 /// Files that are being written.
@@ -30,7 +30,7 @@ impl Files {
         }
     }
 
-    /// Writes the file `path` in the background. `write` returns what the user is told then.
+    /// Writes the file `path` in the background. `write` returns the message for the user then.
     pub fn write<X: Display>(
         &mut self,
         path: PathBuf,
@@ -45,7 +45,7 @@ impl Files {
         self.under_way.push((path, job));
     }
 
-    /// Sentence that tells of the next file that is there, or the reason why it is not.
+    /// Sentence that reports the next file that is there, or the reason why it is not.
     pub fn next_written(&mut self) -> Option<Result<String, String>> {
         let mut jobs = self.under_way.iter().enumerate();
         let (number, written) = jobs.find_map(|(number, (_, job))| Some((number, job.next_event()?)))?;

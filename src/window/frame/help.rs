@@ -35,7 +35,7 @@ pub(super) enum Page {
 #[derive(Debug, Default)]
 pub(super) struct Help {
     pub(super) page: Page,
-    /// Text that the terms on show contain.
+    /// Text that the displayed terms contain.
     pub(super) typed: String,
 }
 
@@ -124,7 +124,7 @@ fn glossary_ui(ui: &mut Ui, typed: &mut String) {
             }
         }
         if !is_any {
-            dim_ui(ui, "No term is called so.");
+            dim_ui(ui, "No matches");
         }
     });
 }

@@ -64,7 +64,7 @@ impl Drop for Memory {
     fn drop(&mut self) {
         self.job.wait(LONGEST_WAIT);
         if self.latest != self.written && !self.has_told {
-            // Nobody is left to be told.
+            // No one is left to be predicted.
             let _ = self.latest.write(&self.path);
         }
     }

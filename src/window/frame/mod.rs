@@ -1,4 +1,4 @@
-//! The window: it lays the views out, hears the news of the training and of files, and applies in one place what views
+//! The window: it lays the views out, hears the events of the training and of files, and applies in one place what views
 //! ask for.
 
 mod actions;

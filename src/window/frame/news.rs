@@ -11,7 +11,7 @@ use crate::window::{
 use decoupler_core::evaluation::RunSettings;
 
 impl DecouplerWindow {
-    /// Takes what the threads and the dialogs have to tell.
+    /// Takes what the threads and the dialogs have to report.
     pub fn take_news(&mut self) {
         self.take_copied();
         while let Some(event) = self.worker.next_event() {
@@ -117,7 +117,7 @@ impl DecouplerWindow {
                 self.take_setup(&setup);
                 let shared = &mut self.shared;
                 self.typed = None;
-                // If it has ended, the news of it say so.
+                // If it has ended, the events of it say so.
                 shared.phase = Phase::Paused;
             }
             Event::Opened(Err(reason)) => {
@@ -167,7 +167,7 @@ impl DecouplerWindow {
             Event::Abandoned => {}
         }
         if self.worker.is_preparing() {
-            // This was news of the training before.
+            // This was events of the training before.
             self.shared.phase = Phase::Preparing;
         }
     }

@@ -25,7 +25,7 @@ impl Told {
 }
 
 impl Notices {
-    /// Tells the user. What worked takes the place of all that was told about the same; a failure only that of the news
+    /// Tells the user. What worked takes the place of all that was said about the same; a failure only that of the events
     /// that it worked, or of the same words.
     pub(super) fn tell(&mut self, matter: Matter, notice: Notice) {
         let works = matches!(notice, Notice::Done(_));
@@ -48,7 +48,7 @@ impl Notices {
         self.tell(matter, Notice::Failed(reason.to_string()));
     }
 
-    /// Takes away all that was told about this.
+    /// Takes away all that was said about this.
     pub(super) fn settle(&mut self, matter: Matter) {
         self.0.retain(|told| told.matter != matter);
     }

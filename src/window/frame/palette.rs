@@ -83,7 +83,7 @@ pub(super) fn palette_ui(ui: &Ui, palette: &mut Palette, actions: &[Action]) -> 
                 }
             }
             if found.is_empty() && terms.is_empty() {
-                dim_ui(ui, "No action or term is called so.");
+                dim_ui(ui, "No matches");
             }
         });
     });
@@ -111,7 +111,7 @@ fn action_ui(ui: &mut Ui, action: &Action, is_marked: bool) -> eframe::egui::Res
         })
         .inner
     });
-    let reason = "There is nothing to do this with now.";
+    let reason = "Not available now";
     line.inner.on_disabled_hover_text(reason)
 }
 

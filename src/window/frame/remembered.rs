@@ -34,7 +34,7 @@ pub(super) struct Remembered {
     /// Colours of values, if the user has chosen them.
     #[serde(deserialize_with = "if_readable")]
     pub(super) colours: Option<SequentialMap>,
-    /// The name of the view on show.
+    /// The name of the current view.
     #[serde(deserialize_with = "if_readable")]
     pub(super) view: Option<String>,
     /// The settings of the next training.
@@ -71,7 +71,7 @@ pub struct WindowFile {
 }
 
 impl WindowFile {
-    /// Reads the file at `path`; one that is missing or of another kind tells nothing.
+    /// Reads the file at `path`; one that is missing or of another kind carries no information.
     pub fn read(path: PathBuf) -> Self {
         let remembered = Remembered::read(&path);
         Self { path, remembered }

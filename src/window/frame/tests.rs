@@ -19,7 +19,7 @@ use crate::window::{
 };
 use decoupler_files::export::NetworkFile;
 
-/// A window, and the news of its threads.
+/// A window, and the events of its threads.
 struct Opened {
     window: DecouplerWindow,
     woken: Receiver<()>,
@@ -49,7 +49,7 @@ impl Opened {
         window
     }
 
-    /// Takes news until `holds`; each may take a minute.
+    /// Takes events until `holds`; each may take a minute.
     #[track_caller]
     fn wait(&mut self, holds: impl Fn(&DecouplerWindow) -> bool) {
         loop {
@@ -77,13 +77,13 @@ impl DerefMut for Opened {
     }
 }
 
-/// Saves the network on show.
+/// Saves the displayed network.
 fn export(window: &mut DecouplerWindow, path: PathBuf) {
     let task = save_task(window);
     window.answer(task, path);
 }
 
-/// Returns the task of saving the network on show.
+/// Returns the task of saving the displayed network.
 fn save_task(window: &DecouplerWindow) -> FileTask {
     let words = FileWords {
         kind: "network",
@@ -114,7 +114,7 @@ fn a_worker_that_died_takes_no_results_with_it_also_when_another_is_started() {
     assert_eq!(window.notice(), Some(&Notice::Failed(lost.to_owned())));
     assert_eq!(
         window.shared.phase, ended,
-        "the new worker has nothing to tell of the old one"
+        "the new worker has nothing to report the old one"
     );
     window.apply(Effect::Settle(Matter::File));
     window.apply(Effect::Continue);
@@ -161,7 +161,7 @@ fn a_training_that_cannot_begin_leaves_the_one_before_to_be_exported() {
     window.apply(Effect::Train);
     window.wait(|window| window.notice().is_some());
     assert!(matches!(window.notice(), Some(Notice::Failed(_))));
-    assert_eq!(window.shared.phase, ended, "the training on show has ended so");
+    assert_eq!(window.shared.phase, ended, "the current training has ended so");
     assert!(window.shared.result().is_some());
 
     window.apply(Effect::Settle(Matter::Settings));

@@ -27,7 +27,7 @@ pub(super) enum Reach {
     Action(String),
 }
 
-/// Name, views, and the tools of the one on show, which `tools_ui` lays out from right to left, before what the window
+/// Name, views, and the tools of the displayed one, which `tools_ui` lays out from right to left, before what the window
 /// itself does.
 pub(super) fn top_bar_ui(
     ui: &mut Ui,

@@ -23,7 +23,7 @@ const STEPS: [Step; 5] = [
     Step {
         title: "Press the sensor",
         text: "Drag on the surface with the mouse: a ball presses it, and the wheel sets its depth. The readings follow, \
-               and a small network says on the right what it feels in them.",
+               and a small network on the right decodes the touch from them.",
         landmark: Landmark::ActualSurface,
         action: Some("Press the middle of the surface"),
     },
@@ -77,7 +77,7 @@ pub(super) enum Reply {
     End,
 }
 
-/// Shows the card of the step beside what it is about, which is ringed; nothing while that is out of view.
+/// Shows the card of the step next to what it is about, which is ringed; nothing while that is out of view.
 pub(super) fn tour_ui(ui: &Ui, tour: Tour, actions: &[Action]) -> Option<Reply> {
     let step = STEPS.get(tour.step)?;
     let place = step.landmark.place(ui.ctx())?;
@@ -161,7 +161,7 @@ fn size_of(ctx: &Context, id: Id) -> Vec2 {
     known.unwrap_or(vec2(WIDTH + space(6), space(40)))
 }
 
-/// The corner of a card of this size near `place`, below it, beside it or above it: the first where it covers nothing of it
+/// The corner of a card of this size near `place`, below it, next to it or above it: the first where it covers nothing of it
 /// and lies in the window.
 fn beside(place: Rect, size: Vec2, window: Rect) -> Pos2 {
     const GAP: f32 = space(3);

@@ -57,7 +57,7 @@ impl DecouplerWindow {
         }
     }
 
-    /// Goes on to the settings that were taken back last.
+    /// Continues to the settings that were taken back last.
     pub(super) fn redo(&mut self) {
         if let Some(drafts) = self.undoing.undoer.redo(&drafts(&self.shared)).cloned() {
             self.take_drafts(drafts);

@@ -21,7 +21,7 @@ terms! { ERROR_TERMS:
         "Largest |error| of z of any node in the test set, in mm.",
         "max(|decoupled z − z|)";
     LINEAR_MAP = "Linear map",
-        "Best affine map from the resistances to the coordinates, one for each row-wire where the network is told the row. A \
+        "Best affine map from the resistances to the coordinates, one for each row-wire where the row is known to the network. A \
          network that is not better is not worth its training.",
         "coordinates = A · R + b";
     REFERENCE = "Reference",

@@ -1,7 +1,7 @@
 /// A term of the field.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Term {
-    /// Name, as it stands in the window.
+    /// Name, as it is in the window.
     pub name: &'static str,
     /// Definition in one or two sentences, with the unit.
     pub definition: &'static str,

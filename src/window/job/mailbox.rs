@@ -97,7 +97,7 @@ impl<E> Report<E> {
         });
     }
 
-    /// Tells how the work stands. It replaces the progress before, if the window has not taken that and nothing was told
+    /// Tells the status of the work. It replaces the progress before, if the window has not taken that and nothing was told
     /// since: a window that looks away finds the latest only. `keep` moves what must not be lost from the older one.
     pub(in crate::window) fn progress(&self, event: E, keep: impl FnOnce(E, &mut E)) {
         self.put(|inside| {

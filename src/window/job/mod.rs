@@ -128,7 +128,7 @@ impl<E> Job<E> {
         self.heard().is_some_and(Mailbox::has_more)
     }
 
-    /// Asks the work to end. What it still has to tell is heard.
+    /// Asks the work to end. What it still has to report is heard.
     pub(super) fn cancel(&self) {
         if let Some(piece) = &self.newest {
             piece.mailbox.cancel();

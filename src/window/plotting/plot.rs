@@ -243,7 +243,7 @@ fn draw_series(
     plot_ui.points(points.radius(radius).color(colour));
 }
 
-/// The words beside points.
+/// The words next to points.
 fn point_labels_ui(ui: &Ui, plot: &Plot, transform: &PlotTransform) {
     let palette = Theme::of(ui).palette;
     let frame = *transform.frame();

@@ -17,7 +17,7 @@ pub enum Pointer {
     Picks,
 }
 
-/// A plot as it stands on the screen.
+/// A plot as it is on the screen.
 pub struct DrawnPlot<'a> {
     /// Plot that is drawn.
     pub plot: &'a Plot,
@@ -84,10 +84,10 @@ pub fn legend_behind_ui(ui: &mut Ui, keys: &[Key]) -> bool {
     has_room
 }
 
-/// Least width of the notes beside a square plot.
+/// Least width of the notes next to a square plot.
 const NOTES_WIDTH: f32 = space(36);
 
-/// The plots side by side over the space that is left, and the notes: beside a square plot that leaves room for them, else
+/// The plots side by side over the space that is left, and the notes: next to a square plot that leaves room for them, else
 /// above.
 pub fn plots_ui<'a>(ui: &mut Ui, id: &str, figure: &'a PlotFigure, pointer: Pointer) -> Vec<DrawnPlot<'a>> {
     let is_square = matches!(&figure.plots[..], [plot] if plot.has_equal_scales);
@@ -99,7 +99,7 @@ pub fn plots_ui<'a>(ui: &mut Ui, id: &str, figure: &'a PlotFigure, pointer: Poin
     let whole = ui.available_rect_before_wrap();
     let count = figure.plots.len().max(1) as f32;
     let width = (whole.width() - (count - 1.0) * space(3)) / count;
-    // Square but for the numbers beside the axes.
+    // Square except for the numbers next to the axes.
     let width = if is_square {
         width.min(whole.height() + space(3))
     } else {

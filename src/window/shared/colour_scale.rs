@@ -46,7 +46,7 @@ pub fn colour_scale_ui(
     });
     let state = match scale.quantity {
         Quantity::Height | Quantity::Target(_) if look.heights == HeightScale::Fitted => {
-            " It fits the heights on show."
+            " It spans the displayed heights."
         }
         Quantity::Error if look.error_limit_mm.is_some() => " It is locked.",
         _ => "",
@@ -77,13 +77,13 @@ fn choices_ui(ui: &mut Ui, scale: &ColourScale, look: Look, changed: &mut Look) 
             let is_locked = look.heights == HeightScale::Stroke;
             let meanings = [
                 "Spans the whole stroke, from full compression to rest: colours mean the same on every surface.",
-                "Spans the heights on show: small differences are seen, and colours change their meaning.",
+                "Spans the displayed heights: small differences are visible, but colours are not comparable between plots.",
             ];
             let meanings = match scale.quantity {
                 Quantity::Height => meanings,
                 _ => [
                     "Spans the values of all test samples: colours mean the same for every sample.",
-                    "Spans the values on show: small differences are seen, and colours change their meaning.",
+                    "Spans the displayed values: small differences are visible, but colours are not comparable between plots.",
                 ],
             };
             if let Some(locked) = lock_ui(ui, is_locked, meanings) {
@@ -97,7 +97,7 @@ fn choices_ui(ui: &mut Ui, scale: &ColourScale, look: Look, changed: &mut Look) 
         Quantity::Error => {
             let limit_mm = *scale.range.end();
             let locked = format!("Keeps ± {} mm for whatever is shown next.", format_number(limit_mm));
-            let meanings = [&*locked, "Spans ± the largest error on show."];
+            let meanings = [&*locked, "Spans ± the largest displayed error."];
             if let Some(locked) = lock_ui(ui, look.error_limit_mm.is_some(), meanings) {
                 changed.error_limit_mm = locked.then_some(limit_mm);
             }

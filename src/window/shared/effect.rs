@@ -38,7 +38,7 @@ pub enum Effect {
     Resume,
     /// End it.
     Stop,
-    /// Go on from the present weights with the method and the epochs of the settings.
+    /// Go on from the current weights with the method and the epochs of the settings.
     Continue,
     /// Look at all surfaces so.
     Look(Look),
@@ -52,14 +52,14 @@ pub enum Effect {
     Copy {
         /// The text.
         text: String,
-        /// Sentence that tells so.
+        /// Sentence that reports so.
         notice: String,
     },
     /// Put this picture on the clipboard, and tell so.
     CopyPicture {
         /// The picture.
         figure: Box<Figure>,
-        /// Sentence that tells so.
+        /// Sentence that reports so.
         notice: String,
     },
     /// Keep the run of a network file that was opened.
@@ -72,6 +72,6 @@ pub enum Effect {
     RemoveRun(u64),
     /// Tell the user.
     Tell(Matter, Notice),
-    /// Withdraw the failures told about this, which have been dealt with.
+    /// Withdraw the failures said about this, which have been assigned with.
     Settle(Matter),
 }

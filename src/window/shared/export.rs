@@ -11,7 +11,7 @@ use decoupler_files::{
     figure::Figure,
 };
 
-/// A thing that a view can hand out, in one form, or the reason why it cannot now.
+/// A thing that a view can export, in one form, or the reason why it cannot now.
 pub struct Export<'a> {
     /// Part of the menu.
     pub group: ExportGroup,
@@ -31,7 +31,7 @@ pub type Ask<'a> = Box<dyn FnOnce() -> Effect + 'a>;
 /// Parts of the Export menu.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum ExportGroup {
-    /// The network of a past epoch that is on show.
+    /// The network of a past epoch that is displayed.
     NetworkOnShow(usize),
     /// The best network of a training, of this epoch.
     BestNetwork(usize),
@@ -45,7 +45,7 @@ pub enum ExportGroup {
     Tables,
     /// Tables to the clipboard.
     Copies,
-    /// Files from which this program goes on.
+    /// Files from which this program continues.
     Training,
 }
 
@@ -53,7 +53,7 @@ impl ExportGroup {
     /// Heading of the part.
     pub fn heading(self) -> Cow<'static, str> {
         let heading = match self {
-            Self::NetworkOnShow(epoch) => return format!("Network on show, epoch {epoch}").into(),
+            Self::NetworkOnShow(epoch) => return format!("Displayed network, epoch {epoch}").into(),
             Self::BestNetwork(epoch) => return format!("Best network, epoch {epoch}").into(),
             Self::Network => "Network",
             Self::Report => "Report",
@@ -191,7 +191,7 @@ pub fn copy_exports<'a>(
     })
 }
 
-/// The errors on show as a CSV file named after `stem`; `table` gives them, or the reason why there are none.
+/// The displayed errors as a CSV file named after `stem`; `table` gives them, or the reason why there are none.
 pub fn error_table_export<'a>(stem: String, table: Result<impl Fn() -> Table + 'a, String>) -> Export<'a> {
     let words = FileWords {
         kind: "error table",

@@ -22,7 +22,7 @@ impl FileInUse {
             Self::Recording(used) => (is_same(used, path), "it is a recording that is open"),
             Self::Checkpoint(used) => (
                 is_same(used, path),
-                "the training on show was resumed from this checkpoint",
+                "the current training was resumed from this checkpoint",
             ),
             Self::Kept(folder) => (
                 path.parent().is_some_and(|parent| is_same_folder(parent, folder)) && path.exists(),

@@ -67,7 +67,7 @@ impl Contents {
         })
     }
 
-    /// The contents that `write` writes, which returns what the user is told then.
+    /// The contents that `write` writes, which returns the message for the user then.
     pub fn telling(write: impl Fn(&Path) -> Result<String, String> + Send + Sync + 'static) -> Self {
         Self(Arc::new(write))
     }

@@ -1,4 +1,4 @@
-//! State shared by all views (the settings, the training on show, the run list, the look of surfaces) and the effects
+//! State shared by all views (the settings, the current training, the run list, the look of surfaces) and the effects
 //! that a view may ask for.
 
 mod colour_scale;

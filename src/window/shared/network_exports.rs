@@ -1,4 +1,4 @@
-//! Networks and the reports of their runs as exports, of the training on show or of a kept run.
+//! Networks and the reports of their runs as exports, of the current training or of a kept run.
 
 use std::{path::Path, sync::Arc};
 
@@ -23,9 +23,9 @@ const NETWORK: BundleDecoder = BundleDecoder::Kind(DecoderKind::Network);
 /// A trained network that can be exported.
 #[derive(Clone, Debug)]
 pub enum NetworkSource {
-    /// Of the training on show, which the worker has.
+    /// Of the current training, which the worker has.
     Training(RunId, Box<Setup>),
-    /// Of a past epoch of the training on show.
+    /// Of a past epoch of the current training.
     Past(RunId, Box<Setup>, usize, PastNetworks),
     /// Of a kept run with this name.
     Kept(String, Arc<NetworkFile>),
@@ -69,7 +69,7 @@ impl NetworkSource {
 }
 
 /// The network in every form and the report of its run; `source` gives it, or the reason why there is none. `prefix`
-/// stands before every name.
+/// comes before every name.
 pub fn network_exports<'a>(
     prefix: &str,
     source: &Result<NetworkSource, String>,

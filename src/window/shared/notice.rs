@@ -10,7 +10,7 @@ pub enum Notice {
 /// Subject of a notice. Work that succeeds takes the failures of the same subject along.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Matter {
-    /// The training on show, or one that was to be shown.
+    /// The current training, or one that was to be shown.
     Training,
     /// Settings with which no training can begin.
     Settings,

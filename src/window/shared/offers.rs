@@ -66,7 +66,7 @@ impl<'a> Offers<'a> {
     }
 }
 
-/// Returns true for keys with which one writes or mends what one has written.
+/// Returns true for keys with which one writes or repairs what one has written.
 fn is_for_typing(keys: &KeyboardShortcut) -> bool {
     keys.modifiers.is_none() || matches!(keys.logical_key, Key::Z | Key::Y)
 }

@@ -11,7 +11,7 @@ use crate::window::{
 pub enum RunWish {
     /// Begin one.
     Train,
-    /// Go on from the present weights with the settings as they are now.
+    /// Go on from the current weights with the settings as they are now.
     Continue,
     /// Hold it.
     Pause,
@@ -35,7 +35,7 @@ pub fn run_buttons_ui(
     let stop = ui.add_enabled(is_busy, ghost_button(if is_short { "■" } else { "■ Stop" }));
     name(&stop, "■ Stop");
     if stop
-        .on_hover_text("Ends the training; the best network so far is kept (Ctrl+.).")
+        .on_hover_text(with_shortcut(ui, "Ends the training; the best network so far is kept", Key::Period))
         .clicked()
     {
         wish = Some(RunWish::Stop);
@@ -50,7 +50,7 @@ pub fn run_buttons_ui(
     let pause = ui.add_enabled(can_pause, ghost_button(if is_short { sign } else { text }));
     name(&pause, text);
     if pause
-        .on_hover_text("Pauses or resumes the training (Ctrl+P).")
+        .on_hover_text(with_shortcut(ui, "Pauses or resumes the training", Key::P))
         .clicked()
     {
         wish = Some(toggled);
@@ -68,7 +68,7 @@ pub fn run_buttons_ui(
         wish = Some(RunWish::Train);
     }
     if can_continue {
-        let hint = "Continues from the present weights with the method and the epochs on the left, counted from here. \
+        let hint = "Continues from the current weights with the method and the epochs on the left, counted from here. \
                     Train starts again from random weights.";
         let go_on = ui.add(ghost_button("Continue"));
         if go_on.on_hover_text(hint).clicked() {

@@ -47,7 +47,7 @@ pub struct RunView {
     pub result: Option<RunResult>,
     /// Reason for which it ended, if it has.
     pub stop_reason: Option<StopReason>,
-    /// True while it stands as in the checkpoint that it was opened from.
+    /// True while it is as in the checkpoint that it was opened from.
     pub is_saved: bool,
 }
 
@@ -105,7 +105,7 @@ impl RunView {
         ErrorTable::of_scores(&self.problem, &self.scores(result), self.published.as_ref())
     }
 
-    /// Takes the worker's news.
+    /// Takes the worker's events.
     pub fn progress(&mut self, progress: Progress) {
         let Progress {
             epochs,

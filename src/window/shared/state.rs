@@ -32,7 +32,7 @@ pub struct Shared {
     pub preview: Option<Preview>,
     /// Progress of reading a recording before a training.
     pub reading: Option<Progress>,
-    /// The present or last training.
+    /// The current or last training.
     pub run: Option<RunView>,
     /// The run list.
     pub runs: RunList,
@@ -165,7 +165,7 @@ impl Shared {
         }
     }
 
-    /// Nodes of the test set on show: the training's, or the draft's if that has moved on; none of a recording.
+    /// Nodes of the current test set: the training's, or the draft's if that has moved on; none of a recording.
     pub fn test(&self) -> Option<&TestView> {
         match &self.preview {
             Some(preview) if self.source == SourceKind::Array => Some(&preview.test),
@@ -173,12 +173,12 @@ impl Shared {
         }
     }
 
-    /// Test samples on show of a recording.
+    /// Displayed test samples of a recording.
     pub fn recorded_test(&self) -> Option<&RecordedTest> {
         self.shown_run().and_then(|run| run.test.recording())
     }
 
-    /// The training on show: none if it is of the other source, or the draft has moved on to another test set.
+    /// The current training: none if it is of the other source, or the draft has moved on to another test set.
     pub fn shown_run(&self) -> Option<&RunView> {
         let run = self.run.as_ref()?;
         let is_recording = run.setup.plan().is_some();
@@ -195,7 +195,7 @@ impl Shared {
         ended.map_or(Phase::Idle, Phase::Ended)
     }
 
-    /// Returns true if the training on show can continue from its present weights with the draft: its sets and networks
+    /// Returns true if the current training can continue from its present weights with the draft: its sets and networks
     /// must be the same. A paused training is resumed instead, unless the method or the stopping rules change.
     pub fn can_continue(&self) -> bool {
         let Some(run) = self.shown_run() else { return false };
@@ -212,7 +212,7 @@ impl Shared {
         may_go_on && fixed == run.asked
     }
 
-    /// The result on show.
+    /// The current result.
     pub fn result(&self) -> Option<&RunResult> {
         self.shown_run().and_then(|run| run.result.as_ref())
     }

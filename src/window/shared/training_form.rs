@@ -55,7 +55,7 @@ pub fn method_settings_ui(ui: &mut Ui, method: &mut Method, starts: &mut usize, 
 pub fn stopping_ui(ui: &mut Ui, stopping: &mut StoppingRules) {
     let usual = StoppingRules::default();
     let hint = format!(
-        "Largest number of epochs. {} Train counts from the first epoch, Continue from the present one.",
+        "Largest number of epochs. {} Train counts from the first epoch, Continue from the current one.",
         glossary::EPOCH.hint
     );
     count_ui(

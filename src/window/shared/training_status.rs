@@ -91,7 +91,7 @@ fn progress_in_words(run: &RunView, phase: Phase) -> Vec<String> {
         && epochs_run > 0
     {
         let per_epoch = time.div_f64(epochs_run as f64);
-        parts.push(format!("{} an epoch", format_duration(per_epoch)));
+        parts.push(format!("{} per epoch", format_duration(per_epoch)));
         if phase.is_busy() {
             parts.push(format!(
                 "at most {} left",

@@ -11,10 +11,10 @@ pub trait View: Debug {
     /// Its name in the top bar.
     fn name(&self) -> &'static str;
 
-    /// It comes on show.
+    /// It is displayed.
     fn enter(&mut self, _shared: &Shared) {}
 
-    /// Takes what its threads have to tell and follows what is shared, also while another view is on show.
+    /// Takes what its threads have to report and follows what is shared, also while another view is displayed.
     fn take_news(&mut self, _shared: &Shared, _effects: &mut Vec<Effect>) {}
 
     /// Returns true while its threads compute.
@@ -54,7 +54,7 @@ pub trait View: Debug {
     /// Its tools at the right of the top bar, from right to left.
     fn tools_ui(&mut self, _ui: &mut Ui, _shared: &Shared, _effects: &mut Vec<Effect>) {}
 
-    /// Returns everything that it can hand out, and what it cannot now with the reason. The order is that of the menu;
+    /// Returns everything that it can export, and what it cannot now with the reason. The order is that of the menu;
     /// forms of one thing follow each other.
     fn exports<'a>(&'a self, _shared: &'a Shared) -> Vec<Export<'a>> {
         Vec::new()
@@ -75,7 +75,7 @@ pub trait View: Debug {
     }
 }
 
-/// The columns beside the middle of a view.
+/// The columns next to the middle of a view.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Columns {
     /// Width of the one on the left, in points.

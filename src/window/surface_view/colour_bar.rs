@@ -6,7 +6,7 @@ use decoupler_files::{export::format_number, figure::surface::ColourScale};
 
 const STRIPS: usize = 128;
 
-/// The scale of colours beside one or more surfaces, as a vertical bar with ticks.
+/// The scale of colours next to one or more surfaces, as a vertical bar with ticks.
 #[derive(Clone, Debug)]
 pub struct ColourBar<'a> {
     /// Scale of the colours.

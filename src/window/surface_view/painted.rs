@@ -27,7 +27,7 @@ pub(super) struct Painted {
 }
 
 impl Painted {
-    /// Returns what the last frame painted if nothing has changed, or paints it anew.
+    /// Returns what the last frame painted if nothing has changed, or paints it again.
     pub(super) fn of(surface: &Surface, camera: OrbitCamera, theme: &Theme, ui: &Ui, response: &Response) -> Arc<Self> {
         let (id, rect) = (response.id, response.rect);
         let kept: Option<Arc<Self>> = ui.data(|data| data.get_temp(id));

@@ -26,7 +26,7 @@ pub struct SurfaceView<'a> {
     pub marked_node: Option<usize>,
     /// Nodes that are lit, for instance those of a chosen bar.
     pub lit_nodes: &'a [usize],
-    /// Line along which a figure beside it cuts the surface.
+    /// Line along which a figure next to it cuts the surface.
     pub section: Option<&'a Section>,
     /// Dark or light.
     pub theme: &'a Theme,
@@ -49,7 +49,7 @@ pub struct SurfaceViewResponse {
 
 impl SurfaceViewResponse {
     /// Shows a tooltip above the hovered node, if there is one: `content` gets the node's index. Above, because what
-    /// the surface rises to is the node itself; beside it where the window ends.
+    /// the surface rises to is the node itself; next to it where the window ends.
     pub fn node_tooltip_ui(&self, content: impl FnOnce(&mut Ui, usize)) {
         if let (Some(node), Some(at)) = (self.hovered_node, self.hovered_at) {
             let anchor = Rect::from_center_size(at, Vec2::splat(20.0));

@@ -28,17 +28,17 @@ pub struct SurfaceStyle {
     pub colours: SequentialMap,
     /// Heights that colours and axes span.
     pub heights: HeightScale,
-    /// Errors at the ends of the colours, in millimetres, while they are locked; else those on show.
+    /// Errors at the ends of the colours, in millimetres, while they are locked; else those displayed.
     pub error_limit_mm: Option<f64>,
 }
 
 /// Heights that colours and axes span.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum HeightScale {
-    /// From full compression to rest, whatever is on show.
+    /// From full compression to rest, whatever is displayed.
     #[default]
     Stroke,
-    /// From the lowest to the highest node on show.
+    /// From the lowest to the highest displayed node.
     Fitted,
 }
 

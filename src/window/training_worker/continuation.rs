@@ -3,8 +3,8 @@ use decoupler_core::{
     training::{StoppingRules, TrainingError, TrainingSettings},
 };
 
-/// Gives `run` more epochs, counted from the start that is furthest. With the method it has, it goes on as if they had
-/// been given from the beginning; another method, or one that had ended for another reason, starts from the present
+/// Gives `run` more epochs, counted from the start that is furthest. With the method it has, it continues as if they had
+/// been given from the beginning; another method, or one that had ended for another reason, starts from the current
 /// weights.
 ///
 /// # Errors

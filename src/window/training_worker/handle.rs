@@ -20,7 +20,7 @@ pub struct Worker {
     answered: Cell<u64>,
     /// The last of those that are cancelled; those before are too.
     cancelled: Arc<AtomicU64>,
-    /// The snapshot on show.
+    /// The displayed snapshot.
     snapshot: Arc<AtomicUsize>,
 }
 

@@ -33,7 +33,7 @@ pub enum Request {
     Open(PathBuf),
     /// Take up the training whose starts stand so, and hold it; one in progress is dropped.
     TakeUp(Box<Setup>, Vec<TrainerState>),
-    /// Go on from the present weights with this method and this many epochs more.
+    /// Go on from the current weights with this method and this many epochs more.
     Continue(TrainingSettings),
     /// Step no further until told to resume.
     Pause,
@@ -54,19 +54,19 @@ pub enum Event {
     Opened(Result<Box<Began>, String>),
     /// A training that was cancelled while it was prepared has not begun.
     Abandoned,
-    /// The training goes on with these settings, or why it cannot.
+    /// The training continues with these settings, or why it cannot.
     Continued(Result<Box<RunSettings>, String>),
     /// Progress of reading a file before a training.
     Reading(Reading),
     /// Progress of the training.
     Progressed(Box<Progress>),
-    /// The training on show has ended: what is to be kept of it, or why nothing can be.
+    /// The current training has ended: what is to be kept of it, or why nothing can be.
     Finished(Result<Box<NetworkFile>, String>),
     /// The thread has ended, and why, unless it was to end.
     Died(Option<JobError>),
 }
 
-/// Takes what it needs from a training, or is told why that is not there.
+/// Takes what it needs from a training, or is informed why that is not there.
 pub struct Inspection(Box<Inspect>);
 
 type Inspect = dyn FnOnce(Result<&TrainedRun, &str>) + Send;
@@ -144,7 +144,7 @@ pub struct Progress {
 }
 
 impl Progress {
-    /// Takes the place of an older one that nobody saw: its epochs, and how its starts stood, are not lost.
+    /// Takes the place of an older one that no one saw: its epochs, and how its starts stood, are not lost.
     pub fn replace(&mut self, older: Self) {
         let newer = std::mem::replace(&mut self.epochs, older.epochs);
         append_epochs(&mut self.epochs, newer);
@@ -169,7 +169,7 @@ pub struct RunResult {
     pub charts: Option<Arc<TargetCharts>>,
     /// Remarks on the errors of a recording, once the training is paused or has ended.
     pub remarks: Vec<String>,
-    /// The snapshot that was on show, and its surface: laid through the nodes here, so that the window need not.
+    /// The snapshot that was displayed, and its surface: laid through the nodes here, so that the window need not.
     pub frame: Option<(usize, Frame)>,
     /// Their errors.
     pub errors: TestErrors,
@@ -214,7 +214,7 @@ mod tests {
     fn no_epoch_is_lost_where_progress_replaces_progress() {
         let [a, b] = [1.0, 2.0];
         let cases = [
-            ("the leader goes on", epochs(a, 0..3), epochs(a, 3..5), epochs(a, 0..5)),
+            ("the leader continues", epochs(a, 0..3), epochs(a, 3..5), epochs(a, 0..5)),
             ("nothing is new", epochs(a, 0..3), epochs(a, 3..3), epochs(a, 0..3)),
             ("another start leads", epochs(a, 0..3), epochs(b, 0..5), epochs(b, 0..5)),
             (

@@ -39,7 +39,7 @@ pub(super) struct TrainingLoop<'a> {
     report: &'a Report<Event>,
     /// The last preparation that is cancelled.
     cancelled: &'a AtomicU64,
-    /// The snapshot on show.
+    /// The displayed snapshot.
     snapshot: &'a AtomicUsize,
     /// Preparations so far.
     preparations: u64,
@@ -330,12 +330,12 @@ impl<'a> TrainingLoop<'a> {
         }
         let file = trained.network_file();
         let sound = file.and_then(|file| file.flaw().map_or(Ok(Box::new(file)), Err));
-        let finished = sound.map_err(|flaw| format!("This training is not kept in the run list: {flaw}"));
+        let finished = sound.map_err(|flaw| format!("This training is not kept in the run list: {defect}"));
         self.report.send(Event::Finished(finished));
     }
 }
 
-/// Message where the training on show is not in the worker: only a worker that died lost it.
+/// Message where the current training is not in the worker: only a worker that died lost it.
 pub const LOST: &str = "the network was lost when the training thread ended: train again";
 
 /// Message where a file was asked for before another training began.
@@ -373,7 +373,7 @@ impl TrainedRun {
         NetworkFile::from_run(&self.run, self.recorded.as_ref()).map_err(|error| error.to_string())
     }
 
-    /// Takes the present state, to be resumed.
+    /// Takes the current state, to be resumed.
     pub fn checkpoint_file(&self) -> Result<CheckpointFile, String> {
         CheckpointFile::from_run(&self.run, self.recorded.as_ref()).map_err(|error| error.to_string())
     }

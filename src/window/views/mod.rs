@@ -44,7 +44,7 @@ pub struct Views {
 }
 
 impl Views {
-    /// As the window opens. `wake` is called whenever a view has news.
+    /// As the window opens. `wake` is called whenever a view has events.
     pub fn new(wake: &Wake) -> Self {
         Self {
             train: TrainView::new(Arc::clone(wake)),

@@ -20,7 +20,7 @@ pub fn section_heading_ui(ui: &mut Ui, text: &str) -> Response {
     response
 }
 
-/// Contents that scroll up and down where they are higher than their place; the scroll bar has a strip of its own beside
+/// Contents that scroll up and down where they are higher than their place; the scroll bar has a strip of its own next to
 /// them.
 pub fn scrolled_ui(ui: &mut Ui, id: &str, contents: impl FnOnce(&mut Ui)) {
     let strip = Margin {

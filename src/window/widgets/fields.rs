@@ -16,7 +16,7 @@ pub use super::number_field::usually;
 pub(crate) use decoupler_core::sensor::short as input_text;
 pub use decoupler_core::text::capitalised;
 
-/// Lays out `name` and the widget made by `value_ui`; joins them for assistive technology and tests. Below it stands why
+/// Lays out `name` and the widget made by `value_ui`; joins them for assistive technology and tests. Below it is why
 /// what was typed into it was not taken.
 pub fn field_ui(ui: &mut Ui, name: &str, hint: &str, value_ui: impl FnOnce(&mut Ui) -> Response) -> Response {
     let field = ui.horizontal(|ui| {

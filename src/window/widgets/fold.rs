@@ -14,7 +14,7 @@ pub fn focus_ring_ui(ui: &Ui, response: &Response) {
     }
 }
 
-/// A part of a form that is folded away until its name is clicked; `summary` tells beside the name how it stands.
+/// A part of a form that is folded away until its name is clicked; `summary` tells next to the name the status of it.
 /// `contents` is added only while it is unfolded.
 pub fn fold_ui(ui: &mut Ui, name: &str, summary: &str, contents: impl FnOnce(&mut Ui)) {
     let dim = Theme::of(ui).palette.dim;

@@ -33,7 +33,7 @@ pub fn usually<N>(usual: N, range: RangeInclusive<N>) -> Limits<N> {
     }
 }
 
-/// A number with its unit, to be dragged or typed: "0.5 mm", "1e-3", "20%". What is no number, out of `limits`, or of
+/// A number with its unit, to be dragged or typed: "0.5 mm", "1e-3", "20%". What is not a number, out of `limits`, or of
 /// another unit is refused: the old value stays, and [`refusal_ui`] tells why. A double click sets the usual value; a right
 /// click copies.
 pub fn number_ui<N: Numeric>(ui: &mut Ui, value: &mut N, limits: &Limits<N>, unit: &str, size: Vec2) -> Response {

@@ -2,7 +2,7 @@ use eframe::egui::{Button, DragValue, FontId, Response, RichText, Ui, Vec2, Widg
 
 use crate::window::theme::{Theme, space, type_size};
 
-/// The number of the snapshot or sample (`what`) on show, to be typed or dragged too, and arrows to its neighbours; returns
+/// The number of the snapshot or sample (`what`) displayed, to be typed or dragged too, and arrows to its neighbours; returns
 /// the one picked.
 pub fn snapshot_ui(ui: &mut Ui, what: &str, shown: usize, snapshots: usize) -> Option<usize> {
     let mut picked = None;

@@ -103,7 +103,7 @@ fn a_trial_of_a_program_that_ends_without_a_result_is_taken_over() {
     assert_eq!(merged("runs", folder), trials);
 }
 
-/// A trial of so many epochs that is stopped after its beginning: its folder, the exit status, and what it said.
+/// A trial of this many epochs that is stopped after its beginning: its folder, the exit status, and what it said.
 #[cfg(target_os = "linux")]
 fn stopped_by(signal: &str, epochs: usize) -> (TempDir, i32, String) {
     let folder = folder_with(&json!({

@@ -76,7 +76,7 @@ impl Array {
         median(&mut Vec::from_iter((0..TURNS).map(|_| repeat(times))))
     }
 
-    /// Milliseconds that networks with so many hidden nodes take for a frame, in double and in single precision.
+    /// Milliseconds that networks with this many hidden nodes take for a frame, in double and in single precision.
     pub(crate) fn network_ms(&self, hidden: usize) -> [f64; 2] {
         let networks = self.networks(hidden);
         let rows = self.scale.rows();

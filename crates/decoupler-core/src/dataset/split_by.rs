@@ -18,7 +18,7 @@ pub enum SplitBy {
     Time,
     /// Whole groups, drawn at random: no group is in two parts.
     Group,
-    /// Single samples, drawn at random. It flatters wherever neighbouring samples are alike.
+    /// Single samples, drawn at random. It is optimistic wherever neighbouring samples are alike.
     Random,
 }
 

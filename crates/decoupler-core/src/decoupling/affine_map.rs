@@ -82,7 +82,7 @@ impl AffineMap {
 }
 
 impl AffineMap {
-    /// Writes the centred channels. Returns `true` if all readings are sound: found out in the same pass, which a separate
+    /// Writes the centred channels. Returns `true` if all readings are valid: found out in the same pass, which a separate
     /// one would lengthen by 6 % of decoding.
     #[inline(always)]
     fn read(&mut self, readings: &[f64], of: impl Fn(f64) -> f64) -> bool {

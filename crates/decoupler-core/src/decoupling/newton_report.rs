@@ -60,7 +60,7 @@ pub enum Solution {
 }
 
 impl Solution {
-    /// Judges an answer by the largest error that what is left of its misfit can hide; `is_explained` tells that rounding
+    /// Judges an answer by the largest error that what is left of its misfit can hide; `is_explained` reports that rounding
     /// explains the misfit, and `is_only` that no other answer would be as good.
     pub(super) fn of(largest_error: f64, is_explained: bool, is_only: impl FnOnce() -> bool) -> Self {
         if largest_error <= LARGEST_ERROR {

@@ -384,7 +384,7 @@ fn rms(squares: f64, count: usize) -> f64 {
     (squares / count as f64).sqrt()
 }
 
-/// Length of so many readings in whole vector registers.
+/// Length of this many readings in whole vector registers.
 fn padded(readings: usize) -> usize {
     readings.next_multiple_of(LANES)
 }

@@ -107,7 +107,7 @@ impl RowProblem {
         3 * self.displacements_mm.len()
     }
 
-    /// Makes `row` the present row-wire.
+    /// Makes `row` the current row-wire.
     pub(crate) fn turn_to(&mut self, row: usize) {
         self.row = row;
     }
@@ -180,7 +180,7 @@ impl RowProblem {
         self.readings_ohm[reading]
     }
 
-    /// The unknowns behind absolute coordinates (3·M2) of nodes on the present row-wire.
+    /// The unknowns behind absolute coordinates (3·M2) of nodes on the current row-wire.
     pub(crate) fn unknowns_of(&self, coordinates_mm: &[f64], unknowns_mm: &mut [f64]) {
         let axes = self.axes.indices();
         for (node, values) in unknowns_mm.chunks_exact_mut(axes.len()).enumerate() {
@@ -192,7 +192,7 @@ impl RowProblem {
         }
     }
 
-    /// Absolute coordinates (3·M2) of nodes on the present row-wire.
+    /// Absolute coordinates (3·M2) of nodes on the current row-wire.
     pub(crate) fn coordinates_of(&self, unknowns_mm: &[f64], coordinates_mm: &mut [f64]) {
         let axes = self.axes.indices();
         for (node, values) in unknowns_mm.chunks_exact(axes.len()).enumerate() {

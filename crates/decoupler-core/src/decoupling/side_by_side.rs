@@ -83,7 +83,7 @@ impl WithSimd for Solving<'_> {
             least_left,
         } = self.0;
         let n = *unknowns;
-        // What columns before leave of the diagonal is found beside what it was.
+        // What columns before leave of the diagonal is found next to what it was.
         for (i, diagonal) in solution.iter_mut().enumerate() {
             *diagonal = lower[begin(i) + i];
         }

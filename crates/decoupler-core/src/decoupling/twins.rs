@@ -4,7 +4,7 @@ use crate::{
     sensor::{Axes, SensorModel},
 };
 
-/// Deformations of a row-wire that give the same readings as another one, by symmetry: the readings do not tell which of
+/// Deformations of a row-wire that give the same readings as another one, by symmetry: the readings do not determine which of
 /// them is the true one, however exact they are.
 ///
 /// The electrodes of a column-wire are evenly spaced, so a node may be mirrored at their middle; and two nodes may change

@@ -243,7 +243,7 @@ mod tests {
             vec![5.0; 20]
         );
         assert_eq!(sizes(100, |s| [(s / 5 % 2) as f64, 1.0], |_| 3.0), vec![5.0; 20]);
-        // A target that goes on changing is evidence of its own.
+        // A target that continues changing is evidence of its own.
         assert_eq!(sizes(100, |s| [irrational(s / 5), 1.0], |s| s as f64), vec![1.0; 100]);
         // The same 20 samples, 5 times over.
         assert_eq!(

@@ -6,7 +6,7 @@ use crate::dataset::Dataset;
 /// Errors of decoupled coordinates on the nodes of a test set.
 ///
 /// The paper's errors (AveZerr, AveXerr and AveYerr) are the mean over samples and nodes of |decoupled − true| / |true|
-/// in percent of the **coordinate**. That denominator flatters, because a node is never lower than 80 % of the height,
+/// in percent of the **coordinate**. That denominator is optimistic, because a node is never lower than 80 % of the height,
 /// so the error is also given in millimetres and in percent of full scale.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]

@@ -1,9 +1,9 @@
-//! Evaluation of decoders: errors as the paper defines them and beyond, beside baselines, a Bayesian reference and the
+//! Evaluation of decoders: errors as the paper defines them and beyond, next to baselines, a Bayesian reference and the
 //! published figures.
 //!
 //! A [`Run`] goes from [`RunSettings`] to trained networks and error tables; [`CrossValidation`] tests on every sample;
 //! [`measure_trade_off`] weighs speed against accuracy; [`experiments`] repeats runs over a grid of settings;
-//! [`recorded`] says what recorded readings can tell.
+//! [`recorded`] says what the recorded readings determine.
 
 mod baselines;
 mod cross_validation;

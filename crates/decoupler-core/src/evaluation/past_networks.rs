@@ -9,7 +9,7 @@ use crate::network::{DecouplingNetwork, Mlp, Networks};
 /// is dropped, so that those of every 2ᵏ-th epoch stay. The latest is always there.
 #[derive(Clone, Debug, Default)]
 pub struct PastNetworks {
-    /// k: the epochs kept are multiples of 2ᵏ, but for the latest.
+    /// k: the epochs kept are multiples of 2ᵏ, except for the latest.
     halvings: u32,
     /// In the order of their epochs.
     kept: Vec<Arc<Past>>,
@@ -62,7 +62,7 @@ impl PastNetworks {
     /// Largest number of networks: a slider has not as many points.
     pub const MOST: usize = 4096;
 
-    /// Takes the present state of `run`, once after each of its steps.
+    /// Takes the current state of `run`, once after each of its steps.
     pub fn record(&mut self, run: &Run) {
         self.record_within(run, Self::MOST_BYTES, Self::MOST);
     }
@@ -118,7 +118,7 @@ impl PastNetworks {
         self.kept.iter().map(|past| past.epoch)
     }
 
-    /// Number of epochs between two networks, but for the latest.
+    /// Number of epochs between two networks, except for the latest.
     pub fn stride(&self) -> usize {
         1 << self.halvings
     }

@@ -32,7 +32,7 @@ pub struct PressedAnswer {
     /// Largest |decoupled z − z|.
     pub worst_mm: f64,
     /// Time to decode the frame: the shortest of several, as whatever else the machine does only adds to it. `None` if the
-    /// frame was decoded too few times, because nobody waited or it takes long.
+    /// frame was decoded too few times, because no one waited or it takes long.
     pub time: Option<Duration>,
 }
 
@@ -74,7 +74,7 @@ impl Pressed {
         &self.readings_ohm
     }
 
-    /// Decodes the readings; `None` once `is_stale` says that nobody waits for the answer any more.
+    /// Decodes the readings; `None` once `is_stale` says that no one waits for the answer any more.
     ///
     /// # Errors
     /// A reading that cannot be decoded.
@@ -106,7 +106,7 @@ impl Pressed {
         let errors = coordinates_mm.iter().zip(&self.coordinates_mm).skip(2).step_by(3);
         let errors = errors.map(|(decoded, actual)| (decoded - actual).abs());
         let (total_mm, worst_mm, nodes) = errors.fold((0.0, 0.0_f64, 0), |(total, worst, nodes), error| {
-            // NaN stays: an answer that is no number has no error that is one.
+            // NaN stays: an answer that is not a number has no error that is one.
             (
                 total + error,
                 if error > worst || error.is_nan() { error } else { worst },

@@ -30,7 +30,7 @@ pub enum NoReference {
 const FINER_ROUNDING: f64 = 4.0;
 /// Share of the reference that may depend on that factor.
 const OWED_TO_ROUNDING: f64 = 0.05;
-/// Relative noise beside which no rounding of readings counts.
+/// Relative noise next to which no rounding of readings counts.
 const SMALLEST_BESIDE_ROUNDING: f64 = 1e-13;
 /// Number of samples, spread over the test set, on which that is tried.
 const TRIED_SAMPLES: usize = 100;
@@ -40,7 +40,7 @@ const TRIED_SAMPLES: usize = 100;
 ///
 /// The posterior of each row under the prior that the scene draws from has medians, which are the answers with the least
 /// expected absolute error: no decoder of the same readings does better on average. Each row is judged by its own readings
-/// and taken as known, even in scenes whose decoders are not told the row; those cannot quite reach it.
+/// and taken as known, even in scenes whose decoders do not know the row; those cannot quite reach it.
 ///
 /// The prior of random nodes is uniform, cut at 0 and at the stroke. Eq. (2) is linearised at the true deformation, and
 /// expectation propagation finds the medians; a decoder that has to find where to linearise can come close. Other loadings
@@ -268,7 +268,7 @@ mod tests {
     }
 
     /// One node: the posterior is normal with standard deviation ε/s while that is small against the stroke; when it is
-    /// large, readings tell nothing, and the middle of the stroke is off by a quarter of it.
+    /// large, readings determine nothing, and the middle of the stroke is off by a quarter of it.
     #[test]
     fn one_node_has_the_closed_form_at_both_ends() {
         let mut model = SensorModel::new("1x1_1x4".parse().unwrap());

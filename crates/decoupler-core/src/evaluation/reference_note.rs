@@ -47,7 +47,7 @@ impl fmt::Display for ReferenceNote {
                  to estimate their posterior. Raise the noise, or let nodes move along z only."
             }
             Self::Missing(NoReference::TooLarge) => {
-                "There is no Bayesian reference: sampling the posteriors of so many or such large rows would take many \
+                "There is no Bayesian reference: sampling the posteriors of that many or such large rows would take many \
                  minutes. Lower the number of test samples, or the size of the array."
             }
             Self::AboveMean => {

@@ -8,7 +8,7 @@ use crate::{
     training::{Method, StopReason},
 };
 
-/// Remark on a decoder's result that is not to be trusted, with cause and cure. Printed beside its errors.
+/// Remark on a decoder's result that is not to be trusted, with cause and cure. Printed next to its errors.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Remark {
@@ -93,7 +93,7 @@ impl fmt::Display for Cause {
                 write!(f, "{samples} for {readings} are too few; give more samples")
             }
             Self::Training => f.write_str(
-                "the network has learned too little, or its samples by heart; train it for more epochs, with other \
+                "the network is under- or overfitted; train it for more epochs, with other \
                  hidden nodes, or on more samples",
             ),
             Self::End { reason, method } => f.write_str(&reason.remedy(method)),
@@ -130,7 +130,7 @@ impl Cause {
     }
 }
 
-/// Errors of a decoder beside those of the mean, coordinate by coordinate or target by target.
+/// Errors of a decoder next to those of the mean, coordinate by coordinate or target by target.
 struct Pair {
     target: String,
     error: f64,
@@ -173,7 +173,7 @@ impl Pair {
         judged.map(pair).collect()
     }
 
-    /// True if the error exceeds that of the mean by what three decimals of their ratio show. An error that is no number is
+    /// True if the error exceeds that of the mean by what three decimals of their ratio show. An error that is not a number is
     /// [`Remark::Missing`]'s matter.
     fn is_worse(&self) -> bool {
         self.error > 1.0005 * self.of_mean + self.rounding

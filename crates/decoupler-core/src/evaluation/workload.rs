@@ -107,7 +107,7 @@ impl Workload {
         })
     }
 
-    /// Returns `true` if it takes so much memory or time that the user should know before it begins: a gigabyte, some
+    /// Returns `true` if it takes this much memory or time that the user should know before it begins: a gigabyte, some
     /// seconds to draw the samples, more samples than are held, or a second an epoch.
     pub fn is_large(&self) -> bool {
         self.bytes > 1_000_000_000
@@ -149,7 +149,7 @@ fn largest_shape(settings: &SimulatedSettings) -> Shape {
     let (scene, scale) = (&settings.source.scene, settings.source.sensor.scale);
     let varying_axes = match (scene.movement, scene.rows) {
         (Movement::Xyz { .. }, _) => 3,
-        // A network that is not told the row also learns its x.
+        // A network that does not know the row also learns its x.
         (Movement::Z, Rows::All) if scale.rows() > 1 => 2,
         (Movement::Z, _) => 1,
     };
@@ -160,7 +160,7 @@ fn largest_shape(settings: &SimulatedSettings) -> Shape {
     }
 }
 
-/// Bytes of so many rows of numbers.
+/// Bytes of this many rows of numbers.
 fn float_bytes(rows: usize, columns: usize) -> u64 {
     (rows as u64).saturating_mul((columns * size_of::<f64>()) as u64)
 }
@@ -197,7 +197,7 @@ mod tests {
         }
     }
 
-    /// Beyond those that are held, samples cost time and no memory but for the equations, which are bounded too.
+    /// Beyond those that are held, samples cost time and no memory except for the equations, which are bounded too.
     #[test]
     fn memory_does_not_grow_with_the_samples() {
         let workload = |samples| {

@@ -10,7 +10,7 @@ use crate::{
 ///
 /// A line has the resistances of one row-wire: in columns named as for `decode`, also among others, M4 of them without
 /// names, or one more that begins with the number of the row-wire. Or it has those of a whole snapshot, rows × M4 without
-/// names, row by row. The first line of readings decides; names may come again, as from a device that starts anew.
+/// names, row by row. The first line of readings decides; names may come again, as from a device that starts again.
 #[derive(Debug)]
 pub struct LineParser {
     scale: ArrayScale,
@@ -90,7 +90,7 @@ impl LineError {
 }
 
 impl LineParser {
-    /// Prepares to read lines for a network of `rows` of an array. `is_complete` tells that the input is read from its
+    /// Prepares to read lines for a network of `rows` of an array. `is_complete` reports that the input is read from its
     /// beginning and no line of it is lost, so that lines without a number are counted.
     ///
     /// # Errors

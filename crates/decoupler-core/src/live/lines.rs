@@ -10,7 +10,7 @@ use crate::text::LONGEST_ROW;
 
 /// Lines of a source, read by a thread of their own as they come.
 ///
-/// From a file or pipe every line is given, and the source waits if nobody takes them. From a device or socket that does
+/// From a file or pipe every line is given, and the source waits if no one takes them. From a device or socket that does
 /// not wait the latest win: once a line has waited for [`Lines::PATIENCE`], all but the newest are dropped, and counted.
 /// Lines that are dropped are the oldest, and as many remain as [`Lines::set_kept`] says. Buffers are used again, so that
 /// nothing is allocated in steady state.
@@ -43,7 +43,7 @@ pub enum NextLine<'a> {
     End(Option<io::Error>),
 }
 
-/// Keeping of lines that nobody takes.
+/// Keeping of lines that no one takes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Keeping {
     /// All, and the source waits.
@@ -68,7 +68,7 @@ struct State {
     waiting: Batch,
     dropped: u64,
     end: Option<Option<io::Error>>,
-    /// Nobody takes lines any more.
+    /// No one takes lines any more.
     is_abandoned: bool,
 }
 
@@ -185,7 +185,7 @@ impl Shared {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Reads lines until the source ends or nobody takes them.
+    /// Reads lines until the source ends or no one takes them.
     fn read(&self, mut source: impl Read, skips_first: bool) -> io::Result<()> {
         let mut chunk = vec![0; CHUNK];
         let mut splitter = Splitter::new(skips_first);

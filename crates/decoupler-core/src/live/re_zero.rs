@@ -16,7 +16,7 @@ use crate::scene::NoiseSource;
 /// take their whole ratio. Where the noise is not known, it is estimated from the differences of successive frames, to which
 /// slow movement contributes little.
 ///
-/// A contact that spares less than half of the rows cannot be told from a drift, and is refused where readings move.
+/// A contact that spares less than half of the rows cannot be distinguished from a drift, and is refused where readings move.
 #[derive(Clone, Debug)]
 pub struct ReZero {
     rows: usize,
@@ -285,7 +285,7 @@ impl ZeroGains {
             .for_each(|(ohm, gain)| *ohm /= gain);
     }
 
-    /// Returns `true` for gains of so many rows and columns that divide any reading soundly: they may come from a file.
+    /// Returns `true` for gains of this many rows and columns that divide any reading soundly: they may come from a file.
     pub fn is_sound(&self, rows: usize, columns: usize) -> bool {
         let is_gain = |gain: &f64| *gain > 0.0 && gain.is_finite();
         self.columns == columns

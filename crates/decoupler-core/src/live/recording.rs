@@ -18,7 +18,7 @@ pub struct Recorder<W: Write> {
 }
 
 impl<W: Write> Recorder<W> {
-    /// Writes the names of the columns, for frames of these row-wires (from 0) with so many channels.
+    /// Writes the names of the columns, for frames of these row-wires (from 0) with this many channels.
     ///
     /// # Errors
     /// Any error of `writer`.

@@ -42,7 +42,7 @@ pub enum Motion {
     Wandering,
     /// Held where it is, as deep as it is.
     Held,
-    /// Lifted from the array; it goes on from where it was.
+    /// Lifted from the array; it continues from where it was.
     Lifted,
 }
 
@@ -113,7 +113,7 @@ impl Simulated {
         self.motion = motion;
     }
 
-    /// Passes over so many frames, as if nobody had taken them. Their noise is not drawn.
+    /// Passes over this many frames, as if no one had taken them. Their noise is not drawn.
     pub fn skip(&mut self, frames: u64) {
         self.frames += frames;
         if self.motion != Motion::Wandering {

@@ -10,7 +10,7 @@ pub(super) struct Converter {
 }
 
 impl Converter {
-    /// A converter of so many bits for the readings of `model`.
+    /// A converter of this many bits for the readings of `model`.
     ///
     /// # Errors
     /// The undeformed sensor has no resistance.

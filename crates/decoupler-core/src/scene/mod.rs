@@ -117,7 +117,7 @@ impl Default for Scene {
 }
 
 impl Scene {
-    /// Checks every number, but not whether an array has the row of [`Rows::One`]: [`Rows::read`] tells that.
+    /// Checks every number, but not whether an array has the row of [`Rows::One`]: [`Rows::read`] reports that.
     ///
     /// # Errors
     /// The first that is impossible.

@@ -242,7 +242,7 @@ mod tests {
         assert!((mean - 1.2876).abs() < 0.06, "{mean}");
         assert!(
             gains.iter().all(|&gain| gain > 0.0 && gain != 1e-6),
-            "the floor tells nothing"
+            "the floor carries no information"
         );
     }
 

@@ -61,7 +61,7 @@ pub enum SurfaceError {
         second: usize,
     },
     /// Scattered nodes are on one line.
-    #[error("all nodes are on one line, oblique to x and y; a surface needs nodes beside it")]
+    #[error("all nodes are on one line, oblique to x and y; a surface needs nodes on both sides of it")]
     OnOneLine,
     /// Scattered nodes are too many for a spline.
     #[error(

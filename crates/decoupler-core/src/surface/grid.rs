@@ -135,7 +135,7 @@ impl GridAxis {
         }
     }
 
-    /// Divides the stretch between the outermost nodes into equal steps, and goes on by `margin_mm` at both ends, with about
+    /// Divides the stretch between the outermost nodes into equal steps, and continues by `margin_mm` at both ends, with about
     /// `target` steps in all.
     pub(super) fn spanning(first_mm: f64, last_mm: f64, target: usize, margin_mm: f64) -> Self {
         let extent_mm = last_mm - first_mm;
@@ -153,7 +153,7 @@ impl GridAxis {
     }
 }
 
-/// Place after so many of equal steps.
+/// Place after this many of equal steps.
 fn along(from: f64, to: f64, step: usize, steps: usize) -> f64 {
     from + (to - from) * step as f64 / steps as f64
 }

@@ -159,6 +159,6 @@ mod tests {
         assert_eq!(Lattice::of(&twice), None, "a node with two places");
         let mut none = whole;
         none[5][0] = f64::NAN;
-        assert_eq!(Lattice::of(&none), None, "a place that is no number");
+        assert_eq!(Lattice::of(&none), None, "a place that is not a number");
     }
 }

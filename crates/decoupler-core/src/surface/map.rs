@@ -103,7 +103,7 @@ impl SurfaceMap {
     }
 
     /// Prepares the thin-plate spline through nodes at these places (x, y), in millimetres, which need be no lattice. It has
-    /// gaps (NaN) beyond their convex hull, but for a margin of half the mean distance between neighbours, and at places that
+    /// gaps (NaN) beyond their convex hull, except for a margin of half the mean distance between neighbours, and at places that
     /// are far from every node.
     ///
     /// # Errors
@@ -202,7 +202,7 @@ impl SurfaceMap {
     }
 }
 
-/// Number of grid points a side for a spline through so many nodes.
+/// Number of grid points a side for a spline through this many nodes.
 fn affordable(nodes: usize) -> usize {
     ((MOST_WEIGHTS as f64 / nodes.max(1) as f64).sqrt() as usize).min(GRID_POINTS)
 }

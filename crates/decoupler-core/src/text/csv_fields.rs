@@ -55,7 +55,7 @@ impl CsvFields {
     /// Field with this index, without surrounding spaces.
     ///
     /// # Panics
-    /// If there are not so many fields.
+    /// If there are not this many fields.
     pub fn get(&self, index: usize) -> &[u8] {
         let ends = &self.ends[..self.count];
         let start = if index == 0 { 0 } else { ends[index - 1] };

@@ -86,7 +86,7 @@ pub(super) struct KeptActivations {
 }
 
 impl KeptActivations {
-    /// About how many bytes are kept for so many samples.
+    /// About how many bytes are kept for this many samples.
     pub(super) fn bytes(shape: Shape, samples: usize) -> usize {
         let bytes = all_bytes(shape, samples);
         if bytes > LARGEST_KEPT_BYTES { 0 } else { bytes }
@@ -165,7 +165,7 @@ impl KeptActivations {
     }
 }
 
-/// Bytes of the activations of so many samples.
+/// Bytes of the activations of this many samples.
 fn all_bytes(shape: Shape, samples: usize) -> usize {
     samples.saturating_mul((shape.hidden + 1 + shape.outputs) * size_of::<f64>())
 }

@@ -45,7 +45,7 @@ pub(super) struct AdaptiveDescent {
     settings: AdaptiveDescentSettings,
     state: AdaptiveState,
     now: Evaluation,
-    /// At the present weights.
+    /// At the current weights.
     gradient: Vec<f64>,
     /// At the candidate.
     backpropagation: Backpropagation,

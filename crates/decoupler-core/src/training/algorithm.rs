@@ -7,7 +7,7 @@ use crate::network::{Mlp, Shape};
 pub(super) trait Algorithm: Sized + Send + Sync {
     /// Settings, chosen before training.
     type Settings: Settings;
-    /// Everything that is carried from epoch to epoch beside the weights.
+    /// Everything that is carried from epoch to epoch next to the weights.
     type State;
 
     /// Name and description for menus, tables and the terminal.
@@ -26,7 +26,7 @@ pub(super) trait Algorithm: Sized + Send + Sync {
         Ok(())
     }
 
-    /// About how many bytes the method's equations take for a network of this shape and so many samples.
+    /// About how many bytes the method's equations take for a network of this shape and this many samples.
     fn equations_bytes(_shape: Shape, _samples: usize) -> usize {
         0
     }
@@ -69,7 +69,7 @@ pub(super) struct Description {
     pub(super) summary: &'static str,
     /// Name of [`Algorithm::parameter`].
     pub(super) parameter_name: &'static str,
-    /// Cure for a training that diverged or did not lower the error; completes "to mend it, …".
+    /// Cure for a training that diverged or did not lower the error; completes "to repair it, …".
     pub(super) cure: &'static str,
 }
 

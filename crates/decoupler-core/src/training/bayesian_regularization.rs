@@ -151,7 +151,7 @@ impl BayesianRegularization {
         sums
     }
 
-    /// Measures γ at the present weights; it keeps its value if rounding hides the trace.
+    /// Measures γ at the current weights; it keeps its value if rounding hides the trace.
     fn measure_effective_parameters(&mut self, mlp: &Mlp) {
         let BayesianState { alpha, beta, .. } = self.state;
         if self.state.further.is_empty() {
@@ -179,7 +179,7 @@ impl BayesianRegularization {
         self.state.effective_parameters = groups.iter().sum();
     }
 
-    /// The present error with the gradient of F / (β n).
+    /// The current error with the gradient of F / (β n).
     fn regularized(&self, mlp: &Mlp) -> Evaluation {
         let beta = self.state.beta;
         let decays = self.state.decays(self.group_of).map(|alpha| alpha / beta);
@@ -197,7 +197,7 @@ impl Algorithm for BayesianRegularization {
     const DESCRIPTION: Description = Description {
         short_name: "br",
         name: "Bayesian regularisation",
-        summary: "Levenberg-Marquardt that keeps weights small, weighing them against the error by what the data can \
+        summary: "Levenberg-Marquardt that keeps weights small, balanced against the error by what the data can \
                   determine: for few or noisy samples.",
         parameter_name: "mu",
         cure: "take another seed, more samples, or Levenberg-Marquardt (lm)",

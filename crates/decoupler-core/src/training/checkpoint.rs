@@ -141,7 +141,7 @@ impl Trainer {
         }
     }
 
-    /// Resumes a training from `state`, with the same samples. A training that the user had stopped goes on.
+    /// Resumes a training from `state`, with the same samples. A training that the user had stopped continues.
     ///
     /// # Errors
     /// A state that is damaged or belongs to other samples.

@@ -5,7 +5,7 @@ use std::time::Instant;
 use super::{Method, SettingError, Stage, StopReason, StoppingRules, Trainer, TrainingError, trainer::check_width};
 
 impl Trainer {
-    /// Continues from the present weights with another method (momentum first, Levenberg-Marquardt to finish), even if the
+    /// Continues from the current weights with another method (momentum first, Levenberg-Marquardt to finish), even if the
     /// training has ended, unless because all epochs were run. Epochs keep counting; the count of validation failures
     /// restarts from 0, but the best validation error so far remains the one to beat.
     ///

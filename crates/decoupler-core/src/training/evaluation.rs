@@ -1,4 +1,4 @@
-//! Error and gradient at the present weights.
+//! Error and gradient at the current weights.
 
 use super::StopReason;
 

@@ -34,7 +34,7 @@ struct Data {
     input_pairs: OnceLock<Vec<Mat<f64>>>,
 }
 
-/// Blocks of samples that are made anew at each use, so that memory does not grow with their number. A block is the same
+/// Blocks of samples that are made again at each use, so that memory does not grow with their number. A block is the same
 /// each time.
 pub(crate) trait DrawnBlocks: Debug + Send + Sync {
     /// Number of blocks.

@@ -34,7 +34,7 @@ impl TrainingFlaw {
         let enough = (1.0 - Self::LEAST_GAIN) * start_mse;
         let flaw = Self {
             diverged_in: diverged_in(trainer.history(), reason),
-            // False for a start without any error, which nothing can improve; true for one that is no number.
+            // False for a start without any error, which nothing can improve; true for one that is not a number.
             is_at_start: start_mse != 0.0 && (trainer.best_mse() >= enough || enough.is_nan()),
             best_epoch: trainer.best_epoch(),
             epochs: trainer.latest().epoch,

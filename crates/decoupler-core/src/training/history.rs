@@ -22,7 +22,7 @@ pub struct EpochRecord {
     /// Number of weights that the data determine, where the method estimates it.
     #[serde(default)]
     pub effective_parameters: Option<f64>,
-    /// Number of epochs at which the validation error was above its best, since the last new best or since the present
+    /// Number of epochs at which the validation error was above its best, since the last new best or since the current
     /// method began.
     pub validation_failures: usize,
 }

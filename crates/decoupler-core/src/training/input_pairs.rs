@@ -39,7 +39,7 @@ impl Default for PairsBuffer {
 }
 
 impl InputPairs {
-    /// Number of bytes that are kept for so many samples; 0 if their pairs are recomputed.
+    /// Number of bytes that are kept for this many samples; 0 if their pairs are recomputed.
     pub(super) fn kept_bytes(inputs: usize, samples: usize) -> usize {
         let bytes = samples.saturating_mul(pairs(inputs + 1) * size_of::<f64>());
         if bytes > LARGEST_KEPT_BYTES { 0 } else { bytes }

@@ -39,7 +39,7 @@ macro_rules! methods {
             $($(#[doc = $doc])* $name($Settings),)*
         }
 
-        /// State that a method carries from epoch to epoch beside the weights. A training resumed from it gives
+        /// State that a method carries from epoch to epoch next to the weights. A training resumed from it gives
         /// bit-identical results.
         #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
         #[serde(rename_all = "snake_case")]
@@ -77,14 +77,14 @@ macro_rules! methods {
                 }
             }
 
-            /// About how many bytes the method's equations take for a network of this shape and so many samples.
+            /// About how many bytes the method's equations take for a network of this shape and this many samples.
             pub fn equations_bytes(&self, shape: Shape, samples: usize) -> usize {
                 match self {
                     $(Self::$name(_) => $name::equations_bytes(shape, samples),)*
                 }
             }
 
-            /// About how many multiplications an epoch takes for a network of this shape and so many samples.
+            /// About how many multiplications an epoch takes for a network of this shape and this many samples.
             pub fn epoch_multiplications(&self, shape: Shape, samples: usize) -> f64 {
                 match self {
                     $(Self::$name(_) => $name::epoch_multiplications(shape, samples),)*

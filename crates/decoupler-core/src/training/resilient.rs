@@ -36,7 +36,7 @@ pub(super) struct Resilient {
 /// State of resilient back-propagation.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ResilientState {
-    /// The gradient before the present one.
+    /// The gradient before the current one.
     previous_gradient: Vec<f64>,
     /// Step length of each weight.
     lengths: Vec<f64>,

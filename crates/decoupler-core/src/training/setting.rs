@@ -19,7 +19,7 @@ pub struct Setting<'a> {
     pub range: RangeInclusive<f64>,
     /// True for a number that counts.
     pub is_whole: bool,
-    /// The present value.
+    /// The current value.
     pub value: &'a mut f64,
 }
 

@@ -80,7 +80,7 @@ fn counted(count: usize) -> String {
     }
 }
 
-/// Refuses a method whose equations would not fit into memory, with so many trainings of this shape at once.
+/// Refuses a method whose equations would not fit into memory, with this many trainings of this shape at once.
 pub(crate) fn check_width(
     method: &Method,
     shape: Shape,
@@ -108,7 +108,7 @@ pub struct Trainer {
     pub(super) best: Best,
     pub(super) history: Vec<EpochRecord>,
     pub(super) stages: Vec<Stage>,
-    /// Epochs since the last best validation error or since the present method began, see [`StoppingRules::max_fail`].
+    /// Epochs since the last best validation error or since the current method began, see [`StoppingRules::max_fail`].
     pub(super) validation_failures: usize,
     pub(super) stop_reason: Option<StopReason>,
     pub(super) elapsed: Duration,
@@ -262,7 +262,7 @@ impl Trainer {
         &self.settings
     }
 
-    /// The present weights, from which another method would continue.
+    /// The current weights, from which another method would continue.
     pub fn present(&self) -> &Mlp {
         &self.mlp
     }

@@ -9,7 +9,7 @@ use decoupler_core::{
 
 pub(crate) const ROW: usize = 0;
 
-/// What a noise does to the readings of one row, written down anew.
+/// What a noise does to the readings of one row, written down again.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Truth {
     pub(crate) relative: f64,

@@ -9,7 +9,7 @@ mod training;
 
 use proptest::test_runner::{Config, RngSeed};
 
-/// So many cases of a property, the same in every run; hence nothing needs to be written down after a failure.
+/// This many cases of a property, the same in every run; hence nothing needs to be written down after a failure.
 fn cases(count: u32) -> Config {
     Config {
         cases: count,

@@ -19,7 +19,7 @@ struct Network {
     to_ground: Vec<f64>,
 }
 
-/// Resistance of a driver and an amplifier, in ohm, and that of a joint: small beside those of the rubber.
+/// Resistance of a driver and an amplifier, in ohm, and that of a joint: small next to those of the rubber.
 const DRIVER_OHM: f64 = 1e-5;
 const JOINT_OHM: f64 = 1e-9;
 

@@ -82,7 +82,7 @@ fn medians_are_those_that_rows_had_one_by_one() {
     }
 }
 
-/// Also beside rows whose readings no deformation explains, which take ten times as many linearisations, and in a decoder
+/// Also next to rows whose readings no deformation explains, which take ten times as many linearisations, and in a decoder
 /// that has learnt which rows take long.
 #[test]
 fn a_frame_gives_the_bits_and_the_standing_of_its_rows() {

@@ -1,4 +1,4 @@
-//! What recorded readings tell, judged on sets whose truth is known by construction.
+//! What the recorded readings determine, judged on sets whose truth is known by construction.
 
 use decoupler_core::{
     dataset::{Dataset, Division, Folds, Parts, Seed, SplitBy, Stream},
@@ -18,7 +18,7 @@ fn normal(rng: &mut impl Rng) -> f64 {
     (0..12).map(|_| rng.random::<f64>()).sum::<f64>() - 6.0
 }
 
-/// Independent samples of so many normal readings with one target.
+/// Independent samples of this many normal readings with one target.
 fn set(samples: usize, channels: usize, seed: u64, target: impl Fn(&[f64], &mut ChaCha8Rng) -> f64) -> Dataset {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let readings = Array2::from_shape_simple_fn((samples, channels), || normal(&mut rng));

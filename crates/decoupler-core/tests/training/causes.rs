@@ -70,7 +70,7 @@ fn settings_that_cannot_work_are_refused_with_the_way_out() {
     assert!(method("gdm", &[("momentum", 1.0)]).check().is_ok());
 }
 
-/// The flaw names the method's own settings, never those of another.
+/// The defect names the method's own settings, never those of another.
 #[test]
 fn a_training_that_leaves_its_start_or_diverges_says_why_and_what_to_change() {
     let cases: [(&str, Values, &str); 8] = [
@@ -97,7 +97,7 @@ fn a_training_that_leaves_its_start_or_diverges_says_why_and_what_to_change() {
     ];
     for (name, values, words) in cases {
         let trainer = trained(method(name, values), 30);
-        let flaw = TrainingFlaw::of(&trainer).unwrap_or_else(|| panic!("{name} has a flaw"));
+        let flaw = TrainingFlaw::of(&trainer).unwrap_or_else(|| panic!("{name} has a defect"));
         let text = flaw.to_string();
         assert!(
             flaw.is_at_start && text.contains("no better than its random start"),
@@ -145,7 +145,7 @@ fn a_training_that_diverges_late_names_the_epoch_and_keeps_the_best_weights() {
         assert!(history[epoch - 1].training_mse <= start_mse);
         assert!(
             flaw.to_string().contains(&format!("diverged in epoch {epoch}")),
-            "{flaw}"
+            "{defect}"
         );
         let errors = history.iter().filter_map(|record| record.validation_mse);
         assert_eq!(trainer.best_mse(), errors.fold(f64::INFINITY, f64::min));

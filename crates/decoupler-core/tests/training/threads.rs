@@ -37,7 +37,7 @@ fn train(method: Method, samples: usize, threads: usize, epochs: usize) -> Mlp {
     })
 }
 
-/// With few samples for so many weights conjugate gradients are cheaper, with many the factored equations.
+/// With few samples for this many weights conjugate gradients are cheaper, with many the factored equations.
 #[test]
 fn one_two_and_three_threads_give_the_same_bits() {
     for method in Method::all() {

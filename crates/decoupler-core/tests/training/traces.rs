@@ -31,7 +31,7 @@ struct Rejecting {
 }
 
 fn traces() -> Traces {
-    serde_json::from_str(include_str!("../fixtures/training_traces.json")).expect("the fixture is sound")
+    serde_json::from_str(include_str!("../fixtures/training_traces.json")).expect("the fixture is valid")
 }
 
 impl Traces {
@@ -89,7 +89,7 @@ fn paths_agree_with_independent_programs() {
     let traces = traces();
     for method in Method::all() {
         let name = method.short_name();
-        // Eq. (11) is the paper's own: no package has it, and a test beside it checks its formula.
+        // Eq. (11) is the paper's own: no package has it, and a test next to it checks its formula.
         let Some(expected) = traces.weights_by_epoch.get(name) else {
             assert_eq!(name, "gdm");
             continue;

@@ -52,7 +52,7 @@ impl WriteError {
     }
 }
 
-/// A file that is written under a temporary name beside its target and then renamed over it, so that nobody
+/// A file that is written under a temporary name next to its target and then renamed over it, so that no one
 /// ever sees half of it. Dropped before [`Self::commit`], it leaves nothing.
 #[derive(Debug)]
 pub struct AtomicFile {

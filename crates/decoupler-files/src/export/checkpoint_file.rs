@@ -44,7 +44,7 @@ struct Document {
 }
 
 impl CheckpointFile {
-    /// Takes the present state of `run`; `recorded` is the origin of its samples if they are recorded.
+    /// Takes the current state of `run`; `recorded` is the origin of its samples if they are recorded.
     ///
     /// # Errors
     /// [`DocumentError::NoPlan`] if the samples are recorded and nothing says where.

@@ -222,7 +222,7 @@ pub enum DocumentError {
         program: String,
     },
     /// The checksum does not match, or a field is missing, of the wrong kind, or does not fit the others.
-    #[error("'{}' is damaged: {flaw}; {}", .path.display(), .kind.cure())]
+    #[error("'{}' is damaged: {defect}; {}", .path.display(), .kind.cure())]
     Damaged {
         /// The file.
         path: PathBuf,
@@ -240,7 +240,7 @@ pub enum DocumentError {
     #[error("'{}' is the recipe of a simulated array: give that of a recording", .0.display())]
     SimulatedRecipe(PathBuf),
     /// The run has values that could not be read back.
-    #[error("'{}' is not saved: {flaw}; train again with other settings", .path.display())]
+    #[error("'{}' is not saved: {defect}; train again with other settings", .path.display())]
     Unsound {
         /// The file.
         path: PathBuf,

@@ -1,4 +1,4 @@
-//! Sentences beside the table of an experiment.
+//! Sentences next to the table of an experiment.
 
 use decoupler_core::{
     dataset::SplitBy,

@@ -35,7 +35,7 @@ pub(super) fn ids(folder: &Path) -> io::Result<Vec<u64>> {
         let name = entry?.file_name();
         let id = name.to_str().and_then(|name| {
             let id = name.strip_prefix("run-")?.strip_suffix(".json")?.parse().ok()?;
-            // Not "run-007.json", which is nobody's.
+            // Not "run-007.json", which is no one's.
             (run_path(Path::new(""), id) == Path::new(name)).then_some(id)
         });
         ids.extend(id);

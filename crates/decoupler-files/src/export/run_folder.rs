@@ -113,7 +113,7 @@ impl RunFolder {
                 Ok(Some(name)) => run.name = clean_name(&name),
                 Ok(None) => {}
                 Err(flaw) => problems.push(format!(
-                    "the name of a run cannot be read: {flaw}; rename '{}'",
+                    "the name of a run cannot be read: {defect}; rename '{}'",
                     run.name
                 )),
             }
@@ -121,7 +121,7 @@ impl RunFolder {
         match read::<[Option<u64>; 2]>(&pinned_path(path)) {
             Ok(pinned) => self.kept.pinned = pinned.unwrap_or(self.kept.pinned),
             Err(flaw) => problems.push(format!(
-                "the runs compared cannot be read: {flaw}; choose A and B again"
+                "the runs compared cannot be read: {defect}; choose A and B again"
             )),
         }
         let runs = &self.kept.runs;

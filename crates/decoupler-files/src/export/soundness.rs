@@ -64,7 +64,7 @@ pub(super) fn flaw(file: &NetworkFile) -> Option<String> {
 
 /// Describes the first impossible value of the settings in a file, and its field.
 pub(super) fn settings_flaw(settings: &RunSettings, recorded: Option<&Recorded>) -> Option<String> {
-    let at = |field: &str, flaw: &dyn Display| format!("{field}: {flaw}");
+    let at = |field: &str, flaw: &dyn Display| format!("{field}: {defect}");
     let training = settings.training.check().map_err(|flaw| at("settings.training", &flaw));
     let source = match settings.simulated() {
         Some(settings) => [
@@ -115,7 +115,7 @@ fn number_flaw(network: &Networks, settings: &RunSettings, row_wires: Option<&[u
                 "network: {found} of them, but rows {} of {} need {}",
                 source.scene.rows, source.sensor.scale, size.networks
             )),
-            Err(flaw) => Some(format!("settings.source.scene.rows: {flaw}")),
+            Err(flaw) => Some(format!("settings.source.scene.rows: {defect}")),
         },
         None => {
             let rows = row_wires.map_or(1, <[usize]>::len);

@@ -56,7 +56,7 @@ impl Unfinished {
         let mut all = all();
         let file = loop {
             let file = builder.tempfile_in(folder).map_err(plain)?;
-            // Some file systems have no locks: nobody will sweep there.
+            // Some file systems have no locks: no one will sweep there.
             let _ = file.as_file().lock();
             // Another program may have swept it before it was locked.
             if file.path().exists() {
@@ -153,7 +153,7 @@ impl UnfinishedFolder {
     }
 }
 
-/// Opens and locks a folder that nobody else works on.
+/// Opens and locks a folder that no one else works on.
 fn locked_folder(path: &Path) -> Option<File> {
     let folder = File::open(path).ok()?;
     folder.try_lock().is_ok().then_some(folder)
@@ -184,7 +184,7 @@ fn sweep_once(folder: &Path) {
     }
 }
 
-/// Removes the unfinished files and folders in `folder` that nobody works on. What cannot be removed stays.
+/// Removes the unfinished files and folders in `folder` that no one works on. What cannot be removed stays.
 fn sweep(folder: &Path) {
     let Ok(entries) = fs::read_dir(folder) else { return };
     for entry in entries.flatten() {

@@ -27,7 +27,7 @@ pub fn describe_workload(workload: &Workload) -> String {
         ),
     };
     format!(
-        "about {}{machine} of memory; on one thread about {} to draw the samples and {} an epoch, {} for {}; the \
+        "about {}{machine} of memory; on one thread about {} to draw the samples and {} per epoch, {} for {}; the \
          figures of the decoders take further time{drawn_again}",
         gigabytes(workload.bytes),
         format_duration(drawing),

@@ -197,7 +197,7 @@ mod tests {
 
     #[test]
     fn the_maps_are_those_of_their_names() {
-        // The ends that matplotlib tabulates; polynomials stand in for its table of cividis.
+        // The ends that matplotlib tabulates; polynomials are in for its table of cividis.
         let ends = |map: SequentialMap| [0.0, 1.0].map(|end| map.colours().at(end));
         let expected = [
             [[68, 1, 84], [253, 231, 37]],

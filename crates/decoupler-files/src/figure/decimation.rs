@@ -1,4 +1,4 @@
-//! Curves of so many points that several share a pixel: of each stretch the least and the largest remain, so that no peak
+//! Curves of this many points that several share a pixel: of each stretch the least and the largest remain, so that no peak
 //! is lost.
 
 /// Stretches into which a long curve is divided: more than the widest chart has pixels.

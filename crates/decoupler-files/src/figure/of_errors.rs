@@ -15,7 +15,7 @@ const BINS: usize = 41;
 /// Largest number of samples of a recording looked at in a figure; of a larger test set, evenly spaced ones.
 const MOST_PAIRS: usize = 20_000;
 
-/// Every so many samples are looked at.
+/// Every this many samples are looked at.
 fn stride(test: &Dataset) -> usize {
     test.samples().div_ceil(MOST_PAIRS).max(1)
 }
@@ -95,7 +95,7 @@ pub fn target_histogram_figure(pairs: &[(f64, f64)], chosen: Option<usize>, targ
     histogram(pairs, chosen, &axis, "samples")
 }
 
-/// The histogram of so many `counted`.
+/// The histogram of this many `counted`.
 fn histogram(pairs: &[(f64, f64)], chosen: Option<usize>, axis: &str, counted: &str) -> PlotFigure {
     let bins = ErrorBins::new(pairs);
     let counts = bins.counts(pairs);

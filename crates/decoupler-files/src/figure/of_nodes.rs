@@ -1,4 +1,4 @@
-//! Figures of decoupled nodes beside the actual ones.
+//! Figures of decoupled nodes next to the actual ones.
 
 use glam::DVec3;
 use ndarray::Array2;
@@ -14,7 +14,7 @@ use decoupler_core::{dataset::Dataset, evaluation::NodeAddress, text::format_num
 /// Largest number of nodes looked at in a figure; of a larger test set, evenly spaced ones.
 const MOST_PAIRS: usize = 20_000;
 
-/// Every so many nodes of a test set are looked at.
+/// Every this many nodes of a test set are looked at.
 fn stride(test: &Dataset) -> usize {
     (test.targets().len() / 3).div_ceil(MOST_PAIRS).max(1)
 }

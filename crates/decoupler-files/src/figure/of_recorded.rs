@@ -12,7 +12,7 @@ use super::{
 };
 use decoupler_core::text::{counted, format_number};
 
-/// Largest number of cells along an axis of a map, but for those that round limits add.
+/// Largest number of cells along an axis of a map, except for those that round limits add.
 const CELLS: usize = 16;
 
 /// Error of a position over the position: root mean square of the distance between the decoded and the actual one, for

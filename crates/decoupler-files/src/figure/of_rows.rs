@@ -1,4 +1,4 @@
-//! The figure of what the readings of each row can tell.
+//! The figure of what the readings of each row determine.
 
 use super::{
     axis::{PlotAxis, TickRule},

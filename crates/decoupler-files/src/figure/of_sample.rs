@@ -124,7 +124,7 @@ mod tests {
             );
             figure.plots[0].series[0].points.iter().map(|point| point.x).collect()
         };
-        assert_eq!(places(3), [0.0, 1.0, 2.0], "these stand at their names");
+        assert_eq!(places(3), [0.0, 1.0, 2.0], "these are at their names");
         assert_eq!(places(13), Vec::from_iter((1..=13).map(f64::from)));
     }
 }

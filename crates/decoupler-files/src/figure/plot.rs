@@ -46,9 +46,9 @@ pub struct PlotPoint {
     pub bar: Option<[f64; 2]>,
     /// Words about the point in place of its coordinates.
     pub note: Option<String>,
-    /// Words beside it, where there is room.
+    /// Words next to it, where there is room.
     pub label: Option<String>,
-    /// Number of what it stands for, by which other figures know it too: a node, a bar.
+    /// Number of what it is for, by which other figures know it too: a node, a bar.
     pub item: Option<usize>,
 }
 
@@ -140,7 +140,7 @@ impl Plot {
         Some([self.x.place(x)?, self.y.place(y)?])
     }
 
-    /// Returns true if words stand beside any point.
+    /// Returns true if words are next to any point.
     pub fn has_point_labels(&self) -> bool {
         let mut points = self.series.iter().flat_map(|series| &series.points);
         points.any(|point| point.label.is_some())

@@ -38,7 +38,7 @@ impl PlotFigure {
 /// Largest number of dots drawn of one cloud; more would not be seen.
 const MOST_POINTS: usize = 2000;
 
-/// Places of every so many items, so that at most [`MOST_POINTS`] and the last one remain.
+/// Places of every this many items, so that at most [`MOST_POINTS`] and the last one remain.
 pub(super) fn thinned_places(count: usize) -> impl Iterator<Item = usize> {
     let stride = count.div_ceil(MOST_POINTS).max(1);
     let last = count.checked_sub(1);

@@ -22,7 +22,7 @@ pub fn along(line: &[DVec2]) -> impl Iterator<Item = DVec2> {
     })
 }
 
-/// Returns the upper left corner of each label beside its point, clear of the other labels and, as far as that is possible,
+/// Returns the upper left corner of each label next to its point, clear of the other labels and, as far as that is possible,
 /// of `marks`, the places that anything else is drawn at; `None` where there is no room between `low` and `high`, the corners of the plot.
 ///
 /// The labels take the best of their places in turn, so that earlier ones are seen where points crowd.

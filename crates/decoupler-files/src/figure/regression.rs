@@ -74,7 +74,7 @@ pub fn regression_figure(pairs_mm: &[(f64, f64)]) -> PlotFigure {
 }
 
 /// Decoded against actual values of the target of this name and unit, with the line on which they would be equal and `line`
-/// through all of them. There are so many samples, of which few enough to be seen are asked for their actual and decoded
+/// through all of them. There are this many samples, of which few enough to be seen are asked for their actual and decoded
 /// value.
 pub fn target_regression_figure(
     samples: (usize, &dyn Fn(usize) -> (f64, f64)),

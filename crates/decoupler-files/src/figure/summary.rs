@@ -172,12 +172,12 @@ mod tests {
             vec![curve],
         );
         let line = |name: &str| ReferenceLine::new(name, LineAt::X(2.0), Hue::Grey, LineStyle::Dashed);
-        plot.lines = vec![line("best weights, epoch 2"), line("network on show")];
+        plot.lines = vec![line("best weights, epoch 2"), line("displayed network")];
         // A zero has no place on a logarithmic axis, and is not told.
         assert_eq!(
             plot.summary(),
             "mse (scaled) on a logarithmic scale against epoch: training from 1.50 at 0 to 0.250 at 3, lowest 0.0100 at 2, \
-             highest 2.50 at 1; best weights, epoch 2; network on show at 2."
+             highest 2.50 at 1; best weights, epoch 2; displayed network at 2."
         );
         plot.series.clear();
         plot.lines.clear();

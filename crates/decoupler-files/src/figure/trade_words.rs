@@ -21,7 +21,7 @@ pub fn point_name(point: &TradeOffPoint) -> String {
     name
 }
 
-/// `Network f32, 12 hidden`, beside a point whose mark tells the preset.
+/// `Network f32, 12 hidden`, next to a point whose mark tells the preset.
 pub fn point_label(point: &TradeOffPoint) -> String {
     let name = point.report.kind.name(point.report.precision).to_owned();
     match point.hidden() {
@@ -54,7 +54,7 @@ pub fn point_facts(point: &TradeOffPoint) -> Vec<String> {
     if let Some(ratio) = point.to_reference() {
         facts.push(format!("{} times the Bayesian reference", format_number(ratio)));
     }
-    facts.push(format!("{} a frame", frame_time(point.report.cost.frame_us)));
+    facts.push(format!("{} per frame", frame_time(point.report.cost.frame_us)));
     facts.push(format!("{} of training", training_time(point.training_seconds)));
     facts.extend(point.report.remarks.iter().map(ToString::to_string));
     facts

@@ -69,7 +69,7 @@ impl Cells {
         self.len() == 0
     }
 
-    /// Cell as a number: NaN where it is missing, or a label that is no number.
+    /// Cell as a number: NaN where it is missing, or a label that is not a number.
     pub(super) fn number(&self, row: usize) -> f64 {
         match self {
             Self::Numbers(numbers) => numbers[row],
@@ -93,7 +93,7 @@ impl Cells {
         }
     }
 
-    /// The first label that is no number.
+    /// The first label that is not a number.
     pub(super) fn wordy_label(&self) -> Option<&str> {
         match self {
             Self::Numbers(_) => None,

@@ -255,7 +255,7 @@ mod tests {
                 "0.1,NA,3\n0.2,1,3\n",
                 "separator comma, decimal point, no header, utf-8",
             ),
-            // Texts beside numbers in every row.
+            // Texts next to numbers in every row.
             ("A,1,2\nB,3,4\n", "separator comma, decimal point, no header, utf-8"),
             (
                 "\"time (s)\",\"x, mm\"\n1,2\n",

@@ -62,7 +62,7 @@ pub enum ImportError {
     /// Nothing is an input, or nothing a target.
     #[error("no column is {0}; name at least one")]
     NoColumns(&'static str),
-    /// A cell of a column that is used is no number.
+    /// A cell of a column that is used is not a number.
     #[error("'{}': line {line}, column {column} ('{name}'): '{text}' is not a finite number{others}; {}", .path.display(), Cure::CallMissing(.text.clone()))]
     NotANumber {
         /// The file.

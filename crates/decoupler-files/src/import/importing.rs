@@ -19,7 +19,7 @@ impl Recipe {
     /// Reads the files, relative to `folder`, and makes the samples.
     ///
     /// # Errors
-    /// If a file cannot be read, a column is missing, a cell that is used is no number, or no row is left; or `watch` breaks.
+    /// If a file cannot be read, a column is missing, a cell that is used is not a number, or no row is left; or `watch` breaks.
     pub fn import(&self, folder: &Path, watch: Watch<'_>) -> Result<Recording, ImportError> {
         let stems = self.stems();
         let mut files = vec![self.read(folder, 0, &self.data, None, watch)?];

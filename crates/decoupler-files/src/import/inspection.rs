@@ -68,7 +68,7 @@ pub enum ColumnKind {
 pub struct TimeSummary {
     /// Name of the column.
     pub column: String,
-    /// `true` if nobody said that the column is the time.
+    /// `true` if no one said that the column is the time.
     pub is_guessed: bool,
     /// Median interval, in the unit of the column.
     pub median_interval: Option<f64>,

@@ -19,7 +19,7 @@ pub(super) fn read(source: impl Read + Seek, watch: Watch<'_>) -> Result<(Vec<Ar
         let size = entry.size();
         match numpy::read(&name, Watched::new(entry, Some(size), watch)) {
             Ok(array) => arrays.push(array),
-            // A text or a number beside the arrays is no reason to refuse them.
+            // A text or a number next to the arrays is no reason to refuse them.
             Err(TableError::Array { what, reason }) => left_out.push(format!("{what}: {reason}")),
             Err(error) => return Err(error),
         }

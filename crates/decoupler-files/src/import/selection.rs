@@ -131,7 +131,7 @@ impl Rows<'_> {
         Ok((kept, dropped))
     }
 
-    /// Sorts the rows by their time; tells of rows that were not in this order.
+    /// Sorts the rows by their time; reports rows that were not in this order.
     pub(super) fn put_in_order(&self, time: ColumnId, kept: &mut [usize]) -> Option<String> {
         let falls = |pair: &[usize]| self.number(time, pair[1]) < self.number(time, pair[0]);
         let first = kept.windows(2).find(|pair| falls(pair))?[1];

@@ -57,7 +57,7 @@ const INPUT_WORDS: [&str; 19] = [
     "pixel",
 ];
 
-/// Units of what is to be told, and of what sensors give.
+/// Units of what is to be predicted, and of what sensors give.
 const TARGET_UNITS: [&str; 22] = [
     "m", "mm", "cm", "µm", "um", "n", "mn", "kn", "nm", "n·m", "n m", "nmm", "n·mm", "mnm", "kg", "g", "deg", "°",
     "rad", "kpa", "pa", "mrad",
@@ -133,7 +133,7 @@ fn plan_of(order: &[&InspectedFile]) -> Plan {
     let first_meanings = guesses(first, joined.is_empty());
     add(&mut plan.import, first, &first_meanings, None);
     for (file, stem) in joined.iter().zip(&stems) {
-        // What comes with the readings is to be told from them, whatever its columns are called.
+        // What comes with the readings is to be predicted from them, whatever its columns are called.
         let meanings = guesses(file, false).into_iter().map(|meaning| match meaning {
             Meaning::Input => Meaning::Target,
             other => other,

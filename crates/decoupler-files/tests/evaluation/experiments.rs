@@ -172,7 +172,7 @@ fn cross_validation_decouples_every_sample_by_what_has_not_seen_it() {
             }
             let [first, second] = [0, 1].map(|repeat| &cell.trials[repeat]);
             assert_eq!(first.seed, second.seed);
-            assert_ne!(first.errors, second.errors, "each repeat deals anew");
+            assert_ne!(first.errors, second.errors, "each repeat deals again");
         }
     }
 }

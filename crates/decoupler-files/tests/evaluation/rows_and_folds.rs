@@ -134,7 +134,7 @@ fn the_reference_takes_each_sample_at_its_own_row_wire() {
         reference_errors(&model, &scene, set, &mut rng).unwrap().unwrap().z_mm
     };
     let whole = reference(&set);
-    // As a fold dealt by samples would have them: no whole snapshots, and in another order.
+    // As a fold assigned by samples would have them: no whole snapshots, and in another order.
     let odd: Vec<usize> = (0..80).filter(|sample| sample % 3 != 0).collect();
     let even: Vec<usize> = (0..80).rev().filter(|sample| sample % 3 == 0).collect();
     let parts = [&odd, &even].map(|part| reference(&set.select(part)) * part.len() as f64);

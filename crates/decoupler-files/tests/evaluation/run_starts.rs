@@ -144,7 +144,7 @@ fn a_run_goes_on_until_every_start_has_ended_or_all_are_stopped() {
     assert_eq!(
         run.trainers()[ended].latest().epoch,
         epochs,
-        "what has ended stands still"
+        "what has ended is paused"
     );
     run.stop();
     assert_eq!(run.stop_reason(), Some(StopReason::Stopped));

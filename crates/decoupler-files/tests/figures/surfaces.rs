@@ -304,7 +304,7 @@ fn lit_nodes_the_section_and_the_chosen_colours_are_in_print() {
         })
     };
     assert_ne!(section(1.0).svg(), plain.svg());
-    assert_eq!(section(99.0).svg(), plain.svg(), "beside the surface");
+    assert_eq!(section(99.0).svg(), plain.svg(), "next to the surface");
     let cividis = figure(&|figure| figure.surfaces[0].colours = SequentialMap::Cividis);
     assert_ne!(cividis.svg(), plain.svg());
 }

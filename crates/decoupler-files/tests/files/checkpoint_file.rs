@@ -1,4 +1,4 @@
-//! The checkpoint file: what is read goes on with the same bits, and whatever happens to the file is noticed.
+//! The checkpoint file: what is read continues with the same bits, and whatever happens to the file is noticed.
 
 use std::{fs, path::PathBuf, time::Duration};
 

@@ -91,7 +91,7 @@ proptest! {
         prop_assert_eq!(bits(read.network.at(0).mlp().weights()), bits(&weights));
     }
 
-    /// A training written at any epoch and read again goes on as one that was never interrupted.
+    /// A training written at any epoch and read again continues as one that was never interrupted.
     #[test]
     fn trainings_are_read_with_the_bits_that_were_written(
         method in prop::sample::select(Method::all().to_vec()),

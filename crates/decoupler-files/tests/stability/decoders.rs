@@ -14,7 +14,7 @@ use crate::{
 };
 
 const ROOM: &str = "decoder";
-/// Factor that chance may put on an error that is the mean's, on a test set of so many nodes.
+/// Factor that chance may put on an error that is the mean's, on a test set of this many nodes.
 fn by_chance(nodes: usize) -> f64 {
     1.1 + 2.0 / (nodes as f64).sqrt()
 }
@@ -33,7 +33,7 @@ fn z_mm(test: &Dataset, answers: &Array2<f64>) -> f64 {
 /// decoder near the mean, not far beyond it.
 const EXPLAINED: f64 = 3.0;
 
-/// The remark beside a decoder's figures, if the program makes one that explains an error of so many times the mean's.
+/// The remark next to a decoder's figures, if the program makes one that explains an error of this many times the mean's.
 fn remark(report: &DecoderReport, times: f64, flaw: Option<&RunFlaw>, outlook: Option<&Outlook>) -> Option<String> {
     if let Some(remark) = report.remarks.first() {
         return Some(remark.to_string());
@@ -124,7 +124,7 @@ fn judge_decoder(seen: &Measured, settings: &SimulatedSettings, kind: DecoderKin
     Verdict::Right
 }
 
-/// The reference is no worse than the mean, nobody beats it, and it claims no certainty that nobody has.
+/// The reference is no worse than the mean, no one beats it, and it claims no certainty that no one has.
 fn judge_reference(seen: &Measured, settings: &SimulatedSettings) -> Verdict {
     let scene = settings.source.scene;
     let told = seen.run.baselines().and_then(|baselines| baselines.nodes()?.reference);
@@ -154,7 +154,7 @@ fn judge_reference(seen: &Measured, settings: &SimulatedSettings) -> Verdict {
     let stroke_mm = settings.source.stroke_mm();
     let is_independent = scene.loading == Loading::RandomNodes;
     if unseen && is_independent && limit_mm < 1e-9 * stroke_mm {
-        return wrong("the reference claims certainty about deformations that no reading tells");
+        return wrong("the reference claims certainty about deformations that no reading determines");
     }
     // A gain common to all readings is found from them.
     let beside_drift = Noise {

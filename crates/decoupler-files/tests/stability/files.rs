@@ -84,7 +84,7 @@ fn judge_network(damage: Damage, place: f64) -> Verdict {
     }
 }
 
-/// A training that is read goes on as the one that was saved.
+/// A training that is read continues as the one that was saved.
 fn judge_checkpoint(damage: Damage, place: f64) -> Verdict {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("run.checkpoint");
@@ -106,7 +106,7 @@ fn judge_checkpoint(damage: Damage, place: f64) -> Verdict {
             if resumed.decouple_test() == run.decouple_test() {
                 Verdict::Right
             } else {
-                wrong("a damaged training is read and goes on otherwise")
+                wrong("a damaged training is read and continues otherwise")
             }
         }
     }

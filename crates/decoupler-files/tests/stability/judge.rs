@@ -90,7 +90,7 @@ impl Job {
 pub(crate) fn refused(error: &impl Display) -> Verdict {
     match flaw_of(&error.to_string()) {
         None => Verdict::Refused(error.to_string()),
-        Some(flaw) => Verdict::Wrong(format!("{flaw} in the refusal: {error}")),
+        Some(flaw) => Verdict::Wrong(format!("{defect} in the refusal: {error}")),
     }
 }
 
@@ -98,7 +98,7 @@ pub(crate) fn refused(error: &impl Display) -> Verdict {
 pub(crate) fn flagged(remark: &impl Display) -> Verdict {
     match flaw_of(&remark.to_string()) {
         None => Verdict::Flagged(remark.to_string()),
-        Some(flaw) => Verdict::Wrong(format!("{flaw} in the remark: {remark}")),
+        Some(flaw) => Verdict::Wrong(format!("{defect} in the remark: {remark}")),
     }
 }
 

@@ -23,7 +23,7 @@ use judge::Job;
 use rayon::prelude::*;
 use table::Table;
 
-/// One job of so many is run.
+/// One job of this many is run.
 const STRIDE: usize = if cfg!(debug_assertions) { 11 } else { 1 };
 
 #[test]
@@ -41,7 +41,7 @@ fn every_cell_is_right_refused_or_flagged() {
         .into_iter()
         .flat_map(|jobs| jobs.into_iter().step_by(STRIDE))
         .collect();
-    // A panic is a wrong cell; its message stands in the table.
+    // A panic is a wrong cell; its message is in the table.
     std::panic::set_hook(Box::new(|_| {}));
     let cells = jobs.par_iter().flat_map_iter(Job::cells).collect();
     let _ = std::panic::take_hook();

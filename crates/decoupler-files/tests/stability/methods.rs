@@ -122,7 +122,7 @@ fn judge(task: &Task, settings: TrainingSettings) -> Verdict {
     if let Some(record) = history.iter().skip(1).find(|record| {
         !(is_number(record.training_mse) && is_number(record.gradient_norm) && is_number(record.parameter))
     }) {
-        return wrong(format!("epoch {} of the history is no number", record.epoch));
+        return wrong(format!("epoch {} of the history is not a number", record.epoch));
     }
     let weights = trainer.best().weights();
     if !weights.iter().all(|weight| weight.is_finite()) {
@@ -300,7 +300,7 @@ pub(crate) fn jobs() -> Vec<Job> {
                 },
             ),
             (
-                "a goal that is no number",
+                "a goal that is not a number",
                 StoppingRules {
                     goal_mse: f64::NAN,
                     ..usual

@@ -30,7 +30,7 @@ fn judge(x_mm: &[f64], y_mm: &[f64], value: impl Fn(f64, f64) -> f64, share: f64
         for (iy, &y) in grid.y_mm().iter().enumerate().filter(|&(iy, _)| grid.is_inside(ix, iy)) {
             let error = (surface[grid.index(ix, iy)] - value(x, y)).abs();
             if error.is_nan() {
-                return wrong("the surface has a point that is no number");
+                return wrong("the surface has a point that is not a number");
             }
             worst = worst.max(error);
         }
@@ -92,7 +92,7 @@ fn judge_gap(x_mm: &[f64], y_mm: &[f64], missing: f64) -> Verdict {
     if surface.iter().all(is_sound) {
         Verdict::Right
     } else {
-        wrong("beside a missing node the surface is neither level nor missing")
+        wrong("next to a missing node the surface is neither level nor missing")
     }
 }
 

@@ -7,7 +7,7 @@ use super::{
 use crate::window::shared::Notice;
 
 impl RunList {
-    /// Takes the list from the thread; returns what the user is to be told.
+    /// Takes the list from the thread; returns what the user is to be predicted.
     pub fn take_news(&mut self, worker: &RunsWorker) -> Option<Notice> {
         let mut notice = None;
         while let Some(event) = worker.next_event() {

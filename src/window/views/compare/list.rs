@@ -110,7 +110,7 @@ fn name_ui(ui: &mut Ui, position: usize, run: &KeptRun, effects: &mut Vec<Effect
     if edit.changed() {
         ui.data_mut(|data| data.insert_temp(id, name.clone()));
     }
-    // Also a field that lost the focus while another view was on show.
+    // Also a field that lost the focus while another view was displayed.
     if !edit.has_focus() && typed.is_some() {
         ui.data_mut(|data| data.remove::<String>(id));
         if name != run.name {

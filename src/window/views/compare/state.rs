@@ -55,9 +55,9 @@ pub struct Compared {
 /// What is drawn of a test set.
 #[derive(Clone, Debug)]
 pub enum Drawn {
-    /// Nodes of an array at the snapshot on show: actual, decoupled, difference.
+    /// Nodes of an array at the displayed snapshot: actual, decoupled, difference.
     Frames(Box<[Frame; 3]>),
-    /// Surfaces through the targets of a recording at the sample on show: actual, decoded, difference.
+    /// Surfaces through the targets of a recording at the displayed sample: actual, decoded, difference.
     Surfaces(Box<[Surface; 3]>),
     /// Regression of each target of a recording, whose targets have no surface.
     Regression(Arc<TargetCharts>),

@@ -87,7 +87,7 @@ impl View for CompareView {
 }
 
 impl CompareView {
-    /// Decoded against actual values of the target on show in this place, if it has no surface.
+    /// Decoded against actual values of the displayed target in this place, if it has no surface.
     pub(super) fn regression(&self, place: usize) -> Option<PlotFigure> {
         let place = &self.places[place];
         let Compared { test, answers, drawn } = place.compared.as_ref()?;

@@ -30,7 +30,7 @@ const MARKDOWN: FileWords = FileWords {
     extensions: &["md"],
 };
 
-/// The figure, the tables, and the verdicts of the experiment on show.
+/// The figure, the tables, and the verdicts of the current experiment.
 pub(super) fn experiment_exports(view: &ExperimentsView, colours: SequentialMap) -> Vec<Export<'_>> {
     let topic = view.topic;
     let stem = topic.name().to_lowercase().replace(' ', "_");

@@ -80,7 +80,7 @@ fn what_it_does(topic: Topic) -> &'static str {
             "Errors of networks with different numbers of hidden nodes on the paper's array."
         }
         Topic::Table(PaperTable::CrossValidation) => {
-            "Cross-validation of a large and a small dataset, shuffled anew in each repeat, and the scatter of the errors over the folds (the paper's Fig. 5)."
+            "Cross-validation of a large and a small dataset, shuffled again in each repeat, and the scatter of the errors over the folds (the paper's Fig. 5)."
         }
         Topic::Table(PaperTable::ArrayScales) => "Errors on arrays of different scales, with 12 hidden nodes.",
         Topic::Sweep => "Any two settings varied against each other, all others fixed.",
@@ -216,7 +216,7 @@ fn run_buttons_ui(ui: &mut Ui, experiments: &mut ExperimentsView, effects: &mut 
         let size = vec2(half, space(7));
         let run = ui.add_enabled(experiments.can_run(), primary_button("▶ Run").min_size(size));
         if run
-            .on_hover_text("Runs all trainings in the background (Ctrl+Enter).")
+            .on_hover_text(with_shortcut(ui, "Runs all trainings in the background", Key::Enter))
             .clicked()
         {
             experiments.run(effects);
@@ -224,7 +224,7 @@ fn run_buttons_ui(ui: &mut Ui, experiments: &mut ExperimentsView, effects: &mut 
         let can_cancel = experiments.running.is_some();
         let cancel = ui.add_enabled(can_cancel, ghost_button("■ Cancel").min_size(size));
         if cancel
-            .on_hover_text("Ends the experiment; finished trials are kept (Ctrl+.).")
+            .on_hover_text(with_shortcut(ui, "Ends the experiment; finished trials are kept", Key::Period))
             .clicked()
         {
             experiments.cancel();

@@ -69,7 +69,7 @@ impl Topic {
 /// The Experiments view.
 #[derive(Debug)]
 pub struct ExperimentsView {
-    /// Experiment on show.
+    /// Current experiment.
     pub topic: Topic,
     /// Ordering and marked cell of the table.
     pub look: ExperimentLook,
@@ -200,7 +200,7 @@ impl Outcome {
 }
 
 impl ExperimentsView {
-    /// Every form as the paper has it, nothing run. `wake` is called when there is news.
+    /// Every form as the paper has it, nothing run. `wake` is called when there is events.
     pub fn new(wake: Wake) -> Self {
         let mut state = Self {
             topic: Topic::ALL[0],
@@ -262,7 +262,7 @@ impl ExperimentsView {
         self.forms.insert(self.topic, checked);
     }
 
-    /// Returns true if the experiment on show can be run now.
+    /// Returns true if the current experiment can be run now.
     pub fn can_run(&self) -> bool {
         self.running.is_none() && self.checked().is_ok()
     }
@@ -274,7 +274,7 @@ impl ExperimentsView {
         };
         effects.push(Effect::Settle(Matter::Experiments));
         if self.topic == Topic::Sweep {
-            // It would stand in the place of the results.
+            // It would are in the place of the results.
             self.folder.close();
         }
         self.begin(experiment.clone(), setup.plan().cloned());
@@ -338,12 +338,12 @@ impl ExperimentsView {
         });
     }
 
-    /// Returns the sweep folder on show, in whose place no experiment is.
+    /// Returns the current sweep folder, in whose place no experiment is.
     pub(super) fn shown_folder(&self) -> Option<&OpenFolder> {
         self.folder.shown().filter(|_| self.topic == Topic::Sweep)
     }
 
-    /// Returns the results of the experiment on show.
+    /// Returns the results of the current experiment.
     pub fn outcome(&self) -> Option<&Outcome> {
         self.outcomes.get(&self.topic)
     }
@@ -359,7 +359,7 @@ fn bytes_of(trial: &Trial, hidden: usize, problem: Option<&Problem>) -> usize {
     let weights = problem.map_or(0, |problem| {
         hidden * (problem.inputs.len() + 1) + (hidden + 1) * problem.targets.len()
     });
-    // The present and the best weights, and up to as many numbers of the method's own.
+    // The current and the best weights, and up to as many numbers of the method's own.
     let of_start = 4 * weights * size_of::<f64>();
     trial.states.len() * of_start + trial.epochs * size_of::<EpochRecord>()
 }

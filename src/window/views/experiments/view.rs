@@ -137,7 +137,7 @@ impl View for ExperimentsView {
 }
 
 /// The promise of an experiment that was not run yet.
-const INVITATION: &str = "Our figures appear beside the published ones as the trials finish.";
+const INVITATION: &str = "Our figures appear next to the published ones as the trials finish.";
 
 /// Returns the hint shown while there is no figure yet, unless that is an invitation to run.
 fn hint(experiments: &ExperimentsView) -> Option<&'static str> {

@@ -9,7 +9,7 @@ use decoupler_core::evaluation::{
 };
 use decoupler_files::import::Setup;
 
-/// News of the experiment begun last.
+/// Events of the experiment begun last.
 #[derive(Debug)]
 pub enum ExperimentEvent {
     /// A recording has been read, with these channels.

@@ -117,7 +117,7 @@ pub(super) fn identifiability_figure(
     }
 }
 
-/// One of the two pictures: `axis` is the one on show, `node` the one marked on both. Returns the place of the scale of its
+/// One of the two pictures: `axis` is the displayed one, `node` the one marked on both. Returns the place of the scale of its
 /// colours.
 fn surface_ui(
     ui: &mut Ui,
@@ -169,7 +169,7 @@ fn node_ui(ui: &mut Ui, analysis: &Analysis, surface: &Surface, node: usize) {
     ui.label(RichText::new(text).size(type_size().note));
 }
 
-/// Choice of the coordinate on show, where several are unknown.
+/// Choice of the displayed coordinate, where several are unknown.
 fn axes_ui(ui: &mut Ui, axis: &mut usize, analysis: &Analysis) {
     let axes = analysis.question.scene.movement.axes().indices();
     if axes.len() < 2 {

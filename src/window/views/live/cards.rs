@@ -15,7 +15,7 @@ use decoupler_files::{
     figure::surface::{Quantity, Surface, SurfaceFigure},
 };
 
-/// The decoupled surface, the actual one beside it where it is known, and the scale of their colours.
+/// The decoupled surface, the actual one next to it where it is known, and the scale of their colours.
 pub fn surfaces_ui(ui: &mut Ui, rect: Rect, view: &mut LiveView, shared: &Shared, effects: &mut Vec<Effect>) {
     let Some(frame) = &view.shown.frame else { return };
     let figure = surface_figure(frame, view.node, shared.look);

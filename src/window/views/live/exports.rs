@@ -53,11 +53,11 @@ pub fn live_exports<'a>(view: &'a LiveView, shared: &'a Shared) -> Vec<Export<'a
 
 const VALUES: FileWords = FileWords {
     kind: "decoded values",
-    description: "The decoded values on show with their times and every digit, as CSV.",
+    description: "The displayed decoded values with their times, in full precision, as CSV.",
     extensions: &["csv"],
 };
 
-/// The values on show of a network of a recording.
+/// The displayed values of a network of a recording.
 fn target_exports<'a>(targets: &'a LiveTargets, shared: &'a Shared) -> Vec<Export<'a>> {
     let chart = Ok(move || Figure::from(targets_card::chart(targets)));
     let mut exports: Vec<Export<'a>> = picture_exports("Decoded values", "live-values".to_owned(), chart).collect();

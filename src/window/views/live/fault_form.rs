@@ -121,7 +121,7 @@ impl FaultForm {
 }
 
 const KINDS: [(Option<FaultKind>, &str, &str); 7] = [
-    (None, "None", "All wires are sound."),
+    (None, "None", "No wire is faulty."),
     (
         Some(FaultKind::BrokenRow),
         "Broken row-wire",

@@ -107,7 +107,7 @@ fn confidence_ui(ui: &mut Ui, view: &LiveView, frame: &LiveFrame, shared: &Share
             dim_ui(ui, &format!("Faults of wires are {reason}."));
         }
         Watched::Sound => fact_ui(ui, "Fault", hint, "none"),
-        Watched::Unexplained => fact_ui(ui, "Fault", hint, "of no single wire"),
+        Watched::Unexplained => fact_ui(ui, "Fault", hint, "not a single-wire fault"),
         Watched::Named(diagnosis) => fact_ui(ui, "Fault", hint, &diagnosis.wire.to_string()),
     }
     let Some(errors) = frame.errors else { return };
@@ -115,7 +115,7 @@ fn confidence_ui(ui: &mut Ui, view: &LiveView, frame: &LiveFrame, shared: &Share
         Some(mm) => format!("{} mm", format_number(mm)),
         None => format_number(None),
     };
-    let hint = "Mean |error| of z over all nodes against the simulated truth, lately.";
+    let hint = "Mean |error| of z over all nodes against the simulated truth, over the last frames.";
     fact_ui(ui, "Error", hint, &in_mm(errors.shown_mm));
     if let Some([by_all, left_out]) = errors.since_named_mm {
         let hint = "Mean |error| of z since the fault was named, by the network with all wires.";
@@ -159,7 +159,7 @@ fn zero_ui(ui: &mut Ui, view: &mut LiveView, effects: &mut Vec<Effect>) {
     let hint = "Smallest and largest gain: reading in the unloaded state over the resistance of the model at rest.";
     fact_ui(ui, "Gains", hint, &gains_in_words(&zero));
     let hint =
-        "Rows on which something was held: they took the gains of their columns only, so that the contact stays.";
+        "Rows in contact during the re-zero: only the gains of their columns were taken, so that the contact is kept.";
     let touched = zero.in_contact.iter().filter(|touched| **touched).count();
     fact_ui(
         ui,

@@ -125,7 +125,7 @@ impl NetworkChoice {
                 ui.selectable_value(&mut self.pick, NetworkPick::File, file);
             }
         });
-        let hint = "The network that decodes the frames: a finished run, or a network file. A replay is decoded anew as \
+        let hint = "The network that decodes the frames: a finished run, or a network file. A replay is decoded again as \
                     soon as another one is chosen.";
         combo.response.labelled_by(label.id).on_hover_text(hint);
         if let Some((_, network)) = self.network(runs) {

@@ -18,7 +18,7 @@ pub fn replay_bar_ui(ui: &mut Ui, view: &mut LiveView) {
             let text = if replay.is_playing { "⏸ Pause" } else { "▶ Play" };
             let play = ui.add(ghost_button(text).min_size([space(18), space(6)].into()));
             if play
-                .on_hover_text("Plays the recording, or holds it (Ctrl+P).")
+                .on_hover_text(with_shortcut(ui, "Plays or pauses the recording", Key::P))
                 .clicked()
             {
                 view.command(Command::Play(!replay.is_playing));

@@ -15,7 +15,7 @@ const RECORDING: (&str, &str) = (
     include_str!("../../../../assets/samples/recording.csv"),
 );
 
-/// The sample recording, laid out as a file beside the user's own, and the network that decodes it.
+/// The sample recording, laid out as a file next to the user's own, and the network that decodes it.
 #[derive(Debug)]
 pub struct Sample {
     job: Job<Result<Laid, String>>,

@@ -64,7 +64,7 @@ pub struct Running {
 }
 
 impl LiveView {
-    /// Nothing decoded yet. `wake` is called when there is news.
+    /// Nothing decoded yet. `wake` is called when there is events.
     pub fn new(wake: Wake) -> Self {
         Self {
             shown: LiveShown::default(),
@@ -168,7 +168,7 @@ impl LiveView {
         }
     }
 
-    /// Goes on with the network that is chosen now, where a replay stands.
+    /// Continues with the network that is chosen now, where a replay stands.
     pub(super) fn start_again(&mut self, shared: &Shared) {
         let replay = self.shown.replay;
         let Ok((network, mut plan)) = self.plan(shared, replay.map_or(0.0, |replay| replay.at_s)) else {
@@ -204,7 +204,7 @@ impl LiveView {
 
     /// Ends decoding; what was shown last stays.
     pub(super) fn stop(&mut self) {
-        // The thread ends once nobody commands it.
+        // The thread ends once no one commands it.
         self.running = None;
     }
 
@@ -260,7 +260,7 @@ impl LiveView {
         self.recorded = Some(Recorded { path, frames, seconds });
     }
 
-    /// Takes what the thread has to tell.
+    /// Takes what the thread has to report.
     pub(super) fn follow(&mut self, effects: &mut Vec<Effect>) {
         let mut tell = |notice| effects.push(Effect::Tell(Matter::Live, notice));
         while let Some(event) = self.job.next_event() {
@@ -308,7 +308,7 @@ impl LiveView {
     }
 }
 
-/// The folder for files of this view: beside the runs, or for this session.
+/// The folder for files of this view: next to the runs, or for this session.
 fn folder(shared: &Shared) -> PathBuf {
     let beside = shared.runs.path.as_ref().and_then(|runs| runs.parent());
     beside.map_or_else(std::env::temp_dir, PathBuf::from)

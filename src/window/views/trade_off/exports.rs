@@ -13,7 +13,7 @@ const POINTS: FileWords = FileWords {
     extensions: &["csv"],
 };
 
-/// The charts and the table at the noise level on show, and every point.
+/// The charts and the table at the displayed noise level, and every point.
 pub(super) fn trade_off_exports(view: &TradeOffView) -> Vec<Export<'_>> {
     let stem = || "trade_off".to_owned();
     let outcome = view.outcome.as_ref().filter(|outcome| outcome.points().0 > 0);

@@ -61,7 +61,7 @@ pub enum Thoroughness {
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
 pub enum TradeOffFormError {
-    /// Something that is no number.
+    /// Something that is not a number.
     #[error("{what}: '{text}' is not a number; write a list such as {example}")]
     NotANumber {
         /// The list.

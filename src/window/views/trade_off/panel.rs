@@ -138,7 +138,7 @@ fn buttons_ui(ui: &mut Ui, trade: &mut TradeOffView, shared: &Shared, effects: &
             "The settings are not valid: the note above says what to change"
         };
         if measure
-            .on_hover_text("Trains, fits and times every decoder in the background (Ctrl+Enter).")
+            .on_hover_text(with_shortcut(ui, "Trains, fits and times every decoder in the background", Key::Enter))
             .on_disabled_hover_text(why_not)
             .clicked()
         {
@@ -147,7 +147,7 @@ fn buttons_ui(ui: &mut Ui, trade: &mut TradeOffView, shared: &Shared, effects: &
         let cancel = ghost_button("■ Cancel").min_size(size);
         let cancel = ui.add_enabled(trade.running.is_some(), cancel);
         if cancel
-            .on_hover_text("Ends the measurement; the points measured so far are kept (Ctrl+.).")
+            .on_hover_text(with_shortcut(ui, "Ends the measurement; the points measured so far are kept", Key::Period))
             .clicked()
         {
             trade.cancel();

@@ -24,7 +24,7 @@ pub struct PlannedLevel {
 pub struct PlannedRun {
     /// Preset from which its settings were derived, if they were.
     pub preset: Option<Preset>,
-    /// Setup, but for the hidden nodes.
+    /// Setup, except for the hidden nodes.
     pub setup: Setup,
     /// Decoders to be measured.
     pub decoders: Vec<DecoderKind>,

@@ -46,9 +46,9 @@ pub(super) enum PointWish {
 /// State of the display of a measurement.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct TradeOffLook {
-    /// The level of noise on show.
+    /// The displayed level of noise.
     pub level: usize,
-    /// The point marked in charts and table, by its place in the level on show.
+    /// The point marked in charts and table, by its place in the displayed level.
     pub marked: Option<usize>,
     /// The limits of the two questions.
     pub limits: TradeOffLimits,
@@ -129,7 +129,7 @@ impl TradeOffOutcome {
 }
 
 impl TradeOffView {
-    /// Nothing measured yet. `wake` is called when there is news.
+    /// Nothing measured yet. `wake` is called when there is events.
     pub fn new(wake: Wake) -> Self {
         Self {
             form: TradeOffForm::default(),
@@ -217,7 +217,7 @@ impl TradeOffView {
         }
     }
 
-    /// The level on show.
+    /// The displayed level.
     pub fn shown(&self) -> Option<&TradeOffLevel> {
         self.outcome
             .as_ref()

@@ -193,7 +193,7 @@ fn level_ui(ui: &mut Ui, outcome: &TradeOffOutcome, look: &mut TradeOffLook) {
         segmented_ui(ui, "Displayed noise level", &options, look.level, false)
     } else {
         let mut picked = None;
-        let combo = ComboBox::from_id_salt("noise on show").selected_text(&names[look.level]);
+        let combo = ComboBox::from_id_salt("noise level").selected_text(&names[look.level]);
         combo.show_ui(ui, |ui| {
             for (level, name) in names.iter().enumerate() {
                 if ui.selectable_label(level == look.level, name).clicked() {

@@ -62,7 +62,7 @@ impl BottomTab {
         (Self::ErrorMap, "Error map"),
     ];
 
-    /// The charts of the source on show, with their names. Readings are among them unless they have a card of their own.
+    /// The charts of the current source, with their names. Readings are among them unless they have a card of their own.
     pub(super) fn offered(shared: &Shared, has_readings: bool) -> Vec<(Self, &'static str)> {
         let all = match shared.source {
             SourceKind::Array => &Self::OF_ARRAY[..],
@@ -84,7 +84,7 @@ fn has_error_map(shared: &Shared) -> bool {
     charts.is_some_and(|charts| charts.error_map.is_ok())
 }
 
-/// Returns true if a surface goes through the targets of the recording on show.
+/// Returns true if a surface goes through the displayed targets of the recording.
 pub(super) fn has_target_surface(shared: &Shared) -> bool {
     let test = shared.recorded_test();
     test.is_some_and(|test| matches!(test.positions, Positions::Surface(_)))

@@ -11,7 +11,7 @@ use decoupler_files::figure::{
 };
 
 /// A chart below the surfaces.
-#[expect(clippy::large_enum_variant, reason = "there is one on show")]
+#[expect(clippy::large_enum_variant, reason = "only one is displayed")]
 pub(super) enum Chart {
     Plots(PlotFigure),
     Map(HeatMap),
@@ -26,7 +26,7 @@ impl From<Chart> for Figure {
     }
 }
 
-/// The chart on show, with what is lit standing out; `None` before there is anything to draw.
+/// The displayed chart, with what is lit standing out; `None` before there is anything to draw.
 pub(super) fn chart(view: &TrainView, shared: &Shared) -> Option<Chart> {
     if view.tab == BottomTab::ErrorMap {
         let charts = view.result(shared)?.charts.as_ref()?;
@@ -45,7 +45,7 @@ fn figure(view: &TrainView, shared: &Shared) -> Option<PlotFigure> {
             if let (Some(epoch), Some(plot)) = (view.scrub.epoch(), figure.plots.first_mut()) {
                 let at = LineAt::X(epoch as f64);
                 plot.lines
-                    .push(ReferenceLine::new("network on show", at, Hue::Orange, LineStyle::Solid));
+                    .push(ReferenceLine::new("displayed network", at, Hue::Orange, LineStyle::Solid));
             }
             figure
         }
@@ -86,7 +86,7 @@ fn figure(view: &TrainView, shared: &Shared) -> Option<PlotFigure> {
     })
 }
 
-/// All targets of the sample on show of a recording, actual and decoded.
+/// All displayed targets of the sample of a recording, actual and decoded.
 pub(super) fn all_targets_figure(view: &TrainView, shared: &Shared) -> Option<PlotFigure> {
     let (test, result) = (shared.recorded_test()?, view.result(shared)?);
     if view.snapshot >= test.set.samples() {

@@ -16,7 +16,7 @@ use crate::window::{
 };
 use decoupler_files::figure::{ErrorBins, PlotFigure};
 
-/// Width of the list of nodes beside the histogram.
+/// Width of the list of nodes next to the histogram.
 const LIST_WIDTH: f32 = space(57);
 
 /// Width of a card below which the longest name of a tab is cut.
@@ -103,7 +103,7 @@ pub fn charts_card_ui(
     }
 }
 
-/// Returns true if the chart on show offers a choice: error bars, or the target of a recording that has several.
+/// Returns true if the displayed chart offers a choice: error bars, or the target of a recording that has several.
 fn has_choice(view: &TrainView, shared: &Shared) -> bool {
     let of_target = || {
         let test = shared.recorded_test();
@@ -117,7 +117,7 @@ fn has_choice(view: &TrainView, shared: &Shared) -> bool {
         }
 }
 
-/// The plots of the chart `tab`, what belongs below or beside them, and what the pointer does there.
+/// The plots of the chart `tab`, what belongs below or next to them, and what the pointer does there.
 fn plots_of_view_ui(ui: &mut Ui, tab: BottomTab, figure: &PlotFigure, view: &mut TrainView, shared: &Shared) {
     let past = shared.shown_run().map(|run| &run.past);
     let past = past.filter(|past| tab == BottomTab::Loss && past.epochs().len() > 1);
@@ -147,7 +147,7 @@ fn plots_of_view_ui(ui: &mut Ui, tab: BottomTab, figure: &PlotFigure, view: &mut
     }
 }
 
-/// Readings of the surface on show. The one under the pointer lights up its nodes; a click cuts the surfaces along its
+/// Readings of the displayed surface. The one under the pointer lights up its nodes; a click cuts the surfaces along its
 /// wires.
 pub fn readings_of_view_ui(ui: &mut Ui, view: &mut TrainView, shared: &Shared) {
     let per_row = shared.test().map_or(1, |test| test.sensor.scale.nodes_per_row());

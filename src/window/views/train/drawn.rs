@@ -9,10 +9,10 @@ use crate::window::{
 use decoupler_core::{dataset::Dataset, evaluation::node_rms_mm};
 use decoupler_files::figure::{TargetSurface, surface::Surface, target_pairs, z_pairs_mm};
 
-/// Drawings of the test set on show. They are made only when that, the result, the snapshot or the target changes.
+/// Drawings of the current test set. They are made only when that, the result, the snapshot or the target changes.
 #[derive(Debug, Default)]
 pub struct Drawn {
-    /// The snapshot on show.
+    /// The displayed snapshot.
     pub frames: Frames,
     /// Drops of its readings below those at rest, in percent: rows read × M4.
     pub drops_percent: Option<Array2<f64>>,
@@ -53,7 +53,7 @@ impl Of {
 }
 
 impl Drawn {
-    /// Follows the test set on show and the network's `result` on it, at the snapshot nearest to the one wished for.
+    /// Follows the current test set and the network's `result` on it, at the snapshot nearest to the one wished for.
     /// `target` is the one whose values a recording's charts show. Returns the snapshot.
     pub(super) fn follow(
         &mut self,
@@ -144,7 +144,7 @@ impl Drawn {
         sample
     }
 
-    /// Draws the surfaces through the targets of the sample on show.
+    /// Draws the surfaces through the displayed targets of the sample.
     fn draw_targets(&mut self, test: &RecordedTest, through: &TargetSurface, result: Option<&RunResult>) {
         let actual = test.set.targets().row(self.snapshot).to_vec();
         let decoded = result.map(|result| result.answers.row(self.snapshot).to_vec());
@@ -173,7 +173,7 @@ impl Drawn {
     }
 
     /// Actual and decoded values of the test set, once there is a result: z of the nodes of an array in millimetres, or the
-    /// values of the target on show in its unit.
+    /// values of the displayed target in its unit.
     pub fn pairs(&self) -> Option<&[(f64, f64)]> {
         let (test, answers) = self.result()?;
         Some(self.pairs.get_or_init(|| match self.target {

@@ -1,4 +1,4 @@
-//! Exports of the training on show.
+//! Exports of the current training.
 
 use super::{
     bottom_tab::has_target_surface,
@@ -20,7 +20,7 @@ use decoupler_files::{
 /// A saved training to go on from.
 pub const CHECKPOINT: FileWords = FileWords {
     kind: "checkpoint",
-    description: "The training as it stands, paused or ended. Resumed here or in a terminal (train --checkpoint FILE \
+    description: "The training in its current state, paused or ended. Resumed here or in a terminal (train --checkpoint FILE \
                   --resume), it gives bit-identical results.",
     extensions: &["checkpoint"],
 };
@@ -58,7 +58,7 @@ pub(super) fn open_task(shared: &Shared) -> FileTask {
     }
 }
 
-/// Everything that can be exported of the training on show.
+/// Everything that can be exported of the current training.
 pub(super) fn train_exports<'a>(view: &'a TrainView, shared: &'a Shared) -> Vec<Export<'a>> {
     let shown = shared.shown_run().and_then(|run| Some((run, run.result.as_ref()?)));
     let shown = shown.ok_or_else(|| "Nothing is trained yet: press Train first.".to_owned());
@@ -127,7 +127,7 @@ fn upper_figure(view: &TrainView, shared: &Shared) -> Figure {
     }
 }
 
-/// The best network, and before it that of a past epoch while it is on show.
+/// The best network, and before it that of a past epoch while it is displayed.
 fn networks<'a>(view: &'a TrainView, shown: &Result<(&'a RunView, &'a RunResult), String>) -> Vec<Export<'a>> {
     let source = shown
         .as_ref()
@@ -148,7 +148,7 @@ fn networks<'a>(view: &'a TrainView, shown: &Result<(&'a RunView, &'a RunResult)
         .collect();
     if let Some(epoch) = view.scrub.result().map(|past| past.epochs_run) {
         let source = NetworkSource::Past(run.id, Box::new(run.setup.clone()), epoch, run.past.clone());
-        // The decoders were measured beside the best network.
+        // The decoders were measured next to the best network.
         let past = network_exports("", &Ok(source), Vec::new).into_iter();
         let past = past
             .map(in_group(ExportGroup::NetworkOnShow(epoch)))

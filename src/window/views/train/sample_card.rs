@@ -1,4 +1,4 @@
-//! What takes the place of the surfaces where a recording has none: all targets of the sample on show.
+//! What takes the place of the surfaces where a recording has none: all displayed targets of the sample.
 
 use eframe::egui::{RichText, Ui};
 
@@ -15,12 +15,12 @@ use crate::window::{
     widgets::{dim_ui, placeholder_ui},
 };
 
-/// All targets of the sample on show, actual beside decoded.
+/// All displayed targets of the sample, actual next to decoded.
 pub fn sample_card_ui(ui: &mut Ui, view: &mut TrainView, shared: &Shared) {
     let Some(figure) = all_targets_figure(view, shared) else {
         let text = match shared.phase {
             Phase::Preparing => "The recording is being read; the first epoch follows.",
-            _ => "Press Train: the targets of each test sample appear here, actual beside decoded.",
+            _ => "Press Train: the targets of each test sample appear here, actual next to decoded.",
         };
         placeholder_ui(ui, text);
         return;

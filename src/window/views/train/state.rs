@@ -27,7 +27,7 @@ pub struct TrainView {
     pub snapshot: usize,
     /// Target of a recording whose values the charts show.
     pub(super) target: usize,
-    /// The snapshot that the worker was told of.
+    /// The snapshot that the worker was informed of.
     pub(super) watched: usize,
     /// Surface shown on the right-hand card.
     pub right: RightCard,
@@ -43,7 +43,7 @@ pub struct TrainView {
     pub drawn: Drawn,
     /// The finger on the actual surface.
     pub press: PressState,
-    /// The past epoch on show.
+    /// The displayed past epoch.
     pub scrub: ScrubState,
     /// Recording that is trained on.
     pub(in crate::window) recording: RecordingEditor,
@@ -73,7 +73,7 @@ impl TrainView {
         }
     }
 
-    /// Draws what is on show.
+    /// Draws what is displayed.
     pub(super) fn follow(&mut self, shared: &Shared) {
         self.scrub.follow(shared);
         let result = result_of(&self.scrub, shared);
@@ -84,17 +84,17 @@ impl TrainView {
         self.lights.node = self.lights.node.filter(|&node| node < nodes);
     }
 
-    /// The result on show: of the training so far, or of the past epoch that was brought back.
+    /// The current result: of the training so far, or of the past epoch that was brought back.
     pub fn result<'a>(&'a self, shared: &'a Shared) -> Option<&'a RunResult> {
         result_of(&self.scrub, shared)
     }
 
-    /// The surfaces on show: those under the finger, or those of the test set.
+    /// The displayed surfaces: those under the finger, or those of the test set.
     pub fn frames(&self) -> &Frames {
         self.press.frames().unwrap_or(&self.drawn.frames)
     }
 
-    /// Drops of the readings of the surface on show below those at rest, in percent: rows read × M4.
+    /// Drops of the readings of the displayed surface below those at rest, in percent: rows read × M4.
     pub fn drops_percent(&self) -> Option<&Array2<f64>> {
         match self.press.shown() {
             Some(shown) => shown.drops_percent.as_ref(),
@@ -108,7 +108,7 @@ impl TrainView {
         self.press.let_go();
     }
 
-    /// Number of snapshots of the test set on show: frames of an array, samples of a recording.
+    /// Number of snapshots of the current test set: frames of an array, samples of a recording.
     pub(super) fn snapshots(shared: &Shared) -> usize {
         let of_recording = || shared.recorded_test().map(|test| test.set.samples());
         let of_array = shared.test().map(|test| test.snapshots.len());

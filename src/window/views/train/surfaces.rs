@@ -29,7 +29,7 @@ const HANDS: [(Hand, &str, &str); 2] = [
         Hand::Press,
         "Press",
         "Drag on the surface to press it; the wheel sets the depth. Drag with Shift or another button to move the picture, \
-         and the surface beside it to turn it.",
+         and the surface next to it to turn it.",
     ),
     (Hand::Turn, "Turn", "Drag to turn the surface; the wheel zooms."),
 ];
@@ -57,7 +57,7 @@ pub fn surfaces_ui(ui: &mut Ui, rect: Rect, view: &mut TrainView, shared: &Share
     }
 }
 
-/// The surfaces of the snapshot on show: the actual one, and once there is a network what its card shows.
+/// The displayed surfaces of the snapshot: the actual one, and once there is a network what its card shows.
 pub fn surface_figure(view: &TrainView, shared: &Shared) -> SurfaceFigure {
     let (frames, style) = (view.frames(), shared.look.style());
     let of_array = |test: &TestView| {
@@ -117,7 +117,7 @@ fn range_of_nodes(surface: &Surface) -> Option<RangeInclusive<f64>> {
     Some(values().reduce(f64::min)?..=values().reduce(f64::max)?)
 }
 
-/// The line of the section, while that is on show.
+/// The line of the section, while that is displayed.
 fn section(view: &TrainView, shared: &Shared) -> Option<Section> {
     let test = shared.test().filter(|_| view.tab == BottomTab::Section)?;
     Some(view.section.section(test))
@@ -149,7 +149,7 @@ fn invitation_ui(ui: &mut Ui, view: &mut TrainView, shared: &Shared) {
     }
 }
 
-/// The card's title, where the options beside it, `options_width` wide, leave room for it.
+/// The card's title, where the options next to it, `options_width` wide, leave room for it.
 fn title_ui(ui: &mut Ui, title: &str, note: &str, options_width: f32) {
     let font = semibold(type_size().title);
     let galley = ui

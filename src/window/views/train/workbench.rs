@@ -18,14 +18,14 @@ use crate::window::{
 pub enum WorkbenchLayout {
     /// In a column of its own, right of the workbench.
     ReportBeside,
-    /// On a card below the surfaces, beside the charts: narrow windows leave the surfaces their width.
+    /// On a card below the surfaces, next to the charts: narrow windows leave the surfaces their width.
     ReportBelow,
 }
 
 impl WorkbenchLayout {
-    /// That of a window so many points wide.
+    /// That of a window this many points wide.
     pub fn of_width(width: f32) -> Self {
-        /// A column beside the surfaces must leave them this window.
+        /// A column next to the surfaces must leave them this window.
         const LEAST_FOR_COLUMN: f32 = 1400.0;
         if width < LEAST_FOR_COLUMN {
             Self::ReportBelow
@@ -35,7 +35,7 @@ impl WorkbenchLayout {
     }
 }
 
-/// The middle of the window: both surfaces above, the charts below, and beside them the readings of an array.
+/// The middle of the window: both surfaces above, the charts below, and next to them the readings of an array.
 pub fn workbench_ui(ui: &mut Ui, view: &mut TrainView, shared: &Shared, effects: &mut Vec<Effect>) {
     let layout = WorkbenchLayout::of_width(ui.ctx().content_rect().width());
     let whole = ui.available_rect_before_wrap();

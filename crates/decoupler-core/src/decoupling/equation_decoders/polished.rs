@@ -98,7 +98,7 @@ impl PolishedDecoder {
 }
 
 /// The standing of an answer to readings with this noise: those that noise explains are all that a posterior can ask for.
-/// The residual is free of the gain, and so is the noise beside it.
+/// The residual is free of the gain, and so is the noise next to it.
 fn standing_beside(noise: &NoiseSource, readings: &[f64], report: PosteriorReport) -> Solution {
     let variance = |&ohm: &f64| noise.relative_to(ohm).own.powi(2);
     let variance = readings.iter().map(variance).sum::<f64>() / readings.len() as f64;

@@ -45,7 +45,7 @@ pub(super) enum Direction<'a> {
 }
 
 impl Gaussians {
-    /// Makes room for so many equations of all unknowns.
+    /// Makes room for this many equations of all unknowns.
     pub(super) fn make_room(&mut self, unknowns: usize, equations: usize) {
         if (self.unknowns, self.equations) == (unknowns, equations) {
             return;

@@ -9,9 +9,9 @@ use super::{
 };
 use crate::decoupling::LARGEST_ERROR;
 
-/// A row on its way to its answer: the equations are linearised anew at each mean.
+/// A row on its way to its answer: the equations are linearised again at each mean.
 ///
-/// Where the error of a linearisation is large beside the noise, as far from the answer with little noise, the noise
+/// Where the error of a linearisation is large next to the noise, as far from the answer with little noise, the noise
 /// is blurred to about that error: the answer is approached from a posterior that can hold it.
 struct Approach {
     /// Index among the rows that are solved.
@@ -43,7 +43,7 @@ const TOLERATED_MISFIT: f64 = 1e4;
 const CURVATURE: f64 = 0.1;
 
 impl Approach {
-    /// From `first` on, by at most so many steps.
+    /// From `first` on, by at most this many steps.
     fn new((index, row): (usize, usize), first: Vec<f64>, most_steps: usize) -> Self {
         Self {
             index,
@@ -142,7 +142,7 @@ impl Approach {
 
 impl Posterior {
     /// Solves `rows` side by side, each from where it is to `begin` by its coordinates in `coordinates_mm` (rows × 3·M2) and
-    /// in at most so many steps; where one has arrived, the next begins. Replaces the coordinates by the medians and returns
+    /// in at most this many steps; where one has arrived, the next begins. Replaces the coordinates by the medians and returns
     /// the report on each row.
     pub(super) fn iterate(
         &mut self,

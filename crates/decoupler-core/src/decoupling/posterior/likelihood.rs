@@ -164,8 +164,8 @@ impl Likelihood {
             .map(move |reading| problem.reading_ohm(reading) / (gain * problem.resistance_ohm(reading)) - 1.0)
     }
 
-    /// 2 Σ ln(σ(P) Φ(P/σ(P))) over readings, with the resistances of the evaluated `problem`: what a likelihood has beside its
-    /// exponent, but for constants. σ(P) is left out for readings that a converter rounded, whose likelihood is a probability.
+    /// 2 Σ ln(σ(P) Φ(P/σ(P))) over readings, with the resistances of the evaluated `problem`: what a likelihood has next to its
+    /// exponent, except for constants. σ(P) is left out for readings that a converter rounded, whose likelihood is a probability.
     pub(super) fn log_normalisers(&self, problem: &RowProblem, drift: f64) -> f64 {
         let gain = self.gain(drift);
         let of_reading = |reading| {

@@ -87,7 +87,7 @@ impl Component {
         x
     }
 
-    /// Logarithm of the density, but for the factor √(2π) of each variable, in room for a vector.
+    /// Logarithm of the density, except for the factor √(2π) of each variable, in room for a vector.
     fn log_density(&self, x: &[f64], product: &mut [f64]) -> f64 {
         product.fill(0.0);
         let mut begin = 0;
@@ -117,7 +117,7 @@ impl Mixture {
         self.components[component].draw(rng)
     }
 
-    /// Logarithm of the density, but for the factor √(2π) of each variable.
+    /// Logarithm of the density, except for the factor √(2π) of each variable.
     pub(super) fn log_density(&self, x: &[f64]) -> f64 {
         let mut apart = vec![0.0; x.len()];
         let logs: Vec<f64> = self

@@ -78,7 +78,7 @@ impl Posterior {
         })
     }
 
-    /// About how many bytes the priors of so many rows take while they are estimated.
+    /// About how many bytes the priors of this many rows take while they are estimated.
     pub(crate) fn prior_bytes(scene: &Scene, rows: usize, unknowns_per_row: usize) -> u64 {
         RowPrior::bytes(scene.loading, rows, unknowns_per_row)
     }

@@ -31,7 +31,7 @@ const PRIOR_DRAWS: usize = 4000;
 const SMALLEST_SPREAD: f64 = 1e-3;
 
 impl RowPrior {
-    /// About how many bytes the priors of so many rows take while they are estimated.
+    /// About how many bytes the priors of this many rows take while they are estimated.
     pub(super) fn bytes(loading: Loading, rows: usize, unknowns: usize) -> u64 {
         // Nodes that move on their own have priors in closed form.
         if loading == Loading::RandomNodes {

@@ -94,7 +94,7 @@ fn no_noise_is_too_small_for_a_posterior() {
                 limit > 1e-3 && limit < 1.0 && limit > 0.98 * last,
                 "{array} {noise}: {limit} {last:?}"
             );
-            // Where 14 decades lie between the patterns, whoever does not know where to linearise stays behind.
+            // Where 14 decades lie between the patterns, anyone who does not know where to linearise stays behind.
             let most = (1.05 * limit).max(if movement == Movement::Z { 0.0 } else { 0.6 });
             assert!(answer < most, "{array} {noise}: {answer} {limit}");
             last = limit;

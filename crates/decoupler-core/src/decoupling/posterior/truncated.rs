@@ -137,7 +137,7 @@ impl Cut {
 }
 
 impl Pairs {
-    /// Goes on to the densities one step further out.
+    /// Continues to the densities one step further out.
     #[inline(always)]
     fn step(&mut self) {
         self.above *= self.growth_above;
@@ -180,7 +180,7 @@ mod tests {
         highest: 1.0,
     };
 
-    /// Mean, variance and median of a factor cut to a range, in the last lane beside other factors.
+    /// Mean, variance and median of a factor cut to a range, in the last lane next to other factors.
     fn cut(factor: Factor, range: Range) -> (f64, f64, f64) {
         let (mut factors, mut ranges) = (Factor::FLAT, Ranges::NONE);
         (0..LANES).for_each(|lane| ranges.set(lane, range));

@@ -49,7 +49,7 @@ pub struct CellSummary {
     pub epoch_ms: Option<f64>,
 }
 
-/// Errors of a cell beside the one by which it is ranked.
+/// Errors of a cell next to the one by which it is ranked.
 #[derive(Clone, Debug, PartialEq)]
 pub enum SummaryErrors {
     /// Errors on the nodes of an array.
@@ -68,7 +68,7 @@ pub enum SummaryErrors {
     },
 }
 
-/// A measured figure beside the published one.
+/// A measured figure next to the published one.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Figure {
     /// Value that the paper reports.

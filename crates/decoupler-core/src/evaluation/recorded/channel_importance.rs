@@ -18,7 +18,7 @@ pub struct ChannelImportance {
 
 /// Measures how much the held-out error grows without each channel, in the order of the channels; `None` if cancelled.
 ///
-/// The model is fitted anew without the channel, rather than the channel permuted: with correlated channels, permuted
+/// The model is fitted again without the channel, rather than the channel permuted: with correlated channels, permuted
 /// readings are such as the sensor never gives, and the model's answers to them say little about the channel (Hooker,
 /// Mentch and Zhou 2021, doi:10.1007/s11222-021-10057-z). A channel that others can replace therefore counts little,
 /// however much a network uses it; of two copies, neither counts.

@@ -110,7 +110,7 @@ fn unit_vector(channel: ArrayView1<'_, f64>) -> Option<Vec<f64>> {
     Some(off.into_iter().map(|value| value / length).collect())
 }
 
-/// Tells whether two unit vectors are the same but for their sign and for rounding.
+/// Tells whether two unit vectors are the same except for their sign and for rounding.
 fn is_parallel(one: &[f64], other: &[f64]) -> bool {
     /// Distance of unit vectors that rounding of the readings explains.
     const ROUNDING: f64 = 1e-9;

@@ -43,7 +43,7 @@ pub enum Undetermined {
         /// Number of independent stretches or groups.
         units: usize,
     },
-    /// The error is not known within a factor of 100, or is no number.
+    /// The error is not known within a factor of 100, or is not a number.
     #[error(
         "its R² is not determined by the {units} independent stretches or groups judged: record longer, or more groups"
     )]
@@ -329,7 +329,7 @@ mod tests {
         holds.count()
     }
 
-    /// 95 % within three standard errors of 200 sets (0.015), and within 0.92 to 0.98 but for heavy tails.
+    /// 95 % within three standard errors of 200 sets (0.015), and within 0.92 to 0.98 except for heavy tails.
     #[test]
     fn intervals_contain_the_true_r2_of_each_kind_of_data_as_often_as_they_say() {
         for (kind, least) in [

@@ -33,7 +33,7 @@ pub struct TargetFindings {
     pub network: Option<Determination>,
     /// R² of ridge regression, or the reason why it is not determined.
     pub ridge: Result<Determination, Undetermined>,
-    /// Error of the network beside that of ridge.
+    /// Error of the network next to that of ridge.
     pub gain: Option<NonlinearGain>,
     /// Error with fewer and with more samples.
     pub curve: LearningCurve,
@@ -65,7 +65,7 @@ impl fmt::Display for Stage {
 }
 
 impl Findings {
-    /// Largest number of networks that [`Self::measure`] trains for so many channels, with so many folds.
+    /// Largest number of networks that [`Self::measure`] trains for this many channels, with this many folds.
     pub fn most_trainings(channels: usize, folds: usize) -> usize {
         (3 + channels + 1) * folds + LearningCurve::MOST_FITS
     }
@@ -109,7 +109,7 @@ impl Findings {
             gains = NonlinearGain::of_validated(set, &validated, by);
             comparison = Some(compared);
         }
-        // Where the readings tell nothing, the better answer is only nearer to the mean.
+        // Where the readings determine nothing, the better answer is only nearer to the mean.
         let is_worth_it = gains.iter().zip(&network).any(|(gain, network)| {
             let is_told = network
                 .as_ref()

@@ -6,7 +6,7 @@ use crate::{
     decoupling::decode_set,
 };
 
-/// Model that is fitted again and again to find out what the readings tell.
+/// Model that is fitted again and again to find out what the readings determine.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum FittedModel {
     /// Ridge regression: a fit takes milliseconds, but it sees only what is linear.

@@ -4,7 +4,7 @@ use crate::{
     evaluation::CrossValidated,
 };
 
-/// Held-out error of the network beside that of ridge regression for one target.
+/// Held-out error of the network next to that of ridge regression for one target.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct NonlinearGain {
     /// RMSE of the network in proportion to that of ridge.

@@ -61,7 +61,7 @@ impl PowerLaw {
         self.floor + self.scale * samples.powf(-self.exponent)
     }
 
-    /// Error with twice so many samples in proportion to that with so many: 1 where more bring nothing.
+    /// Error with twice this many samples in proportion to that with this many: 1 where more bring nothing.
     pub fn doubling(&self, samples: f64) -> f64 {
         self.at(2.0 * samples) / self.at(samples)
     }

@@ -13,7 +13,7 @@ pub enum FaultyWire {
     Columns(usize),
 }
 
-/// Cause of a fault, as far as the readings tell.
+/// Cause of a fault, as far as the readings determine.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum FaultCause {
     /// The readings do not depend on the deformation: the wire is broken at its connector or grounded, or a converter is

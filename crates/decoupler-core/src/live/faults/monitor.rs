@@ -55,7 +55,7 @@ enum State {
     Unexplained,
 }
 
-/// News of a frame.
+/// Events of a frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum FaultEvent {
     /// A fault is named: its wires should be left out.
@@ -225,7 +225,7 @@ impl FaultMonitor {
         chi_squared <= self.limit(readings, rows)
     }
 
-    /// Largest χ² of a sound fit of so many readings and rows.
+    /// Largest χ² of a sound fit of this many readings and rows.
     fn limit(&self, readings: usize, rows: usize) -> f64 {
         quantile(readings, DEVIATE) + self.of_priors * rows as f64
     }

@@ -175,7 +175,7 @@ impl RowFit {
         }
     }
 
-    /// Takes the mean of a prior for the answer, where no reading tells anything.
+    /// Takes the mean of a prior for the answer, where no reading determines anything.
     pub(in crate::live) fn set_to(&mut self, prior: &GaussianPrior) {
         self.unknowns[..prior.mean_mm.len()].copy_from_slice(&prior.mean_mm);
     }

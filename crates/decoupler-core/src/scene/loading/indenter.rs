@@ -11,7 +11,7 @@ use crate::{
 /// A body pressed somewhere onto the surface: place, depth, size, direction and tilt are drawn for each snapshot.
 ///
 /// Under the body the surface follows it; around it the surface is that of a sheet under tension on an elastic foundation
-/// (Pasternak 1954) with decay length λ = `spread_mm`: exp(−distance/λ) beside a cylinder or an edge, which are long in
+/// (Pasternak 1954) with decay length λ = `spread_mm`: exp(−distance/λ) next to a cylinder or an edge, which are long in
 /// one direction, and the axisymmetric K₀(r/λ)/K₀(a/λ) around the contact radius a of a ball or a punch. A ball or a
 /// cylinder touches the sheet as far as its slope equals that of the free surface, so that there is no kink.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]

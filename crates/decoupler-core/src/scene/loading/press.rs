@@ -166,7 +166,7 @@ mod tests {
         assert!((sphere.depth_at_mm(3.0, 2.0) - 0.18187682811379735).abs() < 1e-14);
     }
 
-    /// w″ + w′/r = w/λ² beside round bodies, w″ = w/λ² beside long ones, by central differences.
+    /// w″ + w′/r = w/λ² next to round bodies, w″ = w/λ² next to long ones, by central differences.
     #[test]
     fn the_free_surface_obeys_the_equation_of_its_foundation() {
         let step = 1e-3;

@@ -67,7 +67,7 @@ pub(super) struct Fitted {
 /// (Marquardt 1963) on the logarithms of the resistances, so that relative errors count alike:
 /// minimises `Σ r² + prior_weight · Σ θ²`, with θ the change of a parameter from `nominal` in proportion to its reference.
 ///
-/// The fit has converged when the Gauss-Newton step would lower this by less than a share of it that is nothing beside the
+/// The fit has converged when the Gauss-Newton step would lower this by less than a share of it that is nothing next to the
 /// uncertainty of the parameters (the relative offset of Bates and Watts 1981), whatever the length of the step: patterns
 /// that the readings hardly see do not delay it. Exact readings converge when their rounding is reached.
 pub(super) fn fit(

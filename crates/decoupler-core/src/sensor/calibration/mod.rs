@@ -1,7 +1,7 @@
 //! Calibration: geometry and resistivity of Eq. (2), fitted to the readings of known deformations.
 //!
 //! [`Calibration::fit`] minimises the squared relative errors of the readings by the Levenberg-Marquardt method with
-//! analytic derivatives. What the readings cannot tell stays at its nominal value, and is said to.
+//! analytic derivatives. What the readings cannot determine stays at its nominal value, and is said to.
 //! [`PressLimits::check`] refuses samples that no press can give, before a calibration or a training on them.
 
 mod covariance;

@@ -12,9 +12,9 @@ use super::{
 /// A sensor model fitted to readings of known deformations.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Calibration {
-    /// The fitted model; parameters that the readings do not tell have their nominal values.
+    /// The fitted model; parameters that the readings do not determine have their nominal values.
     pub model: SensorModel,
-    /// Every parameter with what the readings tell of it.
+    /// Every parameter with what the readings determine about it.
     pub parameters: Vec<CalibratedParameter>,
     /// Number of readings fitted.
     pub readings: usize,
@@ -25,7 +25,7 @@ pub struct Calibration {
     /// Root mean square of the relative errors of the fitted model's resistances.
     pub residual: f64,
     /// Singular values of the Jacobian of ln R by relative changes of the parameters, largest first, divided by the
-    /// residual: a pattern is known to one part in so many. 0 for a pattern that the readings do not see.
+    /// residual: a pattern is known to one part in this many. 0 for a pattern that the readings do not see.
     pub patterns: Vec<f64>,
     /// Signs that the readings are not those of such a sensor, with cause and cure.
     pub warnings: Vec<CalibrationWarning>,
@@ -47,10 +47,10 @@ pub struct CalibratedParameter {
 /// Standing of a calibrated value.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Standing {
-    /// The readings tell it: the true value is within ± this, in the parameter's unit. The intervals of all parameters
+    /// The readings determine it: the true value is within ± this, in the parameter's unit. The intervals of all parameters
     /// together hold with 95 % confidence (Bonferroni), given readings that follow Eq. (2).
     Told(f64),
-    /// The readings do not tell it to ±10 %: it keeps its nominal value.
+    /// The readings do not determine it to ±10 %: it keeps its nominal value.
     Held,
 }
 
@@ -61,10 +61,10 @@ impl Calibration {
 
     /// Fits geometry and resistivity of Eq. (2) to `samples`, starting from `nominal`.
     ///
-    /// What the readings tell is decided at a fit with the prior that nominal values are right to ±10 % (two standard
-    /// deviations), which any readings have; the parameters that they tell are then fitted without a prior.
+    /// What the readings determine is decided at a fit with the prior that nominal values are right to ±10 % (two standard
+    /// deviations), which any readings have; the parameters that they determine are then fitted without a prior.
     ///
-    /// Parameters that the readings do not tell to ±10 % are held at their nominal values, one after another, the least
+    /// Parameters that the readings do not determine to ±10 % are held at their nominal values, one after another, the least
     /// known first. The intervals of the others allow for nominal values wrong by ±10 %, for a misfit of single crossings
     /// and for a drift from frame to frame.
     ///
@@ -210,7 +210,7 @@ impl fmt::Display for CalibratedParameter {
             }
             Standing::Held => write!(
                 f,
-                "{parameter}: {} {unit}, its nominal value: these readings do not tell it",
+                "{parameter}: {} {unit}, its nominal value: these readings do not determine it",
                 short(*nominal)
             ),
         }

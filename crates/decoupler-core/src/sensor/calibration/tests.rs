@@ -135,7 +135,7 @@ fn what_one_row_cannot_tell_keeps_its_nominal_value() {
         .parameter(SensorParameter::RowPitch);
     assert_eq!(
         pitch.to_string(),
-        "row pitch: 1 mm, its nominal value: these readings do not tell it"
+        "row pitch: 1 mm, its nominal value: these readings do not determine it"
     );
 }
 

@@ -59,7 +59,7 @@ impl CalibrationWarning {
             .collect()
     }
 
-    /// The errors that all frames share, if they are large beside the noise: an analysis of variance of the residuals by
+    /// The errors that all frames share, if they are large next to the noise: an analysis of variance of the residuals by
     /// crossing.
     fn misfit(model: &SensorModel, references: &Slopes, samples: &[PressedRow], fitted: usize) -> Option<Self> {
         /// Systematic errors in proportion to the noise from which they count.

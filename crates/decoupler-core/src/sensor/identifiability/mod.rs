@@ -238,13 +238,13 @@ mod tests {
         }
     }
 
-    /// Four readings tell four of six patterns exactly; of the other two the whole prior remains.
+    /// Four readings determine four of six patterns exactly; of the other two the whole prior remains.
     #[test]
     fn unseen_patterns_remain_whole_without_noise() {
         let seen = at_rest(&SensorModel::new("2x6_3x4".parse().unwrap()), 1, Axes::Z);
         let share = seen.remaining_share(0.0, 0.3);
         assert!((share - (2.0_f64 / 6.0).sqrt()).abs() < 1e-12, "{share}");
-        // With a little noise the same, but for what that hides.
+        // With a little noise the same, except for what that hides.
         assert!((seen.remaining_share(1e-9, 0.3) - share).abs() < 1e-3);
         assert_eq!(seen.worst_spread_mm(0.0), f64::INFINITY);
     }

@@ -323,7 +323,7 @@ mod tests {
         normal_equations::{Decay, elimination::Elimination, products::Products},
     };
 
-    /// Solves at damping 1e-3 within so many iterations.
+    /// Solves at damping 1e-3 within this many iterations.
     fn solve(most_iterations: usize) -> Option<()> {
         let (mlp, examples) = (random_mlp(8, 12, 2, 1), random_examples(40, 8, 2, 2));
         let shape = mlp.shape();

@@ -53,7 +53,7 @@ impl Cost {
         work.parts(LARGE)
     }
 
-    /// About how many bytes the equations take, beside the samples.
+    /// About how many bytes the equations take, next to the samples.
     pub(super) fn bytes(&self) -> usize {
         let matrices = self.entries.saturating_mul(size_of::<f64>());
         let kept = KeptActivations::bytes(self.shape, self.samples)

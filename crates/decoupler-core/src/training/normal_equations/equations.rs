@@ -45,7 +45,7 @@ impl NormalEquations {
         }
     }
 
-    /// About how many bytes [`Self::cheapest`] takes, beside the samples.
+    /// About how many bytes [`Self::cheapest`] takes, next to the samples.
     pub(in crate::training) fn cheapest_bytes(shape: Shape, samples: usize) -> usize {
         if factoring_is_cheaper(shape, samples) {
             SchurComplement::cost(shape, samples).bytes()
@@ -71,7 +71,7 @@ impl NormalEquations<SchurComplement> {
         Self::with_solver(solver, &SchurComplement::cost(shape, examples.samples()), examples)
     }
 
-    /// About how many bytes [`Self::factored`] takes, beside the samples.
+    /// About how many bytes [`Self::factored`] takes, next to the samples.
     pub(in crate::training) fn factored_bytes(shape: Shape, samples: usize) -> usize {
         SchurComplement::cost(shape, samples).bytes()
     }

@@ -19,7 +19,7 @@ pub(in crate::training) trait HiddenSolver: Send + Sync {
     where
         Self: Sized;
 
-    /// Cost for a network of this shape and so many samples.
+    /// Cost for a network of this shape and this many samples.
     fn cost(shape: Shape, samples: usize) -> Cost
     where
         Self: Sized;

@@ -10,7 +10,7 @@ use crate::{
 
 /// The linear least-squares problem of the output layer: G V = H̃ᵀT, G = H̃ᵀH̃.
 ///
-/// It is solved as a correction of the present V, G δV = −H̃ᵀE, so that rounding errors in G are corrected at the next
+/// It is solved as a correction of the current V, G δV = −H̃ᵀE, so that rounding errors in G are corrected at the next
 /// solution instead of repeated.
 pub(super) struct OutputLayer {
     /// One for each part of the samples; once gathered, the first has the sums of all.
@@ -26,7 +26,7 @@ struct Sums {
 }
 
 impl OutputLayer {
-    /// Allocates for samples in so many `parts`.
+    /// Allocates for samples in this many `parts`.
     pub(super) fn new(shape: Shape, parts: usize) -> Self {
         let h1 = shape.hidden + 1;
         let sums = || Sums {

@@ -49,7 +49,7 @@ impl BlockBuffers {
 }
 
 impl Products {
-    /// Allocates for samples in so many `parts`.
+    /// Allocates for samples in this many `parts`.
     pub(super) fn new<S: HiddenSolver + ?Sized>(solver: &S, cost: &Cost, parts: usize) -> Self {
         let part = |_| {
             let buffers = BlockBuffers::new(cost.shape, solver.pairs_buffer());

@@ -244,7 +244,7 @@ fn squared_lower(matrix: &Mat<f64>) -> f64 {
     columns.flatten().map(|value| value * value).sum()
 }
 
-/// Fills the lower triangle of S, but for its damping: (V̄V̄ᵀ ⊗ 1) ∘ (BᵀB − F Fᵀ). `s` holds the columns of the nodes from
+/// Fills the lower triangle of S, except for its damping: (V̄V̄ᵀ ⊗ 1) ∘ (BᵀB − F Fᵀ). `s` holds the columns of the nodes from
 /// `first` on, from their diagonal down; `squares` has n1² entries for each of those nodes.
 fn fill_schur(terms: &Terms<'_>, first: usize, s: MatMut<'_, f64>, squares: &mut [f64]) {
     let nodes = s.ncols() / terms.n1;

@@ -9,7 +9,7 @@ use decoupler_core::{
 /// Answer of a decoder to a reading, and how much rounding can change it.
 #[derive(Clone, Debug)]
 pub(super) struct Exact {
-    /// Outputs, exact but for their own last digits.
+    /// Outputs, exact except for their own last digits.
     pub(super) answers: Vec<f64>,
     /// Sums of magnitudes by which rounding errors grow.
     pub(super) growth: Growth,

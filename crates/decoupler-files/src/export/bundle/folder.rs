@@ -6,7 +6,7 @@ use std::{
 use super::error::BundleError;
 use crate::export::{WriteError, unfinished::UnfinishedFolder};
 
-/// A folder that is filled under a temporary name beside its target and then renamed, so that it is there whole or not at
+/// A folder that is filled under a temporary name next to its target and then renamed, so that it is there whole or not at
 /// all. Dropped before [`Self::commit`], it leaves nothing.
 #[derive(Debug)]
 pub(super) struct AtomicFolder {
@@ -15,7 +15,7 @@ pub(super) struct AtomicFolder {
 }
 
 impl AtomicFolder {
-    /// Creates the temporary folder beside `target`, which must be missing or an empty folder.
+    /// Creates the temporary folder next to `target`, which must be missing or an empty folder.
     ///
     /// # Errors
     /// Something else is there, or its folder cannot be written.

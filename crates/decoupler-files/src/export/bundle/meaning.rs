@@ -99,7 +99,7 @@ impl Meaning {
         }
     }
 
-    /// Sentences with the names and units of own data, in lines of at most 100 characters that can stand in a comment of any
+    /// Sentences with the names and units of own data, in lines of at most 100 characters that can are in a comment of any
     /// language; none for an array.
     pub(super) fn legend(&self) -> Vec<String> {
         let Self::Own {

@@ -17,7 +17,7 @@ pub(super) struct Origin {
     pub(super) problem: Problem,
     /// Row-wires of the samples in ascending order, from 0, if they are known.
     pub(super) row_wires: Option<Vec<usize>>,
-    /// Names of the recordings, without the folders of whoever trained; empty for a simulated array.
+    /// Names of the recordings, without the folders of anyone who trained; empty for a simulated array.
     pub(super) files: Vec<String>,
     /// Errors of the linear baseline on the test samples.
     pub(super) errors_of_linear: TestErrors,

@@ -25,12 +25,12 @@ impl Tolerance {
     pub(super) const SINGLE: f64 = 1e-5;
 
     /// The usual limit. Where the `deviation` of an evaluation comes near it, because the decoder's own sums let rounding
-    /// errors grow so much, the bound on these: each of n numbers that are added up has a relative error of at most some
+    /// errors grow this much, the bound on these: each of n numbers that are added up has a relative error of at most some
     /// n units (N. J. Higham, Accuracy and Stability of Numerical Algorithms, section 3.1).
     pub(super) fn of(portable: &Portable, arithmetic: Arithmetic, growth: &Growth, deviation: f64) -> Self {
-        /// Other programs add up in another order, and may be so much closer or farther.
+        /// Other programs add up in another order, and may be this much closer or farther.
         const NEAR: f64 = 0.5;
-        // Beside the sums: difference, division, logarithm, weight and the function of a layer.
+        // Next to the sums: difference, division, logarithm, weight and the function of a layer.
         let operations = (portable.channels + portable.widest() + 10) as f64;
         let of_layer = |(index, growth): (usize, &f64)| growth * arithmetic.of_layer(index).unit_roundoff();
         let errors: f64 = growth.0.iter().enumerate().map(of_layer).sum();

@@ -1,4 +1,4 @@
-//! The scale of colours beside a picture.
+//! The scale of colours next to a picture.
 
 use std::ops::RangeInclusive;
 

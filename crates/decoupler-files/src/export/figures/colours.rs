@@ -22,7 +22,7 @@ pub(super) fn rgb(hue: Hue) -> Rgb {
     }
 }
 
-/// A colour so much paler, from 0 (itself) to 1 (white).
+/// A colour this much paler, from 0 (itself) to 1 (white).
 pub(super) fn pale(colour: Rgb, paler: f64) -> Rgb {
     colour.map(|part| (f64::from(part) + paler * (255.0 - f64::from(part))).round() as u8)
 }

@@ -46,7 +46,7 @@ impl Frame<'_> {
         }
         let (axis, range) = &self.y;
         let ticks = axis.ticks(range, (range.end() - range.start()) * NUMBER[1] / area.height);
-        // The name stands beside the longest number.
+        // The name is next to the longest number.
         let mut characters = 3;
         for &place in &ticks.places {
             let (y, text) = (self.y_at(place), axis.tick_text(place, ticks.step));

@@ -16,7 +16,7 @@ const BETWEEN: f64 = 14.0;
 /// Height of a line of the legend, in points.
 pub(super) const LINE: f64 = 1.6 * TEXT;
 
-/// Left end of each key and the line in which it stands, within so many points across.
+/// Left end of each key and the line in which it is, within this many points across.
 fn positions(keys: &[Key], width: f64) -> Vec<(f64, usize)> {
     let (mut left, mut line) = (0.0, 0);
     let position = |key: &Key| {

@@ -77,7 +77,7 @@ impl Picture {
         self.size
     }
 
-    /// The figure as SVG. Its text names the program's font and common ones to stand in for it.
+    /// The figure as SVG. Its text names the program's font and common ones to are in for it.
     pub fn svg(&self) -> &str {
         &self.svg
     }

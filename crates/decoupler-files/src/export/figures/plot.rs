@@ -73,7 +73,7 @@ pub(super) fn draw_plot(plot: &Plot, area: Area, canvas: &mut Canvas) {
     });
 }
 
-/// The words beside points.
+/// The words next to points.
 fn draw_point_labels(plot: &Plot, frame: &Frame<'_>, canvas: &mut Canvas) {
     // Most plots have none.
     if !plot.has_point_labels() {

@@ -32,7 +32,7 @@ const BAR_STEPS: usize = 64;
 const EDGE: Rgb = [0xa2, 0xa9, 0xb4];
 const WHITE: Rgb = [0xff; 3];
 
-/// Draws surfaces side by side, as wide as a page. A key to the colours stands at the right of the last card that it
+/// Draws surfaces side by side, as wide as a page. A key to the colours is at the right of the last card that it
 /// belongs to.
 pub(super) fn draw_surfaces(figure: &SurfaceFigure) -> Picture {
     let scales: Vec<ColourScale> = figure.surfaces.iter().map(Surface::scale).collect();

@@ -1,5 +1,5 @@
 //! Files of the folder that a sweep fills: `TRIAL.json`, the result of a trial, and `sweep-PLAN.json`, the trials to be
-//! trained. Both are named by the hash of what they stand for and never change, so any number of programs may write to
+//! trained. Both are named by the hash of what they are for and never change, so any number of programs may write to
 //! one folder.
 
 mod merging;

@@ -13,7 +13,7 @@ const KIND: DocumentKind = DocumentKind::SweepPlan;
 /// Beginning of the name of a plan file.
 pub(super) const PREFIX: &str = "sweep-";
 
-/// All trials of a specification, in its order, kept beside the results so that missing ones can be named.
+/// All trials of a specification, in its order, kept next to the results so that missing ones can be named.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SweepPlan {

@@ -97,7 +97,7 @@ impl Cell {
         }
     }
 
-    /// Returns the cell with every digit, empty where there is no number.
+    /// Returns the cell with every digit, empty where there is not a number.
     pub fn exact(&self) -> String {
         match self {
             Self::Text(text) => text.clone(),

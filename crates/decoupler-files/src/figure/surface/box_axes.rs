@@ -67,7 +67,7 @@ impl<'a> BoxAxes<'a> {
         let projection = Projection::fit(plot_box, camera, target);
         let near = [usize::from(projection.eye.x > 0.0), usize::from(projection.eye.y > 0.0)];
         let back = [1 - near[0], 1 - near[1]];
-        // The z axis stands on the left of the two upright edges of the outline.
+        // The z axis is on the left of the two upright edges of the outline.
         let outline = [[near[0], back[1]], [back[0], near[1]]];
         let screen_x = |corner: [usize; 2]| projection.point(plot_box.corner_mm(corner[0], corner[1], 0)).x;
         let upright = if screen_x(outline[0]) < screen_x(outline[1]) {

@@ -47,13 +47,13 @@ impl OrbitCamera {
         )
     }
 
-    /// Turned as if the plot were dragged by so many points to the right and down.
+    /// Turned as if the plot were dragged by this many points to the right and down.
     #[must_use]
     pub fn dragged(self, right: f32, down: f32) -> Self {
         self.turned(right * RADIANS_PER_POINT, down * RADIANS_PER_POINT)
     }
 
-    /// Turned by so many presses of an arrow key.
+    /// Turned by this many presses of an arrow key.
     #[must_use]
     pub fn stepped(self, right: f32, down: f32) -> Self {
         self.turned(right * RADIANS_PER_KEY, down * RADIANS_PER_KEY)
@@ -68,13 +68,13 @@ impl OrbitCamera {
         .clamped()
     }
 
-    /// Nearer by so many points of scrolling.
+    /// Nearer by this many points of scrolling.
     #[must_use]
     pub fn scrolled(self, points: f32) -> Self {
         self.zoomed((points * ZOOM_PER_POINT).exp())
     }
 
-    /// Nearer by so many presses of a key.
+    /// Nearer by this many presses of a key.
     #[must_use]
     pub fn zoomed_by_keys(self, presses: f32) -> Self {
         self.zoomed(ZOOM_PER_KEY.powf(presses))

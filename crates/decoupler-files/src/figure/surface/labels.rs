@@ -26,7 +26,7 @@ impl<'a> Labels<'a> {
         (self.measure)(text)
     }
 
-    /// Puts a text beside `anchor`, in the direction `away` (a unit vector) with `gap` between them. If the place is
+    /// Puts a text next to `anchor`, in the direction `away` (a unit vector) with `gap` between them. If the place is
     /// taken it moves on by up to `slide` points, or else stays away. Says whether it was placed.
     pub(super) fn beside(&mut self, anchor: Vec2, away: Vec2, gap: f32, slide: f32, text: &str) -> bool {
         let size = self.size(text);

@@ -231,7 +231,7 @@ mod tests {
     };
     use decoupler_core::surface::SurfaceMap;
 
-    /// Returns the distance from the eye to a triangle at a place on the screen; `None` beside it.
+    /// Returns the distance from the eye to a triangle at a place on the screen; `None` next to it.
     fn distance_at(place: Vec2, corners: [(Vec2, f32); 3]) -> Option<f32> {
         let [a, b, c] = corners.map(|(at, _)| at);
         let whole = (b - a).perp_dot(c - a);

@@ -151,7 +151,7 @@ fn is_hidden(node: DVec3, field: &Field<'_>, stage: &Stage<'_>) -> bool {
 /// it.
 fn line_of_sight(node: DVec3, sight: DVec3, grid: &Grid) -> impl Iterator<Item = (DVec3, usize)> {
     let (x_mm, y_mm) = (grid.x_mm(), grid.y_mm());
-    // Half a cell of the axis along which cells are crossed faster: however stretched the array, so many steps lead
+    // Half a cell of the axis along which cells are crossed faster: however stretched the array, this many steps lead
     // off the grid as it has points.
     let cells = |sight_mm: f64, points_mm: &[f64]| sight_mm.abs() / (points_mm[1] - points_mm[0]);
     let step = 0.5 / cells(sight.x, x_mm).max(cells(sight.y, y_mm)).max(0.5);

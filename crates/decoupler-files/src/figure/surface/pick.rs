@@ -54,7 +54,7 @@ fn cell(points_mm: &[f64], at_mm: f64) -> Option<usize> {
     (after > 0 && at_mm <= points_mm[points_mm.len() - 1]).then(|| (after - 1).min(points_mm.len() - 2))
 }
 
-/// Shares of the ray at which, seen from above, it crosses the lines of the grid, in its own units and order; `None` beside the grid.
+/// Shares of the ray at which, seen from above, it crosses the lines of the grid, in its own units and order; `None` next to the grid.
 fn crossings(field: &Field<'_>, ray: &Ray) -> Option<Vec<f64>> {
     if ray.direction.truncate() == glam::DVec2::ZERO {
         // Straight down it stays over one cell.
@@ -86,7 +86,7 @@ fn crossings(field: &Field<'_>, ray: &Ray) -> Option<Vec<f64>> {
     Some(crossings)
 }
 
-/// Height of the two triangles of a cell at a place; `None` beside it.
+/// Height of the two triangles of a cell at a place; `None` next to it.
 fn height_at([a, b, c, d]: [DVec3; 4], place: DVec3) -> Option<f64> {
     let along = |from: f64, to: f64, at: f64| (at - from) / (to - from);
     let (x, y) = (along(a.x, c.x, place.x), along(a.y, c.y, place.y));
@@ -212,7 +212,7 @@ mod tests {
         );
         assert!(
             ridge.pick(&sight.ray(DVec2::new(12.0, 22.0))).is_none(),
-            "beside the surface"
+            "next to the surface"
         );
     }
 
@@ -258,7 +258,7 @@ mod tests {
             for height_mm in [4.0, 4.37, 5.0] {
                 let at = sight.point(foot.with_z(height_mm));
                 let along = (sight.point(foot.with_z(4.0)) - sight.point(foot)).normalize();
-                // A pointer beside the line counts as on it.
+                // A pointer next to the line counts as on it.
                 for beside in [0.0, 9.0] {
                     match sight.height_mm(foot, 1.0, at + beside * along.perp()) {
                         Some(found_mm) => {

@@ -67,7 +67,7 @@ impl<'a> PlanAxes<'a> {
         plan
     }
 
-    /// Each tick: where it stands, which way it points, its number.
+    /// Each tick: the place of it, which way it points, its number.
     fn marks(&self, steps: [f64; 2]) -> Vec<(Vec2, Vec2, String)> {
         let x = self.ticks[0].iter().map(|&x| {
             let at = self.point(DVec2::new(x, self.min_mm.y)).x;

@@ -1,4 +1,4 @@
-//! Marks on a plateau, which is drawn at the end of the value axis for what lies beyond: a rim and hatching, so that nobody
+//! Marks on a plateau, which is drawn at the end of the value axis for what lies beyond: a rim and hatching, so that no one
 //! takes it for a height.
 
 use glam::DVec3;

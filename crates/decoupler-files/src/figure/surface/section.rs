@@ -35,7 +35,7 @@ impl SectionLine {
 
 impl Section {
     /// Returns the curve in which the plane cuts the surface of these `values` on a grid, linear between its points as the
-    /// surface is drawn; empty if it passes beside the grid.
+    /// surface is drawn; empty if it passes next to the grid.
     pub fn curve_mm(&self, grid: &Grid, values: &[f64]) -> Vec<DVec3> {
         let (across, along) = match self.line {
             SectionLine::RowWire(_) => (grid.x_mm(), grid.y_mm()),
@@ -49,7 +49,7 @@ impl Section {
             SectionLine::ColumnWire(_) => values[grid.index(along, across)],
         };
         let points = along.iter().enumerate().map(|(index, &at_mm)| {
-            // At a point of the grid a gap beside it does not matter.
+            // At a point of the grid a gap next to it does not matter.
             let height = match share {
                 0.0 => value(before, index),
                 _ => (1.0 - share) * value(before, index) + share * value(before + 1, index),
@@ -75,11 +75,11 @@ impl Section {
     }
 }
 
-/// The point of an ascending axis before a place, and the share of the way to the next; `None` beside the axis.
+/// The point of an ascending axis before a place, and the share of the way to the next; `None` next to the axis.
 fn cell(points_mm: &[f64], at_mm: f64) -> Option<(usize, f64)> {
     let after = points_mm.partition_point(|point| *point <= at_mm);
     let before = after.checked_sub(1)?;
-    // A wire through the nodes lies on a point of the grid but for rounding.
+    // A wire through the nodes lies on a point of the grid except for rounding.
     let pitch = points_mm.get(1)? - points_mm[0];
     if let Some(near) = [before, after].into_iter().find(|&near| {
         let point = points_mm.get(near);

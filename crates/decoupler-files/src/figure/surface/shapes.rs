@@ -39,7 +39,7 @@ pub struct Line {
 /// A line of text.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Text {
-    /// The room it takes; the text stands in its middle.
+    /// The room it takes; the text is in its middle.
     pub bounds: Bounds,
     /// The words.
     pub text: String,

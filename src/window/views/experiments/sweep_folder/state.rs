@@ -20,7 +20,7 @@ const FOLDER: FileWords = FileWords {
     extensions: &[],
 };
 
-/// The folder on show, if any, and the dialogs that ask for one.
+/// The current folder, if any, and the dialogs that ask for one.
 #[derive(Debug)]
 pub(in crate::window::views::experiments) struct SweepFolder {
     pub(super) open: Option<OpenFolder>,
@@ -29,7 +29,7 @@ pub(in crate::window::views::experiments) struct SweepFolder {
     chosen: Receiver<PathBuf>,
 }
 
-/// A folder on show.
+/// A displayed folder.
 #[derive(Debug)]
 pub(in crate::window::views::experiments) struct OpenFolder {
     pub(super) path: PathBuf,
@@ -41,7 +41,7 @@ pub(in crate::window::views::experiments) struct OpenFolder {
 }
 
 impl SweepFolder {
-    /// No folder. `wake` is called when there is news of one.
+    /// No folder. `wake` is called when there is events of one.
     pub(in crate::window::views::experiments) fn new(wake: Wake) -> Self {
         let (choices, chosen) = channel();
         Self {
@@ -61,7 +61,7 @@ impl SweepFolder {
         }
     }
 
-    /// The folder on show.
+    /// The current folder.
     pub(in crate::window::views::experiments) fn shown(&self) -> Option<&OpenFolder> {
         self.open.as_ref()
     }

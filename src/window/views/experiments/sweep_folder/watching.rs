@@ -10,15 +10,15 @@ use decoupler_files::export::{MergedSweep, SweepFiles};
 
 /// Shortest time between two looks at the folder.
 const BETWEEN_LOOKS: Duration = Duration::from_secs(1);
-/// Share of the time that reading may take: a look at a large folder is followed by so much longer a rest.
+/// Share of the time that reading may take: a look at a large folder is followed by this much longer a rest.
 const REST: u32 = 10;
 
-/// News of a folder.
+/// Events of a folder.
 #[derive(Debug)]
 pub(in crate::window::views::experiments) enum FolderEvent {
     /// It has changed, or why it cannot be read.
     Read(Result<Box<SweepTable>, String>),
-    /// Nobody looks at it any more, or why that ended.
+    /// No one looks at it any more, or why that ended.
     Ended(Result<(), String>),
 }
 
@@ -33,7 +33,7 @@ pub(super) fn watch(path: &Path, open: &Receiver<()>, report: &Report<FolderEven
                 Ok(_) => read(path),
                 Err(error) => Err(error.clone()),
             };
-            // Of tables that nobody has looked at, the newest is enough.
+            // Of tables that no one has looked at, the newest is enough.
             report.progress(FolderEvent::Read(table), |_, _| ());
             before = Some(files);
         }

@@ -113,7 +113,7 @@ fn curve_figure(found: &RecordingFindings, target: usize) -> PlotFigure {
     )
 }
 
-/// The learning curve on show.
+/// The learning curve displayed.
 pub(super) fn shown_curve_figure(study: &RecordingStudy) -> Option<PlotFigure> {
     let found = study.found.as_ref()?;
     let last = found.targets.len().checked_sub(1)?;

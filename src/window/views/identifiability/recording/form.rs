@@ -84,7 +84,7 @@ fn buttons_ui(ui: &mut Ui, study: &mut RecordingStudy, ready: Option<Setup>) {
         let cancel = ui.vertical_centered_justified(|ui| ui.add(ghost_button("■ Cancel")));
         if cancel
             .inner
-            .on_hover_text("Ends the work under way without a result (Ctrl+.).")
+            .on_hover_text(with_shortcut(ui, "Ends the work under way without a result", Key::Period))
             .clicked()
         {
             study.cancel();

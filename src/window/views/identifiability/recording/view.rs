@@ -14,7 +14,7 @@ use crate::window::{
 use decoupler_core::text::counted;
 use decoupler_files::import::Setup;
 
-const CHANGED: &str = "The recording or the settings have changed since: analyse again for the present ones.";
+const CHANGED: &str = "The recording or the settings have changed since: analyse again.";
 
 /// What the readings determine on the left; the learning curve and the cross-validation on the right.
 pub fn body_ui(ui: &mut Ui, study: &mut RecordingStudy, shared: &Shared) {

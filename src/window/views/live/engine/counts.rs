@@ -81,7 +81,7 @@ impl Tally {
         false
     }
 
-    /// Mean error of the answers shown lately, in millimetres.
+    /// Mean error of the answers shown recently, in millimetres.
     pub(super) fn error_mm(&self) -> Option<f64> {
         self.error_mm
     }

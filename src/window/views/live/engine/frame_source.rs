@@ -94,7 +94,7 @@ impl FrameSource {
         }))
     }
 
-    /// When the next frame is due, of a source that keeps time: `None` while it stands still.
+    /// When the next frame is due, of a source that keeps time: `None` while it is paused.
     pub(super) fn due(&self, now: Instant) -> Option<Instant> {
         match self {
             Self::Simulated(frames) => Some(frames.due()),

@@ -14,12 +14,12 @@ use crate::window::job::Report;
 const BETWEEN_SHOWN: Duration = Duration::from_micros(16_600);
 /// Longest wait for a line of a device between looks at commands.
 const BETWEEN_LOOKS: Duration = Duration::from_millis(20);
-/// Longest wait for a command of a source that stands still.
+/// Longest wait for a command of a source that is paused.
 const LONGEST_WAIT: Duration = Duration::from_secs(60);
 
 /// A source under way and what decodes it.
 pub(super) trait LiveSession {
-    /// When the next frame is due, of a source that keeps time: `None` while it stands still.
+    /// When the next frame is due, of a source that keeps time: `None` while it is paused.
     fn due(&self, now: Instant) -> Option<Instant>;
 
     /// Returns `true` for a source that comes by itself, and so may fall silent.

@@ -54,7 +54,7 @@ pub enum SourcePlan {
         at_s: f64,
         /// Recorded seconds per second.
         speed: f64,
-        /// False to stand still.
+        /// False to are paused.
         is_playing: bool,
     },
     /// A device or socket.
@@ -95,7 +95,7 @@ pub enum Command {
     Seek(f64),
     /// Replay at this speed.
     Speed(f64),
-    /// Go on, or stand still.
+    /// Go on, or are paused.
     Play(bool),
 }
 
@@ -233,7 +233,7 @@ pub struct TruthErrors {
 pub struct Counts {
     /// Frames decoded.
     pub decoded: u64,
-    /// Frames decoded in a second, lately.
+    /// Frames decoded in a second, recently.
     pub frames_per_second: f64,
     /// Median and 99th percentile of the time from reading a frame to its answer.
     pub latency: Option<[Duration; 2]>,
@@ -250,11 +250,11 @@ pub struct Counts {
 /// Place in a recording.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ReplayState {
-    /// Time of the frame on show, from the first, in seconds.
+    /// Time of the displayed frame, from the first, in seconds.
     pub at_s: f64,
     /// Time of the last frame, from the first, in seconds.
     pub length_s: f64,
-    /// False while it stands still.
+    /// False while it is paused.
     pub is_playing: bool,
 }
 

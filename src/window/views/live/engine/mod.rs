@@ -1,8 +1,8 @@
 //! The thread that decodes: a source gives frames, each is decoded as it comes, and the window is shown the latest.
 //!
 //! [`run`] is the loop; a [`LivePlan`] says what it decodes and by what, [`Command`]s change it on the way, and
-//! [`LiveEvent`]s tell of it. A [`LiveShown`] goes to the window only once the one before has been drawn, so that nothing
-//! queues up and no frame is drawn for nobody.
+//! [`LiveEvent`]s report it. A [`LiveShown`] goes to the window only once the one before has been drawn, so that nothing
+//! queues up and no frame is drawn for no one.
 
 mod counts;
 mod decoding;

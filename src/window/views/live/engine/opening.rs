@@ -19,7 +19,7 @@ pub(super) fn open(source: &Source, is_wanted: &dyn Fn() -> bool) -> Result<Opti
     let (send, opened) = channel();
     let wanted = source.clone();
     let open = move || {
-        // Nobody waits for a source that is no longer wanted.
+        // No one waits for a source that is no longer wanted.
         let _ = send.send(wanted.open());
     };
     let thread = thread::Builder::new().name("open source".to_owned()).spawn(open);

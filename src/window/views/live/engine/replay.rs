@@ -16,7 +16,7 @@ pub(super) struct ReplayFrames {
     /// Recorded seconds per second.
     speed: f64,
     is_playing: bool,
-    /// Recorded time at a moment, from which time goes on while it plays.
+    /// Recorded time at a moment, from which time continues while it plays.
     anchor: (f64, Instant),
     /// Index of the frame that comes next.
     next: usize,
@@ -67,7 +67,7 @@ impl ReplayFrames {
         self.speed = speed.clamp(*SPEEDS.start(), *SPEEDS.end());
     }
 
-    /// Goes on, from the beginning after the end, or stands still.
+    /// Continues, from the beginning after the end, or is paused.
     pub(super) fn play(&mut self, is_playing: bool, now: Instant) {
         if is_playing && self.next >= self.frames() {
             self.seek(0.0, now);
@@ -76,7 +76,7 @@ impl ReplayFrames {
         self.is_playing = is_playing;
     }
 
-    /// Shows the frame at a time in seconds after the first, and goes on from there if it plays.
+    /// Shows the frame at a time in seconds after the first, and continues from there if it plays.
     pub(super) fn seek(&mut self, at_s: f64, now: Instant) {
         let time_s = self.first_s() + at_s.max(0.0);
         self.next = self.recording.frame_at(time_s);
@@ -84,7 +84,7 @@ impl ReplayFrames {
         self.is_wanted = true;
     }
 
-    /// When the next frame is due; `None` while it stands still.
+    /// When the next frame is due; `None` while it is paused.
     pub(super) fn due(&self, now: Instant) -> Option<Instant> {
         if self.is_wanted {
             return Some(now);
@@ -94,7 +94,7 @@ impl ReplayFrames {
         Some(now + Duration::try_from_secs_f64(wait_s.max(0.0)).unwrap_or(Duration::MAX / 4))
     }
 
-    /// Writes the next frame, if it is due. Frames that nobody took in time are dropped.
+    /// Writes the next frame, if it is due. Frames that no one took in time are dropped.
     pub(super) fn next(&mut self, frame_ohm: &mut [f64], tally: &mut Tally, now: Instant) -> Option<Arrived> {
         if self.due(now)? > now {
             return None;

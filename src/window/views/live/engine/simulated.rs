@@ -39,7 +39,7 @@ impl SimulatedFrames {
         self.due
     }
 
-    /// Writes the next frame, if it is due. Frames that nobody took in time are dropped.
+    /// Writes the next frame, if it is due. Frames that no one took in time are dropped.
     pub(super) fn next(&mut self, frame_ohm: &mut [f64], tally: &mut Tally) -> Result<Option<Arrived>, String> {
         let now = Instant::now();
         if now < self.due {

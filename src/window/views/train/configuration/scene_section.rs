@@ -231,7 +231,7 @@ fn indenter_ui(ui: &mut Ui, indenter: &mut Indenter) {
 fn size_ui(ui: &mut Ui, draft: &SimulatedSettings) {
     let Ok(size) = draft.source.model_size() else { return };
     let text = format!(
-        "{}, {} a frame",
+        "{}, {} per frame",
         counted(size.unknowns, "unknown"),
         counted(size.equations, "equation")
     );

@@ -1,4 +1,4 @@
-//! Measures decoders in the background. It ends after the last, or after the one in hand when nobody waits for more.
+//! Measures decoders in the background. It ends after the last, or after the one in hand when no one waits for more.
 
 use std::{path::Path, sync::Arc};
 
@@ -40,8 +40,8 @@ impl DecoderMeasuring {
         }
     }
 
-    /// Takes news, forgets what is of a network that is another one by now, and measures the networks on show once they
-    /// stand still and their table is unfolded.
+    /// Takes events, forgets what is of a network that is another one by now, and measures the displayed networks once they
+    /// are paused and their table is unfolded.
     pub fn follow(&mut self, shared: &Shared, state: &mut DecodersState) {
         self.take_news(state);
         let standing = shared.run.as_ref().and_then(|run| {
@@ -74,7 +74,7 @@ impl DecoderMeasuring {
             .start(move |report| measure_all(&setup, networks, &test, report), News::Ended);
     }
 
-    /// Takes what the thread has to tell.
+    /// Takes what the thread has to report.
     fn take_news(&mut self, state: &mut DecodersState) {
         while let Some(news) = self.job.next_event() {
             match news {

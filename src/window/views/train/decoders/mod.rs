@@ -1,4 +1,4 @@
-//! Results of other decoders on the test set: measured on a thread of their own once a training stands still and the
+//! Results of other decoders on the test set: measured on a thread of their own once a training is paused and the
 //! user has unfolded their table, and shown as they come.
 
 mod measuring;

@@ -8,7 +8,7 @@ use decoupler_core::{
 pub struct DecodersState {
     /// True while the table is unfolded.
     pub is_open: bool,
-    /// Results for the training on show; none while it is running.
+    /// Results for the current training; none while it is running.
     pub measured: Option<Vec<DecoderResult>>,
 }
 
@@ -42,7 +42,7 @@ impl DecodersState {
         results.into_iter().any(|result| result.report.is_none())
     }
 
-    /// Takes news about one decoder.
+    /// Takes events about one decoder.
     pub fn take(&mut self, place: usize, report: Result<DecoderReport, String>) {
         if let Some(result) = self.measured.as_mut().and_then(|measured| measured.get_mut(place)) {
             result.report = Some(report);

@@ -84,7 +84,7 @@ impl Figure {
     }
 }
 
-/// The other decoders on the same test set, folded away until the user asks for them, beside the errors `limit` of the
+/// The other decoders on the same test set, folded away until the user asks for them, next to the errors `limit` of the
 /// Bayesian reference. `target` is the one whose errors are shown of a recording. Each decoder can be exported as one of
 /// `source`; returns the file asked for.
 pub fn decoders_ui(

@@ -8,7 +8,7 @@ use decoupler_files::figure::{
     ErrorBins, Hue, LineAt, LineStyle, PlotFigure, ReferenceLine, pair_address, pair_sample,
 };
 
-/// Returns the nodes of the snapshot on show that are lit together: those of the row-wire that is pointed at, and those
+/// Returns the displayed nodes of the snapshot that are lit together: those of the row-wire that is pointed at, and those
 /// whose errors the chosen bar holds.
 pub fn lit_nodes(view: &TrainView, shared: &Shared) -> Vec<usize> {
     let per_row = shared.test().map_or(0, |test| test.sensor.scale.nodes_per_row());
@@ -56,7 +56,7 @@ fn place_of_pair(view: &TrainView, shared: &Shared, pair: usize) -> Option<TestP
 }
 
 /// Actual and decoded value that stand out among those of the test set: of the node that is lit, or of the target and the
-/// sample on show of a recording.
+/// sample displayed of a recording.
 fn lit_pair(view: &TrainView, shared: &Shared) -> Option<(f64, f64)> {
     if let Some(test) = shared.recorded_test() {
         let at = [view.snapshot, view.target_of(test)];
@@ -83,7 +83,7 @@ pub fn with_lights(mut figure: PlotFigure, view: &TrainView, shared: &Shared) ->
         BottomTab::ErrorHistogram => {
             if let (Some((actual, decoded)), Some(plot)) = (lit_pair(view, shared), figure.plots.first_mut()) {
                 let name = if shared.recorded_test().is_some() {
-                    "sample on show"
+                    "displayed sample"
                 } else {
                     "node under the pointer"
                 };

@@ -113,7 +113,7 @@ impl SectionChoice {
     }
 }
 
-/// Returns the figure of the section through the surfaces on show.
+/// Returns the figure of the section through the displayed surfaces.
 pub fn section_of(choice: &SectionChoice, test: &TestView, frames: &Frames, look: Look) -> PlotFigure {
     fn cut(frame: &Frame) -> SectionNodes<'_> {
         SectionNodes {

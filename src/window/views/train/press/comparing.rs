@@ -7,7 +7,7 @@ use decoupler_core::{
     evaluation::{DecoderSet, Pressed, PressedAnswer},
 };
 
-/// Decoders beside the network.
+/// Decoders next to the network.
 const KINDS: [DecoderKind; 5] = [
     DecoderKind::Mean,
     DecoderKind::Ridge,
@@ -16,7 +16,7 @@ const KINDS: [DecoderKind; 5] = [
     DecoderKind::Newton,
 ];
 
-/// A decoder as it stands.
+/// A decoder as it is.
 #[derive(Debug)]
 pub(super) struct Compared {
     pub(super) kind: DecoderKind,
@@ -28,7 +28,7 @@ pub(super) struct Compared {
 
 type Fitted = (DecoderKind, Box<dyn Decoder>);
 
-/// News of the thread that fits decoders.
+/// Events of the thread that fits decoders.
 enum FitNews {
     Fitted(DecoderKind, Result<Box<dyn Decoder>, String>),
     Ended(Result<(), JobError>),
@@ -69,7 +69,7 @@ impl Comparing {
         &self.rows
     }
 
-    /// Takes news, and asks the decoders for what is pressed now.
+    /// Takes events, and asks the decoders for what is pressed now.
     pub(super) fn follow(&mut self, shown: Option<&Shown>) {
         self.take_news();
         let Some(shown) = shown else { return };

@@ -9,7 +9,7 @@ use super::{
 use crate::window::{test_view::TestView, views::train::drawn::Frames};
 use decoupler_core::scene::Touch;
 
-/// Deeper by a turn of the wheel of so many points: the whole stroke in about ten turns of a usual wheel.
+/// Deeper by a turn of the wheel of this many points: the whole stroke in about ten turns of a usual wheel.
 const SHARE_PER_POINT: f64 = 0.002;
 /// Deeper by a press of a key.
 const SHARE_PER_KEY: f64 = 0.05;
@@ -17,7 +17,7 @@ const SHARE_PER_KEY: f64 = 0.05;
 const POINTS_PER_STROKE: f64 = 120.0;
 
 impl PressState {
-    /// Does what mouse and keys mean in this frame, before anything of it is drawn. `frames` are those on show, and `lit` is
+    /// Does what mouse and keys mean in this frame, before anything of it is drawn. `frames` are those displayed, and `lit` is
     /// the node that the pointer lights up.
     pub fn take_pointer(&mut self, ctx: &Context, test: Option<&TestView>, frames: &Frames, lit: Option<usize>) {
         let nobody_types = ctx.memory(|memory| memory.focused().is_none())
@@ -81,7 +81,7 @@ impl PressState {
         let ray = target.sight.ray(points(at));
         let nodes_mm = &frames.actual.nodes_mm;
         let lit = lit.and_then(|node| Some((node, *nodes_mm.get(node)?)));
-        // Beside a lit node on a crest the line of sight may miss the surface, or meet it far behind: the node is meant.
+        // Next to a lit node on a crest the line of sight may miss the surface, or meet it far behind: the node is meant.
         let beside = lit.and_then(|(_, place)| ray.at_level(place.z));
         let met = match (target.surface.pick(&ray), beside, lit) {
             (Some(picked), Some(beside), Some((_, place))) if beside.distance(place) < picked.distance(place) => beside,

@@ -38,7 +38,7 @@ pub fn readings_head_ui(ui: &mut Ui, drops_percent: Option<&Array2<f64>>) {
     });
 }
 
-/// Readings of the surface on show as a map of row-wires and column-wires, in `colours` and with one row pointed out;
+/// Readings of the displayed surface as a map of row-wires and column-wires, in `colours` and with one row pointed out;
 /// `drops_percent` are their drops below those at rest. Returns the one under the pointer.
 pub fn readings_ui(
     ui: &mut Ui,

@@ -13,7 +13,7 @@ use decoupler_core::{
 /// Message of the thread to the window.
 type Trained = Result<Result<Option<Networks>, RunError>, JobError>;
 
-/// A small network for the sensor on show, trained in the background in a moment once somebody is about to press and there
+/// A small network for the sensor displayed, trained in the background in a moment once somebody is about to press and there
 /// is no other.
 #[derive(Debug)]
 pub struct ReadyNetwork {
@@ -46,7 +46,7 @@ impl ReadyNetwork {
         }
     }
 
-    /// Trains the network of the test set on show, unless it is there or too large to be trained in a moment.
+    /// Trains the network of the current test set, unless it is there or too large to be trained in a moment.
     pub(super) fn ask(&mut self, shared: &Shared) {
         let Some(settings) = settings_of(shared) else { return };
         if self.of == Some(settings) {
@@ -66,12 +66,12 @@ impl ReadyNetwork {
         );
     }
 
-    /// Returns true while the network of the test set on show is being trained.
+    /// Returns true while the network of the current test set is being trained.
     pub(super) fn is_awaited(&self, shared: &Shared) -> bool {
         self.of.is_some() && self.of == settings_of(shared) && self.job.is_under_way()
     }
 
-    /// The network, if it is that of the test set on show.
+    /// The network, if it is that of the current test set.
     pub(super) fn subject(&self, shared: &Shared) -> Option<Subject> {
         let settings = settings_of(shared).filter(|settings| self.of == Some(*settings))?;
         Some(Subject {
@@ -83,7 +83,7 @@ impl ReadyNetwork {
     }
 }
 
-/// Settings of the ready-made network for the test set on show; `None` where it would take long.
+/// Settings of the ready-made network for the current test set; `None` where it would take long.
 fn settings_of(shared: &Shared) -> Option<SimulatedSettings> {
     let settings = match (&shared.preview, &shared.run) {
         (Some(preview), _) => preview.settings,

@@ -27,7 +27,7 @@ pub struct PressState {
     pub hand: Hand,
     /// The finger that presses.
     pub finger: Finger,
-    /// The touch; `None` while the test set is on show.
+    /// The touch; `None` while the test set is displayed.
     pub(super) touch: Option<Touch>,
     /// Hold of the pointer, while its button is down.
     pub(super) grip: Option<Grip>,
@@ -67,12 +67,12 @@ impl PressState {
         self.touch.is_some()
     }
 
-    /// The touch; `None` while the test set is on show.
+    /// The touch; `None` while the test set is displayed.
     pub fn touch(&self) -> Option<&Touch> {
         self.touch.as_ref()
     }
 
-    /// The part of the touch that is shown; `None` while the test set is on show, or before the first answer.
+    /// The part of the touch that is shown; `None` while the test set is displayed, or before the first answer.
     pub fn shown(&self) -> Option<&Shown> {
         self.shown.as_ref().filter(|_| self.is_pressing())
     }
@@ -140,7 +140,7 @@ impl PressState {
         self.is_wanted |= self.hand == Hand::Press && drawn.response.hovered();
     }
 
-    /// Answers what is pressed; `result` is that of the network on show.
+    /// Answers what is pressed; `result` is that of the displayed network.
     pub fn follow(&mut self, shared: &Shared, result: Option<&RunResult>) {
         self.ready.take_news();
         if shared.source == SourceKind::Recording {
@@ -170,7 +170,7 @@ impl PressState {
         self.comparing.follow(self.shown.as_ref());
     }
 
-    /// The network on show, whose result is `result`; before there is one, the ready-made one.
+    /// The displayed network, whose result is `result`; before there is one, the ready-made one.
     fn subject(&self, shared: &Shared, result: Option<&RunResult>) -> Option<Subject> {
         match shared.shown_run().zip(result) {
             Some((run, result)) => Some(Subject {

@@ -25,6 +25,6 @@ pub(super) enum Grip {
         /// Height of the node, and of the pointer on the screen, when it was taken.
         begin: (f64, f32),
     },
-    /// The button went down beside the surface.
+    /// The button went down next to the surface.
     Missed,
 }

@@ -135,7 +135,7 @@ pub(super) fn remark(summary: &ColumnSummary, column: usize) -> Option<(String, 
             texts => format!(", and {} other cells", texts - 1),
         };
         return Some((
-            format!("line {line}, column {}: '{text}' is no number{others}", column + 1),
+            format!("line {line}, column {}: '{text}' is not a number{others}", column + 1),
             true,
         ));
     }

@@ -56,7 +56,7 @@ impl Draft {
         let of_tests = of_tests
             .iter()
             .flat_map(|test| std::iter::once(&test.data).chain(&test.join));
-        // The meanings of the columns stand beside the columns.
+        // The meanings of the columns are next to the columns.
         (import.time, import.group, import.row_wire) = (None, None, None);
         (import.inputs, import.targets) = (Vec::new(), Vec::new());
         let paths = files.iter().map(|file| file.path.clone());
@@ -172,7 +172,7 @@ impl Draft {
         given_up
     }
 
-    /// Gives all inputs, targets and unused columns of a file this meaning, but for those that hold no numbers.
+    /// Gives all inputs, targets and unused columns of a file this meaning, except for those that hold no numbers.
     pub(super) fn choose_all(&mut self, file: usize, meaning: Meaning) {
         for column in 0..self.files[file].meanings.len() {
             let of_column = &self.files[file].inspection.columns[column];
@@ -235,7 +235,7 @@ impl Draft {
         }
     }
 
-    /// Paths of the files, but for those of the test.
+    /// Paths of the files, except for those of the test.
     pub(super) fn paths(&self) -> Vec<PathBuf> {
         self.files.iter().map(|file| file.path.clone()).collect()
     }

@@ -85,7 +85,7 @@ impl ChosenPaths {
 }
 
 impl RecordingEditor {
-    /// Nothing open yet. `wake` is called when there is news.
+    /// Nothing open yet. `wake` is called when there is events.
     pub fn new(wake: &Wake) -> Self {
         Self {
             draft: None,

@@ -162,7 +162,7 @@ fn filter_ui(ui: &mut Ui, draft: &mut Draft) -> bool {
                 between them. Empty cells are missing anyway. Rows in which a cell that is used is missing are dropped.";
     let response = text_ui(ui, "Missing cells", hint, "-1, states.c5=-1", &mut draft.missing);
     let is_new = missing(&draft.missing) != draft.plan.import.missing;
-    // Also one that lost the focus while another view was on show.
+    // Also one that lost the focus while another view was displayed.
     let is_left = !response.has_focus() && is_new;
     if is_left {
         draft.plan.import.missing = missing(&draft.missing);

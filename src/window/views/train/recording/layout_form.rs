@@ -73,7 +73,7 @@ pub(super) fn layout_summary(draft: &Draft) -> String {
     }
 }
 
-/// The layout of files of text; changes `draft`. Returns true if the files are to be looked at anew.
+/// The layout of files of text; changes `draft`. Returns true if the files are to be looked at again.
 pub(super) fn layout_ui(ui: &mut Ui, draft: &mut Draft) -> bool {
     for file in &draft.files {
         if let Format::Text(dialect) = &file.format {

@@ -242,7 +242,7 @@ fn cost_ui(ui: &mut Ui, run: &RunView, result: &RunResult) {
     let mut rows = vec![(training, told(result.wall_time))];
     if epochs > 0 {
         let an_epoch = result.wall_time.map(|time| time.div_f64(epochs as f64));
-        rows.push(("An epoch", told(an_epoch)));
+        rows.push(("Time per epoch", told(an_epoch)));
     }
     rows.push(("Best epoch", result.best_epoch.to_string()));
     if let Some(time) = result.frame_time {

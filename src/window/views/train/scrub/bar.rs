@@ -33,7 +33,7 @@ pub fn scrub_bar_ui(ui: &mut Ui, scrub: &mut ScrubState, past: &PastNetworks) {
             let is_past = scrub.epoch().is_some();
             let button = ui.add_enabled(is_past, ghost_button("Latest").min_size(Vec2::new(0.0, space(6))));
             if button
-                .on_hover_text("Shows the latest network again. Export offers the one on show and the best.")
+                .on_hover_text("Shows the latest network again. Export offers the displayed network and the best.")
                 .clicked()
             {
                 scrub.show_latest();
@@ -80,7 +80,7 @@ fn epoch_slider_ui(ui: &mut Ui, scrub: &mut ScrubState, past: &PastNetworks, las
     if slider.double_clicked() {
         place = last;
     }
-    slider.widget_info(|| WidgetInfo::slider(true, epochs[place.min(last)] as f64, "Epoch of the network on show"));
+    slider.widget_info(|| WidgetInfo::slider(true, epochs[place.min(last)] as f64, "Epoch of the displayed network"));
     if place != shown {
         // The hand takes over from the replay.
         if scrub.is_replaying() {

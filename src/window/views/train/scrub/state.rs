@@ -14,7 +14,7 @@ use decoupler_core::{
 /// Time of a replay, in seconds.
 const REPLAY_SECONDS: f64 = 6.0;
 
-/// The past epoch on show, if one is.
+/// The displayed past epoch, if one is.
 #[derive(Debug)]
 pub struct ScrubState {
     /// The training that it is of.
@@ -40,7 +40,7 @@ impl ScrubState {
         }
     }
 
-    /// The result of the past epoch on show; `None` while the latest is.
+    /// The result of the displayed past epoch; `None` while the latest is.
     pub fn result(&self) -> Option<&RunResult> {
         self.result.as_ref().filter(|_| self.wanted.is_some())
     }
@@ -66,7 +66,7 @@ impl ScrubState {
         (self.wanted, self.replay) = (None, None);
     }
 
-    /// Replays from the epoch on show, or from the first one; or stops there.
+    /// Replays from the displayed epoch, or from the first one; or stops there.
     pub fn toggle_replay(&mut self, now_seconds: f64, past: &PastNetworks) {
         self.replay = match self.replay {
             Some(_) => None,
@@ -123,7 +123,7 @@ impl ScrubState {
         let Some(present) = &run.result else { return };
         let (past, networks, test) = (run.past.clone(), Arc::clone(&present.networks), run.test.clone());
         let (is_standing, source) = (present.is_standing, run.settings().source);
-        // The surface on show is laid there too, as with the training's own results.
+        // The displayed surface is laid there too, as with the training's own results.
         let snapshot = present.frame.as_ref().map_or(0, |(snapshot, _)| *snapshot);
         self.job.start(
             move |_| {

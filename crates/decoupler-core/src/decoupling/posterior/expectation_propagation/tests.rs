@@ -186,7 +186,7 @@ fn several_correlated_unknowns_agree_with_sampling() {
 }
 
 /// Models that converge soon and late, one whose numbers overflow, and one that begins with factors: alone, and in every
-/// lane beside the others.
+/// lane next to the others.
 #[test]
 fn models_side_by_side_have_the_bits_of_each_alone() {
     let mut rng = ChaCha8Rng::seed_from_u64(9);

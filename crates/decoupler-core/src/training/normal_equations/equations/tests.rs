@@ -77,7 +77,7 @@ fn the_step_is_that_of_the_dense_jacobian() {
     }
 }
 
-/// Decay that differs between the classes of weights, of output biases towards values of their own, beside the matrix
+/// Decay that differs between the classes of weights, of output biases towards values of their own, next to the matrix
 /// written out.
 #[test]
 fn every_class_of_weights_decays_at_its_own_rate() {

@@ -43,7 +43,7 @@ const HALF: f64 = 0.5;
 
 impl Change {
     pub(super) fn of(quantity: Quantity, units: f64, (low, high): (f64, f64), centre_ohm: f64) -> Self {
-        // Rounding to units takes readings at the limits so much further; of resistances, 1 is the smallest number.
+        // Rounding to units takes readings at the limits this much further; of resistances, 1 is the smallest number.
         let lowest = if quantity == Quantity::Raw { f64::MIN } else { 1.0 };
         let (low, high) = ((low * units - HALF).max(lowest), high * units + HALF);
         let origin = Twofold::from(centre_ohm) * Twofold::from(units);

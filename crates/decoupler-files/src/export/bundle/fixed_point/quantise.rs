@@ -232,7 +232,7 @@ impl FixedNetwork {
         Some((slope * error).min(2.0))
     }
 
-    /// Adds an output with so many units in 1. Returns the bound on its error in units, unless a weight is too large.
+    /// Adds an output with this many units in 1. Returns the bound on its error in units, unless a weight is too large.
     fn push_output(
         &mut self,
         network: &TwoLayers<'_>,
@@ -259,7 +259,7 @@ impl FixedNetwork {
     }
 }
 
-/// A bias with so many bits after the point, and its rounding error. The sum with products of the weights and numbers
+/// A bias with this many bits after the point, and its rounding error. The sum with products of the weights and numbers
 /// below 2^`input_bits` stays within 64 bits; `None` otherwise.
 fn whole_bias(bias: f64, bits: i32, weights: &[i32], input_bits: i32) -> Option<(i64, f64)> {
     let scale = 2.0_f64.powi(bits);
