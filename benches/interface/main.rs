@@ -67,7 +67,7 @@ impl Bench {
         };
         let begun = Instant::now();
         let (ctx, window) = (&self.ctx, &mut self.window);
-        window.take_news();
+        window.take_events();
         let mut output = ctx.run_ui(input, |ui| window.show_ui(ui));
         let shapes = std::mem::take(&mut output.shapes);
         let primitives = ctx.tessellate(shapes, output.pixels_per_point);

@@ -10,7 +10,7 @@ use super::{
 };
 use decoupler_core::{
     evaluation::pressed_rows,
-    sensor::{ArrayScale, Calibration, PressLimits, SensorModel, SensorParameter, Standing},
+    sensor::{ArrayScale, Calibration, ParameterStatus, PressLimits, SensorModel, SensorParameter},
 };
 use decoupler_files::export::{SensorFile, check_writable, format_number};
 
@@ -128,8 +128,8 @@ impl Report {
             nominal: fitted.nominal,
             value: fitted.value,
             half_width: match fitted.standing {
-                Standing::Told(half_width) => Some(half_width),
-                Standing::Held => None,
+                ParameterStatus::Determined(half_width) => Some(half_width),
+                ParameterStatus::Nominal => None,
             },
         };
         Self {

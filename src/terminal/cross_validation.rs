@@ -25,7 +25,7 @@ use decoupler_core::{
     },
 };
 use decoupler_files::{
-    export::{describe_standings, error_table},
+    export::{describe_determinacy, error_table},
     import::{Dropped, Plan, Recording, Setup, SetupSets},
 };
 
@@ -72,9 +72,9 @@ impl Train {
         self.import.save_recipe(setup)?;
         let set = &recording.set;
         let by = plan.division.by;
-        let dealt = Folds::by(set, folds, by, &mut settings.seed.rng(Stream::Split));
-        let dealt = dealt.map_err(|error| Failure::Arguments(error.to_string()))?;
-        let validated = CrossValidated::on_folds(settings, set, dealt, || false)?.expect("nothing cancels it");
+        let assigned = Folds::by(set, folds, by, &mut settings.seed.rng(Stream::Split));
+        let assigned = assigned.map_err(|error| Failure::Arguments(error.to_string()))?;
+        let validated = CrossValidated::on_folds(settings, set, assigned, || false)?.expect("nothing cancels it");
         let (mut optimism, mut end) = (Vec::new(), Ok(()));
         if by == SplitBy::Random {
             let honest = SplitBy::honest(set);
@@ -190,7 +190,7 @@ fn print_folds(
     let better = better(&problem, &scores);
     let mut warnings = recording.warnings.clone();
     warnings.extend(optimism);
-    warnings.extend(describe_standings(channels, &determined));
+    warnings.extend(describe_determinacy(channels, &determined));
     let remarks = channels.iter().zip(gains);
     warnings.extend(remarks.filter_map(|(channel, gain)| gain?.remark(&channel.name)));
     let fallbacks = channels.iter().zip(&better).filter(|(_, better)| **better != NETWORK);

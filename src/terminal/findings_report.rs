@@ -10,7 +10,7 @@ use super::{
 use decoupler_core::{
     evaluation::{
         Channel, RunSettings, TargetErrors,
-        recorded::{ChannelImportance, Determination, Findings, FittedModel, Interval, LearningCurve, Standing},
+        recorded::{ChannelImportance, Determinacy, Determination, Findings, FittedModel, Interval, LearningCurve},
     },
     text::capitalised,
 };
@@ -266,10 +266,10 @@ impl<'a> Target<'a> {
             unit: channel.unit.as_deref(),
             r2: r2(best.map(|(_, determination)| determination)),
             better: best.map(|(model, _)| name_of(model)),
-            standing: best.map(|(_, determination)| match determination.standing() {
-                Standing::Told => "determined",
-                Standing::HardlyTold => "weakly determined",
-                Standing::NotTold => "not determined",
+            standing: best.map(|(_, determination)| match determination.determinacy() {
+                Determinacy::Determined => "determined",
+                Determinacy::WeaklyDetermined => "weakly determined",
+                Determinacy::NotDetermined => "not determined",
             }),
             sentence: describe_target(name, of),
             r2_network: r2(of.network),

@@ -28,7 +28,7 @@ pub(super) struct FineTune {
     #[command(flatten)]
     frames: FrameArguments,
     /// Maximum number of epochs [default: those of the network's training]
-    #[arg(long, value_name = "N", value_parser = super::parsers::count(1..=StoppingRules::MOST_EPOCHS))]
+    #[arg(long, value_name = "N", value_parser = super::parsers::count(1..=StoppingRules::MAX_EPOCHS))]
     epochs: Option<usize>,
     /// File for the fine-tuned network
     #[arg(long, value_name = "FILE")]

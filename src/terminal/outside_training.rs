@@ -6,7 +6,7 @@ use decoupler_core::{
 };
 
 /// Lines that are listed one by one; a damaged file may have thousands.
-const MOST_LISTED: usize = 10;
+const MAX_LISTED: usize = 10;
 
 /// Lines with readings or targets outside the range seen in training, where a network extrapolates.
 pub(super) struct OutsideTraining<'a> {
@@ -59,7 +59,7 @@ impl<'a> OutsideTraining<'a> {
             return of_line;
         }
         self.outside += 1;
-        if self.listed.len() < MOST_LISTED {
+        if self.listed.len() < MAX_LISTED {
             let first_reading = outside().next().zip(range).map(|(channel, range)| {
                 let (name, extremes) = (&self.problem.inputs[channel], range.extremes(channel));
                 described(name, readings[channel], extremes)

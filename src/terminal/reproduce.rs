@@ -17,7 +17,7 @@ use super::{
 use decoupler_core::{
     dataset::{FoldUnit, Seed},
     evaluation::{
-        MOST_STARTS,
+        MAX_STARTS,
         experiments::{
             Axis, Experiment, ExperimentResults, PaperTable, TrialSamples, run_experiments, verdicts, worker_threads,
         },
@@ -52,9 +52,9 @@ pub(super) struct Reproduce {
     /// First seed
     #[arg(long, default_value_t = 0, value_parser = seed)]
     seed: u64,
-    #[arg(long, value_name = "N", value_parser = count(1..=StoppingRules::MOST_EPOCHS), help = defaults_help("Maximum number of epochs", |experiment| experiment.base.training.stopping.epochs))]
+    #[arg(long, value_name = "N", value_parser = count(1..=StoppingRules::MAX_EPOCHS), help = defaults_help("Maximum number of epochs", |experiment| experiment.base.training.stopping.epochs))]
     epochs: Option<usize>,
-    #[arg(long, value_name = "N", value_parser = count(1..=MOST_STARTS), help = defaults_help("Trainings of each network from different random weights; the one with the lowest validation error is kept", |experiment| experiment.base.starts))]
+    #[arg(long, value_name = "N", value_parser = count(1..=MAX_STARTS), help = defaults_help("Trainings of each network from different random weights; the one with the lowest validation error is kept", |experiment| experiment.base.starts))]
     starts: Option<usize>,
     /// Hidden nodes of Table 1 [default: 6,8,10,12,14,16]
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = count(1..=LARGEST_HIDDEN))]

@@ -42,7 +42,7 @@ pub(super) struct SceneArguments {
     #[arg(long, value_name = "OHM", value_parser = number)]
     noise_ohm: Option<f64>,
     /// Resolution of the analogue-to-digital converter, in bits
-    #[arg(long, value_name = "N", value_parser = count(1..=Noise::MOST_BITS as usize))]
+    #[arg(long, value_name = "N", value_parser = count(1..=Noise::MAX_BITS as usize))]
     adc_bits: Option<usize>,
     /// Gain error shared by all readings of a snapshot, e.g. from temperature (standard deviation, relative)
     #[arg(long, value_name = "REL", value_parser = number)]

@@ -130,7 +130,12 @@ impl Simulate {
             let of_network = remarks
                 .filter(|(row, _)| *row == "network")
                 .map(|(_, remark)| remark.to_string());
-            for warning in run.flaw().map(|flaw| flaw.to_string()).into_iter().chain(of_network) {
+            for warning in run
+                .defect()
+                .map(|defect| defect.to_string())
+                .into_iter()
+                .chain(of_network)
+            {
                 eprintln!("Warning: {warning}");
             }
             Some(run.network())

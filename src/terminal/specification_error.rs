@@ -5,7 +5,7 @@ use thiserror::Error;
 use decoupler_core::text::system_cause;
 
 /// Most trials of a sweep. Every program that works on one reads all of them.
-pub(super) const MOST_TRIALS: usize = 100_000;
+pub(super) const MAX_TRIALS: usize = 100_000;
 
 /// Errors of a specification.
 #[derive(Debug, Error)]
@@ -24,6 +24,6 @@ pub(super) enum SpecificationError {
         place: String,
         message: String,
     },
-    #[error("'{}': its axes have more than {MOST_TRIALS} combinations; give fewer values, or several specifications", .0.display())]
+    #[error("'{}': its axes have more than {MAX_TRIALS} combinations; give fewer values, or several specifications", .0.display())]
     TooMany(PathBuf),
 }

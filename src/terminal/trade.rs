@@ -45,7 +45,7 @@ pub(super) struct Trade {
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = method())]
     method: Vec<Method>,
     /// Maximum number of epochs [default: those of the preset; 300 for a recording]
-    #[arg(long, value_name = "N", value_parser = count(1..=StoppingRules::MOST_EPOCHS))]
+    #[arg(long, value_name = "N", value_parser = count(1..=StoppingRules::MAX_EPOCHS))]
     epochs: Option<usize>,
     /// Training samples [default: those of the preset]
     #[arg(long, value_name = "N", value_parser = count(1..=LARGEST_SAMPLES))]

@@ -91,12 +91,12 @@ impl Train {
                 Err(failure) => end = Err(failure),
             }
         }
-        let flaw = run.flaw();
+        let defect = run.defect();
         let reported = self.report.as_ref().map_or(Ok(()), |path| {
             let report = RunReport {
                 name: None,
                 file: &file,
-                flaw: flaw.as_ref(),
+                defect: defect.as_ref(),
                 decoders: &decoders,
                 test: run.test(),
             };

@@ -27,7 +27,7 @@ use decoupler_core::{
 };
 use decoupler_files::{
     export::{
-        NetworkFile, TrainingRecord, decoder_table, describe_standings, describe_worse_than_ridge, error_table,
+        NetworkFile, TrainingRecord, decoder_table, describe_determinacy, describe_worse_than_ridge, error_table,
         format_duration,
     },
     import::SetupSets,
@@ -268,8 +268,8 @@ impl<'a> Trained<'a> {
             .map(ToString::to_string)
             .chain(of_import.into_iter().flatten())
             .chain(self.optimism.iter().cloned())
-            .chain(self.run.flaw().map(|flaw| flaw.to_string()))
-            .chain(describe_standings(&self.file.problem.targets, determined))
+            .chain(self.run.defect().map(|defect| defect.to_string()))
+            .chain(describe_determinacy(&self.file.problem.targets, determined))
             .chain(describe_worse_than_ridge(problem, scores, settings.training.method))
             .collect()
     }

@@ -11,7 +11,7 @@ use super::{
 };
 use decoupler_core::{
     dataset::{LARGEST_SAMPLES, Seed},
-    evaluation::{MOST_STARTS, RunSettings, SimulatedSettings, Simulation, Source},
+    evaluation::{MAX_STARTS, RunSettings, SimulatedSettings, Simulation, Source},
     network::LARGEST_HIDDEN,
     sensor::{ArrayScale, SensorModel},
     training::{Method, StoppingRules, TrainingSettings},
@@ -30,7 +30,7 @@ pub(super) struct TrainingArguments {
     #[arg(long, value_name = "N", value_parser = count(1..=LARGEST_HIDDEN))]
     hidden: Option<usize>,
     /// Number of trainings from different random weights; the one with the lowest validation error is kept [default: 1]
-    #[arg(long, value_name = "N", value_parser = count(1..=MOST_STARTS))]
+    #[arg(long, value_name = "N", value_parser = count(1..=MAX_STARTS))]
     starts: Option<usize>,
     /// Training method [default: lm; br for a recording]
     #[arg(long, value_parser = method())]
@@ -38,13 +38,13 @@ pub(super) struct TrainingArguments {
     #[arg(long = "set", value_name = "NAME=VALUE", value_parser = assignment, help = settings_help())]
     set: Vec<(String, f64)>,
     /// Maximum number of epochs [default: 1000; 300 for a recording]
-    #[arg(long, value_name = "N", value_parser = count(1..=StoppingRules::MOST_EPOCHS))]
+    #[arg(long, value_name = "N", value_parser = count(1..=StoppingRules::MAX_EPOCHS))]
     epochs: Option<usize>,
     /// Training error (mse, scaled) at which training ends [default: 0]
     #[arg(long, value_name = "MSE", value_parser = number)]
     goal: Option<f64>,
     /// Validation failures, epochs without a new best validation error, that end training [default: 6]
-    #[arg(long, value_name = "N", value_parser = count(1..=StoppingRules::MOST_EPOCHS))]
+    #[arg(long, value_name = "N", value_parser = count(1..=StoppingRules::MAX_EPOCHS))]
     max_fail: Option<usize>,
     /// Norm of the gradient below which training ends [default: 1e-7]
     #[arg(long, value_name = "LENGTH", value_parser = number)]

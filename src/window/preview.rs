@@ -39,12 +39,12 @@ pub fn compare(job: &mut Job<PreviewEvent>, settings: SimulatedSettings) {
 /// Returns the baselines of the settings; none where measuring them would keep the next request waiting.
 fn baselines(settings: &SimulatedSettings, is_cancelled: &dyn Fn() -> bool) -> Option<Baselines> {
     /// About a tenth of a second.
-    const MOST_TERMS: usize = 50_000_000;
+    const MAX_TERMS: usize = 50_000_000;
     let scale = settings.source.sensor.scale;
     let samples = settings.source.samples + settings.source.validation_samples + settings.source.test_samples;
     let resistances = scale.nodes_per_row() * scale.nodes_per_column() * scale.columns();
     let linear_map = scale.columns() * (scale.columns() + scale.coordinates_per_row());
-    if samples.saturating_mul(resistances + linear_map) > MOST_TERMS {
+    if samples.saturating_mul(resistances + linear_map) > MAX_TERMS {
         return None;
     }
     // They depend on neither the network nor its method, so the cheapest ones do.

@@ -276,7 +276,11 @@ fn keys_train_and_walk_the_snapshots() {
     driver.wait("the end of the training", |driver| {
         matches!(driver.state().phase, Phase::Ended(_))
     });
-    assert_eq!(driver.views().train.snapshot, 1, "training keeps the displayed snapshot");
+    assert_eq!(
+        driver.views().train.snapshot,
+        1,
+        "training keeps the displayed snapshot"
+    );
     driver.settle();
 }
 

@@ -46,7 +46,7 @@ const DISMISS: &str = "Dismiss";
 const SCROLLING: usize = 5;
 
 /// Number of frames after which a window that still asks for more never comes to rest.
-const MOST_FRAMES: u64 = 100;
+const MAX_FRAMES: u64 = 100;
 
 /// The window and hands to work it.
 pub(crate) struct Driver {
@@ -114,7 +114,7 @@ impl Driver {
         };
         let frame = move |ui: &mut Ui, window: &mut Option<DecouplerWindow>| {
             let window = window.get_or_insert_with(|| made.take().unwrap());
-            window.take_news();
+            window.take_events();
             // The harness leaves a margin, which a real window has not.
             let whole = ui.content_rect();
             let mut root = ui.new_child(UiBuilder::new().max_rect(whole));
@@ -124,7 +124,7 @@ impl Driver {
         let builder = Harness::builder().with_size(size).with_context_setup(set_up);
         let builder = builder.renderer(Rasteriser::default()).with_render_cursor(false);
         // News from threads that work meanwhile may ask for some frames more.
-        let builder = builder.with_max_steps(MOST_FRAMES);
+        let builder = builder.with_max_steps(MAX_FRAMES);
         let harness = builder.build_ui_state(frame, None);
         let mut driver = Self { harness, asked };
         driver.wait("the first surface", |driver| {
@@ -221,9 +221,9 @@ impl Driver {
     /// Whether the window comes to draw no more frames: it asks for none, at no delay. A thread that has events meanwhile may
     /// ask for one; a window that does not rest asks in every frame.
     pub(crate) fn comes_to_rest(&mut self) -> bool {
-        const MOST_NEWS: usize = 20;
+        const MAX_NEWS: usize = 20;
         self.harness.run();
-        (0..MOST_NEWS).any(|_| {
+        (0..MAX_NEWS).any(|_| {
             self.asked.try_iter().for_each(drop);
             self.harness.step();
             self.asked.try_iter().next().is_none()

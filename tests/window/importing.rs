@@ -219,7 +219,7 @@ fn a_checkpoint_goes_on_as_if_it_had_never_stopped() {
     other.click_button("Continue");
     other.wait("the end", |driver| {
         let result = driver.state().result();
-        result.is_some_and(|result| result.is_standing && result.epochs_run == 5)
+        result.is_some_and(|result| result.is_idle && result.epochs_run == 5)
     });
     let run = trained(&plan(&path));
     assert_eq!(other.state().result().unwrap().errors, run.errors());

@@ -70,7 +70,7 @@ impl Driver {
         self.click("▶ Train");
         self.wait("the end of the training", |driver| {
             let result = driver.state().result();
-            matches!(driver.state().phase, Phase::Ended(_)) && result.is_some_and(|result| result.is_standing)
+            matches!(driver.state().phase, Phase::Ended(_)) && result.is_some_and(|result| result.is_idle)
         });
         self.settle();
     }

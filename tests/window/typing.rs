@@ -52,7 +52,7 @@ fn what_cannot_be_taken_is_refused_in_place_and_the_old_value_stays() {
 }
 
 #[test]
-fn news_above_a_field_does_not_interrupt_who_types_in_it() {
+fn a_notice_above_a_field_does_not_interrupt_who_types_in_it() {
     let mut driver = Driver::open();
     driver.enter("Array scale", "20×20_5×60");
     driver.click_button("x, y, z");

@@ -9,7 +9,7 @@ use decoupler_core::{
     evaluation::{Errors, Preset, Run, SimulatedSettings, fine_tune, pressed_rows, rebased},
     network::Networks,
     scene::{Loading, Noise},
-    sensor::{Calibration, SensorModel, SensorParameter, Standing},
+    sensor::{Calibration, ParameterStatus, SensorModel, SensorParameter},
 };
 
 fn main() -> Result<(), Box<dyn Error>> {
@@ -76,8 +76,8 @@ fn coverage(
         let holds = SensorParameter::ALL.map(|parameter| {
             let (fitted, truth) = (calibration.parameter(parameter), parameter.of(real));
             match fitted.standing {
-                Standing::Told(half_width) => (fitted.value - truth).abs() <= half_width,
-                Standing::Held => fitted.value == truth,
+                ParameterStatus::Determined(half_width) => (fitted.value - truth).abs() <= half_width,
+                ParameterStatus::Nominal => fitted.value == truth,
             }
         });
         for (count, holds) in of_each.iter_mut().zip(holds) {

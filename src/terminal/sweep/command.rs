@@ -54,7 +54,7 @@ pub(in crate::terminal) struct Sweep {
     #[arg(long, value_name = "I/N", conflicts_with_all = ["merge", "engine"])]
     shard: Option<Shard>,
     /// Number of trials trained at the same time, each on one thread [default: number of cores]
-    #[arg(long, value_name = "N", value_parser = count(1..=MOST_THREADS), conflicts_with_all = ["merge", "engine"])]
+    #[arg(long, value_name = "N", value_parser = count(1..=MAX_THREADS), conflicts_with_all = ["merge", "engine"])]
     threads: Option<usize>,
     /// Print a script that has this program distribute the trials, and train nothing
     #[arg(
@@ -66,7 +66,7 @@ pub(in crate::terminal) struct Sweep {
     )]
     engine: Option<Engine>,
     /// Number of jobs in the script [default: one for each trial, at most 1000]
-    #[arg(long, value_name = "N", value_parser = count(1..=MOST_JOBS), requires = "engine")]
+    #[arg(long, value_name = "N", value_parser = count(1..=MAX_JOBS), requires = "engine")]
     jobs: Option<usize>,
     /// Write one table of all trials in these folders, and name those that are missing or conflict
     #[arg(long, value_name = "DIR", num_args = 1..)]
@@ -76,8 +76,8 @@ pub(in crate::terminal) struct Sweep {
     json: bool,
 }
 
-const MOST_THREADS: usize = 1024;
-const MOST_JOBS: usize = 100_000;
+const MAX_THREADS: usize = 1024;
+const MAX_JOBS: usize = 100_000;
 
 #[derive(Serialize)]
 struct FilledReport {
@@ -100,7 +100,7 @@ impl Sweep {
             (Some(specification), None) => self.fill(&Trials::read(specification)?),
             (Some(specification), Some(engine)) => {
                 let trials = Trials::read(specification)?.count();
-                let jobs = self.jobs.unwrap_or(Engine::MOST_JOBS).min(trials);
+                let jobs = self.jobs.unwrap_or(Engine::MAX_JOBS).min(trials);
                 let script = engine.script(specification, &self.out, trials, jobs)?;
                 print(|output| write!(output, "{script}"))
             }

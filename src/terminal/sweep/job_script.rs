@@ -19,7 +19,7 @@ pub(super) enum Engine {
 
 impl Engine {
     /// Most jobs of a script unless asked for: Slurm's own limit on arrays, in its default configuration.
-    pub(super) const MOST_JOBS: usize = 1000;
+    pub(super) const MAX_JOBS: usize = 1000;
 
     /// Script that has this engine train the trials of `specification` in this many jobs, each of one thread.
     pub(super) fn script(

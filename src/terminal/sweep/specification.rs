@@ -8,7 +8,7 @@ use serde::Deserialize;
 use serde_json::Value;
 
 use super::{train_options::TrainOptions, unique_keys::UniqueKeys};
-use crate::terminal::specification_error::{MOST_TRIALS, SpecificationError};
+use crate::terminal::specification_error::{MAX_TRIALS, SpecificationError};
 use decoupler_files::import::Plan;
 
 /// Largest file of a specification, in bytes.
@@ -150,7 +150,7 @@ impl Specification {
         let counts = self.axes.iter().map(|axis| axis.values.len());
         let count = counts.into_iter().try_fold(1, usize::checked_mul);
         count
-            .filter(|count| *count <= MOST_TRIALS)
+            .filter(|count| *count <= MAX_TRIALS)
             .ok_or_else(|| SpecificationError::TooMany(self.path.clone()))
     }
 

@@ -273,13 +273,13 @@ fn question_ui(ui: &Ui, question: &Question) -> Option<Answer> {
     /// Height of a line, in points.
     const LINE: f32 = space(6);
     /// Lines to which the list grows before it is scrolled.
-    const MOST_LINES: usize = 8;
+    const MAX_LINES: usize = 8;
     /// Least width of the buttons, in points, so that another name changes no place.
     const BUTTON: f32 = space(34);
     const SAVE: &str = "Save checkpoints and close…";
     const STAY: &str = "Stay";
     card_ui(ui, "Close while work is in progress?", |ui| {
-        let height = LINE * question.height.min(MOST_LINES) as f32;
+        let height = LINE * question.height.min(MAX_LINES) as f32;
         let list = ScrollArea::vertical().max_height(height).min_scrolled_height(height);
         list.auto_shrink([false, false]).show(ui, |ui| {
             ui.spacing_mut().item_spacing.y = 0.0;

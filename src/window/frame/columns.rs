@@ -18,11 +18,11 @@ const REPORT_POINTS: f32 = space(96);
 const REPORT_LIMITS_POINTS: RangeInclusive<f32> = space(82)..=space(140);
 
 /// Least width of the middle, which columns drawn wider leave to it.
-const LEAST_MIDDLE_POINTS: f32 = space(176);
+const MIN_MIDDLE_POINTS: f32 = space(176);
 
 /// Widths of the columns in this window: those that the user has drawn, as far as the middle allows.
 pub(super) fn widths_points(columns: &Columns, remembered: &Remembered, window: f32) -> [f32; 2] {
-    let room = window - LEAST_MIDDLE_POINTS;
+    let room = window - MIN_MIDDLE_POINTS;
     let beside = if columns.has_report {
         *REPORT_LIMITS_POINTS.start()
     } else {
@@ -92,7 +92,7 @@ mod tests {
                 assert!(FORM_POINTS.contains(&form) && REPORT_LIMITS_POINTS.contains(&report));
                 let is_least = (form, report) == (*FORM_POINTS.start(), *REPORT_LIMITS_POINTS.start());
                 assert!(
-                    window - form - report >= LEAST_MIDDLE_POINTS || is_least,
+                    window - form - report >= MIN_MIDDLE_POINTS || is_least,
                     "{form}, {report} of {window}"
                 );
             }

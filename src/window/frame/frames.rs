@@ -17,7 +17,7 @@ pub(super) fn changes_something(ctx: &Context) -> bool {
 
 impl eframe::App for DecouplerWindow {
     fn logic(&mut self, _ctx: &Context, _frame: &mut eframe::Frame) {
-        self.take_news();
+        self.take_events();
     }
 
     fn ui(&mut self, ui: &mut Ui, _frame: &mut eframe::Frame) {

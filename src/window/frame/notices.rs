@@ -1,7 +1,7 @@
 use crate::window::shared::{Matter, Notice};
 
 /// Most notices at a time: they take their room from the view below.
-const MOST: usize = 4;
+const MAX: usize = 4;
 
 /// Time after which a notice that something worked closes by itself, from when it was first shown.
 const DONE_SECONDS: f64 = 10.0;
@@ -36,9 +36,9 @@ impl Notices {
             notice,
             since: None,
         });
-        if told.len() > MOST {
+        if told.len() > MAX {
             // The newest is never the one to go.
-            let oldest = told[..MOST].iter().position(Told::is_done).unwrap_or(0);
+            let oldest = told[..MAX].iter().position(Told::is_done).unwrap_or(0);
             told.remove(oldest);
         }
     }

@@ -4,7 +4,7 @@ use thiserror::Error;
 
 use super::{
     DecouplerWindow, Desktop,
-    remembered::{LEAST_SIZE_POINTS, Remembered, WindowFile},
+    remembered::{MIN_SIZE_POINTS, Remembered, WindowFile},
 };
 
 /// Reasons for which the window cannot open.
@@ -49,7 +49,7 @@ pub fn open() -> Result<(), OpenError> {
         .with_title("Decoupler")
         .with_app_id("decoupler")
         .with_inner_size(size_points)
-        .with_min_inner_size(LEAST_SIZE_POINTS);
+        .with_min_inner_size(MIN_SIZE_POINTS);
     if let Ok(icon) = icon {
         viewport = viewport.with_icon(icon);
     }

@@ -17,7 +17,7 @@ use decoupler_files::{
 const DEFAULT_SIZE_POINTS: [f32; 2] = [1440.0, 900.0];
 
 /// The least size of a window, in points.
-pub(super) const LEAST_SIZE_POINTS: [f32; 2] = [960.0, 640.0];
+pub(super) const MIN_SIZE_POINTS: [f32; 2] = [960.0, 640.0];
 
 /// State of a window that the next one finds again: each value only once the user has had it so.
 ///
@@ -99,7 +99,7 @@ impl Remembered {
     /// Width and height with which the window opens; the window system keeps them to the screen.
     pub(super) fn opening_size_points(&self) -> [f32; 2] {
         let is_possible = |size: &[f32; 2]| {
-            let mut sides = size.iter().zip(LEAST_SIZE_POINTS);
+            let mut sides = size.iter().zip(MIN_SIZE_POINTS);
             sides.all(|(side, least)| side.is_finite() && *side >= least)
         };
         self.size_points.filter(is_possible).unwrap_or(DEFAULT_SIZE_POINTS)

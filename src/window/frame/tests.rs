@@ -53,7 +53,7 @@ impl Opened {
     #[track_caller]
     fn wait(&mut self, holds: impl Fn(&DecouplerWindow) -> bool) {
         loop {
-            self.window.take_news();
+            self.window.take_events();
             if holds(&self.window) {
                 return;
             }

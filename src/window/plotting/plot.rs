@@ -26,7 +26,7 @@ const SPAN_TINT: f32 = 0.12;
 const NUMBER_WIDTH: f64 = 50.0;
 const NUMBER_HEIGHT: f64 = 16.0;
 /// The least distance of grid lines, in points; the plot tells its scale by it.
-const LEAST_GRID: f32 = 8.0;
+const MIN_GRID: f32 = 8.0;
 /// Points of a stepped line closer than this part of an axis are one: a sharp turn between them would be a spike.
 const COINCIDENT: f64 = 5e-4;
 
@@ -54,7 +54,7 @@ pub(super) fn plot_ui(ui: &mut Ui, id: Id, plot: &Plot, pointer: Pointer) -> (Pl
         .custom_y_axes(vec![axis_hints(AxisHints::new_y(), &plot.y, 12.0)])
         .x_grid_spacer(|input| marks(&plot.x, &input, NUMBER_WIDTH))
         .y_grid_spacer(|input| marks(&plot.y, &input, NUMBER_HEIGHT))
-        .grid_spacing(Rangef::new(LEAST_GRID, 300.0))
+        .grid_spacing(Rangef::new(MIN_GRID, 300.0))
         .show_background(false)
         .grid_color(palette.line)
         .allow_scroll(false)
@@ -98,7 +98,7 @@ pub(super) fn plot_ui(ui: &mut Ui, id: Id, plot: &Plot, pointer: Pointer) -> (Pl
 /// The ticks in view.
 fn marks(axis: &PlotAxis, input: &GridInput, number: f64) -> Vec<GridMark> {
     // What a number takes on the axis.
-    let apart = input.base_step_size * number / f64::from(LEAST_GRID);
+    let apart = input.base_step_size * number / f64::from(MIN_GRID);
     let ticks = axis.ticks(&(input.bounds.0..=input.bounds.1), apart);
     let step_size = ticks.step;
     let mark = |value| GridMark { value, step_size };

@@ -238,7 +238,7 @@ fn report_task(source: &NetworkSource, decoders: Vec<DecoderReport>) -> FileTask
         NetworkSource::Kept(name, _) => Some(name.clone()),
     };
     source.task(REPORT, "report", move |file, run| {
-        let flaw = run.and_then(Run::flaw);
+        let defect = run.and_then(Run::defect);
         let test = run.map(|run| Arc::clone(run.test()));
         let (name, decoders) = (name.clone(), decoders.clone());
         Contents::new(move |path: &Path| {
@@ -249,7 +249,7 @@ fn report_task(source: &NetworkSource, decoders: Vec<DecoderReport>) -> FileTask
             let report = RunReport {
                 name: name.as_deref(),
                 file: &file,
-                flaw: flaw.as_ref(),
+                defect: defect.as_ref(),
                 decoders: &decoders,
                 test: &test,
             };

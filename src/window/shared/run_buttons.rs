@@ -1,9 +1,11 @@
-use eframe::egui::{Response, Ui, WidgetInfo, accesskit::Role};
+use eframe::egui::{Key, Response, Ui, WidgetInfo, accesskit::Role};
 
 use super::Phase;
+use decoupler_core::text::capitalised;
+
 use crate::window::{
     theme::space,
-    widgets::{Landmark, ghost_button, primary_button},
+    widgets::{Landmark, ghost_button, primary_button, with_shortcut},
 };
 
 /// Wish of the user for a training.
@@ -35,7 +37,11 @@ pub fn run_buttons_ui(
     let stop = ui.add_enabled(is_busy, ghost_button(if is_short { "■" } else { "■ Stop" }));
     name(&stop, "■ Stop");
     if stop
-        .on_hover_text(with_shortcut(ui, "Ends the training; the best network so far is kept", Key::Period))
+        .on_hover_text(with_shortcut(
+            ui,
+            "Ends the training; the best network so far is kept",
+            Key::Period,
+        ))
         .clicked()
     {
         wish = Some(RunWish::Stop);
@@ -58,11 +64,9 @@ pub fn run_buttons_ui(
     let train = ui.add_enabled(can_train && !is_busy, primary_button("▶ Train"));
     Landmark::Train.stands_at(ui, train.rect);
     let hint = if can_continue {
-        format!("Starts again: {hint} (Ctrl+Enter).")
+        with_shortcut(ui, &format!("Starts again: {hint}"), Key::Enter)
     } else {
-        let mut letters = hint.chars();
-        let first = letters.next().into_iter().flat_map(char::to_uppercase);
-        format!("{} (Ctrl+Enter).", first.chain(letters).collect::<String>())
+        with_shortcut(ui, &capitalised(hint), Key::Enter)
     };
     if train.on_hover_text(hint).clicked() {
         wish = Some(RunWish::Train);

@@ -6,7 +6,7 @@ use crate::window::{
     widgets::fields::{capitalised, count_ui, input_text, quantity_ui, usually},
 };
 use decoupler_core::{
-    evaluation::MOST_STARTS,
+    evaluation::MAX_STARTS,
     training::{Method, StoppingRules},
 };
 
@@ -47,7 +47,7 @@ pub fn method_settings_ui(ui: &mut Ui, method: &mut Method, starts: &mut usize, 
     }
     let hint = format!("{} Default 1.", glossary::STARTS.hint);
     ui.add_enabled_ui(is_new, |ui| {
-        count_ui(ui, "Starts", &hint, starts, usually(1, 1..=MOST_STARTS))
+        count_ui(ui, "Starts", &hint, starts, usually(1, 1..=MAX_STARTS))
     });
 }
 
@@ -63,7 +63,7 @@ pub fn stopping_ui(ui: &mut Ui, stopping: &mut StoppingRules) {
         "Epochs",
         &hint,
         &mut stopping.epochs,
-        usually(usual.epochs, 1..=StoppingRules::MOST_EPOCHS),
+        usually(usual.epochs, 1..=StoppingRules::MAX_EPOCHS),
     );
     let hint = format!("{} Default 6.", glossary::VALIDATION_FAILURES.hint);
     count_ui(
@@ -71,7 +71,7 @@ pub fn stopping_ui(ui: &mut Ui, stopping: &mut StoppingRules) {
         "Validation failures",
         &hint,
         &mut stopping.max_fail,
-        usually(usual.max_fail, 1..=StoppingRules::MOST_EPOCHS),
+        usually(usual.max_fail, 1..=StoppingRules::MAX_EPOCHS),
     );
     let hint = format!(
         "Training error at which training ends. Default 0.\n\n{}",

@@ -15,7 +15,7 @@ pub trait View: Debug {
     fn enter(&mut self, _shared: &Shared) {}
 
     /// Takes what its threads have to report and follows what is shared, also while another view is displayed.
-    fn take_news(&mut self, _shared: &Shared, _effects: &mut Vec<Effect>) {}
+    fn take_events(&mut self, _shared: &Shared, _effects: &mut Vec<Effect>) {}
 
     /// Returns true while its threads compute.
     fn is_working(&self) -> bool {

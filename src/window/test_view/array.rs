@@ -181,12 +181,12 @@ impl TestView {
 /// The outlook of arrays for which it takes a moment; those of the paper take a millisecond.
 fn outlook(settings: &SimulatedSettings) -> Option<Outlook> {
     /// About a third of a second.
-    const MOST_PRODUCTS: usize = 500_000_000;
+    const MAX_PRODUCTS: usize = 500_000_000;
     let scale = settings.source.sensor.scale;
     let unknowns = settings.source.scene.unknowns_per_row(scale);
     let matrix = unknowns.saturating_mul(scale.columns().max(unknowns));
     let products = matrix.saturating_mul(unknowns).saturating_mul(scale.rows());
-    if products > MOST_PRODUCTS {
+    if products > MAX_PRODUCTS {
         return None;
     }
     Outlook::of(&settings.source).ok()

@@ -12,7 +12,7 @@ use decoupler_core::{
 pub fn continue_run(run: &mut Run, training: TrainingSettings) -> Result<(), RunError> {
     training.check().map_err(TrainingError::from)?;
     let stopping = StoppingRules {
-        epochs: (furthest_epoch(run) + training.stopping.epochs).min(StoppingRules::MOST_EPOCHS),
+        epochs: (furthest_epoch(run) + training.stopping.epochs).min(StoppingRules::MAX_EPOCHS),
         ..training.stopping
     };
     let is_other = training.method != run.settings().training.method;

@@ -15,7 +15,7 @@ use crate::window::{
     test_view::{Frame, TargetCharts, TestSet, TestViewError},
 };
 use decoupler_core::{
-    evaluation::{Baselines, PastNetworks, Problem, Run, RunFlaw, RunSettings, StartRecord, TestErrors},
+    evaluation::{Baselines, PastNetworks, Problem, Run, RunDefect, RunSettings, StartRecord, TestErrors},
     network::Networks,
     training::{EpochRecord, Stage, StopReason, TrainerState, TrainingSettings},
 };
@@ -176,7 +176,7 @@ pub struct RunResult {
     /// The epoch of the network.
     pub best_epoch: usize,
     /// Defect of its training, once that has ended.
-    pub flaw: Option<RunFlaw>,
+    pub defect: Option<RunDefect>,
     /// Epochs run by the start that is furthest.
     pub epochs_run: usize,
     /// Number of starts that have ended.
@@ -186,7 +186,7 @@ pub struct RunResult {
     /// Time to decode one snapshot; measured when the training pauses or ends.
     pub frame_time: Option<Duration>,
     /// True once the training is paused or has ended.
-    pub is_standing: bool,
+    pub is_idle: bool,
     /// The networks.
     pub networks: Arc<Networks>,
 }
@@ -214,7 +214,12 @@ mod tests {
     fn no_epoch_is_lost_where_progress_replaces_progress() {
         let [a, b] = [1.0, 2.0];
         let cases = [
-            ("the leader continues", epochs(a, 0..3), epochs(a, 3..5), epochs(a, 0..5)),
+            (
+                "the leader continues",
+                epochs(a, 0..3),
+                epochs(a, 3..5),
+                epochs(a, 0..5),
+            ),
             ("nothing is new", epochs(a, 0..3), epochs(a, 3..3), epochs(a, 0..3)),
             ("another start leads", epochs(a, 0..3), epochs(b, 0..5), epochs(b, 0..5)),
             (

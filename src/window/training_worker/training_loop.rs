@@ -23,7 +23,7 @@ use decoupler_core::{
     training::TrainingSettings,
 };
 use decoupler_files::{
-    export::{CheckpointFile, NetworkFile, describe_standings, describe_worse_than_ridge},
+    export::{CheckpointFile, NetworkFile, describe_determinacy, describe_worse_than_ridge},
     import::{Progress, Setup, SetupSets},
 };
 
@@ -246,8 +246,8 @@ impl<'a> TrainingLoop<'a> {
             .map(|test| Arc::new(test.charts(&answers)));
         let cost = begun.elapsed();
         let has_several = run.trainers().len() > 1;
-        let is_standing = self.is_paused || run.stop_reason().is_some();
-        let starts = (has_several && (is_standing || begun >= self.next_starts)).then(|| run.starts());
+        let is_idle = self.is_paused || run.stop_reason().is_some();
+        let starts = (has_several && (is_idle || begun >= self.next_starts)).then(|| run.starts());
         if starts.is_some() {
             // At most a tenth of the time.
             self.next_starts = Instant::now() + STARTS_INTERVAL.max(9 * (begun.elapsed() - cost));
@@ -262,7 +262,7 @@ impl<'a> TrainingLoop<'a> {
             starts,
             past: self.past.clone(),
             result: RunResult {
-                remarks: if is_standing {
+                remarks: if is_idle {
                     self.remarks(&answers, &errors)
                 } else {
                     Vec::new()
@@ -272,7 +272,7 @@ impl<'a> TrainingLoop<'a> {
                 frame,
                 errors,
                 best_epoch: trainer.best_epoch(),
-                flaw: run.flaw(),
+                defect: run.defect(),
                 epochs_run: furthest_epoch(run),
                 starts_ended: run
                     .trainers()
@@ -280,8 +280,8 @@ impl<'a> TrainingLoop<'a> {
                     .filter(|start| start.stop_reason().is_some())
                     .count(),
                 wall_time: run.wall_time(),
-                frame_time: is_standing.then(|| network_frame_time(run)).flatten(),
-                is_standing,
+                frame_time: is_idle.then(|| network_frame_time(run)).flatten(),
+                is_idle,
                 networks: Arc::new(networks),
             },
             stop_reason: run.stop_reason(),
@@ -308,7 +308,7 @@ impl<'a> TrainingLoop<'a> {
         };
         let run = &trained.run;
         let determined = Determination::measure(run.test(), answers.view(), recorded.plan.division.by);
-        let mut remarks = describe_standings(&run.problem().targets, &determined);
+        let mut remarks = describe_determinacy(&run.problem().targets, &determined);
         if let Some(baselines) = run.baselines() {
             let scores = Scores {
                 network: errors.clone(),
@@ -329,8 +329,8 @@ impl<'a> TrainingLoop<'a> {
             return;
         }
         let file = trained.network_file();
-        let sound = file.and_then(|file| file.flaw().map_or(Ok(Box::new(file)), Err));
-        let finished = sound.map_err(|flaw| format!("This training is not kept in the run list: {defect}"));
+        let sound = file.and_then(|file| file.defect().map_or(Ok(Box::new(file)), Err));
+        let finished = sound.map_err(|defect| format!("This training is not kept in the run list: {defect}"));
         self.report.send(Event::Finished(finished));
     }
 }

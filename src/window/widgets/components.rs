@@ -1,11 +1,18 @@
 //! The few components that egui lacks, each reachable by its label.
 
 use eframe::egui::{
-    self, Align, Button, Color32, Frame, Id, Label, Layout, Margin, ProgressBar, Rect, Response, RichText, ScrollArea,
-    Sense, Stroke, Ui, UiBuilder, Vec2, Widget, WidgetInfo, WidgetText, accesskit::Role, vec2,
+    self, Align, Button, Color32, Frame, Id, Key, KeyboardShortcut, Label, Layout, Margin, Modifiers, ProgressBar,
+    Rect, Response, RichText, ScrollArea, Sense, Stroke, Ui, UiBuilder, Vec2, Widget, WidgetInfo, WidgetText,
+    accesskit::Role, vec2,
 };
 
 use crate::window::theme::{Theme, radius, semibold, space, type_size};
+
+/// Tooltip of an action with its shortcut: "Pauses the training (Ctrl+P).", with the Command key on macOS.
+pub fn with_shortcut(ui: &Ui, text: &str, key: Key) -> String {
+    let shortcut = KeyboardShortcut::new(Modifiers::COMMAND, key);
+    format!("{text} ({}).", ui.ctx().format_shortcut(&shortcut))
+}
 
 /// The head of a section, in small capitals: "SENSOR ARRAY".
 pub fn section_heading_ui(ui: &mut Ui, text: &str) -> Response {

@@ -17,6 +17,7 @@ mod value_under;
 pub use components::{
     card_ui, dim_ui, explained_options_ui, ghost_button, invitation_ui, note_ui, placeholder_ui, primary_button,
     progress_bar_ui, scrolled_ui, section_heading_ui, segmented_ui, state_ui, status_progress_ui, tabs_ui,
+    with_shortcut,
 };
 pub use fact::{coloured_fact_ui, fact_ui};
 pub use fold::{focus_ring_ui, fold_ui};

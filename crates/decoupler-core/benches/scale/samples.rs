@@ -21,12 +21,12 @@ pub(crate) fn print() {
     );
     println!("a process held, less what one holds that trains 100 samples.\n");
     println!("| samples | an epoch, ms | peak, MB | stated, MB |\n|---:|---:|---:|---:|");
-    let least_mb = peak_mb(100);
+    let min_mb = peak_mb(100);
     let mut times = Vec::new();
     for samples in SAMPLES {
         let ms = epoch_ms(samples);
         times.push(ms);
-        let peak = match (peak_mb(samples), least_mb) {
+        let peak = match (peak_mb(samples), min_mb) {
             (Some(peak), Some(least)) => format!("{:.0}", peak - least),
             _ => "not measured here".to_owned(),
         };

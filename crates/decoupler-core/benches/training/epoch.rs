@@ -15,7 +15,7 @@ const TURNS: usize = 300;
 pub(crate) fn print() {
     // The paper's main experiment: 30 resistances, 12 hidden nodes, 1000 samples.
     let stopping = StoppingRules {
-        epochs: StoppingRules::MOST_EPOCHS,
+        epochs: StoppingRules::MAX_EPOCHS,
         ..StoppingRules::default()
     };
     let settings = SimulatedSettings {

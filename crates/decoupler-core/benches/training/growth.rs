@@ -35,9 +35,9 @@ fn row(growing: &str, values: &[usize], sizes: impl Fn(usize) -> Sizes) {
         Some(measured) => format!("{} | {:.2}", list(&measured), exponent(values, &measured)),
         None => "not measured here | ".to_owned(),
     };
-    let least_mb = peak_mb(Sizes::array(1, 1, 1));
+    let min_mb = peak_mb(Sizes::array(1, 1, 1));
     let times = with(&|sizes| Some(sizes.epoch_ms(Method::default(), 1, 9)));
-    let memory = with(&|sizes| Some(peak_mb(sizes)? - least_mb?));
+    let memory = with(&|sizes| Some(peak_mb(sizes)? - min_mb?));
     let values = values.iter().map(usize::to_string).collect::<Vec<_>>().join(", ");
     println!("| {growing} | {values} | {} | {} |", cells(times), cells(memory));
 }

@@ -12,7 +12,7 @@ use crate::timing::median;
 
 const SEEDS: [u64; 5] = [0, 1, 2, 3, 4];
 /// Time limit of each method: several times what Levenberg-Marquardt needs.
-const MOST_TIME: Duration = Duration::from_secs(5);
+const MAX_TIME: Duration = Duration::from_secs(5);
 
 /// Result of a training.
 struct Outcome {
@@ -28,7 +28,7 @@ fn train(method: Method, seed: u64) -> Outcome {
         training: TrainingSettings {
             method,
             stopping: StoppingRules {
-                epochs: StoppingRules::MOST_EPOCHS,
+                epochs: StoppingRules::MAX_EPOCHS,
                 ..StoppingRules::default()
             },
         },
@@ -37,7 +37,7 @@ fn train(method: Method, seed: u64) -> Outcome {
     };
     let mut run = Run::prepare(settings).expect("the paper's experiment is possible");
     while run.step().is_none() {
-        if run.leader().elapsed() >= MOST_TIME {
+        if run.leader().elapsed() >= MAX_TIME {
             run.stop();
         }
     }
@@ -59,7 +59,7 @@ pub(crate) fn print() {
     );
     println!(
         "reached no new best for 6 epochs, the gradient vanished, mu grew too large) or after {} seconds.\n",
-        MOST_TIME.as_secs()
+        MAX_TIME.as_secs()
     );
     println!("| method | epochs | seconds | Z % | X % | ended by time |\n|---|---:|---:|---:|---:|---:|");
     for method in Method::all() {

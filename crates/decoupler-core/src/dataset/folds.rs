@@ -85,8 +85,8 @@ impl Folds {
         let mut order: Vec<usize> = (0..units.len()).collect();
         order.shuffle(rng);
         let deal = |fold: usize| {
-            let dealt = order.iter().skip(fold).step_by(folds);
-            let mut samples: Vec<usize> = dealt.flat_map(|&unit| &units[unit]).copied().collect();
+            let assigned = order.iter().skip(fold).step_by(folds);
+            let mut samples: Vec<usize> = assigned.flat_map(|&unit| &units[unit]).copied().collect();
             samples.sort_unstable();
             samples
         };
@@ -169,18 +169,18 @@ mod tests {
             (4, FoldUnit::Snapshot),
             (13, FoldUnit::Snapshot),
         ] {
-            let dealt = deal(&set, folds, unit, 1);
+            let assigned = deal(&set, folds, unit, 1);
             let mut tested = vec![0; set.samples()];
-            for fold in 0..dealt.count() {
-                let training = dealt.without(&[fold]);
-                for &sample in dealt.test(fold) {
+            for fold in 0..assigned.count() {
+                let training = assigned.without(&[fold]);
+                for &sample in assigned.test(fold) {
                     tested[sample] += 1;
                     assert!(!training.contains(&sample));
                 }
-                assert_eq!(training.len() + dealt.test(fold).len(), set.samples());
+                assert_eq!(training.len() + assigned.test(fold).len(), set.samples());
             }
             assert!(tested.iter().all(|&times| times == 1), "{folds} folds by {unit}");
-            let sizes = (0..folds).map(|fold| dealt.test(fold).len());
+            let sizes = (0..folds).map(|fold| assigned.test(fold).len());
             let unit_size = if unit == FoldUnit::Sample { 1 } else { 10 };
             assert!(sizes.clone().max().unwrap() - sizes.min().unwrap() <= unit_size);
         }
@@ -189,9 +189,9 @@ mod tests {
     #[test]
     fn folds_by_snapshot_never_split_one() {
         let set = set(130);
-        let dealt = deal(&set, 5, FoldUnit::Snapshot, 2);
+        let assigned = deal(&set, 5, FoldUnit::Snapshot, 2);
         for fold in 0..5 {
-            for snapshot in dealt.test(fold).chunks(10) {
+            for snapshot in assigned.test(fold).chunks(10) {
                 assert_eq!(snapshot[0] % 10, 0);
                 assert!(snapshot.windows(2).all(|pair| pair[0] + 1 == pair[1]));
             }
@@ -232,10 +232,10 @@ mod tests {
     #[test]
     fn folds_in_time_are_blocks_one_after_another() {
         let set = set(130);
-        let dealt = Folds::by(&set, 4, SplitBy::Time, &mut Seed(0).rng(Stream::Split)).unwrap();
+        let assigned = Folds::by(&set, 4, SplitBy::Time, &mut Seed(0).rng(Stream::Split)).unwrap();
         let mut next = 0;
         for fold in 0..4 {
-            let block = dealt.test(fold);
+            let block = assigned.test(fold);
             assert_eq!(block, Vec::from_iter(next..next + block.len()));
             assert!(
                 block.len().is_multiple_of(10) && (30..=40).contains(&block.len()),
@@ -249,9 +249,9 @@ mod tests {
         let readings = ndarray::Array2::zeros((103, 1));
         let groups = (0..103usize).map(|sample| sample.saturating_sub(99)).collect();
         let uneven = Dataset::new(readings.clone(), readings, None, groups).unwrap();
-        let dealt = Folds::by(&uneven, 4, SplitBy::Time, &mut Seed(0).rng(Stream::Split)).unwrap();
+        let assigned = Folds::by(&uneven, 4, SplitBy::Time, &mut Seed(0).rng(Stream::Split)).unwrap();
         assert_eq!(
-            (0..4).map(|fold| dealt.test(fold).len()).collect::<Vec<_>>(),
+            (0..4).map(|fold| assigned.test(fold).len()).collect::<Vec<_>>(),
             [100, 1, 1, 1]
         );
         let error = Folds::by(&uneven, 5, SplitBy::Time, &mut Seed(0).rng(Stream::Split)).unwrap_err();
@@ -265,8 +265,8 @@ mod tests {
             (SplitBy::Group, FoldUnit::Snapshot),
             (SplitBy::Random, FoldUnit::Sample),
         ] {
-            let dealt = Folds::by(&set, 5, by, &mut Seed(6).rng(Stream::Split)).unwrap();
-            assert_eq!(dealt, deal(&set, 5, unit, 6), "{by}");
+            let assigned = Folds::by(&set, 5, by, &mut Seed(6).rng(Stream::Split)).unwrap();
+            assert_eq!(assigned, deal(&set, 5, unit, 6), "{by}");
         }
     }
 }

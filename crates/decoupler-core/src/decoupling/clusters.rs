@@ -4,7 +4,7 @@ use rand::{Rng, seq::index};
 /// Rounds of Lloyd's algorithm.
 const ROUNDS: usize = 20;
 /// Samples among which clusters are sought: a few for each are enough.
-const MOST_CLUSTERED: usize = 1000;
+const MAX_CLUSTERED: usize = 1000;
 
 /// Squared Euclidean distance.
 #[inline]
@@ -12,9 +12,9 @@ pub(super) fn distance2(a: ArrayView1<'_, f64>, b: ArrayView1<'_, f64>) -> f64 {
     a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum()
 }
 
-/// Means of `count` clusters of the rows of `x`, or of [`MOST_CLUSTERED`] of them, begun at rows drawn by `rng`.
+/// Means of `count` clusters of the rows of `x`, or of [`MAX_CLUSTERED`] of them, begun at rows drawn by `rng`.
 pub(super) fn k_means(x: ArrayView2<'_, f64>, count: usize, rng: &mut impl Rng) -> Array2<f64> {
-    let most = MOST_CLUSTERED.max(count);
+    let most = MAX_CLUSTERED.max(count);
     let drawn = (x.nrows() > most).then(|| x.select(Axis(0), &index::sample(rng, x.nrows(), most).into_vec()));
     let x = drawn.as_ref().map_or(x, |drawn| drawn.view());
     let mut centres = x.select(Axis(0), &index::sample(rng, x.nrows(), count).into_vec());

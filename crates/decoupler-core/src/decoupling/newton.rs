@@ -45,7 +45,7 @@ const AGREEING_STARTS: usize = 6;
 
 impl Newton {
     /// Largest number of plain steps before damped ones.
-    pub(super) const MOST_PLAIN_STEPS: usize = 25;
+    pub(super) const MAX_PLAIN_STEPS: usize = 25;
 
     /// Creates a solver for rows of `model` in `scene`.
     pub fn new(model: &SensorModel, scene: &Scene, rules: NewtonRules) -> Self {
@@ -151,8 +151,8 @@ impl Newton {
         let mut starts = Starts::default();
         let (mut best, mut answer) = self.run(row, starts.next_mm(&self.ranges));
         let mut agreeing = 1;
-        let most_starts = if self.is_redundant() { self.rules.starts } else { 1 };
-        for _ in 1..most_starts {
+        let max_starts = if self.is_redundant() { self.rules.starts } else { 1 };
+        for _ in 1..max_starts {
             // Readings that leave several answers do so from any start.
             if best.solution != Solution::None || agreeing == AGREEING_STARTS {
                 break;
@@ -274,7 +274,7 @@ impl Newton {
 
     /// Takes plain steps, each shortened to stay where the model is valid.
     fn take_plain_steps(&mut self, unknowns: &mut [f64]) -> (NewtonStop, usize) {
-        let most = self.rules.steps.min(Self::MOST_PLAIN_STEPS);
+        let most = self.rules.steps.min(Self::MAX_PLAIN_STEPS);
         for steps in 1..=most {
             let Self {
                 linearised,
@@ -316,10 +316,10 @@ impl Newton {
     }
 
     /// Takes damped steps within the bounds, each of which lowers the misfit.
-    fn descend(&mut self, unknowns: &mut Vec<f64>, most_steps: usize) -> (NewtonStop, usize) {
+    fn descend(&mut self, unknowns: &mut Vec<f64>, max_steps: usize) -> (NewtonStop, usize) {
         let mut residual = self.problem.evaluate(unknowns);
         let mut damping = 0.0;
-        for steps in 1..=most_steps {
+        for steps in 1..=max_steps {
             let Self {
                 linearised,
                 problem,
@@ -362,7 +362,7 @@ impl Newton {
                 return (NewtonStop::Converged, steps);
             }
         }
-        (NewtonStop::StepsTaken, most_steps)
+        (NewtonStop::StepsTaken, max_steps)
     }
 }
 

@@ -68,7 +68,7 @@ pub(super) const SHORTEST_SHARE: f64 = 1e-3;
 /// Most memory for the estimates of all row-wires; above it they start from the middle, which takes a step more.
 const LARGEST_STARTS_BYTES: usize = 256 << 20;
 /// Largest number of steps; more are not needed where they converge quadratically.
-const MOST_STEPS: usize = 12;
+const MAX_STEPS: usize = 12;
 /// Steps that may fail to become shorter.
 const STEPS_ON_THE_WAY: usize = 2;
 
@@ -200,7 +200,7 @@ impl PlainNewton {
     }
 
     fn take_steps(&mut self, rules: NewtonRules) {
-        for step in 1..=rules.steps.min(MOST_STEPS) {
+        for step in 1..=rules.steps.min(MAX_STEPS) {
             for lane in 0..LANES {
                 if self.lanes[lane].state == State::Moving {
                     self.linearise(lane);

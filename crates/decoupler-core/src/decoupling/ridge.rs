@@ -44,7 +44,7 @@ struct LeftOut {
 }
 
 /// Samples that are left out in turn: of more, evenly spaced ones, which are as good an estimate.
-const MOST_LEFT_OUT: usize = 4000;
+const MAX_LEFT_OUT: usize = 4000;
 
 impl Ridge {
     /// Decomposes the inputs `x` (samples × inputs) for the outputs `y` (samples × outputs); `weights` are the numbers of
@@ -89,7 +89,7 @@ impl Ridge {
         let (of_samples, of_noise) = u.split_at_row(samples);
         let projected = of_samples.transpose() * &b;
         let rest = &b - of_samples * &projected;
-        let stride = samples.div_ceil(MOST_LEFT_OUT);
+        let stride = samples.div_ceil(MAX_LEFT_OUT);
         let chosen: Vec<usize> = (0..samples).step_by(stride).collect();
         let is_all_spanned = unseen.nrows() == 0 && kept + 1 >= samples;
         let share = |sample: usize| 1.0 - weights[sample] / total;

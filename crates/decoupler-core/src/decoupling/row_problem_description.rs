@@ -64,7 +64,7 @@ impl RowProblemDescription {
             row_choice,
             ranges: pairs(ranges(model, scene)),
             wide_ranges: pairs(wide_ranges(model, scene)),
-            steps: rules.steps.min(Newton::MOST_PLAIN_STEPS),
+            steps: rules.steps.min(Newton::MAX_PLAIN_STEPS),
             tolerance: rules.tolerance,
             seeks_solution,
         }

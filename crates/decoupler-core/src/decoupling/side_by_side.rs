@@ -19,7 +19,7 @@ pub(super) struct SideBySide {
 /// Problems side by side.
 pub(super) const LANES: usize = 8;
 /// Share of a diagonal entry below which rounding shows in the solution.
-const LEAST_LEFT: f64 = 1e-11;
+const MIN_LEFT: f64 = 1e-11;
 
 impl SideBySide {
     pub(super) fn new(unknowns: usize) -> Self {
@@ -47,7 +47,7 @@ impl SideBySide {
 
     /// Returns `true` if the problem in `lane` is so well conditioned that its normal equations tell the solution.
     pub(super) fn is_sound(&self, lane: usize) -> bool {
-        self.least_left[lane] > LEAST_LEFT
+        self.least_left[lane] > MIN_LEFT
     }
 
     /// Returns one unknown of the solution in `lane`.

@@ -62,7 +62,7 @@ pub struct Effort {
     /// Time spent on them.
     pub seconds: f64,
     /// Time of the fastest epoch, the one least disturbed by other work on the machine.
-    pub least_epoch_seconds: f64,
+    pub min_epoch_seconds: f64,
 }
 
 impl CrossValidation {
@@ -177,7 +177,7 @@ impl Default for Effort {
         Self {
             epochs: 0,
             seconds: 0.0,
-            least_epoch_seconds: f64::INFINITY,
+            min_epoch_seconds: f64::INFINITY,
         }
     }
 }
@@ -194,7 +194,7 @@ impl Effort {
             let at_work = at_work.count() as f64;
             let begun = Instant::now();
             run.step();
-            effort.least_epoch_seconds = effort.least_epoch_seconds.min(begun.elapsed().as_secs_f64() / at_work);
+            effort.min_epoch_seconds = effort.min_epoch_seconds.min(begun.elapsed().as_secs_f64() / at_work);
         }
         for trainer in run.trainers() {
             effort.epochs += trainer.latest().epoch;
@@ -206,7 +206,7 @@ impl Effort {
     fn add(&mut self, other: Self) {
         self.epochs += other.epochs;
         self.seconds += other.seconds;
-        self.least_epoch_seconds = self.least_epoch_seconds.min(other.least_epoch_seconds);
+        self.min_epoch_seconds = self.min_epoch_seconds.min(other.min_epoch_seconds);
     }
 }
 

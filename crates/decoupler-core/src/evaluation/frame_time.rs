@@ -27,9 +27,9 @@ pub fn decoded_unit(test: &Dataset) -> String {
 /// frames: the median over blocks of frames, each long enough for the clock.
 pub(super) fn frame_us(decoder: &mut dyn Decoder, test: &Dataset) -> Result<f64, DecodeError> {
     const FEWEST_BLOCKS: usize = 3;
-    const MOST_BLOCKS: usize = 101;
+    const MAX_BLOCKS: usize = 101;
     const BLOCK_SECONDS: f64 = 100e-6;
-    const MOST_SECONDS: f64 = 0.03;
+    const MAX_SECONDS: f64 = 0.03;
     let frames = test.frames().ok();
     let mut answer = vec![0.0; test.row_count() * test.outputs()];
     let mut at = 0;
@@ -58,7 +58,7 @@ pub(super) fn frame_us(decoder: &mut dyn Decoder, test: &Dataset) -> Result<f64,
     let frames_in_block = (BLOCK_SECONDS / once).ceil() as usize;
     let mut blocks = Vec::new();
     let mut spent = 0.0;
-    while blocks.len() < FEWEST_BLOCKS || (spent < MOST_SECONDS && blocks.len() < MOST_BLOCKS) {
+    while blocks.len() < FEWEST_BLOCKS || (spent < MAX_SECONDS && blocks.len() < MAX_BLOCKS) {
         let seconds = decode(frames_in_block)?;
         spent += seconds;
         blocks.push(1e6 * seconds / frames_in_block as f64);

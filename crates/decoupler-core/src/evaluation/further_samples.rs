@@ -30,19 +30,19 @@ pub(super) struct FurtherSamples {
 }
 
 /// Largest number of training samples that a run holds.
-pub(super) const MOST_HELD: usize = 100_000;
+pub(super) const MAX_HELD: usize = 100_000;
 /// Blocks that are checked between two looks at whether the preparation is cancelled.
 const CHECKED_TOGETHER: usize = 64;
 
 impl FurtherSamples {
-    /// Prepares to draw what `settings` asks for beyond [`MOST_HELD`]; `None` if that is nothing.
+    /// Prepares to draw what `settings` asks for beyond [`MAX_HELD`]; `None` if that is nothing.
     ///
     /// # Errors
     /// If the sensor or scene is invalid.
     pub(super) fn of(settings: &SimulatedSettings) -> Result<Option<Self>, RunError> {
         let source = &settings.source;
         let rows = source.scene.rows.read(source.sensor.scale.rows())?;
-        let snapshots = source.samples.div_ceil(rows.len()) - source.samples.min(MOST_HELD).div_ceil(rows.len());
+        let snapshots = source.samples.div_ceil(rows.len()) - source.samples.min(MAX_HELD).div_ceil(rows.len());
         if snapshots == 0 {
             return Ok(None);
         }
@@ -83,7 +83,7 @@ impl FurtherSamples {
                     .model
                     .row_resistances_into(row, deformation.row_mm(row), &mut readings_ohm);
                 drawn.map_err(|source| SimulationError::Sensor {
-                    snapshot: MOST_HELD.div_ceil(self.rows.len()) + block * self.snapshots_per_block() + place,
+                    snapshot: MAX_HELD.div_ceil(self.rows.len()) + block * self.snapshots_per_block() + place,
                     source,
                 })?;
             }
@@ -174,15 +174,15 @@ mod tests {
     #[test]
     fn what_a_run_can_hold_is_not_drawn_again() {
         for rows in [Rows::All, Rows::Known, Rows::One(1)] {
-            assert!(FurtherSamples::of(&settings(rows, MOST_HELD)).unwrap().is_none());
-            assert!(FurtherSamples::of(&settings(rows, MOST_HELD + 3)).unwrap().is_some());
+            assert!(FurtherSamples::of(&settings(rows, MAX_HELD)).unwrap().is_none());
+            assert!(FurtherSamples::of(&settings(rows, MAX_HELD + 3)).unwrap().is_some());
         }
     }
 
     /// All row-wires at once see the deformations that each sees alone, and every block comes back as it was.
     #[test]
     fn a_block_is_the_same_each_time_and_no_block_is_another() {
-        let mut settings = settings(Rows::Known, MOST_HELD + 3 * 1100);
+        let mut settings = settings(Rows::Known, MAX_HELD + 3 * 1100);
         settings.source.scene.noise = Noise::default();
         let further = FurtherSamples::of(&settings).unwrap().unwrap();
         assert!(further.check(&|| false).unwrap());
@@ -199,10 +199,10 @@ mod tests {
 
     #[test]
     fn noise_differs_from_row_to_row_and_is_as_large_as_asked_for() {
-        let noisy = FurtherSamples::of(&settings(Rows::Known, MOST_HELD + 3 * 512))
+        let noisy = FurtherSamples::of(&settings(Rows::Known, MAX_HELD + 3 * 512))
             .unwrap()
             .unwrap();
-        let mut quiet = settings(Rows::Known, MOST_HELD + 3 * 512);
+        let mut quiet = settings(Rows::Known, MAX_HELD + 3 * 512);
         quiet.source.scene.noise = Noise::default();
         let quiet = FurtherSamples::of(&quiet).unwrap().unwrap();
         let errors = |row| &noisy.draw(0, Some(row)).readings() / &quiet.draw(0, Some(row)).readings() - 1.0;
@@ -219,7 +219,7 @@ mod tests {
     #[test]
     fn training_on_drawn_samples_is_training_on_all_of_them() {
         for rows in [Rows::All, Rows::Known] {
-            let mut settings = settings(rows, MOST_HELD + 3 * 700);
+            let mut settings = settings(rows, MAX_HELD + 3 * 700);
             settings.training.stopping.epochs = 2;
             (settings.source.validation_samples, settings.source.test_samples) = (30, 30);
             let mut run = Run::prepare(settings).unwrap();

@@ -5,7 +5,7 @@ use crate::network::{DecouplingNetwork, Mlp, Networks};
 
 /// Networks of past epochs: what a run stopped at each of them would have kept, its best by then.
 ///
-/// There are at most [`Self::MOST`], whose weights take at most [`Self::MOST_BYTES`]; beyond that every second of them
+/// There are at most [`Self::MAX`], whose weights take at most [`Self::MAX_BYTES`]; beyond that every second of them
 /// is dropped, so that those of every 2ᵏ-th epoch stay. The latest is always there.
 #[derive(Clone, Debug, Default)]
 pub struct PastNetworks {
@@ -57,17 +57,17 @@ impl Past {
 
 impl PastNetworks {
     /// Largest memory of the weights: 64 MiB.
-    pub const MOST_BYTES: usize = 64 << 20;
+    pub const MAX_BYTES: usize = 64 << 20;
 
     /// Largest number of networks: a slider has not as many points.
-    pub const MOST: usize = 4096;
+    pub const MAX: usize = 4096;
 
     /// Takes the current state of `run`, once after each of its steps.
     pub fn record(&mut self, run: &Run) {
-        self.record_within(run, Self::MOST_BYTES, Self::MOST);
+        self.record_within(run, Self::MAX_BYTES, Self::MAX);
     }
 
-    fn record_within(&mut self, run: &Run, most_bytes: usize, most: usize) {
+    fn record_within(&mut self, run: &Run, max_bytes: usize, most: usize) {
         let leader = run.leader();
         let epoch = run
             .trainers()
@@ -96,7 +96,7 @@ impl PastNetworks {
         };
         self.bytes += past.bytes_after(self.kept.last());
         self.kept.push(Arc::new(past));
-        while (self.bytes > most_bytes || self.kept.len() > most) && self.kept.len() > 1 {
+        while (self.bytes > max_bytes || self.kept.len() > most) && self.kept.len() > 1 {
             if self.kept.len() == 2 {
                 self.kept.remove(0);
             } else {
@@ -171,16 +171,16 @@ mod tests {
     /// Trains to the end, recording; calls `each` after every epoch.
     fn record(
         settings: SimulatedSettings,
-        [most_bytes, most]: [usize; 2],
+        [max_bytes, most]: [usize; 2],
         mut each: impl FnMut(&PastNetworks, usize),
     ) -> (Run, PastNetworks) {
         let (mut run, mut past) = (Run::prepare(settings).unwrap(), PastNetworks::default());
-        past.record_within(&run, most_bytes, most);
+        past.record_within(&run, max_bytes, most);
         let mut epoch = 0;
         while run.stop_reason().is_none() {
             run.step();
             epoch += 1;
-            past.record_within(&run, most_bytes, most);
+            past.record_within(&run, max_bytes, most);
             each(&past, epoch);
         }
         (run, past)
@@ -217,9 +217,9 @@ mod tests {
             .find(|method| method.short_name() == "scg")
             .unwrap();
         let weights = Run::prepare(settings).unwrap().leader().weights();
-        let most_bytes = 10 * 8 * weights;
+        let max_bytes = 10 * 8 * weights;
         // Either bound keeps about ten.
-        for bounds in [[most_bytes, usize::MAX], [usize::MAX, 10]] {
+        for bounds in [[max_bytes, usize::MAX], [usize::MAX, 10]] {
             let (_, past) = record(settings, bounds, |past, epoch| {
                 assert!(past.bytes <= bounds[0] && past.kept.len() <= bounds[1], "at {epoch}");
                 let epochs: Vec<usize> = past.epochs().collect();

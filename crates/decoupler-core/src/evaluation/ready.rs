@@ -13,13 +13,13 @@ pub fn ready_settings(source: &Simulation) -> Option<SimulatedSettings> {
     /// Training samples of each row.
     const SAMPLES: usize = 200;
     /// Pairs of nodes in all samples: about a tenth of a second.
-    const MOST_PAIRS: f64 = 5e7;
+    const MAX_PAIRS: f64 = 5e7;
     /// Unknowns and readings of all rows: with them grows the time of an epoch.
-    const MOST_CHANNELS: usize = 2000;
+    const MAX_CHANNELS: usize = 2000;
     let rows = source.model_size().ok()?;
     let samples = SAMPLES * rows.rows;
     let channels = rows.unknowns + rows.equations;
-    if samples as f64 * node_pairs_per_row(&source.sensor) > MOST_PAIRS || channels > MOST_CHANNELS {
+    if samples as f64 * node_pairs_per_row(&source.sensor) > MAX_PAIRS || channels > MAX_CHANNELS {
         return None;
     }
     let scene = Scene {

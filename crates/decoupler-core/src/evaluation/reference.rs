@@ -137,7 +137,7 @@ fn sampled_medians_mm(
     rng: &mut impl Rng,
 ) -> Result<Result<Array2<f64>, NoReference>, SensorError> {
     let rows = test.row_wires_read().expect("samples of a scene know their row-wire");
-    if SampledPosterior::node_pairs(model, scene) * test.samples() as f64 > MOST_NODE_PAIRS {
+    if SampledPosterior::node_pairs(model, scene) * test.samples() as f64 > MAX_NODE_PAIRS {
         return Ok(Err(NoReference::TooLarge));
     }
     let seed: u64 = rng.random();
@@ -179,7 +179,7 @@ fn sampled_medians_mm(
         }
     }
     // Written so that NaN is refused.
-    let is_trusted = owed_mm <= MOST_OWED_TO_SAMPLING * total_mm && are_uniform(&mut ranks);
+    let is_trusted = owed_mm <= MAX_OWED_TO_SAMPLING * total_mm && are_uniform(&mut ranks);
     Ok(if is_trusted {
         Ok(medians_mm)
     } else {
@@ -191,9 +191,9 @@ fn sampled_medians_mm(
 /// variance of a normal median π/2n times the density at it, over the mean absolute deviation (√(2/π) each), is π/4n.
 const OWED_TO_SAMPLING: f64 = std::f64::consts::FRAC_PI_4;
 /// Share of the reference that may be owed to the number of samples.
-const MOST_OWED_TO_SAMPLING: f64 = 0.02;
+const MAX_OWED_TO_SAMPLING: f64 = 0.02;
 /// Pairs of nodes up to which posteriors are sampled: some minutes of one core.
-const MOST_NODE_PAIRS: f64 = 1e11;
+const MAX_NODE_PAIRS: f64 = 1e11;
 
 /// Returns false if values cannot come from the uniform distribution from 0 to 1 (Kolmogorov and Smirnov): it does so
 /// wrongly once in 100 000 sets.

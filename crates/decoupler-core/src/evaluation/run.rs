@@ -7,7 +7,7 @@ use ndarray::Array2;
 use rayon::prelude::*;
 
 use super::{
-    Baselines, Problem, RunError, RunFlaw, RunSettings, Scores, StartRecord, StartTrainer, TestErrors, starts::lowest,
+    Baselines, Problem, RunDefect, RunError, RunSettings, Scores, StartRecord, StartTrainer, TestErrors, starts::lowest,
 };
 use crate::{
     dataset::{Dataset, PerRow},
@@ -84,8 +84,8 @@ impl Run {
     }
 
     /// Finds the defect of the leader, once its trainings have ended; `None` for a sound run.
-    pub fn flaw(&self) -> Option<RunFlaw> {
-        RunFlaw::of(self.leader())
+    pub fn defect(&self) -> Option<RunDefect> {
+        RunDefect::of(self.leader())
     }
 
     /// Continues every start from its present weights with another method: [`Trainer::continue_with`](crate::training::Trainer::continue_with).

@@ -39,7 +39,7 @@ pub type SimulatedSettings = RunSettings<Simulation>;
 pub type MeasuredSettings = RunSettings<Measured>;
 
 /// Largest number of starts in a run: enough for the distribution of its results, and within memory.
-pub const MOST_STARTS: usize = 100;
+pub const MAX_STARTS: usize = 100;
 
 /// Error for a number out of its range.
 #[derive(Clone, Debug, PartialEq, Error)]
@@ -128,7 +128,7 @@ impl<S> RunSettings<S> {
     pub fn check_network(&self) -> Result<(), CountError> {
         check([
             ("hidden nodes", self.hidden, 1..=LARGEST_HIDDEN),
-            ("starts", self.starts, 1..=MOST_STARTS),
+            ("starts", self.starts, 1..=MAX_STARTS),
         ])
     }
 }

@@ -1,4 +1,4 @@
-use super::{RunError, SimulatedSettings, Simulation, further_samples::MOST_HELD};
+use super::{RunError, SimulatedSettings, Simulation, further_samples::MAX_HELD};
 use crate::{
     dataset::{Dataset, LARGEST_SAMPLES, Split, Stream, hold_out},
     training::TrainingError,
@@ -25,7 +25,7 @@ impl SimulatedSettings {
     ) -> Result<Option<(Split, Dataset)>, RunError> {
         self.check_counts()?;
         let mut held = *self;
-        held.source.samples = self.source.samples.min(MOST_HELD);
+        held.source.samples = self.source.samples.min(MAX_HELD);
         held.draw_unless(is_cancelled)
     }
 

@@ -2,7 +2,7 @@ use std::time::Duration;
 
 use super::{
     RunError, SimulatedSettings,
-    further_samples::MOST_HELD,
+    further_samples::MAX_HELD,
     machine::{Speed, node_pairs_per_row},
 };
 use crate::{
@@ -51,7 +51,7 @@ impl Workload {
         let scale = source.sensor.scale;
         let whole = |samples: usize| samples.div_ceil(size.rows) * size.rows;
         let training = whole(source.samples);
-        let held = whole(source.samples.min(MOST_HELD));
+        let held = whole(source.samples.min(MAX_HELD));
         let held_out = whole(source.validation_samples) + whole(source.test_samples);
         let shape = largest_shape(settings);
         // Readings and targets: drawn, split, scaled, and in blocks for the training.
@@ -205,7 +205,7 @@ mod tests {
             settings.source.samples = samples;
             Workload::of(&settings).unwrap()
         };
-        let (held, all) = (workload(MOST_HELD), workload(1_000_000));
+        let (held, all) = (workload(MAX_HELD), workload(1_000_000));
         assert_eq!((held.drawn_again, all.drawn_again), (0, 900_000));
         assert!(all.bytes < held.bytes + 100_000_000, "{held:?} {all:?}");
         assert!(all.time().epoch > 20 * held.time().epoch, "{held:?} {all:?}");

@@ -100,7 +100,7 @@ pub enum SceneError {
         largest: f64,
     },
     /// Bits out of range.
-    #[error("the converter has {0} bits: give from 1 to {most}", most = Noise::MOST_BITS)]
+    #[error("the converter has {0} bits: give from 1 to {most}", most = Noise::MAX_BITS)]
     Bits(u8),
 }
 

@@ -41,7 +41,7 @@ const LARGEST_ADDITIVE_OHM: f64 = 1e150;
 
 impl Noise {
     /// The most bits of a converter.
-    pub const MOST_BITS: u8 = 32;
+    pub const MAX_BITS: u8 = 32;
 
     /// Noise of standard deviation `relative` in proportion to the resistance, in both sets.
     pub fn relative(relative: f64) -> Self {
@@ -86,7 +86,7 @@ impl Noise {
             }
         }
         match self.converter_bits {
-            Some(bits) if !(1..=Self::MOST_BITS).contains(&bits) => Err(SceneError::Bits(bits)),
+            Some(bits) if !(1..=Self::MAX_BITS).contains(&bits) => Err(SceneError::Bits(bits)),
             _ => Ok(()),
         }
     }

@@ -102,9 +102,9 @@ impl NoiseSource {
 fn positive(mut draw: impl FnMut() -> f64) -> f64 {
     /// Half of the draws are positive, and at the largest noise, where sums overflow, a third is kept: all fail less than
     /// once in 10⁴⁵ readings.
-    const MOST_DRAWS: usize = 256;
+    const MAX_DRAWS: usize = 256;
     let mut value = draw();
-    for _ in 1..MOST_DRAWS {
+    for _ in 1..MAX_DRAWS {
         if value > 0.0 && value.is_finite() {
             break;
         }

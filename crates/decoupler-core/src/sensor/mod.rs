@@ -18,8 +18,8 @@ mod short_number;
 pub use array_scale::{ArrayScale, ArrayScaleError, LARGEST_COUNT};
 pub use axes::Axes;
 pub use calibration::{
-    CalibratedParameter, Calibration, CalibrationError, CalibrationWarning, PressLimits, PressedRow, SensorParameter,
-    Standing,
+    CalibratedParameter, Calibration, CalibrationError, CalibrationWarning, ParameterStatus, PressLimits, PressedRow,
+    SensorParameter,
 };
 pub use conductance::RowConductance;
 pub use geometry::{Geometry, GeometryError};

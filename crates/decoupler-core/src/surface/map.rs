@@ -12,12 +12,12 @@ use super::weights::{Point, Weights};
 use super::{natural_cubic, thin_plate};
 
 /// Largest number of nodes for a spline; beyond it, factorisation and matrix cost more than they show.
-const MOST_SPLINE_NODES: usize = 1000;
+const MAX_SPLINE_NODES: usize = 1000;
 
 /// Largest number of weights (grid points × nodes): about a millisecond per frame, limited by memory bandwidth.
-const MOST_WEIGHTS: usize = 1_100_000;
+const MAX_WEIGHTS: usize = 1_100_000;
 
-/// Number of grid points per side, as far as [`MOST_WEIGHTS`] allows.
+/// Number of grid points per side, as far as [`MAX_WEIGHTS`] allows.
 const GRID_POINTS: usize = 110;
 
 /// Interpolation between the nodes. Each kind reproduces constants and planes.
@@ -77,7 +77,7 @@ impl SurfaceMap {
         let nodes = x_mm.len() * y_mm.len();
         let is_line = x_mm.len() == 1 || y_mm.len() == 1;
         let spline_grid = grid(&x, &y, if is_line { GRID_POINTS } else { affordable(nodes) });
-        let spline = if nodes > MOST_SPLINE_NODES {
+        let spline = if nodes > MAX_SPLINE_NODES {
             None
         } else if x_mm.len() == 1 {
             along(y_mm, &y, spline_grid.y_mm(), spline_grid.inside_y()).map(Spline::AlongY)
@@ -111,10 +111,10 @@ impl SurfaceMap {
     /// nearly so, or all are on one line. A line along x or y is a lattice: see [`Self::new`].
     pub fn scattered(places_mm: &[[f64; 2]]) -> Result<Self, SurfaceError> {
         let nodes = places_mm.len();
-        if nodes > MOST_SPLINE_NODES {
+        if nodes > MAX_SPLINE_NODES {
             return Err(SurfaceError::TooMany {
                 count: nodes,
-                most: MOST_SPLINE_NODES,
+                most: MAX_SPLINE_NODES,
             });
         }
         let (grid, scattered) = Scattered::new(places_mm, affordable(nodes))?;
@@ -204,7 +204,7 @@ impl SurfaceMap {
 
 /// Number of grid points a side for a spline through this many nodes.
 fn affordable(nodes: usize) -> usize {
-    ((MOST_WEIGHTS as f64 / nodes.max(1) as f64).sqrt() as usize).min(GRID_POINTS)
+    ((MAX_WEIGHTS as f64 / nodes.max(1) as f64).sqrt() as usize).min(GRID_POINTS)
 }
 
 fn grid(x: &SortedAxis, y: &SortedAxis, target: usize) -> Grid {

@@ -117,9 +117,9 @@ impl BayesianRegularization {
             None => self.errors - gamma,
             Some(time) => {
                 /// Least part of the errors that is left to tell the noise.
-                const LEAST_FREE: f64 = 0.1;
+                const MIN_FREE: f64 = 0.1;
                 let independent = self.errors / time;
-                (independent - gamma).max(LEAST_FREE * independent)
+                (independent - gamma).max(MIN_FREE * independent)
             }
         };
         let bounded = |value: f64| {

@@ -22,12 +22,12 @@ use rayon::prelude::*;
 /// many times the cost of waking another thread.
 pub(super) const LARGE: usize = 1 << 25;
 /// Most pieces of a result, since each piece reads its factors again.
-const MOST_PIECES: usize = 16;
+const MAX_PIECES: usize = 16;
 /// Fewest rows or columns of a piece; narrower ones waste SIMD lanes.
 const NARROWEST: usize = 16;
 
 /// Most parts of the samples, since each part needs memory for its own sums.
-const MOST_PARTS: usize = 8;
+const MAX_PARTS: usize = 8;
 /// Most memory for those sums.
 const LARGEST_PARTS_BYTES: usize = 32 << 20;
 
@@ -47,7 +47,7 @@ impl Work {
     pub(super) fn parts(self, smallest: usize) -> usize {
         let worth = self.blocks.saturating_mul(self.multiplications) / smallest;
         let affordable = LARGEST_PARTS_BYTES / self.bytes.max(1);
-        worth.min(self.blocks).min(affordable).clamp(1, MOST_PARTS)
+        worth.min(self.blocks).min(affordable).clamp(1, MAX_PARTS)
     }
 }
 
@@ -72,7 +72,7 @@ pub(super) fn is_large(multiplications: usize) -> bool {
 
 /// Number of pieces to split a product of this many multiplications into: a power of two.
 pub(super) fn pieces(multiplications: usize) -> usize {
-    let pieces = (multiplications / LARGE).clamp(1, MOST_PIECES);
+    let pieces = (multiplications / LARGE).clamp(1, MAX_PIECES);
     1 << pieces.ilog2()
 }
 

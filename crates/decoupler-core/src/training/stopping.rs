@@ -34,14 +34,14 @@ impl Default for StoppingRules {
 
 impl StoppingRules {
     /// Largest number of epochs that can be set.
-    pub const MOST_EPOCHS: usize = 1_000_000;
+    pub const MAX_EPOCHS: usize = 1_000_000;
 
     /// Checks the ranges.
     ///
     /// # Errors
     /// The first setting out of range.
     pub fn check(&self) -> Result<(), SettingError> {
-        let most = Self::MOST_EPOCHS as f64;
+        let most = Self::MAX_EPOCHS as f64;
         let values = [
             ("epochs", self.epochs as f64, 1.0..=most),
             ("goal", self.goal_mse, 0.0..=f64::MAX),

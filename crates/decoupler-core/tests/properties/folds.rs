@@ -37,14 +37,14 @@ proptest! {
             FoldUnit::Snapshot => groups_of(&set, &every).len(),
         };
         match Folds::deal(&set, folds, unit, &mut Seed(seed).rng(Stream::Split)) {
-            Ok(dealt) => {
-                prop_assert_eq!(dealt.count(), folds);
-                let mut tested: Vec<usize> = (0..folds).flat_map(|fold| dealt.test(fold).to_vec()).collect();
+            Ok(assigned) => {
+                prop_assert_eq!(assigned.count(), folds);
+                let mut tested: Vec<usize> = (0..folds).flat_map(|fold| assigned.test(fold).to_vec()).collect();
                 tested.sort_unstable();
                 prop_assert_eq!(&tested, &every, "every sample is tested once");
                 let mut sizes = Vec::new();
                 for fold in 0..folds {
-                    let (test, training) = (dealt.test(fold), dealt.without(&[fold]));
+                    let (test, training) = (assigned.test(fold), assigned.without(&[fold]));
                     prop_assert_eq!(test.len() + training.len(), set.samples());
                     prop_assert!(training.iter().all(|sample| !test.contains(sample)));
                     let groups = groups_of(&set, test);

@@ -46,8 +46,8 @@ fn a_random_split_flatters_where_samples_of_a_group_are_alike() {
     let groups = (0..400).map(|sample| sample / 20).collect();
     let alike = Dataset::new(readings, targets, None, groups).unwrap();
     let compared = |set: &Dataset, by| {
-        let dealt = Folds::by(set, 5, by, &mut Seed(0).rng(Stream::Split)).unwrap();
-        let validated = CrossValidated::on_folds(&settings(), set, dealt, || false)
+        let assigned = Folds::by(set, 5, by, &mut Seed(0).rng(Stream::Split)).unwrap();
+        let validated = CrossValidated::on_folds(&settings(), set, assigned, || false)
             .unwrap()
             .unwrap();
         SplitComparison::complete(&settings(), set, 5, (by, &validated), &|| false)
@@ -68,8 +68,8 @@ fn a_random_split_flatters_where_samples_of_a_group_are_alike() {
     assert_eq!(of_independent.by, SplitBy::Time);
     let sentence = of_independent.sentence(0, "y");
     assert!(sentence.contains("is not optimistic"), "{sentence}");
-    let dealt = Folds::by(&independent, 5, SplitBy::Random, &mut Seed(0).rng(Stream::Split)).unwrap();
-    let validated = CrossValidated::on_folds(&settings(), &independent, dealt, || false)
+    let assigned = Folds::by(&independent, 5, SplitBy::Random, &mut Seed(0).rng(Stream::Split)).unwrap();
+    let validated = CrossValidated::on_folds(&settings(), &independent, assigned, || false)
         .unwrap()
         .unwrap();
     let given = (SplitBy::Random, &validated);

@@ -1,7 +1,7 @@
 //! Trainings that come to nothing say why, and what to change.
 
 use decoupler_core::training::{
-    Method, SettingError, StopReason, StoppingRules, Trainer, TrainingFlaw, TrainingSettings,
+    Method, SettingError, StopReason, StoppingRules, Trainer, TrainingDefect, TrainingSettings,
 };
 
 use crate::problems::{problem, start};
@@ -97,10 +97,10 @@ fn a_training_that_leaves_its_start_or_diverges_says_why_and_what_to_change() {
     ];
     for (name, values, words) in cases {
         let trainer = trained(method(name, values), 30);
-        let flaw = TrainingFlaw::of(&trainer).unwrap_or_else(|| panic!("{name} has a defect"));
-        let text = flaw.to_string();
+        let defect = TrainingDefect::of(&trainer).unwrap_or_else(|| panic!("{name} has a defect"));
+        let text = defect.to_string();
         assert!(
-            flaw.is_at_start && text.contains("no better than its random start"),
+            defect.is_at_start && text.contains("no better than its random start"),
             "{text}"
         );
         assert!(text.contains(words), "{name}: {text}");
@@ -113,14 +113,14 @@ fn a_training_that_leaves_its_start_or_diverges_says_why_and_what_to_change() {
 }
 
 #[test]
-fn a_sound_training_has_no_flaw_and_one_under_way_not_yet() {
+fn a_valid_training_has_no_defect_and_one_under_way_not_yet() {
     for method in Method::all() {
         let trainer = trained(method, 200);
-        assert_eq!(TrainingFlaw::of(&trainer), None, "{method}");
+        assert_eq!(TrainingDefect::of(&trainer), None, "{method}");
     }
     let settings = TrainingSettings::default();
     let trainer = Trainer::new(start(), problem(), settings).unwrap();
-    assert_eq!(TrainingFlaw::of(&trainer), None);
+    assert_eq!(TrainingDefect::of(&trainer), None);
 }
 
 /// Step lengths that only grow lower the error for a while before it grows without end.
@@ -134,17 +134,17 @@ fn a_training_that_diverges_late_names_the_epoch_and_keeps_the_best_weights() {
             ("largest step length", 1e300),
         ];
         let trainer = trained(method("rp", &growing), 3000);
-        let Some(flaw) = TrainingFlaw::of(&trainer).filter(|flaw| !flaw.is_at_start) else {
+        let Some(defect) = TrainingDefect::of(&trainer).filter(|defect| !defect.is_at_start) else {
             continue;
         };
         found = true;
-        let epoch = flaw.diverged_in.expect("it is better than its start, so it diverged");
+        let epoch = defect.diverged_in.expect("it is better than its start, so it diverged");
         let history = trainer.history();
         let start_mse = history[0].training_mse;
         assert!(history[epoch..].iter().all(|record| record.training_mse > start_mse));
         assert!(history[epoch - 1].training_mse <= start_mse);
         assert!(
-            flaw.to_string().contains(&format!("diverged in epoch {epoch}")),
+            defect.to_string().contains(&format!("diverged in epoch {epoch}")),
             "{defect}"
         );
         let errors = history.iter().filter_map(|record| record.validation_mse);

@@ -129,9 +129,9 @@ fn existing_folder(path: &Path, target: &Path) -> Result<PathBuf, WriteError> {
 /// Follows a link to a file that is missing, through further links.
 fn link_target(path: &Path) -> PathBuf {
     /// As many as Linux follows.
-    const MOST_LINKS: usize = 40;
+    const MAX_LINKS: usize = 40;
     let mut target = path.to_owned();
-    for _ in 0..MOST_LINKS {
+    for _ in 0..MAX_LINKS {
         let Ok(next) = fs::read_link(&target) else { break };
         target = target.parent().unwrap_or(Path::new("")).join(next);
     }

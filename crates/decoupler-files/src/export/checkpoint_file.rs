@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::value::to_raw_value;
 
 use super::{
-    AtomicFile, DocumentError, DocumentKind, document::PROGRAM, sealed::Sealed, soundness::settings_flaw,
+    AtomicFile, DocumentError, DocumentKind, document::PROGRAM, sealed::Sealed, soundness::settings_defect,
     unfinished::folder_of,
 };
 use crate::import::{Progress, Recorded, Setup, SetupError, SetupSets};
@@ -99,7 +99,7 @@ impl CheckpointFile {
     pub fn save(&self, path: &Path) -> Result<(), DocumentError> {
         let unsound = |error: serde_json::Error| DocumentError::Unsound {
             path: path.to_owned(),
-            flaw: error.to_string(),
+            defect: error.to_string(),
         };
         let recorded = self.recorded.as_ref();
         let run = to_raw_value(&Document {
@@ -120,7 +120,7 @@ impl CheckpointFile {
     /// The file cannot be read, is of another kind or version, or is damaged.
     pub fn load(path: &Path) -> Result<Self, DocumentError> {
         let bytes = KIND.read(path)?;
-        Self::parse(&bytes, folder_of(path)).map_err(|flaw| KIND.damaged(path, flaw))
+        Self::parse(&bytes, folder_of(path)).map_err(|defect| KIND.damaged(path, defect))
     }
 
     fn parse(bytes: &[u8], folder: &Path) -> Result<Self, String> {
@@ -133,6 +133,6 @@ impl CheckpointFile {
             wall_time: document.wall_time,
             starts: document.starts,
         };
-        settings_flaw(&file.settings, file.recorded.as_ref()).map_or(Ok(file), Err)
+        settings_defect(&file.settings, file.recorded.as_ref()).map_or(Ok(file), Err)
     }
 }

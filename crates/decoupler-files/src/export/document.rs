@@ -131,7 +131,7 @@ impl DocumentKind {
         };
         let beginning = format!("{{\"format\":\"{}\",", self.format());
         let heading = Heading::read(bytes).map_err(|no_heading| match no_heading {
-            NoHeading::NotJson(flaw) if bytes.starts_with(beginning.as_bytes()) => self.damaged(&path(), flaw),
+            NoHeading::NotJson(defect) if bytes.starts_with(beginning.as_bytes()) => self.damaged(&path(), defect),
             NoHeading::NotJson(reason) => other(reason),
             NoHeading::CutOff { line, column } => DocumentError::CutOff {
                 path: path(),
@@ -155,9 +155,13 @@ impl DocumentKind {
         }
     }
 
-    pub(super) fn damaged(self, path: &Path, flaw: String) -> DocumentError {
+    pub(super) fn damaged(self, path: &Path, defect: String) -> DocumentError {
         let path = path.to_owned();
-        DocumentError::Damaged { path, kind: self, flaw }
+        DocumentError::Damaged {
+            path,
+            kind: self,
+            defect,
+        }
     }
 }
 
@@ -229,7 +233,7 @@ pub enum DocumentError {
         /// Kind of the file.
         kind: DocumentKind,
         /// Description of the defect, with the field or with line and column.
-        flaw: String,
+        defect: String,
     },
     /// The samples are recorded, and nothing says where.
     #[error(
@@ -245,7 +249,7 @@ pub enum DocumentError {
         /// The file.
         path: PathBuf,
         /// Description of the defect, with the field.
-        flaw: String,
+        defect: String,
     },
     /// The file cannot be written.
     #[error(transparent)]

@@ -64,5 +64,5 @@ pub(super) fn read<T: DeserializeOwned>(path: &Path) -> Result<Option<T>, Docume
         let value = serde_json::from_str(sealed.run.get());
         value.map_err(|error| error.to_string())
     });
-    read.map(Some).map_err(|flaw| KIND.damaged(path, flaw))
+    read.map(Some).map_err(|defect| KIND.damaged(path, defect))
 }

@@ -68,7 +68,7 @@ pub use experiment_words::{describe_conditions, describe_failures, describe_wors
 pub use network_file::NetworkFile;
 pub use recipe_file::{RecipeFile, RecipeSource};
 pub use recorded_words::{
-    describe_positions, describe_standings, describe_target, describe_warnings, describe_worse_than_ridge,
+    describe_determinacy, describe_positions, describe_target, describe_warnings, describe_worse_than_ridge,
 };
 pub use run_folder::{KeptRun, KeptRuns, RunFolder};
 pub use same_file::is_same;

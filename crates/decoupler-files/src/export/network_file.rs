@@ -7,7 +7,7 @@ use super::{
     AtomicFile, DocumentError, DocumentKind, TrainingRecord,
     document::PROGRAM,
     sealed::{Commit, Sealed},
-    soundness::flaw,
+    soundness::defect,
     unfinished::folder_of,
 };
 use crate::import::{InputLines, Recorded, Setup, SetupError};
@@ -140,12 +140,12 @@ impl NetworkFile {
 
     /// As [`Self::save`]; `commit` puts the file in its place.
     pub(super) fn save_by(&self, path: &Path, commit: Commit) -> Result<(), DocumentError> {
-        let unsound = |flaw: String| DocumentError::Unsound {
+        let unsound = |defect: String| DocumentError::Unsound {
             path: path.to_owned(),
-            flaw,
+            defect,
         };
-        if let Some(flaw) = flaw(self) {
-            return Err(unsound(flaw));
+        if let Some(defect) = defect(self) {
+            return Err(unsound(defect));
         }
         let Self {
             program,
@@ -177,13 +177,13 @@ impl NetworkFile {
     pub fn load(path: &Path) -> Result<Self, DocumentError> {
         let bytes = KIND.read(path)?;
         let read = Self::parse(&bytes, folder_of(path));
-        let sound = read.and_then(|file| flaw(&file).map_or(Ok(file), Err));
-        sound.map_err(|flaw| KIND.damaged(path, flaw))
+        let sound = read.and_then(|file| defect(&file).map_or(Ok(file), Err));
+        sound.map_err(|defect| KIND.damaged(path, defect))
     }
 
     /// Describes the first defect that would keep the file from being read back.
-    pub fn flaw(&self) -> Option<String> {
-        flaw(self)
+    pub fn defect(&self) -> Option<String> {
+        defect(self)
     }
 
     fn parse(bytes: &[u8], folder: &Path) -> Result<Self, String> {

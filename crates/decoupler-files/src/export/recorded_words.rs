@@ -2,16 +2,16 @@ use super::format_number;
 use decoupler_core::{
     evaluation::{
         Channel, Problem, Scores, TargetPosition,
-        recorded::{Determination, Findings, Standing, TargetFindings, Undetermined},
+        recorded::{Determinacy, Determination, Findings, TargetFindings, Undetermined},
     },
     training::Method,
 };
 
 /// Warns of targets that the readings explain little of or that could not be judged; `measured` has an entry for each target.
-pub fn describe_standings(targets: &[Channel], measured: &[Result<Determination, Undetermined>]) -> Vec<String> {
+pub fn describe_determinacy(targets: &[Channel], measured: &[Result<Determination, Undetermined>]) -> Vec<String> {
     let of = |(target, measured): (&Channel, &Result<Determination, Undetermined>)| match measured {
         Err(cause) => Some(format!("{}: {cause}", target.name)),
-        Ok(measured) => (measured.standing() != Standing::Told).then(|| measured.sentence(&target.name)),
+        Ok(measured) => (measured.determinacy() != Determinacy::Determined).then(|| measured.sentence(&target.name)),
     };
     targets.iter().zip(measured).filter_map(of).collect()
 }

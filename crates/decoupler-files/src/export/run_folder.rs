@@ -112,7 +112,7 @@ impl RunFolder {
             match read::<String>(&name_path(path, run.id)) {
                 Ok(Some(name)) => run.name = clean_name(&name),
                 Ok(None) => {}
-                Err(flaw) => problems.push(format!(
+                Err(defect) => problems.push(format!(
                     "the name of a run cannot be read: {defect}; rename '{}'",
                     run.name
                 )),
@@ -120,7 +120,7 @@ impl RunFolder {
         }
         match read::<[Option<u64>; 2]>(&pinned_path(path)) {
             Ok(pinned) => self.kept.pinned = pinned.unwrap_or(self.kept.pinned),
-            Err(flaw) => problems.push(format!(
+            Err(defect) => problems.push(format!(
                 "the runs compared cannot be read: {defect}; choose A and B again"
             )),
         }

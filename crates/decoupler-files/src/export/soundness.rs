@@ -11,7 +11,7 @@ use decoupler_core::{
 
 /// Describes the first defect of a network file and its field. Checked before writing and after reading, so
 /// that every file that is written can be read.
-pub(super) fn flaw(file: &NetworkFile) -> Option<String> {
+pub(super) fn defect(file: &NetworkFile) -> Option<String> {
     let NetworkFile {
         program: _,
         settings,
@@ -31,19 +31,19 @@ pub(super) fn flaw(file: &NetworkFile) -> Option<String> {
     };
     let last_epoch = training.history.last().map(|record| record.epoch);
     let simulated = settings.simulated();
-    let flaws = [
+    let defects = [
         (network.values().iter().find_map(weight))
             .map(|index| format!("network: weight {index} is not a finite number")),
-        number_flaw(network, settings, row_wires.as_deref()),
+        number_defect(network, settings, row_wires.as_deref()),
         (network.values().iter()).find_map(|network| mismatch(network, problem, settings.hidden)),
-        simulated.and_then(|settings| place_flaw(network, &settings)),
+        simulated.and_then(|settings| place_defect(network, &settings)),
         last_epoch.is_none().then(|| "training.history: it is empty".to_owned()),
         last_epoch
             .filter(|&last| training.best_epoch > last)
             .map(|last| format!("training.best_epoch: {} is after the last, {last}", training.best_epoch)),
         (!(training.seconds >= 0.0 && training.seconds.is_finite()))
             .then(|| format!("training.seconds: {} is not a time", training.seconds)),
-        starts_flaw(file),
+        starts_defect(file),
         unmeasured("scores.network", errors, problem),
         unmeasured("scores.baselines.mean", &baselines.mean, problem),
         unmeasured("scores.baselines.linear", &baselines.linear, problem),
@@ -51,29 +51,32 @@ pub(super) fn flaw(file: &NetworkFile) -> Option<String> {
             .and_then(|reference| unmeasured("scores.baselines.reference", reference, problem)),
     ];
     let is_placed = |position: &TargetPosition| position.target < problem.targets.len();
-    let problem_flaw = match simulated {
+    let problem_defect = match simulated {
         Some(settings) if *problem != settings.source.problem() => Some("problem: it is not that of the array"),
         None if problem.has_nodes => Some("problem: the targets of a recording are not nodes"),
         None if !problem.positions.iter().all(is_placed) => Some("problem.positions: a target does not exist"),
         _ => None,
     };
-    settings_flaw(settings, recorded.as_ref())
-        .or(problem_flaw.map(str::to_owned))
-        .or_else(|| flaws.into_iter().flatten().next())
+    settings_defect(settings, recorded.as_ref())
+        .or(problem_defect.map(str::to_owned))
+        .or_else(|| defects.into_iter().flatten().next())
 }
 
 /// Describes the first impossible value of the settings in a file, and its field.
-pub(super) fn settings_flaw(settings: &RunSettings, recorded: Option<&Recorded>) -> Option<String> {
-    let at = |field: &str, flaw: &dyn Display| format!("{field}: {defect}");
-    let training = settings.training.check().map_err(|flaw| at("settings.training", &flaw));
+pub(super) fn settings_defect(settings: &RunSettings, recorded: Option<&Recorded>) -> Option<String> {
+    let at = |field: &str, defect: &dyn Display| format!("{field}: {defect}");
+    let training = settings
+        .training
+        .check()
+        .map_err(|defect| at("settings.training", &defect));
     let source = match settings.simulated() {
         Some(settings) => [
-            settings.check_counts().map_err(|flaw| at("settings", &flaw)),
-            (settings.source.sensor.check()).map_err(|flaw| at("settings.source.sensor", &flaw)),
-            (settings.source.scene.check()).map_err(|flaw| at("settings.source.scene", &flaw)),
+            settings.check_counts().map_err(|defect| at("settings", &defect)),
+            (settings.source.sensor.check()).map_err(|defect| at("settings.source.sensor", &defect)),
+            (settings.source.scene.check()).map_err(|defect| at("settings.source.scene", &defect)),
         ],
         None => [
-            settings.check_network().map_err(|flaw| at("settings", &flaw)),
+            settings.check_network().map_err(|defect| at("settings", &defect)),
             Ok(()),
             Ok(()),
         ],
@@ -88,7 +91,7 @@ pub(super) fn settings_flaw(settings: &RunSettings, recorded: Option<&Recorded>)
     checks.into_iter().find_map(Result::err)
 }
 
-fn starts_flaw(file: &NetworkFile) -> Option<String> {
+fn starts_defect(file: &NetworkFile) -> Option<String> {
     let starts = &file.training.starts;
     if !starts.is_empty() && starts.len() != file.settings.starts {
         let (found, expected) = (starts.len(), file.settings.starts);
@@ -106,7 +109,7 @@ fn starts_flaw(file: &NetworkFile) -> Option<String> {
     ))
 }
 
-fn number_flaw(network: &Networks, settings: &RunSettings, row_wires: Option<&[usize]>) -> Option<String> {
+fn number_defect(network: &Networks, settings: &RunSettings, row_wires: Option<&[usize]>) -> Option<String> {
     let found = network.values().len();
     match settings.simulated().map(|settings| settings.source) {
         Some(source) => match source.model_size() {
@@ -115,7 +118,7 @@ fn number_flaw(network: &Networks, settings: &RunSettings, row_wires: Option<&[u
                 "network: {found} of them, but rows {} of {} need {}",
                 source.scene.rows, source.sensor.scale, size.networks
             )),
-            Err(flaw) => Some(format!("settings.source.scene.rows: {defect}")),
+            Err(defect) => Some(format!("settings.source.scene.rows: {defect}")),
         },
         None => {
             let rows = row_wires.map_or(1, <[usize]>::len);
@@ -138,7 +141,7 @@ fn mismatch(network: &DecouplingNetwork, problem: &Problem, hidden: usize) -> Op
 
 /// Describes the first coordinate of a training whose range no node of the scene reaches, even with a stroke to spare.
 /// Expects networks whose sizes and number fit the settings, and says nothing of others.
-fn place_flaw(networks: &Networks, settings: &SimulatedSettings) -> Option<String> {
+fn place_defect(networks: &Networks, settings: &SimulatedSettings) -> Option<String> {
     let source = &settings.source;
     let (sensor, scene) = (&source.sensor, &source.scene);
     let rows = scene.rows.read(sensor.scale.rows()).ok()?;

@@ -4,7 +4,7 @@ use super::ticks::{multiples, step_for, tick_text};
 use decoupler_core::text::format_number;
 
 /// Largest number of parts into which ticks divide an axis.
-const MOST_PARTS: f64 = 8.0;
+const MAX_PARTS: f64 = 8.0;
 /// Values beyond this have no place: differences between them would overflow.
 const LARGEST: f64 = 1e300;
 
@@ -153,7 +153,7 @@ impl PlotAxis {
                 step: 1.0,
             };
         }
-        let parts = (width / apart).clamp(1.0, MOST_PARTS) as usize;
+        let parts = (width / apart).clamp(1.0, MAX_PARTS) as usize;
         let multiples_of = |step: f64| Ticks {
             places: multiples(range, step),
             step,
@@ -214,7 +214,7 @@ fn ticks_within_a_decade(range: &RangeInclusive<f64>, apart: f64) -> Ticks {
     let [low, high] = [range.start(), range.end()].map(|end| 10.0_f64.powf(*end));
     // The upper end is the more crowded one.
     let number = high - 10.0_f64.powf(range.end() - apart);
-    let parts = ((high - low) / number).clamp(1.0, MOST_PARTS) as usize;
+    let parts = ((high - low) / number).clamp(1.0, MAX_PARTS) as usize;
     let step = step_for(&(low..=high), parts);
     let places = multiples(&(low..=high), step).into_iter().map(f64::log10);
     Ticks {

@@ -11,7 +11,7 @@ use decoupler_core::training::{EpochRecord, Stage};
 
 /// Factor above the error or gradient of the start from which a curve is drawn at the upper edge, so that a diverged
 /// training leaves the rest of its curves readable.
-const MOST_GROWTH: f64 = 1e3;
+const MAX_GROWTH: f64 = 1e3;
 /// Learning rates, dampings and scales beyond these are drawn at the edge.
 const PARAMETERS: std::ops::RangeInclusive<f64> = 1e-20..=1e12;
 
@@ -29,7 +29,7 @@ fn curve(name: impl Into<String>, look: Look, history: &[EpochRecord], of: OfEpo
 
 /// A logarithmic axis on which what grew far beyond its value at the start is drawn at the upper edge.
 fn bounded(axis: PlotAxis, at_start: Option<f64>) -> PlotAxis {
-    let highest = MOST_GROWTH * at_start.unwrap_or(0.0);
+    let highest = MAX_GROWTH * at_start.unwrap_or(0.0);
     if highest > 0.0 {
         axis.limited(0.0..=highest)
     } else {

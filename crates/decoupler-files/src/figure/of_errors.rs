@@ -13,11 +13,11 @@ use decoupler_core::{dataset::Dataset, evaluation::Channel};
 const BINS: usize = 41;
 
 /// Largest number of samples of a recording looked at in a figure; of a larger test set, evenly spaced ones.
-const MOST_PAIRS: usize = 20_000;
+const MAX_PAIRS: usize = 20_000;
 
 /// Every this many samples are looked at.
 fn stride(test: &Dataset) -> usize {
-    test.samples().div_ceil(MOST_PAIRS).max(1)
+    test.samples().div_ceil(MAX_PAIRS).max(1)
 }
 
 /// Returns actual and decoded values of a target, in its unit. `answers` has the shape of the targets of `test`.
@@ -183,7 +183,7 @@ mod tests {
         let mut answers = actual;
         answers[[30_000, 1]] += 2.0;
         let pairs = target_pairs(&test, &answers, 1);
-        assert!(pairs.len() <= MOST_PAIRS, "{}", pairs.len());
+        assert!(pairs.len() <= MAX_PAIRS, "{}", pairs.len());
         let off = pairs.iter().position(|(actual, decoded)| actual != decoded).unwrap();
         assert_eq!(pair_sample(&test, off), Some(30_000));
         assert_eq!(pair_sample(&test, pairs.len()), None);

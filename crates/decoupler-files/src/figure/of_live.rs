@@ -12,7 +12,7 @@ use decoupler_core::evaluation::Channel;
 
 const HUES: [Hue; 6] = [Hue::Blue, Hue::Orange, Hue::Green, Hue::Violet, Hue::Cyan, Hue::Red];
 /// Most targets that have colours and names of their own; of more, all are fine lines.
-const MOST_NAMES: usize = 2 * HUES.len();
+const MAX_NAMES: usize = 2 * HUES.len();
 
 /// Values of all targets over time, `history` being times in seconds with a value for each target: a plot for each unit.
 pub fn targets_over_time_figure(targets: &[Channel], history: &[(f64, Arc<[f64]>)]) -> PlotFigure {
@@ -22,7 +22,7 @@ pub fn targets_over_time_figure(targets: &[Channel], history: &[(f64, Arc<[f64]>
             units.push(&target.unit);
         }
     }
-    let has_names = targets.len() <= MOST_NAMES;
+    let has_names = targets.len() <= MAX_NAMES;
     let look = |target: usize| {
         let style = match target / HUES.len() {
             _ if !has_names => LineStyle::Fine,

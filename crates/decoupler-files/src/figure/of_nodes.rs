@@ -12,11 +12,11 @@ use super::{
 use decoupler_core::{dataset::Dataset, evaluation::NodeAddress, text::format_number};
 
 /// Largest number of nodes looked at in a figure; of a larger test set, evenly spaced ones.
-const MOST_PAIRS: usize = 20_000;
+const MAX_PAIRS: usize = 20_000;
 
 /// Every this many nodes of a test set are looked at.
 fn stride(test: &Dataset) -> usize {
-    (test.targets().len() / 3).div_ceil(MOST_PAIRS).max(1)
+    (test.targets().len() / 3).div_ceil(MAX_PAIRS).max(1)
 }
 
 /// Returns actual and decoupled z of the nodes of a test set, in millimetres. `decoupled_mm` has the shape of its

@@ -9,7 +9,7 @@ use super::{
 use decoupler_core::{evaluation::Channel, text::format_number};
 
 /// Most targets whose names have room below the axis.
-const MOST_NAMES: usize = 12;
+const MAX_NAMES: usize = 12;
 
 /// All targets of a sample in their order: actual as squares, decoded as discs. Targets of one unit share its axis; with
 /// several units each is shown in percent of its range, `ranges` being the least and largest value of each.
@@ -23,7 +23,7 @@ pub fn sample_figure(targets: &[Channel], actual: &[f64], decoded: &[f64], range
             100.0 * (value - low) / (high - low)
         }
     };
-    let has_names = targets.len() <= MOST_NAMES;
+    let has_names = targets.len() <= MAX_NAMES;
     // Targets that are not named are counted from 1.
     let first = if has_names { 0.0 } else { 1.0 };
     let series = |name: &str, look: Look, values: &[f64]| {

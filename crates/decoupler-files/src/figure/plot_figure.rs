@@ -36,11 +36,11 @@ impl PlotFigure {
 }
 
 /// Largest number of dots drawn of one cloud; more would not be seen.
-const MOST_POINTS: usize = 2000;
+const MAX_POINTS: usize = 2000;
 
-/// Places of every this many items, so that at most [`MOST_POINTS`] and the last one remain.
+/// Places of every this many items, so that at most [`MAX_POINTS`] and the last one remain.
 pub(super) fn thinned_places(count: usize) -> impl Iterator<Item = usize> {
-    let stride = count.div_ceil(MOST_POINTS).max(1);
+    let stride = count.div_ceil(MAX_POINTS).max(1);
     let last = count.checked_sub(1);
     (0..count)
         .step_by(stride)
@@ -54,7 +54,7 @@ mod tests {
     #[test]
     fn thinning_keeps_both_ends() {
         let thin: Vec<usize> = thinned_places(12_345).collect();
-        assert!(thin.len() <= MOST_POINTS + 1);
+        assert!(thin.len() <= MAX_POINTS + 1);
         assert_eq!((thin[0], thin[thin.len() - 1]), (0, 12_344));
         assert_eq!(thinned_places(1).collect::<Vec<_>>(), [0]);
         assert_eq!(thinned_places(0).count(), 0);

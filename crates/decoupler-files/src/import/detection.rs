@@ -8,7 +8,7 @@ use super::{
 /// Length of the beginning from which the layout is found.
 pub(super) const BEGINNING: usize = 1 << 18;
 /// Number of rows that are looked at.
-const MOST_ROWS: usize = 500;
+const MAX_ROWS: usize = 500;
 
 /// Finds the layout of a file from its `beginning`; `is_whole` if nothing follows.
 ///
@@ -125,7 +125,7 @@ impl Score {
 fn sample(text: &[u8], separator: Separator, decimal: Decimal, crs: bool) -> Result<Vec<Vec<Cell>>, TableError> {
     let mut rows = Rows::new(text, separator, crs);
     let mut sample = Vec::new();
-    while sample.len() < MOST_ROWS {
+    while sample.len() < MAX_ROWS {
         match rows.advance() {
             Ok(true) => sample.push(rows.cells().map(|cell| parse(cell, decimal)).collect()),
             Ok(false) => break,

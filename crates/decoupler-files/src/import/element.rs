@@ -84,10 +84,10 @@ impl Array {
         numbers: Vec<f64>,
         is_by_column: bool,
     ) -> Result<Self, TableError> {
-        if width > super::rows::MOST_CELLS {
+        if width > super::rows::MAX_CELLS {
             let reason = format!(
                 "{rows} × {width} is more than {} columns; transpose it",
-                super::rows::MOST_CELLS
+                super::rows::MAX_CELLS
             );
             return Err(TableError::array(name, reason));
         }

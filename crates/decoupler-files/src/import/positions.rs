@@ -215,9 +215,9 @@ fn check_numbers(table: &Table, column: &Column, name: &'static str) -> Result<(
 
 /// Names of the targets, or the first of them.
 fn listed(targets: &[Channel]) -> String {
-    const MOST: usize = 12;
-    let mut names = Vec::from_iter(targets.iter().take(MOST).map(|target| target.name.as_str()));
-    if targets.len() > MOST {
+    const MAX: usize = 12;
+    let mut names = Vec::from_iter(targets.iter().take(MAX).map(|target| target.name.as_str()));
+    if targets.len() > MAX {
         names.push("…");
     }
     names.join(", ")

@@ -10,7 +10,7 @@ use super::{Separator, TableError, watch::table_error};
 /// Largest length of a row in bytes: 16 MiB, of ten thousand columns and more.
 pub(super) const LONGEST_ROW: usize = 1 << 24;
 /// Largest number of cells in a row.
-pub(super) const MOST_CELLS: usize = 20_000;
+pub(super) const MAX_CELLS: usize = 20_000;
 const BUFFER: usize = 1 << 18;
 
 /// Rows of a file of text, cell by cell and with their line numbers. A row may extend over several lines if the line
@@ -92,8 +92,8 @@ impl<R: Read> Rows<R> {
                 self.text.pop();
             }
             self.cells.split(&self.text, self.separator, quotes > 0);
-            if self.cells.ranges.len() > MOST_CELLS {
-                let limit = MOST_CELLS;
+            if self.cells.ranges.len() > MAX_CELLS {
+                let limit = MAX_CELLS;
                 return Err(TableError::Wide { line: self.line, limit });
             }
             return Ok(true);
@@ -187,7 +187,7 @@ impl Cells {
         } = self;
         // The text of the cells is never longer than that of the row.
         unquoted.resize(unquoted.len().max(text.len() + 1), 0);
-        ends.resize(MOST_CELLS + 2, 0);
+        ends.resize(MAX_CELLS + 2, 0);
         let (mut rest, mut written, mut count) = (text, 0, 0);
         loop {
             let (result, read, copied, found) = parser.read_record(rest, &mut unquoted[written..], &mut ends[count..]);

@@ -98,7 +98,7 @@ fn timeless(results: &[ExperimentResults]) -> Vec<Vec<Trial>> {
     let trials = cells.map(|cell| {
         let timeless = |trial: &Trial| Trial {
             seconds: 0.0,
-            least_epoch_seconds: 0.0,
+            min_epoch_seconds: 0.0,
             states: Vec::new(),
             ..trial.clone()
         };
@@ -295,7 +295,7 @@ fn no_training_gets_below_the_bound_of_its_hidden_nodes() {
             settings.source.validation_samples = 0;
             settings.training.stopping.epochs = 200;
             let (split, _) = settings.draw().unwrap();
-            let least = Bottleneck::fit(split.training.targets(), hidden).unwrap().least_mse();
+            let least = Bottleneck::fit(split.training.targets(), hidden).unwrap().min_mse();
             let mut run = Run::prepare(settings).unwrap();
             while run.step().is_none() {}
             let reached = run.leader().best_mse();

@@ -2,7 +2,7 @@
 
 use decoupler_core::{
     dataset::Seed,
-    evaluation::{MOST_STARTS, Run, RunError, SimulatedSettings, Simulation, StartTrainer, Workload, best_start},
+    evaluation::{MAX_STARTS, Run, RunError, SimulatedSettings, Simulation, StartTrainer, Workload, best_start},
     sensor::SensorModel,
     training::{MachineMemory, Method, StopReason, StoppingRules, Trainer},
 };
@@ -141,11 +141,7 @@ fn a_run_goes_on_until_every_start_has_ended_or_all_are_stopped() {
     let ended = run.trainers().iter().position(|t| t.stop_reason().is_some()).unwrap();
     let epochs = run.trainers()[ended].latest().epoch;
     assert_eq!(run.step(), None);
-    assert_eq!(
-        run.trainers()[ended].latest().epoch,
-        epochs,
-        "what has ended is paused"
-    );
+    assert_eq!(run.trainers()[ended].latest().epoch, epochs, "what has ended is paused");
     run.stop();
     assert_eq!(run.stop_reason(), Some(StopReason::Stopped));
     assert_ne!(run.trainers()[ended].stop_reason(), Some(StopReason::Stopped));
@@ -176,7 +172,7 @@ fn every_start_goes_on_with_another_method_and_keeps_counting() {
 
 #[test]
 fn too_many_starts_are_refused() {
-    for starts in [0, MOST_STARTS + 1] {
+    for starts in [0, MAX_STARTS + 1] {
         let message = Run::prepare(settings(starts)).err().unwrap().to_string();
         assert!(
             message.contains("starts") && message.contains("from 1 to 100"),

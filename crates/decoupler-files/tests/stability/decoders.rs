@@ -3,7 +3,7 @@
 use decoupler_core::{
     dataset::Dataset,
     decoupling::{DecoderKind, Precision, decode_set},
-    evaluation::{DecoderReport, DecoderSet, Outlook, ReferenceNote, Run, RunFlaw, SimulatedSettings},
+    evaluation::{DecoderReport, DecoderSet, Outlook, ReferenceNote, Run, RunDefect, SimulatedSettings},
     ndarray::Array2,
     scene::{Loading, Noise, Rows},
 };
@@ -34,11 +34,11 @@ fn z_mm(test: &Dataset, answers: &Array2<f64>) -> f64 {
 const EXPLAINED: f64 = 3.0;
 
 /// The remark next to a decoder's figures, if the program makes one that explains an error of this many times the mean's.
-fn remark(report: &DecoderReport, times: f64, flaw: Option<&RunFlaw>, outlook: Option<&Outlook>) -> Option<String> {
+fn remark(report: &DecoderReport, times: f64, defect: Option<&RunDefect>, outlook: Option<&Outlook>) -> Option<String> {
     if let Some(remark) = report.remarks.first() {
         return Some(remark.to_string());
     }
-    let of_network = flaw.filter(|_| matches!(report.kind, DecoderKind::Network | DecoderKind::Polish));
+    let of_network = defect.filter(|_| matches!(report.kind, DecoderKind::Network | DecoderKind::Polish));
     let of_scene = outlook
         .and_then(|outlook| outlook.warnings.first())
         .filter(|_| times <= EXPLAINED);
@@ -51,7 +51,7 @@ struct Measured {
     run: Run,
     set: DecoderSet,
     outlook: Option<Outlook>,
-    flaw: Option<RunFlaw>,
+    defect: Option<RunDefect>,
     /// Error of always answering the mean of the training targets.
     mean_mm: f64,
 }
@@ -71,7 +71,7 @@ fn measured(settings: &SimulatedSettings) -> Result<Measured, Verdict> {
     }
     Ok(Measured {
         mean_mm: z_mm(run.test(), &answers),
-        flaw: run.flaw(),
+        defect: run.defect(),
         outlook: Outlook::of(&settings.source).ok(),
         run,
         set,
@@ -96,7 +96,7 @@ fn judge_decoder(seen: &Measured, settings: &SimulatedSettings, kind: DecoderKin
     let errors = *report.errors.nodes().expect("the targets are nodes");
     let found = z_mm(test, &answers);
     let times = found / seen.mean_mm;
-    let remark = remark(&report, times, seen.flaw.as_ref(), seen.outlook.as_ref());
+    let remark = remark(&report, times, seen.defect.as_ref(), seen.outlook.as_ref());
     let or_flagged = |what: String| remark.as_ref().map_or_else(|| wrong(what), flagged);
     if !found.is_finite() || !errors.z_mm.is_finite() {
         return or_flagged(format!("{kind}: the error is {found}, without a reason"));

@@ -88,17 +88,17 @@ impl Job {
 
 /// A refusal, if its message says what to change.
 pub(crate) fn refused(error: &impl Display) -> Verdict {
-    match flaw_of(&error.to_string()) {
+    match defect_of(&error.to_string()) {
         None => Verdict::Refused(error.to_string()),
-        Some(flaw) => Verdict::Wrong(format!("{defect} in the refusal: {error}")),
+        Some(defect) => Verdict::Wrong(format!("{defect} in the refusal: {error}")),
     }
 }
 
 /// A remark, if its message says what to change.
 pub(crate) fn flagged(remark: &impl Display) -> Verdict {
-    match flaw_of(&remark.to_string()) {
+    match defect_of(&remark.to_string()) {
         None => Verdict::Flagged(remark.to_string()),
-        Some(flaw) => Verdict::Wrong(format!("{defect} in the remark: {remark}")),
+        Some(defect) => Verdict::Wrong(format!("{defect} in the remark: {remark}")),
     }
 }
 
@@ -107,7 +107,7 @@ pub(crate) fn wrong(what: impl Into<String>) -> Verdict {
 }
 
 /// What a message lacks: it names no cure, or is not for people.
-fn flaw_of(message: &str) -> Option<&'static str> {
+fn defect_of(message: &str) -> Option<&'static str> {
     const CURES: &[&str] = &[
         "give", "must", "use ", "take", "lower", "raise", "set ", "draw", "train", "make", "check", "choose", "write",
         "copy", "fewer", "keep", "end rows", "name ", "need", "let ", "shift", "begin", "install", "resume", "change",

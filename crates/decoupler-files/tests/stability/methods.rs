@@ -2,7 +2,7 @@
 
 use decoupler_core::{
     network::{Mlp, Shape},
-    training::{Examples, Method, Problem, StopReason, StoppingRules, Trainer, TrainingFlaw, TrainingSettings},
+    training::{Examples, Method, Problem, StopReason, StoppingRules, Trainer, TrainingDefect, TrainingSettings},
 };
 use ndarray::{Array2, Axis, Slice};
 
@@ -138,7 +138,7 @@ fn judge(task: &Task, settings: TrainingSettings) -> Verdict {
         None => history.iter().map(deciding).fold(f64::INFINITY, f64::min),
     };
     let (best, start) = (task.deciding_mse(weights), task.deciding_mse(task.start().weights()));
-    let flaw = TrainingFlaw::of(&trainer);
+    let defect = TrainingDefect::of(&trainer);
     if best.is_finite() && !(agree(best, trainer.best_mse(), 1e-6) || (best - trainer.best_mse()).abs() < 1e-22) {
         return wrong(format!("the error is {best:e}, told is {:e}", trainer.best_mse()));
     }
@@ -156,8 +156,8 @@ fn judge(task: &Task, settings: TrainingSettings) -> Verdict {
     if !holds {
         return wrong(format!("it ended for another reason than told: {reason}"));
     }
-    match flaw {
-        Some(flaw) => flagged(&flaw),
+    match defect {
+        Some(defect) => flagged(&defect),
         None if start > 0.0 && best >= 0.99 * start => wrong(format!(
             "the network is its random start, and nothing says so: {reason}"
         )),

@@ -1,7 +1,7 @@
 //! Every finished training is kept, and all of them survive a restart. A thread of its own keeps their
 //! folder.
 
-mod news;
+mod events;
 mod state;
 mod worker;
 

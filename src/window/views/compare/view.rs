@@ -29,7 +29,7 @@ impl View for CompareView {
         self.opened_with = Some(0);
     }
 
-    fn take_news(&mut self, shared: &Shared, _effects: &mut Vec<Effect>) {
+    fn take_events(&mut self, shared: &Shared, _effects: &mut Vec<Effect>) {
         self.follow(&shared.runs);
     }
 

@@ -29,12 +29,12 @@ pub enum FormError {
     #[error(transparent)]
     Experiment(#[from] ExperimentError),
     /// More than can be looked at.
-    #[error("{0} cells are more than can be looked at: give fewer values, at most {MOST_CELLS} cells")]
+    #[error("{0} cells are more than can be looked at: give fewer values, at most {MAX_CELLS} cells")]
     TooManyCells(usize),
 }
 
 /// The most cells of one experiment in the window.
-const MOST_CELLS: usize = 400;
+const MAX_CELLS: usize = 400;
 
 impl Form {
     /// Returns the default form of `topic`: the paper's own values, or a small sweep.
@@ -111,7 +111,7 @@ impl Form {
         let cells = axes
             .iter()
             .fold(1, |cells: usize, axis| cells.saturating_mul(axis.len()));
-        if cells > MOST_CELLS {
+        if cells > MAX_CELLS {
             return Err(FormError::TooManyCells(cells));
         }
         let mut axes = axes.into_iter();

@@ -1,4 +1,4 @@
-use eframe::egui::{Button, ComboBox, TextEdit, Ui, vec2};
+use eframe::egui::{Button, ComboBox, Key, TextEdit, Ui, vec2};
 
 use super::{
     AxisForm, ExperimentsView, Form, Running, Topic,
@@ -12,12 +12,13 @@ use crate::window::{
         dim_ui,
         fields::{count_ui, seed_ui},
         ghost_button, note_ui, primary_button, progress_bar_ui, scrolled_ui, section_heading_ui, segmented_ui,
+        with_shortcut,
     },
 };
 use decoupler_core::{
     dataset::FoldUnit,
     evaluation::{
-        MOST_STARTS,
+        MAX_STARTS,
         experiments::{AxisKind, PaperTable},
     },
     text::counted,
@@ -26,7 +27,7 @@ use decoupler_core::{
 use decoupler_files::export::format_duration;
 
 /// The most seeds or repeats.
-const MOST_TRIALS: usize = 1000;
+const MAX_TRIALS: usize = 1000;
 
 /// Shows the form: the choice of an experiment, its lists and numbers, Run and Cancel.
 pub fn form_ui(ui: &mut Ui, experiments: &mut ExperimentsView, shared: &Shared, effects: &mut Vec<Effect>) {
@@ -117,14 +118,14 @@ fn fields_ui(ui: &mut Ui, topic: Topic, form: &mut Form, shared: &Shared) {
     }
     let template = &mut form.template;
     let hint = "Number of consecutive seeds for each cell, which show the spread of the results.";
-    count_ui(ui, "Seeds", hint, &mut template.seeds, 1..=MOST_TRIALS);
+    count_ui(ui, "Seeds", hint, &mut template.seeds, 1..=MAX_TRIALS);
     let hint = "First of the consecutive seeds. The same seeds give the same results.";
     seed_ui(ui, "First seed", hint, &mut template.base.seed.0, 0);
     let hint = "Largest number of epochs per training. The paper does not state its own.";
     let epochs = &mut template.base.training.stopping.epochs;
-    count_ui(ui, "Epochs", hint, epochs, 1..=StoppingRules::MOST_EPOCHS);
+    count_ui(ui, "Epochs", hint, epochs, 1..=StoppingRules::MAX_EPOCHS);
     let hint = "Number of trainings from different random weights; the one with the lowest validation error counts.";
-    count_ui(ui, "Starts", hint, &mut template.base.starts, 1..=MOST_STARTS);
+    count_ui(ui, "Starts", hint, &mut template.base.starts, 1..=MAX_STARTS);
 }
 
 fn cross_validation_ui(ui: &mut Ui, form: &mut Form) {
@@ -137,10 +138,10 @@ fn cross_validation_ui(ui: &mut Ui, form: &mut Form) {
         "Folds",
         "Number of folds, k, into which the samples are split.",
         &mut validation.folds,
-        2..=MOST_TRIALS,
+        2..=MAX_TRIALS,
     );
     let hint = "Number of shuffles into new folds, for each seed.";
-    count_ui(ui, "Repeats", hint, &mut validation.repeats, 1..=MOST_TRIALS);
+    count_ui(ui, "Repeats", hint, &mut validation.repeats, 1..=MAX_TRIALS);
     let units = [(FoldUnit::Sample, "By sample"), (FoldUnit::Snapshot, "By snapshot")];
     if let Some(unit) = segmented_ui(ui, "Unit of the folds", &units, validation.unit, true) {
         validation.unit = unit;
@@ -224,7 +225,11 @@ fn run_buttons_ui(ui: &mut Ui, experiments: &mut ExperimentsView, effects: &mut 
         let can_cancel = experiments.running.is_some();
         let cancel = ui.add_enabled(can_cancel, ghost_button("■ Cancel").min_size(size));
         if cancel
-            .on_hover_text(with_shortcut(ui, "Ends the experiment; finished trials are kept", Key::Period))
+            .on_hover_text(with_shortcut(
+                ui,
+                "Ends the experiment; finished trials are kept",
+                Key::Period,
+            ))
             .clicked()
         {
             experiments.cancel();

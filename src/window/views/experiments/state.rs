@@ -103,7 +103,7 @@ struct CheckedForm {
 
 /// The most memory that the finished trainings of one experiment may take. Those of later trials are not kept: they
 /// are trained again when they are to be seen.
-const MOST_KEPT_BYTES: usize = 400_000_000;
+const MAX_KEPT_BYTES: usize = 400_000_000;
 
 /// An experiment under way.
 #[derive(Clone, Copy, Debug)]
@@ -181,7 +181,7 @@ impl Outcome {
         let problem = results.problem.clone();
         let outcome = finished.outcome.map(|mut trial| {
             let bytes = bytes_of(&trial, settings.hidden, problem.as_deref());
-            if self.kept_bytes + bytes > MOST_KEPT_BYTES {
+            if self.kept_bytes + bytes > MAX_KEPT_BYTES {
                 trial.states = Vec::new();
             } else {
                 self.kept_bytes += bytes;

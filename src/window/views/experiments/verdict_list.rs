@@ -2,7 +2,7 @@ use eframe::egui::{Color32, Frame, Margin, RichText, Ui};
 
 use super::Outcome;
 use crate::window::theme::{Palette, Theme, radius, semibold, space, type_size};
-use decoupler_core::evaluation::experiments::{Standing, Verdict};
+use decoupler_core::evaluation::experiments::{Verdict, VerdictStatus};
 
 /// The claims that hold in this run, with the numbers; below, those that could not be tried.
 pub fn verdicts_ui(ui: &mut Ui, outcome: &Outcome) {
@@ -43,11 +43,11 @@ fn verdict_ui(ui: &mut Ui, verdict: &Verdict) {
     ui.add_space(space(2));
 }
 
-fn colour_of(standing: Standing, palette: &Palette) -> Color32 {
+fn colour_of(standing: VerdictStatus, palette: &Palette) -> Color32 {
     match standing {
-        Standing::Holds => palette.good,
-        Standing::HoldsInPart => palette.warning,
-        Standing::Fails => palette.bad,
-        Standing::Undecided => palette.dim,
+        VerdictStatus::Holds => palette.good,
+        VerdictStatus::HoldsInPart => palette.warning,
+        VerdictStatus::Fails => palette.bad,
+        VerdictStatus::Undecided => palette.dim,
     }
 }

@@ -27,7 +27,7 @@ impl View for ExperimentsView {
         "Experiments"
     }
 
-    fn take_news(&mut self, _shared: &Shared, effects: &mut Vec<Effect>) {
+    fn take_events(&mut self, _shared: &Shared, effects: &mut Vec<Effect>) {
         let mut finished = Vec::new();
         while let Some(event) = self.job.next_event() {
             match event {
@@ -47,7 +47,7 @@ impl View for ExperimentsView {
         if !finished.is_empty() {
             self.record(finished);
         }
-        self.folder.take_news();
+        self.folder.take_events();
     }
 
     fn is_working(&self) -> bool {

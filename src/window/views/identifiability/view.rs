@@ -19,8 +19,8 @@ impl View for IdentifiabilityView {
         }
     }
 
-    fn take_news(&mut self, _shared: &Shared, effects: &mut Vec<Effect>) {
-        self.study.take_news(effects);
+    fn take_events(&mut self, _shared: &Shared, effects: &mut Vec<Effect>) {
+        self.study.take_events(effects);
         while let Some(answer) = self.worker.next_answer() {
             if answer.is_newest {
                 self.is_pending = false;

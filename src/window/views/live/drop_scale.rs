@@ -9,7 +9,7 @@ pub struct DropScale {
 }
 
 /// Smallest end of the colours, in percent.
-const LEAST_PERCENT: f64 = 0.5;
+const MIN_PERCENT: f64 = 0.5;
 /// Remainder of the peak after a frame.
 const DECAY: f64 = 0.999;
 
@@ -36,7 +36,7 @@ impl DropScale {
 
     /// The end of the colours in percent: 1, 2 or 5 times a power of ten.
     pub fn largest_percent(&self) -> f64 {
-        let peak = self.peak_percent.max(LEAST_PERCENT);
+        let peak = self.peak_percent.max(MIN_PERCENT);
         let decade = 10_f64.powf(peak.log10().floor());
         let steps = [1.0, 2.0, 5.0].map(|step| step * decade);
         steps

@@ -74,7 +74,7 @@ impl NetworkChoice {
     }
 
     /// Takes the file that the user has opened; returns `true` once its network is there.
-    pub fn take_news(&mut self) -> bool {
+    pub fn take_events(&mut self) -> bool {
         if let Some(path) = self.chosen.as_ref().and_then(|chosen| chosen.try_recv().ok()) {
             self.chosen = None;
             self.loading.start(

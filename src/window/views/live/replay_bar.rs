@@ -1,9 +1,9 @@
-use eframe::egui::{Align, Label, Layout, RichText, Slider, Ui, WidgetInfo};
+use eframe::egui::{Align, Key, Label, Layout, RichText, Slider, Ui, WidgetInfo};
 
 use super::{LiveView, engine::Command};
 use crate::window::{
     theme::{Theme, space, type_size},
-    widgets::{dim_ui, ghost_button, slider_ui},
+    widgets::{dim_ui, ghost_button, slider_ui, with_shortcut},
 };
 
 /// Height of the bar, in points.

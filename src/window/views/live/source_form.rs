@@ -132,7 +132,7 @@ impl SourceForm {
     }
 
     /// Takes the file that the user has chosen; returns `true` if there is one.
-    pub fn take_news(&mut self) -> bool {
+    pub fn take_events(&mut self) -> bool {
         let path = self.chosen.as_ref().and_then(|chosen| chosen.try_recv().ok());
         let Some(path) = path else { return false };
         self.chosen = None;

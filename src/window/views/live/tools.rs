@@ -5,21 +5,28 @@ use crate::window::{
     glossary,
     shared::{Effect, Offers, Shared},
     theme::{Theme, space},
-    widgets::{ghost_button, primary_button},
+    widgets::{ghost_button, primary_button, with_shortcut},
 };
 
 /// The buttons that run the source, from right to left.
 pub fn tools_ui(ui: &mut Ui, view: &mut LiveView, shared: &Shared, effects: &mut Vec<Effect>) {
     let is_running = view.running.is_some();
     let stop = ui.add_enabled(is_running, ghost_button("■ Stop"));
-    if stop.on_hover_text(with_shortcut(ui, "Ends live decoding", Key::Period)).clicked() {
+    if stop
+        .on_hover_text(with_shortcut(ui, "Ends live decoding", Key::Period))
+        .clicked()
+    {
         view.stop();
     }
     let obstacle = view.obstacle(shared);
     let start = ui.add_enabled(!is_running && obstacle.is_none(), primary_button("▶ Start"));
     let why_not = obstacle.as_deref().unwrap_or("Frames are being decoded.");
     if start
-        .on_hover_text(with_shortcut(ui, "Decodes the frames of the source as they arrive", Key::Enter))
+        .on_hover_text(with_shortcut(
+            ui,
+            "Decodes the frames of the source as they arrive",
+            Key::Enter,
+        ))
         .on_disabled_hover_text(why_not)
         .clicked()
     {
@@ -55,7 +62,11 @@ fn record_ui(ui: &mut Ui, view: &LiveView) {
         "Start a source first."
     };
     if button
-        .on_hover_text(with_shortcut(ui, "Writes every frame with its time to a file of its own, as it arrives", Key::R))
+        .on_hover_text(with_shortcut(
+            ui,
+            "Writes every frame with its time to a file of its own, as it arrives",
+            Key::R,
+        ))
         .on_disabled_hover_text(why_not)
         .clicked()
     {

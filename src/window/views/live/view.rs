@@ -25,12 +25,12 @@ impl View for LiveView {
         "Live"
     }
 
-    fn take_news(&mut self, shared: &Shared, effects: &mut Vec<Effect>) {
+    fn take_events(&mut self, shared: &Shared, effects: &mut Vec<Effect>) {
         self.follow(effects);
-        if self.network.take_news() && self.running.is_some() {
+        if self.network.take_events() && self.running.is_some() {
             self.start_again(shared);
         }
-        self.source.take_news();
+        self.source.take_events();
         self.take_sample(shared, effects);
     }
 

@@ -92,7 +92,7 @@ pub enum TradeOffFormError {
         example: &'static str,
     },
     /// More than can be looked at.
-    #[error("{0} points are more than can be looked at: give fewer values, at most {MOST_POINTS} points")]
+    #[error("{0} points are more than can be looked at: give fewer values, at most {MAX_POINTS} points")]
     TooMany(usize),
     /// No decoder.
     #[error("no decoder is chosen: choose at least one")]
@@ -103,7 +103,7 @@ pub enum TradeOffFormError {
 }
 
 /// The most points of one measurement.
-const MOST_POINTS: usize = 1000;
+const MAX_POINTS: usize = 1000;
 
 const NOISES: &str = "0, 1e-4, 1e-3, 1e-2";
 const HIDDEN: &str = "6, 12";
@@ -154,7 +154,7 @@ impl TradeOffForm {
             hidden: list("Hidden nodes", &self.hidden, HIDDEN, 1..=LARGEST_HIDDEN)?,
         };
         match plan.points() {
-            points if points > MOST_POINTS => Err(TradeOffFormError::TooMany(points)),
+            points if points > MAX_POINTS => Err(TradeOffFormError::TooMany(points)),
             _ => Ok(plan),
         }
     }
@@ -205,7 +205,7 @@ impl TradeOffForm {
             source.samples = source.samples.min(self.samples.clamp(1, LARGEST_SAMPLES));
             source.validation_samples = source.validation_samples.min(source.samples.div_ceil(5));
             let stopping = &mut settings.training.stopping;
-            stopping.epochs = stopping.epochs.min(self.most_epochs());
+            stopping.epochs = stopping.epochs.min(self.max_epochs());
         }
         settings
     }
@@ -235,7 +235,7 @@ impl TradeOffForm {
             }
             if self.thoroughness == Thoroughness::Quick {
                 let stopping = &mut settings.training.stopping;
-                stopping.epochs = stopping.epochs.min(self.most_epochs());
+                stopping.epochs = stopping.epochs.min(self.max_epochs());
             }
             let mut plan = plan.clone();
             // A share of the user stays.
@@ -255,8 +255,8 @@ impl TradeOffForm {
         })
     }
 
-    fn most_epochs(&self) -> usize {
-        self.epochs.clamp(1, StoppingRules::MOST_EPOCHS)
+    fn max_epochs(&self) -> usize {
+        self.epochs.clamp(1, StoppingRules::MAX_EPOCHS)
     }
 }
 

@@ -1,4 +1,4 @@
-use eframe::egui::{TextEdit, Ui, vec2};
+use eframe::egui::{Key, TextEdit, Ui, vec2};
 
 use super::{Thoroughness, TradeOffForm, TradeOffView, WhichPresets, names::noise_name};
 use crate::window::{
@@ -6,7 +6,7 @@ use crate::window::{
     theme::space,
     widgets::{
         dim_ui, fields::count_ui, ghost_button, note_ui, primary_button, progress_bar_ui, scrolled_ui,
-        section_heading_ui, segmented_ui,
+        section_heading_ui, segmented_ui, with_shortcut,
     },
 };
 use decoupler_core::{
@@ -99,7 +99,7 @@ fn training_ui(ui: &mut Ui, form: &mut TradeOffForm, source: SourceKind) {
                 count_ui(ui, "Maximum samples", hint, &mut form.samples, 1..=LARGEST_SAMPLES);
             }
             let hint = "Largest number of epochs per training.";
-            let epochs = 1..=StoppingRules::MOST_EPOCHS;
+            let epochs = 1..=StoppingRules::MAX_EPOCHS;
             count_ui(ui, "Maximum epochs", hint, &mut form.epochs, epochs);
         }
         Thoroughness::Full => {
@@ -138,7 +138,11 @@ fn buttons_ui(ui: &mut Ui, trade: &mut TradeOffView, shared: &Shared, effects: &
             "The settings are not valid: the note above says what to change"
         };
         if measure
-            .on_hover_text(with_shortcut(ui, "Trains, fits and times every decoder in the background", Key::Enter))
+            .on_hover_text(with_shortcut(
+                ui,
+                "Trains, fits and times every decoder in the background",
+                Key::Enter,
+            ))
             .on_disabled_hover_text(why_not)
             .clicked()
         {
@@ -147,7 +151,11 @@ fn buttons_ui(ui: &mut Ui, trade: &mut TradeOffView, shared: &Shared, effects: &
         let cancel = ghost_button("■ Cancel").min_size(size);
         let cancel = ui.add_enabled(trade.running.is_some(), cancel);
         if cancel
-            .on_hover_text(with_shortcut(ui, "Ends the measurement; the points measured so far are kept", Key::Period))
+            .on_hover_text(with_shortcut(
+                ui,
+                "Ends the measurement; the points measured so far are kept",
+                Key::Period,
+            ))
             .clicked()
         {
             trade.cancel();

@@ -20,7 +20,7 @@ impl View for TradeOffView {
         "Trade-off"
     }
 
-    fn take_news(&mut self, _shared: &Shared, effects: &mut Vec<Effect>) {
+    fn take_events(&mut self, _shared: &Shared, effects: &mut Vec<Effect>) {
         while let Some(event) = self.job.next_event() {
             match event {
                 TradeOffEvent::Samples { decoded, recorded } => {

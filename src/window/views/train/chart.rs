@@ -44,8 +44,12 @@ fn figure(view: &TrainView, shared: &Shared) -> Option<PlotFigure> {
             let mut figure = loss_figure(run.outline.records(), &run.stages, result.best_epoch);
             if let (Some(epoch), Some(plot)) = (view.scrub.epoch(), figure.plots.first_mut()) {
                 let at = LineAt::X(epoch as f64);
-                plot.lines
-                    .push(ReferenceLine::new("displayed network", at, Hue::Orange, LineStyle::Solid));
+                plot.lines.push(ReferenceLine::new(
+                    "displayed network",
+                    at,
+                    Hue::Orange,
+                    LineStyle::Solid,
+                ));
             }
             figure
         }

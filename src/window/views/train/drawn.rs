@@ -202,12 +202,12 @@ mod tests {
             remarks: Vec::new(),
             frame: None,
             best_epoch: 0,
-            flaw: None,
+            defect: None,
             epochs_run: 0,
             starts_ended: 0,
             wall_time: None,
             frame_time: None,
-            is_standing: true,
+            is_idle: true,
             networks: Arc::new(run.network()),
         }
     }

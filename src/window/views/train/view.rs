@@ -25,8 +25,8 @@ impl View for TrainView {
         "Train"
     }
 
-    fn take_news(&mut self, shared: &Shared, effects: &mut Vec<Effect>) {
-        self.recording.take_news(shared, effects);
+    fn take_events(&mut self, shared: &Shared, effects: &mut Vec<Effect>) {
+        self.recording.take_events(shared, effects);
         self.measuring.follow(shared, &mut self.decoders);
     }
 

@@ -26,8 +26,8 @@ impl WorkbenchLayout {
     /// That of a window this many points wide.
     pub fn of_width(width: f32) -> Self {
         /// A column next to the surfaces must leave them this window.
-        const LEAST_FOR_COLUMN: f32 = 1400.0;
-        if width < LEAST_FOR_COLUMN {
+        const MIN_FOR_COLUMN: f32 = 1400.0;
+        if width < MIN_FOR_COLUMN {
             Self::ReportBelow
         } else {
             Self::ReportBeside

@@ -11,7 +11,7 @@ fn worst(scene: &Scene, model: &SensorModel, rules: NewtonRules, snapshots: usiz
     let set = Dataset::simulate(model, scene, snapshots * rows, &mut Seed(5).rng(Stream::Test)).unwrap();
     let mut newton = Newton::new(model, scene, rules);
     let mut worst_mm = 0.0_f64;
-    let mut most_steps = 0;
+    let mut max_steps = 0;
     for sample in 0..set.samples() {
         let mut coordinates = vec![0.0; model.scale.coordinates_per_row()];
         let readings = set.sample_readings(sample);
@@ -21,12 +21,12 @@ fn worst(scene: &Scene, model: &SensorModel, rules: NewtonRules, snapshots: usiz
         assert_eq!(report.stop, NewtonStop::Converged, "{report:?}");
         assert_eq!(report.solution, Solution::Unique, "{report:?}");
         assert!(report.residual < 1e-13);
-        most_steps = most_steps.max(report.steps);
+        max_steps = max_steps.max(report.steps);
         for (ours, truth) in coordinates.iter().zip(set.sample_targets(sample)) {
             worst_mm = worst_mm.max((ours - truth).abs());
         }
     }
-    (worst_mm, most_steps)
+    (worst_mm, max_steps)
 }
 
 #[test]

@@ -132,10 +132,10 @@ impl WithSimd for Rounds<'_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(mut self, _: S) {
-        let flaws = self.propagation.gaussians.factor();
+        let defects = self.propagation.gaussians.factor();
         for round in 0..ROUNDS {
             let share = (0.5_f64.powi((round / ROUNDS_UNDAMPED) as i32)).max(SMALLEST_SHARE);
-            let moved = self.propagation.meet_ranges(Pack::splat(share), flaws);
+            let moved = self.propagation.meet_ranges(Pack::splat(share), defects);
             self.close_lanes(moved, share, round + 1);
             if !self.open.contains(&true) {
                 break;
@@ -147,7 +147,7 @@ impl WithSimd for Rounds<'_> {
 impl Propagation {
     /// Lets every site meet its range once. Returns the largest change of a mean, or NaN where numbers overflow.
     #[inline(always)]
-    fn meet_ranges(&mut self, share: Pack, flaws: Pack) -> Pack {
+    fn meet_ranges(&mut self, share: Pack, defects: Pack) -> Pack {
         let Self {
             gaussians,
             of_unknowns,
@@ -155,16 +155,16 @@ impl Propagation {
             forms,
         } = self;
         let n = of_unknowns.len();
-        let mut largest = flaws;
+        let mut largest = defects;
         for (unknown, site) in of_unknowns.iter_mut().enumerate() {
             let marginals = gaussians.marginals(Direction::Unknown(unknown));
-            let (moved, flaws) = site.meet_range(gaussians, marginals, share);
-            largest = largest.max_or_nan(moved + flaws);
+            let (moved, defects) = site.meet_range(gaussians, marginals, share);
+            largest = largest.max_or_nan(moved + defects);
         }
         for (site, form) in of_rounded.iter_mut().zip(forms.chunks_exact(n)) {
             let marginals = gaussians.marginals(Direction::Form(form));
-            let (_, flaws) = site.meet_range(gaussians, marginals, share);
-            largest = largest.max_or_nan(flaws);
+            let (_, defects) = site.meet_range(gaussians, marginals, share);
+            largest = largest.max_or_nan(defects);
         }
         largest
     }

@@ -100,7 +100,7 @@ impl Gaussians {
             column[m..].fill(Pack::ZERO);
             *squares = dot(&column[..m], &column[..m]);
         }
-        let mut flaws = Pack::ZERO;
+        let mut defects = Pack::ZERO;
         for k in 0..n {
             self.pivot(k);
             // The column's own equation comes last; those of others have a 0 in it.
@@ -111,7 +111,7 @@ impl Gaussians {
             reflector[m] = single;
             rest[(n - k - 1) * height + m + k] = right;
             let square = self.squares[k] + single * single;
-            flaws += square.flaws();
+            defects += square.defects();
             let length = square.sqrt();
             let diagonal = length.negated_where_positive(reflector[0]);
             // v = x − diagonal e₁ has vᵀv = 2 length (length + |x₁|).
@@ -131,7 +131,7 @@ impl Gaussians {
             reflector[0] = Pack::ONE / diagonal;
         }
         self.invert();
-        flaws
+        defects
     }
 
     /// Moves the largest of the columns from `k` on to place `k` in each lane.

@@ -19,7 +19,7 @@ struct Approach {
     /// Row-wire.
     row: usize,
     at: Point,
-    most_steps: usize,
+    max_steps: usize,
     steps: usize,
     rounds: usize,
     /// Factor of the noise in the linearisation at `at`.
@@ -44,7 +44,7 @@ const CURVATURE: f64 = 0.1;
 
 impl Approach {
     /// From `first` on, by at most this many steps.
-    fn new((index, row): (usize, usize), first: Vec<f64>, most_steps: usize) -> Self {
+    fn new((index, row): (usize, usize), first: Vec<f64>, max_steps: usize) -> Self {
         Self {
             index,
             row,
@@ -52,7 +52,7 @@ impl Approach {
                 drift: 0.0,
                 displacements_mm: first,
             },
-            most_steps,
+            max_steps,
             steps: 0,
             rounds: 0,
             blur: 1.0,
@@ -67,7 +67,7 @@ impl Approach {
 
     /// True if the linearisation is far from the answer.
     fn is_rough(&self) -> bool {
-        self.steps == 0 && self.most_steps > 1
+        self.steps == 0 && self.max_steps > 1
     }
 
     /// Makes `model` the linearisation at the place where the equations of the row were evaluated.
@@ -136,7 +136,7 @@ impl Approach {
         self.at.drift = between(self.at.drift, found.means.drift);
         let misfits = self.misfits.iter().zip(&found.misfits);
         self.expected = Some(misfits.map(|(&from, &to)| between(from, to)).collect());
-        self.steps == self.most_steps
+        self.steps == self.max_steps
     }
 }
 
@@ -146,7 +146,7 @@ impl Posterior {
     /// the report on each row.
     pub(super) fn iterate(
         &mut self,
-        (rows, most_steps): (&[usize], usize),
+        (rows, max_steps): (&[usize], usize),
         readings_ohm: &[f64],
         coordinates_mm: &mut [f64],
         begin: impl Fn(&mut Self, usize, &[f64]) -> Vec<f64>,
@@ -162,14 +162,14 @@ impl Posterior {
             for lane in lanes.iter_mut().filter(|lane| lane.is_none()) {
                 *lane = waiting.next().map(|(index, row)| {
                     let first = begin(self, row, &coordinates_mm[index * outputs..][..outputs]);
-                    Approach::new((index, row), first, most_steps)
+                    Approach::new((index, row), first, max_steps)
                 });
             }
             if lanes.iter().all(Option::is_none) {
                 return reports.into_iter().flatten().collect();
             }
             for (lane, model) in lanes.iter_mut().zip(&mut models) {
-                if let Some(approach) = lane.as_mut().filter(|approach| approach.steps < approach.most_steps) {
+                if let Some(approach) = lane.as_mut().filter(|approach| approach.steps < approach.max_steps) {
                     self.problem
                         .read(approach.row, &readings_ohm[approach.index * channels..][..channels]);
                     self.problem.evaluate(&approach.at.displacements_mm);

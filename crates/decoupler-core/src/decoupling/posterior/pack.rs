@@ -127,7 +127,7 @@ impl Pack {
 
     /// 0 where this is above 0 and finite, NaN elsewhere.
     #[inline(always)]
-    pub(super) fn flaws(mut self) -> Self {
+    pub(super) fn defects(mut self) -> Self {
         for lane in 0..LANES {
             let is_sound = (self.0[lane] > 0.0) & (self.0[lane] < f64::INFINITY);
             self.0[lane] = if is_sound { 0.0 } else { f64::NAN };
@@ -216,9 +216,13 @@ mod tests {
                 .iter()
                 .all(|pack| pack.get(0).is_nan())
         );
-        let flawed = [0.0, -1.0, f64::INFINITY, f64::NAN];
-        assert!(flawed.iter().all(|&value| Pack::splat(value).flaws().get(0).is_nan()));
-        assert_eq!(Pack::splat(1e-300).flaws().get(0), 0.0);
+        let defective = [0.0, -1.0, f64::INFINITY, f64::NAN];
+        assert!(
+            defective
+                .iter()
+                .all(|&value| Pack::splat(value).defects().get(0).is_nan())
+        );
+        assert_eq!(Pack::splat(1e-300).defects().get(0), 0.0);
         let negated = [(2.0, 3.0), (2.0, -3.0), (2.0, 0.0)]
             .map(|(a, b)| Pack::splat(a).negated_where_positive(Pack::splat(b)).get(0));
         assert_eq!(negated, [-2.0, 2.0, 2.0]);

@@ -95,7 +95,7 @@ impl Site {
         let moved = (moments.mean - self.moments.mean).abs() * self.per_width;
         (self.seen, self.moments) = (seen, moments);
         let left = gaussians.multiply(mean, variance, change);
-        (moved, moments.variance.flaws() + left.flaws())
+        (moved, moments.variance.defects() + left.defects())
     }
 
     /// The square root of the factor's precision in `lane`, and what it equals times the unknown: the factor as an equation.

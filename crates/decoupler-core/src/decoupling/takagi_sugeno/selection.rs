@@ -19,12 +19,12 @@ const RELATIVE_WIDTH: f64 = 4.0;
 /// Penalties in ascending order, in proportion to the mean of the diagonal of the normal equations.
 const RIDGES: [f64; 5] = [1e-10, 1e-8, 1e-6, 1e-4, 1e-2];
 /// Regressors of the largest system tried.
-const MOST_REGRESSORS: usize = 512;
+const MAX_REGRESSORS: usize = 512;
 /// Regressors of the largest system in proportion to the samples: a fold must leave enough for its fit.
 const REGRESSORS_PER_SAMPLE: f64 = 0.75;
 const FOLDS: usize = 5;
 /// Samples that the cross-validation uses.
-const MOST_VALIDATED: usize = 1000;
+const MAX_VALIDATED: usize = 1000;
 /// A system with more rules must reduce the mean squared error to this, so that it is not chosen by chance.
 const WORTHWHILE: f64 = 0.99;
 
@@ -42,7 +42,7 @@ pub(super) struct Choice {
 pub(super) fn choose(units: &Units, noise: &[f64], rng: &mut impl Rng) -> Choice {
     let mut order: Vec<usize> = (0..units.weights.len()).collect();
     order.shuffle(rng);
-    order.truncate(MOST_VALIDATED);
+    order.truncate(MAX_VALIDATED);
     let units = Units {
         x: units.x.select(Axis(0), &order),
         y: units.y.select(Axis(0), &order),
@@ -62,7 +62,7 @@ pub(super) fn choose(units: &Units, noise: &[f64], rng: &mut impl Rng) -> Choice
     };
     let targets = weighted((&y - &mean).view(), &units.weights);
     let (samples, inputs) = x.dim();
-    let most = MOST_REGRESSORS.min((REGRESSORS_PER_SAMPLE * samples as f64) as usize);
+    let most = MAX_REGRESSORS.min((REGRESSORS_PER_SAMPLE * samples as f64) as usize);
     let affordable = RULES.into_iter().filter(|rules| rules * (inputs + 1) <= most);
     let affordable: Vec<usize> = affordable.collect();
     if inputs == 0 || targets.ncols() == 0 || affordable.len() < 2 {

@@ -15,7 +15,7 @@ pub struct Bottleneck {
     mean: Array1<f64>,
     /// Varying outputs × components kept, orthonormal.
     components: Array2<f64>,
-    least_mse: f64,
+    min_mse: f64,
 }
 
 impl Bottleneck {
@@ -35,13 +35,13 @@ impl Bottleneck {
             outputs,
             mean,
             components,
-            least_mse: left_out / (samples * channels).max(1) as f64,
+            min_mse: left_out / (samples * channels).max(1) as f64,
         })
     }
 
     /// Least mean squared error (scaled) of any network with so few hidden nodes, on the set to which this was fitted.
-    pub fn least_mse(&self) -> f64 {
-        self.least_mse
+    pub fn min_mse(&self) -> f64 {
+        self.min_mse
     }
 
     /// Returns the best possible answers, in millimetres, for the true `coordinates_mm` (samples × 3·M2).
@@ -80,7 +80,7 @@ mod tests {
         for hidden in 0..=4 {
             let bottleneck = Bottleneck::fit(cube().view(), hidden).unwrap();
             let expected = 1.0 - hidden.min(3) as f64 / 3.0;
-            assert!((bottleneck.least_mse() - expected).abs() < 1e-12, "{hidden} hidden");
+            assert!((bottleneck.min_mse() - expected).abs() < 1e-12, "{hidden} hidden");
             let reconstructed = bottleneck.reconstruct(cube().view());
             let mse = (reconstructed - cube()).mapv(|error| error * error).mean().unwrap();
             assert!((mse - expected).abs() < 1e-12, "{hidden} hidden");
@@ -91,7 +91,7 @@ mod tests {
     fn channels_that_vary_together_need_one_node() {
         let line = array![[0.0, 5.0, 2.0], [1.0, 5.0, 4.0], [3.0, 5.0, 8.0]];
         let bottleneck = Bottleneck::fit(line.view(), 1).unwrap();
-        assert!(bottleneck.least_mse() < 1e-30);
+        assert!(bottleneck.min_mse() < 1e-30);
         let difference = bottleneck.reconstruct(line.view()) - line;
         assert!(difference.iter().all(|error| error.abs() < 1e-14));
     }
@@ -99,7 +99,7 @@ mod tests {
     #[test]
     fn nothing_that_varies_needs_nothing() {
         let bottleneck = Bottleneck::fit(array![[1.0, 2.0], [1.0, 2.0]].view(), 3).unwrap();
-        assert_eq!(bottleneck.least_mse(), 0.0);
+        assert_eq!(bottleneck.min_mse(), 0.0);
         assert_eq!(bottleneck.reconstruct(array![[1.0, 2.0]].view()), array![[1.0, 2.0]]);
     }
 

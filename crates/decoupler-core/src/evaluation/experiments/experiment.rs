@@ -100,7 +100,7 @@ pub enum ExperimentError {
     #[error("a recording is divided for each seed: give seeds instead of a cross-validation")]
     CrossValidation,
     /// There are too many trainings.
-    #[error("{0} trainings: give fewer values, seeds or repeats, so that there are at most {MOST_TRAININGS}")]
+    #[error("{0} trainings: give fewer values, seeds or repeats, so that there are at most {MAX_TRAININGS}")]
     TooMany(usize),
     /// The operating system provides no threads.
     #[error("cannot start worker threads: {0}")]
@@ -108,10 +108,10 @@ pub enum ExperimentError {
 }
 
 /// Largest number of trainings in one experiment.
-const MOST_TRAININGS: usize = 1_000_000;
+const MAX_TRAININGS: usize = 1_000_000;
 
 /// Largest number of seeds or repeats.
-const MOST_TRIALS: usize = 1000;
+const MAX_TRIALS: usize = 1000;
 
 impl Experiment {
     /// Returns the cells, row by row; at least one if [`Self::check`] succeeds.
@@ -190,7 +190,7 @@ impl Experiment {
             return Err(ExperimentError::SameAxes(self.axis.name()));
         }
         for (what, count) in [("seeds", self.seeds), ("repeats", self.repeats())] {
-            let allowed = 1..=MOST_TRIALS;
+            let allowed = 1..=MAX_TRIALS;
             if !allowed.contains(&count) {
                 return Err(CountError { what, count, allowed }.into());
             }
@@ -200,7 +200,7 @@ impl Experiment {
             .fold(1, |cells: usize, axis| cells.saturating_mul(axis.len()));
         let factors = [self.seeds, self.repeats(), self.folds(), self.base.starts];
         let trainings = factors.into_iter().fold(cells, usize::saturating_mul);
-        if trainings > MOST_TRAININGS {
+        if trainings > MAX_TRAININGS {
             return Err(ExperimentError::TooMany(trainings));
         }
         self.check_source()?;
@@ -307,7 +307,7 @@ impl PaperTable {
         let with = |axis, epochs, starts, cross_validation| {
             let mut base = SimulatedSettings::default();
             base.training.stopping.epochs = epochs;
-            base.training.stopping.max_fail = StoppingRules::MOST_EPOCHS;
+            base.training.stopping.max_fail = StoppingRules::MAX_EPOCHS;
             base.starts = starts;
             Experiment {
                 base: base.into(),

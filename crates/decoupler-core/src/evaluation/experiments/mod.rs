@@ -27,4 +27,4 @@ pub use runner::{Finished, run_experiments, worker_threads};
 pub use samples::{RecordedSamples, TrialSamples};
 pub use summary::{CellSummary, Figure, SummaryErrors};
 pub use trial::{Trial, TrialFailure};
-pub use verdict::{Standing, Verdict, verdicts};
+pub use verdict::{Verdict, VerdictStatus, verdicts};

@@ -99,8 +99,8 @@ impl CellResults {
     }
 
     /// Time of the fastest epoch, the one least disturbed by other work on the machine.
-    pub fn least_epoch_seconds(&self) -> Option<f64> {
-        self.spread(|trial| Some(trial.least_epoch_seconds))
+    pub fn min_epoch_seconds(&self) -> Option<f64> {
+        self.spread(|trial| Some(trial.min_epoch_seconds))
             .map(|spread| spread.smallest)
     }
 
@@ -153,7 +153,7 @@ pub(super) mod tests {
             networks: 1,
             epochs: 10,
             seconds: 10.0,
-            least_epoch_seconds: 1.0,
+            min_epoch_seconds: 1.0,
             states: Vec::new(),
         }
     }

@@ -121,7 +121,7 @@ impl CellResults {
             bound_percent: median(|trial| trial.bottleneck.as_ref()?.percent()).map(without_rounding),
             epochs_run: epochs_run.map(|spread| spread.median),
             training_seconds: median(|trial| Some(trial.seconds_per_network())),
-            epoch_ms: self.least_epoch_seconds().map(|seconds| 1e3 * seconds),
+            epoch_ms: self.min_epoch_seconds().map(|seconds| 1e3 * seconds),
         }
     }
 

@@ -35,7 +35,7 @@ pub struct Trial {
     /// Time spent on them.
     pub seconds: f64,
     /// Time of the fastest epoch, the one least disturbed by other work on the machine.
-    pub least_epoch_seconds: f64,
+    pub min_epoch_seconds: f64,
     /// Final state of every training, for [`Run::resume`]; empty for a cross-validation, which has as many networks as
     /// folds.
     pub states: Vec<TrainerState>,
@@ -94,7 +94,7 @@ impl Trial {
             networks: 1,
             epochs: effort.epochs,
             seconds: effort.seconds,
-            least_epoch_seconds: effort.least_epoch_seconds,
+            min_epoch_seconds: effort.min_epoch_seconds,
             states: run.states(),
         }))
     }
@@ -129,7 +129,7 @@ impl Trial {
             networks: validated.folds.count(),
             epochs: validated.effort.epochs,
             seconds: validated.effort.seconds,
-            least_epoch_seconds: validated.effort.least_epoch_seconds,
+            min_epoch_seconds: validated.effort.min_epoch_seconds,
             states: Vec::new(),
         }))
     }

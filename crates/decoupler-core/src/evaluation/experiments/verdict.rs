@@ -14,16 +14,16 @@ use crate::text::format_number;
 pub struct Verdict {
     /// Claim, either the paper's or one to compare it with.
     pub claim: &'static str,
-    /// Standing of the claim in this run.
-    pub standing: Standing,
+    /// VerdictStatus of the claim in this run.
+    pub standing: VerdictStatus,
     /// Numbers that support the verdict.
     pub finding: String,
 }
 
-/// Standing of a claim in a run.
+/// Status of a claim in a run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Standing {
+pub enum VerdictStatus {
     /// The claim holds, beyond the spread of the trials.
     Holds,
     /// The claim holds for some cells but not for others.
@@ -34,7 +34,7 @@ pub enum Standing {
     Undecided,
 }
 
-impl fmt::Display for Standing {
+impl fmt::Display for VerdictStatus {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.pad(match self {
             Self::Holds => "holds",
@@ -82,13 +82,13 @@ pub fn verdicts(results: &ExperimentResults) -> Vec<Verdict> {
 fn missing(claim: &'static str) -> Verdict {
     Verdict {
         claim,
-        standing: Standing::Undecided,
+        standing: VerdictStatus::Undecided,
         finding: "Too few results.".to_owned(),
     }
 }
 
 /// Returns the standing of a claim that is true, false or undecided (`None`) in each of several cases.
-fn standing_of(cases: impl IntoIterator<Item = Option<bool>>) -> Standing {
+fn standing_of(cases: impl IntoIterator<Item = Option<bool>>) -> VerdictStatus {
     let (mut is_true, mut is_false, mut is_open) = (false, false, false);
     for case in cases {
         is_true |= case == Some(true);
@@ -96,10 +96,10 @@ fn standing_of(cases: impl IntoIterator<Item = Option<bool>>) -> Standing {
         is_open |= case.is_none();
     }
     match (is_true, is_false) {
-        (true, true) => Standing::HoldsInPart,
-        (true, false) if !is_open => Standing::Holds,
-        (false, true) if !is_open => Standing::Fails,
-        _ => Standing::Undecided,
+        (true, true) => VerdictStatus::HoldsInPart,
+        (true, false) if !is_open => VerdictStatus::Holds,
+        (false, true) if !is_open => VerdictStatus::Fails,
+        _ => VerdictStatus::Undecided,
     }
 }
 
@@ -199,19 +199,19 @@ fn optimum_exists(cells: Vec<CellErrors>) -> Verdict {
     let (before, beyond) = (&cells[..place], &cells[place + 1..]);
     let standing = if before.is_empty() || beyond.is_empty() {
         if is_lowest() {
-            Standing::Fails
+            VerdictStatus::Fails
         } else {
-            Standing::Undecided
+            VerdictStatus::Undecided
         }
     } else if is_lower(before) && is_lower(beyond) {
-        Standing::Holds
+        VerdictStatus::Holds
     } else {
-        Standing::Undecided
+        VerdictStatus::Undecided
     };
     let ends = [&cells[0], last].into_iter().filter(|end| end.column != best.column);
     let ends: Vec<_> = ends.map(CellErrors::figures).collect();
     let open = match standing {
-        Standing::Undecided => "; not decided with so few trials or so wide a spread",
+        VerdictStatus::Undecided => "; not decided with so few trials or so wide a spread",
         _ => "",
     };
     let finding = sentence(&format!(
@@ -244,15 +244,15 @@ fn in_order(claim: &'static str, measured: Vec<CellErrors>) -> Verdict {
 /// Compares a polynomial and an exponential law for the time of the fastest epoch in each cell.
 fn time_does_not_explode(results: &ExperimentResults, what: &str, size: impl Fn(usize) -> usize) -> Verdict {
     let claim = "Training time does not grow exponentially";
-    let point = |cell: &CellResults| Some((size(cell.cell.column) as f64, cell.least_epoch_seconds()?));
+    let point = |cell: &CellResults| Some((size(cell.cell.column) as f64, cell.min_epoch_seconds()?));
     let points: Vec<_> = results.cells.iter().filter_map(point).collect();
     let Some(growth) = Growth::fit(&points) else {
         return missing(claim);
     };
     let standing = match growth.law() {
-        Some(GrowthLaw::Polynomial) => Standing::Holds,
-        Some(GrowthLaw::Exponential) => Standing::Fails,
-        None => Standing::Undecided,
+        Some(GrowthLaw::Polynomial) => VerdictStatus::Holds,
+        Some(GrowthLaw::Exponential) => VerdictStatus::Fails,
+        None => VerdictStatus::Undecided,
     };
     let off = |residual: f64| format_number(100.0 * residual.exp_m1());
     let times = points
@@ -271,7 +271,7 @@ fn time_does_not_explode(results: &ExperimentResults, what: &str, size: impl Fn(
         format_number(100.0 * (growth.factor_per_unit - 1.0)),
         off(growth.exponential_residual),
     ) + match standing {
-        Standing::Undecided => " These sizes and times do not decide between the two.",
+        VerdictStatus::Undecided => " These sizes and times do not decide between the two.",
         _ => "",
     };
     Verdict {
@@ -308,7 +308,7 @@ mod tests {
         verdicts(&results)
     }
 
-    fn standing(verdicts: &[Verdict], claim: &str) -> Standing {
+    fn standing(verdicts: &[Verdict], claim: &str) -> VerdictStatus {
         let verdict = verdicts.iter().find(|verdict| verdict.claim.contains(claim));
         verdict.unwrap_or_else(|| panic!("no verdict on {claim}")).standing
     }
@@ -317,35 +317,35 @@ mod tests {
     fn an_optimum_needs_a_rise_beyond_the_spread_on_both_sides() {
         let low: &[f64] = &[1.6, 1.7, 1.8];
         let high: &[f64] = &[2.0, 2.1, 2.2];
-        let cases: [(&[&[f64]], Standing); 7] = [
-            (&[high, low, low, high], Standing::Holds),
+        let cases: [(&[&[f64]], VerdictStatus); 7] = [
+            (&[high, low, low, high], VerdictStatus::Holds),
             // One seed or two have no spread.
-            (&[&[4.0], &[3.0], &[2.0], &[1.0], &[2.0]], Standing::Undecided),
-            (&[&high[..2], &low[..2], &high[..2]], Standing::Undecided),
-            (&[high, &[1.6, 1.7, 2.9], &[1.8, 1.9, 2.0]], Standing::Undecided),
-            (&[&[1.7, 1.9, 2.0], low, high], Standing::Undecided),
-            (&[high, high, low], Standing::Fails),
-            (&[low, high, high], Standing::Fails),
+            (&[&[4.0], &[3.0], &[2.0], &[1.0], &[2.0]], VerdictStatus::Undecided),
+            (&[&high[..2], &low[..2], &high[..2]], VerdictStatus::Undecided),
+            (&[high, &[1.6, 1.7, 2.9], &[1.8, 1.9, 2.0]], VerdictStatus::Undecided),
+            (&[&[1.7, 1.9, 2.0], low, high], VerdictStatus::Undecided),
+            (&[high, high, low], VerdictStatus::Fails),
+            (&[low, high, high], VerdictStatus::Fails),
         ];
         for (cells, expected) in cases {
             let verdicts = judged(PaperTable::HiddenNodes, cells, |_, _| {});
             assert_eq!(standing(&verdicts, "optimal"), expected, "{cells:?}: {verdicts:?}");
         }
         let few = judged(PaperTable::HiddenNodes, &[high, low], |_, _| {});
-        assert_eq!(standing(&few, "optimal"), Standing::Undecided);
+        assert_eq!(standing(&few, "optimal"), VerdictStatus::Undecided);
     }
 
     #[test]
     fn an_order_holds_if_the_ranges_of_the_trials_are_apart() {
         let rising: [&[f64]; 3] = [&[1.0, 1.1, 1.2], &[1.3, 1.4, 1.6], &[2.0, 2.1, 2.2]];
         let [small, middle, large] = rising;
-        let cases: [(&[&[f64]], Standing); 6] = [
-            (&rising, Standing::Holds),
-            (&[small, &[1.2, 1.4, 1.6], large], Standing::Undecided),
-            (&[small, large, middle], Standing::HoldsInPart),
-            (&[large, middle, small], Standing::Fails),
-            (&[&[1.0], &[2.0], &[3.0]], Standing::Undecided),
-            (&[small], Standing::Undecided),
+        let cases: [(&[&[f64]], VerdictStatus); 6] = [
+            (&rising, VerdictStatus::Holds),
+            (&[small, &[1.2, 1.4, 1.6], large], VerdictStatus::Undecided),
+            (&[small, large, middle], VerdictStatus::HoldsInPart),
+            (&[large, middle, small], VerdictStatus::Fails),
+            (&[&[1.0], &[2.0], &[3.0]], VerdictStatus::Undecided),
+            (&[small], VerdictStatus::Undecided),
         ];
         for (cells, expected) in cases {
             let verdicts = judged(PaperTable::ArrayScales, cells, |_, _| {});
@@ -353,8 +353,8 @@ mod tests {
         }
         // The large dataset is the first cell.
         let sizes = |cells: [&[f64]; 2]| judged(PaperTable::CrossValidation, &cells, |_, _| {});
-        assert_eq!(standing(&sizes([small, large]), "larger dataset"), Standing::Holds);
-        assert_eq!(standing(&sizes([large, small]), "larger dataset"), Standing::Fails);
+        assert_eq!(standing(&sizes([small, large]), "larger dataset"), VerdictStatus::Holds);
+        assert_eq!(standing(&sizes([large, small]), "larger dataset"), VerdictStatus::Fails);
     }
 
     #[test]
@@ -372,13 +372,17 @@ mod tests {
         let bad = of([3.0, 3.0, 3.0]);
         let within = of([0.1, 0.2, 2.27]);
         for claim in ["published", "linear map"] {
-            assert_eq!(standing(&good, claim), Standing::Holds);
-            assert_eq!(standing(&mixed, claim), Standing::HoldsInPart);
-            assert_eq!(standing(&bad, claim), Standing::Fails);
+            assert_eq!(standing(&good, claim), VerdictStatus::Holds);
+            assert_eq!(standing(&mixed, claim), VerdictStatus::HoldsInPart);
+            assert_eq!(standing(&bad, claim), VerdictStatus::Fails);
         }
-        assert_eq!(standing(&within, "published"), Standing::Undecided);
+        assert_eq!(standing(&within, "published"), VerdictStatus::Undecided);
         let one_seed = judged(PaperTable::ArrayScales, &[&[0.1], &[0.1], &[0.1]], |_, _| {});
-        assert!(one_seed.iter().all(|verdict| verdict.standing == Standing::Undecided));
+        assert!(
+            one_seed
+                .iter()
+                .all(|verdict| verdict.standing == VerdictStatus::Undecided)
+        );
         let published = mixed
             .iter()
             .find(|verdict| verdict.claim.contains("published"))
@@ -396,16 +400,16 @@ mod tests {
         let cells: [&[f64]; 6] = [&[1.0]; 6];
         let judge = |law: &dyn Fn(f64) -> f64| {
             let verdicts = judged(PaperTable::HiddenNodes, &cells, |cell, trial| {
-                trial.least_epoch_seconds = law(hidden[cell]);
+                trial.min_epoch_seconds = law(hidden[cell]);
             });
             standing(&verdicts, "time")
         };
-        assert_eq!(judge(&|h| 0.01 * h * h * h), Standing::Holds);
-        assert_eq!(judge(&|h| 0.01 * 1.3_f64.powf(h)), Standing::Fails);
+        assert_eq!(judge(&|h| 0.01 * h * h * h), VerdictStatus::Holds);
+        assert_eq!(judge(&|h| 0.01 * 1.3_f64.powf(h)), VerdictStatus::Fails);
         let three = judged(PaperTable::ArrayScales, &cells[..3], |cell, trial| {
-            trial.least_epoch_seconds = [1.0, 2.0, 4.0][cell];
+            trial.min_epoch_seconds = [1.0, 2.0, 4.0][cell];
         });
-        assert_eq!(standing(&three, "time"), Standing::Undecided);
+        assert_eq!(standing(&three, "time"), VerdictStatus::Undecided);
     }
 
     #[test]
@@ -414,7 +418,9 @@ mod tests {
             let verdicts = judged(table, &[], |_, _| {});
             assert!(!verdicts.is_empty());
             assert!(
-                verdicts.iter().all(|verdict| verdict.standing == Standing::Undecided),
+                verdicts
+                    .iter()
+                    .all(|verdict| verdict.standing == VerdictStatus::Undecided),
                 "{verdicts:?}"
             );
         }

@@ -121,7 +121,7 @@ fn is_parallel(one: &[f64], other: &[f64]) -> bool {
 
 fn saturation(channel: usize, readings: ArrayView1<'_, f64>) -> Vec<ChannelRemark> {
     const FEWEST: usize = 5;
-    const LEAST_SHARE: f64 = 0.01;
+    const MIN_SHARE: f64 = 0.01;
     /// Times as many as at any of the neighbouring values.
     const PILE: usize = 3;
     let mut sorted = readings.to_vec();
@@ -133,7 +133,7 @@ fn saturation(channel: usize, readings: ArrayView1<'_, f64>) -> Vec<ChannelRemar
     let judge = |end: &[f64], next: &[&[f64]], is_largest: bool| {
         let share = end.len() as f64 / sorted.len() as f64;
         let neighbours = next.iter().map(|run| run.len()).max().unwrap_or(0);
-        let piles_up = end.len() >= FEWEST && share >= LEAST_SHARE && end.len() > PILE * neighbours;
+        let piles_up = end.len() >= FEWEST && share >= MIN_SHARE && end.len() > PILE * neighbours;
         piles_up.then_some(ChannelRemark::Saturated {
             channel,
             value: end[0],

@@ -20,14 +20,14 @@ pub struct Determination {
 
 /// Degrees to which readings determine a target.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Standing {
-    /// Neither of the others.
-    Told,
+pub enum Determinacy {
+    /// R² ≥ 0.5 and its interval excludes 0.
+    Determined,
     /// R² is below 0.5: more of the target's variance remains than the readings explain.
-    HardlyTold,
+    WeaklyDetermined,
     /// The interval of R² reaches 0, so that always answering the mean may be as good; or R² is below 0.1, so that the
     /// error is within 5 % (√0.9) of that of the mean.
-    NotTold,
+    NotDetermined,
 }
 
 /// Reason why R² of a target cannot be judged.
@@ -129,22 +129,22 @@ impl Determination {
     }
 
     /// Returns the degree to which the readings determine the target.
-    pub fn standing(&self) -> Standing {
+    pub fn determinacy(&self) -> Determinacy {
         if self.r2.value < 0.1 || self.r2.low <= 0.0 {
-            Standing::NotTold
+            Determinacy::NotDetermined
         } else if self.r2.value < 0.5 {
-            Standing::HardlyTold
+            Determinacy::WeaklyDetermined
         } else {
-            Standing::Told
+            Determinacy::Determined
         }
     }
 
     /// Returns a sentence on the target of this name, such as "the readings explain little of y (R² 0.35, 0.25 to 0.44)".
     pub fn sentence(&self, name: &str) -> String {
-        let verb = match self.standing() {
-            Standing::Told => "determine",
-            Standing::HardlyTold => "explain little of",
-            Standing::NotTold => "do not determine",
+        let verb = match self.determinacy() {
+            Determinacy::Determined => "determine",
+            Determinacy::WeaklyDetermined => "explain little of",
+            Determinacy::NotDetermined => "do not determine",
         };
         let few = if self.units < Self::FEW_UNITS {
             format!(

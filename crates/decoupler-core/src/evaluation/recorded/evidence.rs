@@ -59,7 +59,7 @@ impl Evidence {
                 Some(cosines) => SumVariance {
                     variance: of_cosines(influences, cosines),
                     units: cosines + 1,
-                    freedom: tail_freedom(influences).min(cosines as f64).max(LEAST_FREEDOM),
+                    freedom: tail_freedom(influences).min(cosines as f64).max(MIN_FREEDOM),
                 },
             },
         }
@@ -67,7 +67,7 @@ impl Evidence {
 }
 
 /// Fewest degrees of freedom, below which intervals say nothing.
-const LEAST_FREEDOM: f64 = 2.0;
+const MIN_FREEDOM: f64 = 2.0;
 
 fn of_independent(values: &[f64]) -> SumVariance {
     let units = values.len();
@@ -75,7 +75,7 @@ fn of_independent(values: &[f64]) -> SumVariance {
     SumVariance {
         variance: correction * values.iter().map(|value| value * value).sum::<f64>(),
         units,
-        freedom: tail_freedom(values).min(units as f64 - 1.0).max(LEAST_FREEDOM),
+        freedom: tail_freedom(values).min(units as f64 - 1.0).max(MIN_FREEDOM),
     }
 }
 
@@ -103,7 +103,7 @@ pub(super) fn slow_cosines(series: &[f64]) -> Option<usize> {
     const WEIGHT: f64 = 25.0;
     const FEWEST: f64 = 3.0;
     /// More change no interval.
-    const MOST: f64 = 60.0;
+    const MAX: f64 = 60.0;
     let mut series = series.to_vec();
     let mut slow: Option<f64> = None;
     while series.len() >= SHORTEST {
@@ -117,7 +117,7 @@ pub(super) fn slow_cosines(series: &[f64]) -> Option<usize> {
             let memory = (found + (1.0 + 3.0 * found) / count).min(0.97);
             let bias = (PI / count).powi(2) / 6.0 * 2.0 * memory / (1.0 - memory).powi(2);
             let best = (2.0 * bias * bias * WEIGHT).powf(-0.2).round();
-            slow = Some(slow.unwrap_or(MOST).min(best).clamp(FEWEST, MOST));
+            slow = Some(slow.unwrap_or(MAX).min(best).clamp(FEWEST, MAX));
         }
         series = series.chunks_exact(2).map(|pair| 0.5 * (pair[0] + pair[1])).collect();
     }
@@ -127,9 +127,9 @@ pub(super) fn slow_cosines(series: &[f64]) -> Option<usize> {
 /// Variance of the sum of `series` from its projections on the `cosines` slowest cosines.
 fn of_cosines(series: &[f64], cosines: usize) -> f64 {
     /// Enough for the slow cosines.
-    const MOST_CELLS: usize = 2000;
+    const MAX_CELLS: usize = 2000;
     let count = series.len();
-    let length = count.div_ceil(MOST_CELLS);
+    let length = count.div_ceil(MAX_CELLS);
     let cells = series.chunks(length).enumerate().map(|(cell, values)| {
         let middle = (cell * length) as f64 + 0.5 * values.len() as f64;
         (middle / count as f64, values.iter().sum::<f64>())

@@ -3,8 +3,8 @@ use std::fmt;
 use ndarray::Array2;
 
 use super::{
-    ChannelImportance, ChannelRemark, Determination, FittedModel, LearningCurve, NonlinearGain, SplitComparison,
-    Standing, Undetermined, channel_importance, channel_remarks,
+    ChannelImportance, ChannelRemark, Determinacy, Determination, FittedModel, LearningCurve, NonlinearGain,
+    SplitComparison, Undetermined, channel_importance, channel_remarks,
 };
 use crate::{
     dataset::{Dataset, Division, Folds, Stream},
@@ -66,8 +66,8 @@ impl fmt::Display for Stage {
 
 impl Findings {
     /// Largest number of networks that [`Self::measure`] trains for this many channels, with this many folds.
-    pub fn most_trainings(channels: usize, folds: usize) -> usize {
-        (3 + channels + 1) * folds + LearningCurve::MOST_FITS
+    pub fn max_trainings(channels: usize, folds: usize) -> usize {
+        (3 + channels + 1) * folds + LearningCurve::MAX_FITS
     }
 
     /// Studies `set` by cross-validation with `folds` folds by the rule of `division`, whose test samples judge the learning
@@ -113,7 +113,7 @@ impl Findings {
         let is_worth_it = gains.iter().zip(&network).any(|(gain, network)| {
             let is_told = network
                 .as_ref()
-                .is_some_and(|network| network.standing() != Standing::NotTold);
+                .is_some_and(|network| network.determinacy() != Determinacy::NotDetermined);
             is_told && gain.as_ref().is_some_and(NonlinearGain::is_supported)
         });
         let best = if is_worth_it {

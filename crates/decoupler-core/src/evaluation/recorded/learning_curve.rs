@@ -51,7 +51,7 @@ impl LearningCurve {
     /// of what is sensed, and errors follow no law that could be extended.
     const LEVELS: i32 = 7;
     /// Largest number of fits of [`Self::measure`].
-    pub(super) const MOST_FITS: usize = Self::LEVELS as usize * Self::REPEATS;
+    pub(super) const MAX_FITS: usize = Self::LEVELS as usize * Self::REPEATS;
     /// Fewest training samples of a fit.
     const FEWEST: usize = 8;
     /// Part of the error that twice the samples must save to be called a gain.

@@ -20,7 +20,7 @@ mod student;
 
 pub use channel_importance::{ChannelImportance, channel_importance};
 pub use channel_remark::{ChannelRemark, channel_remarks};
-pub use determination::{Determination, Standing, Undetermined};
+pub use determination::{Determinacy, Determination, Undetermined};
 pub use findings::{Findings, Stage, TargetFindings};
 pub use held_out::FittedModel;
 pub use interval::Interval;

@@ -14,7 +14,7 @@ impl Resampling {
     /// Number of replicates.
     const REPLICATES: usize = 1000;
     /// Most units: more would take long to draw and change no interval. Neighbours are joined to fewer.
-    const MOST_UNITS: usize = 2000;
+    const MAX_UNITS: usize = 2000;
 
     /// Units of `set`: its groups where it is split by group, otherwise blocks as long as the independent stretches of
     /// `series`, values of the samples in the order of the recording.
@@ -22,12 +22,12 @@ impl Resampling {
         let units = match by {
             SplitBy::Group => {
                 let groups = set.snapshots();
-                let joined = groups.len().div_ceil(Self::MOST_UNITS);
+                let joined = groups.len().div_ceil(Self::MAX_UNITS);
                 groups.chunks(joined.max(1)).map(<[Vec<usize>]>::concat).collect()
             }
             SplitBy::Time | SplitBy::Random => {
                 let length = slow_cosines(series).map_or(1, |cosines| series.len().div_ceil(cosines + 1));
-                let length = length.max(set.samples().div_ceil(Self::MOST_UNITS));
+                let length = length.max(set.samples().div_ceil(Self::MAX_UNITS));
                 let samples: Vec<usize> = (0..set.samples()).collect();
                 samples.chunks(length).map(<[usize]>::to_vec).collect()
             }

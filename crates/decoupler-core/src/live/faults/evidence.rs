@@ -54,7 +54,7 @@ pub(super) struct Evidence<'a> {
 /// Range of the logarithm of a reading, or of a gain, that is not known: from a seventh to sevenfold.
 const WIDTH: f64 = 4.0;
 /// Column-wires that are examined on all lines.
-const MOST_COLUMNS: usize = 8;
+const MAX_COLUMNS: usize = 8;
 /// Lines by which they are chosen.
 const WORST_LINES: usize = 4;
 
@@ -241,7 +241,7 @@ impl Evidence<'_> {
             order.push((fits.map(|fit| fit.chi_squared).sum(), column));
         }
         order.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let mut suspects: Vec<usize> = order.iter().take(MOST_COLUMNS).map(|(_, column)| *column).collect();
+        let mut suspects: Vec<usize> = order.iter().take(MAX_COLUMNS).map(|(_, column)| *column).collect();
         // Two columns that touch hide behind each other: leaving one out does not help.
         if let Some(&(_, best)) = order.first() {
             suspects.extend([best.saturating_sub(1), (best + 1).min(self.columns - 1)]);

@@ -69,8 +69,8 @@ pub enum FaultEvent {
 /// Normal deviate that is exceeded with a probability of 10⁻³.
 const DEVIATE: f64 = 3.090_232_306_167_814;
 /// Largest arrays that are checked: unknowns of a row, and column-wires.
-const MOST_UNKNOWNS: usize = 64;
-const MOST_COLUMNS: usize = 128;
+const MAX_UNKNOWNS: usize = 64;
+const MAX_COLUMNS: usize = 128;
 /// Largest factor of [`FaultMonitor::PERSISTENCE`] between comparisons of frames that nothing explains.
 const LONGEST_WAIT: usize = 1024;
 
@@ -82,7 +82,7 @@ impl FaultMonitor {
 
     /// Returns `true` unless the array is so large that checking would take too long for every frame.
     pub fn is_affordable(scale: ArrayScale, scene: &Scene) -> bool {
-        scene.unknowns_per_row(scale) <= MOST_UNKNOWNS && scale.columns() <= MOST_COLUMNS
+        scene.unknowns_per_row(scale) <= MAX_UNKNOWNS && scale.columns() <= MAX_COLUMNS
     }
 
     /// Prepares to check frames of `rows`, with the noise of `scene`, which must have some.

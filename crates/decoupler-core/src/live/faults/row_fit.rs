@@ -83,8 +83,8 @@ pub(in crate::live) struct Fitted {
 const SMALLEST_NOISE: f64 = 1e-6;
 /// Decrease of χ² that is not worth a step.
 const TOLERANCE: f64 = 1e-2;
-const MOST_STEPS: usize = 12;
-const MOST_HALVINGS: usize = 6;
+const MAX_STEPS: usize = 12;
+const MAX_HALVINGS: usize = 6;
 
 impl RowFit {
     /// Room for fits of `rows` row-wires together, 1 or 2.
@@ -145,7 +145,7 @@ impl RowFit {
             *gain = 0.0;
         }
         let mut chi_squared = self.evaluate(view);
-        for _ in 0..MOST_STEPS {
+        for _ in 0..MAX_STEPS {
             self.find_step(view);
             let decrease: f64 = self.step.iter().map(|entry| entry * entry).sum();
             // ½ gᵀH⁻¹g is the decrease of χ²/2 that the linearised equations promise.
@@ -320,7 +320,7 @@ impl RowFit {
         self.trial.copy_from_slice(&self.unknowns);
         let height_mm = self.model.geometry.height_mm;
         let deepest_mm = |high_mm: f64| 0.5 * (high_mm + height_mm);
-        for halving in 0..MOST_HALVINGS {
+        for halving in 0..MAX_HALVINGS {
             let share = 0.5_f64.powi(i32::try_from(halving).unwrap_or(0));
             for (i, unknown) in self.unknowns.iter_mut().enumerate() {
                 *unknown = self.trial[i] + share * self.step[i];

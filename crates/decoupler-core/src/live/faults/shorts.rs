@@ -63,11 +63,11 @@ const DEVIATE: f64 = 3.719_016_485_455_68;
 /// Evidence from which on wires are taken to touch: one false alarm in 10¹⁰ presses.
 const LIMIT: f64 = 23.025_850_929_940_457;
 /// Presses that are kept for comparison. Wires whose readings are equal so often that these do not decide are not judged.
-const MOST_PRESSES: usize = 64;
+const MAX_PRESSES: usize = 64;
 /// Draws from the scene, and pairs of nodes for which resistances are computed in all of them.
 const DRAWS: usize = 1000;
-const LEAST_DRAWS: usize = 100;
-const MOST_NODE_PAIRS: usize = 30_000_000;
+const MIN_DRAWS: usize = 100;
+const MAX_NODE_PAIRS: usize = 30_000_000;
 
 /// Readings of a pair in one frame.
 struct Comparison {
@@ -137,7 +137,7 @@ impl Shorts {
     ) -> Option<Pair> {
         let length = readings.len();
         self.compare(&readings, at_rest_ohm);
-        let mut presses = Vec::with_capacity((MOST_PRESSES + 1) * length);
+        let mut presses = Vec::with_capacity((MAX_PRESSES + 1) * length);
         presses.extend_from_slice(&self.signature[..length]);
         let mut found: Vec<(f64, [bool; 2])> = Vec::new();
         let [exact_ohm, noisy_ohm] = drawn_ohm.map(|ohm| ohm.chunks_exact(at_rest_ohm.len()));
@@ -163,7 +163,7 @@ impl Shorts {
         let count = |which: usize| pressed.clone().filter(|(_, is_equal)| is_equal[which]).count();
         let equal = count(0).max(count(1));
         let log_equal = ((equal + 1) as f64 / (pressed.count() + 2) as f64).ln();
-        (-log_equal * MOST_PRESSES as f64 > LIMIT).then_some(Pair {
+        (-log_equal * MAX_PRESSES as f64 > LIMIT).then_some(Pair {
             wire,
             readings,
             log_equal,
@@ -239,7 +239,7 @@ fn draw(model: &SensorModel, scene: &Scene, rows: &[usize], rng: &mut impl Rng) 
     let scale = model.scale;
     let columns = scale.columns();
     let node_pairs = rows.len() * scale.nodes_per_row() * columns * scale.nodes_per_column();
-    let draws = (MOST_NODE_PAIRS / node_pairs).clamp(LEAST_DRAWS, DRAWS);
+    let draws = (MAX_NODE_PAIRS / node_pairs).clamp(MIN_DRAWS, DRAWS);
     let mut frames_ohm = vec![0.0; (draws + 1) * rows.len() * columns];
     let at_rest = vec![DVec3::ZERO; scale.nodes_per_row()];
     let sampler = scene.sampler(model);
@@ -273,7 +273,7 @@ impl Pair {
             let mut presses = self.presses.chunks_exact(signature.len());
             presses.all(|press| distance(signature, press) >= self.distance.max(compared.noise))
         };
-        if self.presses.len() <= MOST_PRESSES * signature.len() && is_new() {
+        if self.presses.len() <= MAX_PRESSES * signature.len() && is_new() {
             self.presses.extend_from_slice(signature);
             self.evidence -= self.log_equal;
             self.is_held |= self.evidence >= LIMIT;

@@ -78,7 +78,7 @@ pub(super) fn fit(
     prior_weight: f64,
 ) -> Result<Fitted, CalibrationError> {
     /// Iterations after which a fit that has not ended will not.
-    const MOST: usize = 200;
+    const MAX: usize = 200;
     /// Length of the step that is left, in standard deviations of the parameters.
     const OFFSET: f64 = 1e-4;
     /// Share of Σ r² below which its change is its rounding.
@@ -101,7 +101,7 @@ pub(super) fn fit(
     let (mut model, mut damping) = (*start, 1e-6);
     let mut here = Linearised::at(&model, references, samples);
     let mut moved = changes(&model);
-    for iteration in 1..=MOST {
+    for iteration in 1..=MAX {
         let mut gram = here.gram;
         free.iter().for_each(|&index| gram[index][index] += prior_weight);
         let decomposition = Decomposition::of(&gram, free)?;

@@ -18,7 +18,7 @@ mod warning;
 pub use error::CalibrationError;
 pub use parameter::SensorParameter;
 pub use presses::PressLimits;
-pub use report::{CalibratedParameter, Calibration, Standing};
+pub use report::{CalibratedParameter, Calibration, ParameterStatus};
 pub use warning::CalibrationWarning;
 
 use super::DVec3;

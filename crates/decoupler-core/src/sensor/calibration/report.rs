@@ -40,18 +40,18 @@ pub struct CalibratedParameter {
     pub nominal: f64,
     /// Value of the fitted model.
     pub value: f64,
-    /// Standing of the value.
-    pub standing: Standing,
+    /// Status of the value.
+    pub standing: ParameterStatus,
 }
 
-/// Standing of a calibrated value.
+/// Status of a calibrated value.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Standing {
+pub enum ParameterStatus {
     /// The readings determine it: the true value is within ± this, in the parameter's unit. The intervals of all parameters
     /// together hold with 95 % confidence (Bonferroni), given readings that follow Eq. (2).
-    Told(f64),
+    Determined(f64),
     /// The readings do not determine it to ±10 %: it keeps its nominal value.
-    Held,
+    Nominal,
 }
 
 impl Calibration {
@@ -107,13 +107,13 @@ impl Calibration {
             let noise_variance = here.squares / (readings - free.len()) as f64;
             let fit_variances = variances(&model, &free, &references, samples, (&decomposition, noise_variance));
             let factor = two_sided_quantile(0.05 / free.len().max(1) as f64);
-            let least_known = fit_variances
+            let min_known = fit_variances
                 .iter()
                 .enumerate()
                 .max_by(|(_, one), (_, other)| one.total_cmp(other));
             // False for NaN.
             let is_told = |variance: f64| factor * variance.sqrt() <= Self::NOMINAL_TOLERANCE;
-            if let Some((index, &variance)) = least_known
+            if let Some((index, &variance)) = min_known
                 && !is_told(variance)
             {
                 free.remove(index);
@@ -133,8 +133,8 @@ impl Calibration {
                     parameter,
                     nominal: parameter.of(nominal),
                     value: parameter.of(&model),
-                    standing: place.map_or(Standing::Held, |place| {
-                        Standing::Told(half_width(place) * references[index])
+                    standing: place.map_or(ParameterStatus::Nominal, |place| {
+                        ParameterStatus::Determined(half_width(place) * references[index])
                     }),
                 }
             });
@@ -199,7 +199,7 @@ impl fmt::Display for CalibratedParameter {
         } = self;
         let unit = parameter.unit();
         match standing {
-            Standing::Told(half_width) => {
+            ParameterStatus::Determined(half_width) => {
                 // Two digits of the interval, and the value to the same place.
                 let digits = (1.0 - half_width.log10().floor()).clamp(0.0, 12.0) as usize;
                 write!(
@@ -208,7 +208,7 @@ impl fmt::Display for CalibratedParameter {
                     short(*nominal)
                 )
             }
-            Standing::Held => write!(
+            ParameterStatus::Nominal => write!(
                 f,
                 "{parameter}: {} {unit}, its nominal value: these readings do not determine it",
                 short(*nominal)

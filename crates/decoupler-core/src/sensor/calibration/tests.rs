@@ -59,8 +59,8 @@ fn frames(real: &SensorModel, rows: &[usize], frames: usize, noise: f64, rng: &m
 fn holds(calibration: &Calibration, real: &SensorModel) -> bool {
     let mut told = calibration.parameters.iter();
     told.all(|fitted| match fitted.standing {
-        Standing::Told(half_width) => (fitted.value - fitted.parameter.of(real)).abs() <= half_width,
-        Standing::Held => fitted.value == fitted.nominal,
+        ParameterStatus::Determined(half_width) => (fitted.value - fitted.parameter.of(real)).abs() <= half_width,
+        ParameterStatus::Nominal => fitted.value == fitted.nominal,
     })
 }
 
@@ -68,7 +68,7 @@ fn told(calibration: &Calibration) -> Vec<SensorParameter> {
     let told = calibration
         .parameters
         .iter()
-        .filter(|fitted| fitted.standing != Standing::Held);
+        .filter(|fitted| fitted.standing != ParameterStatus::Nominal);
     told.map(|fitted| fitted.parameter).collect()
 }
 
@@ -88,7 +88,7 @@ fn a_sensor_off_by_5_percent_is_recovered_within_the_stated_intervals() {
             SensorParameter::ColumnNodeX,
         ] {
             let fitted = calibration.parameter(parameter);
-            assert!(fitted.standing != Standing::Held, "seed {seed}: {fitted}");
+            assert!(fitted.standing != ParameterStatus::Nominal, "seed {seed}: {fitted}");
         }
         assert!(
             (calibration.residual / 1e-3 - 1.0).abs() < 0.1,
@@ -169,8 +169,8 @@ fn intervals_allow_for_wires_that_are_off() {
         }
         let calibration = Calibration::fit(&nominal(), &samples).unwrap();
         match calibration.parameter(SensorParameter::Height).standing {
-            Standing::Told(half_width) => half_width / calibration.residual,
-            Standing::Held => f64::INFINITY,
+            ParameterStatus::Determined(half_width) => half_width / calibration.residual,
+            ParameterStatus::Nominal => f64::INFINITY,
         }
     };
     let (wide, narrow) = (half_width(0.01), half_width(0.0));

@@ -1,7 +1,7 @@
 use std::{collections::BTreeMap, fmt};
 
 use super::{
-    super::SensorModel, CalibratedParameter, Calibration, PressedRow, Standing, equations::Slopes,
+    super::SensorModel, CalibratedParameter, Calibration, ParameterStatus, PressedRow, equations::Slopes,
     levenberg_marquardt::residuals,
 };
 
@@ -40,7 +40,7 @@ impl CalibrationWarning {
         let mut largest = 0.0_f64;
         let mut far = Vec::new();
         for (fitted, reference) in parameters.iter().zip(references) {
-            let Standing::Told(half_width) = fitted.standing else {
+            let ParameterStatus::Determined(half_width) = fitted.standing else {
                 continue;
             };
             let apart = (fitted.value - fitted.nominal).abs();

@@ -3,17 +3,17 @@
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
 /// Most parameters of a problem.
-pub(super) const MOST_PARAMETERS: usize = 9;
+pub(super) const MAX_PARAMETERS: usize = 9;
 
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Dual {
     pub(super) value: f64,
-    pub(super) slopes: [f64; MOST_PARAMETERS],
+    pub(super) slopes: [f64; MAX_PARAMETERS],
 }
 
 impl Dual {
     pub(super) fn constant(value: f64) -> Self {
-        let slopes = [0.0; MOST_PARAMETERS];
+        let slopes = [0.0; MAX_PARAMETERS];
         Self { value, slopes }
     }
 

@@ -66,7 +66,7 @@ impl Fit<'_> {
     /// Steps until none lowers the sum of squares, and returns the parameters, the steps taken, and why there is no other.
     fn run(&self) -> (Vec<f64>, usize, StopReason) {
         /// No problem needs as many.
-        const MOST_STEPS: usize = 2000;
+        const MAX_STEPS: usize = 2000;
         let damping = Damping::default();
         let (mut mu, mut scaled) = (damping.mu, vec![1.0; self.units.len()]);
         let mut at = self.linearised(&scaled);
@@ -80,7 +80,7 @@ impl Fit<'_> {
                 (next.residuals.squared_norm_l2() < before).then_some((candidate, next))
             });
             match found {
-                Ok(found) if steps < MOST_STEPS => (scaled, at) = found,
+                Ok(found) if steps < MAX_STEPS => (scaled, at) = found,
                 Ok(_) => return (self.parameters(&scaled), steps, StopReason::EpochsReached),
                 Err(reason) => return (self.parameters(&scaled), steps, reason),
             }

@@ -36,7 +36,7 @@ const TOLERANCE: f64 = 1e-8;
 /// Ridge on the diagonals of the preconditioner, relative to their largest entry, against rounding.
 const RIDGE: f64 = 1e-13;
 /// Iterations after which the step is taken as it is, if its residual is below [`WORST_RESIDUAL`].
-const MOST_ITERATIONS: usize = 500;
+const MAX_ITERATIONS: usize = 500;
 /// Largest relative residual of an inexact Gauss-Newton step (Dembo, Eisenstat and Steihaug 1982). Above it the solution is
 /// refused and the damping has to grow.
 const WORST_RESIDUAL: f64 = 1e-3;
@@ -60,7 +60,7 @@ pub(in crate::training) struct ConjugateGradient {
     /// F with the entries of each node together: n1 × h·(h+1).
     f: Mat<f64>,
     cholesky: Cholesky,
-    most_iterations: usize,
+    max_iterations: usize,
     /// One for each part of the samples; the first gets the sum.
     parts: Vec<PartBuffers>,
     /// FᵀP and that times V̄V̄ᵀ: (h+1) × h.
@@ -92,7 +92,7 @@ impl HiddenSolver for ConjugateGradient {
             blocks: Mat::zeros(n1, order),
             f: Mat::zeros(n1, h * (h + 1)),
             cholesky: Cholesky::new(n1),
-            most_iterations: MOST_ITERATIONS,
+            max_iterations: MAX_ITERATIONS,
             parts: (0..parts).map(part).collect(),
             eliminated: [h + 1; 2].map(|h1| Mat::zeros(h1, h)),
             residual: vec![0.0; order],
@@ -158,7 +158,7 @@ impl HiddenSolver for ConjugateGradient {
         let mut length = self.precondition();
         self.direction.copy_from_slice(&self.preconditioned);
         let goal = TOLERANCE * TOLERANCE * length;
-        for _ in 0..self.most_iterations {
+        for _ in 0..self.max_iterations {
             if length <= goal {
                 return Some(());
             }
@@ -324,11 +324,11 @@ mod tests {
     };
 
     /// Solves at damping 1e-3 within this many iterations.
-    fn solve(most_iterations: usize) -> Option<()> {
+    fn solve(max_iterations: usize) -> Option<()> {
         let (mlp, examples) = (random_mlp(8, 12, 2, 1), random_examples(40, 8, 2, 2));
         let shape = mlp.shape();
         let mut solver = ConjugateGradient::new(shape, &examples);
-        solver.most_iterations = most_iterations;
+        solver.max_iterations = max_iterations;
         let mut products = Products::new(&solver, &ConjugateGradient::cost(shape, 40), 1);
         let mut kept = KeptActivations::new(shape, &examples, 1);
         products.gather(&solver, &mlp, &examples, &mut kept);
@@ -347,7 +347,7 @@ mod tests {
 
     #[test]
     fn a_step_that_is_far_from_converged_is_refused() {
-        assert_eq!(solve(MOST_ITERATIONS), Some(()));
+        assert_eq!(solve(MAX_ITERATIONS), Some(()));
         assert_eq!(solve(3), None);
     }
 }

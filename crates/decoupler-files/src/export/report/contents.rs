@@ -8,7 +8,7 @@ use super::{
 };
 use crate::{
     export::{
-        Cell, NetworkFile, Table, TableColumn, WriteError, atomic_write, decoder_table, describe_standings,
+        Cell, NetworkFile, Table, TableColumn, WriteError, atomic_write, decoder_table, describe_determinacy,
         describe_worse_than_ridge, document::PROGRAM, error_table, figures::dark_style, format_duration,
         format_percent, unfinished::folder_of,
     },
@@ -17,7 +17,7 @@ use crate::{
 use decoupler_core::{
     dataset::Dataset,
     evaluation::{
-        DecoderReport, Outlook, ReferenceNote, RunFlaw, SimulatedSettings, StartRecord, TestErrors, error_remarks,
+        DecoderReport, Outlook, ReferenceNote, RunDefect, SimulatedSettings, StartRecord, TestErrors, error_remarks,
         recorded::Determination,
     },
     sensor::Geometry,
@@ -33,7 +33,7 @@ pub struct RunReport<'a> {
     /// Its network, record and errors.
     pub file: &'a NetworkFile,
     /// Defect of its training.
-    pub flaw: Option<&'a RunFlaw>,
+    pub defect: Option<&'a RunDefect>,
     /// Other decoders on its test set, as far as they were measured.
     pub decoders: &'a [DecoderReport],
     /// Its test set: [`Run::test`](decoupler_core::evaluation::Run::test), or [`NetworkFile::test_set`], which draws or reads it again.
@@ -172,7 +172,7 @@ impl RunReport<'_> {
 
     /// Everything that a reader has to weigh, with cause and cure.
     fn remarks(&self, setup: &Setup, answers: &ndarray::Array2<f64>) -> Vec<String> {
-        let mut remarks = Vec::from_iter(self.flaw.map(ToString::to_string));
+        let mut remarks = Vec::from_iter(self.defect.map(ToString::to_string));
         match (setup.simulated(), setup.plan()) {
             (Some(settings), _) => remarks.extend(self.array_remarks(&settings)),
             (None, Some(plan)) => remarks.extend(self.recording_remarks(plan, answers)),
@@ -219,7 +219,7 @@ impl RunReport<'_> {
 
     fn recording_remarks(&self, plan: &Plan, answers: &ndarray::Array2<f64>) -> Vec<String> {
         let measured = Determination::measure(self.test, answers.view(), plan.division.by);
-        let mut remarks = describe_standings(&self.file.problem.targets, &measured);
+        let mut remarks = describe_determinacy(&self.file.problem.targets, &measured);
         let NetworkFile {
             problem,
             scores,

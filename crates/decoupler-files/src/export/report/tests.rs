@@ -29,11 +29,11 @@ fn run() -> Run {
 fn report(name: &str, file: &NetworkFile, run: &Run) -> String {
     let set = DecoderSet::new(&file.settings.simulated().unwrap(), Some(file.network.clone())).unwrap();
     let ridge = set.measure(DecoderKind::Ridge, Precision::Double, run.test()).unwrap();
-    let (flaw, decoders) = (run.flaw(), [ridge.unwrap()]);
+    let (defect, decoders) = (run.defect(), [ridge.unwrap()]);
     let report = RunReport {
         name: Some(name),
         file,
-        flaw: flaw.as_ref(),
+        defect: defect.as_ref(),
         decoders: &decoders,
         test: run.test(),
     };
@@ -177,7 +177,7 @@ fn a_report_of_a_recording_has_its_errors_figures_and_command() {
     let report = RunReport {
         name: None,
         file: &file,
-        flaw: None,
+        defect: None,
         decoders: &decoders,
         test: run.test(),
     };

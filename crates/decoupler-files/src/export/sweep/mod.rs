@@ -90,5 +90,5 @@ fn load<T: DeserializeOwned>(kind: DocumentKind, path: &Path) -> Result<(String,
         let value = serde_json::from_str(sealed.run.get()).map_err(|error| error.to_string())?;
         Ok((sealed.program, value))
     });
-    read.map_err(|flaw| kind.damaged(path, flaw))
+    read.map_err(|defect| kind.damaged(path, defect))
 }

@@ -61,8 +61,8 @@ impl SweepPlan {
         if combinations == Some(plan.trials.len()) {
             Ok(plan)
         } else {
-            let flaw = "trials: there are more or fewer than combinations of the axes' values".to_owned();
-            Err(KIND.damaged(path, flaw))
+            let defect = "trials: there are more or fewer than combinations of the axes' values".to_owned();
+            Err(KIND.damaged(path, defect))
         }
     }
 

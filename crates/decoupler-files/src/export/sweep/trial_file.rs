@@ -103,11 +103,11 @@ impl Trial {
         if path.file_stem() == Some(trial.id().to_string().as_ref()) {
             Ok(trial)
         } else {
-            let flaw = format!(
+            let defect = format!(
                 "its name belongs to another trial than its options, which are of {}",
                 trial.id()
             );
-            Err(KIND.damaged(path, flaw))
+            Err(KIND.damaged(path, defect))
         }
     }
 }

@@ -7,7 +7,7 @@ use super::{camera::OrbitCamera, shapes::Bounds};
 /// Distance of the eye in half diagonals of the box: a mild perspective.
 const EYE_DISTANCE: f32 = 4.0;
 /// The least ratio of the box's horizontal sides; longer arrays are drawn shorter than they are.
-const LEAST_SIDE: f32 = 0.3;
+const MIN_SIDE: f32 = 0.3;
 /// Angle of view, in radians; what is seen is scaled anyway.
 const VIEW: f32 = 0.5;
 /// Heights of the box in units of its longer horizontal side: within these, the picture gets the shape of its card.
@@ -31,7 +31,7 @@ impl PlotBox {
     pub(super) fn new(min_mm: DVec3, max_mm: DVec3, tall_per_wide: f32) -> Self {
         let size = (max_mm - min_mm).as_vec3();
         let longer = size.x.max(size.y);
-        let (a, b) = ((size.x / longer).max(LEAST_SIDE), (size.y / longer).max(LEAST_SIDE));
+        let (a, b) = ((size.x / longer).max(MIN_SIDE), (size.y / longer).max(MIN_SIDE));
         let of_height = |height: f32| {
             let sides = Vec3::new(a, b, height);
             let per_mm = sides.as_dvec3() / (max_mm - min_mm);

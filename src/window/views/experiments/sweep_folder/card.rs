@@ -11,7 +11,7 @@ use crate::window::{
 use decoupler_core::text::counted;
 
 /// Most problems that are spelled out.
-const MOST_PROBLEMS: usize = 3;
+const MAX_PROBLEMS: usize = 3;
 
 /// Shows the folder: how far it is filled, and the table of its trials.
 pub(in crate::window::views::experiments) fn folder_card_ui(ui: &mut Ui, folder: &mut SweepFolder) {
@@ -48,11 +48,11 @@ fn trials_ui(ui: &mut Ui, table: &SweepTable, sort: &mut SortBy) {
         dim_ui(ui, "New trials appear here by themselves.");
     }
     ui.add_space(space(1));
-    for problem in table.problems.iter().take(MOST_PROBLEMS) {
+    for problem in table.problems.iter().take(MAX_PROBLEMS) {
         note_ui(ui, problem);
     }
-    if table.problems.len() > MOST_PROBLEMS {
-        let rest = table.problems.len() - MOST_PROBLEMS;
+    if table.problems.len() > MAX_PROBLEMS {
+        let rest = table.problems.len() - MAX_PROBLEMS;
         note_ui(ui, &format!("and {} more", counted(rest, "problem")));
     }
     if finished == 0 {

@@ -71,7 +71,7 @@ impl SweepFolder {
         self.job.abandon();
     }
 
-    pub(in crate::window::views::experiments) fn take_news(&mut self) {
+    pub(in crate::window::views::experiments) fn take_events(&mut self) {
         while let Ok(path) = self.chosen.try_recv() {
             self.show(path);
         }

@@ -1,4 +1,4 @@
-use eframe::egui::Ui;
+use eframe::egui::{Key, Ui};
 
 use super::{
     RecordingStudy,
@@ -10,14 +10,14 @@ use crate::window::{
     widgets::{
         dim_ui, explained_options_ui,
         fields::{capitalised, count_ui},
-        ghost_button, note_ui, primary_button, scrolled_ui, section_heading_ui,
+        ghost_button, note_ui, primary_button, scrolled_ui, section_heading_ui, with_shortcut,
     },
 };
 use decoupler_core::evaluation::recorded::{Findings, FittedModel};
 use decoupler_files::{export::format_duration, import::Setup};
 
 /// Largest number of folds offered.
-const MOST_FOLDS: usize = 1000;
+const MAX_FOLDS: usize = 1000;
 
 const MODELS: [(Option<FittedModel>, &str, &str); 3] = [
     (
@@ -65,7 +65,7 @@ fn choices_ui(ui: &mut Ui, study: &mut RecordingStudy) {
     section_heading_ui(ui, "Cross-validation");
     let FoldsChoice { folds, compares_random } = &mut study.choice;
     let hint = "Number of parts. Each part is tested by models fitted to the other parts.";
-    count_ui(ui, "Folds", hint, folds, 2..=MOST_FOLDS);
+    count_ui(ui, "Folds", hint, folds, 2..=MAX_FOLDS);
     let hint = "Repeats the cross-validation with random folds and reports how optimistic their errors are. It takes twice \
                 as long.";
     ui.checkbox(compares_random, "Compare with random folds")
@@ -84,7 +84,11 @@ fn buttons_ui(ui: &mut Ui, study: &mut RecordingStudy, ready: Option<Setup>) {
         let cancel = ui.vertical_centered_justified(|ui| ui.add(ghost_button("■ Cancel")));
         if cancel
             .inner
-            .on_hover_text(with_shortcut(ui, "Ends the work under way without a result", Key::Period))
+            .on_hover_text(with_shortcut(
+                ui,
+                "Ends the work under way without a result",
+                Key::Period,
+            ))
             .clicked()
         {
             study.cancel();
@@ -95,8 +99,8 @@ fn buttons_ui(ui: &mut Ui, study: &mut RecordingStudy, ready: Option<Setup>) {
     ui.vertical_centered_justified(|ui| {
         let analyse = ui.add_enabled(ready.is_some(), primary_button("Analyse readings"));
         let hint = "Measures by cross-validation how well the readings determine each target, what each channel contributes, \
-                    and what more samples would bring (Ctrl+Enter).";
-        let is_analysed = analyse.on_hover_text(hint).on_disabled_hover_text(why_not).clicked();
+                    and what more samples would bring";
+        let is_analysed = analyse.on_hover_text(with_shortcut(ui, hint, Key::Enter)).on_disabled_hover_text(why_not).clicked();
         let validate = ui.add_enabled(ready.is_some(), ghost_button("Cross-validate"));
         let hint = "Tests on every sample with networks trained on the other folds: one training per fold.";
         let is_validated = validate.on_hover_text(hint).on_disabled_hover_text(why_not).clicked();
@@ -135,7 +139,7 @@ fn cost(study: &RecordingStudy, setup: &Setup, shared: &Shared) -> String {
         || setup.plan().map_or(0, |plan| plan.import.inputs.len()),
         |found| found.inputs.len(),
     );
-    let most = Findings::most_trainings(channels, folds);
+    let most = Findings::max_trainings(channels, folds);
     let least = match study.model {
         Some(_) => most,
         // Ridge may turn out to do as well.

@@ -121,7 +121,7 @@ impl RecordingStudy {
     }
 
     /// Takes the events of the thread.
-    pub fn take_news(&mut self, effects: &mut Vec<Effect>) {
+    pub fn take_events(&mut self, effects: &mut Vec<Effect>) {
         while let Some(event) = self.job.next_event() {
             match event {
                 StudyEvent::Reading(progress) => self.reading = Some(progress),

@@ -120,8 +120,10 @@ fn validate(
 ) -> Result<(), String> {
     let (settings, set, by) = (setup.settings(), &recording.set, plan.division.by);
     let is_cancelled = || report.is_cancelled();
-    let dealt = Folds::by(set, folds, by, &mut settings.seed.rng(Stream::Split)).map_err(|error| error.to_string())?;
-    let validated = CrossValidated::on_folds(settings, set, dealt, is_cancelled).map_err(|error| error.to_string())?;
+    let assigned =
+        Folds::by(set, folds, by, &mut settings.seed.rng(Stream::Split)).map_err(|error| error.to_string())?;
+    let validated =
+        CrossValidated::on_folds(settings, set, assigned, is_cancelled).map_err(|error| error.to_string())?;
     let Some(validated) = validated else { return Ok(()) };
     let comparison = if compares_random && by != SplitBy::Random {
         let compared = SplitComparison::complete(settings, set, folds, (by, &validated), &is_cancelled);

@@ -26,7 +26,7 @@ pub(super) trait LiveSession {
     fn is_stream(&self) -> bool;
 
     /// Returns `true` if something has come that the window does not know.
-    fn has_news(&self) -> bool;
+    fn has_events(&self) -> bool;
 
     /// Takes what the source has, waiting for a stream at most until `latest`. Returns the end of the source once it
     /// comes.
@@ -75,12 +75,12 @@ fn decode(
     while !report.is_cancelled() {
         let now = Instant::now();
         let may_show_at = shown.map_or(now, |shown| shown + BETWEEN_SHOWN);
-        if session.has_news() && is_drawn && may_show_at <= now {
+        if session.has_events() && is_drawn && may_show_at <= now {
             show(session, report);
             (is_drawn, shown) = (false, Some(now));
         }
         let mut until = session.due(now).unwrap_or(now + LONGEST_WAIT);
-        if session.has_news() && is_drawn {
+        if session.has_events() && is_drawn {
             until = until.min(may_show_at);
         }
         // A stream waits for its lines instead.

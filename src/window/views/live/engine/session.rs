@@ -23,7 +23,7 @@ pub(super) struct Session {
     /// The last frame with an answer.
     arrived: Option<Arrived>,
     /// True if something has come that the window does not know.
-    has_news: bool,
+    has_events: bool,
 }
 
 impl Session {
@@ -44,12 +44,12 @@ impl Session {
             tally,
             recording: None,
             arrived: None,
-            has_news: false,
+            has_events: false,
         }))
     }
 
     fn decode(&mut self, arrived: Arrived, send: &dyn Fn(LiveEvent)) {
-        self.has_news = true;
+        self.has_events = true;
         if let Some(recording) = &mut self.recording
             && let Err(reason) = recording.record(arrived.time_s, &self.readings_ohm)
         {
@@ -113,8 +113,8 @@ impl LiveSession for Session {
         self.source.is_stream()
     }
 
-    fn has_news(&self) -> bool {
-        self.has_news
+    fn has_events(&self) -> bool {
+        self.has_events
     }
 
     fn take_next(&mut self, latest: Instant, send: &dyn Fn(LiveEvent)) -> Option<Result<(), String>> {
@@ -124,9 +124,9 @@ impl LiveSession for Session {
             Next::Frame(arrived) => self.decode(arrived, send),
             Next::Bad(reason) => {
                 self.tally.bad(reason);
-                self.has_news = true;
+                self.has_events = true;
             }
-            Next::Nothing if self.source.is_stream() => self.has_news |= self.tally.falls_silent(Instant::now()),
+            Next::Nothing if self.source.is_stream() => self.has_events |= self.tally.falls_silent(Instant::now()),
             Next::Nothing => {}
             // Nothing was shown, and the view would say nothing of why.
             Next::End(Ok(())) if self.tally.counts().decoded == 0 => {
@@ -158,7 +158,7 @@ impl LiveSession for Session {
             Command::EndRecording => self.end_recording(None, send),
             Command::Move(_) | Command::Break(_) | Command::Seek(_) | Command::Speed(_) | Command::Play(_) => {
                 self.source.obey(&command)?;
-                self.has_news = true;
+                self.has_events = true;
             }
         }
         Ok(())
@@ -171,7 +171,7 @@ impl LiveSession for Session {
     }
 
     fn show(&mut self) -> LiveShown {
-        self.has_news = false;
+        self.has_events = false;
         self.shown()
     }
 }

@@ -16,7 +16,7 @@ use decoupler_files::{export::NetworkFile, figure::TargetSurface};
 /// Length of the history in seconds.
 const HISTORY_S: f64 = 20.0;
 /// Most values in the history, over all targets.
-const MOST_VALUES: usize = 20_000;
+const MAX_VALUES: usize = 20_000;
 
 /// A source of samples, and the network of a recording that decodes them.
 #[derive(Debug)]
@@ -33,7 +33,7 @@ pub(super) struct TargetSession {
     history: VecDeque<(f64, Arc<[f64]>)>,
     ranges: Vec<(f64, f64)>,
     outside: (Option<usize>, usize),
-    has_news: bool,
+    has_events: bool,
 }
 
 impl TargetSession {
@@ -54,7 +54,7 @@ impl TargetSession {
             history: VecDeque::new(),
             ranges: vec![(f64::INFINITY, f64::NEG_INFINITY); problem.targets.len()],
             outside: (None, 0),
-            has_news: false,
+            has_events: false,
             surface: surface.map(Arc::new),
             network,
             problem,
@@ -62,7 +62,7 @@ impl TargetSession {
     }
 
     fn decode(&mut self, arrived: Arrived) {
-        self.has_news = true;
+        self.has_events = true;
         let (row_index, readings) = (self.sample[0] as usize, &self.sample[1..]);
         let is_answered = self.compiled.decode_row(row_index, readings, &mut self.answer) == Ok(());
         if !is_answered || self.answer.iter().any(|value| !value.is_finite()) {
@@ -83,7 +83,7 @@ impl TargetSession {
             self.history.clear();
         }
         self.history.push_back((arrived.time_s, self.answer.as_slice().into()));
-        let most = (MOST_VALUES / self.answer.len().max(1)).max(2);
+        let most = (MAX_VALUES / self.answer.len().max(1)).max(2);
         let is_old = |(time_s, _): &(f64, Arc<[f64]>)| *time_s < arrived.time_s - HISTORY_S;
         while self.history.len() > most || self.history.front().is_some_and(is_old) {
             self.history.pop_front();
@@ -104,8 +104,8 @@ impl LiveSession for TargetSession {
         matches!(self.source, TargetSource::Stream(_))
     }
 
-    fn has_news(&self) -> bool {
-        self.has_news
+    fn has_events(&self) -> bool {
+        self.has_events
     }
 
     fn take_next(&mut self, latest: Instant, _send: &dyn Fn(LiveEvent)) -> Option<Result<(), String>> {
@@ -114,9 +114,9 @@ impl LiveSession for TargetSession {
             Next::Frame(arrived) => self.decode(arrived),
             Next::Bad(reason) => {
                 self.tally.bad(reason);
-                self.has_news = true;
+                self.has_events = true;
             }
-            Next::Nothing if self.is_stream() => self.has_news |= self.tally.falls_silent(Instant::now()),
+            Next::Nothing if self.is_stream() => self.has_events |= self.tally.falls_silent(Instant::now()),
             Next::Nothing => {}
             Next::End(Ok(())) if self.tally.counts().decoded == 0 => {
                 let reason = self.tally.counts().last_bad;
@@ -138,7 +138,7 @@ impl LiveSession for TargetSession {
                 Command::Play(is_playing) => replay.play(is_playing, now),
                 _ => return Ok(()),
             }
-            self.has_news = true;
+            self.has_events = true;
         }
         Ok(())
     }
@@ -146,7 +146,7 @@ impl LiveSession for TargetSession {
     fn end_recording(&mut self, _reason: Option<String>, _send: &dyn Fn(LiveEvent)) {}
 
     fn show(&mut self) -> LiveShown {
-        self.has_news = false;
+        self.has_events = false;
         let latest = self.history.back().map(|(time_s, _)| *time_s);
         LiveShown {
             frame: None,

@@ -81,8 +81,8 @@ pub fn workload_ui(ui: &mut Ui, draft: &SimulatedSettings) {
 
 /// A slider for small networks, with small marks at the suggestions.
 fn hidden_slider_ui(ui: &mut Ui, hidden: &mut usize, suggestions: &[usize]) {
-    const MOST: usize = 64;
-    let slider = Slider::new(hidden, 1..=MOST).clamping(eframe::egui::SliderClamping::Never);
+    const MAX: usize = 64;
+    let slider = Slider::new(hidden, 1..=MAX).clamping(eframe::egui::SliderClamping::Never);
     let width = ui.available_width();
     let response = slider_ui(ui, slider, width);
     if response.double_clicked() {
@@ -90,8 +90,8 @@ fn hidden_slider_ui(ui: &mut Ui, hidden: &mut usize, suggestions: &[usize]) {
     }
     let rail = response.rect.x_range().shrink(0.4 * response.rect.height());
     let stroke = Stroke::new(1.5, Theme::of(ui).palette.warning);
-    for &suggestion in suggestions.iter().filter(|suggestion| **suggestion <= MOST) {
-        let share = (suggestion - 1) as f32 / (MOST - 1) as f32;
+    for &suggestion in suggestions.iter().filter(|suggestion| **suggestion <= MAX) {
+        let share = (suggestion - 1) as f32 / (MAX - 1) as f32;
         let (x, bottom) = (rail.min + share * rail.span(), response.rect.bottom() + space(1));
         ui.painter().vline(x, bottom - space(1)..=bottom, stroke);
     }

@@ -31,7 +31,7 @@ fn settings_ui(ui: &mut Ui, noise: &mut Noise) {
         "Ω",
     );
     let mut bits = noise.converter_bits.map_or(0, usize::from);
-    let most = usize::from(Noise::MOST_BITS);
+    let most = usize::from(Noise::MAX_BITS);
     let hint = "Resolution of the analogue-to-digital converter, in bits; its range is 0 to twice the largest \
                 resistance at rest. 0 for no quantisation.";
     count_ui(ui, "Converter bits", hint, &mut bits, usually(0, 0..=most));

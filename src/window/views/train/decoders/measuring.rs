@@ -16,7 +16,7 @@ use decoupler_core::{
 use decoupler_files::import::Setup;
 
 /// Message of the thread to the window.
-enum News {
+enum MeasuringEvent {
     /// Report of the decoder at this place in the list.
     Measured(usize, Result<DecoderReport, String>),
     /// Nothing more will come.
@@ -26,7 +26,7 @@ enum News {
 /// The window's end of the thread.
 #[derive(Debug)]
 pub struct DecoderMeasuring {
-    job: Job<News>,
+    job: Job<MeasuringEvent>,
     /// The training whose networks are measured, and how many epochs had been run.
     of: Option<(RunId, usize)>,
 }
@@ -43,11 +43,11 @@ impl DecoderMeasuring {
     /// Takes events, forgets what is of a network that is another one by now, and measures the displayed networks once they
     /// are paused and their table is unfolded.
     pub fn follow(&mut self, shared: &Shared, state: &mut DecodersState) {
-        self.take_news(state);
+        self.take_events(state);
         let standing = shared.run.as_ref().and_then(|run| {
             let result = run.result.as_ref()?;
             result
-                .is_standing
+                .is_idle
                 .then_some((run, (run.id, result.epochs_run), &result.networks))
         });
         let is_other = standing.is_some_and(|(_, of, _)| self.of.is_some_and(|measured| measured != of));
@@ -70,23 +70,25 @@ impl DecoderMeasuring {
 
     /// Measures all decoders of `setup` with their trained `networks` on `test`.
     fn begin(&mut self, setup: Setup, networks: Networks, test: Arc<Dataset>) {
-        self.job
-            .start(move |report| measure_all(&setup, networks, &test, report), News::Ended);
+        self.job.start(
+            move |report| measure_all(&setup, networks, &test, report),
+            MeasuringEvent::Ended,
+        );
     }
 
     /// Takes what the thread has to report.
-    fn take_news(&mut self, state: &mut DecodersState) {
+    fn take_events(&mut self, state: &mut DecodersState) {
         while let Some(news) = self.job.next_event() {
             match news {
-                News::Measured(place, report) => state.take(place, report),
-                News::Ended(Ok(())) => {}
-                News::Ended(Err(error)) => state.end(&format!("{error}: close the table and open it again")),
+                MeasuringEvent::Measured(place, report) => state.take(place, report),
+                MeasuringEvent::Ended(Ok(())) => {}
+                MeasuringEvent::Ended(Err(error)) => state.end(&format!("{error}: close the table and open it again")),
             }
         }
     }
 }
 
-fn measure_all(setup: &Setup, networks: Networks, test: &Dataset, report: &Report<News>) {
+fn measure_all(setup: &Setup, networks: Networks, test: &Dataset, report: &Report<MeasuringEvent>) {
     let is_cancelled = || report.is_cancelled();
     let sets = setup.sets(Path::new(""), &is_cancelled, &mut |_| ());
     let set = match sets {
@@ -106,7 +108,7 @@ fn measure_all(setup: &Setup, networks: Networks, test: &Dataset, report: &Repor
             Ok(report) => report.ok_or_else(|| "it needs a trained network".to_owned()),
             Err(error) => Err(error.to_string()),
         };
-        report.send(News::Measured(
+        report.send(MeasuringEvent::Measured(
             place,
             set.as_ref().map_err(String::clone).and_then(measure),
         ));
@@ -144,7 +146,7 @@ mod tests {
         measuring.begin(impossible.into(), run.network(), Arc::clone(run.test()));
         while state.is_measuring() {
             woken.recv().unwrap();
-            measuring.take_news(&mut state);
+            measuring.take_events(&mut state);
         }
         assert!(!state.is_measuring());
         for result in state.measured.iter().flatten() {

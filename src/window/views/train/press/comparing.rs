@@ -29,7 +29,7 @@ pub(super) struct Compared {
 type Fitted = (DecoderKind, Box<dyn Decoder>);
 
 /// Events of the thread that fits decoders.
-enum FitNews {
+enum FitEvent {
     Fitted(DecoderKind, Result<Box<dyn Decoder>, String>),
     Ended(Result<(), JobError>),
 }
@@ -43,7 +43,7 @@ struct Decoded {
 /// The other decoders under the finger: fitted in the background once somebody presses, and asked there one touch at a
 /// time; the newest touch wins.
 pub(super) struct Comparing {
-    fits: Job<FitNews>,
+    fits: Job<FitEvent>,
     decoding: Job<Result<Decoded, JobError>>,
     of: Option<Subject>,
     decoders: Vec<Fitted>,
@@ -71,9 +71,9 @@ impl Comparing {
 
     /// Takes events, and asks the decoders for what is pressed now.
     pub(super) fn follow(&mut self, shown: Option<&Shown>) {
-        self.take_news();
+        self.take_events();
         let Some(shown) = shown else { return };
-        let subject = shown.question.subject.as_ref().filter(|subject| subject.is_standing);
+        let subject = shown.question.subject.as_ref().filter(|subject| subject.is_idle);
         let is_same = match (&self.of, subject) {
             (Some(of), Some(subject)) => of.is(subject),
             (of, subject) => of.is_none() && subject.is_none(),
@@ -120,7 +120,8 @@ impl Comparing {
                 is_present: false,
             })
             .into();
-        self.fits.start(move |report| fit_all(&subject, report), FitNews::Ended);
+        self.fits
+            .start(move |report| fit_all(&subject, report), FitEvent::Ended);
     }
 
     fn ask(&mut self, pressed: Arc<Pressed>) {
@@ -142,13 +143,13 @@ impl Comparing {
         );
     }
 
-    fn take_news(&mut self) {
+    fn take_events(&mut self) {
         while let Some(news) = self.fits.next_event() {
             match news {
-                FitNews::Fitted(kind, Ok(decoder)) => self.decoders.push((kind, decoder)),
-                FitNews::Fitted(kind, Err(reason)) => self.fail(|other| other == kind, &reason),
-                FitNews::Ended(Ok(())) => {}
-                FitNews::Ended(Err(error)) => self.fail(|_| true, &error.to_string()),
+                FitEvent::Fitted(kind, Ok(decoder)) => self.decoders.push((kind, decoder)),
+                FitEvent::Fitted(kind, Err(reason)) => self.fail(|other| other == kind, &reason),
+                FitEvent::Ended(Ok(())) => {}
+                FitEvent::Ended(Err(error)) => self.fail(|_| true, &error.to_string()),
             }
         }
         while let Some(decoded) = self.decoding.next_event() {
@@ -184,7 +185,7 @@ impl Comparing {
 }
 
 /// Fits one decoder after the other, the fastest first.
-fn fit_all(subject: &Subject, report: &Report<FitNews>) {
+fn fit_all(subject: &Subject, report: &Report<FitEvent>) {
     let set = DecoderSet::new(&subject.settings, Some((*subject.networks).clone())).map_err(|error| error.to_string());
     for kind in KINDS {
         if report.is_cancelled() {
@@ -194,7 +195,10 @@ fn fit_all(subject: &Subject, report: &Report<FitNews>) {
             Ok(decoder) => decoder.ok_or_else(|| "it needs a trained network".to_owned()),
             Err(error) => Err(error.to_string()),
         };
-        report.send(FitNews::Fitted(kind, set.as_ref().map_err(String::clone).and_then(fit)));
+        report.send(FitEvent::Fitted(
+            kind,
+            set.as_ref().map_err(String::clone).and_then(fit),
+        ));
     }
 }
 

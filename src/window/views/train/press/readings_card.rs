@@ -71,9 +71,9 @@ pub fn readings_ui(
 /// Colours from none to the largest drop, up to a round number so that they hold while the finger moves a little.
 fn readings_map(drops_percent: &Array2<f64>, rows: &[usize]) -> HeatMap {
     /// The end of the colours of a sensor at rest.
-    const LEAST_PERCENT: f64 = 0.01;
+    const MIN_PERCENT: f64 = 0.01;
     let largest = drops_percent.iter().copied().filter(|drop| drop.is_finite());
-    let largest = largest.fold(LEAST_PERCENT, f64::max);
+    let largest = largest.fold(MIN_PERCENT, f64::max);
     let decade = 10_f64.powf(largest.log10().floor());
     let ends = [1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0].map(|end| end * decade);
     let end = ends.into_iter().find(|end| *end >= largest).unwrap_or(10.0 * decade);

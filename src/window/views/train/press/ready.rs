@@ -36,7 +36,7 @@ impl ReadyNetwork {
     }
 
     /// Takes the network once it is trained.
-    pub(super) fn take_news(&mut self) {
+    pub(super) fn take_events(&mut self) {
         while let Some(trained) = self.job.next_event() {
             match trained {
                 Ok(Ok(networks)) => self.networks = networks.map(Arc::new),
@@ -78,7 +78,7 @@ impl ReadyNetwork {
             networks: Arc::clone(self.networks.as_ref()?),
             settings,
             is_ready_made: true,
-            is_standing: true,
+            is_idle: true,
         })
     }
 }

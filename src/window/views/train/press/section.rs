@@ -232,7 +232,7 @@ fn remarks_ui(ui: &mut Ui, press: &PressState, shown: &Shown, shared: &Shared) {
         Some(subject) if subject.is_ready_made => {
             "A small network answers, trained on a few ball prints a moment ago. Train gives you your own."
         }
-        Some(subject) if !subject.is_standing => "The other decoders answer when the training is paused or finished.",
+        Some(subject) if !subject.is_idle => "The other decoders answer when the training is paused or finished.",
         Some(_) => "",
         None if press.ready.is_awaited(shared) => "A small network is being trained to answer…",
         None if shared.phase == Phase::Preparing => "The network answers once its training has begun.",

@@ -55,11 +55,11 @@ impl Question {
     /// Returns true if the answer takes a few milliseconds at most.
     pub(super) fn is_light(&self) -> bool {
         /// About three milliseconds.
-        const MOST_PAIRS: f64 = 2e6;
+        const MAX_PAIRS: f64 = 2e6;
         /// Weights of the networks: as long.
-        const MOST_WEIGHTS: usize = 2_000_000;
+        const MAX_WEIGHTS: usize = 2_000_000;
         let weights = self.subject.as_ref().map_or(0, |subject| subject.networks.weights());
-        Pressed::node_pairs(&self.test.sensor, &self.test.rows) <= MOST_PAIRS && weights <= MOST_WEIGHTS
+        Pressed::node_pairs(&self.test.sensor, &self.test.rows) <= MAX_PAIRS && weights <= MAX_WEIGHTS
     }
 
     /// Presses, reads and decodes.

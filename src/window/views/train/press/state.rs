@@ -142,7 +142,7 @@ impl PressState {
 
     /// Answers what is pressed; `result` is that of the displayed network.
     pub fn follow(&mut self, shared: &Shared, result: Option<&RunResult>) {
-        self.ready.take_news();
+        self.ready.take_events();
         if shared.source == SourceKind::Recording {
             // There is no sensor model to press.
             self.let_go();
@@ -177,7 +177,7 @@ impl PressState {
                 networks: Arc::clone(&result.networks),
                 settings: run.simulated()?,
                 is_ready_made: false,
-                is_standing: result.is_standing,
+                is_idle: result.is_idle,
             }),
             None => self.ready.subject(shared),
         }

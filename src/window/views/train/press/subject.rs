@@ -12,7 +12,7 @@ pub struct Subject {
     /// True for the small one that was not asked for.
     pub is_ready_made: bool,
     /// True once it changes no more.
-    pub is_standing: bool,
+    pub is_idle: bool,
 }
 
 impl Subject {

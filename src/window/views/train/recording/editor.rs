@@ -185,7 +185,7 @@ impl RecordingEditor {
     }
 
     /// Takes events of the threads and paths chosen, and reports the plan if it has changed.
-    pub fn take_news(&mut self, shared: &Shared, effects: &mut Vec<Effect>) {
+    pub fn take_events(&mut self, shared: &Shared, effects: &mut Vec<Effect>) {
         self.take_chosen(shared.phase.is_busy(), effects);
         if let Some(opened) = self.opening.next_opened() {
             match opened {

@@ -10,7 +10,7 @@ use crate::window::widgets::{
 use decoupler_files::import::{Decimal, DialectChoice, Encoding, Format, Meaning, Separator};
 
 /// Largest number of lines before a table.
-const MOST_LINES: usize = 1_000_000;
+const MAX_LINES: usize = 1_000_000;
 
 /// The join of the files in words.
 pub(super) fn joined_summary(draft: &Draft) -> String {
@@ -145,7 +145,7 @@ pub(super) fn layout_ui(ui: &mut Ui, draft: &mut Draft) -> bool {
         "Lines before",
         "Lines before the table, which are skipped.",
         &mut lines,
-        0..=MOST_LINES,
+        0..=MAX_LINES,
     );
     dialect.skip_lines = (lines > 0).then_some(lines);
     *dialect != before

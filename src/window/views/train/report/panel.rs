@@ -133,8 +133,8 @@ fn verdict_ui(ui: &mut Ui, shared: &Shared, run: &RunView, result: &RunResult) {
 
 /// What the errors of a recording do not show, or by how much the network is better than ridge regression.
 fn verdict_on_targets_ui(ui: &mut Ui, run: &RunView, result: &RunResult) {
-    let flaw = result.flaw.as_ref().map(|flaw| capitalised(&flaw.to_string()));
-    for remark in flaw.iter().chain(&result.remarks) {
+    let defect = result.defect.as_ref().map(|defect| capitalised(&defect.to_string()));
+    for remark in defect.iter().chain(&result.remarks) {
         note_ui(ui, &sentence(remark));
     }
     let (network, ridge) = (result.errors.targets(), run.baselines.linear.targets());
@@ -144,7 +144,7 @@ fn verdict_on_targets_ui(ui: &mut Ui, run: &RunView, result: &RunResult) {
         .map(|(network, ridge)| ridge.rmse / network.rmse);
     let ratios = Vec::from_iter(ratios.filter(|ratio| ratio.is_finite()));
     let extreme = |pick: fn(f64, f64) -> f64| ratios.iter().copied().reduce(pick).map(format_number);
-    if let (true, Some(low), Some(high)) = (flaw.is_none(), extreme(f64::min), extreme(f64::max))
+    if let (true, Some(low), Some(high)) = (defect.is_none(), extreme(f64::min), extreme(f64::max))
         && ratios.iter().all(|ratio| *ratio > 1.0)
     {
         let times = if low == high { low } else { format!("{low} to {high}") };
@@ -165,8 +165,8 @@ fn verdict_on_nodes_ui(
 ) {
     let remarks = error_remarks(settings, &run.scores(result), Some(reason));
     let of_network = remarks.iter().find(|(row, _)| *row == NETWORK);
-    let fault = if let Some(flaw) = &result.flaw {
-        Some(flaw.to_string())
+    let fault = if let Some(defect) = &result.defect {
+        Some(defect.to_string())
     } else if let Some((row, remark)) = of_network {
         Some(format!("{row}: {remark}"))
     } else if errors.z_mm > baselines.linear.z_mm {

@@ -94,7 +94,7 @@ fn epoch_slider_ui(ui: &mut Ui, scrub: &mut ScrubState, past: &PastNetworks, las
         stride => format!(
             "Brings back the network that a training stopped at this epoch would have kept. Every {stride}th is \
              remembered, so that they take no more than {} MB.",
-            PastNetworks::MOST_BYTES >> 20
+            PastNetworks::MAX_BYTES >> 20
         ),
     };
     slider.on_hover_text(hint);

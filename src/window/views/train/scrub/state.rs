@@ -122,7 +122,7 @@ impl ScrubState {
     fn compute(&mut self, run: &RunView, epoch: usize) {
         let Some(present) = &run.result else { return };
         let (past, networks, test) = (run.past.clone(), Arc::clone(&present.networks), run.test.clone());
-        let (is_standing, source) = (present.is_standing, run.settings().source);
+        let (is_idle, source) = (present.is_idle, run.settings().source);
         // The displayed surface is laid there too, as with the training's own results.
         let snapshot = present.frame.as_ref().map_or(0, |(snapshot, _)| *snapshot);
         self.job.start(
@@ -131,7 +131,7 @@ impl ScrubState {
                 let array = test.array();
                 let recording = test.recording();
                 Some(RunResult {
-                    is_standing,
+                    is_idle,
                     frame: array.map(|test| (snapshot, test.frame(result.answers.view(), snapshot))),
                     charts: recording.map(|test| Arc::new(test.charts(&result.answers))),
                     ..result
@@ -159,12 +159,12 @@ fn result_at(
         charts: None,
         remarks: Vec::new(),
         best_epoch,
-        flaw: None,
+        defect: None,
         epochs_run: epoch,
         starts_ended: 0,
         wall_time: None,
         frame_time: None,
-        is_standing: true,
+        is_idle: true,
         networks: Arc::new(networks),
     })
 }

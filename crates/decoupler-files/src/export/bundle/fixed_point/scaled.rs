@@ -9,7 +9,7 @@ pub(super) struct ScaledRow {
 }
 
 /// Most bits after the point of a weight.
-const MOST_BITS: i32 = 20;
+const MAX_BITS: i32 = 20;
 
 impl ScaledRow {
     /// Scales `weights` so that the largest takes `width` bits with its sign. `fewest` limits the power of two.
@@ -24,7 +24,7 @@ impl ScaledRow {
         if fitting.is_nan() || fitting < f64::from(fewest) {
             return None;
         }
-        let bits = fitting.min(f64::from(MOST_BITS)) as i32;
+        let bits = fitting.min(f64::from(MAX_BITS)) as i32;
         let scale = 2.0_f64.powi(bits);
         let rounded: Vec<i32> = weights.iter().map(|weight| (weight * scale).round() as i32).collect();
         let errors = weights

@@ -36,7 +36,7 @@ impl Units {
                 vec![decimals.ok_or(FixedPointError::Reading(largest_ohm))?; portable.channels]
             }
             Meaning::Own { .. } => channels
-                .map(|channel| most_decimals(largest(channel), LARGEST_READING))
+                .map(|channel| max_decimals(largest(channel), LARGEST_READING))
                 .collect(),
         };
         Ok(Self { decimals })
@@ -50,7 +50,7 @@ impl Units {
                 .map(|output| {
                     let reaches = networks.iter().map(|network| network.reach(output));
                     let reach = reaches.fold(0.0, f64::max);
-                    most_decimals(portable.scales[output], OUTPUT_UNITS).min(most_decimals(reach, LARGEST_OUTPUT))
+                    max_decimals(portable.scales[output], OUTPUT_UNITS).min(max_decimals(reach, LARGEST_OUTPUT))
                 })
                 .collect(),
         };
@@ -84,13 +84,13 @@ impl Units {
 }
 
 /// Most decimals with which `size` has at most `units` units.
-fn most_decimals(size: f64, units: f64) -> i32 {
+fn max_decimals(size: f64, units: f64) -> i32 {
     /// Far within the range of double precision, so that units and their squares are numbers.
-    const MOST: f64 = 120.0;
+    const MAX: f64 = 120.0;
     if size == 0.0 {
         return 0;
     }
-    (units / size).log10().floor().clamp(-MOST, MOST) as i32
+    (units / size).log10().floor().clamp(-MAX, MAX) as i32
 }
 
 fn ten_to(decimals: i32) -> f64 {
@@ -112,7 +112,7 @@ mod tests {
             (0.0, 1e7, 0),
             (1e300, 1e7, -120),
         ] {
-            assert_eq!(most_decimals(size, units), expected, "{size} {units}");
+            assert_eq!(max_decimals(size, units), expected, "{size} {units}");
         }
     }
 }

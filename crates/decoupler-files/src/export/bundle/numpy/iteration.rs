@@ -23,10 +23,10 @@ pub(super) fn source(equations: &RowProblemDescription) -> String {
          COLUMN_Y = np.array({columns})\n\
          AXES = {axes:?}\n\
          HEIGHT, OHM_PER_MM = {height:?}, {resistivity:?}\n\
-         LEAST = np.array({least})\n\
-         MOST = np.array({most})\n\
-         LEAST_OF_STEP = np.array({least_of_step})\n\
-         MOST_OF_STEP = np.array({most_of_step})\n\
+         MIN = np.array({least})\n\
+         MAX = np.array({most})\n\
+         MIN_OF_STEP = np.array({least_of_step})\n\
+         MAX_OF_STEP = np.array({most_of_step})\n\
          STEPS, TOLERANCE, STARTS, EXPLAINED = {steps}, {tolerance:e}, {starts}, {EXPLAINED:e}\n\
          {rest}\n\n",
         rows = list(rows.iter().map(|&row| geometry.row_x_mm(row))),
@@ -63,7 +63,7 @@ const FUNCTIONS: &str = r#"def evaluate(row, r, u):
     cube = inverse**3
     slopes = np.stack([-(dx * cube).sum(2), -(dy * cube).sum(2), (z * cube).sum(2)], axis=2)[:, :, AXES]
     per_ohm = r / OHM_PER_MM
-    derivatives = slopes.transpose(1, 0, 2).reshape(len(r), -1) * per_ohm[:, None] * (MOST - LEAST)
+    derivatives = slopes.transpose(1, 0, 2).reshape(len(r), -1) * per_ohm[:, None] * (MAX - MIN)
     return per_ohm * inverse.sum(axis=(0, 2)) - 1, derivatives
 
 
@@ -73,19 +73,19 @@ def misfit_of(row, r, u):
 
 def iterate(row, r, u):
     """Takes Gauss-Newton steps from u; returns the misfit and the answer."""
-    u = first = np.clip(u, LEAST, MOST)
+    u = first = np.clip(u, MIN, MAX)
     before = misfit_of(row, r, u)
     for _ in range(STEPS):
         residuals, derivatives = evaluate(row, r, u)
         step = np.linalg.lstsq(derivatives, -residuals, rcond=None)[0]
-        room, moves = np.where(step > 0, MOST_OF_STEP, LEAST_OF_STEP) - u, step != 0
-        share = min(1, *(room[moves] / (step * (MOST - LEAST))[moves]), 1)
+        room, moves = np.where(step > 0, MAX_OF_STEP, MIN_OF_STEP) - u, step != 0
+        share = min(1, *(room[moves] / (step * (MAX - MIN))[moves]), 1)
         if not np.isfinite(step).all() or share < SHORTEST:
             break
-        u = u + share * step * (MOST - LEAST)
+        u = u + share * step * (MAX - MIN)
         if np.abs(step).max() <= TOLERANCE:
             break
-    u = np.clip(u, LEAST, MOST)
+    u = np.clip(u, MIN, MAX)
     misfit = misfit_of(row, r, u)
     return (misfit, u) if misfit <= before else (before, first)
 
@@ -94,7 +94,7 @@ def attempt(row, r, outputs, starts):
     """Iterates from the first answer, and from other starts until the readings are explained."""
     at = outputs.reshape(-1, 3)
     moved = np.column_stack([at[:, 0] - ROW_X[row], at[:, 1] - NODE_Y, HEIGHT - at[:, 2]])
-    begins = [moved[:, AXES].ravel(), (LEAST + MOST) / 2, np.zeros(len(LEAST)), MOST]
+    begins = [moved[:, AXES].ravel(), (MIN + MAX) / 2, np.zeros(len(MIN)), MAX]
     best = None
     for begin in begins[:starts]:
         found = iterate(row, r, begin)

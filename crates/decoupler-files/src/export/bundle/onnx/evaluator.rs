@@ -24,7 +24,7 @@ pub(super) fn evaluate(graph: &Graph, inputs: Vec<(String, Tensor)>) -> Result<H
             let value = values.get(name);
             value.ok_or_else(|| format!("{} needs '{name}', which is not computed before", node.name))
         };
-        let value = apply(node, input).map_err(|flaw| format!("{}: {defect}", node.name))?;
+        let value = apply(node, input).map_err(|defect| format!("{}: {defect}", node.name))?;
         let [output] = &node.output[..] else {
             return Err(format!("{} has not one output", node.name));
         };

@@ -1,52 +1,52 @@
 use std::fmt;
 
 use super::StartTrainer;
-use crate::training::TrainingFlaw;
+use crate::training::TrainingDefect;
 
 /// Defect of a run that has ended: trainings of its leader came to nothing or diverged. Its text says what to change.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct RunFlaw {
+pub struct RunDefect {
     /// Number of networks: one, or one for each row-wire.
     pub networks: usize,
     /// Number of networks whose training has a defect.
-    pub flawed: usize,
+    pub defective: usize,
     /// Index of the first of them, from 0.
     pub first: usize,
     /// Defect of the first.
-    pub flaw: TrainingFlaw,
+    pub defect: TrainingDefect,
 }
 
-impl RunFlaw {
+impl RunDefect {
     /// Finds the defect of one start whose trainings have all ended.
     pub(super) fn of(start: &StartTrainer) -> Option<Self> {
         start.stop_reason()?;
         let numbered = start.rows().iter().enumerate();
-        let mut flaws = numbered.filter_map(|(index, trainer)| Some((index, TrainingFlaw::of(trainer)?)));
-        let (first, flaw) = flaws.next()?;
+        let mut defects = numbered.filter_map(|(index, trainer)| Some((index, TrainingDefect::of(trainer)?)));
+        let (first, defect) = defects.next()?;
         Some(Self {
             networks: start.rows().len(),
-            flawed: 1 + flaws.count(),
+            defective: 1 + defects.count(),
             first,
-            flaw,
+            defect,
         })
     }
 }
 
-impl fmt::Display for RunFlaw {
+impl fmt::Display for RunDefect {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self {
             networks,
-            flawed,
+            defective,
             first,
-            flaw,
+            defect,
         } = self;
         if *networks > 1 {
             write!(
                 f,
-                "{flawed} of {networks} networks, the first being number {}: ",
+                "{defective} of {networks} networks, the first being number {}: ",
                 first + 1
             )?;
         }
-        flaw.fmt(f)
+        defect.fmt(f)
     }
 }

@@ -6,10 +6,10 @@ use super::{EpochRecord, Method, StopReason, Trainer};
 
 /// Defect of a training that has ended: what happened, and what to change. Its text says both.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct TrainingFlaw {
+pub struct TrainingDefect {
     /// Epoch in which the error grew above that of the start and stayed there, if it did.
     pub diverged_in: Option<usize>,
-    /// True if the best network is hardly better than the random start: [`TrainingFlaw::LEAST_GAIN`].
+    /// True if the best network is hardly better than the random start: [`TrainingDefect::MIN_GAIN`].
     pub is_at_start: bool,
     /// Epoch of the best network.
     pub best_epoch: usize,
@@ -21,18 +21,18 @@ pub struct TrainingFlaw {
     pub method: Method,
 }
 
-impl TrainingFlaw {
+impl TrainingDefect {
     /// Share by which the error that decides (validation, or training where nothing is held out) must fall below that of
     /// the start for the network to count as trained.
-    pub const LEAST_GAIN: f64 = 0.01;
+    pub const MIN_GAIN: f64 = 0.01;
 
     /// Finds the defect of a training; `None` for a sound one and for one that has not ended.
     pub fn of(trainer: &Trainer) -> Option<Self> {
         let reason = trainer.stop_reason()?;
         let start = trainer.history().first()?;
         let start_mse = start.validation_mse.unwrap_or(start.training_mse);
-        let enough = (1.0 - Self::LEAST_GAIN) * start_mse;
-        let flaw = Self {
+        let enough = (1.0 - Self::MIN_GAIN) * start_mse;
+        let defect = Self {
             diverged_in: diverged_in(trainer.history(), reason),
             // False for a start without any error, which nothing can improve; true for one that is not a number.
             is_at_start: start_mse != 0.0 && (trainer.best_mse() >= enough || enough.is_nan()),
@@ -41,7 +41,7 @@ impl TrainingFlaw {
             reason,
             method: trainer.settings().method,
         };
-        (flaw.diverged_in.is_some() || flaw.is_at_start).then_some(flaw)
+        (defect.diverged_in.is_some() || defect.is_at_start).then_some(defect)
     }
 
     /// Returns the setting to change, in words.
@@ -66,7 +66,7 @@ fn diverged_in(history: &[EpochRecord], reason: StopReason) -> Option<usize> {
     (after < history.len() || reason == StopReason::Diverged).then_some(after)
 }
 
-impl fmt::Display for TrainingFlaw {
+impl fmt::Display for TrainingDefect {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { epochs, best_epoch, .. } = self;
         match (self.diverged_in, self.is_at_start) {

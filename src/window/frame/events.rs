@@ -12,7 +12,7 @@ use decoupler_core::evaluation::RunSettings;
 
 impl DecouplerWindow {
     /// Takes what the threads and the dialogs have to report.
-    pub fn take_news(&mut self) {
+    pub fn take_events(&mut self) {
         self.take_copied();
         while let Some(event) = self.worker.next_event() {
             self.take_event(event);
@@ -20,7 +20,7 @@ impl DecouplerWindow {
         while let Some(event) = self.previews.next_event() {
             self.take_preview(event);
         }
-        if let Some(notice) = self.shared.runs.take_news(&self.runs) {
+        if let Some(notice) = self.shared.runs.take_events(&self.runs) {
             self.notices.tell(Matter::RunList, notice);
         }
         while let Some(written) = self.files.next_written() {
@@ -37,7 +37,7 @@ impl DecouplerWindow {
         let mut effects = Vec::new();
         let mut working = Vec::new();
         for view in self.views.all() {
-            view.take_news(&self.shared, &mut effects);
+            view.take_events(&self.shared, &mut effects);
             working.extend(view.is_working().then(|| view.name()));
         }
         self.shared.working = working;

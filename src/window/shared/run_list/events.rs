@@ -8,7 +8,7 @@ use crate::window::shared::Notice;
 
 impl RunList {
     /// Takes the list from the thread; returns what the user is to be predicted.
-    pub fn take_news(&mut self, worker: &RunsWorker) -> Option<Notice> {
+    pub fn take_events(&mut self, worker: &RunsWorker) -> Option<Notice> {
         let mut notice = None;
         while let Some(event) = worker.next_event() {
             match event {
@@ -97,18 +97,18 @@ mod tests {
             worker.keep(small_run());
         }
         (0..3).for_each(|_| wait(&woken));
-        assert!(list.take_news(&worker).is_none());
+        assert!(list.take_events(&worker).is_none());
         let [first, second] = [0, 1].map(|place: usize| list.workspace.runs[place].id);
         // A list is on its way when the user removes one run and renames the other.
         worker.look();
         wait(&woken);
         list.remove(first, &worker);
         list.rename(second, "mine", &worker);
-        assert!(list.take_news(&worker).is_none());
+        assert!(list.take_events(&worker).is_none());
         let names = |list: &RunList| Vec::from_iter(list.workspace.runs.iter().map(|run| run.name.clone()));
         assert_eq!(names(&list), ["mine"]);
         (0..2).for_each(|_| wait(&woken));
-        assert!(list.take_news(&worker).is_none());
+        assert!(list.take_events(&worker).is_none());
         assert_eq!(names(&list), ["mine"]);
         assert!(list.path.is_some());
     }
