@@ -44,7 +44,7 @@ struct Target<'a> {
     /// Of the better of network and ridge.
     r2: Option<Figure>,
     better: Option<&'static str>,
-    /// told, hardly told or not told.
+    /// determined, weakly determined or not determined.
     standing: Option<&'static str>,
     sentence: String,
     r2_network: Option<Figure>,

@@ -35,7 +35,7 @@ pub(super) struct Follow {
     /// With --follow: form of the answers [default: csv]
     #[arg(long, value_name = "csv|jsonl", hide_possible_values = true)]
     format: Option<Form>,
-    /// With --follow: report rate and latency on standard error every this many seconds; always at the end, and on SIGUSR1
+    /// With --follow: report rate and latency on standard error every N seconds; always at the end, and on SIGUSR1
     #[arg(long, value_name = "SECONDS", value_parser = number)]
     report: Option<f64>,
     /// With --follow: relative noise of the readings (standard deviation) by which faults are judged [default: that of the

@@ -25,16 +25,16 @@ fn recording() -> TempDir {
     folder
 }
 
-const TELL: &str = "inspect --data r.csv --inputs a,b,d,e --targets x,y";
+const INSPECT: &str = "inspect --data r.csv --inputs a,b,d,e --targets x,y";
 
 #[test]
 fn each_target_and_channel_is_judged_with_an_interval() {
     let folder = recording();
-    let report = json(&format!("{TELL} --model ridge --json"), folder.path());
+    let report = json(&format!("{INSPECT} --model ridge --json"), folder.path());
     let target = |index: usize| &report["targets"][index];
     assert_eq!(
         (&target(0)["standing"], &target(0)["unit"]),
-        (&"told".into(), &"mm".into())
+        (&"determined".into(), &"mm".into())
     );
     // Of x, the readings miss 0.05²/3 of (1 + 0.3² + 0.05²)/3.
     let r2 = &target(0)["r2"];
@@ -45,7 +45,7 @@ fn each_target_and_channel_is_judged_with_an_interval() {
         r2["low"].as_f64().unwrap() < value && value < r2["high"].as_f64().unwrap(),
         "{r2}"
     );
-    assert_eq!(target(1)["standing"], "not told");
+    assert_eq!(target(1)["standing"], "not determined");
     assert!(
         target(1)["sentence"]
             .as_str()
@@ -67,7 +67,7 @@ fn each_target_and_channel_is_judged_with_an_interval() {
     );
     let curve = target(0)["learning_curve"].as_array().unwrap();
     assert!(curve.len() >= 5 && target(0)["outlook"].is_string());
-    let text = String::from_utf8(decoupler(&format!("{TELL} --model ridge"), folder.path()).stdout).unwrap();
+    let text = String::from_utf8(decoupler(&format!("{INSPECT} --model ridge"), folder.path()).stdout).unwrap();
     for expected in [
         "The readings determine x (R² 0.99",
         "do not determine y",
@@ -236,7 +236,7 @@ fn repeated_readings_keep_their_frequency() {
         let target = &report["targets"][0];
         let value = target["r2"]["value"].as_f64().unwrap();
         assert!((value - 0.64).abs() < 0.06, "{target}");
-        assert_eq!(target["standing"], "told", "{target}");
+        assert_eq!(target["standing"], "determined", "{target}");
         // The learning curve uses the same fits.
         let last = target["learning_curve"].as_array().unwrap().last().unwrap();
         assert!(last["rmse"].as_f64().unwrap() < 0.4, "{last}");

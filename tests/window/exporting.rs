@@ -329,7 +329,7 @@ fn a_report_holds_the_errors_shown_and_a_kept_run_leaves_too() {
 }
 
 #[test]
-fn export_says_which_network_it_takes_and_offers_the_epoch_on_show() {
+fn export_says_which_network_it_takes_and_offers_the_displayed_epoch() {
     let folder = tempfile::tempdir().unwrap();
     let [past, best, errors] = ["past.json", "best.json", "errors.csv"].map(|name| folder.path().join(name));
     let mut driver = trained_driver();
@@ -350,7 +350,7 @@ fn export_says_which_network_it_takes_and_offers_the_epoch_on_show() {
     });
     driver.open_menu();
     assert!(
-        driver.has("NETWORK ON SHOW, EPOCH 4") && driver.has(&heading),
+        driver.has("DISPLAYED NETWORK, EPOCH 4") && driver.has(&heading),
         "{:#?}",
         driver.texts()
     );

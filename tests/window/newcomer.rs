@@ -86,7 +86,7 @@ fn one_of_a_kind_is_singular() {
         driver.texts()
     );
     driver.enter("Hidden nodes", "1");
-    driver.wait("the array", |driver| driver.says("1 unknown, 1 equation a frame"));
+    driver.wait("the array", |driver| driver.says("1 unknown, 1 equation per frame"));
     driver.wait("its readings", |driver| driver.says("1 row-wire × 1 column-wire"));
     let texts = driver.texts();
     let plural = |text: &&String| {

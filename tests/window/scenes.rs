@@ -33,7 +33,7 @@ fn wait_for_scene(driver: &mut Driver) {
 fn known_rows_train_one_small_network_for_each_row() {
     let mut driver = Driver::open();
     driver.configure_small();
-    assert!(driver.has("60 unknowns, 180 equations a frame"));
+    assert!(driver.has("60 unknowns, 180 equations per frame"));
     assert!(driver.has("18 inputs, 12 outputs, 198 weights"));
     driver.click_button("Known");
     // (18 + 1) · 6 + (6 + 1) · 6: x of a known row does not vary.
@@ -57,7 +57,7 @@ fn one_row_is_all_that_is_drawn() {
     driver.click_button("One");
     driver.enter("Row", "4");
     assert_eq!(driver.state().draft.source.scene.rows, Rows::One(3));
-    assert!(driver.has("6 unknowns, 18 equations a frame"));
+    assert!(driver.has("6 unknowns, 18 equations per frame"));
     wait_for_scene(&mut driver);
     assert_eq!(driver.views().train.drawn.frames.actual.nodes_mm.len(), 6);
     assert!(driver.says("1 of 100"), "a snapshot is one sample");
@@ -269,7 +269,7 @@ fn scenes_that_move_sideways_say_how_badly_conditioned_they_are() {
     assert_eq!(condition(&driver), of(&driver.state().draft));
     assert!(!driver.says("ill-conditioned"));
     driver.click_button("x, y, z");
-    assert!(driver.has("180 unknowns, 180 equations a frame"));
+    assert!(driver.has("180 unknowns, 180 equations per frame"));
     wait_for_scene(&mut driver);
     assert_eq!(condition(&driver), of(&driver.state().draft));
     assert!(driver.says("even rounding blurs it"));

@@ -59,7 +59,7 @@ impl FrameSource {
         is_wanted: &dyn Fn() -> bool,
     ) -> Result<Option<Self>, String> {
         let (sensor, scene): (SensorModel, Scene) = (settings.source.sensor, plan.scene(settings));
-        // The rows of a frame are told apart also where the network is not told them.
+        // The rows of a frame are told apart also where the network does not know them.
         let rows = match scene.rows {
             Rows::All => Rows::Known,
             rows => rows,
