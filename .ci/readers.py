@@ -144,7 +144,9 @@ def check_onnx(network, precision):
     if rows is not None:
         answers = session.run([given], {**inputs, "row": np.where(rows == 1, 0, rows)})[0]
         assert np.isnan(answers[rows == 1]).all() and not np.isnan(answers[rows != 1]).any()
-    check_onnx_to_c(network, precision, limit, folder, inputs, coordinates)
+    # Graphs of Gaussians and fuzzy rules, on which onnxruntime agrees to rounding, are miscompiled (by 1.3.5 and 1.4.0).
+    if decoder_of(network) == "network":
+        check_onnx_to_c(network, precision, limit, folder, inputs, coordinates)
 
 
 def check_onnx_to_c(network, precision, limit, folder, inputs, coordinates):
