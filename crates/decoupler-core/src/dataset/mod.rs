@@ -6,22 +6,17 @@
 //! and [`Folds`] divide a set, and [`Frames`] groups it into whole frames.
 
 mod division;
-mod faults;
 mod folds;
 mod frames;
-mod per_row;
 mod samples;
 mod seed;
 mod simulation;
 mod split;
-mod split_by;
 
 pub use division::{Division, DivisionError, Parts};
 pub use folds::{FoldUnit, Folds, FoldsError};
-pub use frames::{Frames, FramesError};
-pub use per_row::PerRow;
+pub use frames::{Frames, FramesError, PerRow};
 pub use samples::{Dataset, DatasetError, LARGEST_SAMPLES};
 pub use seed::{Seed, Stream};
 pub use simulation::SimulationError;
-pub use split::{Split, hold_out};
-pub use split_by::{SplitBy, SplitByError};
+pub use split::{Split, SplitBy, SplitByError, hold_out};

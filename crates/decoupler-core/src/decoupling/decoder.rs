@@ -1,10 +1,13 @@
+use std::fmt;
+
 use ndarray::{Array2, Axis};
 use thiserror::Error;
 
-use super::{Description, NotDescribed, SolvedRows};
+use super::{Description, NotDescribed, newton::Solution, row_problem::RowProblem};
 use crate::{
     dataset::{Dataset, PerRow},
     network::Quantity,
+    sensor::{Axes, SensorModel},
 };
 
 /// A method of decoding readings into targets; for a simulated array, resistances in ohm into coordinates of nodes in
@@ -175,5 +178,79 @@ impl<D: Decoder> Decoder for PerRow<D> {
             maps.extend(of_row.description()?.maps);
         }
         Ok(Description::of_maps(maps))
+    }
+}
+
+/// Root mean square of m/R − 1 over the readings m of a row, with R the model's resistances at the decoded coordinates.
+///
+/// It needs no ground truth, so it tells how far to trust any decoder; 1 and above explains nothing. Infinite if the
+/// model has no resistance at these coordinates.
+///
+/// # Panics
+/// If there are not M4 readings and 3·M2 coordinates.
+pub fn resistance_residual(model: &SensorModel, readings_ohm: &[f64], coordinates_mm: &[f64]) -> f64 {
+    assert_eq!(coordinates_mm.len(), model.scale.coordinates_per_row());
+    let mut problem = RowProblem::new(model, Axes::Xyz);
+    // Displacements are measured from the first row, wherever the nodes are.
+    problem.read(0, readings_ohm);
+    let mut unknowns = vec![0.0; problem.unknowns()];
+    problem.unknowns_of(coordinates_mm, &mut unknowns);
+    let residual = problem.evaluate(&unknowns);
+    if residual.is_finite() { residual } else { f64::INFINITY }
+}
+
+/// Number of rows decoded by solving the equations of the sensor, and of those whose answers cannot be relied on.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct SolvedRows {
+    /// Rows decoded.
+    pub rows: usize,
+    /// Rows whose readings the answer does not explain.
+    pub unsolved: usize,
+    /// Rows whose readings other answers may explain as well.
+    pub undetermined: usize,
+}
+
+impl SolvedRows {
+    pub(super) fn count(&mut self, solution: Solution) {
+        self.rows += 1;
+        match solution {
+            Solution::Unique => {}
+            Solution::None => self.unsolved += 1,
+            Solution::Undetermined => self.undetermined += 1,
+        }
+    }
+
+    /// Returns `true` if every answer can be relied on.
+    pub fn are_reliable(self) -> bool {
+        self.unsolved == 0 && self.undetermined == 0
+    }
+}
+
+impl fmt::Display for SolvedRows {
+    /// Writes how many answers cannot be relied on, why, and what helps; nothing if all can.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self {
+            rows,
+            unsolved,
+            undetermined,
+        } = *self;
+        if unsolved > 0 {
+            write!(
+                f,
+                "{unsolved} of {rows} rows were not solved: their answers do not explain the readings. Check that readings \
+                 and geometry belong together, give the noise of the readings, or let nodes move along z only"
+            )?;
+        }
+        if unsolved > 0 && undetermined > 0 {
+            write!(f, "; ")?;
+        }
+        if undetermined > 0 {
+            write!(
+                f,
+                "{undetermined} of {rows} rows are not determined by their readings: other deformations may explain \
+                 them as well. Use more column-wires, nodes that move along fewer axes, known rows, or a layout without symmetry"
+            )?;
+        }
+        Ok(())
     }
 }

@@ -1,6 +1,11 @@
 use super::{
+    least_squares::Triangle,
+    newton::LARGEST_ERROR,
     row_problem::{Range, RowProblem},
-    triangle::Triangle,
+};
+use crate::{
+    scene::Scene,
+    sensor::{Axes, SensorModel},
 };
 
 /// Linearised equations for one step, in proportion to the ranges of the unknowns. Kept between steps so that none
@@ -98,5 +103,191 @@ impl Linearised {
             .iter()
             .map(|slope| slope.abs())
             .sum()
+    }
+}
+
+/// Returns where in `range` each of `count` functions of one variable is least, and its value there: the least of a grid of
+/// steps of about 1, which finds the deepest of several valleys, then golden-section search within a step of it.
+///
+/// `of` returns the values of all functions, each at its own place, so that work they share is done once.
+pub(super) fn least(range: (f64, f64), count: usize, of: impl Fn(&[f64]) -> Vec<f64>) -> Vec<(f64, f64)> {
+    let (low, high) = range;
+    let steps = (high - low).ceil().max(1.0);
+    let step = (high - low) / steps;
+    let mut best = vec![(low, f64::INFINITY); count];
+    for k in 0..=steps as usize {
+        let at = low + step * k as f64;
+        for (best, value) in best.iter_mut().zip(of(&vec![at; count])) {
+            // The lowest place is kept where no value is a number.
+            if value < best.1 {
+                *best = (at, value);
+            }
+        }
+    }
+    let mut valleys: Vec<Valley> = best.into_iter().map(|best| Valley::around(best, step, range)).collect();
+    for inner in 0..2 {
+        let at: Vec<f64> = valleys.iter().map(|valley| valley.inner[inner].0).collect();
+        for (valley, value) in valleys.iter_mut().zip(of(&at)) {
+            valley.inner[inner].1 = value;
+        }
+    }
+    while valleys.iter().any(Valley::is_wide) {
+        let at: Vec<f64> = valleys.iter_mut().map(Valley::narrow).collect();
+        for (valley, value) in valleys.iter_mut().zip(of(&at)) {
+            valley.take(value);
+        }
+    }
+    valleys.into_iter().map(|valley| valley.best).collect()
+}
+
+/// Golden-section search of one function.
+struct Valley {
+    /// Place and value of the least so far.
+    best: (f64, f64),
+    left: f64,
+    right: f64,
+    /// Places and values between the ends, in order.
+    inner: [(f64, f64); 2],
+    /// Index of the one of [`Self::inner`] that is to be evaluated; `None` once the valley is narrow.
+    open: Option<usize>,
+}
+
+impl Valley {
+    /// Width to which a valley is narrowed.
+    const WIDTH: f64 = 0.02;
+
+    fn around(best: (f64, f64), step: f64, (low, high): (f64, f64)) -> Self {
+        let (left, right) = ((best.0 - step).max(low), (best.0 + step).min(high));
+        let inner = [right - golden() * (right - left), left + golden() * (right - left)];
+        Self {
+            best,
+            left,
+            right,
+            inner: inner.map(|at| (at, f64::NAN)),
+            open: None,
+        }
+    }
+
+    fn is_wide(&self) -> bool {
+        self.right - self.left > Self::WIDTH
+    }
+
+    /// Narrows the valley, if it is wide, and returns where to evaluate the function next.
+    fn narrow(&mut self) -> f64 {
+        self.open = None;
+        if !self.is_wide() {
+            return self.best.0;
+        }
+        for inner in self.inner {
+            if inner.1 < self.best.1 {
+                self.best = inner;
+            }
+        }
+        let [first, second] = self.inner;
+        let (open, at) = if first.1 < second.1 {
+            self.right = second.0;
+            self.inner[1] = first;
+            (0, self.right - golden() * (self.right - self.left))
+        } else {
+            self.left = first.0;
+            self.inner[0] = second;
+            (1, self.left + golden() * (self.right - self.left))
+        };
+        self.open = Some(open);
+        self.inner[open].0 = at;
+        at
+    }
+
+    /// Takes the value at the place that was asked for.
+    fn take(&mut self, value: f64) {
+        if let Some(open) = self.open {
+            self.inner[open].1 = value;
+        }
+    }
+}
+
+/// The golden ratio's inverse.
+fn golden() -> f64 {
+    0.5 * (5.0_f64.sqrt() - 1.0)
+}
+
+/// Deformations of a row-wire that give the same readings as another one, by symmetry: the readings do not determine which of
+/// them is the true one, however exact they are.
+///
+/// The electrodes of a column-wire are evenly spaced, so a node may be mirrored at their middle; and two nodes may change
+/// places. Either needs nodes that move so far sideways.
+#[derive(Clone, Debug)]
+pub(super) struct Twins {
+    model: SensorModel,
+    axes: Axes,
+    largest_shift_mm: f64,
+}
+
+impl Twins {
+    pub(super) fn new(model: &SensorModel, scene: &Scene) -> Self {
+        Self {
+            model: *model,
+            axes: scene.movement.axes(),
+            largest_shift_mm: scene.movement.largest_shift_mm(),
+        }
+    }
+
+    /// Returns `true` if the deformation `unknowns_mm` of row-wire `row` has a twin within reach of the nodes.
+    pub(super) fn has(&self, row: usize, unknowns_mm: &[f64]) -> bool {
+        if self.axes == Axes::Z {
+            return false;
+        }
+        let nodes = unknowns_mm.as_chunks::<3>().0;
+        nodes.iter().any(|&[x, ..]| self.is_mirrored(row, x))
+            || (1..nodes.len()).any(|apart| {
+                let pairs = nodes.iter().zip(&nodes[apart..]);
+                self.model.geometry.node_pitch_mm * apart as f64 <= 2.0 * self.largest_shift_mm
+                    && pairs.into_iter().any(|(a, b)| self.is_exchanged(apart, *a, *b))
+            })
+    }
+
+    fn is_within(&self, shift_mm: f64) -> bool {
+        shift_mm.abs() <= self.largest_shift_mm
+    }
+
+    fn is_apart(&self, a_mm: f64, b_mm: f64) -> bool {
+        (a_mm - b_mm).abs() > LARGEST_ERROR * 2.0 * self.largest_shift_mm
+    }
+
+    fn is_mirrored(&self, row: usize, x_mm: f64) -> bool {
+        let geometry = &self.model.geometry;
+        let electrodes = (self.model.scale.nodes_per_column() - 1) as f64;
+        let middle_mm = (geometry.column_node_x0_mm - geometry.row_x0_mm)
+            + (0.5 * geometry.column_node_pitch_mm * electrodes - geometry.row_pitch_mm * row as f64);
+        let mirrored_mm = 2.0 * middle_mm - x_mm;
+        self.is_within(mirrored_mm) && self.is_apart(mirrored_mm, x_mm)
+    }
+
+    /// Returns `true` if node `a` may take the place of node `b`, `apart` places on, and the other way round.
+    fn is_exchanged(&self, apart: usize, a: [f64; 3], b: [f64; 3]) -> bool {
+        let distance_mm = self.model.geometry.node_pitch_mm * apart as f64;
+        let differs = self.is_apart(a[0], b[0]) || self.is_apart(a[1], b[1] + distance_mm) || self.is_apart(a[2], b[2]);
+        self.is_within(b[1] + distance_mm) && self.is_within(a[1] - distance_mm) && differs
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_deepest_valley_of_each_function_is_found_and_narrowed() {
+        let two_valleys = |at: f64| ((at - 2.7).powi(2)).min((at + 20.3).powi(2) - 0.1);
+        let parabola = |at: f64| (at - 4.1).powi(2);
+        let found = least((-30.0, 5.0), 2, |at| vec![two_valleys(at[0]), parabola(at[1])]);
+        let (at, value) = found[0];
+        assert!((at + 20.3).abs() < 0.02 && (value + 0.1).abs() < 1e-3, "{at} {value}");
+        assert!((found[1].0 - 4.1).abs() < 0.02, "{found:?}");
+        for (range, expected) in [((-3.0, 4.5), -3.0), ((7.0, 7.2), 7.0)] {
+            assert_eq!(least(range, 1, |at| at.to_vec())[0].0, expected);
+        }
+        assert_eq!(least((1.0, 3.0), 1, |at| vec![-at[0]])[0].0, 3.0);
+        assert_eq!(least((1.0, 3.0), 1, |_| vec![f64::NAN])[0].0, 1.0);
+        assert!(least((1.0, 3.0), 0, |_| Vec::new()).is_empty());
     }
 }

@@ -1,12 +1,12 @@
 use glam::DVec3;
 
 use super::{
-    affine_start::AffineStart,
-    newton_report::{NewtonReport, NewtonRules, NewtonStop, ROUNDING, Solution},
+    affine_map::AffineStart,
+    gauss_newton::Twins,
+    newton::{NewtonReport, NewtonRules, NewtonStop, ROUNDING, Solution},
     normal_equations::write_normal_equations,
     row_problem::{Range, ranges, wide_ranges},
     side_by_side::{LANES, SideBySide},
-    twins::Twins,
 };
 use crate::{
     scene::Scene,

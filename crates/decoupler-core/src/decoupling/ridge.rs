@@ -1,7 +1,7 @@
 use faer::Mat;
 use ndarray::{Array2, ArrayView2, Axis};
 
-use super::line_search::least;
+use super::gauss_newton::least;
 use crate::network::ScalingError;
 
 /// Ridge regressions of outputs on inputs with every penalty, from one singular value decomposition, and their
@@ -230,7 +230,7 @@ mod tests {
     use ndarray::Array1;
     use rand::{SeedableRng, rngs::ChaCha8Rng};
 
-    use crate::scene::normal::standard_normal;
+    use crate::scene::standard_normal;
 
     fn normal(rows: usize, columns: usize, seed: u64) -> Array2<f64> {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);

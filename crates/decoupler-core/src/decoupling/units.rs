@@ -120,7 +120,7 @@ mod tests {
         dataset::{Seed, Stream},
         decoupling::{AffineMap, Decoder, RadialBasisNetwork, RadialBasisSettings, TakagiSugeno, decode_set},
         network::{InputChoice, Quantity},
-        scene::normal::standard_normal,
+        scene::standard_normal,
     };
 
     /// A case of `tests/fixtures/repeated_samples.py`.

@@ -6,7 +6,7 @@ use super::{
     Baselines, Errors, NoReference, Run, RunError, RunSets, RunSettings, SimulatedSettings, StartTrainer, TestErrors,
     baselines::fit_baselines,
     reference_errors,
-    sets::check_sets,
+    run_sets::check_sets,
     task::{Task, tasks},
 };
 use crate::{

@@ -6,11 +6,14 @@ use std::{
 use glam::DVec3;
 use ndarray::Array2;
 
-use super::machine::node_pairs_per_row;
+use super::{RunError, Simulation, run_sets::check_networks, workload::node_pairs_per_row};
 use crate::{
+    dataset::{Dataset, PerRow, Split},
     decoupling::{DecodeError, Decoder},
+    network::{DecouplingNetwork, Networks},
     scene::Touch,
-    sensor::{SensorError, SensorModel},
+    sensor::{PressLimits, PressedRow, SensorError, SensorModel},
+    training::{Examples, Problem, Trainer, TrainingSettings},
 };
 
 /// A sensor touched by hand: where its nodes are and what its wires read, without noise.
@@ -148,6 +151,116 @@ impl PressedAnswer {
     pub fn nodes_mm(&self) -> impl Iterator<Item = DVec3> + '_ {
         self.coordinates_mm.chunks_exact(3).map(DVec3::from_slice)
     }
+}
+
+/// Returns the samples of `set` as readings of known deformations, for [`Calibration::fit`](crate::sensor::Calibration::fit).
+/// Its targets are the absolute coordinates of the row's nodes in millimetres, as `sensor` places its nodes at rest.
+///
+/// # Errors
+/// If the samples do not know their row-wire.
+///
+/// # Panics
+/// If the targets are not 3·M2, or a row-wire is not one of the array.
+pub fn pressed_rows(set: &Dataset, sensor: &SensorModel) -> Result<Vec<PressedRow>, RunError> {
+    let pressed = |sample: usize| {
+        let row = set.row_wire(sample).ok_or(RunError::NoRowWires)?;
+        Ok(PressedRow {
+            frame: set.groups()[sample],
+            row,
+            displacements_mm: displacements_mm(set, sample, row, sensor),
+            resistances_ohm: set.sample_readings(sample).to_vec(),
+        })
+    };
+    (0..set.samples()).map(pressed).collect()
+}
+
+/// Returns `set` with its targets, coordinates in millimetres as `from` places its nodes at rest, replaced by those that
+/// the same displacements give in `to`: so that a network trained on one model of a sensor can be judged by, or trained
+/// on, samples described by another.
+///
+/// # Errors
+/// If the samples do not know their row-wire.
+///
+/// # Panics
+/// If the targets are not 3·M2, or a row-wire is not one of both arrays.
+pub fn rebased(set: &Dataset, from: &SensorModel, to: &SensorModel) -> Result<Dataset, RunError> {
+    let rows = (0..set.samples()).map(|sample| set.row_wire(sample));
+    let rows: Vec<usize> = rows.collect::<Option<_>>().ok_or(RunError::NoRowWires)?;
+    let mut targets = Array2::zeros(set.targets().dim());
+    for (sample, (&row, mut moved)) in rows.iter().zip(targets.rows_mut()).enumerate() {
+        let displacements = displacements_mm(set, sample, row, from).into_iter().enumerate();
+        let coordinates =
+            displacements.flat_map(|(node, displacement)| to.displaced_mm(row, node, displacement).to_array());
+        moved.iter_mut().zip(coordinates).for_each(|(to, value)| *to = value);
+    }
+    let read = set.row_wires_read().unwrap_or_default();
+    let moved = Dataset::new(set.readings().to_owned(), targets, Some(&rows), set.groups().to_vec());
+    let moved = moved.and_then(|moved| moved.among_rows(read));
+    Ok(moved.expect("the parts are those of a set"))
+}
+
+fn displacements_mm(set: &Dataset, sample: usize, row: usize, sensor: &SensorModel) -> Vec<DVec3> {
+    let targets = set.sample_targets(sample);
+    assert_eq!(
+        targets.len(),
+        sensor.scale.coordinates_per_row(),
+        "targets are coordinates of the row's nodes"
+    );
+    let position = |(node, mm): (usize, &[f64])| sensor.displacement_mm(row, node, DVec3::from_slice(mm));
+    targets.chunks_exact(3).enumerate().map(position).collect()
+}
+
+/// Displacements for which a network of this simulated scene is made: samples of others are no presses, or ask for answers
+/// that it was never trained to give.
+pub fn press_limits(simulation: &Simulation) -> PressLimits {
+    PressLimits {
+        largest_depth_mm: simulation.stroke_mm(),
+        largest_shift_mm: simulation.scene.movement.largest_shift_mm(),
+    }
+}
+
+/// Continues the training of `networks` on other samples, such as the frames of the real sensor after a training on its
+/// calibrated model; returns `None` if cancelled. Scalings stay as they are. The weights of the lowest validation error
+/// are returned, which may be those given: with a validation set, fine-tuning cannot make it worse.
+///
+/// # Errors
+/// If the samples do not have the channels, targets or rows of the networks, or a setting is out of range.
+pub fn fine_tune(
+    networks: &Networks,
+    split: &Split,
+    training: TrainingSettings,
+    is_cancelled: &dyn Fn() -> bool,
+) -> Result<Option<Networks>, RunError> {
+    check_networks(networks, split)?;
+    let mut tuned = Vec::with_capacity(networks.values().len());
+    for (index, network) in networks.values().iter().enumerate() {
+        let examples = |set: &Dataset| {
+            let set = if networks.only().is_some() {
+                set.clone()
+            } else {
+                set.of_row(index)
+            };
+            let inputs = network.inputs().of(set.readings());
+            Examples::new(inputs.view(), network.outputs().scale(set.targets()).view())
+        };
+        let problem = Problem {
+            training: examples(&split.training),
+            validation: split.validation.as_ref().map(examples),
+            test: None,
+        };
+        let mut trainer = Trainer::new(network.mlp().clone(), problem, training)?;
+        while trainer.step().is_none() {
+            if is_cancelled() {
+                return Ok(None);
+            }
+        }
+        tuned.push(DecouplingNetwork::new(
+            network.inputs().clone(),
+            trainer.best().clone(),
+            network.outputs().clone(),
+        ));
+    }
+    Ok(Some(PerRow::each(tuned)))
 }
 
 #[cfg(test)]

@@ -1,18 +1,26 @@
 use std::{
+    fmt,
     sync::Arc,
     time::{Duration, Instant},
 };
 
 use ndarray::Array2;
 use rayon::prelude::*;
+use thiserror::Error;
 
 use super::{
-    Baselines, Problem, RunDefect, RunError, RunSettings, Scores, StartRecord, StartTrainer, TestErrors, starts::lowest,
+    Baselines, CountError, Problem, RunSettings, Scores, StartRecord, StartTrainer, TestErrors, starts::lowest,
 };
 use crate::{
-    dataset::{Dataset, PerRow},
-    network::{DecouplingNetwork, Inputs, MinMax, Mlp, Networks},
-    training::{Method, SettingError, StopReason, StoppingRules, TrainerState, check_width},
+    dataset::{Dataset, DivisionError, FoldsError, PerRow, SimulationError},
+    decoupling::DecodeError,
+    network::{DecouplingNetwork, Inputs, MinMax, Mlp, Networks, ScalingError},
+    scene::SceneError,
+    sensor::SensorError,
+    training::{
+        MachineMemory, Method, ResumeError, SettingError, StopReason, StoppingRules, TrainerState, TrainingDefect,
+        TrainingError, check_width,
+    },
 };
 
 /// A run: its sets of samples, one training per start, and the errors of the best network.
@@ -206,4 +214,165 @@ impl Run {
             baselines: self.baselines.clone()?,
         })
     }
+}
+
+/// Defect of a run that has ended: trainings of its leader came to nothing or diverged. Its text says what to change.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RunDefect {
+    /// Number of networks: one, or one for each row-wire.
+    pub networks: usize,
+    /// Number of networks whose training has a defect.
+    pub defective: usize,
+    /// Index of the first of them, from 0.
+    pub first: usize,
+    /// Defect of the first.
+    pub defect: TrainingDefect,
+}
+
+impl RunDefect {
+    /// Finds the defect of one start whose trainings have all ended.
+    pub(super) fn of(start: &StartTrainer) -> Option<Self> {
+        start.stop_reason()?;
+        let numbered = start.rows().iter().enumerate();
+        let mut defects = numbered.filter_map(|(index, trainer)| Some((index, TrainingDefect::of(trainer)?)));
+        let (first, defect) = defects.next()?;
+        Some(Self {
+            networks: start.rows().len(),
+            defective: 1 + defects.count(),
+            first,
+            defect,
+        })
+    }
+}
+
+impl fmt::Display for RunDefect {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self {
+            networks,
+            defective,
+            first,
+            defect,
+        } = self;
+        if *networks > 1 {
+            write!(
+                f,
+                "{defective} of {networks} networks, the first being number {}: ",
+                first + 1
+            )?;
+        }
+        defect.fmt(f)
+    }
+}
+
+/// Error in preparing a run.
+#[derive(Clone, Debug, PartialEq, Error)]
+#[non_exhaustive]
+pub enum RunError {
+    /// A number is out of range.
+    #[error(transparent)]
+    Count(#[from] CountError),
+    /// More samples than a run can hold.
+    #[error(
+        "{training} training and {validation} validation samples, held together as whole snapshots of {rows} rows, are \
+         {total}: the limit is {most}; give fewer for validation"
+    )]
+    TooManySamples {
+        /// Training samples that are held.
+        training: usize,
+        /// Validation samples given.
+        validation: usize,
+        /// Row-wires of a snapshot.
+        rows: usize,
+        /// Samples of the whole snapshots.
+        total: usize,
+        /// Largest number possible.
+        most: usize,
+    },
+    /// The sensor is invalid.
+    #[error(transparent)]
+    Sensor(#[from] SensorError),
+    /// The scene is invalid.
+    #[error(transparent)]
+    Scene(#[from] SceneError),
+    /// Samples cannot be drawn.
+    #[error(transparent)]
+    Simulation(#[from] SimulationError),
+    /// Folds cannot be filled.
+    #[error(transparent)]
+    Folds(#[from] FoldsError),
+    /// Samples cannot be divided.
+    #[error(transparent)]
+    Division(#[from] DivisionError),
+    /// Samples cannot be scaled.
+    #[error(transparent)]
+    Scaling(#[from] ScalingError),
+    /// A reading is not a resistance.
+    #[error(transparent)]
+    Decode(#[from] DecodeError),
+    /// The sets do not belong together.
+    #[error("the {set} set has {found}, the training set {expected}: give sets of one sensor")]
+    Sets {
+        /// Name of the set: validation or test.
+        set: &'static str,
+        /// Channels, targets or row-wires of the set.
+        found: String,
+        /// Channels, targets or row-wires of the training set.
+        expected: String,
+    },
+    /// The samples are not such as the networks decode.
+    #[error(
+        "the {set} set has {found}, the networks have {expected}: give samples of the sensor they were trained for"
+    )]
+    Networks {
+        /// Name of the set: training or validation.
+        set: &'static str,
+        /// Channels, targets or row-wires of the set.
+        found: String,
+        /// Their number in the networks.
+        expected: usize,
+    },
+    /// A row-wire that needs its own network has no samples.
+    #[error("row {} has no {set} samples: give some of every row, or train one network for all rows", .row_wire + 1)]
+    RowWithoutSamples {
+        /// Row-wire, from 0.
+        row_wire: usize,
+        /// Name of the set: training, validation or test.
+        set: &'static str,
+    },
+    /// The samples of a simulated run have no row-wires.
+    #[error(
+        "samples of a simulated sensor must know their row-wire: build the set with row-wires, or call it measured"
+    )]
+    NoRowWires,
+    /// A training cannot begin.
+    #[error(transparent)]
+    Training(#[from] TrainingError),
+    /// The run would take more memory than the machine has.
+    #[error(
+        "this would take about {:.1} GB of memory, and {memory}: use fewer samples, hidden nodes or starts, or the scaled \
+         conjugate gradient (scg)",
+        *.bytes as f64 * 1e-9
+    )]
+    Memory {
+        /// Memory needed, in bytes.
+        bytes: u64,
+        /// Memory that there is.
+        memory: MachineMemory,
+    },
+    /// A saved training cannot be resumed.
+    #[error("start {}: {source}", .start + 1)]
+    Resume {
+        /// Index of the start, from 0.
+        start: usize,
+        /// Reason given by the trainer.
+        source: ResumeError,
+    },
+    /// The number of saved trainings does not match the settings.
+    #[error("{found} saved trainings, but the settings ask for {expected}: starts times networks")]
+    Starts {
+        /// Number of trainings found.
+        found: usize,
+        /// Number of trainings expected.
+        expected: usize,
+    },
 }

@@ -1,7 +1,15 @@
 use std::sync::Arc;
 
-use super::{Problem, RunError, SimulatedSettings, Workload, further_samples::FurtherSamples};
-use crate::dataset::{Dataset, Split};
+use super::{
+    Problem, RunError, RunSettings, SimulatedSettings, Simulation, Source, Workload,
+    further_samples::{FurtherSamples, MAX_HELD},
+};
+use crate::{
+    dataset::{Dataset, LARGEST_SAMPLES, Split, Stream, hold_out},
+    network::Networks,
+    scene::RowModel,
+    training::TrainingError,
+};
 
 /// Sets of samples of a run, drawn from a model or recorded.
 #[derive(Clone, Debug)]
@@ -74,5 +82,189 @@ impl SimulatedSettings {
             further,
             ..RunSets::new(split, test).described(self.source.problem())
         }))
+    }
+}
+
+/// Checks that the sets of a run belong together and meet its settings.
+pub(super) fn check_sets(settings: &RunSettings, split: &Split, test: &Dataset) -> Result<(), RunError> {
+    let training = &split.training;
+    if matches!(settings.source, Source::Simulated(_)) && training.row_wires_read().is_none() {
+        return Err(RunError::NoRowWires);
+    }
+    let sets = [("validation", split.validation.as_ref()), ("test", Some(test))];
+    let sets = sets.into_iter().filter_map(|(name, set)| Some((name, set?)));
+    for (name, set) in sets.clone() {
+        let sizes = [
+            ("channels", set.channels(), training.channels()),
+            ("targets", set.outputs(), training.outputs()),
+        ];
+        let mut differences = sizes
+            .into_iter()
+            .filter(|(_, found, expected)| found != expected)
+            .map(|(what, found, expected)| (format!("{found} {what}"), expected.to_string()));
+        let rows = || (describe_rows(set), describe_rows(training));
+        let rows_differ = set.row_wires_read() != training.row_wires_read();
+        if let Some((found, expected)) = differences.next().or_else(|| rows_differ.then(rows)) {
+            return Err(RunError::Sets {
+                set: name,
+                found,
+                expected,
+            });
+        }
+    }
+    if settings.source.row_model() == RowModel::Each {
+        // A test set may lack a row, but not the sets that fit a network and select its weights.
+        for (name, set) in [("training", training)].into_iter().chain(sets) {
+            let mut has_samples = vec![name == "test"; set.row_count()];
+            (0..set.samples()).for_each(|sample| has_samples[set.row_index(sample)] = true);
+            if let Some(row_index) = has_samples.iter().position(|has_samples| !has_samples) {
+                let row_wire = set.row_wires_read().map_or(0, |read| read[row_index]);
+                return Err(RunError::RowWithoutSamples { row_wire, set: name });
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Checks that the sets of a split are such as `networks` decode.
+pub(super) fn check_networks(networks: &Networks, split: &Split) -> Result<(), RunError> {
+    let network = networks.at(0);
+    let sets = [
+        ("training", Some(&split.training)),
+        ("validation", split.validation.as_ref()),
+    ];
+    for (set, samples) in sets.into_iter().filter_map(|(name, set)| Some((name, set?))) {
+        let count = networks.values().len();
+        let sizes = [
+            ("channels", samples.channels(), network.inputs().channels()),
+            ("targets", samples.outputs(), network.outputs().channels()),
+            ("row-wires", if count == 1 { 1 } else { samples.row_count() }, count),
+        ];
+        if let Some((what, found, expected)) = sizes.into_iter().find(|(_, found, expected)| found != expected) {
+            return Err(RunError::Networks {
+                set,
+                found: format!("{found} {what}"),
+                expected,
+            });
+        }
+        let row_without = (0..count).find(|&row| count > 1 && samples.of_row(row).samples() == 0);
+        if let Some(row) = row_without {
+            let row_wire = samples.row_wires_read().map_or(0, |read| read[row]);
+            return Err(RunError::RowWithoutSamples { row_wire, set });
+        }
+    }
+    Ok(())
+}
+
+/// Lists the row-wires of a set, counted from 1.
+fn describe_rows(set: &Dataset) -> String {
+    match set.row_wires_read() {
+        None => "no row-wires".to_owned(),
+        Some(read) => {
+            let numbers: Vec<String> = read.iter().map(|row_wire| (row_wire + 1).to_string()).collect();
+            format!("the row-wires {}", numbers.join(", "))
+        }
+    }
+}
+
+impl SimulatedSettings {
+    /// Draws the training, validation and test sets of these settings.
+    ///
+    /// # Errors
+    /// If the settings are invalid.
+    pub fn draw(&self) -> Result<(Split, Dataset), RunError> {
+        Ok(self.draw_unless(&|| false)?.expect("nothing cancels it"))
+    }
+
+    /// As [`Self::draw`], but only those training samples that a run holds.
+    pub(crate) fn draw_held(&self) -> Result<(Split, Dataset), RunError> {
+        Ok(self.draw_held_unless(&|| false)?.expect("nothing cancels it"))
+    }
+
+    /// As [`Self::draw_held`]; returns `None` once `is_cancelled`, which is called after each set.
+    pub(super) fn draw_held_unless(
+        &self,
+        is_cancelled: &dyn Fn() -> bool,
+    ) -> Result<Option<(Split, Dataset)>, RunError> {
+        self.check_counts()?;
+        let mut held = *self;
+        held.source.samples = self.source.samples.min(MAX_HELD);
+        held.draw_unless(is_cancelled)
+    }
+
+    fn draw_unless(&self, is_cancelled: &dyn Fn() -> bool) -> Result<Option<(Split, Dataset)>, RunError> {
+        self.check_counts()?;
+        self.training.check().map_err(TrainingError::from)?;
+        let Simulation {
+            samples: training,
+            validation_samples: validation,
+            ..
+        } = self.source;
+        let rows = self.source.model_size()?.rows;
+        let held_out = validation.div_ceil(rows);
+        let total = (training.div_ceil(rows) + held_out) * rows;
+        if total > LARGEST_SAMPLES {
+            return Err(RunError::TooManySamples {
+                training,
+                validation,
+                rows,
+                total,
+                most: LARGEST_SAMPLES,
+            });
+        }
+        let test = self.draw_test()?;
+        if is_cancelled() {
+            return Ok(None);
+        }
+        let drawn = self.draw_training(total)?;
+        if is_cancelled() {
+            return Ok(None);
+        }
+        let split = hold_out(drawn, held_out, &mut self.seed.rng(Stream::Split));
+        Ok(Some((split, test)))
+    }
+
+    /// Draws at least `samples` samples with the noise of the training set.
+    ///
+    /// # Errors
+    /// If the sensor, scene, or number of samples is invalid.
+    pub(super) fn draw_training(&self, samples: usize) -> Result<Dataset, RunError> {
+        let Simulation { sensor, scene, .. } = &self.source;
+        sensor.check()?;
+        scene.check()?;
+        let mut set = Dataset::simulate(sensor, scene, samples, &mut self.seed.rng(Stream::Training))?;
+        set.disturb(
+            sensor,
+            &scene.noise.in_training(),
+            &mut self.seed.rng(Stream::TrainingNoise),
+        )?;
+        Ok(set)
+    }
+
+    /// Draws the samples of `set`, drawn by [`Self::draw_training`], with the noise of the test set; `None` if that is the
+    /// same.
+    pub(super) fn draw_tested_folds(&self, set: &Dataset) -> Result<Option<Dataset>, RunError> {
+        let Simulation { sensor, scene, .. } = &self.source;
+        let noise = scene.noise.in_test();
+        if noise == scene.noise.in_training() {
+            return Ok(None);
+        }
+        let mut tested = Dataset::simulate(sensor, scene, set.samples(), &mut self.seed.rng(Stream::Training))?;
+        tested.disturb(sensor, &noise, &mut self.seed.rng(Stream::TestNoise))?;
+        Ok(Some(tested))
+    }
+
+    /// Draws the test set of these settings, which the window shows before anything is trained.
+    ///
+    /// # Errors
+    /// If the sensor, scene, or number of samples is invalid.
+    pub fn draw_test(&self) -> Result<Dataset, RunError> {
+        let Simulation { sensor, scene, .. } = &self.source;
+        sensor.check()?;
+        scene.check()?;
+        let samples = self.source.test_samples;
+        let mut set = Dataset::simulate(sensor, scene, samples, &mut self.seed.rng(Stream::Test))?;
+        set.disturb(sensor, &scene.noise.in_test(), &mut self.seed.rng(Stream::TestNoise))?;
+        Ok(set)
     }
 }

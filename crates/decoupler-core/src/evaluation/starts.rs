@@ -1,6 +1,14 @@
+use std::time::Duration;
+
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use crate::training::StopReason;
+use crate::{
+    network::Mlp,
+    training::{
+        EpochRecord, Method, SettingError, Stage, StopReason, StoppingRules, Trainer, TrainerState, TrainingError,
+    },
+};
 
 /// Result of one start of a run.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -48,4 +56,191 @@ pub(super) fn lowest(errors: impl IntoIterator<Item = f64>) -> Option<usize> {
     numbered
         .min_by(|(_, one), (_, other)| one.total_cmp(other))
         .map(|(place, _)| place)
+}
+
+/// Trainings of one start: one shared by all row-wires, or one per row-wire where the row is known, in parallel.
+///
+/// Values for several trainings are their means, epoch by epoch; a training that has ended keeps its last values.
+pub struct StartTrainer {
+    rows: Vec<Trainer>,
+    /// History averaged over all rows; empty for a single training, which has its own.
+    history: Vec<EpochRecord>,
+}
+
+impl StartTrainer {
+    /// Combines the trainings of one start.
+    ///
+    /// # Panics
+    /// If `rows` is empty.
+    pub(super) fn new(rows: Vec<Trainer>) -> Self {
+        assert!(!rows.is_empty());
+        let mut joined = Self {
+            rows,
+            history: Vec::new(),
+        };
+        joined.rebuild_history(0);
+        joined
+    }
+
+    /// Training of each row-wire, or the one shared by all.
+    pub fn rows(&self) -> &[Trainer] {
+        &self.rows
+    }
+
+    /// Runs one epoch of every training that has not ended. Returns the reason for stopping once all have ended.
+    pub(super) fn step(&mut self) -> Option<StopReason> {
+        // Stays on this thread, which saves a hand-over every epoch.
+        if let [only] = self.rows.as_mut_slice() {
+            return only.step();
+        }
+        let next = |trainer: &Trainer| trainer.stop_reason().is_none().then(|| trainer.history().len());
+        let first_new = self.rows.iter().filter_map(next).min();
+        self.rows.par_iter_mut().for_each(|trainer| {
+            trainer.step();
+        });
+        if let Some(first_new) = first_new {
+            self.rebuild_history(first_new);
+        }
+        self.stop_reason()
+    }
+
+    fn rebuild_history(&mut self, from: usize) {
+        if self.rows.len() == 1 {
+            return;
+        }
+        let epochs = self.rows.iter().map(|trainer| trainer.history().len()).max();
+        self.history.truncate(from);
+        for epoch in self.history.len()..epochs.unwrap_or(0) {
+            let at = |trainer: &Trainer| *trainer.history().get(epoch).unwrap_or(trainer.latest());
+            let records: Vec<EpochRecord> = self.rows.iter().map(at).collect();
+            self.history.push(mean_record(epoch, &records));
+        }
+    }
+
+    pub(super) fn stop(&mut self) {
+        self.rows.iter_mut().for_each(Trainer::stop);
+    }
+
+    /// Returns the reason for stopping once all trainings have ended: [`StopReason::Stopped`] if the user stopped any
+    /// before its end, otherwise that of the longest training.
+    pub fn stop_reason(&self) -> Option<StopReason> {
+        let reasons: Vec<_> = self.rows.iter().map(Trainer::stop_reason).collect::<Option<_>>()?;
+        if reasons.contains(&StopReason::Stopped) {
+            return Some(StopReason::Stopped);
+        }
+        self.longest().stop_reason()
+    }
+
+    /// Returns the first training with the most epochs.
+    fn longest(&self) -> &Trainer {
+        let mut longest = &self.rows[0];
+        for trainer in &self.rows[1..] {
+            if trainer.history().len() > longest.history().len() {
+                longest = trainer;
+            }
+        }
+        longest
+    }
+
+    pub(super) fn continue_with(&mut self, method: Method) -> Result<(), TrainingError> {
+        // Rows may differ in inputs, so all are checked before any is changed.
+        for trainer in &self.rows {
+            trainer.check_method(&method)?;
+        }
+        self.rows
+            .iter_mut()
+            .try_for_each(|trainer| trainer.continue_with(method))
+    }
+
+    pub(super) fn set_stopping(&mut self, stopping: StoppingRules) -> Result<(), SettingError> {
+        // All rows have the same rules, so either the first is refused or none.
+        self.rows
+            .iter_mut()
+            .try_for_each(|trainer| trainer.set_stopping(stopping))
+    }
+
+    pub(super) fn states(&self) -> impl Iterator<Item = TrainerState> + '_ {
+        self.rows.iter().map(Trainer::state)
+    }
+
+    /// Records of all epochs so far, beginning with the initialisation.
+    pub fn history(&self) -> &[EpochRecord] {
+        match &self.rows[..] {
+            [only] => only.history(),
+            _ => &self.history,
+        }
+    }
+
+    /// Record of the latest epoch.
+    pub fn latest(&self) -> &EpochRecord {
+        self.history()
+            .last()
+            .expect("the start is recorded when the trainer is made")
+    }
+
+    /// Epoch of the best network; of several, the latest.
+    pub fn best_epoch(&self) -> usize {
+        self.rows.iter().map(Trainer::best_epoch).max().unwrap_or(0)
+    }
+
+    /// Mean error of the best networks on the validation set, or on the training set if nothing is held out.
+    pub fn best_mse(&self) -> f64 {
+        mean(self.rows.iter().map(Trainer::best_mse))
+    }
+
+    /// Best network of each row-wire, or the one shared by all.
+    pub fn best(&self) -> impl Iterator<Item = &Mlp> {
+        self.rows.iter().map(Trainer::best)
+    }
+
+    /// Mean record of the trainings, each at its best epoch.
+    pub(super) fn best_records(&self) -> EpochRecord {
+        let best = |trainer: &Trainer| trainer.history()[trainer.best_epoch()];
+        let records: Vec<EpochRecord> = self.rows.iter().map(best).collect();
+        mean_record(self.best_epoch(), &records)
+    }
+
+    /// Methods used so far, in order.
+    pub fn stages(&self) -> &[Stage] {
+        self.longest().stages()
+    }
+
+    /// Training time summed over all rows, without pauses.
+    pub fn elapsed(&self) -> Duration {
+        let times = self.rows.iter().map(Trainer::elapsed);
+        times.fold(Duration::ZERO, Duration::saturating_add)
+    }
+
+    /// Total number of weights in all networks.
+    pub fn weights(&self) -> usize {
+        self.rows.iter().map(|trainer| trainer.present().weights().len()).sum()
+    }
+}
+
+fn mean(values: impl ExactSizeIterator<Item = f64>) -> f64 {
+    let count = values.len() as f64;
+    values.sum::<f64>() / count
+}
+
+/// Averages the errors of several records; a single record keeps its exact bits.
+fn mean_record(epoch: usize, records: &[EpochRecord]) -> EpochRecord {
+    let of = |value: fn(&EpochRecord) -> f64| mean(records.iter().map(value));
+    let of_known = |value: fn(&EpochRecord) -> Option<f64>| {
+        let values: Vec<f64> = records.iter().map(value).collect::<Option<_>>()?;
+        Some(mean(values.into_iter()))
+    };
+    EpochRecord {
+        epoch,
+        training_mse: of(|record| record.training_mse),
+        validation_mse: of_known(|record| record.validation_mse),
+        test_mse: of_known(|record| record.test_mse),
+        gradient_norm: of(|record| record.gradient_norm),
+        parameter: of(|record| record.parameter),
+        effective_parameters: of_known(|record| record.effective_parameters),
+        validation_failures: records
+            .iter()
+            .map(|record| record.validation_failures)
+            .max()
+            .unwrap_or(0),
+    }
 }

@@ -5,7 +5,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use super::line_batch::{Batch, Entry, Splitter};
+use super::line_parser::{Batch, Entry, Splitter};
 use crate::text::LONGEST_ROW;
 
 /// Lines of a source, read by a thread of their own as they come.

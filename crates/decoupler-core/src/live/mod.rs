@@ -5,23 +5,19 @@
 //! no hardware. [`ReZero`] takes the unloaded state from recent frames, and [`Recorder`] keeps frames for a replay.
 
 mod faults;
-mod latency;
 mod left_out_decoder;
-mod line_batch;
 mod line_parser;
 mod lines;
-mod median_polish;
 mod re_zero;
 mod recording;
 mod simulated;
 mod source;
 
 pub use faults::{Diagnosis, FaultCause, FaultEvent, FaultMonitor, FaultyWire};
-pub use latency::Latencies;
 pub use left_out_decoder::LeftOutDecoder;
 pub use line_parser::{LineError, LineParser, ParsedLine};
 pub use lines::{Keeping, Line, Lines, NextLine};
 pub use re_zero::{ReZero, ReZeroError, ZeroGains};
-pub use recording::{Recorder, Recording, RecordingError};
+pub use recording::{Latencies, Recorder, Recording, RecordingError};
 pub use simulated::{Motion, Simulated, SimulatedError};
 pub use source::{Source, SourceError};

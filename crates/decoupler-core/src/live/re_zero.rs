@@ -1,7 +1,7 @@
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-use super::median_polish::{Polished, median};
+use super::left_out_decoder::{Polished, median};
 use crate::scene::NoiseSource;
 
 /// Takes the unloaded state from recent frames, without erasing a contact that is held.
@@ -303,7 +303,7 @@ mod tests {
     use super::*;
     use crate::{
         dataset::{Seed, Stream},
-        scene::{Deformation, Indenter, Noise, normal::standard_normal},
+        scene::{Deformation, Indenter, Noise, standard_normal},
         sensor::SensorModel,
     };
 

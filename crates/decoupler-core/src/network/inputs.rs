@@ -6,7 +6,7 @@ use thiserror::Error;
 
 use super::{
     ChannelNoise, MinMax, Quantity, ReadingRange, ScalingError, Whitening,
-    resolution::{root_mean_square, rounding},
+    quantity::{root_mean_square, rounding},
 };
 use crate::scene::{NoiseSource, RelativeNoise};
 

@@ -1,5 +1,3 @@
-use super::exponential;
-
 /// Replaces each value by its hyperbolic tangent, within 3 units in the last place.
 ///
 /// With y = 2|x|, tanh|x| = (eʸ − 1) / (eʸ − 1 + 2), of the parts of eʸ. There are no branches, so that the loop vectorises,
@@ -18,7 +16,7 @@ fn tanh(x: f64) -> f64 {
     const SATURATED: f64 = 40.0;
     let twice = 2.0 * x.abs();
     // Written so that NaN passes through.
-    let (power, less_one) = exponential::parts(if twice > SATURATED { SATURATED } else { twice });
+    let (power, less_one) = parts(if twice > SATURATED { SATURATED } else { twice });
     let exponential_less_one = power * less_one + (power - 1.0);
     (exponential_less_one / (exponential_less_one + 2.0)).copysign(x)
 }
@@ -67,6 +65,54 @@ fn tanh_single(x: f32) -> f32 {
     let power = f32::from_bits((shifted.to_bits() << 23).wrapping_add(127 << 23));
     let exponential_less_one = power * less_one + (power - 1.0);
     (exponential_less_one / (exponential_less_one + 2.0)).copysign(x)
+}
+
+/// Returns eˣ within 2 units in the last place for x from −708 to 709; below, what it is at −708.
+#[inline(always)]
+pub(crate) fn exp(x: f64) -> f64 {
+    /// Below, powers of two are no normal numbers.
+    const LOWEST: f64 = -708.0;
+    // Written so that NaN passes through.
+    let (power, less_one) = parts(if x < LOWEST { LOWEST } else { x });
+    power * (1.0 + less_one)
+}
+
+/// Returns 2ᵏ and eʳ − 1, of which eˣ = 2ᵏ eʳ is made, for x from −708 to 709.
+///
+/// x is split into k·ln 2 + r, |r| ≤ ½ ln 2; eʳ − 1 is its Taylor polynomial of degree 13 (remainder below 1e-17). There
+/// are no branches, so that loops over it vectorise, and no fused operations, so that every machine gives the same bits.
+#[inline(always)]
+pub(super) fn parts(x: f64) -> (f64, f64) {
+    /// ln 2 in two parts; products of the first with an integer up to 2¹¹ are exact.
+    const LN2_HIGH: f64 = 6.931_471_803_691_238e-1;
+    const LN2_LOW: f64 = 1.908_214_929_270_587_7e-10;
+    /// Adding 1.5·2⁵² leaves the nearest integer in the low bits.
+    const ROUND: f64 = 6_755_399_441_055_744.0;
+    /// 1/n! from n = 13 down to 2.
+    const INVERSE_FACTORIALS: [f64; 12] = [
+        1.0 / 6_227_020_800.0,
+        1.0 / 479_001_600.0,
+        1.0 / 39_916_800.0,
+        1.0 / 3_628_800.0,
+        1.0 / 362_880.0,
+        1.0 / 40_320.0,
+        1.0 / 5_040.0,
+        1.0 / 720.0,
+        1.0 / 120.0,
+        1.0 / 24.0,
+        1.0 / 6.0,
+        1.0 / 2.0,
+    ];
+
+    let shifted = x * std::f64::consts::LOG2_E + ROUND;
+    let k = shifted - ROUND;
+    let r = (x - k * LN2_HIGH) - k * LN2_LOW;
+    let mut tail = INVERSE_FACTORIALS[0];
+    for coefficient in &INVERSE_FACTORIALS[1..] {
+        tail = tail * r + coefficient;
+    }
+    let power = f64::from_bits((shifted.to_bits() << 52).wrapping_add(1023 << 52));
+    (power, r + r * r * tail)
 }
 
 #[cfg(test)]
@@ -121,5 +167,23 @@ mod tests {
         let mut nan = [f32::NAN];
         tanh_in_place_single(&mut nan);
         assert!(nan[0].is_nan());
+    }
+
+    #[test]
+    fn agrees_with_the_standard_library_where_powers_of_two_are_normal() {
+        let arguments = (-7080..=7090).map(|i| f64::from(i) * 0.1);
+        for x in arguments.chain((0..320).flat_map(|e| [10.0_f64.powi(-e), -(10.0_f64.powi(-e))])) {
+            let (ours, theirs) = (exp(x), x.exp());
+            assert!(
+                (ours - theirs).abs() <= 2.0 * f64::EPSILON * theirs,
+                "{x}: {ours} {theirs}"
+            );
+        }
+    }
+
+    #[test]
+    fn what_is_far_below_is_next_to_nothing_and_nan_stays() {
+        assert!(exp(-1e300) < 1e-307 && exp(f64::NEG_INFINITY) < 1e-307);
+        assert!(exp(f64::NAN).is_nan());
     }
 }

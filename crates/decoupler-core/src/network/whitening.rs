@@ -178,7 +178,7 @@ impl TryFrom<Record> for Whitening {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::network::resolution::rounding;
+    use crate::network::quantity::rounding;
     use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
 
     fn correlated(samples: usize) -> Array2<f64> {

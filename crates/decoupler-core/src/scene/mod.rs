@@ -1,32 +1,27 @@
 //! The scene: rows read, movement, loading and noise. Nothing that does not vary in the scene is modelled further on.
 
-mod converter;
-mod deformation;
 mod fault;
 mod loading;
-mod movement;
 mod noise;
 mod noise_source;
-pub(crate) mod normal;
-mod relative_noise;
 mod rows;
-mod touch;
 
-pub use deformation::Deformation;
 pub use fault::{ConverterEnd, Fault, FaultError, FaultySensor};
 pub(crate) use loading::LatentRow;
 pub use loading::{Contact, DeformationSampler, Indenter, IndenterShape, Loading, Span};
-pub use movement::Movement;
-pub use noise::{Noise, NoisySets};
-pub use noise_source::NoiseSource;
-pub use relative_noise::RelativeNoise;
+pub use noise::{Noise, NoisySets, RelativeNoise};
+pub(crate) use noise::{normal_cdf, standard_normal};
+pub use noise_source::{NoiseSource, Print, Touch};
 pub use rows::{RowModel, Rows};
-pub use touch::{Print, Touch};
 
+use std::{fmt, str::FromStr};
+
+use glam::DVec3;
+use ndarray::Array2;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-use crate::sensor::{ArrayScale, Geometry, SensorModel, short};
+use crate::sensor::{ArrayScale, Axes, Geometry, SensorError, SensorModel, short};
 
 /// Rows read, movement, loading and noise of the readings. The default is the paper's.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -143,6 +138,158 @@ impl Scene {
     /// Unknowns of each row-wire of an array: what moves, and nothing else.
     pub fn unknowns_per_row(&self, scale: ArrayScale) -> usize {
         scale.nodes_per_row() * self.movement.axes().count()
+    }
+}
+
+/// Converter that digitises readings: it reads from 0 to twice the largest resistance at rest, and clips beyond.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Converter {
+    pub(super) step_ohm: f64,
+    steps: f64,
+}
+
+impl Converter {
+    /// A converter of this many bits for the readings of `model`.
+    ///
+    /// # Errors
+    /// The undeformed sensor has no resistance.
+    pub(super) fn new(bits: u8, model: &SensorModel) -> Result<Self, SensorError> {
+        let rest = vec![DVec3::ZERO; model.scale.nodes_per_row()];
+        let mut largest_ohm = 0.0_f64;
+        for row in 0..model.scale.rows() {
+            largest_ohm = model
+                .row_resistances(row, &rest)?
+                .into_iter()
+                .fold(largest_ohm, f64::max);
+        }
+        let steps = 2.0_f64.powi(i32::from(bits));
+        Ok(Self {
+            step_ohm: 2.0 * largest_ohm / steps,
+            steps,
+        })
+    }
+
+    /// The lowest and the highest reading.
+    pub(super) fn range_ohm(self) -> (f64, f64) {
+        (self.step_ohm, self.step_ohm * self.steps)
+    }
+
+    /// Rounds a reading.
+    pub(super) fn round_ohm(self, reading_ohm: f64) -> f64 {
+        self.step(reading_ohm) * self.step_ohm
+    }
+
+    /// The lowest and the highest value that it gives as `reading_ohm`. The last step is open, for it clips.
+    pub(super) fn rounded_from_ohm(self, reading_ohm: f64) -> (f64, f64) {
+        let Self { step_ohm, steps } = self;
+        let step = self.step(reading_ohm);
+        let lowest_ohm = if step > 1.0 { (step - 0.5) * step_ohm } else { 0.0 };
+        let highest_ohm = if step < steps {
+            (step + 0.5) * step_ohm
+        } else {
+            f64::INFINITY
+        };
+        (lowest_ohm, highest_ohm)
+    }
+
+    fn step(self, reading_ohm: f64) -> f64 {
+        (reading_ohm / self.step_ohm).round().clamp(1.0, self.steps)
+    }
+}
+
+/// Displacement of each upper node at one moment, in millimetres; z counts downwards.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Deformation {
+    /// Row-wires × nodes on a row-wire, in standard (row-major) layout.
+    displacement_mm: Array2<DVec3>,
+}
+
+impl Deformation {
+    /// The deformation with `displacement_mm(row, node)` at every node.
+    pub fn from_fn(scale: ArrayScale, mut displacement_mm: impl FnMut(usize, usize) -> DVec3) -> Self {
+        let shape = (scale.rows(), scale.nodes_per_row());
+        Self {
+            displacement_mm: Array2::from_shape_fn(shape, |(row, node)| displacement_mm(row, node)),
+        }
+    }
+
+    /// Displacements of the nodes of row-wire `row`, in millimetres.
+    pub fn row_mm(&self, row: usize) -> &[DVec3] {
+        let nodes = self.displacement_mm.ncols();
+        let all = self.displacement_mm.as_slice().expect("built in standard layout");
+        &all[row * nodes..(row + 1) * nodes]
+    }
+
+    /// Positions of the displaced nodes of row-wire `row`, in millimetres.
+    pub fn row_positions_mm<'a>(&'a self, model: &'a SensorModel, row: usize) -> impl Iterator<Item = DVec3> + 'a {
+        let displacements = self.row_mm(row).iter().enumerate();
+        displacements.map(move |(node, &displacement)| model.displaced_mm(row, node, displacement))
+    }
+}
+
+/// Movement of the nodes, which sets the unknowns of each of them.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+pub enum Movement {
+    /// Down only, as in the paper.
+    #[default]
+    Z,
+    /// Down, and sideways by up to `largest_shift_mm` along x and along y.
+    Xyz {
+        /// The largest shift along x, and along y, either way.
+        largest_shift_mm: f64,
+    },
+}
+
+impl fmt::Display for Movement {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(match self {
+            Self::Z => "z",
+            Self::Xyz { .. } => "xyz",
+        })
+    }
+}
+
+impl FromStr for Movement {
+    type Err = SceneError;
+
+    /// Reads `z` or `xyz`.
+    fn from_str(text: &str) -> Result<Self, SceneError> {
+        match text.trim() {
+            "z" => Ok(Self::Z),
+            "xyz" => Ok(Self::SIDEWAYS),
+            _ => Err(SceneError::AxesText(text.to_owned())),
+        }
+    }
+}
+
+impl Movement {
+    /// Sideways too, by up to a fifth of a millimetre: a tenth of the assumed node pitch.
+    pub const SIDEWAYS: Self = Self::Xyz { largest_shift_mm: 0.2 };
+
+    /// The unknown coordinates.
+    pub fn axes(self) -> Axes {
+        match self {
+            Self::Z => Axes::Z,
+            Self::Xyz { .. } => Axes::Xyz,
+        }
+    }
+
+    /// The largest shift sideways.
+    pub fn largest_shift_mm(self) -> f64 {
+        match self {
+            Self::Z => 0.0,
+            Self::Xyz { largest_shift_mm } => largest_shift_mm,
+        }
+    }
+
+    pub(super) fn check(self) -> Result<(), SceneError> {
+        match self {
+            Self::Xyz {
+                largest_shift_mm: shift,
+            } if !(shift > 0.0 && shift.is_finite()) => Err(SceneError::Shift(shift)),
+            _ => Ok(()),
+        }
     }
 }
 

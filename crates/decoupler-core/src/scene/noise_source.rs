@@ -1,6 +1,9 @@
+use std::collections::BTreeMap;
+
+use glam::{DVec2, DVec3};
 use rand::Rng;
 
-use super::{Noise, RelativeNoise, converter::Converter, normal::standard_normal};
+use super::{Converter, Deformation, Indenter, Noise, RelativeNoise, standard_normal};
 use crate::sensor::{SensorError, SensorModel};
 
 /// Noise of one sensor, ready to be drawn; none by default.
@@ -114,12 +117,49 @@ fn positive(mut draw: impl FnMut() -> f64) -> f64 {
     value
 }
 
+/// A deformation made by hand: the print of an indenter, and single nodes moved up and down.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Touch {
+    /// The indenter pressed onto the surface, if there is one.
+    pub print: Option<Print>,
+    /// Depths in millimetres of nodes moved one by one, by row-wire and node on it, from 0; they count instead of the
+    /// print's.
+    pub nodes_mm: BTreeMap<(usize, usize), f64>,
+}
+
+/// An upright indenter pressed onto one place.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Print {
+    /// The indenter; of its sizes the middle one counts.
+    pub indenter: Indenter,
+    /// Place of its middle.
+    pub place_mm: DVec2,
+    /// Depth of its middle.
+    pub depth_mm: f64,
+}
+
+impl Touch {
+    /// Deformation of an array whose nodes can travel `stroke_mm`: no node goes above its rest or below that.
+    pub fn deformation(&self, model: &SensorModel, stroke_mm: f64) -> Deformation {
+        let within = |depth_mm: f64| depth_mm.clamp(0.0, stroke_mm);
+        let print = self.print.as_ref().map(|print| {
+            let depth_mm = within(print.depth_mm);
+            print.indenter.press(model, print.place_mm, depth_mm)
+        });
+        Deformation::from_fn(model.scale, |row, node| {
+            let of_print = print.as_ref().map_or(DVec3::ZERO, |print| print.row_mm(row)[node]);
+            let moved_mm = self.nodes_mm.get(&(row, node));
+            moved_mm.map_or(of_print, |&depth_mm| DVec3::Z * within(depth_mm))
+        })
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::{
         dataset::{Seed, Stream},
-        scene::{NoisySets, normal::normal_cdf},
+        scene::{NoisySets, normal_cdf},
     };
 
     fn disturbed(noise: Noise, resistance_ohm: f64, count: usize) -> Vec<f64> {
@@ -272,5 +312,64 @@ mod tests {
             ..Noise::relative(0.1)
         };
         assert!(test_only.in_training().is_none() && !test_only.in_test().is_none());
+    }
+
+    fn model() -> SensorModel {
+        SensorModel::new("10x6_3x18".parse().unwrap())
+    }
+
+    #[test]
+    fn a_punch_presses_the_nodes_under_its_face_and_leaves_those_far_away() {
+        let model = model();
+        let middle = model.geometry.row_node_mm(model.scale, 4, 2);
+        let indenter = "indenter:flat-punch".parse::<crate::scene::Loading>().unwrap();
+        let crate::scene::Loading::Indenter(indenter) = indenter else {
+            panic!("an indenter")
+        };
+        let touch = Touch {
+            print: Some(Print {
+                indenter,
+                place_mm: middle.truncate(),
+                depth_mm: 0.6,
+            }),
+            ..Touch::default()
+        };
+        let pressed = touch.deformation(&model, 1.0);
+        assert_eq!(pressed.row_mm(4)[2], DVec3::new(0.0, 0.0, 0.6));
+        // The face of middle size, 4 mm in radius, covers the neighbours 2 mm away.
+        assert_eq!(pressed.row_mm(4)[3].z, 0.6);
+        assert!(pressed.row_mm(9)[5].z < 0.6 * 0.5);
+    }
+
+    #[test]
+    fn nothing_leaves_the_limits_of_the_scene() {
+        let model = model();
+        let deep = |depth_mm| Touch {
+            print: Some(Print {
+                indenter: Indenter::default(),
+                place_mm: DVec2::new(12.0, 9.0),
+                depth_mm,
+            }),
+            nodes_mm: [((0, 0), 7.0), ((1, 1), -7.0), ((2, 2), 0.25)].into(),
+        };
+        for depth_mm in [-3.0, 0.0, 0.4, 99.0] {
+            let pressed = deep(depth_mm).deformation(&model, 0.5);
+            for row in 0..10 {
+                assert!(pressed.row_mm(row).iter().all(|u| (0.0..=0.5).contains(&u.z)));
+            }
+            let [low, high, free] = [(0, 0), (1, 1), (2, 2)].map(|(row, node)| pressed.row_mm(row)[node].z);
+            assert_eq!(
+                [low, high, free],
+                [0.5, 0.0, 0.25],
+                "moved nodes stay where they were put"
+            );
+        }
+        assert!(
+            Touch::default()
+                .deformation(&model, 1.0)
+                .row_mm(3)
+                .iter()
+                .all(|u| *u == DVec3::ZERO)
+        );
     }
 }

@@ -2,29 +2,21 @@
 //! are [`DVec3`], the double-precision vector of the crate `glam`.
 
 mod array_scale;
-mod axes;
 mod calibration;
 mod conductance;
 mod fixed_point;
 mod geometry;
 mod identifiability;
-mod partial_sum;
 mod reciprocal_distances;
-mod reciprocal_root;
-mod relative_noise;
 mod resistance;
-mod short_number;
 
 pub use array_scale::{ArrayScale, ArrayScaleError, LARGEST_COUNT};
-pub use axes::Axes;
 pub use calibration::{
     CalibratedParameter, Calibration, CalibrationError, CalibrationWarning, ParameterStatus, PressLimits, PressedRow,
     SensorParameter,
 };
 pub use conductance::RowConductance;
-pub use geometry::{Geometry, GeometryError};
+pub use geometry::{Axes, Geometry, GeometryError};
 pub use glam::DVec3;
 pub use identifiability::{Identifiability, IdentifiabilityError, IdentifiabilityWarning, RowPair};
-pub use relative_noise::RelativeNoise;
-pub use resistance::{DEFAULT_RESISTIVITY_OHM_PER_MM, SensorError, SensorModel};
-pub use short_number::short;
+pub use resistance::{DEFAULT_RESISTIVITY_OHM_PER_MM, RelativeNoise, SensorError, SensorModel, short};

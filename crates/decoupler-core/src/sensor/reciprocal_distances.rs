@@ -5,9 +5,9 @@ use pulp::{Simd, WithSimd};
 
 use super::{
     ArrayScale, Geometry,
+    conductance::ReciprocalRoot,
     fixed_point::{Parts, two_sum},
     geometry::Differences,
-    reciprocal_root::ReciprocalRoot,
 };
 
 /// Columns per block, whose sums stay in registers. The padding of the last block is discarded.

@@ -4,8 +4,7 @@ use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use super::{
-    ArrayScale, Geometry, GeometryError, reciprocal_distances::sum_reciprocal_distances, reciprocal_root::Divided,
-    short,
+    ArrayScale, Geometry, GeometryError, conductance::Divided, reciprocal_distances::sum_reciprocal_distances,
 };
 
 /// Default resistance per millimetre of rubber. The paper gives none: g scales every
@@ -162,6 +161,42 @@ impl SensorModel {
     }
 }
 
+/// Noise of a reading relative to the reading, from all sources of a scene.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct RelativeNoise {
+    /// Standard deviation of each reading's own error.
+    pub own: f64,
+    /// Standard deviation of the error common to all readings of a snapshot.
+    pub common: f64,
+}
+
+impl RelativeNoise {
+    /// Standard deviation of a reading's whole error.
+    pub fn total(self) -> f64 {
+        libm::hypot(self.own, self.common)
+    }
+
+    /// Factor on the part that `readings` have in common, by which readings with a common error count as if each had its own
+    /// alone: own / √(own² + readings · common²), from the eigenvalues of the covariance own² I + common² 1 1ᵀ. Exact
+    /// readings have the rounding of double precision as their own error.
+    pub(super) fn weight_of_mean(self, readings: usize) -> f64 {
+        if self.common == 0.0 {
+            return 1.0;
+        }
+        let own = self.own.max(f64::EPSILON);
+        own / libm::hypot(own, self.common * (readings as f64).sqrt())
+    }
+}
+
+/// A number of any size in a few characters, for messages: `0.5`, `-5`, `1e300`.
+pub fn short(value: f64) -> String {
+    if value == 0.0 || (1e-4..1e6).contains(&value.abs()) {
+        format!("{value}")
+    } else {
+        format!("{value:e}")
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -200,5 +235,23 @@ mod tests {
         let near = DVec3::new(0.0, 0.0, model.geometry.height_mm * (1.0 - 1e-15));
         assert!(model.row_resistances(0, &[near]).is_ok());
         assert!(model.row_resistances(0, &[DVec3::NAN]).is_err());
+    }
+
+    #[test]
+    fn no_number_takes_three_hundred_digits() {
+        let cases = [
+            (0.0, "0"),
+            (-5.0, "-5"),
+            (0.25, "0.25"),
+            (1e6, "1e6"),
+            (-1e300, "-1e300"),
+            (2.5e-300, "2.5e-300"),
+            (f64::NAN, "NaN"),
+            (f64::INFINITY, "inf"),
+        ];
+        for (value, text) in cases {
+            assert_eq!(short(value), text);
+        }
+        assert!(short(f64::MAX).len() < 25 && short(-f64::MIN_POSITIVE).len() < 25);
     }
 }

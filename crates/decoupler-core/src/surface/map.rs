@@ -1,15 +1,17 @@
 //! Interpolation from the values at the nodes to a surface.
+//!
+//! Errors in the coordinates of the nodes.
 
 use std::{fmt, ops::RangeInclusive};
 
 use ndarray::Array2;
 
-use super::bilinear::Bilinear;
-use super::error::{Axis, SurfaceError};
-use super::grid::{Grid, GridAxis, SortedAxis};
-use super::scattered::Scattered;
-use super::weights::{Point, Weights};
-use super::{natural_cubic, thin_plate};
+use super::{
+    bilinear::{self, Bilinear},
+    grid::{Grid, GridAxis, Point, SortedAxis, Weights},
+    scattered::Scattered,
+    thin_plate,
+};
 
 /// Largest number of nodes for a spline; beyond it, factorisation and matrix cost more than they show.
 const MAX_SPLINE_NODES: usize = 1000;
@@ -218,7 +220,7 @@ fn grid(x: &SortedAxis, y: &SortedAxis, target: usize) -> Grid {
 
 /// The spline through the nodes on one line, at the grid points along it.
 fn along(nodes_mm: &[f64], sorted: &SortedAxis, points_mm: &[f64], inside: RangeInclusive<usize>) -> Option<Weights> {
-    let of_sorted = natural_cubic::weights(&sorted.nodes_mm, points_mm);
+    let of_sorted = bilinear::weights(&sorted.nodes_mm, points_mm);
     let mut weights = Array2::zeros(of_sorted.dim());
     for (column, &node) in of_sorted.columns().into_iter().zip(&sorted.order) {
         weights.column_mut(node).assign(&column);
@@ -250,4 +252,80 @@ fn surface(x_mm: &[f64], y_mm: &[f64], grid: &Grid) -> Option<Weights> {
 
 fn node_at(nodes_mm: &[f64], point_mm: f64) -> Option<usize> {
     nodes_mm.iter().position(|&node_mm| node_mm == point_mm)
+}
+
+/// Axis of the coordinates at fault.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Axis {
+    /// The x axis, in a lattice with one coordinate per row-wire.
+    X,
+    /// The y axis, in a lattice with one coordinate per node of a row.
+    Y,
+}
+
+impl fmt::Display for Axis {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter.write_str(match self {
+            Self::X => "x",
+            Self::Y => "y",
+        })
+    }
+}
+
+/// Error in the coordinates of the nodes.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum SurfaceError {
+    /// An axis has no coordinates.
+    #[error("a surface needs at least one {axis} coordinate, and none was given")]
+    NoNodes {
+        /// The empty axis.
+        axis: Axis,
+    },
+    /// A coordinate is NaN, infinite, or so large that distances would overflow.
+    #[error("{axis} coordinate {index} is {value_mm:?} mm; nodes need finite places within ±1e300 mm")]
+    NotFinite {
+        /// Axis at fault.
+        axis: Axis,
+        /// Index in the coordinates given.
+        index: usize,
+        /// Value found, in millimetres.
+        value_mm: f64,
+    },
+    /// Two coordinates coincide, where the surface would have two heights, or are too close to draw points between.
+    #[error("{axis} coordinates {first} and {second} coincide at {value_mm:?} mm; nodes need places of their own")]
+    Duplicate {
+        /// Axis at fault.
+        axis: Axis,
+        /// Index of the first in the coordinates given.
+        first: usize,
+        /// Index of the second.
+        second: usize,
+        /// Coordinate that they share, in millimetres.
+        value_mm: f64,
+    },
+    /// Two scattered nodes coincide, where the surface would have two heights.
+    #[error("nodes {first} and {second} coincide; nodes need places of their own")]
+    SamePlace {
+        /// Index of the first in the places given.
+        first: usize,
+        /// Index of the second.
+        second: usize,
+    },
+    /// Scattered nodes are on one line.
+    #[error("all nodes are on one line, oblique to x and y; a surface needs nodes on both sides of it")]
+    OnOneLine,
+    /// Scattered nodes are too many for a spline.
+    #[error(
+        "{count} scattered nodes are too many; a surface is laid through at most {most}, or through a lattice of any size"
+    )]
+    TooMany {
+        /// Number of nodes.
+        count: usize,
+        /// Largest number.
+        most: usize,
+    },
+    /// Scattered nodes of which some are much nearer to each other than to the rest.
+    #[error("a surface through the nodes would overshoot a thousandfold; leave out one of those that nearly coincide")]
+    Uneven,
 }

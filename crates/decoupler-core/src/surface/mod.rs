@@ -6,16 +6,10 @@
 //! reproduce constants and planes, and none depends on the unit of length or the origin. [`Lattice`] finds the lines of a lattice among places in any order.
 
 mod bilinear;
-mod error;
 mod grid;
-mod lattice;
 mod map;
-mod natural_cubic;
 mod scattered;
 mod thin_plate;
-mod weights;
 
-pub use error::{Axis, SurfaceError};
-pub use grid::Grid;
-pub use lattice::Lattice;
-pub use map::{Interpolation, SurfaceMap};
+pub use grid::{Grid, Lattice};
+pub use map::{Axis, Interpolation, SurfaceError, SurfaceMap};

@@ -5,10 +5,11 @@
 
 use glam::DVec2;
 
-use super::error::{Axis, SurfaceError};
-use super::grid::{CLOSEST_RELATIVE, Grid, GridAxis, check_coordinates};
-use super::thin_plate;
-use super::weights::{Point, Weights};
+use super::{
+    grid::{CLOSEST_RELATIVE, Grid, GridAxis, Point, Weights, check_coordinates},
+    map::{Axis, SurfaceError},
+    thin_plate,
+};
 
 /// Places this near to one line, as a part of their extent along it, are on it.
 const THINNEST: f64 = 1e-6;

@@ -1,3 +1,5 @@
+use std::io::{self, ErrorKind};
+
 use serde::{Deserialize, Deserializer};
 
 /// Returns a name from a file without what is no letter of it: control characters, with which a name could drive a terminal
@@ -46,6 +48,47 @@ pub(crate) fn cleaned_if_any<'de, D: Deserializer<'de>>(deserializer: D) -> Resu
     Ok(Option::<String>::deserialize(deserializer)?.map(|name| clean_name(&name)))
 }
 
+/// Says in plain words why the operating system refused a file, and what to do about it.
+pub fn system_cause(error: &io::Error) -> String {
+    let words = match error.kind() {
+        ErrorKind::NotFound => "there is no such file or folder; check the name",
+        ErrorKind::PermissionDenied => {
+            "permission denied; change the permissions of the file and its folder, or give another place"
+        }
+        ErrorKind::IsADirectory => "it is a folder; give the name of a file",
+        ErrorKind::NotADirectory => "a part of the path is a file, not a folder; correct the path",
+        ErrorKind::AlreadyExists => "there is a file of this name already; remove it, or give another name",
+        ErrorKind::StorageFull => "the disk is full; free some space, or give a place on another disk",
+        ErrorKind::QuotaExceeded => "your share of the disk is used up; free some space, or give another place",
+        // Beyond a limit of our own.
+        ErrorKind::FileTooLarge if error.get_ref().is_some() => return error.to_string(),
+        ErrorKind::FileTooLarge => "the file is too large for this disk; give a place on another disk",
+        ErrorKind::ReadOnlyFilesystem => "the disk is read-only; give a place on another disk",
+        ErrorKind::InvalidFilename => {
+            "the name is too long, or has characters that the disk does not allow; give another"
+        }
+        ErrorKind::ResourceBusy | ErrorKind::ExecutableFileBusy => {
+            "another program is using it; close that program, or wait, and try again"
+        }
+        ErrorKind::BrokenPipe => "the program that reads it has ended; start both again",
+        ErrorKind::OutOfMemory => "memory is full; close other programs, or use less data",
+        ErrorKind::InvalidData => "it is not text that can be read; check that it is the right file",
+        _ => return with_cure(error),
+    };
+    words.to_owned()
+}
+
+/// The system's own words, without its number, for what happens rarely.
+fn with_cure(error: &io::Error) -> String {
+    let text = error.to_string();
+    let words = text.split(" (os error").next().unwrap_or(&text);
+    if error.raw_os_error().is_some() {
+        format!("the system reports: {words}; check the disk or device, or give another place")
+    } else {
+        words.to_owned()
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -85,5 +128,17 @@ mod tests {
             assert_eq!(inert(text) != text, is_changed, "{text}");
             assert_eq!(clean_name(&inert(text)), text);
         }
+    }
+
+    #[test]
+    fn every_refusal_is_said_in_words_with_a_cure() {
+        // Linux numbers: no entry, permission, exists, not a folder, is a folder, too large, full, read-only, input/output,
+        // too many open files, name too long, loop of links.
+        for number in [2, 13, 17, 20, 21, 27, 28, 30, 5, 24, 36, 40] {
+            let text = system_cause(&io::Error::from_raw_os_error(number));
+            assert!(!text.contains("os error") && text.contains(';'), "{number}: {text}");
+        }
+        let own = io::Error::other("the archive is empty; choose another");
+        assert_eq!(system_cause(&own), "the archive is empty; choose another");
     }
 }

@@ -1,4 +1,4 @@
-use std::time::Duration;
+use std::{fmt, time::Duration};
 
 /// Text in place of a missing number.
 const NO_NUMBER: &str = "–";
@@ -70,6 +70,12 @@ pub fn capitalised(text: &str) -> String {
     let mut letters = text.chars();
     let first = letters.next().into_iter().flat_map(char::to_uppercase);
     first.chain(letters).collect()
+}
+
+/// `1 sample`, `2 samples`.
+pub fn counted<N: fmt::Display + PartialEq + From<u8>>(count: N, noun: &str) -> String {
+    let is_one = count == N::from(1);
+    format!("{count} {noun}{}", if is_one { "" } else { "s" })
 }
 
 #[cfg(test)]

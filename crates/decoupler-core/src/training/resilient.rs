@@ -4,8 +4,8 @@ use serde::{Deserialize, Serialize};
 
 use super::{
     Evaluation, Examples, SettingError, StopReason,
-    algorithm::{Algorithm, Checked, Description},
     backpropagation::Backpropagation,
+    method::{Algorithm, Checked, Description},
     setting::{check_limit, settings},
 };
 use crate::network::Mlp;

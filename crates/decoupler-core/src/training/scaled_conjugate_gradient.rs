@@ -4,8 +4,8 @@ use serde::{Deserialize, Serialize};
 
 use super::{
     Evaluation, Examples, StopReason,
-    algorithm::{Algorithm, Checked, Description},
     backpropagation::Backpropagation,
+    method::{Algorithm, Checked, Description},
     setting::settings,
 };
 use crate::network::Mlp;

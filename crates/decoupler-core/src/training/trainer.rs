@@ -1,4 +1,12 @@
 //! A training in progress, stepped one epoch at a time.
+//!
+//! The stages of a training, each under one method.
+//!
+//! The record of one epoch.
+//!
+//! Error and gradient at the current weights.
+//!
+//! Correlation of the errors of neighbouring samples.
 
 use std::time::{Duration, Instant};
 
@@ -6,8 +14,8 @@ use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use super::{
-    EpochRecord, Evaluation, Examples, MachineMemory, Method, SettingError, Stage, StopReason, StoppingRules,
-    activations::Activations, method::Running,
+    Examples, MachineMemory, Method, SettingError, StopReason, StoppingRules, activations::Activations,
+    examples::column, method::Running,
 };
 use crate::network::{Mlp, Shape};
 
@@ -311,9 +319,98 @@ impl Trainer {
     }
 }
 
+/// The epochs of a training under one method; [`super::Trainer::continue_with`] begins the next stage.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Stage {
+    /// The first epoch under this method; 0 for the first stage.
+    pub first_epoch: usize,
+    /// The method and its settings.
+    pub method: Method,
+}
+
+/// Errors and state of the training after one epoch; epoch 0 is the start. Errors are mean squared errors in scaled units.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct EpochRecord {
+    /// Number of the epoch; 0 is the start.
+    pub epoch: usize,
+    /// Error on the training set.
+    pub training_mse: f64,
+    /// Error on the validation set, if there is one.
+    pub validation_mse: Option<f64>,
+    /// Error on the test set, if there is one. It is only displayed.
+    pub test_mse: Option<f64>,
+    /// Euclidean norm of the gradient of the training error, including the penalty on the weights where the method
+    /// regularises.
+    pub gradient_norm: f64,
+    /// The damping mu, or the learning rate, after this epoch: [`super::Method::parameter_name`].
+    pub parameter: f64,
+    /// Number of weights that the data determine, where the method estimates it.
+    #[serde(default)]
+    pub effective_parameters: Option<f64>,
+    /// Number of epochs at which the validation error was above its best, since the last new best or since the current
+    /// method began.
+    pub validation_failures: usize,
+}
+
+/// Error and gradient at the weights that a method has just reached.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Evaluation {
+    /// Mean squared error over samples and outputs, in scaled units.
+    pub mse: f64,
+    /// Euclidean norm of the gradient of the objective: of [`Self::mse`], plus the penalty on the weights where the method
+    /// regularises.
+    pub gradient_norm: f64,
+}
+
+impl Evaluation {
+    /// Returns the evaluation if it consists of finite numbers.
+    ///
+    /// # Errors
+    /// [`StopReason::Diverged`] if it does not.
+    pub(super) fn if_finite(self) -> Result<Self, StopReason> {
+        if self.mse.is_finite() && self.gradient_norm.is_finite() {
+            Ok(self)
+        } else {
+            Err(StopReason::Diverged)
+        }
+    }
+}
+
+/// Number of consecutive samples whose errors tell as much as one independent error: the integrated autocorrelation time
+/// 1 + 2 Σ ρ(k) of the errors of `mlp`, over all outputs together, up to the first lag without positive correlation, at most
+/// `lags` (Sokal 1997, doi:10.1007/978-1-4899-0319-8_6). 1 for independent errors.
+pub(super) fn correlation_time(mlp: &Mlp, examples: &Examples, lags: usize) -> f64 {
+    let mut outputs = vec![Vec::new(); examples.outputs()];
+    let mut activations = Activations::new(mlp.shape());
+    // Samples that are drawn again are independent, and their errors need not be held either.
+    for block in examples.held() {
+        activations.forward(mlp, block);
+        for (index, errors) in outputs.iter_mut().enumerate() {
+            errors.extend_from_slice(&column(activations.errors.as_ref(), index)[..block.samples()]);
+        }
+    }
+    let products = |lag: usize| -> f64 {
+        let of_output = |errors: &Vec<f64>| {
+            let pairs = errors.iter().zip(errors.get(lag..).unwrap_or_default());
+            pairs.map(|(one, other)| one * other).sum::<f64>()
+        };
+        outputs.iter().map(of_output).sum()
+    };
+    let squares = products(0);
+    let correlations = (1..=lags).map(|lag| products(lag) / squares);
+    // False for NaN, as where there are no errors.
+    1.0 + 2.0 * correlations.take_while(|correlation| *correlation > 0.0).sum::<f64>()
+}
+
 #[cfg(test)]
 mod tests {
+    use ndarray::Array2;
+    use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
+
     use super::*;
+    use crate::network::Shape;
 
     #[test]
     fn trainings_at_once_share_the_memory() {
@@ -329,5 +426,35 @@ mod tests {
             refused.contains("of 1000000000 trainings at once would take"),
             "{refused}"
         );
+    }
+
+    /// A network that answers 0, and targets that follow an autoregression of the first order.
+    fn time(memory: f64, lags: usize) -> f64 {
+        let mut rng = ChaCha8Rng::seed_from_u64(7);
+        let mut value = [0.0; 2];
+        let targets = Array2::from_shape_fn((20_000, 2), |(_, output)| {
+            value[output] = memory * value[output] + rng.random_range(-1.0..1.0);
+            value[output]
+        });
+        let shape = Shape {
+            inputs: 1,
+            hidden: 1,
+            outputs: 2,
+        };
+        let mlp = Mlp::from_weights(shape, vec![0.0; shape.weights()]);
+        let examples = Examples::new(Array2::zeros((20_000, 1)).view(), targets.view());
+        correlation_time(&mlp, &examples, lags)
+    }
+
+    /// The integrated autocorrelation time of an autoregression of memory ρ is (1 + ρ)/(1 − ρ).
+    #[test]
+    fn it_is_that_of_the_theory() {
+        for memory in [0.0, 0.5, 0.8_f64] {
+            let expected = (1.0 + memory) / (1.0 - memory);
+            let found = time(memory, 100);
+            assert!((found / expected - 1.0).abs() < 0.1, "{memory}: {found}, {expected}");
+        }
+        assert_eq!(time(0.8, 0), 1.0);
+        assert!(time(0.8, 1) < 2.7);
     }
 }

@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{
     Damping, Evaluation, Examples, FactoredEquations, SettingError, StopReason,
-    algorithm::{Algorithm, Checked, Description, add_step},
+    method::{Algorithm, Checked, Description, add_step},
 };
 use crate::network::{Mlp, Shape};
 

@@ -1,20 +1,20 @@
 //! Trained networks prepared to decode fast: scalings folded into the weights, layers padded to vector registers.
 
 mod folded_network;
-pub(super) mod padded_layer;
-mod real;
 
 use ndarray::{Array1, Array2, Axis, Slice};
 use pulp::{Simd, WithSimd};
 
-use self::{folded_network::FoldedNetwork, padded_layer::affine};
+use self::folded_network::FoldedNetwork;
 use super::{AffineLayer, DecodeError, Decoder, Description, Layer, LayeredMap, NotDescribed};
 use crate::{
     dataset::PerRow,
     network::{DecouplingNetwork, Networks},
 };
+use folded_network::affine;
 
-pub use real::Real;
+pub(super) use folded_network::PaddedLayer;
+pub use folded_network::Real;
 
 /// Networks prepared to decode frames fast and without allocation, in double or single precision: the scalings are
 /// folded into the weights, and layers are padded to whole vector registers.

@@ -1,11 +1,9 @@
 //! Decoders that solve the equations of the sensor.
 
 mod newton;
-mod plain_first;
 mod polished;
 mod posterior;
 mod row_search;
-mod row_twins;
 #[cfg(test)]
 mod tests;
 

@@ -1,9 +1,8 @@
 use rand::Rng;
 
 use super::{
-    plain_first::PlainFirst,
-    row_search::EXPLAINED,
-    row_twins::{RowTwins, rest_of_searched},
+    newton::PlainFirst,
+    row_search::{EXPLAINED, RowTwins, rest_of_searched},
 };
 use crate::{
     decoupling::{

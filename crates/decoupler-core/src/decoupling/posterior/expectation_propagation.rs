@@ -1,11 +1,9 @@
 use pulp::{Simd, WithSimd};
 
 use super::{
-    gaussian::{Direction, Gaussians},
-    linear_model::LinearModel,
-    marginal::Marginal,
+    gaussian::{Direction, Gaussians, LinearModel},
     pack::{LANES, Pack},
-    site::Site,
+    truncated::{Marginal, Site},
 };
 
 /// The marginals of all unknowns.

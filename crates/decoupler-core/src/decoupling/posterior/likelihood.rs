@@ -1,11 +1,11 @@
 use super::{
-    evidence::log_probability,
-    linear_model::{LinearModel, RoundedReading},
-    marginal::Marginal,
+    gaussian::{LinearModel, RoundedReading},
+    iteration::log_probability,
+    truncated::Marginal,
 };
 use crate::{
     decoupling::row_problem::{Range, RowProblem},
-    scene::{NoiseSource, normal::normal_cdf},
+    scene::{NoiseSource, normal_cdf},
 };
 
 /// The likelihood of the readings of one row-wire, linearised.

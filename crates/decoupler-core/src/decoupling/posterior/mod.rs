@@ -1,28 +1,23 @@
 //! The posterior of a row-wire's deformation given its readings, the noise and the prior of a scene.
 
-mod evidence;
 mod expectation_propagation;
 mod factor;
 mod gaussian;
 mod iteration;
 mod likelihood;
-mod limit;
-mod linear_model;
-mod linearised;
-mod marginal;
-mod mixture;
 mod pack;
-mod products;
-mod report;
 mod row_prior;
 mod sampled;
-mod site;
 mod truncated;
 
-pub use report::PosteriorReport;
 pub(crate) use sampled::SampledPosterior;
 
+use expectation_propagation::{Propagation, TOLERANCE};
+use gaussian::{LinearModel, Point};
+use likelihood::Likelihood;
+use pack::LANES;
 use rand::Rng;
+use row_prior::RowPrior;
 
 use super::{
     DecodeError,
@@ -32,9 +27,6 @@ use crate::{
     scene::Scene,
     sensor::{SensorError, SensorModel},
 };
-use expectation_propagation::Propagation;
-use likelihood::Likelihood;
-use row_prior::RowPrior;
 
 /// Newton's method with noise and prior: iterates the posterior of the linearised equations, cut to the range of every
 /// unknown, and answers with its median, the answer of the least expected distance.
@@ -186,6 +178,99 @@ impl Posterior {
             DecodeError::check(readings).map_err(|error| DecodeError { row_index, ..error })?;
         }
         Ok(())
+    }
+}
+
+/// Result of a row's posterior.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PosteriorReport {
+    /// Linearisations.
+    pub steps: usize,
+    /// Rounds of expectation propagation over all unknowns, in all linearisations.
+    pub rounds: usize,
+    /// rms over readings of the relative misfit m/(γR) − 1 at the answer, with the gain γ of [`Self::drift`].
+    pub residual: f64,
+    /// Mean of the gain error of the snapshot, in standard deviations of the scene's drift; 0 without drift.
+    pub drift: f64,
+    /// rms over unknowns of the posterior standard deviation.
+    pub spread_mm: f64,
+    /// True if no unknown has a posterior standard deviation above
+    /// [`LARGEST_ERROR`](crate::decoupling::LARGEST_ERROR) of its range.
+    pub determined: bool,
+    /// True if the answer can be relied on: expectation propagation converged in a last linearisation that was as good as
+    /// the readings.
+    pub converged: bool,
+}
+
+impl Posterior {
+    /// Computes the medians of the posterior linearised at the true deformation of the row whose nodes are at `truth_mm`
+    /// (3·M2), given noisy readings of it: the answer of a decoder that knows where to linearise. Writes absolute
+    /// coordinates (3·M2) and returns true; or writes the truth and returns false if the posterior did not converge.
+    ///
+    /// # Panics
+    /// If `row` is none of the rows given.
+    pub fn limit(&mut self, row: usize, readings_ohm: &[f64], truth_mm: &[f64], coordinates_mm: &mut [f64]) -> bool {
+        self.limits(&[row], readings_ohm, truth_mm, coordinates_mm)
+    }
+
+    /// As [`Self::limit`], several rows side by side (rows × M4 readings, rows × 3·M2 coordinates). Returns `true` if all
+    /// posteriors converged.
+    ///
+    /// # Panics
+    /// If one of `rows` is none of the rows given.
+    pub(crate) fn limits(
+        &mut self,
+        rows: &[usize],
+        readings_ohm: &[f64],
+        truths_mm: &[f64],
+        coordinates_mm: &mut [f64],
+    ) -> bool {
+        let (channels, outputs) = (self.problem.equations(), self.problem.coordinates());
+        coordinates_mm.copy_from_slice(truths_mm);
+        let mut all_converged = true;
+        let chunks = rows
+            .chunks(LANES)
+            .zip(readings_ohm.chunks(LANES * channels))
+            .zip(coordinates_mm.chunks_mut(LANES * outputs));
+        for ((rows, readings_ohm), coordinates_mm) in chunks {
+            let mut lanes = [const { None }; LANES];
+            let mut models = [const { None }; LANES];
+            for (lane, &row) in rows.iter().enumerate() {
+                let mut truth = Point {
+                    displacements_mm: vec![0.0; self.ranges.len()],
+                    drift: 0.0,
+                };
+                self.problem.read(row, &readings_ohm[lane * channels..][..channels]);
+                self.problem.unknowns_of(
+                    &coordinates_mm[lane * outputs..][..outputs],
+                    &mut truth.displacements_mm,
+                );
+                self.problem.evaluate(&truth.displacements_mm);
+                if self.likelihood.has_drift() {
+                    truth.drift = self.likelihood.likeliest_drift(&self.problem);
+                }
+                let model = models[lane].insert(LinearModel::default());
+                self.linearise(model, row, (&truth, 1.0), None);
+                model.tolerance = TOLERANCE;
+                lanes[lane] = Some((row, truth));
+            }
+            let found = self.propagation.marginals(&models);
+            let lanes = lanes.into_iter().zip(&models).zip(found);
+            for (((lane, model), marginals), coordinates_mm) in lanes.zip(coordinates_mm.chunks_exact_mut(outputs)) {
+                let (Some((row, truth)), Some(model)) = (lane, model) else {
+                    continue;
+                };
+                match marginals.filter(|marginals| marginals.converged) {
+                    Some(marginals) => {
+                        let found = self.linearised(model, &truth, 1.0, marginals);
+                        self.problem.turn_to(row);
+                        self.problem.coordinates_of(&self.medians_mm(&found), coordinates_mm);
+                    }
+                    None => all_converged = false,
+                }
+            }
+        }
+        all_converged
     }
 }
 

@@ -1,3 +1,5 @@
+//! Sums and products of vectors of packs, in blocks whose additions need not wait for each other.
+
 use std::ops::{Add, AddAssign, Div, DivAssign, Mul, MulAssign, Neg, Sub, SubAssign};
 
 /// Rows side by side.
@@ -188,9 +190,90 @@ impl Neg for Pack {
     }
 }
 
+/// Entries of a block.
+const STRANDS: usize = 4;
+
+/// Sum of the products.
+#[inline(always)]
+pub(super) fn dot(a: &[Pack], b: &[Pack]) -> Pack {
+    let ((blocks_a, rest_a), (blocks_b, rest_b)) = (a.as_chunks::<STRANDS>(), b.as_chunks::<STRANDS>());
+    let mut sums = [Pack::ZERO; STRANDS];
+    for (a, b) in blocks_a.iter().zip(blocks_b) {
+        for strand in 0..STRANDS {
+            sums[strand] += a[strand] * b[strand];
+        }
+    }
+    for (strand, sum) in sums.iter_mut().enumerate().take(STRANDS - 1) {
+        if let (Some(&a), Some(&b)) = (rest_a.get(strand), rest_b.get(strand)) {
+            *sum += a * b;
+        }
+    }
+    (sums[0] + sums[1]) + (sums[2] + sums[3])
+}
+
+/// Sums of the products of two vectors with a third.
+#[inline(always)]
+pub(super) fn dots([a, b]: [&[Pack]; 2], c: &[Pack]) -> [Pack; 2] {
+    const STRANDS: usize = 2;
+    let (blocks_a, rest_a) = a.as_chunks::<STRANDS>();
+    let (blocks_b, rest_b) = b.as_chunks::<STRANDS>();
+    let (blocks_c, rest_c) = c.as_chunks::<STRANDS>();
+    let mut sums = [[Pack::ZERO; STRANDS]; 2];
+    for ((a, b), c) in blocks_a.iter().zip(blocks_b).zip(blocks_c) {
+        for strand in 0..STRANDS {
+            sums[0][strand] += a[strand] * c[strand];
+            sums[1][strand] += b[strand] * c[strand];
+        }
+    }
+    if let ([a], [b], [c]) = (rest_a, rest_b, rest_c) {
+        sums[0][0] += *a * *c;
+        sums[1][0] += *b * *c;
+    }
+    [sums[0][0] + sums[0][1], sums[1][0] + sums[1][1]]
+}
+
+/// Adds a factor times `from` to each of two vectors.
+#[inline(always)]
+pub(super) fn add_to_both([a, b]: [&mut [Pack]; 2], factors: [Pack; 2], from: &[Pack]) {
+    const STRANDS: usize = 2;
+    let (blocks_a, rest_a) = a.as_chunks_mut::<STRANDS>();
+    let (blocks_b, rest_b) = b.as_chunks_mut::<STRANDS>();
+    let (blocks_from, rest_from) = from.as_chunks::<STRANDS>();
+    for ((a, b), from) in blocks_a.iter_mut().zip(blocks_b).zip(blocks_from) {
+        for strand in 0..STRANDS {
+            a[strand] += factors[0] * from[strand];
+            b[strand] += factors[1] * from[strand];
+        }
+    }
+    if let ([a], [b], [from]) = (rest_a, rest_b, rest_from) {
+        *a += factors[0] * *from;
+        *b += factors[1] * *from;
+    }
+}
+
+/// Adds `factor` times `from`; returns the sum of the squares of what comes out.
+#[inline(always)]
+pub(super) fn add(to: &mut [Pack], factor: Pack, from: &[Pack]) -> Pack {
+    let ((blocks_to, rest_to), (blocks_from, rest_from)) = (to.as_chunks_mut::<STRANDS>(), from.as_chunks::<STRANDS>());
+    let mut sums = [Pack::ZERO; STRANDS];
+    for (to, from) in blocks_to.iter_mut().zip(blocks_from) {
+        for strand in 0..STRANDS {
+            to[strand] += factor * from[strand];
+            sums[strand] += to[strand] * to[strand];
+        }
+    }
+    for (strand, sum) in sums.iter_mut().enumerate().take(STRANDS - 1) {
+        if let (Some(to), Some(&from)) = (rest_to.get_mut(strand), rest_from.get(strand)) {
+            *to += factor * from;
+            *sum += *to * *to;
+        }
+    }
+    (sums[0] + sums[1]) + (sums[2] + sums[3])
+}
+
 #[cfg(test)]
 mod tests {
-    use super::*;
+    use super::{LANES, *};
 
     #[test]
     fn small_exponentials_agree_with_the_standard_library() {
@@ -226,5 +309,46 @@ mod tests {
         let negated = [(2.0, 3.0), (2.0, -3.0), (2.0, 0.0)]
             .map(|(a, b)| Pack::splat(a).negated_where_positive(Pack::splat(b)).get(0));
         assert_eq!(negated, [-2.0, 2.0, 2.0]);
+    }
+
+    fn pack(value: impl Fn(usize) -> f64) -> Pack {
+        let mut pack = Pack::ZERO;
+        (0..LANES).for_each(|lane| pack.set(lane, value(lane)));
+        pack
+    }
+
+    fn values(pack: Pack) -> Vec<f64> {
+        (0..LANES).map(|lane| pack.get(lane)).collect()
+    }
+
+    /// Integers, whose sums are exact in any order.
+    #[test]
+    fn products_and_sums_are_those_of_every_lane_for_any_length() {
+        for length in 0..=11 {
+            let vector = |seed: usize| -> Vec<Pack> {
+                let entry = |place: usize| pack(|lane| ((7 * place + 5 * lane + seed) % 11) as f64 - 5.0);
+                (0..length).map(entry).collect()
+            };
+            let [a, b, c] = [1, 3, 8].map(vector);
+            let product = |a: &[Pack], b: &[Pack]| -> Vec<f64> {
+                let of_lane = |lane: usize| a.iter().zip(b).map(|(a, b)| a.get(lane) * b.get(lane)).sum();
+                (0..LANES).map(of_lane).collect()
+            };
+            assert_eq!(values(dot(&a, &b)), product(&a, &b));
+            assert_eq!(dots([&a, &b], &c).map(values), [product(&a, &c), product(&b, &c)]);
+            let factors = [pack(|lane| lane as f64), pack(|lane| 2.0 - lane as f64)];
+            let sums = |to: &[Pack], factor: Pack| -> Vec<Vec<f64>> {
+                to.iter().zip(&c).map(|(&to, &c)| values(to + factor * c)).collect()
+            };
+            let (mut added, mut first, mut second) = (a.clone(), a.clone(), b.clone());
+            let squares = add(&mut added, factors[0], &c);
+            add_to_both([&mut first, &mut second], factors, &c);
+            let of = |packs: &[Pack]| -> Vec<Vec<f64>> { packs.iter().map(|&pack| values(pack)).collect() };
+            assert_eq!(
+                (of(&added), values(squares)),
+                (sums(&a, factors[0]), product(&added, &added))
+            );
+            assert_eq!((of(&first), of(&second)), (sums(&a, factors[0]), sums(&b, factors[1])));
+        }
     }
 }

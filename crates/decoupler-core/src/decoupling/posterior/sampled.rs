@@ -2,12 +2,12 @@ use glam::DVec3;
 use rand::{Rng, RngExt};
 
 use super::{
+    factor::{Component, Mixture},
     likelihood::Likelihood,
-    mixture::{Component, Mixture},
 };
 use crate::{
     decoupling::row_problem::RowProblem,
-    scene::{LatentRow, Scene, normal::standard_normal},
+    scene::{LatentRow, Scene, standard_normal},
     sensor::{SensorError, SensorModel},
 };
 

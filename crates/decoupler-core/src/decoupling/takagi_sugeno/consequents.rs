@@ -9,7 +9,7 @@ use faer::{
 };
 use ndarray::{Array1, Array2, ArrayView2, Axis, Slice};
 
-use super::antecedents::Antecedents;
+use super::selection::Antecedents;
 use crate::{decoupling::units::Units, network::ScalingError};
 
 /// Normal equations of the consequents on some samples: AᵀA and AᵀT of the regressors A and the targets T.
@@ -207,7 +207,7 @@ mod tests {
     use rand::{SeedableRng, rngs::ChaCha8Rng};
     use serde::Deserialize;
 
-    use crate::scene::normal::standard_normal;
+    use crate::scene::standard_normal;
 
     /// A case of `tests/fixtures/takagi_sugeno.py`.
     #[derive(Deserialize)]

@@ -1,16 +1,14 @@
 //! Fuzzy rules with affine consequents.
 
-mod antecedents;
 mod consequents;
 mod selection;
 
 use ndarray::{Array2, Axis, Slice};
 use rand::Rng;
 
-use self::antecedents::{Antecedents, normalise};
 use super::{
     AffineLayer, DecodeError, Decoder, Description, Layer, LayeredMap, NotDescribed,
-    linear_fit::LinearFit,
+    affine_map::LinearFit,
     units::{Units, with_noise},
 };
 use crate::{
@@ -18,6 +16,7 @@ use crate::{
     network::{InputChoice, Inputs, MinMax, Quantity, ScalingChoice, ScalingError},
     scene::NoiseSource,
 };
+use selection::{Antecedents, normalise};
 
 /// A fuzzy system of Takagi and Sugeno (1985): rules "if the readings x are near centre i, then the coordinates are
 /// Cᵢ·x + dᵢ", blended by their normalised firing strengths.

@@ -117,7 +117,7 @@ mod tests {
     use rand::{SeedableRng, rngs::ChaCha8Rng};
 
     use super::*;
-    use crate::scene::normal::standard_normal;
+    use crate::scene::standard_normal;
 
     fn fit(law: impl Fn(f64) -> f64) -> Growth {
         Growth::fit(&[6.0, 10.0, 16.0, 24.0, 32.0, 40.0].map(|x| (x, law(x)))).unwrap()

@@ -6,25 +6,19 @@
 //! the paper's claims they support.
 
 mod axis;
-mod bottleneck;
-mod cell_errors;
 mod experiment;
 mod growth;
 mod results;
 mod runner;
-mod samples;
 mod summary;
-mod time_left;
 mod trial;
 mod verdict;
 
 pub use axis::{Axis, AxisKind};
-pub use bottleneck::Bottleneck;
 pub use experiment::{Cell, Experiment, ExperimentError, ExperimentRecording, PaperTable};
 pub use growth::Growth;
 pub use results::{CellResults, ExperimentResults};
 pub use runner::{Finished, run_experiments, worker_threads};
-pub use samples::{RecordedSamples, TrialSamples};
 pub use summary::{CellSummary, Figure, SummaryErrors};
-pub use trial::{Trial, TrialFailure};
+pub use trial::{Bottleneck, RecordedSamples, Trial, TrialFailure, TrialSamples};
 pub use verdict::{Verdict, VerdictStatus, verdicts};

@@ -4,8 +4,8 @@ use serde::Serialize;
 
 use super::{
     Axis, CellResults, ExperimentResults, Growth,
-    cell_errors::{CellErrors, sorted_by},
     growth::GrowthLaw,
+    summary::{CellErrors, sorted_by},
 };
 use crate::text::format_number;
 

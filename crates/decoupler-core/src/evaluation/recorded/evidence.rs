@@ -1,6 +1,13 @@
 use std::f64::consts::PI;
 
-use crate::dataset::{Dataset, SplitBy};
+use ndarray::Array2;
+use rand::{Rng, RngExt};
+
+use crate::{
+    dataset::{Dataset, Folds, SplitBy},
+    decoupling::decode_set,
+    evaluation::{CrossValidated, RunError, RunSettings, baselines::fit_baselines, cross_validation::scatter},
+};
 
 /// Independent evidence in a set of samples: its groups, or stretches of its order.
 ///
@@ -142,12 +149,125 @@ fn of_cosines(series: &[f64], cosines: usize) -> f64 {
     2.0 * squares.sum::<f64>() / cosines as f64
 }
 
+/// Samples in the units that a bootstrap draws: groups (Davison and Hinkley 1997, section 3.8) or consecutive blocks
+/// (Carlstein 1986), so that what neighbouring samples have in common is not taken for independent evidence.
+#[derive(Clone, Debug)]
+pub(super) struct Resampling {
+    units: Vec<Vec<usize>>,
+}
+
+impl Resampling {
+    /// Number of replicates.
+    const REPLICATES: usize = 1000;
+    /// Most units: more would take long to draw and change no interval. Neighbours are joined to fewer.
+    const MAX_UNITS: usize = 2000;
+
+    /// Units of `set`: its groups where it is split by group, otherwise blocks as long as the independent stretches of
+    /// `series`, values of the samples in the order of the recording.
+    pub(super) fn of(set: &Dataset, by: SplitBy, series: &[f64]) -> Self {
+        let units = match by {
+            SplitBy::Group => {
+                let groups = set.snapshots();
+                let joined = groups.len().div_ceil(Self::MAX_UNITS);
+                groups.chunks(joined.max(1)).map(<[Vec<usize>]>::concat).collect()
+            }
+            SplitBy::Time | SplitBy::Random => {
+                let length = slow_cosines(series).map_or(1, |cosines| series.len().div_ceil(cosines + 1));
+                let length = length.max(set.samples().div_ceil(Self::MAX_UNITS));
+                let samples: Vec<usize> = (0..set.samples()).collect();
+                samples.chunks(length).map(<[usize]>::to_vec).collect()
+            }
+        };
+        Self { units }
+    }
+
+    /// Number of units.
+    pub(super) fn count(&self) -> usize {
+        self.units.len()
+    }
+
+    /// Returns the sums over each unit of K values of every sample.
+    pub(super) fn sums<const K: usize>(&self, values: impl Fn(usize) -> [f64; K]) -> Vec<[f64; K]> {
+        let sum = |unit: &Vec<usize>| {
+            let mut sums = [0.0; K];
+            for &sample in unit {
+                sums.iter_mut()
+                    .zip(values(sample))
+                    .for_each(|(sum, value)| *sum += value);
+            }
+            sums
+        };
+        self.units.iter().map(sum).collect()
+    }
+
+    /// Draws as many units as there are, with replacement, and calls `replicate` with how often each was drawn, again and
+    /// again.
+    pub(super) fn draw(&self, rng: &mut impl Rng, mut replicate: impl FnMut(&[f64])) {
+        let mut times = vec![0.0; self.count()];
+        for _ in 0..Self::REPLICATES {
+            times.fill(0.0);
+            for _ in 0..self.count() {
+                times[rng.random_range(0..self.count())] += 1.0;
+            }
+            replicate(&times);
+        }
+    }
+}
+
+/// Sum of the units' sums, each as often as it was drawn.
+pub(super) fn weighted<const K: usize>(sums: &[[f64; K]], times: &[f64]) -> [f64; K] {
+    let mut total = [0.0; K];
+    for (sums, &times) in sums.iter().zip(times) {
+        total
+            .iter_mut()
+            .zip(sums)
+            .for_each(|(total, sum)| *total += times * sum);
+    }
+    total
+}
+
+/// Model that is fitted again and again to find out what the readings determine.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum FittedModel {
+    /// Ridge regression: a fit takes milliseconds, but it sees only what is linear.
+    #[default]
+    Ridge,
+    /// The network of the settings: each fit is a training.
+    Network,
+}
+
+impl FittedModel {
+    /// Returns held-out answers for every sample of `set`, each by a model fitted without its fold; `None` if cancelled.
+    pub(super) fn held_out(
+        self,
+        settings: &RunSettings,
+        set: &Dataset,
+        folds: &Folds,
+        is_cancelled: &dyn Fn() -> bool,
+    ) -> Result<Option<Array2<f64>>, RunError> {
+        if self == Self::Network {
+            let validated = CrossValidated::on_folds(settings, set, folds.clone(), is_cancelled)?;
+            return Ok(validated.map(|validated| validated.network));
+        }
+        let mut answers = Array2::zeros(set.targets().dim());
+        for fold in 0..folds.count() {
+            if is_cancelled() {
+                return Ok(None);
+            }
+            let (_, mut ridge) = fit_baselines(&set.select(&folds.without(&[fold])), settings)?;
+            let of_fold = decode_set(&mut ridge, &set.select(folds.test(fold)))?;
+            scatter(&mut answers, folds.test(fold), &of_fold);
+        }
+        Ok(Some(answers))
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use rand::{SeedableRng, rngs::ChaCha8Rng};
 
     use super::*;
-    use crate::scene::normal::standard_normal;
+    use crate::scene::standard_normal;
 
     fn autoregressive(memory: f64, n: usize, seed: u64) -> Vec<f64> {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);

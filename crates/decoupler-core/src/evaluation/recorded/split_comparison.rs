@@ -1,5 +1,13 @@
+use std::fmt;
+
+use ndarray::Array2;
+
+use super::{
+    ChannelImportance, ChannelRemark, Determinacy, Determination, FittedModel, LearningCurve, NonlinearGain,
+    Undetermined, channel_importance, channel_remarks,
+};
 use crate::{
-    dataset::{Dataset, Folds, SplitBy, Stream},
+    dataset::{Dataset, Division, Folds, SplitBy, Stream},
     evaluation::{CrossValidated, RunError, RunSettings, Scores, TargetErrors},
 };
 
@@ -96,4 +104,153 @@ impl SplitComparison {
 
 fn ratio(random: &TargetErrors, honest: &TargetErrors) -> Option<f64> {
     Some(random.rmse / honest.rmse).filter(|ratio| ratio.is_finite())
+}
+
+/// Findings on a recording: of each target, by each channel, and with more samples.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Findings {
+    /// Model behind [`Self::importance`] and the learning curves.
+    pub model: FittedModel,
+    /// Findings on each target.
+    pub targets: Vec<TargetFindings>,
+    /// Constant, duplicated and saturated channels.
+    pub remarks: Vec<ChannelRemark>,
+    /// Worth of each channel; empty if there is only one.
+    pub importance: Vec<ChannelImportance>,
+    /// Errors that a random split would hide; `None` without networks.
+    pub comparison: Option<SplitComparison>,
+}
+
+/// Findings on one target.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TargetFindings {
+    /// R² of the network; `None` without networks, or where it is not determined.
+    pub network: Option<Determination>,
+    /// R² of ridge regression, or the reason why it is not determined.
+    pub ridge: Result<Determination, Undetermined>,
+    /// Error of the network next to that of ridge.
+    pub gain: Option<NonlinearGain>,
+    /// Error with fewer and with more samples.
+    pub curve: LearningCurve,
+}
+
+/// Part of the work of [`Findings::measure`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Stage {
+    /// Cross-validation by the rule of the split.
+    Folds,
+    /// Cross-validation by other rules, to compare.
+    OtherFolds,
+    /// Fits without each channel.
+    Channels,
+    /// Fits to fewer samples.
+    Samples,
+}
+
+impl fmt::Display for Stage {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Folds => "cross-validation",
+            Self::OtherFolds => "cross-validation by another split",
+            Self::Channels => "fits without each channel",
+            Self::Samples => "fits to fewer samples",
+        })
+    }
+}
+
+impl Findings {
+    /// Largest number of networks that [`Self::measure`] trains for this many channels, with this many folds.
+    pub fn max_trainings(channels: usize, folds: usize) -> usize {
+        (3 + channels + 1) * folds + LearningCurve::MAX_FITS
+    }
+
+    /// Studies `set` by cross-validation with `folds` folds by the rule of `division`, whose test samples judge the learning
+    /// curve; `None` if cancelled. `model` is what is fitted without each channel and to fewer samples: if it is not given, the
+    /// network where it is worth more than ridge regression for a target, else ridge; with ridge, no network is trained at all.
+    ///
+    /// # Errors
+    /// If the set cannot be divided, or the settings are invalid.
+    pub fn measure(
+        settings: &RunSettings,
+        set: &Dataset,
+        (division, folds): (&Division, usize),
+        model: Option<FittedModel>,
+        begin: &dyn Fn(Stage),
+        is_cancelled: &dyn Fn() -> bool,
+    ) -> Result<Option<Self>, RunError> {
+        let by = division.by;
+        let folds_by = |by| Folds::by(set, folds, by, &mut settings.seed.rng(Stream::Split));
+        let validate = |by| -> Result<Option<CrossValidated>, RunError> {
+            CrossValidated::on_folds(settings, set, folds_by(by)?, is_cancelled)
+        };
+        begin(Stage::Folds);
+        let judged = |answers: &Array2<f64>| Determination::measure(set, answers.view(), by);
+        let (network, ridge, gains, comparison);
+        if model == Some(FittedModel::Ridge) {
+            let answers = FittedModel::Ridge.held_out(settings, set, &folds_by(by)?, is_cancelled)?;
+            let Some(answers) = answers else { return Ok(None) };
+            ridge = judged(&answers);
+            (network, gains, comparison) = (vec![None; set.outputs()], vec![None; set.outputs()], None);
+        } else {
+            let Some(validated) = validate(by)? else {
+                return Ok(None);
+            };
+            begin(Stage::OtherFolds);
+            let compared = SplitComparison::complete(settings, set, folds, (by, &validated), is_cancelled)?;
+            let Some(compared) = compared else { return Ok(None) };
+            network = judged(&validated.network).into_iter().map(Result::ok).collect();
+            ridge = judged(&validated.linear);
+            gains = NonlinearGain::of_validated(set, &validated, by);
+            comparison = Some(compared);
+        }
+        // Where the readings determine nothing, the better answer is only nearer to the mean.
+        let is_worth_it = gains.iter().zip(&network).any(|(gain, network)| {
+            let is_told = network
+                .as_ref()
+                .is_some_and(|network| network.determinacy() != Determinacy::NotDetermined);
+            is_told && gain.as_ref().is_some_and(NonlinearGain::is_supported)
+        });
+        let best = if is_worth_it {
+            FittedModel::Network
+        } else {
+            FittedModel::Ridge
+        };
+        let model = model.unwrap_or(best);
+        begin(Stage::Channels);
+        let Some(importance) = channel_importance(settings, set, (&folds_by(by)?, by), model, is_cancelled)? else {
+            return Ok(None);
+        };
+        begin(Stage::Samples);
+        let parts = division.divide(set, &mut settings.seed.rng(Stream::Split))?;
+        let Some(curves) = LearningCurve::measure(settings, set, (&parts, by), model, is_cancelled)? else {
+            return Ok(None);
+        };
+        let targets = network.into_iter().zip(ridge).zip(gains).zip(curves);
+        let target = |(((network, ridge), gain), curve)| TargetFindings {
+            network,
+            ridge,
+            gain,
+            curve,
+        };
+        Ok(Some(Self {
+            model,
+            targets: targets.map(target).collect(),
+            remarks: channel_remarks(set),
+            importance,
+            comparison,
+        }))
+    }
+}
+
+impl TargetFindings {
+    /// R² of the better of network and ridge, with the model.
+    pub fn best(&self) -> Option<(FittedModel, Determination)> {
+        let network = self.network.map(|network| (FittedModel::Network, network));
+        let ridge = self.ridge.ok().map(|ridge| (FittedModel::Ridge, ridge));
+        match (network, ridge) {
+            (Some(network), Some(ridge)) if ridge.1.r2.value >= network.1.r2.value => Some(ridge),
+            (network, ridge) => network.or(ridge),
+        }
+    }
 }

@@ -1,7 +1,7 @@
 use std::f64::consts::TAU;
 
 use super::{
-    diagnosis::{Diagnosis, FaultCause, FaultyWire},
+    monitor::{Diagnosis, FaultCause, FaultyWire},
     prior::GaussianPrior,
     row_fit::{Fitted, RowFit, View},
 };

@@ -1,7 +1,7 @@
 use glam::DVec3;
 use rand::Rng;
 
-use super::cholesky::Cholesky;
+use super::row_fit::Cholesky;
 use crate::{
     scene::{Loading, Scene},
     sensor::SensorModel,

@@ -2,10 +2,7 @@ use std::f64::consts::TAU;
 
 use glam::DVec3;
 
-use super::{
-    cholesky::Cholesky,
-    prior::{GaussianPrior, ranges_mm},
-};
+use super::prior::{GaussianPrior, ranges_mm};
 use crate::{
     scene::Scene,
     sensor::{RowConductance, SensorError, SensorModel},
@@ -359,5 +356,145 @@ impl RowFit {
             }
             coordinates_mm.copy_from_slice(&self.model.displaced_mm(row, node, displacement).to_array());
         }
+    }
+}
+
+/// Cholesky factor L Lᵀ of a small symmetric positive definite matrix, kept between uses so that none allocates.
+#[derive(Clone, Debug)]
+pub(super) struct Cholesky {
+    order: usize,
+    /// L, row by row; entries above the diagonal are not used.
+    lower: Vec<f64>,
+}
+
+impl Cholesky {
+    pub(super) fn new(order: usize) -> Self {
+        Self {
+            order,
+            lower: vec![0.0; order * order],
+        }
+    }
+
+    /// Factors `matrix` (order × order), of which the lower triangle is read. Returns `false` if it is not positive
+    /// definite.
+    pub(super) fn factor(&mut self, matrix: &[f64]) -> bool {
+        let n = self.order;
+        for i in 0..n {
+            for j in 0..=i {
+                let (row_i, row_j) = (&self.lower[i * n..i * n + j], &self.lower[j * n..j * n + j]);
+                let product: f64 = row_i.iter().zip(row_j).map(|(a, b)| a * b).sum();
+                let rest = matrix[i * n + j] - product;
+                self.lower[i * n + j] = if i == j {
+                    if !(rest > 0.0 && rest.is_finite()) {
+                        return false;
+                    }
+                    rest.sqrt()
+                } else {
+                    rest / self.lower[j * n + j]
+                };
+            }
+        }
+        true
+    }
+
+    /// ln det of the matrix.
+    pub(super) fn log_determinant(&self) -> f64 {
+        let diagonal = (0..self.order).map(|i| self.lower[i * self.order + i].ln());
+        2.0 * diagonal.sum::<f64>()
+    }
+
+    /// Replaces b by L⁻¹ b, whose squared norm is bᵀ A⁻¹ b.
+    pub(super) fn solve_lower(&self, b: &mut [f64]) {
+        let n = self.order;
+        for i in 0..n {
+            let product: f64 = self.lower[i * n..i * n + i].iter().zip(&*b).map(|(l, x)| l * x).sum();
+            b[i] = (b[i] - product) / self.lower[i * n + i];
+        }
+    }
+
+    /// Replaces b by A⁻¹ b.
+    pub(super) fn solve(&self, b: &mut [f64]) {
+        self.solve_lower(b);
+        self.solve_upper(b);
+    }
+
+    /// Replaces b by L⁻ᵀ b.
+    pub(super) fn solve_upper(&self, b: &mut [f64]) {
+        let n = self.order;
+        for i in (0..n).rev() {
+            let product: f64 = (i + 1..n).map(|j| self.lower[j * n + i] * b[j]).sum();
+            b[i] = (b[i] - product) / self.lower[i * n + i];
+        }
+    }
+}
+
+/// Predictions of readings that were left out of a fit.
+impl RowFit {
+    /// Logarithm of the reading from which on the converter clips.
+    pub(super) fn log_full_scale(&self) -> f64 {
+        self.full_scale_ohm.ln()
+    }
+
+    /// Returns `true` for a reading at the end of the converter's range of a resistance that is beyond it.
+    pub(super) fn is_clipped(&self, log_reading: f64, log_ohm: f64) -> bool {
+        log_reading >= self.log_full_scale() && log_ohm >= self.log_full_scale()
+    }
+
+    /// Variance of ln R in a direction of the unknowns, given by its slopes; they are overwritten.
+    pub(super) fn variance(&self, slopes: &mut [f64]) -> f64 {
+        self.cholesky.solve_lower(slopes);
+        slopes.iter().map(|entry| entry * entry).sum()
+    }
+
+    /// Slopes of −ln R of a column by all unknowns, into `slopes`.
+    pub(super) fn slopes_of(&self, column: usize, slopes: &mut [f64]) {
+        let of_column = self.slopes.iter().skip(column).step_by(self.model.scale.columns());
+        slopes.iter_mut().zip(of_column).for_each(|(to, slope)| *to = *slope);
+    }
+
+    /// ln R of a column that is broken before node `electrodes`, with its slopes as in [`Self::slopes_of`], after a fit of
+    /// one row-wire.
+    pub(super) fn broken_column(&self, (row, column, electrodes): (usize, usize, usize), slopes: &mut [f64]) -> f64 {
+        slopes.fill(0.0);
+        let nodes = (row, 0..self.model.scale.nodes_per_row());
+        let add = |node: usize, slope: DVec3| {
+            for (place, &axis) in self.axes.iter().enumerate() {
+                slopes[node * self.axes.len() + place] += slope[axis];
+            }
+        };
+        let sum = self
+            .model
+            .partial_sum(nodes, (column, 0..electrodes), &self.displacements_mm, add);
+        slopes.iter_mut().for_each(|slope| *slope /= sum);
+        let gain = match slopes.last_mut().zip(self.unknowns.last()) {
+            Some((slope, gain)) if self.common > 0.0 => {
+                *slope = -1.0;
+                *gain
+            }
+            _ => 0.0,
+        };
+        (self.model.resistivity_ohm_per_mm / sum).ln() + gain
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_factored_matrix_gives_back_its_solution_and_determinant() {
+        let matrix = [4.0, 0.0, 0.0, 2.0, 5.0, 0.0, -1.0, 1.5, 3.0];
+        let mut cholesky = Cholesky::new(3);
+        assert!(cholesky.factor(&matrix));
+        // A x for x = (1, −2, 3), with the upper triangle that mirrors the lower one.
+        let mut b = [-3.0, -3.5, 5.0];
+        cholesky.solve(&mut b);
+        for (found, expected) in b.iter().zip([1.0, -2.0, 3.0]) {
+            assert!((found - expected).abs() < 1e-14);
+        }
+        // 4·(15 − 2.25) − 2·(6 + 1.5) − 1·(3 + 5).
+        assert!((cholesky.log_determinant() - 28.0_f64.ln()).abs() < 1e-14);
+        assert!(!cholesky.factor(&[1.0, 0.0, 0.0, 2.0, 1.0, 0.0, 0.0, 0.0, 1.0]));
+        assert!(!cholesky.factor(&[f64::NAN; 9]));
     }
 }

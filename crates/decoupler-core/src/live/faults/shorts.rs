@@ -1,10 +1,7 @@
 use glam::DVec3;
 use rand::Rng;
 
-use super::{
-    diagnosis::{Diagnosis, FaultCause, FaultyWire},
-    monitor::{FaultMonitor, quantile},
-};
+use super::monitor::{Diagnosis, FaultCause, FaultMonitor, FaultyWire, quantile};
 use crate::{
     scene::{Loading, NoiseSource, Scene},
     sensor::{SensorError, SensorModel},

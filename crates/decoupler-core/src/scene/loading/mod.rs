@@ -1,17 +1,14 @@
 //! Loadings of the surface, and the drawing of deformations.
 
 mod indenter;
-mod latent_row;
-mod modified_bessel;
 mod press;
-mod round_contact;
 mod sampler;
 mod smooth_field;
 
 pub use indenter::{Indenter, IndenterShape, Span};
-pub(crate) use latent_row::LatentRow;
 pub use press::Contact;
 pub use sampler::DeformationSampler;
+pub(crate) use sampler::LatentRow;
 
 use std::{fmt, str::FromStr};
 

@@ -4,22 +4,16 @@
 //! analytic derivatives. What the readings cannot determine stays at its nominal value, and is said to.
 //! [`PressLimits::check`] refuses samples that no press can give, before a calibration or a training on them.
 
-mod covariance;
 mod equations;
 mod error;
 mod levenberg_marquardt;
-mod parameter;
-mod presses;
 mod report;
 #[cfg(test)]
 mod tests;
-mod warning;
 
+pub use equations::PressLimits;
 pub use error::CalibrationError;
-pub use parameter::SensorParameter;
-pub use presses::PressLimits;
-pub use report::{CalibratedParameter, Calibration, ParameterStatus};
-pub use warning::CalibrationWarning;
+pub use report::{CalibratedParameter, Calibration, CalibrationWarning, ParameterStatus, SensorParameter};
 
 use super::DVec3;
 

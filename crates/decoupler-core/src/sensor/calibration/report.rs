@@ -1,12 +1,10 @@
-use std::fmt;
+use std::{collections::BTreeMap, fmt};
 
 use super::{
     super::{SensorModel, short},
-    CalibrationError, PressLimits, PressedRow, SensorParameter,
-    covariance::{Decomposition, variances},
+    CalibrationError, PressLimits, PressedRow,
     equations::{COUNT, Slopes},
-    levenberg_marquardt::{Fitted, Linearised, fit, fit_with_prior},
-    warning::CalibrationWarning,
+    levenberg_marquardt::{Decomposition, Fitted, Linearised, fit, fit_with_prior, residuals, variances},
 };
 
 /// A sensor model fitted to readings of known deformations.
@@ -212,6 +210,204 @@ impl fmt::Display for CalibratedParameter {
                 f,
                 "{parameter}: {} {unit}, its nominal value: these readings do not determine it",
                 short(*nominal)
+            ),
+        }
+    }
+}
+
+/// Parameter of the sensor model that readings depend on.
+///
+/// Only differences of coordinates matter, so the x of the first row-wire is the origin and stays, and the y of the first
+/// column-wire cancels: rows are centred over the column-wires.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[non_exhaustive]
+pub enum SensorParameter {
+    /// Distance of the undeformed row-wires above the column-wires.
+    Height,
+    /// Distance between row-wires.
+    RowPitch,
+    /// Distance between the nodes on a row-wire.
+    NodePitch,
+    /// Distance between column-wires.
+    ColumnPitch,
+    /// x of the first node on each column-wire.
+    ColumnNodeX,
+    /// Distance between the nodes on a column-wire.
+    ColumnNodePitch,
+    /// Resistance per millimetre of rubber, g.
+    Resistivity,
+}
+
+impl SensorParameter {
+    /// Every parameter.
+    pub const ALL: [Self; 7] = [
+        Self::Height,
+        Self::RowPitch,
+        Self::NodePitch,
+        Self::ColumnPitch,
+        Self::ColumnNodeX,
+        Self::ColumnNodePitch,
+        Self::Resistivity,
+    ];
+
+    /// Number of parameters.
+    pub(super) const COUNT: usize = Self::ALL.len();
+
+    /// Unit of the value.
+    pub fn unit(self) -> &'static str {
+        match self {
+            Self::Resistivity => "ohm/mm",
+            _ => "mm",
+        }
+    }
+
+    /// Value in `model`, in [`Self::unit`].
+    pub fn of(self, model: &SensorModel) -> f64 {
+        *self.field(&mut model.clone())
+    }
+
+    /// Returns what a relative change of the parameter is in proportion to: the nominal value, or, for the x of the column
+    /// nodes, which may be 0 or far from any origin, the nominal distance between them.
+    pub fn reference(self, nominal: &SensorModel) -> f64 {
+        match self {
+            Self::ColumnNodeX => nominal.geometry.column_node_pitch_mm,
+            _ => self.of(nominal),
+        }
+    }
+
+    pub(super) fn field(self, model: &mut SensorModel) -> &mut f64 {
+        let geometry = &mut model.geometry;
+        match self {
+            Self::Height => &mut geometry.height_mm,
+            Self::RowPitch => &mut geometry.row_pitch_mm,
+            Self::NodePitch => &mut geometry.node_pitch_mm,
+            Self::ColumnPitch => &mut geometry.column_pitch_mm,
+            Self::ColumnNodeX => &mut geometry.column_node_x0_mm,
+            Self::ColumnNodePitch => &mut geometry.column_node_pitch_mm,
+            Self::Resistivity => &mut model.resistivity_ohm_per_mm,
+        }
+    }
+}
+
+impl fmt::Display for SensorParameter {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(match self {
+            Self::Height => "height",
+            Self::RowPitch => "row pitch",
+            Self::NodePitch => "node pitch",
+            Self::ColumnPitch => "column pitch",
+            Self::ColumnNodeX => "x of the first column node",
+            Self::ColumnNodePitch => "column node pitch",
+            Self::Resistivity => "resistance per millimetre",
+        })
+    }
+}
+
+/// Sign that the readings are not those of the sensor that was fitted, and what to check.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum CalibrationWarning {
+    /// Fitted values are far from their nominal ones.
+    FarFromNominal {
+        /// The parameters.
+        parameters: Vec<CalibratedParameter>,
+        /// Largest distance, in standard deviations of the prior.
+        deviations: f64,
+    },
+    /// The readings of a crossing are off by the same amount in every frame.
+    Misfit {
+        /// Root mean square over crossings of the relative error that all frames share.
+        systematic: f64,
+        /// Relative standard deviation of the readings of a crossing about their mean error.
+        noise: f64,
+    },
+}
+
+impl CalibrationWarning {
+    /// Warnings about a fit of `fitted` parameters.
+    pub(super) fn of(
+        model: &SensorModel,
+        references: &Slopes,
+        samples: &[PressedRow],
+        parameters: &[CalibratedParameter],
+        fitted: usize,
+    ) -> Vec<Self> {
+        /// Standard deviations of the prior from which a value is far from its nominal one.
+        const FAR: f64 = 3.0;
+        let deviation = 0.5 * Calibration::NOMINAL_TOLERANCE;
+        let mut largest = 0.0_f64;
+        let mut far = Vec::new();
+        for (fitted, reference) in parameters.iter().zip(references) {
+            let ParameterStatus::Determined(half_width) = fitted.standing else {
+                continue;
+            };
+            let apart = (fitted.value - fitted.nominal).abs();
+            // By what is certain of it.
+            if apart - half_width > FAR * deviation * reference {
+                largest = largest.max(apart / (deviation * reference));
+                far.push(*fitted);
+            }
+        }
+        let far = (!far.is_empty()).then_some(Self::FarFromNominal {
+            parameters: far,
+            deviations: largest,
+        });
+        far.into_iter()
+            .chain(Self::misfit(model, references, samples, fitted))
+            .collect()
+    }
+
+    /// The errors that all frames share, if they are large next to the noise: an analysis of variance of the residuals by
+    /// crossing.
+    fn misfit(model: &SensorModel, references: &Slopes, samples: &[PressedRow], fitted: usize) -> Option<Self> {
+        /// Systematic errors in proportion to the noise from which they count.
+        const LARGE: f64 = 3.0;
+        /// Readings beyond one for each crossing from which their noise is known.
+        const FEWEST: usize = 10;
+        /// Relative errors that rounding explains.
+        const SMALLEST: f64 = 1e-12;
+        // Number, sum and sum of squares of the residuals of each crossing.
+        let mut crossings: BTreeMap<(usize, usize), (f64, f64, f64)> = BTreeMap::new();
+        residuals(model, references, samples, |sample, column, residual, _| {
+            let (count, sum, squares) = crossings.entry((sample.row, column)).or_default();
+            *count += 1.0;
+            *sum += residual;
+            *squares += residual * residual;
+        });
+        let readings: f64 = crossings.values().map(|(count, ..)| count).sum();
+        let (groups, fitted) = (crossings.len() as f64, fitted as f64);
+        if readings - groups < FEWEST as f64 || groups <= fitted {
+            return None;
+        }
+        let shared: f64 = crossings.values().map(|(count, sum, _)| sum * sum / count).sum();
+        let all: f64 = crossings.values().map(|(.., squares)| squares).sum();
+        let noise_variance = (all - shared).max(0.0) / (readings - groups);
+        let excess = (shared / (groups - fitted) - noise_variance) / (readings / groups);
+        let (systematic, noise) = (excess.max(0.0).sqrt(), noise_variance.sqrt());
+        (systematic > SMALLEST && systematic > LARGE * noise).then_some(Self::Misfit { systematic, noise })
+    }
+}
+
+impl fmt::Display for CalibrationWarning {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::FarFromNominal { parameters, deviations } => {
+                for (place, fitted) in parameters.iter().enumerate() {
+                    let separator = if place == 0 { "" } else { "; " };
+                    write!(f, "{separator}{fitted}")?;
+                }
+                write!(
+                    f,
+                    ": up to {deviations:.0} standard deviations from nominal values that are assumed to be right to ±10 % (two \
+                     standard deviations); check the array scale, the order of the wires and the unit of the displacements, or \
+                     give a nominal sensor that is nearer"
+                )
+            }
+            Self::Misfit { systematic, noise } => write!(
+                f,
+                "the readings of a crossing are off by {systematic:.1e} in every frame, and vary by {noise:.1e} only: Eq. (2) \
+                 with these parameters does not describe the sensor; check the array scale, the order of the wires, and \
+                 wires with a resistance of their own"
             ),
         }
     }

@@ -1,17 +1,13 @@
 //! Identifiability: how well the readings of a row-wire determine its deformation.
 
-mod alike_rows;
-mod error;
-mod warning;
-
-pub use alike_rows::RowPair;
-pub use error::IdentifiabilityError;
-pub use warning::IdentifiabilityWarning;
+use std::fmt;
 
 use faer::Mat;
 use glam::DVec3;
+use thiserror::Error;
 
 use super::{Axes, RelativeNoise, RowConductance, SensorModel};
+use crate::sensor::SensorError;
 
 /// Deformation patterns that the readings of one row-wire see, from the singular values of the Jacobian of ln R.
 ///
@@ -153,10 +149,175 @@ impl Identifiability {
     }
 }
 
+/// Two row-wires whose undeformed readings are most alike.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RowPair {
+    /// One row-wire, from 0.
+    pub first: usize,
+    /// The other.
+    pub second: usize,
+    /// rms over readings of the difference of ln R, as far as an error common to all readings leaves it.
+    pub difference: f64,
+}
+
+impl Identifiability {
+    /// Rows whose undeformed readings differ less than this count as the same even without noise.
+    pub const SAME_ROWS: f64 = 1e-9;
+
+    /// The two row-wires whose undeformed readings are most alike; `None` for a single row-wire.
+    ///
+    /// A layout that is symmetric about a line between row-wires gives mirror rows the same readings: no decoder can
+    /// tell which one it reads unless the electronics say so. Of readings with a common error in their `noise`, such as the
+    /// gain of a snapshot, a difference that is common to all of them counts only as far as that error leaves it.
+    ///
+    /// # Errors
+    /// The undeformed sensor has no resistance.
+    pub fn most_alike_rows(model: &SensorModel, noise: RelativeNoise) -> Result<Option<RowPair>, SensorError> {
+        let rest = vec![DVec3::ZERO; model.scale.nodes_per_row()];
+        let readings: Vec<Vec<f64>> = (0..model.scale.rows())
+            .map(|row| model.row_resistances(row, &rest))
+            .collect::<Result<_, _>>()?;
+        let weight = noise.weight_of_mean(model.scale.columns());
+        let mut closest: Option<RowPair> = None;
+        for (second, of_second) in readings.iter().enumerate() {
+            for (first, of_first) in readings[..second].iter().enumerate() {
+                let differences = of_first.iter().zip(of_second).map(|(a, b)| (a / b).ln());
+                let hidden = (1.0 - weight) * differences.clone().sum::<f64>() / of_first.len() as f64;
+                let squares = differences.map(|difference| (difference - hidden).powi(2));
+                let difference = (squares.sum::<f64>() / of_first.len() as f64).sqrt();
+                if closest.is_none_or(|pair| difference < pair.difference) {
+                    closest = Some(RowPair {
+                        first,
+                        second,
+                        difference,
+                    });
+                }
+            }
+        }
+        Ok(closest)
+    }
+}
+
+/// Error of an identifiability analysis.
+#[derive(Clone, Debug, PartialEq, Error)]
+#[non_exhaustive]
+pub enum IdentifiabilityError {
+    /// The model has no resistance for the deformation.
+    #[error(transparent)]
+    Sensor(#[from] SensorError),
+    /// The array has no such row-wire.
+    #[error("row {} does not exist: the array has rows 1 to {rows}", row + 1)]
+    Row {
+        /// Row-wire asked for, from 0.
+        row: usize,
+        /// Row-wires of the array.
+        rows: usize,
+    },
+    /// The decomposition did not converge.
+    #[error("the singular values of row {} did not converge: use lengths of similar size in the geometry", .0 + 1)]
+    NotConverged(usize),
+}
+
+/// An obstacle to decoupling, and what to change.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum IdentifiabilityWarning {
+    /// Fewer readings than unknowns.
+    TooFewReadings {
+        /// Readings of a row.
+        equations: usize,
+        /// Unknowns of a row.
+        unknowns: usize,
+    },
+    /// Two rows read the same.
+    RowsAlike {
+        /// The two rows.
+        pair: RowPair,
+        /// Relative error of a reading.
+        noise: f64,
+    },
+    /// Noise hides the deformation.
+    Hopeless {
+        /// Relative error of a reading.
+        noise: f64,
+        /// Share of the prior spread that remains.
+        share: f64,
+    },
+    /// Some deformation pattern hardly changes the readings.
+    IllConditioned {
+        /// Largest singular value over the smallest.
+        condition: f64,
+    },
+}
+
+impl fmt::Display for IdentifiabilityWarning {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match *self {
+            Self::TooFewReadings { equations, unknowns } => write!(
+                f,
+                "a row has {unknowns} unknowns but only {equations} readings: some deformations cannot be seen; use at \
+                 least {unknowns} column-wires, or let nodes move along z only"
+            ),
+            Self::RowsAlike { pair, noise } => {
+                let (first, second) = (pair.first + 1, pair.second + 1);
+                write!(
+                    f,
+                    "row-wires {first} and {second} cannot be told apart: at rest their readings differ by {:.1e}, the \
+                     noise is {noise:.1e}; shift the column nodes so that no row mirrors another, or use a known row",
+                    pair.difference
+                )
+            }
+            Self::Hopeless { noise, share } => write!(
+                f,
+                "with noise of {noise:.1e} the readings hardly narrow the deformation ({:.0} % of its spread remains); \
+                 lower the noise, reduce the height, widen the node pitch, or add column-wires",
+                100.0 * share
+            ),
+            Self::IllConditioned { condition } if condition.is_infinite() => f.write_str(
+                "some deformation changes no reading at all; reduce the height, widen the node pitch, add column-wires, or \
+                 let nodes move along z only",
+            ),
+            Self::IllConditioned { condition } => write!(
+                f,
+                "some deformation is seen {condition:.0e} times worse than another: even rounding blurs it; reduce the \
+                 height, widen the node pitch, add column-wires, or let nodes move along z only"
+            ),
+        }
+    }
+}
+
+impl Identifiability {
+    /// The condition number from which [`IdentifiabilityWarning::IllConditioned`] is given: readings exact to 16
+    /// digits then leave fewer than 6 in the worst-seen pattern.
+    pub const LARGEST_CONDITION: f64 = 1e10;
+    /// The share of the prior spread that remains from which noise is called hopeless: readings then tell less than
+    /// a tenth of the variance.
+    pub const HOPELESS_SHARE: f64 = 0.95;
+    /// Warnings to the user, most severe first. `noise` is the relative error of a reading of its own (for a common error see
+    /// [`Self::of_row_with_gain`] and [`Self::most_alike_rows`]), `prior_mm` the standard
+    /// deviation of each unknown before reading; `alike` the most similar rows if the row is not known beforehand.
+    pub fn warnings(&self, noise: f64, prior_mm: f64, alike: Option<RowPair>) -> Vec<IdentifiabilityWarning> {
+        let condition = self.condition();
+        let share = self.remaining_share(noise, prior_mm);
+        let alike = alike.filter(|pair| pair.difference <= noise.max(Self::SAME_ROWS));
+        let warnings = [
+            (self.equations < self.unknowns()).then_some(IdentifiabilityWarning::TooFewReadings {
+                equations: self.equations,
+                unknowns: self.unknowns(),
+            }),
+            alike.map(|pair| IdentifiabilityWarning::RowsAlike { pair, noise }),
+            (share >= Self::HOPELESS_SHARE).then_some(IdentifiabilityWarning::Hopeless { noise, share }),
+            (condition >= Self::LARGEST_CONDITION).then_some(IdentifiabilityWarning::IllConditioned { condition }),
+        ];
+        warnings.into_iter().flatten().collect()
+    }
+}
+
 #[cfg(test)]
 mod tests {
+    use glam::DVec3;
+
     use super::*;
-    use crate::sensor::ArrayScale;
+    use crate::sensor::{ArrayScale, Axes, Identifiability, SensorModel};
 
     pub(super) fn at_rest(model: &SensorModel, row: usize, axes: Axes) -> Identifiability {
         let rest = vec![DVec3::ZERO; model.scale.nodes_per_row()];
@@ -256,5 +417,69 @@ mod tests {
         assert_eq!((z.unknowns(), xyz.unknowns()), (10, 30));
         assert!(xyz.condition() > z.condition());
         assert!(z.worst_pattern.iter().all(|p| p.x == 0.0 && p.y == 0.0));
+    }
+
+    #[test]
+    fn mirror_rows_are_found_and_named() {
+        let mut model = SensorModel::new("10x6_3x18".parse().unwrap());
+        let default = Identifiability::most_alike_rows(&model, RelativeNoise::default())
+            .unwrap()
+            .unwrap();
+        assert!(default.difference > 1e-3, "{default:?}");
+        // Column nodes at 7.5, 12.5, 17.5 are symmetric about x = 12.5, the middle of rows 8 to 17.
+        model.geometry.column_node_x0_mm = 7.5;
+        let pair = Identifiability::most_alike_rows(&model, RelativeNoise::default())
+            .unwrap()
+            .unwrap();
+        assert!(pair.difference < 1e-14, "{pair:?}");
+        assert_eq!(pair.first + pair.second, 9);
+        let warnings = Identifiability::of_row(&model, 0, &[DVec3::ZERO; 6], Axes::Z)
+            .unwrap()
+            .warnings(0.0, 0.3, Some(pair));
+        let words = warnings[0].to_string();
+        assert!(
+            words.contains("cannot be told apart") && words.contains("shift"),
+            "{words}"
+        );
+        assert_eq!(
+            Identifiability::most_alike_rows(&SensorModel::new("1x6_3x18".parse().unwrap()), RelativeNoise::default()),
+            Ok(None)
+        );
+    }
+
+    #[test]
+    fn rows_that_do_not_exist_are_counted_from_one() {
+        let model = SensorModel::new(ArrayScale::default());
+        let error = Identifiability::of_row(&model, 10, &[DVec3::ZERO; 10], Axes::Z).unwrap_err();
+        assert_eq!(error.to_string(), "row 11 does not exist: the array has rows 1 to 10");
+        assert!(IdentifiabilityError::NotConverged(0).to_string().contains("row 1 "));
+    }
+
+    #[test]
+    fn too_few_readings_leave_a_pattern_unseen() {
+        let model = SensorModel::new("2x6_3x4".parse().unwrap());
+        let seen = at_rest(&model, 1, Axes::Z);
+        assert_eq!(seen.condition(), f64::INFINITY);
+        assert_eq!(seen.unknowns(), 6);
+        let length = seen.worst_pattern.iter().map(|p| p.length_squared()).sum::<f64>();
+        assert!((length - 1.0).abs() < 1e-12);
+        let warnings = seen.warnings(0.0, 0.3, None);
+        assert!(matches!(
+            warnings[0],
+            IdentifiabilityWarning::TooFewReadings {
+                equations: 4,
+                unknowns: 6
+            }
+        ));
+    }
+
+    #[test]
+    fn noise_is_hopeless_only_when_it_hides_nearly_everything() {
+        let seen = at_rest(&SensorModel::new(ArrayScale::default()), 0, Axes::Z);
+        assert_eq!(seen.remaining_share(0.0, 0.3), 0.0);
+        assert!(seen.warnings(1e-4, 0.3, None).is_empty());
+        assert!((seen.remaining_share(1e3, 0.3) - 1.0).abs() < 1e-6);
+        let words = seen.warnings(1.0, 0.3, None)[0].to_string();
+        assert!(words.contains("100 %") || words.contains("99 %"), "{words}");
     }
 }

@@ -5,17 +5,19 @@
 //! rule, until no step lowers the error. Only the equations differ: the networks' are made of products that other models
 //! have not, so here J is written out and the step is found by QR decomposition. A network's weights are all of the order
 //! of 1; so are these parameters, which are counted in units of their starting values.
+//!
+//! The models of NIST's nonlinear regression problems.
+//!
+//! Numbers that carry their derivatives with respect to up to nine parameters.
 
-mod dual;
-mod models;
+use std::{
+    f64::consts::PI,
+    ops::{Add, Div, Mul, Neg, Sub},
+};
 
 use faer::{Mat, prelude::SolveLstsq};
 use serde::Deserialize;
 
-use self::{
-    dual::Dual,
-    models::{Model, model},
-};
 use super::{Damping, StopReason};
 
 #[derive(Deserialize)]
@@ -156,3 +158,176 @@ fn certified_parameters_are_found_to_more_than_nine_digits() {
         );
     }
 }
+
+/// A response from parameters and predictors.
+pub(super) type Model = fn(&[Dual], &[f64]) -> Dual;
+
+/// Returns the model of the problem with this name.
+pub(super) fn model(name: &str) -> Model {
+    match name {
+        "Misra1a" | "BoxBOD" => |b, x| b[0] * (1.0 - (-b[1] * x[0]).exp()),
+        "Misra1b" => |b, x| b[0] * (1.0 - 1.0 / (1.0 + b[1] * x[0] / 2.0).square()),
+        "Misra1c" => |b, x| b[0] * (1.0 - (1.0 + 2.0 * b[1] * x[0]).pow(Dual::constant(-0.5))),
+        "Misra1d" => |b, x| b[0] * b[1] * x[0] / (1.0 + b[1] * x[0]),
+        "Chwirut1" | "Chwirut2" => |b, x| (-b[0] * x[0]).exp() / (b[1] + b[2] * x[0]),
+        "Lanczos1" | "Lanczos2" | "Lanczos3" => |b, x| {
+            let decay = |k: usize| b[k] * (-b[k + 1] * x[0]).exp();
+            decay(0) + decay(2) + decay(4)
+        },
+        "Gauss1" | "Gauss2" | "Gauss3" => |b, x| {
+            let bell = |k: usize| b[k] * (-((x[0] - b[k + 1]) / b[k + 2]).square()).exp();
+            b[0] * (-b[1] * x[0]).exp() + bell(2) + bell(5)
+        },
+        "DanWood" => |b, x| b[0] * Dual::constant(x[0]).pow(b[1]),
+        "Kirby2" => |b, x| polynomial(&b[..3], x[0]) / (1.0 + x[0] * polynomial(&b[3..], x[0])),
+        "Hahn1" | "Thurber" => |b, x| polynomial(&b[..4], x[0]) / (1.0 + x[0] * polynomial(&b[4..], x[0])),
+        // Of the logarithm of the response.
+        "Nelson" => |b, x| b[0] - b[1] * x[0] * (-b[2] * x[1]).exp(),
+        "MGH09" => |b, x| b[0] * (x[0] * x[0] + x[0] * b[1]) / (x[0] * x[0] + x[0] * b[2] + b[3]),
+        "MGH10" => |b, x| b[0] * (b[1] / (x[0] + b[2])).exp(),
+        "MGH17" => |b, x| b[0] + b[1] * (-x[0] * b[3]).exp() + b[2] * (-x[0] * b[4]).exp(),
+        "Roszman1" => |b, x| b[0] - b[1] * x[0] - (b[2] / (x[0] - b[3])).atan() / PI,
+        "ENSO" => |b, x| {
+            let cycle = |period: Dual, cos: Dual, sin: Dual| {
+                let phase = 2.0 * PI * x[0] / period;
+                cos * phase.cos() + sin * phase.sin()
+            };
+            b[0] + cycle(Dual::constant(12.0), b[1], b[2]) + cycle(b[3], b[4], b[5]) + cycle(b[6], b[7], b[8])
+        },
+        "Rat42" => |b, x| b[0] / (1.0 + (b[1] - b[2] * x[0]).exp()),
+        "Rat43" => |b, x| b[0] / (1.0 + (b[1] - b[2] * x[0]).exp()).pow(1.0 / b[3]),
+        "Eckerle4" => |b, x| b[0] / b[1] * (-0.5 * ((x[0] - b[2]) / b[1]).square()).exp(),
+        "Bennett5" => |b, x| b[0] * (b[1] + x[0]).pow(-1.0 / b[2]),
+        _ => unreachable!("no model for {name}"),
+    }
+}
+
+fn polynomial(coefficients: &[Dual], x: f64) -> Dual {
+    let highest_first = coefficients.iter().rev().copied();
+    highest_first
+        .reduce(|sum, coefficient| sum * x + coefficient)
+        .expect("at least one coefficient")
+}
+
+/// Most parameters of a problem.
+pub(super) const MAX_PARAMETERS: usize = 9;
+
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Dual {
+    pub(super) value: f64,
+    pub(super) slopes: [f64; MAX_PARAMETERS],
+}
+
+impl Dual {
+    pub(super) fn constant(value: f64) -> Self {
+        let slopes = [0.0; MAX_PARAMETERS];
+        Self { value, slopes }
+    }
+
+    pub(super) fn parameter(index: usize, value: f64) -> Self {
+        let mut parameter = Self::constant(value);
+        parameter.slopes[index] = 1.0;
+        parameter
+    }
+
+    /// A function of this number by its value and its derivative there.
+    fn chain(self, value: f64, derivative: f64) -> Self {
+        let slopes = self.slopes.map(|slope| derivative * slope);
+        Self { value, slopes }
+    }
+
+    fn combined(self, other: Self, value: f64, by_self: f64, by_other: f64) -> Self {
+        let slopes = std::array::from_fn(|k| by_self * self.slopes[k] + by_other * other.slopes[k]);
+        Self { value, slopes }
+    }
+
+    pub(super) fn exp(self) -> Self {
+        let value = self.value.exp();
+        self.chain(value, value)
+    }
+
+    pub(super) fn sin(self) -> Self {
+        self.chain(self.value.sin(), self.value.cos())
+    }
+
+    pub(super) fn cos(self) -> Self {
+        self.chain(self.value.cos(), -self.value.sin())
+    }
+
+    pub(super) fn atan(self) -> Self {
+        self.chain(self.value.atan(), 1.0 / (1.0 + self.value * self.value))
+    }
+
+    pub(super) fn square(self) -> Self {
+        self * self
+    }
+
+    pub(super) fn pow(self, exponent: Self) -> Self {
+        let value = self.value.powf(exponent.value);
+        let by_base = exponent.value * self.value.powf(exponent.value - 1.0);
+        self.combined(exponent, value, by_base, value * self.value.ln())
+    }
+}
+
+impl Neg for Dual {
+    type Output = Self;
+
+    fn neg(self) -> Self {
+        self.chain(-self.value, -1.0)
+    }
+}
+
+impl Add for Dual {
+    type Output = Self;
+
+    fn add(self, other: Self) -> Self {
+        self.combined(other, self.value + other.value, 1.0, 1.0)
+    }
+}
+
+impl Sub for Dual {
+    type Output = Self;
+
+    fn sub(self, other: Self) -> Self {
+        self.combined(other, self.value - other.value, 1.0, -1.0)
+    }
+}
+
+impl Mul for Dual {
+    type Output = Self;
+
+    fn mul(self, other: Self) -> Self {
+        self.combined(other, self.value * other.value, other.value, self.value)
+    }
+}
+
+impl Div for Dual {
+    type Output = Self;
+
+    fn div(self, other: Self) -> Self {
+        let value = self.value / other.value;
+        self.combined(other, value, 1.0 / other.value, -value / other.value)
+    }
+}
+
+macro_rules! with_constants {
+    ($($operator:ident $method:ident),*) => {$(
+        impl $operator<f64> for Dual {
+            type Output = Self;
+
+            fn $method(self, other: f64) -> Self {
+                self.$method(Self::constant(other))
+            }
+        }
+
+        impl $operator<Dual> for f64 {
+            type Output = Dual;
+
+            fn $method(self, other: Dual) -> Dual {
+                Dual::constant(self).$method(other)
+            }
+        }
+    )*};
+}
+
+with_constants!(Add add, Sub sub, Mul mul, Div div);

@@ -8,26 +8,132 @@
 //! S = μI + (V̄V̄ᵀ ⊗ 1) ∘ (BᵀB − C G⁻¹ Cᵀ),   G = H̃ᵀH̃ + μI       (Schur complement on W)
 //! ```
 //!
-//! Two implementations of [`HiddenSolver`](hidden_solver::HiddenSolver) solve with S. For the usual networks S is formed
+//! Two implementations of [`HiddenSolver`](conjugate::HiddenSolver) solve with S. For the usual networks S is formed
 //! and factored. Its order is h·n1, so for wide ones conjugate gradients, which never form S, are cheaper; the choice is
 //! made by the number of multiplications.
 //!
 //! Hidden weights are numbered node by node here: weight (i, a) is i·n1 + a.
+//!
+//! The choice of the solver for a network.
+//!
+//! The cost of solving the equations, from sizes alone, so that the choice of the solver is the same on every machine and
+//! after every pause.
 
-mod choice;
 mod cholesky;
 mod conjugate;
-mod cost;
-#[cfg(test)]
-mod dense;
-mod elimination;
 mod equations;
-mod hidden_solver;
 mod output_layer;
 mod products;
 mod schur;
-mod sums;
-mod weight_classes;
 
 pub(super) use equations::{FactoredEquations, NormalEquations};
-pub(super) use weight_classes::{Decay, PerClass, class_sizes, class_squares};
+pub(super) use schur::{Decay, PerClass, class_sizes, class_squares};
+
+use conjugate::{ConjugateGradient, HiddenSolver};
+use schur::SchurComplement;
+
+use crate::{
+    network::Shape,
+    training::{
+        activations::KeptActivations,
+        examples::{BLOCK, InputPairs},
+        parallel::{LARGE, Work},
+    },
+};
+
+/// Speed of the large products of the factored solver relative to the small ones of conjugate gradients.
+const SPEED: f64 = 2.0;
+
+/// Tells whether factoring is cheaper than conjugate gradients.
+pub(super) fn factoring_is_cheaper(shape: Shape, samples: usize) -> bool {
+    let factored = SchurComplement::cost(shape, samples);
+    let iterated = ConjugateGradient::cost(shape, samples);
+    factored.total() <= SPEED * iterated.total()
+}
+
+/// Cost of a solver for one network and number of samples.
+#[derive(Clone, Copy, Debug)]
+pub(in crate::training) struct Cost {
+    pub(super) shape: Shape,
+    pub(super) samples: usize,
+    /// Multiplications per sample to gather BᵀB.
+    pub(super) gram_per_sample: f64,
+    /// Multiplications to solve once.
+    pub(super) solving: f64,
+    /// Entries of the solver's matrices.
+    pub(super) entries: usize,
+    /// Rows and columns of the entries of BᵀB that are gathered.
+    pub(super) gram: (usize, usize),
+    /// Entries per sample of the buffer for pairs of inputs.
+    pub(super) pairs: usize,
+}
+
+/// Number of columns that are filled at a time, so that they stay in the cache.
+pub(super) const CHUNK: usize = 512;
+
+impl Cost {
+    /// Multiplications per sample to gather all products.
+    fn gathering_per_sample(&self) -> f64 {
+        let (n1, h) = (self.shape.inputs as f64 + 1.0, self.shape.hidden as f64);
+        self.gram_per_sample + n1 * h * (h + 1.0)
+    }
+
+    /// Multiplications to gather and to solve once.
+    pub(super) fn total(&self) -> f64 {
+        self.samples as f64 * self.gathering_per_sample() + self.solving
+    }
+
+    /// Number of parts of the samples that the products are gathered in.
+    pub(super) fn gathering_parts(&self, blocks: usize) -> usize {
+        let work = Work {
+            blocks,
+            multiplications: BLOCK * self.gathering_per_sample() as usize,
+            bytes: self.part_bytes(),
+        };
+        work.parts(LARGE)
+    }
+
+    /// About how many bytes the equations take, next to the samples.
+    pub(super) fn bytes(&self) -> usize {
+        let matrices = self.entries.saturating_mul(size_of::<f64>());
+        let kept = KeptActivations::bytes(self.shape, self.samples)
+            + match self.pairs {
+                0 => 0,
+                _ => InputPairs::kept_bytes(self.shape.inputs, self.samples),
+            };
+        matrices.saturating_add(self.part_bytes()).saturating_add(kept)
+    }
+
+    /// About how many bytes the products take for each part of the samples.
+    fn part_bytes(&self) -> usize {
+        let (h, n1) = (self.shape.hidden, self.shape.inputs + 1);
+        let (rows, columns) = self.gram;
+        let buffers = BLOCK * (CHUNK.min(h * h) + 3 * h + n1 + self.pairs);
+        size_of::<f64>() * (rows * columns + self.shape.hidden_weights() * (h + 1) + buffers)
+    }
+}
+
+#[cfg(test)]
+mod dense;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_usual_networks_are_factored_and_wide_ones_iterated() {
+        let is_factored = |inputs, hidden, outputs, samples| {
+            let shape = Shape {
+                inputs,
+                hidden,
+                outputs,
+            };
+            factoring_is_cheaper(shape, samples)
+        };
+        for samples in [100, 1000, 100_000] {
+            assert!(is_factored(30, 12, 20, samples), "{samples} samples");
+        }
+        assert!(!is_factored(96, 64, 64, 2000));
+        assert!(!is_factored(1536, 512, 1024, 10_000));
+    }
+}

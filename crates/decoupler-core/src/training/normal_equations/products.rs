@@ -2,19 +2,13 @@
 
 use faer::{Accum, Mat, MatMut, MatRef, Par, linalg::matmul::matmul};
 
-use super::{
-    cost::{CHUNK, Cost},
-    hidden_solver::HiddenSolver,
-    sums::Sums,
-};
+use super::{CHUNK, Cost, conjugate::HiddenSolver, equations::Sums};
 use crate::{
     network::{Mlp, Shape},
     training::{
         Evaluation, Examples,
-        activations::{BlockNow, KeptActivations},
-        elementwise::{multiply, multiply_into, tanh_slopes_into},
-        examples::{BLOCK, column, column_mut},
-        input_pairs::PairsBuffer,
+        activations::{BlockNow, KeptActivations, multiply, multiply_into, tanh_slopes_into},
+        examples::{BLOCK, PairsBuffer, column, column_mut},
         parallel::{add_product, for_each_part},
     },
 };
@@ -165,16 +159,16 @@ impl Sums {
 mod tests {
     use super::{
         super::{
+            cholesky::output_weights,
             conjugate::ConjugateGradient,
             dense::{errors, jacobian},
-            elimination::output_weights,
             schur::SchurComplement,
         },
         *,
     };
-    use crate::training::{
-        examples::tests::{random_examples, random_mlp},
-        input_pairs::InputPairs,
+    use crate::training::examples::{
+        InputPairs,
+        tests::{random_examples, random_mlp},
     };
 
     /// The products gathered for one of the solvers.

@@ -1,12 +1,12 @@
 use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
 
-use super::{
-    super::{linear_model::RoundedReading, marginal::medians},
-    *,
-};
+use super::*;
 use crate::{
-    decoupling::row_problem::Range,
-    scene::normal::{normal_cdf, standard_normal},
+    decoupling::{
+        posterior::{gaussian::RoundedReading, truncated::medians},
+        row_problem::Range,
+    },
+    scene::{normal_cdf, standard_normal},
 };
 
 const UNIT: Range = Range {
