@@ -19,7 +19,7 @@ use decoupler_core::{
 };
 use decoupler_files::{
     export::{Table, TableColumn, error_table, format_number, trade_off_summary},
-    figure::trade_words::point_name,
+    figure::point_name,
     import::Recordings,
 };
 

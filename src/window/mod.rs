@@ -27,8 +27,6 @@ mod training_worker;
 mod views;
 mod widgets;
 
-use decoupler_files::figure::ticks;
-
 pub use frame::{DecouplerWindow, Desktop, OpenError, WindowFile, open};
 pub use shared::{Effect, Matter, Notice, Phase, Shared, SourceKind};
 pub use views::{

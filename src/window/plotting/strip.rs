@@ -1,11 +1,11 @@
 use eframe::egui::{Align2, FontId, Rect, Sense, Stroke, StrokeKind, Ui, Vec2, WidgetInfo, accesskit::Role, pos2};
 
-use crate::window::{
-    theme::{Theme, radius, space, type_size},
-    ticks::{multiples, step_for, tick_text},
-};
+use crate::window::theme::{Theme, radius, space, type_size};
 use decoupler_core::evaluation::Spread;
-use decoupler_files::export::format_number;
+use decoupler_files::{
+    export::format_number,
+    figure::{multiples, step_for, tick_text},
+};
 
 /// One dot for each value on a line, with a box over the middle half of them.
 #[derive(Clone, Copy, Debug)]

@@ -11,7 +11,7 @@ use decoupler_files::{
     export::format_number,
     figure::{
         surface::{OrbitCamera, Section, Sight, Surface, ViewMode},
-        ticks::tick_text,
+        tick_text,
     },
 };
 

@@ -1,13 +1,18 @@
+//! Reading of files, of which none has to be a file of ours or even to end.
+
 use std::{
     fs::{self, File, Permissions},
-    io::{self, BufWriter, ErrorKind, Write},
+    io::{self, BufWriter, ErrorKind, Read, Write},
     path::{Path, PathBuf},
 };
 
+use decoupler_core::text::system_cause;
 use thiserror::Error;
 
-use super::unfinished::{Unfinished, folder_of};
-use decoupler_core::text::system_cause;
+use super::{
+    tables::{Heading, NoHeading},
+    unfinished::{Unfinished, folder_of},
+};
 
 /// Errors of writing a file.
 #[derive(Debug, Error)]
@@ -241,8 +246,75 @@ pub fn check_writable(path: &Path) -> Result<(), WriteError> {
     }
 }
 
+/// Returns true if two paths lead to the same file, existing or not, also through links and hard links. Pipes and devices
+/// are never the same: reading from one does not destroy what was written to it.
+pub fn is_same(one: &Path, other: &Path) -> bool {
+    let is_special = |path: &Path| fs::metadata(path).is_ok_and(|found| !found.is_file());
+    if is_special(one) || is_special(other) {
+        return false;
+    }
+    let place = |path: &Path| {
+        let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
+        let folder = fs::canonicalize(folder.unwrap_or(Path::new("."))).ok()?;
+        let new = path.file_name().map(|name| folder.join(name));
+        fs::canonicalize(path).ok().or(new)
+    };
+    is_same_on_disk(one, other) || (place(one).is_some() && place(one) == place(other))
+}
+
+#[cfg(unix)]
+fn is_same_on_disk(one: &Path, other: &Path) -> bool {
+    use std::os::unix::fs::MetadataExt;
+    let on_disk = |path: &Path| fs::metadata(path).ok().map(|found| (found.dev(), found.ino()));
+    on_disk(one).is_some() && on_disk(one) == on_disk(other)
+}
+
+#[cfg(not(unix))]
+fn is_same_on_disk(_one: &Path, _other: &Path) -> bool {
+    false
+}
+
+/// Largest file of JSON that is read or written, in bytes: 1 GiB.
+pub(super) const LARGEST_BYTES: u64 = 1 << 30;
+/// Length of the beginning that shows whether the rest is worth reading.
+const BEGINNING: u64 = 1 << 16;
+
+/// Reads the file of JSON at `path`. Where the beginning shows that it is none of ours, only the beginning is returned.
+///
+/// # Errors
+/// The operating system refuses, or the file does not end within [`LARGEST_BYTES`].
+pub(super) fn read_limited(path: &Path) -> io::Result<Vec<u8>> {
+    let file = File::open(path)?;
+    let length = file.metadata()?.len();
+    if length > LARGEST_BYTES {
+        return Err(too_large());
+    }
+    let mut bytes = Vec::new();
+    (&file).take(BEGINNING).read_to_end(&mut bytes)?;
+    if matches!(Heading::read(&bytes), Err(NoHeading::NotJson(_) | NoHeading::Other)) {
+        return Ok(bytes);
+    }
+    // A pipe or device tells no length.
+    (&file).take(LARGEST_BYTES + 1 - BEGINNING).read_to_end(&mut bytes)?;
+    if bytes.len() as u64 > LARGEST_BYTES {
+        return Err(too_large());
+    }
+    Ok(bytes)
+}
+
+pub(super) fn too_large() -> io::Error {
+    io::Error::new(
+        ErrorKind::FileTooLarge,
+        "it is larger than 1 GiB, which no file of its kind is",
+    )
+}
+
 #[cfg(test)]
 mod tests {
+    use std::fs;
+
+    use rand::{Rng, SeedableRng, rngs::ChaCha8Rng};
+
     use super::*;
     use crate::export::test_folder::names;
 
@@ -342,5 +414,67 @@ mod tests {
         assert!(commit(second).unwrap_err().is_taken());
         assert_eq!(fs::read(&path).unwrap(), b"first");
         assert_eq!(names(folder.path()), ["run.json"]);
+    }
+
+    #[test]
+    fn a_file_is_the_same_by_any_of_its_paths() {
+        let folder = tempfile::tempdir().unwrap();
+        let [file, same, other] = ["a", "./a", "b"].map(|name| folder.path().join(name));
+        assert!(
+            is_same(&file, &same) && !is_same(&file, &other),
+            "before there is a file"
+        );
+        fs::write(&file, "").unwrap();
+        assert!(is_same(&file, &same) && !is_same(&file, &other));
+        fs::hard_link(&file, &other).unwrap();
+        assert!(is_same(&file, &other));
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_device_may_be_read_and_written() {
+        assert!(!is_same(Path::new("/dev/null"), Path::new("/dev/null")));
+    }
+
+    #[test]
+    fn only_the_beginning_is_read_of_what_is_no_json() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("file");
+        let read = |bytes: &[u8]| {
+            fs::write(&path, bytes).unwrap();
+            read_limited(&path).unwrap()
+        };
+        let json = format!("{{\"format\":\"a\",\"text\":\"{}\"}}", "ä".repeat(100_000));
+        assert_eq!(read(json.as_bytes()), json.as_bytes());
+        let cut = &json.as_bytes()[..150_000];
+        assert_eq!(read(cut), cut);
+        assert_eq!(read(&[b'x'; 100_000]).len(), 1 << 16);
+    }
+
+    #[test]
+    fn only_the_beginning_is_read_of_random_bytes() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("file");
+        let mut bytes = vec![0; 100_000];
+        ChaCha8Rng::seed_from_u64(0).fill_bytes(&mut bytes);
+        for first in 0..=u8::MAX {
+            bytes[0] = first;
+            fs::write(&path, &bytes).unwrap();
+            assert_eq!(read_limited(&path).unwrap().len(), 1 << 16, "first byte {first}");
+        }
+    }
+
+    #[test]
+    fn what_is_too_large_is_refused_unread() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("file");
+        fs::write(&path, "{\"format\":\"").unwrap();
+        File::options()
+            .write(true)
+            .open(&path)
+            .unwrap()
+            .set_len(1 << 40)
+            .unwrap();
+        assert_eq!(read_limited(&path).unwrap_err().kind(), ErrorKind::FileTooLarge);
     }
 }

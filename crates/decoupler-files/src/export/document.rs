@@ -8,8 +8,8 @@ use thiserror::Error;
 
 use super::{
     WriteError,
-    heading::{Heading, NoHeading},
-    limited::read_limited,
+    atomic::read_limited,
+    tables::{Heading, NoHeading},
 };
 use crate::import::Recorded;
 use decoupler_core::{

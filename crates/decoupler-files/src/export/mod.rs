@@ -34,17 +34,11 @@ mod document;
 mod experiment_tables;
 mod experiment_words;
 pub mod figures;
-mod heading;
-mod kept_files;
-mod limited;
 mod network_file;
 mod recipe_file;
-mod recorded_words;
 pub mod report;
 mod run_folder;
-mod same_file;
 mod samples;
-mod sealed;
 mod sensor_file;
 mod soundness;
 mod sweep;
@@ -53,11 +47,9 @@ mod tables;
 #[cfg(test)]
 mod test_folder;
 mod trade_tables;
-mod training_record;
 mod unfinished;
-mod workload_words;
 
-pub use atomic::{AtomicFile, WriteError, atomic_write, check_writable};
+pub use atomic::{AtomicFile, WriteError, atomic_write, check_writable, is_same};
 pub use checkpoint_file::CheckpointFile;
 pub use decoupler_core::text::{format_decimals, format_duration, format_number, format_percent, format_r2};
 pub use document::{DocumentError, DocumentKind};
@@ -67,24 +59,17 @@ pub use experiment_tables::{
 pub use experiment_words::{describe_conditions, describe_failures, describe_worse_than_mean};
 pub use network_file::NetworkFile;
 pub use recipe_file::{RecipeFile, RecipeSource};
-pub use recorded_words::{
-    describe_determinacy, describe_positions, describe_target, describe_warnings, describe_worse_than_ridge,
-};
 pub use run_folder::{KeptRun, KeptRuns, RunFolder};
-pub use same_file::is_same;
-pub use samples::{write_decoded, write_decoded_header};
-pub use samples::{write_samples, write_samples_header};
+pub use samples::{TrainingRecord, write_decoded, write_decoded_header, write_samples, write_samples_header};
 pub use sensor_file::SensorFile;
-pub use sweep::MergedSweep;
-pub use sweep::sweep_specification;
 pub use sweep::{
-    PlanAxis, SweepFolderError, SweepPlan, SweepTableFormat, Trial, TrialId, TrialOptions, decoders_in_order,
-    recording_options, train_options,
+    MergedSweep, PlanAxis, SweepFiles, SweepFolderError, SweepPlan, SweepRow, SweepTableFormat, Trial, TrialId,
+    TrialOptions, decoders_in_order, recording_options, sweep_specification, train_options,
 };
-pub use sweep::{SweepFiles, SweepRow};
 pub use table::{Cell, Table, TableColumn, TableForm};
-pub use tables::{decoder_table, error_table, write_loss_curves};
-pub use trade_tables::{trade_off_points, trade_off_summary};
-pub use training_record::TrainingRecord;
+pub use tables::{
+    decoder_table, describe_determinacy, describe_positions, describe_target, describe_warnings,
+    describe_worse_than_ridge, error_table, write_loss_curves,
+};
+pub use trade_tables::{describe_workload, trade_off_points, trade_off_summary};
 pub use unfinished::exit_leaving_nothing;
-pub use workload_words::describe_workload;

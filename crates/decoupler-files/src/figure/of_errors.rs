@@ -5,8 +5,7 @@ use ndarray::Array2;
 use super::{
     axis::PlotAxis,
     look::{Hue, Key, LineStyle, Look},
-    plot::{LineAt, Plot, PlotPoint, ReferenceLine, Series},
-    plot_figure::PlotFigure,
+    plot::{LineAt, Plot, PlotFigure, PlotPoint, ReferenceLine, Series},
 };
 use decoupler_core::{dataset::Dataset, evaluation::Channel};
 

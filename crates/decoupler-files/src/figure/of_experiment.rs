@@ -7,8 +7,7 @@ use super::{
     colour_map::SequentialMap,
     heat_map::HeatMap,
     look::{Hue, Key, LineStyle, Look, Marker},
-    plot::{LineAt, Plot, PlotPoint, ReferenceLine, Series, Span},
-    plot_figure::PlotFigure,
+    plot::{LineAt, Plot, PlotFigure, PlotPoint, ReferenceLine, Series, Span},
 };
 use crate::figure::Figure;
 use decoupler_core::{

@@ -3,8 +3,7 @@
 use super::{
     axis::PlotAxis,
     look::{Hue, Key, LineStyle, Look, Marker},
-    plot::{Plot, PlotPoint, Series},
-    plot_figure::PlotFigure,
+    plot::{Plot, PlotFigure, PlotPoint, Series},
 };
 use decoupler_core::{
     evaluation::recorded::LearningCurve,

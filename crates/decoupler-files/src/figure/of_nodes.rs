@@ -6,8 +6,7 @@ use ndarray::Array2;
 use super::{
     axis::{PlotAxis, TickRule},
     look::{Hue, Key, Look, Marker},
-    plot::{Plot, PlotPoint, Series},
-    plot_figure::PlotFigure,
+    plot::{Plot, PlotFigure, PlotPoint, Series},
 };
 use decoupler_core::{dataset::Dataset, evaluation::NodeAddress, text::format_number};
 

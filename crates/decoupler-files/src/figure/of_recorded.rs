@@ -5,10 +5,9 @@ use std::ops::RangeInclusive;
 use ndarray::{Array2, ArrayView2};
 
 use super::{
-    axis::PlotAxis,
+    axis::{PlotAxis, step_for, tick_text},
     colour_map::SequentialMap,
     heat_map::HeatMap,
-    ticks::{step_for, tick_text},
 };
 use decoupler_core::text::{counted, format_number};
 

@@ -7,8 +7,7 @@ use glam::DVec3;
 use super::{
     axis::PlotAxis,
     look::{Hue, Key, LineStyle, Look, Marker},
-    plot::{Plot, PlotPoint, Series, Span},
-    plot_figure::PlotFigure,
+    plot::{Plot, PlotFigure, PlotPoint, Series, Span},
     surface::{Section, SectionLine},
 };
 use decoupler_core::{

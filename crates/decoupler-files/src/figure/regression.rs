@@ -3,8 +3,7 @@
 use super::{
     axis::PlotAxis,
     look::{Hue, Key, LineStyle, Look, Marker},
-    plot::{Plot, PlotPoint, Series},
-    plot_figure::{PlotFigure, thinned_places},
+    plot::{Plot, PlotFigure, PlotPoint, Series, thinned_places},
 };
 use decoupler_core::text::format_number;
 

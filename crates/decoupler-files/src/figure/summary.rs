@@ -4,8 +4,7 @@ use super::{
     axis::{AxisScale, PlotAxis},
     heat_map::HeatMap,
     look::LineStyle,
-    plot::{LineAt, Plot, PlotPoint, Series},
-    plot_figure::PlotFigure,
+    plot::{LineAt, Plot, PlotFigure, PlotPoint, Series},
     surface::{Quantity, Surface},
 };
 use decoupler_core::text::{counted, format_number};

@@ -6,13 +6,12 @@ use std::{
 
 use super::{
     Cells, Column, Dialect, DialectChoice, Encoding, Fault, Format, Missing, Table, TableError,
-    column::{Labels, name_and_unit},
     detection::{BEGINNING, detect},
-    number::{Cell, parse},
+    dialect::Utf16,
+    format::{Cell, parse},
+    input_lines::table_error,
     rows::Rows,
-    table::{Excess, Lines, stem},
-    utf16::Utf16,
-    watch::table_error,
+    table::{Excess, Labels, Lines, name_and_unit, stem},
 };
 use decoupler_core::text::clean_name;
 

@@ -1,8 +1,8 @@
 use super::{
     Decimal, Dialect, DialectChoice, Encoding, Separator, TableError,
-    number::{Cell, parse},
+    dialect::Utf16,
+    format::{Cell, parse},
     rows::Rows,
-    utf16::Utf16,
 };
 
 /// Length of the beginning from which the layout is found.

@@ -2,7 +2,7 @@
 
 use std::{fmt, fs::File, io::BufReader, path::Path};
 
-use super::{Dialect, TableError, Watch, element::Array, matlab, npz, numpy, watch::Watched};
+use super::{Decimal, Dialect, TableError, Watch, input_lines::Watched, matlab, npz, numpy};
 
 /// Kind of a file.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -64,6 +64,188 @@ impl fmt::Display for Format {
             Self::Npy => f.write_str("NumPy array"),
             Self::Npz => f.write_str("archive of NumPy arrays"),
             Self::Matlab => f.write_str("MATLAB file"),
+        }
+    }
+}
+
+/// Type of the numbers in a file of NumPy or MATLAB.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Element {
+    F32,
+    F64,
+    I8,
+    I16,
+    I32,
+    I64,
+    U8,
+    U16,
+    U32,
+    U64,
+}
+
+/// Order of the bytes of a number.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Endian {
+    Little,
+    Big,
+}
+
+impl Element {
+    /// Number of bytes.
+    pub(super) fn size(self) -> usize {
+        match self {
+            Self::I8 | Self::U8 => 1,
+            Self::I16 | Self::U16 => 2,
+            Self::F32 | Self::I32 | Self::U32 => 4,
+            Self::F64 | Self::I64 | Self::U64 => 8,
+        }
+    }
+
+    /// Reads the numbers in `bytes`, of which no part is left over.
+    pub(super) fn read(self, bytes: &[u8], endian: Endian) -> Vec<f64> {
+        macro_rules! numbers {
+            ($type:ty) => {
+                bytes
+                    .chunks_exact(size_of::<$type>())
+                    .map(|chunk| {
+                        let bytes = chunk.try_into().expect("chunks have the size of the type");
+                        let number = match endian {
+                            Endian::Little => <$type>::from_le_bytes(bytes),
+                            Endian::Big => <$type>::from_be_bytes(bytes),
+                        };
+                        #[allow(clippy::cast_lossless, reason = "not lossless for all of the types")]
+                        let number = number as f64;
+                        number
+                    })
+                    .collect()
+            };
+        }
+        match self {
+            Self::F32 => numbers!(f32),
+            Self::F64 => numbers!(f64),
+            Self::I8 => numbers!(i8),
+            Self::I16 => numbers!(i16),
+            Self::I32 => numbers!(i32),
+            Self::I64 => numbers!(i64),
+            Self::U8 => numbers!(u8),
+            Self::U16 => numbers!(u16),
+            Self::U32 => numbers!(u32),
+            Self::U64 => numbers!(u64),
+        }
+    }
+}
+
+/// A named array of numbers: rows × columns, column by column.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Array {
+    pub(super) name: String,
+    pub(super) rows: usize,
+    pub(super) columns: Vec<Vec<f64>>,
+}
+
+impl Array {
+    /// Divides `numbers` into columns.
+    pub(super) fn new(
+        name: String,
+        rows: usize,
+        width: usize,
+        numbers: Vec<f64>,
+        is_by_column: bool,
+    ) -> Result<Self, TableError> {
+        if width > super::rows::MAX_CELLS {
+            let reason = format!(
+                "{rows} × {width} is more than {} columns; transpose it",
+                super::rows::MAX_CELLS
+            );
+            return Err(TableError::array(name, reason));
+        }
+        let columns = if width == 1 {
+            vec![numbers]
+        } else if is_by_column {
+            numbers.chunks_exact(rows.max(1)).map(<[f64]>::to_vec).collect()
+        } else {
+            let column = |index| numbers.iter().skip(index).step_by(width).copied().collect();
+            (0..width).map(column).collect()
+        };
+        Ok(Self { name, rows, columns })
+    }
+}
+
+/// A cell as a number.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Cell {
+    /// A finite number.
+    Number(f64),
+    /// Empty, or "NaN".
+    Missing,
+    /// Anything else, infinities included.
+    Text,
+}
+
+/// Longest number that is copied to the stack.
+const LONGEST: usize = 64;
+
+/// Reads a cell without surrounding spaces; the number is the one nearest to the text.
+pub(super) fn parse(cell: &[u8], decimal: Decimal) -> Cell {
+    if cell.is_empty() {
+        return Cell::Missing;
+    }
+    let number = match decimal {
+        Decimal::Point => parse_point(cell),
+        // A point would be a separator of thousands, or a point after all.
+        Decimal::Comma if cell.contains(&b'.') || cell.len() > LONGEST => None,
+        Decimal::Comma => {
+            let mut copy = [0; LONGEST];
+            let copy = &mut copy[..cell.len()];
+            copy.copy_from_slice(cell);
+            if let Some(comma) = copy.iter_mut().find(|byte| **byte == b',') {
+                *comma = b'.';
+            }
+            parse_point(copy)
+        }
+    };
+    match number {
+        Some(number) if number.is_finite() => Cell::Number(number),
+        Some(number) if number.is_nan() => Cell::Missing,
+        _ => Cell::Text,
+    }
+}
+
+fn parse_point(cell: &[u8]) -> Option<f64> {
+    std::str::from_utf8(cell).ok()?.parse().ok()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn cells_are_numbers_missing_or_text() {
+        use Cell::{Missing, Number, Text};
+        let cases = [
+            ("1.5", Number(1.5), Text),
+            ("1,5", Text, Number(1.5)),
+            ("-2e-3", Number(-0.002), Number(-0.002)),
+            ("+.5", Number(0.5), Text),
+            ("1.234,5", Text, Text),
+            ("1,234,5", Text, Text),
+            ("", Missing, Missing),
+            ("NaN", Missing, Missing),
+            ("nan", Missing, Missing),
+            ("inf", Text, Text),
+            ("1e999", Text, Text),
+            ("NA", Text, Text),
+            ("1 000", Text, Text),
+            ("0x10", Text, Text),
+            (
+                "9007199254740993",
+                Number(9_007_199_254_740_992.0),
+                Number(9_007_199_254_740_992.0),
+            ),
+        ];
+        for (text, point, comma) in cases {
+            assert_eq!(parse(text.as_bytes(), Decimal::Point), point, "{text}");
+            assert_eq!(parse(text.as_bytes(), Decimal::Comma), comma, "{text}");
         }
     }
 }

@@ -3,8 +3,7 @@ use std::path::{Path, PathBuf};
 use super::{
     Cells, Cure, ImportError, Joined, Missing, Recipe, Recording, Table, Watch,
     csv_table::Reading,
-    gather::{Source, gather},
-    join::{Partners, median_interval, nearest},
+    join::{Partners, Source, gather, median_interval, nearest},
     meanings::Meanings,
     names::{ColumnId, Names},
     positions::read_positions,
@@ -12,8 +11,7 @@ use super::{
     selection::{Rows, not_a_number},
     table::stem,
 };
-use decoupler_core::dataset::Dataset;
-use decoupler_core::evaluation::Channel;
+use decoupler_core::{dataset::Dataset, evaluation::Channel};
 
 impl Recipe {
     /// Reads the files, relative to `folder`, and makes the samples.

@@ -1,10 +1,15 @@
-use thiserror::Error;
+use std::{
+    io::{self, Read},
+    ops::ControlFlow,
+};
 
-use super::{InputColumns, InputError};
 use decoupler_core::{
     evaluation::Channel,
     text::{CsvFields, number},
 };
+use thiserror::Error;
+
+use super::{InputColumns, InputError, TableError};
 
 /// Parser of lines of CSV that come one by one and hold the inputs of a network: under the names of a header or, without
 /// one, in their order, after the number of the row-wire where each row-wire has a network.
@@ -152,6 +157,72 @@ impl InputLines {
             row_index,
             readings: &self.readings,
         })
+    }
+}
+
+/// Number of bytes between two reports.
+const INTERVAL: u64 = 1 << 20;
+
+/// Progress of the reading of one file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Progress {
+    /// Number of bytes read.
+    pub bytes: u64,
+    /// Size of the file in bytes; `None` for a pipe.
+    pub of: Option<u64>,
+}
+
+/// Called every megabyte; [`ControlFlow::Break`] cancels the import.
+pub type Watch<'a> = &'a mut dyn FnMut(Progress) -> ControlFlow<()>;
+
+/// A source that reports how far it has been read.
+pub(super) struct Watched<'a, 'w, R> {
+    source: R,
+    progress: Progress,
+    next: u64,
+    watch: &'a mut (dyn FnMut(Progress) -> ControlFlow<()> + 'w),
+}
+
+impl<'a, 'w, R: Read> Watched<'a, 'w, R> {
+    pub(super) fn new(
+        source: R,
+        of: Option<u64>,
+        watch: &'a mut (dyn FnMut(Progress) -> ControlFlow<()> + 'w),
+    ) -> Self {
+        Self {
+            source,
+            progress: Progress { bytes: 0, of },
+            next: 0,
+            watch,
+        }
+    }
+}
+
+impl<R: Read> Read for Watched<'_, '_, R> {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        if self.progress.bytes >= self.next {
+            self.next = self.progress.bytes + INTERVAL;
+            if (self.watch)(self.progress).is_break() {
+                return Err(io::Error::other(Cancelled));
+            }
+        }
+        let read = self.source.read(buffer)?;
+        self.progress.bytes += read as u64;
+        Ok(read)
+    }
+}
+
+/// Carries a cancellation through readers that know errors of input only.
+#[derive(Debug, thiserror::Error)]
+#[error("cancelled")]
+struct Cancelled;
+
+/// The error as the import reports it.
+pub(super) fn table_error(error: io::Error) -> TableError {
+    if error.get_ref().is_some_and(|inner| inner.is::<Cancelled>()) {
+        TableError::Cancelled
+    } else {
+        TableError::Io(error)
     }
 }
 

@@ -3,7 +3,7 @@ use std::path::Path;
 use ndarray::Array2;
 use thiserror::Error;
 
-use super::{Column, ImportError, Recipe, TableError, Watch, column::name_and_unit, csv_table::named, names::Names};
+use super::{Column, ImportError, Recipe, TableError, Watch, csv_table::named, names::Names, table::name_and_unit};
 use decoupler_core::evaluation::Channel;
 
 /// Readings of a file for a network that was trained on others of its kind.

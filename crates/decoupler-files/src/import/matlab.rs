@@ -8,8 +8,8 @@ use flate2::read::ZlibDecoder;
 
 use super::{
     TableError,
-    element::{Array, Element, Endian},
-    watch::table_error,
+    format::{Array, Element, Endian},
+    input_lines::table_error,
 };
 
 /// Number of bytes that are read at once, so that a length that lies costs no memory.

@@ -49,7 +49,7 @@ impl Names {
     /// Finds a column by its full name, with or without the unit that the header gives.
     pub(super) fn find(&self, given: &str) -> Result<ColumnId, ImportError> {
         let name = &clean_name(given.trim());
-        let bare = super::column::name_and_unit(name).0;
+        let bare = super::table::name_and_unit(name).0;
         let with = |name: &str| -> Vec<ColumnId> {
             let found = self.names.iter().filter(|(other, _)| other == name);
             found.map(|(_, id)| *id).collect()

@@ -2,7 +2,7 @@ use std::io::{Read, Seek};
 
 use zip::{ZipArchive, result::ZipError};
 
-use super::{TableError, Watch, element::Array, numpy, watch::Watched};
+use super::{TableError, Watch, format::Array, input_lines::Watched, numpy};
 
 /// Reads the arrays of an archive, and says which entries are none.
 pub(super) fn read(source: impl Read + Seek, watch: Watch<'_>) -> Result<(Vec<Array>, Vec<String>), TableError> {
@@ -29,7 +29,7 @@ pub(super) fn read(source: impl Read + Seek, watch: Watch<'_>) -> Result<(Vec<Ar
 
 fn defect(what: &str, error: ZipError) -> TableError {
     match error {
-        ZipError::Io(error) => super::watch::table_error(error),
+        ZipError::Io(error) => super::input_lines::table_error(error),
         error => TableError::array(what, format!("{error}; save it again with numpy.savez")),
     }
 }

@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{
     Cure, ImportError, Joined, Recipe, Recording, Watch,
-    stored_path::{restored, stored},
+    recipe::{restored, stored},
 };
 use decoupler_core::dataset::{Dataset, Division, Seed, Split, SplitBy};
 

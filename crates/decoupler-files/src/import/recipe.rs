@@ -1,4 +1,9 @@
-use std::{collections::BTreeMap, path::PathBuf};
+//! Paths of recordings in files that name them: relative to the folder of the file.
+
+use std::{
+    collections::BTreeMap,
+    path::{Component, Path, PathBuf},
+};
 
 use serde::{Deserialize, Serialize};
 
@@ -62,4 +67,82 @@ pub struct Joined {
     /// Largest time between partners; half the median interval of this file if absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub limit: Option<f64>,
+}
+
+/// Path of a recording to be stored in a file in `folder`: relative to the folder; the name alone for a recording in the
+/// user's home if the folder lies elsewhere, so that no file names the home of its author.
+pub fn stored(path: &Path, folder: &Path) -> PathBuf {
+    let absolute = |path: &Path| std::path::absolute(path).map_or_else(|_| path.to_owned(), |path| normal(&path));
+    relative(&absolute(path), &absolute(folder), std::env::home_dir().as_deref())
+}
+
+/// Path of a recording that a file in `folder` names as `stored`. A recording that is not where it was may lie next to the
+/// file.
+pub(super) fn restored(stored: &Path, folder: &Path) -> PathBuf {
+    let path = normal(&folder.join(stored));
+    let neighbour = path.file_name().map(|name| folder.join(name));
+    match neighbour {
+        Some(neighbour) if !path.exists() && neighbour.exists() => neighbour,
+        _ => path,
+    }
+}
+
+/// Path of a file as seen from `folder`, both absolute; the name alone if the way leads out of `home` or has no common
+/// beginning.
+fn relative(path: &Path, folder: &Path, home: Option<&Path>) -> PathBuf {
+    let name = || path.file_name().map_or_else(|| path.to_owned(), PathBuf::from);
+    if home.is_some_and(|home| path.starts_with(home) && !folder.starts_with(home)) {
+        return name();
+    }
+    let (of_path, of_folder) = (Vec::from_iter(path.components()), Vec::from_iter(folder.components()));
+    let shared = of_path
+        .iter()
+        .zip(&of_folder)
+        .take_while(|(one, other)| one == other)
+        .count();
+    if shared == 0 {
+        return name();
+    }
+    let up = of_folder[shared..].iter().map(|_| Component::ParentDir);
+    up.chain(of_path[shared..].iter().copied()).collect()
+}
+
+/// Removes `..` by the names before it.
+fn normal(path: &Path) -> PathBuf {
+    let mut normal = PathBuf::new();
+    for component in path.components() {
+        match component {
+            Component::CurDir => {}
+            Component::ParentDir if matches!(normal.components().next_back(), Some(Component::Normal(_))) => {
+                normal.pop();
+            }
+            component => normal.push(component),
+        }
+    }
+    normal
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn no_stored_path_names_the_home_of_its_author() {
+        let home = Some(Path::new("/home/ada"));
+        for (path, folder, expected) in [
+            ("/home/ada/data/press.csv", "/home/ada/data", "press.csv"),
+            (
+                "/home/ada/data/press.csv",
+                "/home/ada/nets/best",
+                "../../data/press.csv",
+            ),
+            ("/home/ada/data/press.csv", "/media/stick", "press.csv"),
+            ("/data/press.csv", "/home/ada", "../../data/press.csv"),
+            ("/data/a/press.csv", "/data/b", "../a/press.csv"),
+        ] {
+            let found = relative(Path::new(path), Path::new(folder), home);
+            assert_eq!(found, Path::new(expected), "{path} from {folder}");
+        }
+        assert_eq!(normal(Path::new("/a/b/../c/./d")), Path::new("/a/c/d"));
+    }
 }

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{
     ImportError, Plan, PlannedSets,
-    stored_path::{restored, stored},
+    recipe::{restored, stored},
 };
 use decoupler_core::dataset::Dataset;
 

@@ -5,7 +5,7 @@ use std::{
 
 use csv_core::ReadRecordResult;
 
-use super::{Separator, TableError, watch::table_error};
+use super::{Separator, TableError, input_lines::table_error};
 
 /// Largest length of a row in bytes: 16 MiB, of ten thousand columns and more.
 pub(super) const LONGEST_ROW: usize = 1 << 24;

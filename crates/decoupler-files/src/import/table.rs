@@ -1,7 +1,8 @@
-use std::path::Path;
+use std::{collections::HashMap, path::Path};
 
-use super::{Column, Dialect, Format};
 use decoupler_core::text::clean_name;
+
+use super::{Dialect, Format};
 
 /// A file as columns of equal lengths.
 #[derive(Clone, Debug)]
@@ -86,6 +87,154 @@ pub(super) fn stem(path: &Path) -> String {
         .map_or_else(|| "data".to_owned(), |stem| clean_name(&stem.to_string_lossy()))
 }
 
+/// A column of a table.
+#[derive(Clone, Debug, Default)]
+pub struct Column {
+    /// Name without the unit.
+    pub name: String,
+    /// Unit, if the header has one in brackets.
+    pub unit: Option<String>,
+    /// Cells, one for each row.
+    pub cells: Cells,
+    /// Number of cells that are missing.
+    pub missing: usize,
+    /// Cells that are neither numbers nor missing.
+    pub faults: Faults,
+}
+
+/// Cells of a column.
+#[derive(Clone, Debug)]
+pub enum Cells {
+    /// Numbers; NaN where a cell is missing or no number.
+    Numbers(Vec<f64>),
+    /// Labels of groups.
+    Labels {
+        /// Number of each cell's label, in the order in which labels first occur; `None` where it is missing.
+        numbers: Vec<Option<u32>>,
+        /// The labels, each with its number if it is one, else NaN.
+        texts: Vec<(String, f64)>,
+    },
+}
+
+/// Cells that are neither numbers nor missing.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Faults {
+    /// Number of such cells.
+    pub count: usize,
+    /// The first of them.
+    pub first: Option<Fault>,
+}
+
+/// A cell that is neither a number nor missing.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Fault {
+    /// Line of the cell, from 1.
+    pub line: u64,
+    /// Text of the cell, shortened.
+    pub text: String,
+}
+
+impl Default for Cells {
+    fn default() -> Self {
+        Self::Numbers(Vec::new())
+    }
+}
+
+impl Cells {
+    /// Number of cells.
+    pub fn len(&self) -> usize {
+        match self {
+            Self::Numbers(numbers) => numbers.len(),
+            Self::Labels { numbers, .. } => numbers.len(),
+        }
+    }
+
+    /// Returns `true` if there are no cells.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// Cell as a number: NaN where it is missing, or a label that is not a number.
+    pub(super) fn number(&self, row: usize) -> f64 {
+        match self {
+            Self::Numbers(numbers) => numbers[row],
+            Self::Labels { numbers, texts } => numbers[row].map_or(f64::NAN, |label| texts[label as usize].1),
+        }
+    }
+
+    /// Returns `true` for a cell that is missing.
+    pub(super) fn is_missing(&self, row: usize) -> bool {
+        match self {
+            Self::Numbers(numbers) => numbers[row].is_nan(),
+            Self::Labels { numbers, .. } => numbers[row].is_none(),
+        }
+    }
+
+    /// Value that is equal for cells of the same group.
+    pub(super) fn group(&self, row: usize) -> u64 {
+        match self {
+            Self::Numbers(numbers) => numbers[row].to_bits(),
+            Self::Labels { numbers, .. } => numbers[row].map_or(u64::MAX, u64::from),
+        }
+    }
+
+    /// The first label that is not a number.
+    pub(super) fn wordy_label(&self) -> Option<&str> {
+        match self {
+            Self::Numbers(_) => None,
+            Self::Labels { texts, .. } => texts
+                .iter()
+                .find(|(_, number)| number.is_nan())
+                .map(|(text, _)| text.as_str()),
+        }
+    }
+}
+
+/// Labels in the order in which they first occur.
+#[derive(Debug, Default)]
+pub(super) struct Labels {
+    pub(super) numbers: Vec<Option<u32>>,
+    texts: Vec<(String, f64)>,
+    known: HashMap<String, u32>,
+}
+
+impl Labels {
+    /// Adds a cell: its text and, if it is one, its number.
+    pub(super) fn push(&mut self, label: Option<(&str, Option<f64>)>) {
+        let number = label.map(|(text, value)| {
+            self.known.get(text).copied().unwrap_or_else(|| {
+                let number = self.texts.len() as u32;
+                self.texts.push((clean_name(text), value.unwrap_or(f64::NAN)));
+                self.known.insert(text.to_owned(), number);
+                number
+            })
+        });
+        self.numbers.push(number);
+    }
+
+    pub(super) fn into_cells(self) -> Cells {
+        Cells::Labels {
+            numbers: self.numbers,
+            texts: self.texts,
+        }
+    }
+}
+
+/// Divides a header as "x (mm)" or "x [mm]" into name and unit.
+pub(super) fn name_and_unit(header: &str) -> (&str, Option<&str>) {
+    let header = header.trim();
+    for (open, close) in [('(', ')'), ('[', ']')] {
+        if let Some(rest) = header.strip_suffix(close)
+            && let Some((name, unit)) = rest.rsplit_once(open)
+            && !name.trim().is_empty()
+            && !unit.trim().is_empty()
+        {
+            return (name.trim(), Some(unit.trim()));
+        }
+    }
+    (header, None)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -102,5 +251,22 @@ mod tests {
             assert_eq!(lines.of(row), line);
         }
         assert_eq!(Lines::default().of(4), 5);
+    }
+
+    #[test]
+    fn units_stand_in_brackets_at_the_end() {
+        let cases = [
+            ("x (mm)", "x", Some("mm")),
+            (" force [N] ", "force", Some("N")),
+            ("B(µT)", "B", Some("µT")),
+            ("f(x) (1/s)", "f(x)", Some("1/s")),
+            ("x", "x", None),
+            ("(mm)", "(mm)", None),
+            ("x ()", "x ()", None),
+            ("x (mm) raw", "x (mm) raw", None),
+        ];
+        for (header, name, unit) in cases {
+            assert_eq!(name_and_unit(header), (name, unit), "{header}");
+        }
     }
 }

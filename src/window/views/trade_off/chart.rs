@@ -12,10 +12,7 @@ use crate::window::{
     widgets::{claim_right_click, dim_ui},
 };
 use decoupler_core::evaluation::{TradeOffCost, TradeOffLevel, TradeOffPoint};
-use decoupler_files::figure::{
-    PlotFigure,
-    trade_words::{point_facts, point_name},
-};
+use decoupler_files::figure::{PlotFigure, point_facts, point_name};
 
 /// Half the side of the square in which a point answers the pointer.
 const REACH: f32 = 7.0;

@@ -14,7 +14,7 @@ use decoupler_core::{
 };
 use decoupler_files::{
     export::format_percent,
-    figure::trade_words::{frame_time, point_facts, point_name},
+    figure::{frame_time, point_facts, point_name},
 };
 
 /// "Fastest under", "most accurate under", and the marked point. Returns what the user wants to do with it; `source` gives

@@ -16,7 +16,7 @@ use crate::window::{
 use decoupler_core::evaluation::{RunSettings, TradeOffLevel, TradeOffLimits, TradeOffPoint};
 use decoupler_files::{
     export::NetworkFile,
-    figure::trade_words::point_name,
+    figure::point_name,
     import::{Recorded, Setup},
 };
 

@@ -10,7 +10,7 @@ use crate::window::{
 use decoupler_core::evaluation::{TradeOffCost, TradeOffLevel, TradeOffPoint};
 use decoupler_files::{
     export::format_number,
-    figure::trade_words::{frame_time, point_name, training_time},
+    figure::{frame_time, point_name, training_time},
 };
 
 /// A column of figures.

@@ -1,12 +1,15 @@
 use std::{fmt, str::FromStr};
 
+use decoupler_core::decoupling::{DecoderKind, Precision};
 use thiserror::Error;
 
 use super::{
-    BundleDecoder, BundleError, c99,
-    draft::{Call, Draft},
-    json, matlab, numpy, onnx,
+    BundleError, c99,
+    fixed_point::FixedNetworks,
+    folder::{Call, Draft},
+    matlab, numpy, onnx,
     report::BundleCheck,
+    weights::{self, Digits},
 };
 
 /// Form in which a network leaves the program.
@@ -148,7 +151,7 @@ impl BundleFormat {
                 precisions: &[Double],
                 has_iterations: false,
                 writer: Writer {
-                    export: json::export,
+                    export: weights::export,
                     call: |_| String::new(),
                 },
             },
@@ -272,6 +275,146 @@ impl FromStr for BundlePrecision {
         let mut all = Self::ALL.into_iter();
         let found = all.find(|precision| precision.to_string() == text.trim());
         found.ok_or_else(|| ChoiceError::Precision(text.to_owned()))
+    }
+}
+
+/// Decoder that leaves the program as a bundle.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum BundleDecoder {
+    /// One of the decoders that are compared with the network.
+    Kind(DecoderKind),
+    /// The linear map of the error table.
+    Linear,
+}
+
+impl BundleDecoder {
+    /// All decoders, in the order offered to the user.
+    pub fn all() -> impl Iterator<Item = Self> {
+        DecoderKind::ALL.into_iter().map(Self::Kind).chain([Self::Linear])
+    }
+
+    /// Says what each decoder is, for the help of a command.
+    pub fn help() -> String {
+        let line = |decoder: Self| {
+            let meaning = match decoder {
+                Self::Kind(kind) => kind.meaning(),
+                Self::Linear => "The linear map of the error table",
+            };
+            format!("{decoder}: {meaning}")
+        };
+        let lines: Vec<String> = Self::all().map(line).collect();
+        format!("Decoder to export. {}", lines.join("; "))
+    }
+
+    /// Returns `true` for the trained network.
+    pub fn is_network(self) -> bool {
+        self == Self::Kind(DecoderKind::Network)
+    }
+
+    /// Returns `true` if the decoder computes with a trained network.
+    pub fn needs_network(self) -> bool {
+        matches!(self, Self::Kind(kind) if kind.needs_network())
+    }
+
+    /// Returns `true` if the decoder iterates on the equations of the sensor.
+    pub fn solves_equations(self) -> bool {
+        matches!(self, Self::Kind(kind) if kind.needs_sensor())
+    }
+
+    /// Name in tables and forms.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Kind(kind) => kind.name(Precision::Double),
+            Self::Linear => "Linear map",
+        }
+    }
+
+    /// Word for it in sentences, and the name of its file of weights: network or decoder.
+    pub(super) fn noun(self) -> &'static str {
+        if self.is_network() { "network" } else { "decoder" }
+    }
+}
+
+impl Default for BundleDecoder {
+    fn default() -> Self {
+        Self::Kind(DecoderKind::Network)
+    }
+}
+
+impl fmt::Display for BundleDecoder {
+    /// Writes the word used in the terminal and in files.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Kind(kind) => kind.fmt(f),
+            Self::Linear => f.pad("linear"),
+        }
+    }
+}
+
+impl FromStr for BundleDecoder {
+    type Err = ChoiceError;
+
+    fn from_str(text: &str) -> Result<Self, ChoiceError> {
+        let found = Self::all().find(|decoder| decoder.to_string() == text.trim());
+        found.ok_or_else(|| ChoiceError::Decoder(text.to_owned()))
+    }
+}
+
+/// Form in which a bundle takes readings, and to which its callers round what they have.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Taking<'a> {
+    /// Double precision.
+    Double,
+    /// Single precision.
+    Single,
+    /// Whole numbers of units.
+    Whole(&'a FixedNetworks),
+}
+
+/// Changes of the outputs by rounding the readings to the form that a bundle takes, relative to their scales.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct ReadingRounding {
+    /// Largest change found.
+    pub largest: f64,
+    /// Largest change possible, to first order, at the readings that were tried.
+    pub bound: f64,
+}
+
+impl Taking<'_> {
+    /// The number that a bundle is given for a reading of a channel.
+    pub(super) fn rounded(self, channel: usize, reading: f64) -> f64 {
+        match self {
+            Self::Double => reading,
+            Self::Single => Digits::Single.round(reading),
+            Self::Whole(networks) => networks.representable(channel, reading),
+        }
+    }
+
+    /// Largest rounding error of a reading of a channel.
+    pub(super) fn error(self, channel: usize, reading: f64) -> f64 {
+        match self {
+            Self::Double => 0.0,
+            Self::Single => {
+                let of_digits = reading.abs() * Digits::Single.unit_roundoff();
+                // Below the smallest normal number there are fewer digits.
+                of_digits.max(0.5 * f64::from(f32::from_bits(1)))
+            }
+            Self::Whole(networks) => 0.5 * networks.readings.unit(channel),
+        }
+    }
+}
+
+impl ReadingRounding {
+    /// Largest change with which a bundle is still written.
+    pub(super) const LARGEST: f64 = 0.01;
+
+    /// The larger of both figures.
+    pub fn worst(self) -> f64 {
+        if self.largest.is_nan() {
+            f64::NAN
+        } else {
+            self.largest.max(self.bound)
+        }
     }
 }
 

@@ -1,22 +1,22 @@
+use decoupler_core::{
+    dataset::{Dataset, PerRow, Seed, Stream},
+    decoupling::{CompiledNetworks, Decoder, DecoderKind, Description, Layer, Precision, decode_set},
+    evaluation::{
+        Channel, DecoderSet, Problem, RunError, RunSets, RunSettings, SimulatedSettings, TargetErrors, TestErrors,
+    },
+    network::{Networks, ReadingRange},
+};
 use rand::RngExt;
 use serde_json::{Map, Value, json};
 
 use super::{
     BundleDecoder, BundleError, BundlePrecision,
-    fitted::FittedDecoder,
     meaning::Meaning,
-    origin::Origin,
     portable::{ChannelRanges, Portable},
 };
 use crate::{
-    export::NetworkFile,
-    import::{Setup, SetupSets},
-};
-use decoupler_core::{
-    dataset::{Seed, Stream},
-    decoupling::{Description, Layer},
-    evaluation::{Channel, RunError, SimulatedSettings, TargetErrors, TestErrors},
-    network::ReadingRange,
+    export::{NetworkFile, document::PROGRAM},
+    import::{Plan, Setup, SetupSets},
 };
 
 /// A decoder to be exported, with the meaning of its readings and targets.
@@ -275,4 +275,137 @@ fn ranges(portable: &Portable) -> Vec<Option<Value>> {
         .iter()
         .map(|of_row| of_row.as_ref().map(range))
         .collect()
+}
+
+/// A decoder fitted to training samples, with what a bundle says of these.
+pub(super) struct FittedDecoder {
+    pub(super) kind: BundleDecoder,
+    pub(super) decoder: Box<dyn Decoder>,
+    pub(super) description: Description,
+    /// Readings in training of all row-wires, or of each where the row is an argument.
+    pub(super) reading_ranges: Vec<Option<ReadingRange>>,
+    /// Smallest and largest target in training, likewise.
+    pub(super) target_extremes: Vec<Vec<(f64, f64)>>,
+    /// Errors on the test samples.
+    pub(super) errors: TestErrors,
+}
+
+impl FittedDecoder {
+    /// Takes trained networks, which know the range of their readings themselves, and their errors on the test samples.
+    pub(super) fn of_networks(networks: &Networks, errors: TestErrors) -> Self {
+        let all = networks.values().iter();
+        let extremes = all.clone().map(|network| {
+            let outputs = network.outputs();
+            (0..outputs.channels()).map(|output| outputs.extremes(output)).collect()
+        });
+        let decoder = CompiledNetworks::<f64>::new(networks, networks.values().len());
+        Self {
+            kind: BundleDecoder::Kind(DecoderKind::Network),
+            description: decoder.description().expect("networks consist of layers"),
+            decoder: Box::new(decoder),
+            reading_ranges: all.map(|network| network.inputs().range().cloned()).collect(),
+            target_extremes: extremes.collect(),
+            errors,
+        }
+    }
+
+    /// Fits a decoder to the training samples of `sets` by these settings and measures it on the test samples; `networks` are
+    /// those trained with these settings, for the decoders that need them.
+    ///
+    /// # Errors
+    /// The samples cannot be scaled or decoded, or no program outside this one can compute what the decoder does.
+    pub(super) fn fit(
+        settings: RunSettings,
+        sets: RunSets,
+        networks: Option<Networks>,
+        kind: BundleDecoder,
+    ) -> Result<Self, BundleError> {
+        if kind.needs_network() && networks.is_none() {
+            return Err(BundleError::NoNetwork(kind));
+        }
+        let (training, test) = (sets.split.training, sets.test);
+        let of_row = |set: &Dataset| {
+            let targets = set.targets();
+            let extremes = targets.columns().into_iter().map(|column| {
+                let both = |(low, high): (f64, f64), &value: &f64| (low.min(value), high.max(value));
+                column.iter().fold((f64::INFINITY, f64::NEG_INFINITY), both)
+            });
+            Ok::<_, BundleError>((ReadingRange::of(set.readings()), extremes.collect::<Vec<_>>()))
+        };
+        let in_training = PerRow::fit(&training, settings.source.row_model(), of_row)?;
+        let (reading_ranges, target_extremes) = in_training.values().iter().cloned().unzip();
+        let set = DecoderSet::on_set(settings, training, networks);
+        let decoder = match kind {
+            BundleDecoder::Linear => Some(set.linear().map_err(Box::new)?),
+            BundleDecoder::Kind(kind) => set.decoder(kind, Precision::Double).map_err(Box::new)?,
+        };
+        let mut decoder = decoder.ok_or(BundleError::NoSensor(kind))?;
+        let description = decoder
+            .description()
+            .map_err(|reason| BundleError::NotDescribed { decoder: kind, reason })?;
+        let answers = decode_set(&mut *decoder, &test).map_err(|error| Box::new(RunError::from(error)))?;
+        decoder.take_solved_rows();
+        Ok(Self {
+            kind,
+            decoder,
+            description,
+            reading_ranges,
+            target_extremes,
+            errors: TestErrors::measure(&settings.source, &test, &answers),
+        })
+    }
+}
+
+/// Facts about the samples to which an exported decoder was fitted, for the metadata of its bundle.
+pub(super) struct Origin {
+    /// Program and version that trained or fitted it.
+    pub(super) program: String,
+    pub(super) settings: RunSettings,
+    /// Names, units and positions of readings and targets.
+    pub(super) problem: Problem,
+    /// Row-wires of the samples in ascending order, from 0, if they are known.
+    pub(super) row_wires: Option<Vec<usize>>,
+    /// Names of the recordings, without the folders of anyone who trained; empty for a simulated array.
+    pub(super) files: Vec<String>,
+    /// Errors of the linear baseline on the test samples.
+    pub(super) errors_of_linear: TestErrors,
+}
+
+impl Origin {
+    /// Takes the facts from the file of a trained network.
+    pub(super) fn of_file(file: &NetworkFile) -> Self {
+        Self {
+            program: file.program.clone(),
+            settings: file.settings,
+            problem: file.problem.clone(),
+            row_wires: file.row_wires.clone(),
+            files: names(file.recorded.as_ref().map(|recorded| &recorded.plan)),
+            errors_of_linear: file.scores.baselines.linear.clone(),
+        }
+    }
+
+    /// Takes the facts from the samples of `setup`, for a decoder without a network.
+    ///
+    /// # Errors
+    /// The samples cannot be scaled or decoded.
+    pub(super) fn of_sets(setup: &Setup, sets: &SetupSets) -> Result<Self, BundleError> {
+        let (settings, samples) = (*setup.settings(), &sets.sets);
+        let set = DecoderSet::on_set(settings, samples.split.training.clone(), None);
+        let mut linear = set.linear().map_err(Box::new)?;
+        let answers = decode_set(&mut *linear, &samples.test).map_err(|error| Box::new(RunError::from(error)))?;
+        Ok(Self {
+            program: PROGRAM.to_owned(),
+            problem: Problem::clone(&samples.problem),
+            row_wires: samples.test.row_wires_read().map(<[usize]>::to_vec),
+            files: names(setup.plan()),
+            errors_of_linear: TestErrors::measure(&settings.source, &samples.test, &answers),
+            settings,
+        })
+    }
+}
+
+fn names(plan: Option<&Plan>) -> Vec<String> {
+    let paths = plan.into_iter().flat_map(Plan::files);
+    let names = paths.filter_map(|path| path.file_name());
+    names.map(|name| name.to_string_lossy().into_owned()).collect()
 }

@@ -2,22 +2,15 @@ use std::{fs, path::Path};
 
 use super::{
     c99::{self, Compiled, run_self_test},
-    choice::{BundleFormat, BundlePrecision},
-    draft::{Draft, deviation},
+    choice::{BundleFormat, BundlePrecision, ReadingRounding, Taking},
     error::BundleError,
     exported_decoder::{ExportedDecoder, Metadata},
     fixed_point::{FixedNetworks, HiddenWidth, USUAL_BOUND},
-    folder::AtomicFolder,
-    golden::golden_csv,
-    identifier::identifier,
-    json,
+    folder::{AtomicFolder, Draft, deviation, identifier},
     portable::Portable,
-    readme::readme,
-    report::{BundleCheck, BundleReport, VectorCounts},
-    taking::{ReadingRounding, Taking},
-    tolerance::Tolerance,
-    vectors::{Deviation, Vectors},
-    weights::{Arithmetic, Weights},
+    report::{BundleCheck, BundleReport, VectorCounts, readme},
+    vectors::{Deviation, Tolerance, Vectors, golden_csv},
+    weights::{self, Arithmetic, Weights},
 };
 use crate::export::{NetworkFile, WriteError};
 
@@ -293,7 +286,7 @@ impl Bundle<'_> {
             remarks: self.remarks,
         };
         if self.format == BundleFormat::Json {
-            self.folder.commit_only(json::FILE)?;
+            self.folder.commit_only(weights::FILE)?;
             return Ok(BundleReport {
                 files: of_file(path, portable, Vec::new()).files,
                 ..report

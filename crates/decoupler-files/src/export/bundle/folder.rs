@@ -3,7 +3,16 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use super::error::BundleError;
+use super::{
+    choice::BundlePrecision,
+    error::BundleError,
+    exported_decoder::Metadata,
+    fixed_point::FixedNetworks,
+    iteration::Iteration,
+    portable::Portable,
+    vectors::{Deviation, Vector, Vectors},
+    weights::Weights,
+};
 use crate::export::{WriteError, unfinished::UnfinishedFolder};
 
 /// A folder that is filled under a temporary name next to its target and then renamed, so that it is there whole or not at
@@ -105,6 +114,87 @@ fn is_empty_folder(path: &Path) -> bool {
     fs::read_dir(path).is_ok_and(|mut entries| entries.next().is_none())
 }
 
+/// Longest identifier: with what is added to it, within the 63 characters of MATLAB's.
+const LONGEST: usize = 40;
+
+/// Name for functions and files, after the folder of the bundle: lower-case letters, digits and underscores.
+pub(super) fn identifier(path: &Path) -> String {
+    let name = path
+        .file_stem()
+        .map(|name| name.to_string_lossy().to_lowercase())
+        .unwrap_or_default();
+    let plain: String = name
+        .chars()
+        .map(|c| if c.is_ascii_alphanumeric() { c } else { '_' })
+        .collect();
+    let words: Vec<_> = plain.split('_').filter(|word| !word.is_empty()).collect();
+    let mut joined = words.join("_");
+    if !joined.starts_with(|c: char| c.is_ascii_lowercase()) {
+        joined.insert_str(0, if joined.is_empty() { "network" } else { "network_" });
+    }
+    joined.truncate(LONGEST);
+    joined
+}
+
+/// A bundle of floating-point numbers in the making, which its format fills.
+pub(super) struct Draft<'a> {
+    /// Prefix of the names of functions and files.
+    pub(super) name: &'a str,
+    pub(super) folder: &'a AtomicFolder,
+    pub(super) portable: &'a Portable,
+    pub(super) weights: &'a Weights,
+    pub(super) vectors: &'a Vectors,
+    pub(super) limits: Deviation,
+    pub(super) metadata: &'a Metadata,
+    /// Remarks for the user, with cause and cure.
+    pub(super) remarks: &'a mut Vec<String>,
+}
+
+/// What the README says of the way to call a bundle.
+pub(super) struct Call<'a> {
+    /// Prefix of the names of functions and files.
+    pub(super) name: &'a str,
+    pub(super) portable: &'a Portable,
+    /// For a bundle in whole numbers.
+    pub(super) fixed: Option<&'a FixedNetworks>,
+    pub(super) precision: BundlePrecision,
+}
+
+impl Draft<'_> {
+    /// Writes a file and reads it back.
+    ///
+    /// # Errors
+    /// The operating system refuses.
+    pub(super) fn write(&self, file: &str, contents: impl AsRef<[u8]>) -> Result<Vec<u8>, BundleError> {
+        self.folder.write(file, contents)?;
+        fs::read(self.folder.path().join(file)).map_err(|error| BundleError::read_back(file, error.to_string()))
+    }
+
+    /// Deviation of a bundle with these numbers.
+    pub(super) fn deviation_of(&self, weights: &Weights) -> Deviation {
+        deviation(self.portable, weights, self.vectors)
+    }
+}
+
+impl Call<'_> {
+    /// True if answers to readings that no deformation explains are told apart.
+    pub(super) fn tells_unexplained(&self) -> bool {
+        let equations = self.portable.equations.as_ref();
+        equations.is_some_and(|equations| equations.seeks_solution)
+    }
+}
+
+/// Deviation of a bundle of `portable` with these numbers.
+pub(super) fn deviation(portable: &Portable, weights: &Weights, vectors: &Vectors) -> Deviation {
+    vectors.deviation(|vector: &Vector| match &portable.equations {
+        None => weights.decode(vector.row, &vector.taken),
+        Some(equations) => {
+            let first = |map: usize| weights.decode(map, &vector.taken);
+            Iteration::new(equations).decode(vector.row, &vector.taken, first)
+        }
+    })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -147,5 +237,21 @@ mod tests {
             (names(home.path()), names(&full)),
             (vec!["file".into(), "full".into()], vec!["kept".into()])
         );
+    }
+
+    #[test]
+    fn any_folder_gives_a_name() {
+        let cases = [
+            ("out/Left hand-2", "left_hand_2"),
+            ("10x10_5x30", "network_10x10_5x30"),
+            ("hånd", "h_nd"),
+            ("__", "network"),
+            ("a.b.bundle", "a_b"),
+            ("", "network"),
+        ];
+        for (path, expected) in cases {
+            assert_eq!(identifier(Path::new(path)), expected);
+        }
+        assert_eq!(identifier(Path::new(&"x".repeat(300))).len(), LONGEST);
     }
 }

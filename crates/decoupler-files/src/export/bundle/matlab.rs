@@ -3,8 +3,8 @@
 use std::fmt::Write;
 
 use super::{
-    draft::{Call, Draft},
     error::BundleError,
+    folder::{Call, Draft},
     meaning::Meaning,
     portable::Portable,
     report::BundleCheck,

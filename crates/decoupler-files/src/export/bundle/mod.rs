@@ -8,31 +8,21 @@
 
 mod c99;
 mod choice;
-mod decoder_choice;
-mod draft;
 mod error;
 mod exact;
 mod exported_decoder;
 mod exporting;
-mod fitted;
 mod fixed_point;
 mod folder;
 mod folding;
-mod golden;
-mod identifier;
 mod iteration;
-mod json;
 mod matlab;
 mod meaning;
 mod numpy;
 mod onnx;
-mod origin;
 mod portable;
-mod readme;
 mod report;
 mod tables;
-mod taking;
-mod tolerance;
 mod twofold;
 mod vectors;
 mod weights;
@@ -42,12 +32,11 @@ mod tests;
 
 pub use self::{
     choice::{BundleFormat, BundlePrecision, ChoiceError},
-    decoder_choice::BundleDecoder,
     error::BundleError,
     exported_decoder::ExportedDecoder,
     exporting::export_bundle,
     fixed_point::FixedPointError,
     portable::FoldError,
     report::{BundleCheck, BundleReport, VectorCounts},
-    taking::ReadingRounding,
 };
+pub use choice::{BundleDecoder, ReadingRounding};

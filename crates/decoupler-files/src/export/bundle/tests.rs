@@ -8,6 +8,7 @@ use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
 
 use super::{
     BundleError, BundleFormat, BundlePrecision, FoldError, c99,
+    choice::Taking,
     exact::decode_exactly,
     export_bundle,
     exported_decoder::ExportedDecoder,
@@ -16,7 +17,6 @@ use super::{
     meaning::Meaning,
     numpy, onnx,
     portable::Portable,
-    taking::Taking,
     twofold::Twofold,
     vectors::{Deviation, Vectors},
     weights::{Arithmetic, Weights},

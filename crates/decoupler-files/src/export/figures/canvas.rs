@@ -2,10 +2,7 @@
 
 use std::fmt::{Display, Write as _};
 
-use super::{
-    colours::{INK, Rgb},
-    picture::Picture,
-};
+use super::picture::{INK, Picture, Rgb};
 use decoupler_core::text::is_unprintable;
 
 /// Size of all text, in points.

@@ -1,8 +1,7 @@
 use super::{
     canvas::{Anchor, Area, CHARACTER, Canvas, TEXT},
-    colour_bar::{COLOUR_BAR_WIDTH, draw_colour_bar},
-    colours::{INK, MISSING, contrast},
-    picture::Picture,
+    frame::{COLOUR_BAR_WIDTH, draw_colour_bar},
+    picture::{INK, MISSING, Picture, contrast},
 };
 use crate::{export::format_number, figure::HeatMap};
 

@@ -4,18 +4,13 @@
 //! both look alike on every machine. Values that are not finite are left out.
 
 mod canvas;
-mod colour_bar;
-mod colours;
-mod dark;
 mod frame;
 mod heat_map;
-mod legend;
 mod picture;
 mod plot;
-mod plot_figure;
 mod surfaces;
 
-pub(crate) use dark::dark_style;
+pub(crate) use picture::dark_style;
 pub use picture::{Picture, PictureError, PictureFormat};
 
 use crate::figure::Figure;

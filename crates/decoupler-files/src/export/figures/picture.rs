@@ -1,3 +1,7 @@
+//! Figures inside an HTML page that follows the reader's dark theme.
+//!
+//! The colours of figures: dark enough for paper.
+
 use std::{
     io,
     path::{Path, PathBuf},
@@ -7,7 +11,12 @@ use std::{
 use resvg::{tiny_skia, usvg};
 use thiserror::Error;
 
-use crate::export::{WriteError, atomic_write};
+use super::{canvas::number, plot::PAGE_WIDTH};
+pub(super) use crate::figure::Rgb;
+use crate::{
+    export::{WriteError, atomic_write},
+    figure::Hue,
+};
 
 /// A finished figure.
 #[derive(Clone, Debug, PartialEq)]
@@ -151,4 +160,85 @@ fn fonts() -> Arc<usvg::fontdb::Database> {
         Arc::new(fonts)
     };
     Arc::clone(FONTS.get_or_init(load))
+}
+
+/// Colours of print, and those that take their place on a dark ground.
+fn pairs() -> [(Rgb, Rgb); 11] {
+    [
+        ([0xff; 3], [0x1b, 0x1e, 0x24]),
+        (INK, [0xe7, 0xea, 0xf0]),
+        (DIM, [0x98, 0xa2, 0xb3]),
+        (GRID, [0x2c, 0x32, 0x3c]),
+        (MISSING, [0x24, 0x29, 0x32]),
+        (rgb(Hue::Blue), [0x5b, 0x9d, 0xff]),
+        (rgb(Hue::Red), [0xf0, 0x6a, 0x6a]),
+        (rgb(Hue::Green), [0x4c, 0xc3, 0x8a]),
+        (rgb(Hue::Orange), [0xf0, 0xa8, 0x3c]),
+        (rgb(Hue::Violet), [0xb5, 0x8a, 0xe6]),
+        (rgb(Hue::Cyan), [0x4f, 0xc3, 0xd9]),
+    ]
+}
+
+/// Style rules that show figures inside a page on a dark ground where the reader prefers that.
+pub(crate) fn dark_style() -> String {
+    let hex = |[red, green, blue]: Rgb| format!("#{red:02x}{green:02x}{blue:02x}");
+    let rules = pairs().map(|(print, dark)| {
+        let (print, dark) = (hex(print), hex(dark));
+        // White dots mark nodes on any ground.
+        let of_circles = if print == "#ffffff" { ":not(circle)" } else { "" };
+        format!(
+            "  svg [fill=\"{print}\"]{of_circles} {{ fill: {dark}; }}\n  svg [stroke=\"{print}\"] {{ stroke: {dark}; }}\n"
+        )
+    });
+    format!(
+        "@media screen and (prefers-color-scheme: dark) {{\n{}}}\n",
+        rules.concat()
+    )
+}
+
+impl Picture {
+    /// The figure as part of an HTML page, as wide in proportion as on a printed one: without outside references, and with
+    /// names that no figure in another `place` has. `label` is read aloud in its place.
+    pub(crate) fn inline_svg(&self, place: usize, label: &str) -> String {
+        let label = super::canvas::escaped(label).replace('"', "&quot;");
+        let [width, height] = self.size();
+        let share = number(100.0 * width / PAGE_WIDTH);
+        let [width, height] = [width, height].map(number);
+        let own = format!("xmlns=\"http://www.w3.org/2000/svg\" width=\"{width}pt\" height=\"{height}pt\"");
+        let here = format!("role=\"img\" aria-label=\"{label}\" width=\"{share}%\"");
+        self.svg()
+            .replacen(&own, &here, 1)
+            .replace("id=\"c", &format!("id=\"f{place}c"))
+            .replace("url(#c", &format!("url(#f{place}c"))
+    }
+}
+
+pub(super) const INK: Rgb = [0x1b, 0x24, 0x30];
+pub(super) const DIM: Rgb = [0x5b, 0x64, 0x72];
+pub(super) const GRID: Rgb = [0xe3, 0xe7, 0xee];
+pub(super) const MISSING: Rgb = [0xf3, 0xf5, 0xf8];
+
+/// A hue in print.
+pub(super) fn rgb(hue: Hue) -> Rgb {
+    match hue {
+        Hue::Blue => [0x1f, 0x6f, 0xeb],
+        Hue::Red => [0xc6, 0x2f, 0x2f],
+        Hue::Green => [0x1a, 0x7f, 0x4b],
+        Hue::Orange => [0xa8, 0x64, 0x00],
+        Hue::Violet => [0x7a, 0x3e, 0xb1],
+        Hue::Cyan => [0x0b, 0x76, 0x8c],
+        Hue::Grey => DIM,
+        Hue::Ink => INK,
+    }
+}
+
+/// A colour this much paler, from 0 (itself) to 1 (white).
+pub(super) fn pale(colour: Rgb, paler: f64) -> Rgb {
+    colour.map(|part| (f64::from(part) + paler * (255.0 - f64::from(part))).round() as u8)
+}
+
+/// Ink on light colours, white on dark ones.
+pub(super) fn contrast([red, green, blue]: Rgb) -> Rgb {
+    let luma = 0.299 * f64::from(red) + 0.587 * f64::from(green) + 0.114 * f64::from(blue);
+    if luma > 120.0 { INK } else { [255; 3] }
 }

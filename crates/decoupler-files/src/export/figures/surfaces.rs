@@ -6,9 +6,8 @@ use glam::Vec2;
 
 use super::{
     canvas::{Anchor, Area, At, Canvas, Stroke, TEXT},
-    colours::{DIM, GRID, INK, Rgb, rgb as hue_rgb},
-    picture::Picture,
-    plot_figure::PAGE_WIDTH,
+    picture::{DIM, GRID, INK, Picture, Rgb, rgb as hue_rgb},
+    plot::PAGE_WIDTH,
 };
 use crate::figure::{
     ColourMap, Hue, SequentialMap,

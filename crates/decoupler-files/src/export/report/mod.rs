@@ -2,7 +2,6 @@
 
 mod command;
 mod contents;
-mod html;
 mod pictures;
 mod settings;
 

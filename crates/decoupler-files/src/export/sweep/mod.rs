@@ -5,11 +5,8 @@
 mod merging;
 mod plan_file;
 mod row;
-mod specification;
-mod table;
 mod train_options;
 mod trial_file;
-mod trial_id;
 
 use std::{
     fs, io,
@@ -19,23 +16,19 @@ use std::{
 use serde::{Serialize, de::DeserializeOwned};
 use serde_json::value::to_raw_value;
 
-use super::{AtomicFile, DocumentError, DocumentKind, WriteError, sealed::Sealed};
+use super::{AtomicFile, DocumentError, DocumentKind, WriteError, network_file::Sealed};
 use decoupler_core::text::system_cause;
 
-pub use self::row::SweepRow;
-pub use self::specification::sweep_specification;
 pub use self::{
     merging::{MergedSweep, SweepFolderError},
-    plan_file::SweepPlan,
-    train_options::train_options,
+    plan_file::{PlanAxis, SweepPlan},
+    row::SweepRow,
+    train_options::{decoders_in_order, recording_options, train_options},
     trial_file::{Trial, TrialOptions},
-    trial_id::TrialId,
 };
-pub use self::{
-    plan_file::PlanAxis,
-    table::SweepTableFormat,
-    train_options::{decoders_in_order, recording_options},
-};
+pub use plan_file::sweep_specification;
+pub use row::SweepTableFormat;
+pub use trial_file::TrialId;
 
 /// Trial and plan files of a folder.
 #[derive(Debug, PartialEq, Eq)]

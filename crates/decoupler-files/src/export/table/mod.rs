@@ -1,7 +1,6 @@
 //! Tables: described once, and written as CSV for other programs or as text for papers and spreadsheets.
 
 mod description;
-mod latex;
 mod text;
 
 pub use description::{Cell, Table, TableColumn};

@@ -1,6 +1,18 @@
 //! Cells of the surface cut off at the ends of the value axis.
+//!
+//! Lines of equal value within one cell of the grid (marching squares).
+//!
+//! One axis of the box around a surface: the edge that carries its ticks.
+//!
+//! Marks on a plateau, which is drawn at the end of the value axis for what lies beyond: a rim and hatching, so that no one
+//! takes it for a height.
 
-use glam::DVec3;
+use std::ops::RangeInclusive;
+
+use glam::{DVec3, Vec2};
+
+use super::{drawing::Labels, field::Field, projection::Projection};
+use crate::figure::axis::{multiples, round_steps, tick_text};
 
 /// A corner of a cut polygon: its place, and its share of each corner of the cell.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -67,9 +79,170 @@ fn cut(polygon: &[CutCorner], excess: impl Fn(DVec3) -> f64) -> Vec<CutCorner> {
     kept
 }
 
+/// Calls `draw` with the ends of each piece of the line `value = level`. An end is given as
+/// `(corner a, corner b, part)`: on the side from a to b, `part` of the way. Corners go round the cell.
+pub(super) fn cross_cell(values: [f64; 4], level: f64, mut draw: impl FnMut([(usize, usize, f32); 2])) {
+    let mut ends = [(0, 0, 0.0); 4];
+    let mut found = 0;
+    for a in 0..4 {
+        let b = (a + 1) % 4;
+        if (values[a] < level) != (values[b] < level) {
+            ends[found] = (a, b, ((level - values[a]) / (values[b] - values[a])) as f32);
+            found += 1;
+        }
+    }
+    match found {
+        2 => draw([ends[0], ends[1]]),
+        // A saddle: the middle decides which corners belong together.
+        4 => {
+            let middle_is_low = values.iter().sum::<f64>() < 4.0 * level;
+            let first_is_low = values[0] < level;
+            let [w, x, y, z] = ends;
+            if middle_is_low == first_is_low {
+                draw([w, x]);
+                draw([y, z]);
+            } else {
+                draw([z, w]);
+                draw([x, y]);
+            }
+        }
+        _ => {}
+    }
+}
+
+/// Length of a tick, in points.
+pub(super) const TICK: f32 = 4.0;
+/// Room between a tick and its number, in points.
+pub(super) const GAP: f32 = 3.0;
+/// Axes seen end-on get no ticks.
+pub(super) const SHORTEST_AXIS: f32 = 36.0;
+
+/// One axis as drawn: an edge of the box with its ticks.
+pub(super) struct Edge {
+    pub(super) axis: usize,
+    from_mm: DVec3,
+    pub(super) away: Vec2,
+    pub(super) ticks: Vec<f64>,
+    pub(super) step: f64,
+}
+
+impl Edge {
+    pub(super) fn new(
+        projection: &Projection,
+        axis: usize,
+        from_mm: DVec3,
+        range: RangeInclusive<f64>,
+        labels: &Labels<'_>,
+    ) -> Self {
+        let mut edge = Self {
+            axis,
+            from_mm,
+            away: Vec2::ZERO,
+            ticks: Vec::new(),
+            step: 1.0,
+        };
+        let (start, end) = (
+            edge.point(projection, *range.start()),
+            edge.point(projection, *range.end()),
+        );
+        let along = (end - start).normalize_or_zero();
+        let middle = projection.bounds().middle();
+        let across = Vec2::new(along.y, -along.x);
+        edge.away = if across.dot(start + 0.5 * (end - start) - middle) < 0.0 {
+            -across
+        } else {
+            across
+        };
+        let length = (end - start).length();
+        let width = range.end() - range.start();
+        if length < SHORTEST_AXIS || width.is_nan() || width <= 0.0 {
+            return edge;
+        }
+        // The perspective makes the far end of an edge shorter than its average.
+        let points_per_mm = 0.8 * f64::from(length) / width;
+        edge.step = round_steps(width / 12.0)
+            .find(|&step| {
+                let widest = [range.start(), range.end()].map(|&value| labels.size(&tick_text(value, step)));
+                let size = widest[0].max(widest[1]);
+                let apart = ((size.x + 8.0) / along.x.abs().max(1e-3)).min((size.y + 5.0) / along.y.abs().max(1e-3));
+                step * points_per_mm >= f64::from(apart.max(20.0))
+            })
+            .unwrap_or(width);
+        edge.ticks = multiples(&range, edge.step);
+        edge
+    }
+
+    pub(super) fn point(&self, projection: &Projection, value: f64) -> Vec2 {
+        let mut place_mm = self.from_mm;
+        place_mm[self.axis] = value;
+        projection.point(place_mm)
+    }
+
+    pub(super) fn length(&self, projection: &Projection) -> f32 {
+        let (low, high) = (
+            projection.plot_box.min_mm[self.axis],
+            projection.plot_box.max_mm[self.axis],
+        );
+        (self.point(projection, high) - self.point(projection, low)).length()
+    }
+}
+
+/// Lines of the hatching along the longer side of a surface, about.
+const HATCHES: usize = 22;
+
+/// Calls `mark` with the ends of each piece of the rim and of the hatching in the cell at `(ix, iy)`; nothing where the
+/// cell has no part beyond the axis that is drawn.
+pub(super) fn plateau_marks(field: &Field<'_>, ix: usize, iy: usize, mut mark: impl FnMut([DVec3; 2])) {
+    if !field.keeps_plateau(ix, iy) {
+        return;
+    }
+    let corners = field.corners_mm(ix, iy);
+    let values = corners.map(|corner| corner.z);
+    for (end, side) in [(*field.shown().start(), -1.0), (*field.shown().end(), 1.0)] {
+        let excess = |place: DVec3| side * (place.z - end);
+        if !corners.iter().any(|corner| excess(*corner) > 0.0) {
+            continue;
+        }
+        let flat = |place: DVec3| place.with_z(end);
+        cross_cell(values, end, |ends| {
+            mark(ends.map(|(a, b, part)| flat(corners[a].lerp(corners[b], f64::from(part)))));
+        });
+        // Along the diagonal of every few cells; those of neighbours meet.
+        let [a, b, c, d] = corners;
+        let points = field.grid.x_mm().len().max(field.grid.y_mm().len());
+        if (ix + iy).is_multiple_of((points / HATCHES).max(1)) {
+            // The cell bends along the other diagonal.
+            let middle = a.lerp(c, 0.5);
+            for [from, to] in [[b, middle], [middle, d]] {
+                if let Some(ends) = beyond([from, to], excess) {
+                    mark(ends.map(flat));
+                }
+            }
+        }
+    }
+}
+
+/// The part of a straight line where `excess`, which is linear along it, is above 0.
+fn beyond([from, to]: [DVec3; 2], excess: impl Fn(DVec3) -> f64) -> Option<[DVec3; 2]> {
+    let (here, there) = (excess(from), excess(to));
+    let crossing = || from.lerp(to, here / (here - there));
+    match (here > 0.0, there > 0.0) {
+        (true, true) => Some([from, to]),
+        (true, false) => Some([from, crossing()]),
+        (false, true) => Some([crossing(), to]),
+        (false, false) => None,
+    }
+}
+
 #[cfg(test)]
 mod tests {
+    use std::sync::Arc;
+
+    use decoupler_core::surface::SurfaceMap;
+    use glam::Vec2;
+
     use super::*;
+    use crate::figure::surface::{Bounds, Card, Drawing, OrbitCamera, Quantity, Surface, ViewMode};
 
     fn area(polygon: &[CutCorner]) -> f64 {
         let flat = |at: usize| polygon[at % polygon.len()].place.truncate();
@@ -121,5 +294,115 @@ mod tests {
         assert!((at_level(1.0) - 0.0625).abs() < 1e-15 && (at_level(3.0) - 0.5).abs() < 1e-15);
         let total: f64 = polygons.iter().map(|polygon| area(polygon)).sum();
         assert!((total - 1.0).abs() < 1e-15, "{total}");
+    }
+
+    fn pieces(values: [f64; 4]) -> Vec<[(usize, usize, f32); 2]> {
+        let mut pieces = Vec::new();
+        cross_cell(values, 0.5, |piece| pieces.push(piece));
+        pieces
+    }
+
+    #[test]
+    fn a_slope_is_crossed_once() {
+        assert_eq!(pieces([0.0, 1.0, 1.0, 0.0]), [[(0, 1, 0.5), (2, 3, 0.5)]]);
+        assert!(pieces([0.0, 0.1, 0.2, 0.3]).is_empty());
+    }
+
+    #[test]
+    fn a_saddle_is_crossed_twice_around_its_lower_or_upper_corners() {
+        // Middle low: the high corners 1 and 3 are cut off.
+        assert_eq!(
+            pieces([0.0, 0.8, 0.0, 0.8]),
+            [[(0, 1, 0.625), (1, 2, 0.375)], [(2, 3, 0.625), (3, 0, 0.375)]]
+        );
+        // Middle high: the low corners 0 and 2 are.
+        assert_eq!(pieces([0.1, 1.0, 0.1, 1.0])[0][0].0, 3);
+    }
+
+    /// A flat sheet 5 high over 6 × 6 nodes, of which the middle overshoots to `top`.
+    fn overshot(top: f64, mode: ViewMode) -> Surface {
+        let places: Vec<f64> = (0..6).map(f64::from).collect();
+        let map = Arc::new(SurfaceMap::new(&places, &places).expect("a lattice"));
+        let is_middle = |node: usize| (2..4).contains(&(node / 6)) && (2..4).contains(&(node % 6));
+        let heights: Vec<f64> = (0..36).map(|node| if is_middle(node) { top } else { 5.0 }).collect();
+        let values = map.evaluate(&heights);
+        let node = |node: usize| DVec3::new(places[node / 6], places[node % 6], heights[node]);
+        Surface {
+            title: String::new(),
+            values: values.into(),
+            nodes: (0..36).map(node).collect(),
+            map,
+            quantity: Quantity::Height,
+            range: 4.0..=5.0,
+            mode,
+            colours: Default::default(),
+        }
+    }
+
+    fn laid_out(surface: &Surface) -> Drawing {
+        surface.lay_out(
+            OrbitCamera::default(),
+            &Card {
+                bounds: Bounds::of([Vec2::ZERO, Vec2::splat(400.0)]),
+                measure: &|text| Vec2::new(6.0 * text.chars().count() as f32, 14.0),
+                colours: surface.colours.colours(),
+            },
+        )
+    }
+
+    /// Returns true if any painted piece of the surface covers a place of the screen.
+    fn covers(drawing: &Drawing, place: Vec2) -> bool {
+        let mesh = &drawing.mesh;
+        let covers = |corners: [Vec2; 3]| {
+            let [a, b, c] = corners;
+            let sides = [(a, b), (b, c), (c, a)].map(|(from, to)| (to - from).perp_dot(place - from));
+            sides.iter().all(|side| *side >= 0.0) || sides.iter().all(|side| *side <= 0.0)
+        };
+        mesh.strips().flat_map(|(cells, _)| cells).any(|&cell| {
+            let [a, b, c, d] = mesh.corners(cell).map(|corner| mesh.vertices[corner].at);
+            covers([a, b, c]) || covers([a, c, d])
+        })
+    }
+
+    #[test]
+    fn an_overshoot_leaves_no_hole_and_is_marked() {
+        for (top, mode) in [(5.6, ViewMode::ThreeD), (3.4, ViewMode::ThreeD), (5.6, ViewMode::Top)] {
+            let surface = overshot(top, mode);
+            let drawing = laid_out(&surface);
+            let end = if top > 5.0 { 5.08 } else { 3.92 };
+            for step in 0..121 {
+                let place = DVec3::new(2.0 + 0.1 * f64::from(step / 11), 2.0 + 0.1 * f64::from(step % 11), end);
+                let at = drawing.sight.point(place).as_vec2();
+                assert!(covers(&drawing, at), "{top} {mode:?}: a hole at {place}");
+            }
+            let note = drawing.note.unwrap_or_default();
+            assert_eq!(note.contains("hatched"), mode == ViewMode::ThreeD, "{note}");
+        }
+    }
+
+    #[test]
+    fn the_hatching_lies_on_the_plateau_only() {
+        let surface = overshot(5.6, ViewMode::ThreeD);
+        let field = Field::new(&surface);
+        let mut marks = 0;
+        let (x_mm, y_mm) = (field.grid.x_mm(), field.grid.y_mm());
+        for ix in 0..x_mm.len() - 1 {
+            for iy in 0..y_mm.len() - 1 {
+                plateau_marks(&field, ix, iy, |ends| {
+                    marks += 1;
+                    for place in ends {
+                        assert_eq!(place.z, 5.08);
+                        let near = |at: f64| (1.0..=4.0).contains(&at);
+                        assert!(near(place.x) && near(place.y), "{place} is not near the overshoot");
+                    }
+                });
+            }
+        }
+        assert!(marks > 20, "{marks}");
+        let within = overshot(5.05, ViewMode::ThreeD);
+        assert!(
+            laid_out(&within).note.is_none(),
+            "what the box has room for is no overshoot"
+        );
     }
 }

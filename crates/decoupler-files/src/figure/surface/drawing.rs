@@ -1,22 +1,21 @@
 //! A surface laid out in a card, ready to be painted.
+//!
+//! Text around a plot, placed so that nothing overlaps.
 
-use glam::Vec2;
+use decoupler_core::text::counted;
+use glam::{DVec3, Vec2};
 
 use super::{
-    box_axes::BoxAxes,
-    camera::OrbitCamera,
+    box_axes::{BoxAxes, PlanAxes},
+    camera::{OrbitCamera, Sight},
     field::Field,
     mesh::Mesh,
     nodes::Dots,
-    plan_axes::PlanAxes,
-    projection::PlotBox,
+    projection::{PlotBox, Projection},
     shapes::{Bounds, Line, Text},
-    sight::Sight,
-    stage::Stage,
     surface_figure::{Surface, ViewMode},
 };
 use crate::figure::colour_map::ColourMap;
-use decoupler_core::text::counted;
 
 /// Room that the labels of a box usually take, in points.
 const LABELS: Vec2 = Vec2::new(72.0, 56.0);
@@ -104,5 +103,86 @@ fn note(has_plateau: bool, nodes: usize) -> Option<String> {
         (true, _) => Some(format!("Beyond the axes: hatched, {}", counted(nodes, "node"))),
         (false, 1) => Some("1 node beyond the axes is drawn at their edge".to_owned()),
         (false, _) => Some(format!("{nodes} nodes beyond the axes are drawn at their edge")),
+    }
+}
+
+/// Mapping of places to points on the screen.
+pub(super) enum Stage<'a> {
+    /// In space, lit.
+    Space(&'a Projection),
+    /// From above.
+    Plan(&'a PlanAxes<'a>),
+}
+
+impl Stage<'_> {
+    /// Returns the position on the screen of a place with a value.
+    pub(super) fn point(&self, place: DVec3) -> Vec2 {
+        match self {
+            Self::Space(projection) => projection.point(place),
+            Self::Plan(plan) => plan.point(place.truncate()),
+        }
+    }
+
+    /// Returns the place of the eye, for a picture in space.
+    pub(super) fn eye_mm(&self) -> Option<DVec3> {
+        match self {
+            Self::Space(projection) => Some(projection.plot_box.place_mm(projection.eye)),
+            Self::Plan(_) => None,
+        }
+    }
+}
+
+/// Room kept free around every label, in points.
+const CLEARANCE: f32 = 4.0;
+
+/// The labels of one plot, in the order in which they claimed their places.
+pub(super) struct Labels<'a> {
+    measure: &'a dyn Fn(&str) -> Vec2,
+    placed: Vec<Text>,
+}
+
+impl<'a> Labels<'a> {
+    pub(super) fn new(measure: &'a dyn Fn(&str) -> Vec2) -> Self {
+        Self {
+            measure,
+            placed: Vec::new(),
+        }
+    }
+
+    /// Size that a text would take.
+    pub(super) fn size(&self, text: &str) -> Vec2 {
+        (self.measure)(text)
+    }
+
+    /// Puts a text next to `anchor`, in the direction `away` (a unit vector) with `gap` between them. If the place is
+    /// taken it moves on by up to `slide` points, or else stays away. Says whether it was placed.
+    pub(super) fn beside(&mut self, anchor: Vec2, away: Vec2, gap: f32, slide: f32, text: &str) -> bool {
+        let size = self.size(text);
+        // How far the text reaches from its middle towards the anchor.
+        let reach = 0.5 * away.abs().dot(size);
+        let mut slid = 0.0;
+        while slid <= slide {
+            let bounds = Bounds::centred(anchor + away * (gap + reach + slid), size);
+            let is_free = |other: &Text| !other.bounds.grown(CLEARANCE).intersects(&bounds);
+            if self.placed.iter().all(is_free) {
+                self.placed.push(Text {
+                    bounds,
+                    text: text.to_owned(),
+                });
+                return true;
+            }
+            slid += 4.0;
+        }
+        false
+    }
+
+    /// The rectangle that all labels cover.
+    pub(super) fn bounds(&self) -> Bounds {
+        let all = self.placed.iter().map(|label| label.bounds);
+        all.fold(Bounds::NOTHING, Bounds::union)
+    }
+
+    pub(super) fn into_texts(self) -> Vec<Text> {
+        self.placed
     }
 }

@@ -1,11 +1,22 @@
 //! The height field as it is drawn: its points, its values, and what the box around it has room for.
+//!
+//! The key to the colours of one or more surfaces.
 
-use std::ops::RangeInclusive;
+use std::{borrow::Cow, ops::RangeInclusive, sync::Arc};
 
-use glam::DVec3;
-
-use super::surface_figure::{Surface, ViewMode};
 use decoupler_core::surface::{Grid, SurfaceMap};
+use glam::{DVec3, Vec2};
+
+use super::{
+    cut::TICK,
+    drawing::Labels,
+    shapes::{Bounds, Ink, Line, Text},
+    surface_figure::{Surface, ViewMode},
+};
+use crate::figure::{
+    axis::{multiples, round_steps, tick_text},
+    colour_map::SequentialMap,
+};
 
 /// Room for overshoots of the surface above and below the range, as a part of it.
 const HEADROOM: f64 = 0.08;
@@ -144,5 +155,134 @@ fn usable_range(range: &RangeInclusive<f64>) -> RangeInclusive<f64> {
         low..=high
     } else {
         low - 0.5..=low + 0.5
+    }
+}
+
+const BAR_WIDTH: f32 = 12.0;
+
+/// Scale of colours: a quantity and its range.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ColourScale {
+    /// Quantity of the values.
+    pub quantity: Quantity,
+    /// Values at both ends.
+    pub range: RangeInclusive<f64>,
+    /// Colours of values that do not diverge.
+    pub colours: SequentialMap,
+}
+
+/// A laid-out colour scale: a bar from the lowest value at the bottom to the highest at the top.
+#[derive(Clone, Debug)]
+pub struct ScaleDrawing {
+    /// The bar.
+    pub bar: Bounds,
+    /// Its ticks.
+    pub lines: Vec<Line>,
+    /// Numbers and name.
+    pub texts: Vec<Text>,
+}
+
+impl ColourScale {
+    /// Width that the bar takes with its numbers, in points.
+    pub const WIDTH: f32 = 64.0;
+
+    /// Lays the scale out in `area`; `None` if that or the range is too small. `measure` tells the size of a text.
+    pub fn lay_out(&self, area: Bounds, measure: &dyn Fn(&str) -> Vec2) -> Option<ScaleDrawing> {
+        let (low, high) = (*self.range.start(), *self.range.end());
+        let name = self.quantity.axis_name();
+        let line = measure(&name).y;
+        let left = area.min.x + 8.0;
+        let bar = Bounds {
+            min: Vec2::new(left, area.min.y + line + 12.0),
+            max: Vec2::new(left + BAR_WIDTH, area.max.y - line),
+        };
+        let height = bar.size().y;
+        if height < 20.0 || high.partial_cmp(&low) != Some(std::cmp::Ordering::Greater) || !(high - low).is_finite() {
+            return None;
+        }
+        let mut labels = Labels::new(measure);
+        let points_per_unit = f64::from(height) / (high - low);
+        let step = round_steps((high - low) / 10.0)
+            .find(|step| step * points_per_unit >= f64::from(line + 14.0))
+            .unwrap_or(high - low);
+        let mut lines = Vec::new();
+        for value in multiples(&self.range, step) {
+            let at = Vec2::new(bar.max.x, bar.max.y - ((value - low) * points_per_unit) as f32);
+            lines.push(Line {
+                from: at,
+                to: at + Vec2::new(TICK, 0.0),
+                ink: Ink::Edge,
+            });
+            labels.beside(at, Vec2::X, TICK + 3.0, 0.0, &tick_text(value, step));
+        }
+        let name_at = Vec2::new(area.min.x + 4.0 + 0.5 * measure(&name).x, bar.min.y - 6.0);
+        labels.beside(name_at, Vec2::NEG_Y, 2.0, 8.0, &name);
+        Some(ScaleDrawing {
+            bar,
+            lines,
+            texts: labels.into_texts(),
+        })
+    }
+}
+
+/// Quantity that a surface shows, and with it its colours.
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+pub enum Quantity {
+    /// Heights.
+    Height,
+    /// Errors, diverging about zero.
+    Error,
+    /// A deformation pattern without a scale of its own, diverging about zero.
+    Pattern,
+    /// Change of the readings with each node.
+    Sensitivity,
+    /// Values of measured targets in their unit, if that is known.
+    Target(Option<Arc<str>>),
+    /// Errors of measured targets in their unit, diverging about zero.
+    TargetError(Option<Arc<str>>),
+}
+
+impl Quantity {
+    /// Name of the value axis, with its unit.
+    pub fn axis_name(&self) -> Cow<'static, str> {
+        let with_unit = |name: &'static str, unit: &Option<Arc<str>>| match unit {
+            Some(unit) => format!("{name} ({unit})").into(),
+            None => name.into(),
+        };
+        match self {
+            Self::Height => "z (mm)".into(),
+            Self::Error => "error (mm)".into(),
+            Self::Pattern => "pattern".into(),
+            Self::Sensitivity => "1/mm".into(),
+            Self::Target(unit) => with_unit("value", unit),
+            Self::TargetError(unit) => with_unit("error", unit),
+        }
+    }
+
+    /// The range from `low` to `high` in words, with the unit; `height` writes heights and errors in millimetres, `number`
+    /// all others.
+    pub fn range_text(
+        &self,
+        (low, high): (f64, f64),
+        height: impl Fn(f64) -> String,
+        number: impl Fn(f64) -> String,
+    ) -> String {
+        let with_unit = |name: &str, unit: &Option<Arc<str>>| {
+            let unit = unit.as_ref().map_or_else(String::new, |unit| format!(" {unit}"));
+            format!("{name} {} to {}{unit}", number(low), number(high))
+        };
+        match self {
+            Self::Height => format!("z {} to {} mm", height(low), height(high)),
+            Self::Error => format!("error {} to {} mm", height(low), height(high)),
+            Self::Pattern => format!("pattern {} to {}", number(low), number(high)),
+            Self::Sensitivity => format!("sensitivity {} to {} per mm", number(low), number(high)),
+            Self::Target(unit) => with_unit("value", unit),
+            Self::TargetError(unit) => with_unit("error", unit),
+        }
+    }
+
+    /// Returns `true` if the colours diverge from zero.
+    pub fn is_diverging(&self) -> bool {
+        matches!(self, Self::Error | Self::Pattern | Self::TargetError(_))
     }
 }

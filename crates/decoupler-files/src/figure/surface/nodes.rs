@@ -3,9 +3,9 @@
 use glam::{DVec3, Vec2};
 
 use super::{
+    drawing::Stage,
     field::Field,
     shapes::{Bounds, Disc, Ink},
-    stage::Stage,
 };
 use decoupler_core::surface::Grid;
 

@@ -3,8 +3,8 @@
 use glam::DVec3;
 
 use super::{
+    camera::Ray,
     field::{CellPart, Field},
-    sight::Ray,
     surface_figure::Surface,
 };
 

@@ -2,7 +2,7 @@
 
 use glam::{DVec2, DVec3};
 
-use super::{field::Field, sight::Sight, surface_figure::Surface};
+use super::{camera::Sight, field::Field, surface_figure::Surface};
 use decoupler_core::surface::Grid;
 
 /// Wire along which surfaces are cut, by its number from 0.

@@ -5,7 +5,11 @@ use std::{ops::RangeInclusive, sync::Arc};
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
-use super::{camera::OrbitCamera, colour_scale::ColourScale, quantity::Quantity, section::Section};
+use super::{
+    camera::OrbitCamera,
+    field::{ColourScale, Quantity},
+    section::Section,
+};
 use crate::figure::colour_map::SequentialMap;
 use decoupler_core::surface::SurfaceMap;
 

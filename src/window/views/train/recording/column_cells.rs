@@ -7,7 +7,7 @@ use eframe::egui::{
 use crate::window::theme::{Theme, space, type_size};
 use decoupler_files::{
     export::format_number,
-    figure::ticks::tick_text,
+    figure::tick_text,
     import::{ColumnKind, ColumnSummary, Meaning},
 };
 

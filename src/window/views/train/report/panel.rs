@@ -24,7 +24,7 @@ use decoupler_core::{
 };
 use decoupler_files::{
     export::{format_duration, format_number},
-    figure::trade_words::frame_time,
+    figure::frame_time,
 };
 
 /// The error table, what can be opened, and what it cost. Before a training, what the network has to beat.

@@ -1,6 +1,6 @@
 use super::{
     header::{Header, push_out_of_range},
-    literal::{long, push_array},
+    long, push_array,
 };
 use crate::export::bundle::{
     fixed_point::{CONDUCTANCE_BITS, FixedNetwork, FixedNetworks, HiddenWidth, LogTable, TangentTable, Units},

@@ -1,7 +1,6 @@
 use super::{
     header::{Header, push_out_of_range},
-    iteration,
-    literal::{number, push_array, type_name},
+    iteration, number, push_array, type_name,
 };
 use crate::export::bundle::{
     meaning::Meaning,

@@ -1,6 +1,6 @@
 use std::fmt::Write;
 
-use super::literal::push_array;
+use super::push_array;
 use crate::export::bundle::{
     meaning::{Meaning, comment, wrapped},
     portable::Portable,

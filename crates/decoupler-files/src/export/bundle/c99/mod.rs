@@ -1,12 +1,17 @@
 //! Bundles as one C99 header and one source, with a self-test.
 
-mod compiler;
 mod fixed;
 mod floating;
 mod header;
 mod iteration;
-mod literal;
 mod selftest;
+
+use std::{
+    fmt::{Display, Write},
+    io,
+    path::Path,
+    process::{Command, Output},
+};
 
 use self::{
     fixed::readings,
@@ -15,17 +20,16 @@ use self::{
 };
 use super::{
     choice::BundlePrecision,
-    draft::{Call, Draft},
     error::BundleError,
     fixed_point::FixedNetworks,
+    folder::{Call, Draft},
     meaning::Meaning,
     portable::Portable,
     report::BundleCheck,
     vectors::{Deviation, Vector},
     weights::Weights,
 };
-
-pub(super) use self::compiler::{Compiled, run_self_test};
+use crate::export::bundle::weights::Digits;
 
 /// Files of a bundle: names and contents.
 pub(super) type Files = Vec<(String, String)>;
@@ -159,4 +163,176 @@ pub(super) fn call(call: &Call<'_>) -> String {
          cc -std=c99 -O2 {name}_decode.c {name}_selftest.c -lm -o selftest && ./selftest\n{units}{range}{explained}",
         libm = if library.is_empty() { "" } else { ", and link with -lm" },
     )
+}
+
+const COMPILER: &str = "cc";
+/// The flags under which the source has no warning.
+const FLAGS: [&str; 7] = [
+    "-std=c99",
+    "-Wall",
+    "-Wextra",
+    "-Werror",
+    "-pedantic",
+    "-Wconversion",
+    "-O2",
+];
+
+/// Outcome of compiling and running a self-test.
+#[derive(Clone, Debug, PartialEq)]
+pub(in crate::export::bundle) enum Compiled {
+    /// Largest deviations of the golden vectors, relative to the range of the outputs.
+    Ran { deviation: Deviation },
+    /// Not compiled, and why.
+    NoCompiler(&'static str),
+}
+
+/// Compiles the source and the self-test in `folder` and runs it; neither leaves anything there.
+///
+/// # Errors
+/// The compiler refuses the source, or the self-test fails.
+pub(in crate::export::bundle) fn run_self_test(folder: &Path, name: &str) -> Result<Compiled, BundleError> {
+    let failed = |step: &'static str, reason: String| BundleError::SelfTest { step, reason };
+    let home = tempfile::tempdir().map_err(|error| failed("compiling the C source", error.to_string()))?;
+    let program = home.path().join("selftest");
+    let trial = home.path().join("trial.c");
+    let hello = "#include <math.h>\n#include <stdio.h>\nint main(void)\n{\n    return puts(\"\") < 0;\n}\n";
+    let tried = std::fs::write(&trial, hello).and_then(|()| compile(&[&trial], &program));
+    match tried {
+        Err(error) if error.kind() == io::ErrorKind::NotFound => {
+            return Ok(Compiled::NoCompiler("no C compiler found"));
+        }
+        Ok(output) if output.status.success() => {}
+        _ => {
+            return Ok(Compiled::NoCompiler(
+                "the C compiler 'cc' cannot compile an empty program",
+            ));
+        }
+    }
+    let sources = ["decode", "selftest"].map(|part| folder.join(format!("{name}_{part}.c")));
+    let output = compile(&[&sources[0], &sources[1]], &program);
+    let output = output.map_err(|error| failed("compiling the C source", error.to_string()))?;
+    if !output.status.success() {
+        return Err(failed("compiling the C source", first_lines(&output.stderr)));
+    }
+    let output = Command::new(&program).output();
+    let output = output.map_err(|error| failed("the self-test of the C source", error.to_string()))?;
+    let text = first_lines(&output.stdout);
+    let printed = |name: &str| -> Option<f64> {
+        let (_, rest) = text.split_once(name)?;
+        rest.split([' ', ',']).next()?.parse().ok()
+    };
+    let total = printed("largest deviation: ");
+    let deviation = total.map(|total| Deviation {
+        total,
+        of_arithmetic: printed("by arithmetic: ").unwrap_or(total),
+    });
+    match deviation {
+        Some(deviation) if output.status.success() => Ok(Compiled::Ran { deviation }),
+        _ => Err(failed("the self-test of the C source", text)),
+    }
+}
+
+fn compile(sources: &[&Path], program: &Path) -> io::Result<Output> {
+    let mut command = Command::new(COMPILER);
+    command.args(FLAGS).args(sources).arg("-o").arg(program).arg("-lm");
+    command.output()
+}
+
+/// The first lines of a message, as one.
+fn first_lines(text: &[u8]) -> String {
+    let text = String::from_utf8_lossy(text);
+    text.lines().take(3).collect::<Vec<_>>().join("; ")
+}
+
+/// Name of the C type with these digits.
+pub(super) fn type_name(digits: Digits) -> &'static str {
+    match digits {
+        Digits::Single => "float",
+        Digits::Double => "double",
+    }
+}
+
+/// A number as C reads it back to the same bits; one beyond the largest that `digits` can have is this.
+pub(super) fn number(digits: Digits, value: f64) -> String {
+    match digits {
+        Digits::Single => format!("{:e}f", (value as f32).clamp(f32::MIN, f32::MAX)),
+        Digits::Double => format!("{:e}", value.clamp(f64::MIN, f64::MAX)),
+    }
+}
+
+/// A 64-bit whole number.
+pub(super) fn long(value: i64) -> String {
+    format!("INT64_C({value})")
+}
+
+/// Appends `declaration = { … };` with the nested braces of `shape`. The elements are given row by row.
+pub(super) fn push_array(
+    text: &mut String,
+    declaration: &str,
+    shape: &[usize],
+    elements: impl IntoIterator<Item = impl Display>,
+) {
+    let _ = write!(text, "{declaration} = ");
+    push_level(text, shape, &mut elements.into_iter(), 0);
+    text.push_str(";\n\n");
+}
+
+fn push_level(text: &mut String, shape: &[usize], elements: &mut impl Iterator<Item = impl Display>, depth: usize) {
+    /// Characters after which a line ends.
+    const WIDTH: usize = 100;
+    let Some((&size, inner)) = shape.split_first() else {
+        return;
+    };
+    let indent = "    ".repeat(depth + 1);
+    text.push_str("{\n");
+    let mut line = indent.clone();
+    for _ in 0..size {
+        if inner.is_empty() {
+            // The iterator has as many elements as the shape says.
+            let Some(element) = elements.next() else { break };
+            let _ = write!(line, "{element}, ");
+            if line.len() > WIDTH {
+                text.push_str(line.trim_end());
+                text.push('\n');
+                line.clone_from(&indent);
+            }
+        } else {
+            text.push_str(&indent);
+            push_level(text, inner, elements, depth + 1);
+            text.push_str(",\n");
+        }
+    }
+    if line.len() > indent.len() {
+        text.push_str(line.trim_end());
+        text.push('\n');
+    }
+    let _ = write!(text, "{}}}", "    ".repeat(depth));
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_are_those_of_c() {
+        let cases = [
+            (number(Digits::Double, 0.1), "1e-1"),
+            (number(Digits::Double, -1.0 / 3.0), "-3.333333333333333e-1"),
+            (number(Digits::Single, f64::from(0.1_f32)), "1e-1f"),
+            (number(Digits::Single, -1e39), "-3.4028235e38f"),
+            (number(Digits::Double, f64::INFINITY), "1.7976931348623157e308"),
+            (long(-5), "INT64_C(-5)"),
+        ];
+        for (literal, expected) in cases {
+            assert_eq!(literal, expected);
+        }
+    }
+
+    #[test]
+    fn every_dimension_has_its_braces() {
+        let mut text = String::new();
+        push_array(&mut text, "static const int a[2][2]", &[2, 2], [1, 2, 3, 4]);
+        let words: Vec<_> = text.split_whitespace().collect();
+        assert_eq!(words.join(" "), "static const int a[2][2] = { { 1, 2, }, { 3, 4, }, };");
+    }
 }

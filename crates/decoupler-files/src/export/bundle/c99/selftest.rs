@@ -1,7 +1,4 @@
-use super::{
-    header::Header,
-    literal::{number, push_array},
-};
+use super::{header::Header, number, push_array};
 use crate::export::bundle::{
     vectors::{Deviation, Vector},
     weights::Digits,

@@ -4,25 +4,28 @@
 //! Every number has a range that holds for any readings whatever, because each step begins with a saturation; sums can
 //! therefore not wrap. The bound on the error is computed by interval analysis over the range of readings in training and
 //! a tenth of it on either side.
+//!
+//! The decoder in whole numbers, step by step as the C source has it.
 
-mod change;
-mod decoding;
 mod logarithm;
 mod quantise;
 mod scaled;
-mod tangent;
-mod two_layers;
-mod units;
 
+use decoupler_core::{decoupling::Layer, network::Quantity};
+use ndarray::Array2;
 use thiserror::Error;
 
 pub(super) use self::{
-    change::{CONDUCTANCE_BITS, HiddenWidth},
     logarithm::LogTable,
     quantise::{FixedNetwork, FixedNetworks, USUAL_BOUND},
-    tangent::TangentTable,
-    units::Units,
 };
+use crate::export::bundle::{
+    meaning::Meaning,
+    portable::{ChannelRanges, Portable},
+    twofold::Twofold,
+};
+pub(super) use logarithm::TangentTable;
+pub(super) use scaled::{CONDUCTANCE_BITS, HiddenWidth};
 
 /// Reasons for which a network cannot leave in fixed point.
 #[derive(Clone, Debug, PartialEq, Error)]
@@ -61,4 +64,219 @@ pub enum FixedPointError {
         /// A way to train a network that amplifies less.
         cure: &'static str,
     },
+}
+
+/// A network of one hidden layer with the hyperbolic tangent.
+#[derive(Clone, Copy, Debug)]
+pub(in crate::export::bundle) struct TwoLayers<'a> {
+    /// R₀ of each channel.
+    pub(super) centre: &'a [f64],
+    /// Channels × hidden nodes.
+    pub(super) hidden_weights: &'a Array2<Twofold>,
+    pub(super) hidden_biases: &'a [Twofold],
+    /// Hidden nodes × outputs.
+    pub(super) output_weights: &'a Array2<Twofold>,
+    pub(super) output_biases: &'a [Twofold],
+}
+
+impl<'a> TwoLayers<'a> {
+    /// The networks of `portable`; `None` if it is another decoder.
+    pub(super) fn of(portable: &'a Portable) -> Option<Vec<Self>> {
+        let maps = portable.maps.iter();
+        maps.map(|map| match &map.layers[..] {
+            [Layer::Affine(hidden), Layer::Tanh, Layer::Affine(output)] => Some(Self {
+                centre: &map.centre,
+                hidden_weights: &hidden.weights,
+                hidden_biases: &hidden.biases,
+                output_weights: &output.weights,
+                output_biases: &output.biases,
+            }),
+            _ => None,
+        })
+        .collect()
+    }
+
+    /// Largest size of an output, whatever the activations.
+    pub(super) fn reach(&self, output: usize) -> f64 {
+        let weights = self.output_weights.column(output);
+        let of_weights: f64 = weights.iter().map(|weight| weight.to_f64().abs()).sum();
+        self.output_biases[output].to_f64().abs() + of_weights
+    }
+}
+
+impl FixedNetworks {
+    /// Decodes readings in units: outputs in units, or `None` if a resistance is not above 0.
+    pub(in crate::export::bundle) fn decode_whole(&self, network: usize, readings: &[i32]) -> Option<Vec<i32>> {
+        let network = &self.networks[network];
+        let channels = readings.len();
+        let largest_change = i64::from(self.hidden_width.largest_change());
+        let mut changes = Vec::new();
+        for (channel, &reading) in readings.iter().enumerate() {
+            if reading <= 0 && self.quantity != Quantity::Raw {
+                return None;
+            }
+            let change = self.change(reading, network.centres[channel]);
+            let scaled = shift(
+                change * i64::from(network.factors[channel]),
+                network.factor_shifts[channel],
+            );
+            changes.push(scaled.clamp(-largest_change, largest_change));
+        }
+        let mut activations = Vec::new();
+        for (node, &bias) in network.hidden_biases.iter().enumerate() {
+            let weights = &network.hidden_weights[node * channels..][..channels];
+            let products = weights
+                .iter()
+                .zip(&changes)
+                .map(|(&weight, change)| i64::from(weight) * change);
+            let argument = shift(bias + products.sum::<i64>(), network.hidden_shifts[node]);
+            let largest = i64::from(TangentTable::LARGEST);
+            activations.push(i64::from(self.tangent.of(argument.clamp(-largest, largest) as i32)));
+        }
+        let hidden = activations.len();
+        let outputs = network.output_biases.iter().enumerate().map(|(output, &bias)| {
+            let weights = &network.output_weights[output * hidden..][..hidden];
+            let products = weights
+                .iter()
+                .zip(&activations)
+                .map(|(&weight, activation)| i64::from(weight) * activation);
+            let sum = shift(bias + products.sum::<i64>(), network.output_shifts[output]);
+            // Proven to fit when the weights were rounded.
+            sum.clamp(i64::from(-i32::MAX), i64::from(i32::MAX)) as i32
+        });
+        Some(outputs.collect())
+    }
+
+    fn change(&self, reading: i32, centre: i32) -> i64 {
+        match self.quantity {
+            Quantity::Resistance | Quantity::Raw => i64::from(reading) - i64::from(centre),
+            Quantity::Conductance => {
+                let difference = i64::from(centre) - i64::from(reading);
+                let relative = difference * (1_i64 << CONDUCTANCE_BITS) / i64::from(reading);
+                relative.clamp(-(1 << 31), 1 << 31)
+            }
+            Quantity::LogResistance => i64::from(self.logarithm.of(reading)) - i64::from(centre),
+        }
+    }
+}
+
+/// value / 2^bits, rounded to the nearest, halves up.
+fn shift(value: i64, bits: u8) -> i64 {
+    if bits == 0 {
+        return value;
+    }
+    (value + (1 << (bits - 1))) >> bits
+}
+
+/// Units of whole numbers: each is 10^−`decimals` of the unit in which the network has the reading or the output.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(in crate::export::bundle) struct Units {
+    decimals: Vec<i32>,
+}
+
+/// Size that readings within their limits stay below, so that those outside have a factor of 2.
+const LARGEST_READING: f64 = (1_u32 << 30) as f64;
+/// Units in the range of an output of own data: more than a network in whole numbers can tell.
+const OUTPUT_UNITS: f64 = 1e7;
+/// Size that outputs of own data stay below whatever the activations, so that their sums fit with all bits of a weight.
+const LARGEST_OUTPUT: f64 = (1_u32 << 24) as f64;
+
+impl Units {
+    /// Units of the readings. Those of an array share one, with a name of its own.
+    ///
+    /// # Errors
+    /// Resistances of an array are beyond all of these units.
+    pub(super) fn of_readings(portable: &Portable, ranges: &[&ChannelRanges]) -> Result<Self, FixedPointError> {
+        let largest = |channel: usize| {
+            let limits = ranges.iter().map(|range| range.limits[channel]);
+            limits.fold(0.0_f64, |largest, (low, high)| largest.max(low.abs()).max(high.abs()))
+        };
+        let channels = 0..portable.channels;
+        let decimals = match portable.meaning {
+            Meaning::Array(_) => {
+                let largest_ohm = channels.map(largest).fold(0.0, f64::max);
+                let fits = |&decimals: &i32| largest_ohm * ten_to(decimals) <= LARGEST_READING;
+                let decimals = [9, 6, 3, 0].into_iter().find(fits);
+                vec![decimals.ok_or(FixedPointError::Reading(largest_ohm))?; portable.channels]
+            }
+            Meaning::Own { .. } => channels
+                .map(|channel| max_decimals(largest(channel), LARGEST_READING))
+                .collect(),
+        };
+        Ok(Self { decimals })
+    }
+
+    /// Units of the outputs: nanometres for an array.
+    pub(super) fn of_outputs(portable: &Portable, networks: &[TwoLayers<'_>]) -> Self {
+        let decimals = match portable.meaning {
+            Meaning::Array(_) => vec![6; portable.outputs],
+            Meaning::Own { .. } => (0..portable.outputs)
+                .map(|output| {
+                    let reaches = networks.iter().map(|network| network.reach(output));
+                    let reach = reaches.fold(0.0, f64::max);
+                    max_decimals(portable.scales[output], OUTPUT_UNITS).min(max_decimals(reach, LARGEST_OUTPUT))
+                })
+                .collect(),
+        };
+        Self { decimals }
+    }
+
+    /// Number of units in 1.
+    pub(in crate::export::bundle) fn per_one(&self, index: usize) -> f64 {
+        ten_to(self.decimals[index])
+    }
+
+    /// Decimals of the first, and of all where they share one.
+    pub(in crate::export::bundle) fn first_decimals(&self) -> i32 {
+        self.decimals[0]
+    }
+
+    /// A unit in those of the network: 1e-6.
+    pub(in crate::export::bundle) fn unit(&self, index: usize) -> f64 {
+        ten_to(-self.decimals[index])
+    }
+
+    /// Every unit in those of the network.
+    pub(in crate::export::bundle) fn all(&self) -> impl Iterator<Item = f64> {
+        (0..self.decimals.len()).map(|index| self.unit(index))
+    }
+
+    /// The value in units, at most the largest number.
+    pub(in crate::export::bundle) fn whole(&self, index: usize, value: f64) -> i32 {
+        (value * self.per_one(index)).round() as i32
+    }
+}
+
+/// Most decimals with which `size` has at most `units` units.
+fn max_decimals(size: f64, units: f64) -> i32 {
+    /// Far within the range of double precision, so that units and their squares are numbers.
+    const MAX: f64 = 120.0;
+    if size == 0.0 {
+        return 0;
+    }
+    (units / size).log10().floor().clamp(-MAX, MAX) as i32
+}
+
+fn ten_to(decimals: i32) -> f64 {
+    10.0_f64.powi(decimals)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn units_are_as_small_as_the_numbers_allow() {
+        for (size, units, expected) in [
+            (1.0, 1e7, 7),
+            (9.9, 1e7, 6),
+            (1e9, LARGEST_READING, 0),
+            (2e9, LARGEST_READING, -1),
+            (3e-12, 1e7, 18),
+            (0.0, 1e7, 0),
+            (1e300, 1e7, -120),
+        ] {
+            assert_eq!(max_decimals(size, units), expected, "{size} {units}");
+        }
+    }
 }

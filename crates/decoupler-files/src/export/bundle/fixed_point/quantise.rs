@@ -1,11 +1,7 @@
 use super::{
-    FixedPointError,
-    change::{Change, HiddenWidth},
-    logarithm::LogTable,
-    scaled::ScaledRow,
-    tangent::TangentTable,
-    two_layers::TwoLayers,
-    units::Units,
+    FixedPointError, TwoLayers, Units,
+    logarithm::{LogTable, TangentTable},
+    scaled::{Change, HiddenWidth, ScaledRow},
 };
 use crate::export::bundle::portable::Portable;
 use decoupler_core::network::Quantity;

@@ -5,8 +5,8 @@ mod npz;
 
 use self::npz::NamedArray;
 use super::{
-    draft::{Call, Draft},
     error::BundleError,
+    folder::{Call, Draft},
     meaning::Meaning,
     portable::Portable,
     report::BundleCheck,

@@ -11,28 +11,23 @@
 //! | `readings_outside`, if the range in training is known | batch | int64 |
 
 mod evaluator;
-mod graph;
 mod operations;
 mod schema;
-mod tensor;
 mod writer;
 
 use prost::Message;
 
-use self::{
-    evaluator::evaluate,
-    schema::Model,
-    tensor::{Tensor, Values},
-};
+use self::{evaluator::evaluate, schema::Model};
 use super::{
     choice::BundlePrecision,
-    draft::{Call, Draft},
     error::BundleError,
+    folder::{Call, Draft},
     report::BundleCheck,
     vectors::Vector,
     weights::Digits,
 };
 use decoupler_core::network::Quantity;
+use evaluator::{Tensor, Values};
 
 pub(super) use self::writer::write;
 

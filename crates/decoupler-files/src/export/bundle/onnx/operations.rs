@@ -1,8 +1,8 @@
 //! The operations of the ONNX specification, opset 13, as far as our graphs use them.
 
 use super::{
+    evaluator::{Tensor, Values},
     schema::{BOOL, DOUBLE, FLOAT, INT64},
-    tensor::{Tensor, Values},
 };
 use crate::export::bundle::weights::Digits;
 

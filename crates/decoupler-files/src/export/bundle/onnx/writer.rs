@@ -1,9 +1,11 @@
 use prost::Message;
 
 use super::{
-    graph::GraphBuilder,
-    schema::{Dimension, Graph, INT64, Model, OperatorSet, Property, TensorShape, TensorType, TypeOfValue, ValueInfo},
-    tensor::{Tensor, element_type},
+    evaluator::{Tensor, element_type},
+    schema::{
+        Dimension, Graph, GraphBuilder, INT64, Model, OperatorSet, Property, TensorShape, TensorType, TypeOfValue,
+        ValueInfo,
+    },
 };
 use crate::export::bundle::{
     exported_decoder::Metadata,
