@@ -1,18 +1,21 @@
+//! Parsers of values that several commands take.
+
 use std::{
+    borrow::Cow,
     error::Error,
     ffi::OsString,
     io::{Write, stderr},
+    ops::RangeInclusive,
     process::ExitCode,
 };
 
 use clap::{Parser, Subcommand, error::ErrorKind};
+pub use decoupler_files::export::exit_leaving_nothing;
 
 use super::{
-    calibrate::Calibrate, decode::Decode, export::Export, failure::Failure, fine_tune::FineTune, inspect::Inspect,
-    interruption, parse_error::one_line, reproduce::Reproduce, simulate::Simulate, sweep::Sweep, trade::Trade,
-    train::Train,
+    calibrate::Calibrate, decode::Decode, export::Export, failure::Failure, inspect::Inspect, interruption,
+    outside_training::FineTune, reproduce::Reproduce, samples::Simulate, sweep::Sweep, trade::Trade, train::Train,
 };
-pub use decoupler_files::export::exit_leaving_nothing;
 
 /// Opens the window and returns when it is closed.
 pub type Window = fn() -> Result<(), Box<dyn Error>>;
@@ -96,10 +99,61 @@ impl Arguments {
     }
 }
 
+/// Returns a parser of whole numbers in `allowed`.
+pub(super) fn count(allowed: RangeInclusive<usize>) -> impl Fn(&str) -> Result<usize, String> + Clone {
+    move |text| {
+        let count = text.parse().ok().filter(|count| allowed.contains(count));
+        count.ok_or_else(|| format!("give a whole number from {} to {}", allowed.start(), allowed.end()))
+    }
+}
+
+/// Parses a finite number that is not negative.
+pub(super) fn number(text: &str) -> Result<f64, String> {
+    let number = text
+        .parse()
+        .ok()
+        .filter(|number: &f64| number.is_finite() && *number >= 0.0);
+    number.ok_or_else(|| "give a number from 0, for example 1e-7".to_owned())
+}
+
+/// Parses a seed.
+pub(super) fn seed(text: &str) -> Result<u64, String> {
+    text.parse()
+        .map_err(|_| format!("give a whole number from 0 to {}", u64::MAX))
+}
+
+/// The parser's message in one line, without its usage text.
+pub(super) fn one_line(error: &clap::Error) -> String {
+    let text = error.render().to_string();
+    let paragraphs = text.split("\n\n").map(|paragraph| {
+        let lines: Vec<_> = paragraph.lines().map(str::trim).collect();
+        lines.join(" ")
+    });
+    let said = paragraphs.filter(|paragraph| {
+        let aside = ["Usage:", "For more information"];
+        !paragraph.is_empty() && !aside.iter().any(|start| paragraph.starts_with(start))
+    });
+    let line = said.collect::<Vec<_>>().join("; ");
+    let line = line.strip_prefix("error: ").unwrap_or(&line);
+    line.split(' ').map(shortened).collect::<Vec<_>>().join(" ")
+}
+
+/// A word as given, unless it is too long to be read.
+fn shortened(word: &str) -> Cow<'_, str> {
+    const LONGEST: usize = 200;
+    const BEGINNING: usize = 40;
+    if word.chars().count() <= LONGEST {
+        return Cow::Borrowed(word);
+    }
+    let beginning: String = word.chars().take(BEGINNING).collect();
+    Cow::Owned(format!("{beginning}…"))
+}
+
 #[cfg(test)]
 mod tests {
-    use super::*;
     use clap::CommandFactory;
+
+    use super::*;
 
     #[test]
     fn endless_values_are_cut_in_messages() {

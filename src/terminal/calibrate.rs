@@ -4,8 +4,8 @@ use clap::Args;
 use serde::Serialize;
 
 use super::{
+    decode::FrameArguments,
     failure::Failure,
-    frames::FrameArguments,
     output::{print, print_object},
 };
 use decoupler_core::{

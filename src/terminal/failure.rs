@@ -5,9 +5,6 @@ use std::{
     path::PathBuf,
 };
 
-use thiserror::Error;
-
-use super::{interruption, specification_error::SpecificationError};
 use decoupler_core::{
     dataset::{SimulationError, SplitBy},
     evaluation::{RunError, experiments::ExperimentError},
@@ -21,6 +18,9 @@ use decoupler_files::{
     export::{DocumentError, SweepFolderError, WriteError, bundle::BundleError, figures::PictureError},
     import::{Cure, ImportError, InputLineError, SetupError},
 };
+use thiserror::Error;
+
+use super::interruption;
 
 /// Reasons for which a command fails.
 #[derive(Debug, Error)]
@@ -246,4 +246,28 @@ fn comes_of_arguments(error: &RunError) -> bool {
             | RunError::Folds(_)
             | RunError::Division(_)
     )
+}
+
+/// Most trials of a sweep. Every program that works on one reads all of them.
+pub(super) const MAX_TRIALS: usize = 100_000;
+
+/// Errors of a specification.
+#[derive(Debug, Error)]
+pub(super) enum SpecificationError {
+    #[error("cannot read '{}': {}", .path.display(), system_cause(.source))]
+    Read { path: PathBuf, source: io::Error },
+    #[error(
+        "'{}' is no specification: {message}; write {{\"train\": {{OPTION: VALUE, ...}}, \"axes\": {{OPTION: [VALUE, ...], \
+         ...}}}} with the options of decoupler train",
+        .path.display()
+    )]
+    Layout { path: PathBuf, message: String },
+    #[error("'{}': {place}: {message}", .path.display())]
+    Option {
+        path: PathBuf,
+        place: String,
+        message: String,
+    },
+    #[error("'{}': its axes have more than {MAX_TRIALS} combinations; give fewer values, or several specifications", .0.display())]
+    TooMany(PathBuf),
 }

@@ -1,26 +1,36 @@
 //! Findings on a recording, in the terminal.
 
+use std::io::{self, Write};
+
 use clap::{
     Args,
     builder::{PossibleValuesParser, TypedValueParser},
 };
-
-use super::{
-    failure::Failure,
-    findings_report::Report,
-    import_arguments::ImportArguments,
-    output::progress_bar,
-    parsers::{count, seed},
-    samples::{with_bar, working_folder},
-};
 use decoupler_core::{
     dataset::Seed,
     evaluation::{
-        Measured, RunSettings,
-        recorded::{Findings, FittedModel, Stage},
+        Channel, Measured, RunSettings, TargetErrors,
+        recorded::{
+            ChannelImportance, Determinacy, Determination, Findings, FittedModel, Interval, LearningCurve, Stage,
+        },
     },
     network::LARGEST_HIDDEN,
     scene::RowModel,
+    text::capitalised,
+};
+use decoupler_files::{
+    export::{Cell, Table, describe_target, describe_warnings, format_number},
+    import::{Dropped, Plan, Recording},
+};
+use serde::Serialize;
+
+use super::{
+    arguments::{count, seed},
+    failure::Failure,
+    import_arguments::ImportArguments,
+    output::{print, print_object, progress_bar},
+    recording_report::{FileFound, files, write_files, write_warnings},
+    samples::{with_bar, working_folder},
 };
 
 // Models that are fitted to measure how well the readings determine the targets.
@@ -79,5 +89,287 @@ impl StudyArguments {
         bar.finish_and_clear();
         let Some(findings) = found? else { return Ok(()) };
         Report::new(&plan, &recording, &settings, folds, &findings).print(is_json)
+    }
+}
+
+/// The object printed by `inspect --targets --json`.
+#[derive(Serialize)]
+pub(super) struct Report<'a> {
+    files: Vec<FileFound>,
+    rows: usize,
+    samples: usize,
+    dropped: &'a [Dropped],
+    split: String,
+    folds: usize,
+    hidden: usize,
+    seed: u64,
+    /// Model behind the worth of the channels and the learning curves.
+    model: &'static str,
+    targets: Vec<Target<'a>>,
+    channels: Vec<Worth<'a>>,
+    warnings: Vec<String>,
+}
+
+#[derive(Serialize)]
+struct Target<'a> {
+    name: &'a str,
+    unit: Option<&'a str>,
+    /// Of the better of network and ridge.
+    r2: Option<Figure>,
+    better: Option<&'static str>,
+    /// determined, weakly determined or not determined.
+    standing: Option<&'static str>,
+    sentence: String,
+    r2_network: Option<Figure>,
+    r2_ridge: Option<Figure>,
+    /// RMSE of the network in proportion to that of ridge.
+    network_to_ridge: Option<Figure>,
+    /// RMSE of the network and of ridge with honest and with random folds.
+    splits: Option<Splits>,
+    learning_curve: Vec<Point>,
+    /// RMSE with twice the samples in proportion to that with all.
+    with_twice_the_samples: Option<Figure>,
+    outlook: String,
+}
+
+#[derive(Serialize)]
+struct Splits {
+    by: String,
+    network: f64,
+    ridge: f64,
+    random_network: f64,
+    random_ridge: f64,
+    sentence: String,
+}
+
+#[derive(Clone, Copy, Serialize)]
+struct Figure {
+    value: f64,
+    low: f64,
+    high: f64,
+}
+
+#[derive(Serialize)]
+struct Point {
+    samples: usize,
+    rmse: f64,
+    least: f64,
+    largest: f64,
+}
+
+/// Growth of the error of each target without a channel.
+#[derive(Serialize)]
+struct Worth<'a> {
+    name: &'a str,
+    unit: Option<&'a str>,
+    growth: Vec<Option<Figure>>,
+    is_dispensable: bool,
+}
+
+impl From<Interval> for Figure {
+    fn from(Interval { value, low, high }: Interval) -> Self {
+        Self { value, low, high }
+    }
+}
+
+impl From<Figure> for Interval {
+    fn from(Figure { value, low, high }: Figure) -> Self {
+        Self { value, low, high }
+    }
+}
+
+fn name_of(model: FittedModel) -> &'static str {
+    match model {
+        FittedModel::Ridge => "ridge",
+        FittedModel::Network => "network",
+    }
+}
+
+impl<'a> Report<'a> {
+    pub(super) fn new(
+        plan: &Plan,
+        recording: &'a Recording,
+        settings: &RunSettings,
+        folds: usize,
+        findings: &Findings,
+    ) -> Self {
+        let channels = &recording.inputs;
+        let mut warnings = recording.warnings.clone();
+        warnings.extend(describe_warnings(channels, &recording.targets, findings));
+        let worth = |of: &ChannelImportance| Worth {
+            name: &channels[of.channel].name,
+            unit: channels[of.channel].unit.as_deref(),
+            growth: of.growth.iter().map(|growth| growth.map(Figure::from)).collect(),
+            is_dispensable: of.is_dispensable(),
+        };
+        let targets = recording.targets.iter().enumerate();
+        Self {
+            files: files(std::iter::once(recording)),
+            rows: recording.rows,
+            samples: recording.set.samples(),
+            dropped: &recording.dropped,
+            split: plan.division.by.to_string(),
+            folds,
+            hidden: settings.hidden,
+            seed: settings.seed.0,
+            model: name_of(findings.model),
+            targets: targets
+                .map(|(index, channel)| Target::new(index, channel, findings))
+                .collect(),
+            channels: findings.importance.iter().map(worth).collect(),
+            warnings,
+        }
+    }
+
+    pub(super) fn print(&self, is_json: bool) -> Result<(), Failure> {
+        if is_json {
+            return print_object(self);
+        }
+        print(|out| {
+            write_files(&self.files, self.rows, self.dropped, out)?;
+            writeln!(
+                out,
+                "{} samples, {} folds by {}; intervals of 95 % from stretches or groups of samples\n",
+                self.samples, self.folds, self.split
+            )?;
+            self.write_targets(out)?;
+            self.write_splits(out)?;
+            self.write_channels(out)?;
+            self.write_curves(out)?;
+            write_warnings(&self.warnings, out)
+        })
+    }
+
+    fn write_targets(&self, out: &mut impl Write) -> io::Result<()> {
+        for target in &self.targets {
+            write!(out, "{}", capitalised(&target.sentence))?;
+            let of = |name: &str, r2: Option<Figure>| r2.map(|r2| format!("{name} {:.2}", r2.value));
+            let of: Vec<String> = [of("network", target.r2_network), of("ridge", target.r2_ridge)]
+                .into_iter()
+                .flatten()
+                .collect();
+            writeln!(
+                out,
+                "{}",
+                if of.len() > 1 {
+                    format!(" ({})", of.join(", "))
+                } else {
+                    String::new()
+                }
+            )?;
+        }
+        writeln!(out)
+    }
+
+    fn write_splits(&self, out: &mut impl Write) -> io::Result<()> {
+        let splits: Vec<&Splits> = self
+            .targets
+            .iter()
+            .filter_map(|target| target.splits.as_ref())
+            .collect();
+        if splits.is_empty() {
+            return Ok(());
+        }
+        for splits in splits {
+            writeln!(out, "{}", capitalised(&splits.sentence))?;
+        }
+        writeln!(out)
+    }
+
+    fn target_names(&self) -> impl Iterator<Item = &str> {
+        self.targets.iter().map(|target| target.name)
+    }
+
+    fn write_channels(&self, out: &mut impl Write) -> io::Result<()> {
+        if self.channels.is_empty() {
+            return Ok(());
+        }
+        writeln!(
+            out,
+            "Error (RMSE) without a channel, in proportion to that with all of them (fits: {})",
+            self.model
+        )?;
+        let row = |channel: &Worth<'_>| {
+            let growth = channel.growth.iter().map(|growth| match growth {
+                Some(growth) => Interval::from(*growth).to_string(),
+                None => format_number(None),
+            });
+            let note = if channel.is_dispensable { "dispensable" } else { "" };
+            let texts = std::iter::once(channel.name.to_string()).chain(growth);
+            texts.chain([note.to_owned()]).map(Cell::from).collect()
+        };
+        let headings = std::iter::once("channel").chain(self.target_names()).chain([""]);
+        let table = Table::of_headings(headings, self.channels.iter().map(row));
+        write!(out, "{}", table.aligned())?;
+        writeln!(out)
+    }
+
+    fn write_curves(&self, out: &mut impl Write) -> io::Result<()> {
+        let Some(first) = self.targets.first().filter(|first| !first.learning_curve.is_empty()) else {
+            return Ok(());
+        };
+        writeln!(
+            out,
+            "Test error (RMSE) by the number of training samples (fits: {})",
+            self.model
+        )?;
+        let row = |(index, point): (usize, &Point)| {
+            let errors = self.targets.iter().map(|target| target.learning_curve.get(index));
+            let errors = errors.map(|point| Cell::from(point.map(|point| point.rmse)));
+            std::iter::once(point.samples.into()).chain(errors).collect()
+        };
+        let headings = std::iter::once("samples").chain(self.target_names());
+        let table = Table::of_headings(headings, first.learning_curve.iter().enumerate().map(row));
+        write!(out, "{}", table.aligned())?;
+        for target in &self.targets {
+            writeln!(out, "{}", capitalised(&target.outlook))?;
+        }
+        writeln!(out)
+    }
+}
+
+impl<'a> Target<'a> {
+    fn new(index: usize, channel: &'a Channel, findings: &Findings) -> Self {
+        let of = &findings.targets[index];
+        let (best, name) = (of.best(), &channel.name);
+        let r2 = |determination: Option<Determination>| determination.map(|of| of.r2.into());
+        let LearningCurve { points, doubling, .. } = &of.curve;
+        Self {
+            name,
+            unit: channel.unit.as_deref(),
+            r2: r2(best.map(|(_, determination)| determination)),
+            better: best.map(|(model, _)| name_of(model)),
+            standing: best.map(|(_, determination)| match determination.determinacy() {
+                Determinacy::Determined => "determined",
+                Determinacy::WeaklyDetermined => "weakly determined",
+                Determinacy::NotDetermined => "not determined",
+            }),
+            sentence: describe_target(name, of),
+            r2_network: r2(of.network),
+            r2_ridge: r2(of.ridge.ok()),
+            network_to_ridge: of.gain.map(|gain| gain.ratio.into()),
+            splits: findings.comparison.as_ref().map(|comparison| {
+                let rmse = |errors: &[TargetErrors]| errors[index].rmse;
+                Splits {
+                    by: comparison.by.to_string(),
+                    network: rmse(&comparison.network),
+                    ridge: rmse(&comparison.ridge),
+                    random_network: rmse(&comparison.random_network),
+                    random_ridge: rmse(&comparison.random_ridge),
+                    sentence: comparison.sentence(index, name),
+                }
+            }),
+            learning_curve: points
+                .iter()
+                .map(|point| Point {
+                    samples: point.samples,
+                    rmse: point.rmse,
+                    least: point.range[0],
+                    largest: point.range[1],
+                })
+                .collect(),
+            with_twice_the_samples: doubling.map(|doubling| doubling.ratio.into()),
+            outlook: of.curve.sentence(name),
+        }
     }
 }

@@ -1,4 +1,8 @@
+//! Lines as they come, parsed for the network that decodes them.
+
 use std::{
+    fmt,
+    io::{Write, stderr},
     path::Path,
     sync::{
         Arc,
@@ -8,18 +12,26 @@ use std::{
 };
 
 use clap::Args;
+use decoupler_core::{
+    dataset::SimulationError,
+    evaluation::Simulation,
+    live::{
+        FaultEvent, FaultMonitor, Keeping, LeftOutDecoder, Line, LineError, LineParser, Lines, NextLine, ParsedLine,
+        Source,
+    },
+    scene::Noise,
+};
+use decoupler_files::{
+    export::NetworkFile,
+    import::{InputLine, InputLineError, InputLines},
+};
 
 use super::{
+    arguments::number,
     failure::Failure,
-    follow_answers::{Answers, Form},
-    follow_faults::Faults,
-    follow_lines::Parser,
-    follow_report::Report,
+    follow_report::{Answers, Form, Report},
     interruption::Graceful,
-    parsers::number,
 };
-use decoupler_core::live::{Keeping, Line, Lines, NextLine, ParsedLine, Source};
-use decoupler_files::export::NetworkFile;
 
 // Decoding of frames as they come.
 #[derive(Args)]
@@ -195,4 +207,204 @@ fn report_too_long(number: u64, report: &mut Report) {
 
 fn wrong(argument: &str, reason: impl std::fmt::Display) -> Failure {
     Failure::Arguments(format!("{argument}: {reason}"))
+}
+
+/// Parser of the lines of an array or of a recording.
+pub(super) enum Parser {
+    /// Resistances, row by row or in whole snapshots.
+    Array(Box<LineParser>),
+    /// Columns under the names of the inputs.
+    Columns(Box<InputLines>),
+}
+
+/// Error in a line.
+pub(super) enum ParseError {
+    Array(LineError),
+    Columns { line: u64, source: InputLineError },
+}
+
+impl Parser {
+    /// Prepares to read lines for the network of `file`. `is_complete` is true if no line of the input is lost.
+    pub(super) fn new(file: &NetworkFile, is_complete: bool) -> Result<Self, Failure> {
+        Ok(match file.settings.source.simulation() {
+            Some(simulation) => {
+                let parser = LineParser::new(simulation.sensor.scale, simulation.scene.rows, is_complete);
+                Self::Array(Box::new(parser.map_err(SimulationError::from)?))
+            }
+            None => Self::Columns(Box::new(file.input_lines())),
+        })
+    }
+
+    pub(super) fn parse(&mut self, line: u64, text: &[u8]) -> Result<ParsedLine<'_>, ParseError> {
+        match self {
+            Self::Array(parser) => parser.parse(line, text).map_err(ParseError::Array),
+            Self::Columns(parser) => match parser.parse(line, text) {
+                Ok(InputLine::NoReadings) => Ok(ParsedLine::NoReadings),
+                Ok(InputLine::Readings { row_index, readings }) => Ok(ParsedLine::Row {
+                    row_index: Some(row_index),
+                    readings_ohm: readings,
+                }),
+                Err(source) => Err(ParseError::Columns { line, source }),
+            },
+        }
+    }
+
+    /// Counts a line that is too long to be parsed.
+    pub(super) fn count_bad(&mut self) {
+        if let Self::Array(parser) = self {
+            parser.count_bad();
+        }
+    }
+}
+
+impl ParseError {
+    /// Returns true if the later lines cannot be decoded either.
+    pub(super) fn is_final(&self) -> bool {
+        match self {
+            Self::Array(error) => error.is_final(),
+            Self::Columns { source, .. } => source.is_final(),
+        }
+    }
+
+    /// The failure of a program that stops at this error in the lines of `input`.
+    pub(super) fn failure(self, input: Source) -> Failure {
+        match self {
+            Self::Array(error) => Failure::Line(input, error),
+            Self::Columns { line, source } => Failure::OtherColumns { input, line, source },
+        }
+    }
+}
+
+impl fmt::Display for ParseError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Array(error) => error.fmt(f),
+            Self::Columns { line, source } => write!(f, "line {line}: {source}"),
+        }
+    }
+}
+
+/// Looks for faults in the frames that lines make up, and reports them.
+pub(super) struct Faults {
+    watch: Option<Watch>,
+    /// `true` once it was informed that lines do not say their row-wire.
+    is_told: bool,
+}
+
+struct Watch {
+    monitor: FaultMonitor,
+    left_out: LeftOutDecoder,
+    /// Latest readings of every row read: rows × M4.
+    frame_ohm: Vec<f64>,
+    /// Rows of which readings came since the last check.
+    is_new: Vec<bool>,
+    columns: usize,
+}
+
+impl Faults {
+    pub(super) fn new(source: &Simulation, relative_noise: Option<f64>) -> Result<Self, Failure> {
+        let (sensor, mut scene) = (&source.sensor, source.scene);
+        if let Some(relative) = relative_noise {
+            scene.noise = Noise::relative(relative);
+            scene
+                .check()
+                .map_err(|error| Failure::Arguments(format!("--noise: {error}")))?;
+        }
+        let scale = sensor.scale;
+        let reason = if scene.noise.in_test().is_none() {
+            Some("the network was trained without noise to judge them by; give --noise REL")
+        } else if !FaultMonitor::is_affordable(scale, &scene) {
+            Some("the array is too large for it")
+        } else {
+            None
+        };
+        if let Some(reason) = reason {
+            tell(&format!("faults of wires are not looked for: {reason}"));
+            return Ok(Self {
+                watch: None,
+                is_told: true,
+            });
+        }
+        let rows = scene.rows.read(scale.rows()).map_err(SimulationError::from)?;
+        Ok(Self {
+            watch: Some(Watch {
+                monitor: FaultMonitor::new(sensor, &scene, &rows).map_err(Failure::Sensor)?,
+                left_out: LeftOutDecoder::new(sensor, &scene, &rows).map_err(Failure::Sensor)?,
+                frame_ohm: vec![0.0; rows.len() * scale.columns()],
+                is_new: vec![false; rows.len()],
+                columns: scale.columns(),
+            }),
+            is_told: false,
+        })
+    }
+
+    /// Looks for nothing, where there is no model of the sensor.
+    pub(super) fn none() -> Self {
+        Self {
+            watch: None,
+            is_told: true,
+        }
+    }
+
+    /// The decoder that leaves out the wires of a named fault, if there is one, with the latest readings of every row read.
+    pub(super) fn left_out(&mut self) -> Option<(&mut LeftOutDecoder, &[f64])> {
+        let watch = self.watch.as_mut()?;
+        Some((&mut watch.left_out, &watch.frame_ohm))
+    }
+
+    /// Takes the readings of a line; returns `true` if all rows have come since the last check.
+    pub(super) fn take(&mut self, line: u64, parsed: ParsedLine<'_>) -> bool {
+        let Some(watch) = &mut self.watch else { return false };
+        match parsed {
+            ParsedLine::Row {
+                row_index: Some(index),
+                readings_ohm,
+            } => {
+                watch.frame_ohm[index * watch.columns..][..watch.columns].copy_from_slice(readings_ohm);
+                watch.is_new[index] = true;
+            }
+            ParsedLine::Snapshot(readings_ohm) => {
+                watch.frame_ohm.copy_from_slice(readings_ohm);
+                watch.is_new.fill(true);
+            }
+            ParsedLine::Row { row_index: None, .. } if !self.is_told => {
+                self.is_told = true;
+                tell(&format!(
+                    "line {line}: faults of wires are not looked for in lines that do not say their row-wire; name a \
+                     column row, or send whole snapshots in one line"
+                ));
+            }
+            ParsedLine::Row { .. } | ParsedLine::NoReadings => {}
+        }
+        watch.is_new.iter().all(|is_new| *is_new)
+    }
+
+    /// Checks the latest readings, and tells what they have made known.
+    pub(super) fn check(&mut self, line: u64) {
+        let Some(watch) = &mut self.watch else { return };
+        watch.is_new.fill(false);
+        match watch.monitor.check(&watch.frame_ohm) {
+            Some(FaultEvent::Named(fault)) => {
+                tell(&format!(
+                    "line {line}: {fault}; left out from here on, by Gauss-Newton steps on the other readings"
+                ));
+            }
+            Some(FaultEvent::Unexplained) => tell(&format!(
+                "line {line}: the readings contradict Eq. (2), and no fault of a single wire explains them: the answers may \
+                 be wrong; check the wiring, the geometry and the order of the rows"
+            )),
+            Some(FaultEvent::Recovered) => {
+                tell(&format!(
+                    "line {line}: the readings agree with Eq. (2) again; all wires are used"
+                ));
+            }
+            None => {}
+        }
+        watch.left_out.leave_out(watch.monitor.named());
+    }
+}
+
+fn tell(message: &str) {
+    // There is no one to report to if this fails.
+    let _ = writeln!(stderr(), "warning: {message}");
 }

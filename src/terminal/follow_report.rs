@@ -1,11 +1,23 @@
 use std::{
     fmt::Display,
-    io::{Write, stderr},
+    io::{self, BufWriter, StdoutLock, Write, stderr, stdout},
     time::{Duration, Instant},
 };
 
-use super::failure::Failure;
-use decoupler_core::live::{Latencies, Source};
+use clap::ValueEnum;
+use decoupler_core::{
+    decoupling::{CompiledNetworks, Decoder},
+    live::{Latencies, LeftOutDecoder, ParsedLine, Source},
+};
+use decoupler_files::export::{NetworkFile, write_decoded};
+use ndarray::ArrayView1;
+use serde_json::{Map, Value, json};
+
+use super::{
+    decode::{rows_read, write_heading},
+    failure::Failure,
+    outside_training::OutsideTraining,
+};
 
 /// Counts of what came, and messages on standard error.
 pub(super) struct Report {
@@ -112,5 +124,149 @@ impl Report {
             stderr(),
             "{decoded} lines decoded in {seconds:.1} s ({rate:.0} a second), {bad} bad, {dropped} dropped; {latencies}"
         );
+    }
+}
+
+/// Form of the answers.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub(super) enum Form {
+    /// Lines of CSV in the columns of decode.
+    #[default]
+    Csv,
+    /// One JSON object a line.
+    Jsonl,
+}
+
+/// Decodes lines and writes their answers to standard output; as CSV, or of an array, without allocation in steady state.
+pub(super) struct Answers<'a> {
+    file: &'a NetworkFile,
+    compiled: CompiledNetworks<f64>,
+    rows: usize,
+    answer: Vec<f64>,
+    outside: OutsideTraining<'a>,
+    form: Form,
+    has_heading: bool,
+    output: BufWriter<StdoutLock<'static>>,
+}
+
+impl<'a> Answers<'a> {
+    pub(super) fn new(file: &'a NetworkFile, form: Form) -> Result<Self, Failure> {
+        let rows = rows_read(file)?;
+        Ok(Self {
+            file,
+            compiled: CompiledNetworks::new(&file.network, rows),
+            rows,
+            answer: vec![0.0; rows * file.problem.targets.len()],
+            outside: OutsideTraining::new(&file.problem),
+            form,
+            has_heading: form == Form::Jsonl,
+            output: BufWriter::with_capacity(1 << 16, stdout().lock()),
+        })
+    }
+
+    /// Number of row-wires read.
+    pub(super) fn rows(&self) -> usize {
+        self.rows
+    }
+
+    /// Decodes a line, by `left_out` and the latest readings of every row read if they are given, and writes and flushes the answer. Returns `false` if there is none.
+    pub(super) fn write(
+        &mut self,
+        line: u64,
+        parsed: ParsedLine<'_>,
+        left_out: Option<(&mut LeftOutDecoder, &[f64])>,
+    ) -> io::Result<bool> {
+        let outputs = self.file.problem.targets.len();
+        let (first_row, readings) = match parsed {
+            ParsedLine::NoReadings => return Ok(true),
+            ParsedLine::Row {
+                row_index,
+                readings_ohm,
+            } => (row_index, readings_ohm),
+            ParsedLine::Snapshot(readings) => (Some(0), readings),
+        };
+        let channels = self.compiled.channels();
+        let rows = readings.len() / channels;
+        let answer = &mut self.answer[..rows * outputs];
+        // A wire can be left out of a row that is known only.
+        let fault = left_out
+            .as_ref()
+            .and_then(|(left_out, _)| left_out.fault())
+            .filter(|_| first_row.is_some());
+        let first_row = first_row.unwrap_or(0);
+        let lines = || readings.chunks_exact(channels);
+        let is_answered = match left_out {
+            Some((left_out, frame_ohm)) if fault.is_some() => match parsed {
+                ParsedLine::Snapshot(_) => left_out.decode(readings, answer),
+                _ => left_out.decode_row_of(frame_ohm, first_row, answer),
+            },
+            _ => {
+                let mut rows = lines().zip(answer.chunks_exact_mut(outputs)).enumerate();
+                rows.try_for_each(|(row, (readings, answer))| {
+                    self.compiled.decode_row(first_row + row, readings, answer)
+                })
+            }
+        };
+        if is_answered.is_err() {
+            return Ok(false);
+        }
+        if answer.iter().any(|value| !value.is_finite()) {
+            return Ok(false);
+        }
+        let (mut readings_outside, mut targets_outside) = (Some(0), 0);
+        for (row, (readings, answer)) in lines().zip(answer.chunks_exact(outputs)).enumerate() {
+            let network = self.file.network.at(first_row + row);
+            let of_row = self.outside.count(network, line, readings, answer);
+            readings_outside = readings_outside.zip(of_row.readings).map(|(sum, count)| sum + count);
+            targets_outside += of_row.targets;
+        }
+        let problem = &self.file.problem;
+        if !self.has_heading {
+            write_heading(problem, rows, &mut self.output)?;
+            self.has_heading = true;
+        }
+        let answer = &self.answer[..rows * outputs];
+        match self.form {
+            Form::Csv => write_decoded(
+                ArrayView1::from(answer),
+                readings_outside,
+                targets_outside,
+                &mut self.output,
+            )?,
+            Form::Jsonl if problem.has_nodes => {
+                write!(self.output, "{{\"line\":{line},\"coordinates_mm\":[")?;
+                for (index, coordinate) in answer.iter().enumerate() {
+                    let separator = if index == 0 { "" } else { "," };
+                    write!(self.output, "{separator}{coordinate:?}")?;
+                }
+                match readings_outside {
+                    Some(count) => write!(self.output, "],\"readings_outside\":{count}")?,
+                    None => write!(self.output, "],\"readings_outside\":null")?,
+                }
+                write!(self.output, ",\"coordinates_outside\":{targets_outside}")?;
+                match fault {
+                    Some(fault) => writeln!(self.output, ",\"left_out\":\"{}\"}}", fault.wire)?,
+                    None => writeln!(self.output, ",\"left_out\":null}}")?,
+                }
+            }
+            Form::Jsonl => {
+                let targets = problem.targets.iter().zip(answer);
+                let targets = targets.map(|(target, value)| (target.name.clone(), (*value).into()));
+                let answer = json!({
+                    "line": line,
+                    "targets": targets.collect::<Map<String, Value>>(),
+                    "readings_outside": readings_outside,
+                    "targets_outside": targets_outside,
+                });
+                writeln!(self.output, "{answer}")?;
+            }
+        }
+        self.output.flush()?;
+        Ok(true)
+    }
+
+    /// Warns of lines outside the range seen in training.
+    pub(super) fn warn(&self) {
+        self.outside.warn();
     }
 }

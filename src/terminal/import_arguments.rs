@@ -2,7 +2,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 
-use super::{checkpointing::check_same, failure::Failure};
+use super::{failure::Failure, interruption::check_same};
 use decoupler_core::dataset::{Division, SplitBy};
 use decoupler_files::{
     export::{RecipeFile, RecipeSource},

@@ -1,12 +1,27 @@
+//! Readings of a file for a network, line by line, with the network of each line.
+
 use std::{
-    io::{self, Write, stdout},
+    fs::File,
+    io::{self, BufReader, Write, stdout},
+    path::Path,
     time::Duration,
 };
 
+use decoupler_core::{
+    dataset::SimulationError,
+    evaluation::Simulation,
+    scene::RowModel,
+    text::{ReadError, Reading, ResistanceReader},
+};
+use decoupler_files::{
+    export::NetworkFile,
+    import::{InputTable, Recipe},
+};
 use indicatif::{ProgressBar, ProgressStyle};
+use ndarray::Array2;
 use serde::Serialize;
 
-use super::failure::Failure;
+use super::{failure::Failure, samples::with_bar};
 
 /// Prints one JSON object on standard output.
 pub(super) fn print_object(object: &impl Serialize) -> Result<(), Failure> {
@@ -30,4 +45,139 @@ pub(super) fn progress_bar(is_hidden: bool, steps: usize, template: &str) -> Pro
     bar.set_style(ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar()));
     bar.enable_steady_tick(Duration::from_millis(200));
     bar
+}
+
+/// Number of lines decoded and written together, so that memory does not grow with the file.
+const BLOCK: usize = 1024;
+
+/// Readings of some lines.
+pub(super) struct Readings {
+    /// Lines × inputs of the network.
+    pub(super) values: Array2<f64>,
+    /// Line numbers, from 1.
+    pub(super) lines: Vec<u64>,
+    /// Index of the row-wire of each line among those that the network reads; 0 if one network reads all.
+    pub(super) row_indices: Vec<usize>,
+}
+
+/// Reads the file `input` for the network of `file` and passes its lines to `take`, block by block.
+pub(super) fn read(
+    file: &NetworkFile,
+    input: &Path,
+    take: &mut dyn FnMut(Readings) -> Result<(), Failure>,
+) -> Result<(), Failure> {
+    match (&file.recorded, file.settings.source.simulation()) {
+        (Some(recorded), _) => take(read_columns(file, &recorded.plan.import, input)?),
+        (None, Some(simulation)) => read_resistances(file, simulation, input, take),
+        (None, None) => unreachable!("a file of a recording has its plan"),
+    }
+}
+
+/// Reads the columns of the names of the inputs, or as many columns as there are inputs, from a file of any format.
+fn read_columns(file: &NetworkFile, recipe: &Recipe, input: &Path) -> Result<Readings, Failure> {
+    let has_rows = file.network.only().is_none();
+    let table = with_bar(true, |watch| {
+        recipe.read_inputs(input, &file.problem.inputs, has_rows, watch)
+    })?;
+    let InputTable {
+        readings,
+        row_wires,
+        lines,
+    } = table;
+    let row_indices = match (row_wires, &file.row_wires) {
+        _ if !has_rows => vec![0; lines.len()],
+        (Some(of_lines), Some(read)) => {
+            let index = |(row_wire, &line): (usize, &u64)| {
+                let index = read.binary_search(&row_wire);
+                index.map_err(|_| Failure::UnknownRow {
+                    path: input.to_owned(),
+                    line,
+                    row: row_wire + 1,
+                })
+            };
+            of_lines.into_iter().zip(&lines).map(index).collect::<Result<_, _>>()?
+        }
+        _ => {
+            return Err(Failure::NoRowWires {
+                path: input.to_owned(),
+                column: recipe.row_wire.clone().unwrap_or_default(),
+            });
+        }
+    };
+    Ok(Readings {
+        values: readings,
+        lines,
+        row_indices,
+    })
+}
+
+/// Reads CSV of the resistances of an array. Lines that do not contain the number of their row-wire are whole snapshots.
+fn read_resistances(
+    file: &NetworkFile,
+    Simulation { sensor, scene, .. }: &Simulation,
+    input: &Path,
+    take: &mut dyn FnMut(Readings) -> Result<(), Failure>,
+) -> Result<(), Failure> {
+    let opened = File::open(input).map_err(|source| Failure::Open {
+        path: input.to_owned(),
+        source,
+    })?;
+    let unreadable = |source| Failure::Resistances {
+        path: input.to_owned(),
+        source,
+    };
+    let (scale, rows) = (sensor.scale, scene.rows);
+    let reader = ResistanceReader::new(BufReader::new(opened), scale.columns()).map_err(unreadable)?;
+    let read = rows.read(scale.rows()).map_err(SimulationError::from)?;
+    let mut reader = match rows.model() {
+        RowModel::Shared => reader,
+        RowModel::Each => reader.with_row_wires(scale.rows()),
+    };
+    // The turn of each line's row-wire, where the file does not have it.
+    let mut turns = (0..read.len()).cycle();
+    let mut lines_in_turn = 0;
+    let mut is_empty = true;
+    while let Some(reading) = reader.read(BLOCK).map_err(unreadable)? {
+        is_empty = false;
+        let Reading {
+            resistances_ohm,
+            lines,
+            row_wires,
+        } = reading;
+        let row_indices = match row_wires {
+            Some(row_wires) => {
+                let index = |(row_wire, &line): (usize, &u64)| {
+                    let index = read.iter().position(|other| *other == row_wire);
+                    index.ok_or_else(|| Failure::OtherRow {
+                        path: input.to_owned(),
+                        line,
+                        row: row_wire + 1,
+                        rows,
+                    })
+                };
+                row_wires.into_iter().zip(&lines).map(index).collect::<Result<_, _>>()?
+            }
+            _ if file.network.only().is_some() => vec![0; lines.len()],
+            None => {
+                lines_in_turn += lines.len();
+                turns.by_ref().take(lines.len()).collect()
+            }
+        };
+        take(Readings {
+            values: resistances_ohm,
+            lines,
+            row_indices,
+        })?;
+    }
+    if is_empty {
+        return Err(unreadable(ReadError::Empty));
+    }
+    if !lines_in_turn.is_multiple_of(read.len()) {
+        return Err(Failure::PartOfSnapshot {
+            path: input.to_owned(),
+            lines: lines_in_turn,
+            rows: read.len(),
+        });
+    }
+    Ok(())
 }

@@ -8,10 +8,10 @@ use std::{
 use clap::{Args, ValueEnum};
 
 use super::{
+    arguments::{count, seed},
     failure::Failure,
     interruption::Graceful,
     output::progress_bar,
-    parsers::{count, seed},
     reproduce_report::{Reproduced, print_json, print_text},
 };
 use decoupler_core::{

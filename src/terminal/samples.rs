@@ -1,16 +1,29 @@
 //! Samples of a run: drawn after an announcement of the work, or read with a progress bar.
 
 use std::{
-    io::{Write, stderr},
+    io::{BufWriter, Write, stderr, stdout},
     ops::ControlFlow,
-    path::Path,
+    path::{Path, PathBuf},
 };
 
-use super::{failure::Failure, output::progress_bar};
-use decoupler_core::evaluation::{RunError, RunSettings, Workload};
+use clap::Args;
+use decoupler_core::{
+    dataset::{Dataset, LARGEST_SAMPLES, Seed, SimulationError, Stream},
+    decoupling::{Decoder, Precision, decode_set},
+    evaluation::{DecoderSet, Run, RunError, RunSettings, SimulatedSettings, Simulation, Workload, error_remarks},
+    scene::{Fault, FaultySensor},
+    sensor::{ArrayScale, SensorModel},
+};
 use decoupler_files::{
-    export::describe_workload,
+    export::{AtomicFile, WriteError, describe_workload, write_samples, write_samples_header},
     import::{Progress, Setup, SetupError, SetupSets},
+};
+
+use super::{
+    arguments::{count, seed},
+    failure::Failure,
+    output::progress_bar,
+    scene_arguments::SceneArguments,
 };
 
 /// Draws or reads the samples of `setup`.
@@ -75,4 +88,130 @@ pub(super) fn announce_workload(workload: &Workload) -> Result<(), RunError> {
         let _ = writeln!(stderr(), "{}", describe_workload(workload));
     }
     Ok(())
+}
+
+/// Largest number of snapshots drawn and written together, so that memory does not grow with the number of samples.
+const BLOCK: usize = 64;
+/// Memory for them where one of a large array takes much.
+const BLOCK_BYTES: usize = 64 << 20;
+
+/// Draw samples of an array and write them as CSV
+///
+/// A line is one row-wire at one moment: snapshot and row counted from 1, its resistances r_1, r_2, … in ohm, and
+/// x_1, y_1, z_1, x_2, … of its nodes in mm. Samples come as whole snapshots of all rows. With the seed and array of
+/// a training they are its test samples. With --decoder, one of them, the coordinates that it decodes follow as
+/// decoded_x_1, …; networks are first trained with the settings of the preset.
+#[derive(Args)]
+#[command(allow_negative_numbers = true)]
+pub(super) struct Simulate {
+    /// Array scale M1xM2_M3xM4: rows x nodes on each, nodes on each column x columns
+    #[arg(long, value_name = "SCALE", default_value = "10x10_5x30")]
+    array: ArrayScale,
+    /// Samples, rounded up to whole snapshots
+    #[arg(long, value_name = "N", default_value_t = 100, value_parser = count(1..=LARGEST_SAMPLES))]
+    samples: usize,
+    /// Seed of all random numbers
+    #[arg(long, default_value_t = 0, value_parser = seed)]
+    seed: u64,
+    /// Fault of a wire or of the electronics, as it shows in the readings: open-row:ROW or open-column:COLUMN (broken at
+    /// the connector, or with @NODE before that node), short-rows:ROW-ROW, short-columns:COLUMN-COLUMN, gain:COLUMN=REL (an
+    /// amplifier's error), stuck:COLUMN=low|high (a converter at an end of its range)
+    #[arg(long, value_name = "FAULT")]
+    fault: Option<Fault>,
+    #[command(flatten)]
+    scene: SceneArguments,
+    /// File to write instead of standard output
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+}
+
+impl Simulate {
+    pub(super) fn run(self) -> Result<(), Failure> {
+        match &self.out {
+            Some(path) => {
+                let mut file = AtomicFile::create(path)?;
+                self.write(&mut file, |source| WriteError::io(path, source).into())?;
+                Ok(file.commit()?)
+            }
+            None => {
+                let mut output = BufWriter::new(stdout().lock());
+                self.write(&mut output, Failure::Output)?;
+                output.flush().map_err(Failure::Output)
+            }
+        }
+    }
+
+    fn write(&self, writer: &mut dyn Write, refused: impl Fn(std::io::Error) -> Failure) -> Result<(), Failure> {
+        let mut settings = self.scene.settings()?;
+        settings.source.sensor = SensorModel::new(self.array);
+        settings.seed = Seed(self.seed);
+        let (Simulation { sensor, scene, .. }, seed) = (&settings.source, settings.seed);
+        let rows = scene.rows.read(self.array.rows()).map_err(SimulationError::from)?;
+        let faulty = match self.fault {
+            Some(fault) => {
+                fault
+                    .check(self.array, &rows)
+                    .map_err(|error| Failure::Arguments(format!("--fault: {error}")))?;
+                Some(FaultySensor::new(sensor, scene.noise.in_test(), fault).map_err(Failure::Sensor)?)
+            }
+            None => None,
+        };
+        let mut decoder = self.decoder(&settings)?;
+        let (mut rng, mut noise_rng) = (seed.rng(Stream::Test), seed.rng(Stream::TestNoise));
+        let snapshots = self.samples.div_ceil(rows.len());
+        write_samples_header(self.array, decoder.is_some(), writer).map_err(&refused)?;
+        let numbers = rows.len() * (self.array.columns() + self.array.coordinates_per_row());
+        let block = (BLOCK_BYTES / (size_of::<f64>() * numbers)).clamp(1, BLOCK);
+        for first in (0..snapshots).step_by(block) {
+            let samples = block.min(snapshots - first) * rows.len();
+            let mut set = Dataset::simulate(sensor, scene, samples, &mut rng)?;
+            if let Some(faulty) = &faulty {
+                set.break_before_noise(sensor, faulty);
+            }
+            set.disturb(sensor, &scene.noise.in_test(), &mut noise_rng)
+                .map_err(RunError::from)?;
+            if let Some(faulty) = &faulty {
+                set.break_after_noise(faulty);
+            }
+            let decoded_mm = match &mut decoder {
+                Some(decoder) => Some(decode_set(&mut **decoder, &set).map_err(RunError::from)?),
+                None => None,
+            };
+            write_samples(&set, decoded_mm.as_ref(), first + 1, writer).map_err(&refused)?;
+        }
+        Ok(())
+    }
+
+    /// The given decoder, with its networks trained; none if none is given.
+    fn decoder(&self, settings: &SimulatedSettings) -> Result<Option<Box<dyn Decoder>>, Failure> {
+        self.scene.check_one_noise()?;
+        let kind = match self.scene.decoder[..] {
+            [] => return Ok(None),
+            [kind] => kind,
+            _ => return Err(Failure::Arguments("--decoder: give only one here".to_owned())),
+        };
+        let networks = if kind.needs_network() {
+            announce(&(*settings).into())?;
+            let mut run = Run::prepare(*settings)?;
+            while run.step().is_none() {}
+            let scores = run.scores();
+            let remarks = scores.map(|scores| error_remarks(settings, &scores, run.stop_reason()));
+            let remarks = remarks.into_iter().flatten();
+            let of_network = remarks
+                .filter(|(row, _)| *row == "network")
+                .map(|(_, remark)| remark.to_string());
+            for warning in run
+                .defect()
+                .map(|defect| defect.to_string())
+                .into_iter()
+                .chain(of_network)
+            {
+                eprintln!("Warning: {warning}");
+            }
+            Some(run.network())
+        } else {
+            None
+        };
+        Ok(DecoderSet::new(settings, networks)?.decoder(kind, Precision::Double)?)
+    }
 }

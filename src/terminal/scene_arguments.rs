@@ -1,9 +1,9 @@
 use clap::Args;
 
 use super::{
-    checkpointing::check_same,
+    arguments::{count, number},
     failure::Failure,
-    parsers::{count, number},
+    interruption::check_same,
 };
 use decoupler_core::{
     decoupling::DecoderKind,

@@ -7,10 +7,9 @@ use clap::Args;
 use indicatif::ProgressBar;
 
 use super::{
-    checkpointing::{CheckpointArguments, Checkpointing},
     failure::{Failure, Interruption},
     import_arguments::ImportArguments,
-    interruption::Graceful,
+    interruption::{CheckpointArguments, Checkpointing, Graceful},
     output::progress_bar,
     samples::{announce, following, sets},
     train_report::Trained,

@@ -4,9 +4,9 @@ use clap::{
 };
 
 use super::{
-    checkpointing::check_same,
+    arguments::{count, number, seed},
     failure::Failure,
-    parsers::{count, number, seed},
+    interruption::check_same,
     scene_arguments::SceneArguments,
 };
 use decoupler_core::{

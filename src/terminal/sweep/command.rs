@@ -1,23 +1,34 @@
-use std::{fs, io::Write, num::NonZero, path::PathBuf, time::Instant};
+use std::{
+    fs::{self, File, TryLockError},
+    io::Write,
+    num::NonZero,
+    path::{Path, PathBuf},
+    sync::{
+        Arc,
+        atomic::{AtomicBool, Ordering},
+    },
+    time::Instant,
+};
 
 use clap::Args;
+use decoupler_core::evaluation::experiments::worker_threads;
+use decoupler_files::export::{
+    MergedSweep, SweepTableFormat, Trial, TrialId, WriteError, atomic_write, check_writable, format_duration,
+};
 use serde::Serialize;
 
 use super::{
-    arguments::SweepArguments,
+    arguments::{Shard, SweepArguments},
     filling::{Filled, fill},
     job_script::Engine,
-    shard::Shard,
-    stop::Stop,
     trials::Trials,
 };
 use crate::terminal::{
+    arguments::count,
     failure::Failure,
+    interruption::{Graceful, STATUS},
     output::{print, print_object, progress_bar},
-    parsers::count,
 };
-use decoupler_core::evaluation::experiments::worker_threads;
-use decoupler_files::export::{MergedSweep, SweepTableFormat, atomic_write, check_writable, format_duration};
 
 /// Train every combination of options, on one machine or on many
 ///
@@ -202,5 +213,113 @@ impl Sweep {
             unreadable: merged.damaged.len(),
             out: out.clone(),
         })
+    }
+}
+
+/// Exit status after SIGTERM: 128 plus the number of the signal, as in shells.
+const TERMINATED: u8 = 143;
+
+/// Requests to stop: Ctrl-C, SIGTERM (by which clusters announce that a job must end), or a failure of another thread.
+pub(super) struct Stop {
+    graceful: Graceful,
+    terminated: Arc<AtomicBool>,
+    failed: AtomicBool,
+}
+
+impl Stop {
+    pub(super) fn begin() -> Self {
+        let terminated = Arc::new(AtomicBool::new(false));
+        #[cfg(unix)]
+        {
+            // Without it SIGTERM ends the program at once, which loses no more than the time since the last checkpoint.
+            let _ = signal_hook::flag::register(signal_hook::consts::SIGTERM, Arc::clone(&terminated));
+        }
+        Self {
+            graceful: Graceful::begin(),
+            terminated,
+            failed: AtomicBool::new(false),
+        }
+    }
+
+    /// Has every thread stop because one of them cannot go on.
+    pub(super) fn fail(&self) {
+        self.failed.store(true, Ordering::Relaxed);
+    }
+
+    pub(super) fn is_requested(&self) -> bool {
+        self.failed.load(Ordering::Relaxed) || self.signal_status().is_some()
+    }
+
+    /// Exit status for the signal that has come, if one has.
+    pub(super) fn signal_status(&self) -> Option<u8> {
+        if self.terminated.load(Ordering::Relaxed) {
+            return Some(TERMINATED);
+        }
+        self.graceful.is_end_requested().then_some(STATUS)
+    }
+}
+
+/// The right to train a trial, held by a lock that the system releases however the program ends.
+pub(super) struct Claim {
+    path: PathBuf,
+    /// Locked as long as it is open.
+    _file: File,
+}
+
+/// State of a trial for a program that would train it.
+pub(super) enum Claimed {
+    /// To be trained here and now.
+    Ours(Claim),
+    /// Another program is at it.
+    Theirs,
+    /// Its result is there.
+    Done,
+}
+
+impl Claim {
+    /// Claims the trial `id` of `folder`.
+    pub(super) fn take(folder: &Path, id: TrialId) -> Result<Claimed, WriteError> {
+        let result = Trial::path(folder, id);
+        let path = folder.join(format!("{id}.claim"));
+        if result.exists() {
+            // A program that was killed just then has left its claim next to the result; one that still runs holds it.
+            if let Ok(file) = File::options().write(true).open(&path)
+                && file.try_lock().is_ok()
+            {
+                Self { path, _file: file }.finish();
+            }
+            return Ok(Claimed::Done);
+        }
+        let mut options = File::options();
+        let file = options.create(true).truncate(false).write(true).open(&path);
+        let file = file.map_err(|source| WriteError::io(&path, source))?;
+        match file.try_lock() {
+            Err(TryLockError::WouldBlock) => return Ok(Claimed::Theirs),
+            // Some file systems have no locks: two programs may train a trial there, and the first to finish counts.
+            Ok(()) | Err(TryLockError::Error(_)) => {}
+        }
+        let claim = Self { path, _file: file };
+        // Its last holder may have finished it before the lock was free. The file is removed only when the result is
+        // there, so no one can hold another lock of the same name and find no result.
+        if result.exists() {
+            claim.finish();
+            return Ok(Claimed::Done);
+        }
+        Ok(Claimed::Ours(claim))
+    }
+
+    /// File in which the unfinished training is saved.
+    pub(super) fn checkpoint(&self) -> PathBuf {
+        self.path.with_extension("checkpoint")
+    }
+
+    /// Ends the claim on a trial whose result is there, and leaves nothing but the result.
+    pub(super) fn finish(self) {
+        for path in [self.checkpoint(), self.path] {
+            match fs::remove_file(path) {
+                // What stays does no harm.
+                Ok(()) | Err(_) => {}
+            }
+        }
     }
 }

@@ -16,11 +16,9 @@ use indicatif::ProgressBar;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
 use super::{
-    claim::{Claim, Claimed},
-    stop::Stop,
+    command::{Claim, Claimed, Stop},
     train_options::TrainOptions,
-    training::train,
-    trials::Trials,
+    trials::{Trials, train},
 };
 use crate::terminal::failure::Failure;
 use decoupler_core::evaluation::experiments::ExperimentError;

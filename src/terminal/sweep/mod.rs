@@ -3,16 +3,11 @@
 //! on any machines that see the folder, may fill it together, end at any moment and be started again.
 
 mod arguments;
-mod claim;
 mod command;
 mod filling;
 mod job_script;
-mod shard;
 mod specification;
-mod stop;
 mod train_options;
-mod training;
 mod trials;
-mod unique_keys;
 
 pub(super) use command::Sweep;

@@ -2,7 +2,7 @@ use clap::{ArgAction, Args, Command, FromArgMatches};
 use serde_json::Value;
 
 use crate::terminal::{
-    failure::Failure, import_arguments::ImportArguments, parse_error::one_line, training_arguments::TrainingArguments,
+    arguments::one_line, failure::Failure, import_arguments::ImportArguments, training_arguments::TrainingArguments,
 };
 use decoupler_core::decoupling::DecoderKind;
 use decoupler_files::{

@@ -3,7 +3,7 @@ use std::{
     sync::{Arc, mpsc::channel},
 };
 
-use super::{DecouplerWindow, copying::ToCopy, path_look::Found, remembered::is_within_limits, save_form::Saving};
+use super::{DecouplerWindow, clipboard::ToCopy, files::Found, remembered::is_within_limits, save_form::Saving};
 use crate::window::{
     preview,
     shared::{

@@ -1,12 +1,22 @@
 //! The clipboard, which reports whether it took what was put on it.
+//!
+//! Text and pictures on their way to the clipboard, and what a right click copies.
 
 use std::{
     env, fmt,
     sync::{Arc, Mutex, PoisonError},
 };
 
-use super::{Desktop, copying::not_copied};
-use crate::window::shared::Notice;
+use decoupler_files::figure::Figure;
+use eframe::egui::{ColorImage, Id, Response, ScrollArea, Ui};
+
+use super::{DecouplerWindow, Desktop};
+use crate::window::{
+    job::{Job, JobError, Wake},
+    shared::{Effect, Export, ExportGroup, Matter, Notice},
+    theme::space,
+    widgets::{dim_ui, take_claim, take_value_under},
+};
 
 /// Something to be put on the clipboard.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -106,6 +116,149 @@ impl fmt::Debug for Clipboard {
             Self::Wayland(_) => "Wayland",
             Self::Toolkit => "Toolkit",
         })
+    }
+}
+
+/// Something to be copied.
+#[derive(Debug)]
+pub(super) enum ToCopy {
+    /// Text as it is.
+    Text(String),
+    /// A picture, still to be drawn.
+    Picture(Box<Figure>),
+}
+
+impl ToCopy {
+    fn into_content(self) -> Result<Content, String> {
+        match self {
+            Self::Text(text) => Ok(Content::Text(text)),
+            Self::Picture(figure) => {
+                let (size, rgba) = figure.draw().pixels().map_err(|error| error.to_string())?;
+                Ok(Content::Picture { size, rgba })
+            }
+        }
+    }
+}
+
+/// Outcome of copying: what the toolkit still has to copy, if anything, and the message for the user then.
+type Copied = (Option<Content>, Notice);
+
+/// What is on its way to the clipboard; the newest wins.
+#[derive(Debug)]
+pub(super) struct Copying {
+    clipboard: Clipboard,
+    job: Job<Result<Copied, JobError>>,
+}
+
+impl Copying {
+    pub(super) fn new(clipboard: Clipboard, wake: Wake) -> Self {
+        Self {
+            clipboard,
+            job: Job::prompt("clipboard", wake),
+        }
+    }
+
+    /// Copies `to_copy`; `notice` is the message for the user once the clipboard has it.
+    pub(super) fn start(&mut self, to_copy: ToCopy, notice: String) {
+        let clipboard = self.clipboard.clone();
+        self.job.abandon();
+        self.job.start(
+            move |_| match to_copy.into_content() {
+                Ok(content) => clipboard.take(content, notice),
+                Err(reason) => (None, not_copied(&reason)),
+            },
+            |copied| copied,
+        );
+    }
+}
+
+/// Notice that nothing was copied.
+pub(super) fn not_copied(reason: &str) -> Notice {
+    Notice::Failed(format!("Nothing was copied: {}", reason.trim_end_matches('.')))
+}
+
+impl DecouplerWindow {
+    /// Copies text; `notice` is the message for the user once the clipboard has it.
+    pub(super) fn copy_text(&mut self, text: String, notice: String) {
+        match &self.copying.clipboard {
+            // There is nothing to wait for.
+            toolkit @ Clipboard::Toolkit => {
+                let copied = toolkit.take(Content::Text(text), notice);
+                self.tell_copied(copied);
+            }
+            _ => self.copying.start(ToCopy::Text(text), notice),
+        }
+    }
+
+    /// Tells of what was copied.
+    pub(super) fn take_copied(&mut self) {
+        while let Some(copied) = self.copying.job.next_event() {
+            self.tell_copied(copied.unwrap_or_else(|error| (None, not_copied(&error.to_string()))));
+        }
+    }
+
+    fn tell_copied(&mut self, (for_toolkit, notice): Copied) {
+        match for_toolkit {
+            Some(Content::Text(text)) => self.ctx.copy_text(text),
+            Some(Content::Picture { size, rgba }) => {
+                self.ctx.copy_image(ColorImage::from_rgba_unmultiplied(size, &rgba));
+            }
+            None => {}
+        }
+        self.notices.tell(Matter::Clipboard, notice);
+    }
+}
+
+/// The menu at a right click on a part of the window: to copy the value under the pointer, and the pictures and tables of
+/// the current view.
+pub(super) fn copy_menu_ui<'a>(part: &Response, exports: impl FnOnce() -> Vec<Export<'a>>, effects: &mut Vec<Effect>) {
+    let id = Id::unique("value to copy");
+    let is_asked = part.container_secondary_clicked();
+    // A field inside the part may have a menu of its own.
+    if is_asked && take_claim(&part.ctx) {
+        return;
+    }
+    if is_asked {
+        let value = take_value_under(&part.ctx);
+        part.ctx.data_mut(|data| data.insert_temp(id, value));
+    }
+    part.container_context_menu(|ui| menu_ui(ui, id, exports(), effects));
+}
+
+fn menu_ui(ui: &mut Ui, id: Id, exports: Vec<Export<'_>>, effects: &mut Vec<Effect>) {
+    ui.set_min_width(space(60));
+    let mut is_empty = true;
+    if let Some(value) = ui.data(|data| data.get_temp::<Option<String>>(id)).flatten() {
+        is_empty = false;
+        let shown = value.lines().next().unwrap_or_default();
+        if ui.button(format!("Copy “{shown}”")).clicked() {
+            let notice = format!("Copied {shown}");
+            effects.push(Effect::Copy { text: value, notice });
+            ui.close();
+        }
+        ui.separator();
+    }
+    ScrollArea::vertical().max_height(space(100)).show(ui, |ui| {
+        for export in exports {
+            let is_meant = export.is_copy() || export.group == ExportGroup::Figures;
+            let label = export.label();
+            let Some(ask) = export.ask.ok().filter(|_| is_meant) else {
+                continue;
+            };
+            is_empty = false;
+            let text = if label.starts_with("Copy") {
+                label
+            } else {
+                format!("{label}…")
+            };
+            if ui.button(text).on_hover_text(export.description).clicked() {
+                effects.push(ask());
+                ui.close();
+            }
+        }
+    });
+    if is_empty {
+        dim_ui(ui, "There is nothing to copy here yet.");
     }
 }
 

@@ -1,33 +1,22 @@
-use std::{path::PathBuf, sync::Arc, time::Duration};
+use std::{ops::RangeInclusive, path::PathBuf, sync::Arc, time::Duration};
 
-use eframe::egui::{self, Context, Frame as PanelFrame, Margin, Panel, Ui};
+use eframe::egui::{self, Context, Event, Frame as PanelFrame, Key, Margin, Modifiers, Panel, Ui};
 
 use super::{
-    actions::Overlay,
-    clipboard::Clipboard,
+    actions::{Overlay, Undoing},
+    clipboard::{Clipboard, Copying, copy_menu_ui},
     closing::Closing,
-    columns::{edge_ui, widths_points},
-    copying::{Copying, copy_menu_ui},
-    desktop::Desktop,
-    dialogs::Dialogs,
-    export_menu::export_menu_ui,
-    files::Files,
-    frames::changes_something,
-    interface_scale::SCALES,
-    memory::Memory,
-    notice::{self, notice_ui},
-    notices::Notices,
-    path_look::PathLooks,
-    remembered::{Remembered, WindowFile},
+    files::{Dialogs, Files, PathLooks},
+    notices::{self, Notices, notice_ui},
+    remembered::{Memory, Remembered, WindowFile},
     save_form::{self, Saving, save_form_ui},
-    top_bar::{Reach, top_bar_ui},
+    top_bar::{Reach, edge_ui, export_menu_ui, top_bar_ui, widths_points},
     tour::{self, Tour, tour_ui},
-    undoing::Undoing,
 };
 use crate::window::{
     job::{Job, Wake},
     preview::PreviewEvent,
-    shared::{Action, Effect, Matter, Notice, Phase, RunsWorker, Shared},
+    shared::{Action, Effect, Matter, Notice, Offers, Phase, RunsWorker, Shared},
     theme::{self, Theme, space},
     training_worker::Worker,
     views::Views,
@@ -256,8 +245,8 @@ impl DecouplerWindow {
         // Before anything changes the places.
         for (place, reply) in replies.inner {
             match reply {
-                notice::Reply::Dismiss => self.notices.dismiss(place),
-                notice::Reply::Restart => self.restart_worker(),
+                notices::Reply::Dismiss => self.notices.dismiss(place),
+                notices::Reply::Restart => self.restart_worker(),
             }
         }
         self.apply_all(effects);
@@ -308,5 +297,74 @@ impl DecouplerWindow {
             Some(save_form::Reply::Cancel) => self.saving = None,
             None => {}
         }
+    }
+}
+
+/// Returns `true` if the user did something in this frame that parts of the window already drawn may depend on: one
+/// frame more shows it everywhere. A pointer that merely moves changes nothing.
+pub(super) fn changes_something(ctx: &Context) -> bool {
+    ctx.input(|input| {
+        let is_change = |event: &Event| match event {
+            Event::PointerMoved(_) | Event::MouseMoved(_) => input.pointer.any_down(),
+            Event::PointerGone | Event::WindowFocused(_) => false,
+            _ => true,
+        };
+        input.events.iter().any(is_change)
+    })
+}
+
+impl eframe::App for DecouplerWindow {
+    fn logic(&mut self, _ctx: &Context, _frame: &mut eframe::Frame) {
+        self.take_events();
+    }
+
+    fn ui(&mut self, ui: &mut Ui, _frame: &mut eframe::Frame) {
+        self.show_ui(ui);
+    }
+}
+
+/// Services of the desktop that the window uses: file dialogs and the clipboard.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Desktop {
+    /// The desktop's own.
+    Native,
+    /// None: the window asks for paths itself, and what is copied goes no further than the toolkit. For tests.
+    None,
+}
+
+/// Sizes of the interface between which the user can choose, as shares of the usual one.
+pub(super) const SCALES: RangeInclusive<f32> = 0.8..=2.0;
+
+/// One step larger or smaller.
+const STEP: f32 = 0.1;
+
+impl DecouplerWindow {
+    /// Offers larger and smaller text and controls.
+    pub(super) fn offer_scales(&mut self, offers: &mut Offers<'_>) {
+        let scale = self.ctx.zoom_factor();
+        let can_grow = scale < *SCALES.end() - 0.5 * STEP;
+        let can_shrink = scale > *SCALES.start() + 0.5 * STEP;
+        // On many keyboards plus is the shifted equals sign.
+        let is_equals = can_grow
+            && self
+                .ctx
+                .input_mut(|input| input.consume_key(Modifiers::COMMAND, Key::Equals));
+        if offers.offer_keys("Larger interface", Modifiers::COMMAND, Key::Plus, can_grow) || is_equals {
+            self.set_scale(scale + STEP);
+        }
+        if offers.offer_keys("Smaller interface", Modifiers::COMMAND, Key::Minus, can_shrink) {
+            self.set_scale(scale - STEP);
+        }
+        let is_usual = (scale - 1.0).abs() < 0.5 * STEP;
+        if offers.offer_keys("Usual size of the interface", Modifiers::COMMAND, Key::Num0, !is_usual) {
+            self.set_scale(1.0);
+        }
+    }
+
+    /// Draws everything at this share of its usual size, kept to whole steps within [`SCALES`].
+    pub(super) fn set_scale(&mut self, scale: f32) {
+        let scale = ((scale / STEP).round() * STEP).clamp(*SCALES.start(), *SCALES.end());
+        self.ctx.set_zoom_factor(scale);
+        self.remembered.scale = Some(scale);
     }
 }

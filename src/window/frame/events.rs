@@ -1,7 +1,7 @@
 use super::{
     DecouplerWindow,
     applying::{have_same_sets, have_same_test_set, is_of_test_set},
-    dialogs::Answer,
+    files::Answer,
 };
 use crate::window::{
     preview::PreviewEvent,

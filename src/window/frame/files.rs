@@ -1,13 +1,31 @@
 //! Files in the making, each on a thread of its own.
+//!
+//! Native file dialogs, waited for on a thread of their own.
+//!
+//! Looks at typed paths on threads of their own: a network drive that does not answer must not hold the window.
 
 use std::{
     fmt::{self, Display},
+    fs,
     path::{Path, PathBuf},
+    pin::Pin,
     sync::Arc,
-    time::Duration,
+    time::{Duration, Instant},
 };
 
-use crate::window::job::{Job, JobError, Wake};
+use directories::ProjectDirs;
+use eframe::{NativeOptions, egui};
+use rfd::FileHandle;
+use thiserror::Error;
+
+use super::{
+    DecouplerWindow, Desktop,
+    remembered::{MIN_SIZE_POINTS, Remembered, WindowFile},
+};
+use crate::window::{
+    job::{Job, JobError, Wake},
+    shared::{FileInUse, FileTask, refuse_in_use},
+};
 
 /// Longest time that dropping waits for a file. What takes longer is removed when the program ends.
 const LONGEST_WAIT: Duration = Duration::from_secs(5);
@@ -76,12 +94,230 @@ impl fmt::Debug for Files {
     }
 }
 
+/// An answer sooner than this was no person's: the desktop has no dialog to show. On a busy machine that takes a while to
+/// be found out; a person who cancels as fast is asked in the window.
+const NO_PERSON: Duration = Duration::from_secs(1);
+
+/// Answer to a question for a path.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Answer {
+    /// The user chose this file.
+    Chosen(PathBuf),
+    /// The user thought better of it.
+    Cancelled,
+    /// There is no dialog here; ask in the window.
+    NoDialog,
+}
+
+/// Questions under way, each with the task that it was asked for.
+#[derive(Debug)]
+pub struct Dialogs {
+    desktop: Desktop,
+    asked: Vec<(FileTask, Job<Answer>)>,
+}
+
+impl Dialogs {
+    /// No questions yet.
+    pub fn new(desktop: Desktop) -> Self {
+        Self {
+            desktop,
+            asked: Vec::new(),
+        }
+    }
+
+    /// Asks for the path of a file; returns whether there is a dialog to ask with. `wake` is called when the answer is
+    /// there. Must run on the window's thread, which some desktops require.
+    pub fn ask(&mut self, task: &FileTask, wake: Wake) -> bool {
+        if self.desktop == Desktop::None {
+            return false;
+        }
+        let choice = choice(task);
+        let asked = Instant::now();
+        let mut job = Job::prompt("file dialog", wake);
+        job.start(
+            move |_| match pollster::block_on(choice) {
+                Some(file) => Answer::Chosen(file.path().to_owned()),
+                None if asked.elapsed() < NO_PERSON => Answer::NoDialog,
+                None => Answer::Cancelled,
+            },
+            |answer| answer.unwrap_or(Answer::NoDialog),
+        );
+        self.asked.push((task.clone(), job));
+        true
+    }
+
+    /// The next answer, if one has come, with the task that it was asked for.
+    pub fn next_answer(&mut self) -> Option<(FileTask, Answer)> {
+        let mut jobs = self.asked.iter().enumerate();
+        let (number, answer) = jobs.find_map(|(number, (_, job))| Some((number, job.next_event()?)))?;
+        let (task, _) = self.asked.remove(number);
+        Some((task, answer))
+    }
+
+    /// Returns true while an answer is still to come.
+    pub fn is_asking(&self) -> bool {
+        !self.asked.is_empty()
+    }
+}
+
+/// Shows the dialog.
+fn choice(task: &FileTask) -> Pin<Box<dyn Future<Output = Option<FileHandle>> + Send>> {
+    let suggestion = task.suggested_path();
+    let mut dialog = rfd::AsyncFileDialog::new().set_title(format!("{} {}", task.verb(), task.words.kind));
+    if task.is_read() && task.words.extensions.len() > 1 {
+        dialog = dialog.add_filter(task.words.kind, task.words.extensions);
+    }
+    for extension in task.words.extensions {
+        dialog = dialog.add_filter(extension.to_uppercase(), &[extension]);
+    }
+    if let Some(folder) = suggestion.parent() {
+        dialog = dialog.set_directory(folder);
+    }
+    if task.is_read() && task.words.extensions.is_empty() {
+        Box::pin(dialog.pick_folder())
+    } else if task.is_read() {
+        // The terminal gives checkpoints any name.
+        Box::pin(dialog.add_filter("All files", &["*"]).pick_file())
+    } else {
+        if let Some(name) = suggestion.file_name() {
+            dialog = dialog.set_file_name(name.to_string_lossy());
+        }
+        Box::pin(dialog.save_file())
+    }
+}
+
+/// Reasons for which the window cannot open.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum OpenError {
+    /// Nothing to open it on.
+    #[error("there is no display to open a window on; `decoupler train --help` does the same work in a terminal")]
+    NoDisplay,
+    /// No OpenGL on it, or the display refuses.
+    #[error("no window can be opened here: {0}; {PACKAGES}")]
+    NoWindow(String),
+    /// A library that the window needs cannot be loaded, or the window itself failed.
+    #[error("the window failed as said above; {PACKAGES}")]
+    Failed,
+}
+
+/// Advice on the packages that a bare system lacks.
+const PACKAGES: &str = "on a bare Debian, install libxcursor1 libxi6 libxkbcommon-x11-0 libgl1-mesa-dri, or work in a \
+                        terminal: `decoupler train --help`";
+
+/// Opens the window and returns when it is closed.
+///
+/// # Errors
+/// There is no display, or no OpenGL on it.
+pub fn open() -> Result<(), OpenError> {
+    let displays = ["DISPLAY", "WAYLAND_DISPLAY", "WAYLAND_SOCKET"];
+    if cfg!(target_os = "linux") && displays.iter().all(|name| std::env::var_os(name).is_none()) {
+        return Err(OpenError::NoDisplay);
+    }
+    // Systems without a home folder keep no runs, which the run list says, and remember nothing.
+    let folders = ProjectDirs::from("", "", "decoupler");
+    let file = folders
+        .as_ref()
+        .map(|folders| WindowFile::read(folders.data_dir().join("window.json")));
+    let size_points = match &file {
+        Some(file) => file.remembered.opening_size_points(),
+        None => Remembered::default().opening_size_points(),
+    };
+    let icon = eframe::icon_data::from_png_bytes(include_bytes!("../../../assets/icon.png"));
+    let mut viewport = egui::ViewportBuilder::default()
+        .with_title("Decoupler")
+        .with_app_id("decoupler")
+        .with_inner_size(size_points)
+        .with_min_inner_size(MIN_SIZE_POINTS);
+    if let Ok(icon) = icon {
+        viewport = viewport.with_icon(icon);
+    }
+    let options = NativeOptions {
+        viewport,
+        // egui smooths lines and text itself; smoothing the meshes too doubles the time of a frame without a graphics card.
+        multisampling: 0,
+        ..NativeOptions::default()
+    };
+    let create = |creation: &eframe::CreationContext<'_>| {
+        let window = DecouplerWindow::new(&creation.egui_ctx, Desktop::Native, file);
+        let window = match &folders {
+            Some(folders) => window.keeping_runs(folders.data_dir().join("runs")),
+            None => window,
+        };
+        Ok::<Box<dyn eframe::App>, Box<dyn std::error::Error + Send + Sync>>(Box::new(window))
+    };
+    // A library that is not there makes the window system panic, with the library's name.
+    let run = || eframe::run_native("Decoupler", options, Box::new(create));
+    match std::panic::catch_unwind(std::panic::AssertUnwindSafe(run)) {
+        Ok(Ok(())) => Ok(()),
+        Ok(Err(error)) => Err(OpenError::NoWindow(error.to_string())),
+        Err(_) => Err(OpenError::Failed),
+    }
+}
+
+/// What is at a path to which a file is to be written.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) enum Found {
+    /// Nothing that would be lost. What else is wrong with the path is told when it is written to.
+    Nothing,
+    /// Another file.
+    File,
+    /// A file that the program needs, and why nothing may be saved over it.
+    InUse(String),
+}
+
+/// Paths that are being looked at.
+pub(super) struct PathLooks {
+    wake: Wake,
+    under_way: Vec<(PathBuf, Job<Found>)>,
+}
+
+impl PathLooks {
+    /// None yet. `wake` is called when something was found.
+    pub(super) fn new(wake: Wake) -> Self {
+        Self {
+            wake,
+            under_way: Vec::new(),
+        }
+    }
+
+    /// Looks at `path`, on which nothing is `used` that may be lost.
+    pub(super) fn start(&mut self, path: PathBuf, used: Vec<FileInUse>) {
+        // Each has a thread of its own: one that never ends holds no other up.
+        let mut job = Job::prompt("path", Arc::clone(&self.wake));
+        let looked_at = path.clone();
+        job.start(
+            move |_| look(&looked_at, &used),
+            |found| found.unwrap_or_else(|error| Found::InUse(error.to_string())),
+        );
+        self.under_way.push((path, job));
+    }
+
+    /// The next path of which something is known.
+    pub(super) fn next_found(&mut self) -> Option<(PathBuf, Found)> {
+        let mut jobs = self.under_way.iter().enumerate();
+        let (number, found) = jobs.find_map(|(number, (_, job))| Some((number, job.next_event()?)))?;
+        let (path, _) = self.under_way.remove(number);
+        Some((path, found))
+    }
+}
+
+fn look(path: &Path, used: &[FileInUse]) -> Found {
+    match refuse_in_use(path, used) {
+        Err(reason) => Found::InUse(reason),
+        // A folder is no file that could be lost, and a pipe or a device is there to be written to.
+        Ok(()) if fs::metadata(path).is_ok_and(|found| found.is_file()) => Found::File,
+        Ok(()) => Found::Nothing,
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use std::{fs, sync::mpsc::channel};
 
-    use super::*;
     use decoupler_files::export::WriteError;
+
+    use super::*;
 
     #[test]
     fn every_file_is_told_also_one_whose_writing_panicked() {

@@ -6,7 +6,7 @@ use eframe::egui::{
     text_edit::TextEditState,
 };
 
-use super::path_look::Found;
+use super::files::Found;
 use crate::window::{
     shared::FileTask,
     theme::{Theme, semibold, space, type_size},

@@ -1,9 +1,17 @@
-use eframe::egui::{Align, Label, Layout, RichText, Sense, Stroke, Ui, Vec2, WidgetInfo, accesskit::Role};
+//! The Export menu: everything that the current view can export, drawn from one list.
 
+use std::ops::RangeInclusive;
+
+use eframe::egui::{
+    Align, Button, CursorIcon, Frame, Id, Label, Layout, Margin, Rect, RichText, ScrollArea, Sense, Stroke,
+    TextWrapMode, Ui, Vec2, WidgetInfo, accesskit::Role, containers::menu::MenuButton,
+};
+
+use super::remembered::Remembered;
 use crate::window::{
-    shared::Action,
+    shared::{Action, Ask, Columns, Effect, Export},
     theme::{Theme, semibold, space, type_size},
-    widgets::{ghost_button, segmented_ui},
+    widgets::{Landmark, ghost_button, section_heading_ui, segmented_ui},
 };
 
 /// Width from which on there is room for everything, in points.
@@ -109,4 +117,223 @@ fn mark_ui(ui: &mut Ui) {
         painter.vline(inner.left() + share * inner.width(), inner.y_range(), stroke);
     }
     painter.circle_filled(inner.center(), 3.5, theme.palette.accent);
+}
+
+const WIDTH: f32 = space(88);
+
+/// The button that opens the menu. `exports` lists what there is; it is called only while the menu is open.
+pub(super) fn export_menu_ui<'a>(ui: &mut Ui, exports: impl FnOnce() -> Vec<Export<'a>>, effects: &mut Vec<Effect>) {
+    let (button, _) = MenuButton::from_button(ghost_button("Export")).ui(ui, |ui| {
+        // What the window cannot hold is scrolled to.
+        let most = ui.ctx().content_rect().height() - space(20);
+        let scroll = ScrollArea::vertical().max_height(most).min_scrolled_height(most);
+        let margin = Margin {
+            left: 8,
+            right: 8,
+            top: 0,
+            bottom: 8,
+        };
+        scroll.show(ui, |ui| {
+            Frame::new().inner_margin(margin).show(ui, |ui| {
+                // A menu justifies its lines, and shows buttons as text.
+                ui.with_layout(Layout::top_down(Align::Min), |ui| {
+                    ui.set_width(WIDTH);
+                    ui.visuals_mut().widgets.inactive.weak_bg_fill = Theme::of(ui).palette.raised;
+                    let asked = exports_ui(ui, exports());
+                    effects.extend(asked.map(|ask| ask()));
+                });
+            });
+        });
+    });
+    Landmark::Export.stands_at(ui, button.rect);
+    button.on_hover_text("Networks, reports, figures and tables of this view, as files or to the clipboard.");
+}
+
+/// One line for each thing, with a button for each of its forms; a reason, where there is one, is told once for all that
+/// follow each other and share it. Returns what was asked for.
+fn exports_ui<'a>(ui: &mut Ui, exports: Vec<Export<'a>>) -> Option<Ask<'a>> {
+    let mut asked = None;
+    let mut told = String::new();
+    let mut group = None;
+    let mut exports = gathered(exports).into_iter().peekable();
+    while let Some(first) = exports.next() {
+        if group.replace(first.group) != Some(first.group) {
+            section_heading_ui(ui, &first.group.heading());
+        }
+        let reason = first.ask.as_ref().err().cloned().unwrap_or_default();
+        if reason != told && !reason.is_empty() {
+            let text = RichText::new(&reason).size(type_size().note);
+            ui.label(text.color(Theme::of(ui).palette.dim));
+        }
+        told = reason;
+        let name = first.name.clone();
+        let mut forms = vec![first];
+        while let Some(next) = exports.next_if(|next| next.group == forms[0].group && next.name == name) {
+            forms.push(next);
+        }
+        ui.horizontal(|ui| {
+            ui.style_mut().wrap_mode = Some(TextWrapMode::Extend);
+            ui.set_min_height(space(6));
+            let colour = if forms[0].ask.is_ok() {
+                Theme::of(ui).palette.text
+            } else {
+                Theme::of(ui).palette.dim
+            };
+            ui.label(RichText::new(name).color(colour));
+            ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
+                // From right to left.
+                for form in forms.into_iter().rev() {
+                    asked = asked.take().or(form_ui(ui, form));
+                }
+            });
+        });
+    }
+    asked
+}
+
+/// The exports with those of one group together, in the order in which the groups begin: each has one heading.
+fn gathered(mut exports: Vec<Export<'_>>) -> Vec<Export<'_>> {
+    let mut groups = Vec::new();
+    for export in &exports {
+        if !groups.contains(&export.group) {
+            groups.push(export.group);
+        }
+    }
+    exports.sort_by_key(|export| groups.iter().position(|group| *group == export.group));
+    exports
+}
+
+/// The button of one form. Returns the request if it was clicked.
+fn form_ui<'a>(ui: &mut Ui, export: Export<'a>) -> Option<Ask<'a>> {
+    let (label, is_there) = (export.label(), export.ask.is_ok());
+    let button = ui.add_enabled(is_there, Button::new(&export.form));
+    button.widget_info(|| WidgetInfo::labeled(Role::Button, is_there, &label));
+    let button = button.on_hover_text(export.description);
+    match export.ask {
+        Ok(ask) => button.clicked().then_some(ask),
+        Err(reason) => {
+            button.on_disabled_hover_text(reason);
+            None
+        }
+    }
+}
+
+/// Widths of the column on the left between which its names stand clear of their values.
+const FORM_POINTS: RangeInclusive<f32> = space(62)..=space(110);
+
+/// Width of the column on the right, unless the user has drawn it wider or narrower.
+const REPORT_POINTS: f32 = space(96);
+
+/// Widths of the column on the right at which its table is whole.
+const REPORT_LIMITS_POINTS: RangeInclusive<f32> = space(82)..=space(140);
+
+/// Least width of the middle, which columns drawn wider leave to it.
+const MIN_MIDDLE_POINTS: f32 = space(176);
+
+/// Widths of the columns in this window: those that the user has drawn, as far as the middle allows.
+pub(super) fn widths_points(columns: &Columns, remembered: &Remembered, window: f32) -> [f32; 2] {
+    let room = window - MIN_MIDDLE_POINTS;
+    let beside = if columns.has_report {
+        *REPORT_LIMITS_POINTS.start()
+    } else {
+        0.0
+    };
+    let form = drawn(remembered.form_points, &FORM_POINTS, room - beside).unwrap_or(columns.form_width);
+    let report = drawn(remembered.report_points, &REPORT_LIMITS_POINTS, room - form).unwrap_or(REPORT_POINTS);
+    [form, report]
+}
+
+fn drawn(width: Option<f32>, limits: &RangeInclusive<f32>, room: f32) -> Option<f32> {
+    let (&least, &most) = (limits.start(), limits.end());
+    Some(width?.clamp(least, room.clamp(least, most)))
+}
+
+/// The edge of a column, to be dragged: `panel` is at the left of the window or at the right. A double click gives
+/// the column its usual width, which is none of its own.
+pub(super) fn edge_ui(ui: &Ui, label: &str, panel: Rect, is_left: bool, width: &mut Option<f32>) {
+    let edge = if is_left { panel.right() } else { panel.left() };
+    // The scroll bar of the column on the left ends where this begins.
+    let strip = Rect::from_x_y_ranges(edge - 2.0..=edge + 4.0, panel.y_range());
+    let response = ui.interact(strip, Id::unique(label), Sense::CLICK | Sense::DRAG);
+    response.widget_info(|| WidgetInfo::labeled(Role::Splitter, true, label));
+    let response = response.on_hover_and_drag_cursor(CursorIcon::ResizeHorizontal);
+    if response.hovered() || response.dragged() {
+        let stroke = Stroke::new(2.0, Theme::of(ui).palette.accent);
+        ui.painter().vline(edge, panel.y_range(), stroke);
+    }
+    if response.double_clicked() {
+        *width = None;
+    } else if response.dragged()
+        && let Some(pointer) = response.interact_pointer_pos()
+    {
+        let wished = if is_left {
+            pointer.x - panel.left()
+        } else {
+            panel.right() - pointer.x
+        };
+        *width = Some(wished.round());
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::window::shared::ExportGroup;
+
+    #[test]
+    fn each_group_has_one_heading_and_keeps_the_order_of_its_exports() {
+        let export = |(group, name): (ExportGroup, &str)| Export {
+            group,
+            name: name.to_owned(),
+            form: String::new(),
+            description: "",
+            ask: Err(String::new()),
+        };
+        let exports = [
+            (ExportGroup::Network, "network"),
+            (ExportGroup::Tables, "errors"),
+            (ExportGroup::Copies, "errors"),
+            (ExportGroup::Tables, "channels"),
+            (ExportGroup::Copies, "channels"),
+            (ExportGroup::Training, "checkpoint"),
+        ];
+        let gathered = gathered(exports.map(export).into());
+        let found: Vec<_> = gathered
+            .iter()
+            .map(|export| (export.group, export.name.as_str()))
+            .collect();
+        let [network, errors, copied_errors, channels, copied_channels, checkpoint] = exports;
+        let expected = [network, errors, channels, copied_errors, copied_channels, checkpoint];
+        assert_eq!(found, expected);
+    }
+
+    fn widths(form: Option<f32>, report: Option<f32>, window: f32) -> [f32; 2] {
+        let columns = Columns {
+            form_width: 272.0,
+            has_report: true,
+        };
+        let remembered = Remembered {
+            form_points: form,
+            report_points: report,
+            ..Remembered::default()
+        };
+        widths_points(&columns, &remembered, window)
+    }
+
+    #[test]
+    fn columns_are_as_wide_as_they_were_drawn_within_limits_that_leave_the_middle_its_own() {
+        assert_eq!(widths(None, None, 1440.0), [272.0, 384.0], "the usual widths");
+        assert_eq!(widths(Some(300.0), Some(400.0), 1440.0), [300.0, 400.0]);
+        for wish in [-1e30, 0.0, 1e4, f32::INFINITY] {
+            for window in [960.0, 1400.0, 1440.0, 3000.0] {
+                let [form, report] = widths(Some(wish), Some(wish), window);
+                assert!(FORM_POINTS.contains(&form) && REPORT_LIMITS_POINTS.contains(&report));
+                let is_least = (form, report) == (*FORM_POINTS.start(), *REPORT_LIMITS_POINTS.start());
+                assert!(
+                    window - form - report >= MIN_MIDDLE_POINTS || is_least,
+                    "{form}, {report} of {window}"
+                );
+            }
+        }
+    }
 }

@@ -1,13 +1,25 @@
-use super::{
-    Term,
-    errors::ERROR_TERMS,
-    sensor::{SCENE_TERMS, SENSOR_TERMS},
-    training::{NETWORK_TERMS, TRAINING_TERMS},
-};
 use decoupler_core::{
     decoupling::{DecoderKind, Precision},
     training::Method,
 };
+
+/// Defines the terms of a group: for each its name, its definition, and its equation if it has one.
+macro_rules! terms {
+    ($GROUP:ident: $($TERM:ident = $name:literal, $definition:literal $(, $equation:literal)?;)*) => {
+        $(
+            #[doc = $definition]
+            pub const $TERM: crate::window::glossary::Term = crate::window::glossary::Term {
+                name: $name,
+                definition: $definition,
+                equation: concat!("" $(, $equation)?),
+                hint: concat!($definition $(, "\n\n", $equation)?),
+            };
+        )*
+
+        /// The terms of this group.
+        pub(super) const $GROUP: &[crate::window::glossary::Term] = &[$($TERM),*];
+    };
+}
 
 /// Terms that belong together.
 #[derive(Clone, Debug)]
@@ -40,6 +52,191 @@ pub fn groups() -> Vec<Group> {
     ]
     .map(|(heading, terms)| Group { heading, terms })
     .into()
+}
+
+/// A term of the field.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Term {
+    /// Name, as it is in the window.
+    pub name: &'static str,
+    /// Definition in one or two sentences, with the unit.
+    pub definition: &'static str,
+    /// Equation; empty for none.
+    pub equation: &'static str,
+    /// Definition and equation: what stands under the pointer.
+    pub hint: &'static str,
+}
+
+impl Term {
+    /// Returns true if every word of `typed` occurs in the name or the definition, in any order.
+    pub fn matches(&self, typed: &str) -> bool {
+        let text = format!("{} {}", self.name, self.definition).to_lowercase();
+        typed.split_whitespace().all(|word| text.contains(&word.to_lowercase()))
+    }
+}
+
+terms! { ERROR_TERMS:
+    Z_PERCENT = "Z %",
+        "AveZerr of the paper: mean |error| of z in percent of the coordinate z, which is never near 0. Always answering \
+         the mean scores about 5 % on the paper's scene.",
+        "100 · mean(|decoupled z − z| / |z|)";
+    X_PERCENT = "X %",
+        "AveXerr of the paper: mean |error| of x in percent of the coordinate x.",
+        "100 · mean(|decoupled x − x| / |x|)";
+    Y_PERCENT = "Y %",
+        "AveYerr of the paper: mean |error| of y in percent of the coordinate y.",
+        "100 · mean(|decoupled y − y| / |y|)";
+    Z_MM = "mm",
+        "Mean |error| of z in millimetres.",
+        "mean(|decoupled z − z|)";
+    STROKE_PERCENT = "stroke %",
+        "Mean |error| of z in percent of the full scale, the distance a node can travel.",
+        "100 · mean(|decoupled z − z|) / stroke";
+    WORST_NODE = "Worst node",
+        "Largest |error| of z of any node in the test set, in mm.",
+        "max(|decoupled z − z|)";
+    LINEAR_MAP = "Linear map",
+        "Best affine map from the resistances to the coordinates, one for each row-wire where the row is known to the network. A \
+         network that is not better is not worth its training.",
+        "coordinates = A · R + b";
+    REFERENCE = "Reference",
+        "Bayesian reference: the error that remains given the noise and the loading of the scene. On average, no decoder of a \
+         row's own readings does better. Without noise, only the rounding of the readings is left.";
+    PUBLISHED = "Published",
+        "What the paper reports for this array, hidden nodes and samples.";
+    RESIDUAL = "Residual",
+        "Relative difference between the readings and those that Eq. (2) gives for the decoded deformation (root mean \
+         square). It needs no ground truth.",
+        "rms((R − R of the decoded nodes) / R)";
+    PARETO_FRONT = "Pareto front",
+        "The decoders that no other beats: whatever is more accurate costs more time.";
+}
+
+terms! { NETWORK_TERMS:
+    HIDDEN_NODES = "Hidden nodes",
+        "Number of nodes in the tanh layer between resistances and coordinates.",
+        "coordinates = V · tanh(W · inputs + b) + c";
+    INPUTS = "Inputs",
+        "Quantity that the network reads for each resistance.";
+    CONDUCTANCE = "Conductance",
+        "1/R. By Eq. (2) it is a sum over nodes, and so the closest to linear in the deformation.";
+    LOG_RESISTANCE = "Log-resistance",
+        "ln R: relative errors become additive.";
+    SCALING = "Scaling",
+        "Scaling of the inputs.";
+    MIN_MAX = "Min-max",
+        "Each channel scaled to −1 to 1, as in the paper.",
+        "2 · (x − min) / (max − min) − 1";
+    WHITENING = "Whitening",
+        "Principal components, each divided by its scatter: components of small variance count as much as large ones, \
+         unless noise hides them.",
+        "component / √(σ² + noise²)";
+    STARTS = "Starts",
+        "Number of trainings from different random weights, side by side; the one with the lowest validation error is \
+         kept. Several starts show how much the results vary.";
+    SEED = "Seed",
+        "Seed of all random numbers: the same seed gives the same network.";
+}
+
+terms! { TRAINING_TERMS:
+    METHOD = "Method",
+        "Algorithm that adjusts the weights.";
+    EPOCH = "Epoch",
+        "One pass over the training set, after which the weights change.";
+    MSE = "mse",
+        "Mean square error of the scaled coordinates, each in [−1, 1]; those that are constant are left out.",
+        "mse = mean (decoupled − actual)²";
+    TRAINING_SET = "Training set",
+        "The samples to which the network is fitted.";
+    VALIDATION_SET = "Validation set",
+        "Samples that select the best weights and end the training; 0 for none, and all epochs are run.";
+    TEST_SET = "Test set",
+        "Held-out samples, on which all errors are measured and whose snapshots are shown. They are never trained on.";
+    VALIDATION_FAILURES = "Validation failures",
+        "Training ends after this many epochs without a new best validation error.";
+    GRADIENT = "Gradient",
+        "Derivative of the training error by the weights; its norm falls towards 0 at a minimum.",
+        "∂ mse / ∂ weights";
+    DAMPING = "Damping μ",
+        "Shortens the steps of Levenberg-Marquardt: large, they follow the gradient; small, they are Gauss-Newton steps.",
+        "(J^T J + μ I) · step = −J^T · error";
+    EFFECTIVE_PARAMETERS = "Effective parameters",
+        "Number of weights that the data determine, as estimated by Bayesian regularisation. Near the number of weights, \
+         more hidden nodes may help; far below it, fewer would do.",
+        "γ = N − α tr (β J^T J + α I)⁻¹";
+}
+
+terms! { SENSOR_TERMS:
+    ARRAY_SCALE = "Array scale",
+        "M1×M2_M3×M4: row-wires × nodes on each, nodes on each column-wire × column-wires. Any size is possible.";
+    ROW_WIRE = "Row-wire",
+        "A wire on top of the rubber, with M2 electrode nodes that move with the surface. The row-wires are read one \
+         after the other.";
+    COLUMN_WIRE = "Column-wire",
+        "A wire at the bottom of the rubber, with M3 electrode nodes at rest. Each gives one reading of every row-wire.";
+    NODE = "Node",
+        "An electrode on a wire, at which current enters or leaves the rubber. The coordinates of the nodes of the \
+         row-wires are what is decoded.";
+    READING = "Reading",
+        "Resistance between a row-wire and a column-wire, in Ω: the parallel connection of the rubber between all of \
+         their nodes.",
+        "1 / R = Σ Σ 1 / (g · |p + u − q|)    over the nodes p of the row and q of the column, Eq. (2)";
+    DROP = "Drop of a reading",
+        "How far a reading has fallen below its value in the unloaded state, in percent.",
+        "drop = 100 · (1 − R / R unloaded)";
+    SNAPSHOT = "Snapshot",
+        "One reading of every row-wire at one moment, also called a frame. The samples of a snapshot share one \
+         deformation.";
+    SAMPLE = "Sample",
+        "The readings of one row-wire at one moment, with the coordinates of its nodes.";
+    DECOUPLING = "Decoupling",
+        "Recovering the coordinates of each node from readings every one of which mixes many nodes.";
+    HEIGHT = "Height",
+        "Height of the row-wires above the column-wires, undeformed, in mm.";
+    RESISTIVITY = "Resistivity",
+        "Resistance of the rubber per millimetre (g in the paper), in Ω/mm. It scales all resistances equally.";
+    STROKE = "Stroke",
+        "Distance that a node can travel downwards, in mm: the full scale of the deformation.",
+        "stroke = largest compression · height";
+    CONDITION_NUMBER = "Condition number",
+        "Worst-case amplification of a relative error in the readings, for the worst row with its nodes pressed half way.",
+        "largest / smallest singular value of the Jacobian of ln R";
+    SINGULAR_VALUES = "Singular values",
+        "How strongly each independent pattern of movement of a row changes its readings, per millimetre. Patterns with \
+         small ones drown in the noise.",
+        "∂ ln R / ∂u = U Σ V^T";
+    UNLOADED_STATE = "Unloaded state",
+        "The readings while nothing presses. Re-zero takes the latest half second as such and divides readings by its \
+         gains, which removes the drift of amplifiers and temperature. A contact that is held on fewer than half of the \
+         rows is kept.",
+        "gain = R unloaded / R of the model at rest";
+    WIRE_FAULT = "Fault",
+        "A broken, shorted, drifting or stuck wire, named once four frames in a row contradict Eq. (2).";
+}
+
+terms! { SCENE_TERMS:
+    LOADING = "Loading",
+        "Distribution of the deformations in the samples.";
+    RANDOM_NODES = "Random nodes",
+        "Every node is pressed by an independent random amount, as in the paper.";
+    SMOOTH_FIELD = "Smooth field",
+        "A smooth random surface: nodes within the correlation length move alike.";
+    CORRELATION_LENGTH = "Correlation length",
+        "Distance over which the displacements of nodes stay correlated, in mm.";
+    INDENTER = "Indenter",
+        "A body pressed somewhere onto the surface.";
+    SPREAD = "Spread",
+        "Decay length of the surface around the indenter, in mm.";
+    ROWS = "Rows",
+        "Row-wires that are read, by one network or by one network per row.";
+    AXES = "Axes",
+        "Axes along which nodes move. The other coordinates are not modelled.";
+    LARGEST_COMPRESSION = "Largest compression",
+        "Largest displacement of a node downwards, in percent of the height.";
+    RELATIVE_NOISE = "Relative noise",
+        "Noise of each reading (standard deviation), relative to the reading.";
+    DRIFT = "Drift",
+        "Gain error shared by all readings of a snapshot, e.g. from temperature (standard deviation, in percent).";
 }
 
 #[cfg(test)]

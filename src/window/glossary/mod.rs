@@ -2,14 +2,6 @@
 //! pointer at a term and what the list of all terms says come from here; decoders and training methods describe
 //! themselves.
 
-mod errors;
 mod list;
-mod sensor;
-mod term;
-mod training;
 
-pub use errors::*;
-pub use list::groups;
-pub use sensor::*;
-pub use term::Term;
-pub use training::*;
+pub use list::{Term, groups, *};

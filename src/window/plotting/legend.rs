@@ -2,7 +2,7 @@ use eframe::egui::{
     Color32, CornerRadius, FontId, Pos2, Rect, RichText, Sense, Shape, Stroke, StrokeKind, Ui, Vec2, vec2,
 };
 
-use super::colours::hue_colour;
+use super::cells::hue_colour;
 use crate::window::theme::{Theme, space, type_size};
 use decoupler_files::figure::{Key, LineStyle, Look, Marker};
 

@@ -1,3 +1,6 @@
+use std::path::{Path, PathBuf};
+
+use decoupler_files::export::is_same;
 use eframe::egui::{Context, Key, KeyboardShortcut, Modifiers};
 
 /// Something that the user can do, as the list of all actions shows it.
@@ -71,8 +74,59 @@ fn is_for_typing(keys: &KeyboardShortcut) -> bool {
     keys.modifiers.is_none() || matches!(keys.logical_key, Key::Z | Key::Y)
 }
 
+/// A file that the program needs, and that nothing is saved over.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum FileInUse {
+    /// A recording or another file that is read again.
+    Recording(PathBuf),
+    /// The checkpoint that a training was resumed from. The same training may be saved over it.
+    Checkpoint(PathBuf),
+    /// The folder in which the program keeps networks from session to session.
+    Kept(PathBuf),
+    /// A file that is being written at this moment.
+    Recorded(PathBuf),
+}
+
+impl FileInUse {
+    /// Reason for which nothing may be saved over the file at `path`, if this is that file.
+    fn reason(&self, path: &Path) -> Option<&'static str> {
+        let (is_this, reason) = match self {
+            Self::Recording(used) => (is_same(used, path), "it is a recording that is open"),
+            Self::Checkpoint(used) => (
+                is_same(used, path),
+                "the current training was resumed from this checkpoint",
+            ),
+            Self::Kept(folder) => (
+                path.parent().is_some_and(|parent| is_same_folder(parent, folder)) && path.exists(),
+                "it is kept by this program from session to session",
+            ),
+            Self::Recorded(used) => (is_same(used, path), "frames are being recorded to it"),
+        };
+        is_this.then_some(reason)
+    }
+}
+
+/// Says why nothing may be saved over the file at `path`, if it is one of `used`, by whatever name. Asks the file system,
+/// which may take its time.
+///
+/// # Errors
+/// If it is one of them, with what to do.
+pub fn refuse_in_use(path: &Path, used: &[FileInUse]) -> Result<(), String> {
+    match used.iter().find_map(|used| used.reason(path)) {
+        Some(reason) => Err(format!("'{}' is in use: {reason}; give another name", path.display())),
+        None => Ok(()),
+    }
+}
+
+fn is_same_folder(one: &Path, other: &Path) -> bool {
+    let real = |path: &Path| path.canonicalize().ok();
+    real(one).is_some() && real(one) == real(other)
+}
+
 #[cfg(test)]
 mod tests {
+    use std::fs;
+
     use eframe::egui::{Event, RawInput};
 
     use super::*;
@@ -130,5 +184,27 @@ mod tests {
     fn an_open_question_hears_the_keys_alone() {
         let enter = Some((Modifiers::COMMAND, Key::Enter));
         assert_eq!(frame(None, enter, false).1, [false; 3]);
+    }
+
+    #[test]
+    fn a_file_in_use_is_refused_by_any_of_its_names_and_others_are_not() {
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name);
+        fs::create_dir(at("kept")).unwrap();
+        for name in ["a.csv", "b.csv", "kept/run-1.json"] {
+            fs::write(at(name), "").unwrap();
+        }
+        let used = [FileInUse::Recording(at("a.csv")), FileInUse::Kept(at("kept"))];
+        for (name, is_refused) in [
+            ("a.csv", true),
+            ("kept/../a.csv", true),
+            ("b.csv", false),
+            ("none.csv", false),
+            ("none/a.csv", false),
+            ("kept/run-1.json", true),
+            ("kept/new.json", false),
+        ] {
+            assert_eq!(refuse_in_use(&at(name), &used).is_err(), is_refused, "{name}");
+        }
     }
 }

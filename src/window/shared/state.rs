@@ -1,12 +1,8 @@
-use super::{Look, RunList, RunResult, RunView, opening_settings};
 use std::sync::Arc;
 
-use serde::{Deserialize, Serialize};
-
-use crate::window::test_view::{HeightScale, RecordedTest, TestView};
 use decoupler_core::{
-    evaluation::{Baselines, Measured, RunSettings, SimulatedSettings},
-    scene::RowModel,
+    evaluation::{Baselines, Measured, RunSettings, SimulatedSettings, Simulation},
+    scene::{Indenter, Loading, RowModel, Scene},
     training::{StopReason, TrainingSettings},
 };
 use decoupler_files::{
@@ -16,6 +12,10 @@ use decoupler_files::{
     },
     import::{Plan, Progress, Setup},
 };
+use serde::{Deserialize, Serialize};
+
+use super::{FileTask, Look, RunList, RunResult, RunView};
+use crate::window::test_view::{HeightScale, RecordedTest, TestView};
 
 /// State that all views read.
 #[derive(Debug)]
@@ -215,5 +215,46 @@ impl Shared {
     /// The current result.
     pub fn result(&self) -> Option<&RunResult> {
         self.shown_run().and_then(|run| run.result.as_ref())
+    }
+}
+
+/// Settings with which the window opens for the first time: the paper's experiment, but with a ball pressed somewhere
+/// onto the surface, which everybody recognises as touch, in place of nodes that are pressed each by itself.
+pub fn opening_settings() -> SimulatedSettings {
+    let paper = SimulatedSettings::default();
+    SimulatedSettings {
+        source: Simulation {
+            scene: Scene {
+                loading: Loading::Indenter(Indenter::default()),
+                ..paper.source.scene
+            },
+            ..paper.source
+        },
+        ..paper
+    }
+}
+
+/// Work that closing the window would cut short.
+#[derive(Debug)]
+pub struct Unfinished {
+    /// Name of the work, which tells it apart from other work of the same view: "Training".
+    pub work: &'static str,
+    /// Its progress: "epoch 12 of 1000".
+    pub progress: String,
+    /// Saves what has been done so far, if that is possible.
+    pub saving: Option<FileTask>,
+    /// True if its result survives the window once the work has ended.
+    pub is_kept: bool,
+}
+
+impl Unfinished {
+    /// Work that can only be discarded, and whose result is gone with the window.
+    pub fn discarded(work: &'static str, progress: String) -> Self {
+        Self {
+            work,
+            progress,
+            saving: None,
+            is_kept: false,
+        }
     }
 }

@@ -1,16 +1,16 @@
 use std::time::Duration;
 
+use decoupler_core::{evaluation::TestErrors, training::StopReason};
+use decoupler_files::{
+    export::{format_duration, format_number, format_percent},
+    import::Progress,
+};
 use eframe::egui::{Color32, RichText, Ui};
 
 use super::{Phase, RunView, Shared, SourceKind};
 use crate::window::{
     theme::{Palette, Theme, type_size},
-    widgets::{state_ui, status_progress_ui},
-};
-use decoupler_core::{evaluation::TestErrors, training::StopReason};
-use decoupler_files::{
-    export::{format_duration, format_number, format_percent},
-    import::Progress,
+    widgets::{fields::capitalised, state_ui, status_progress_ui},
 };
 
 /// Shows the state of the training: phase, epoch, error, speed, time left, and why it stopped; before it how much of a
@@ -106,4 +106,20 @@ fn progress_in_words(run: &RunView, phase: Phase) -> Vec<String> {
 
 fn time_left(per_epoch: Duration, epochs: usize) -> Duration {
     Duration::try_from_secs_f64(per_epoch.as_secs_f64() * epochs as f64).unwrap_or(Duration::MAX)
+}
+
+/// Returns the text with a full stop, and with a capital unless it begins with the name of a column or file.
+pub fn sentence(text: &str) -> String {
+    const WORDS: [&str; 11] = [
+        "the", "for", "no", "none", "there", "a", "all", "always", "column", "too", "twice",
+    ];
+    let first = text.split_whitespace().next().unwrap_or_default();
+    let mut sentence = text.to_owned();
+    if WORDS.contains(&first) {
+        sentence = capitalised(&sentence);
+    }
+    if !sentence.ends_with(['.', '!', '?']) {
+        sentence.push('.');
+    }
+    sentence
 }

@@ -1,9 +1,21 @@
+//! What the surfaces of all views have in common: their mode, their camera, and the node that is marked on neighbours.
+
 use std::{fmt::Debug, path::PathBuf};
 
-use eframe::egui::{Context, Ui};
+use decoupler_core::evaluation::Channel;
+use decoupler_files::figure::{
+    SequentialMap,
+    surface::{OrbitCamera, ViewMode},
+};
+use eframe::egui::{ComboBox, Context, Ui};
 
 use super::{Effect, Export, FileInUse, Offers, Shared, Unfinished, training_status_ui};
-use crate::window::theme::space;
+use crate::window::{
+    surface_view::SurfaceViewResponse,
+    test_view::{HeightScale, SurfaceStyle},
+    theme::space,
+    widgets::segmented_ui,
+};
 
 /// One of the views. It owns what only it shows and the handles of its own threads; it reads what is shared, and asks the
 /// window for everything else.
@@ -82,4 +94,81 @@ pub struct Columns {
     pub form_width: f32,
     /// True if there is a column on the right.
     pub has_report: bool,
+}
+
+/// Camera, mode and colours in which all views draw surfaces.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Look {
+    /// Shared by all surfaces.
+    pub camera: OrbitCamera,
+    /// In space or from above.
+    pub mode: ViewMode,
+    /// Dark or light.
+    pub is_dark: bool,
+    /// Colours of values that do not diverge.
+    pub colours: SequentialMap,
+    /// Heights that colours and axes span.
+    pub heights: HeightScale,
+    /// Errors at the ends of the colours, in millimetres, while they are locked.
+    pub error_limit_mm: Option<f64>,
+}
+
+impl Look {
+    /// Returns the look of the surfaces of a test set.
+    pub fn style(&self) -> SurfaceStyle {
+        SurfaceStyle {
+            mode: self.mode,
+            colours: self.colours,
+            heights: self.heights,
+            error_limit_mm: self.error_limit_mm,
+        }
+    }
+}
+
+/// Surface shown of a network.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum RightCard {
+    /// The surface that it found.
+    #[default]
+    Decoupled,
+    /// Its difference from the actual one.
+    Error,
+}
+
+/// The choice between surfaces in space and from above.
+pub fn view_mode_ui(ui: &mut Ui, look: Look, effects: &mut Vec<Effect>) {
+    let modes = [(ViewMode::ThreeD, "3-D"), (ViewMode::Top, "Top view")];
+    let picked = segmented_ui(ui, "Surface view", &modes, look.mode, false);
+    effects.extend(picked.map(|mode| Effect::Look(Look { mode, ..look })));
+}
+
+/// Turns all surfaces as this one was turned, and marks the node under the pointer on its neighbours too.
+pub fn follow_surface(shown: &SurfaceViewResponse, look: Look, marked: &mut Option<usize>, effects: &mut Vec<Effect>) {
+    if shown.camera != look.camera {
+        let camera = shown.camera;
+        effects.push(Effect::Look(Look { camera, ..look }));
+    }
+    // Each card speaks for the pointer only while it is over it, so that the other card's mark stays.
+    if shown.response.contains_pointer() && shown.hovered_node != *marked {
+        *marked = shown.hovered_node;
+        shown.response.ctx.request_repaint();
+    }
+}
+
+/// The list of targets behind `name`, where there are several.
+pub fn target_choice_ui(ui: &mut Ui, name: &str, id: &str, targets: &[Channel], target: &mut usize) {
+    *target = (*target).min(targets.len().saturating_sub(1));
+    if targets.len() < 2 {
+        return;
+    }
+    ui.horizontal(|ui| {
+        let label = ui.label(name);
+        let combo = ComboBox::from_id_salt(id).selected_text(targets[*target].title());
+        let picked = combo.show_ui(ui, |ui| {
+            for (index, of) in targets.iter().enumerate() {
+                ui.selectable_value(target, index, of.title());
+            }
+        });
+        picked.response.labelled_by(label.id);
+    });
 }

@@ -5,7 +5,6 @@
 
 mod colour_bar;
 mod painted;
-mod ribbon;
 mod view;
 
 pub use colour_bar::ColourBar;

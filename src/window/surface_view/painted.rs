@@ -1,15 +1,16 @@
 //! A surface as it is painted, kept from frame to frame: a pointer that moves changes none of it.
+//!
+//! Thin, soft lines inside a mesh, so that what is drawn later hides them.
 
 use std::sync::Arc;
 
-use eframe::egui::{Color32, FontId, Mesh, Painter, Pos2, Rect, Response, Shape, Stroke, Ui};
-use glam::Vec2;
-
-use super::ribbon;
-use crate::window::theme::{Palette, Theme, rgb, type_size};
 use decoupler_files::figure::surface::{
     self, Bounds, Card, Disc, Dots, Ink, Line, OrbitCamera, Section, Sight, Surface, Text, ViewMode,
 };
+use eframe::egui::{Color32, FontId, Mesh, Painter, Pos2, Rect, Response, Shape, Stroke, Ui};
+use glam::Vec2;
+
+use crate::window::theme::{Palette, Theme, rgb, type_size};
 
 /// A laid-out surface and what it was made of.
 pub(super) struct Painted {
@@ -133,8 +134,8 @@ fn label_font() -> FontId {
 fn mesh(drawn: &surface::Mesh) -> Mesh {
     let [cells, lines] = drawn.counts();
     let mut mesh = Mesh::default();
-    mesh.reserve_vertices(drawn.vertices.len() + ribbon::VERTICES * lines);
-    mesh.reserve_triangles(2 * cells + ribbon::TRIANGLES * lines);
+    mesh.reserve_vertices(drawn.vertices.len() + VERTICES * lines);
+    mesh.reserve_triangles(2 * cells + TRIANGLES * lines);
     for vertex in &drawn.vertices {
         let colour = rgb(vertex.colour);
         let colour = if vertex.opacity < 1.0 {
@@ -153,7 +154,7 @@ fn mesh(drawn: &surface::Mesh) -> Mesh {
         for line in lines {
             let colour = if line.is_black { Color32::BLACK } else { Color32::WHITE };
             let colour = colour.gamma_multiply(line.opacity);
-            ribbon::line(&mut mesh, to_egui(line.from), to_egui(line.to), colour);
+            add_line(&mut mesh, to_egui(line.from), to_egui(line.to), colour);
         }
     }
     mesh
@@ -186,4 +187,30 @@ pub(super) fn to_egui(point: Vec2) -> Pos2 {
 
 pub(super) fn to_glam(point: Pos2) -> Vec2 {
     Vec2::new(point.x, point.y)
+}
+
+/// Half the width over which a line fades out, in points.
+const REACH: f32 = 1.0;
+
+/// Vertices and triangles of one line.
+pub(super) const VERTICES: usize = 6;
+pub(super) const TRIANGLES: usize = 4;
+
+/// Appends a line about one point wide whose colour fades out on both sides.
+pub(super) fn add_line(mesh: &mut Mesh, from: Pos2, to: Pos2, colour: Color32) {
+    let along = to - from;
+    let length = along.length();
+    if length < 1e-3 || !length.is_finite() {
+        return;
+    }
+    let across = along.rot90() * (REACH / length);
+    let first = mesh.vertices.len() as u32;
+    for (side, colour) in [(-1.0, Color32::TRANSPARENT), (0.0, colour), (1.0, Color32::TRANSPARENT)] {
+        mesh.colored_vertex(from + across * side, colour);
+        mesh.colored_vertex(to + across * side, colour);
+    }
+    for strip in [first, first + 2] {
+        mesh.add_triangle(strip, strip + 1, strip + 2);
+        mesh.add_triangle(strip + 2, strip + 1, strip + 3);
+    }
 }

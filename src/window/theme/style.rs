@@ -1,11 +1,16 @@
 //! egui's visuals, made of our tokens.
+//!
+//! Inter with tabular digits, in two weights; egui's own fonts stand behind it for rare signs.
 
-use eframe::egui::style::{HandleShape, ScrollStyle, Selection, WidgetVisuals};
+use std::sync::Arc;
+
 use eframe::egui::{
-    self, Color32, Context, CornerRadius, FontFamily, FontId, Margin, Shadow, Stroke, Style, TextStyle, Visuals, vec2,
+    self, Color32, Context, CornerRadius, FontData, FontDefinitions, FontFamily, FontId, Margin, Shadow, Stroke, Style,
+    TextStyle, Visuals,
+    style::{HandleShape, ScrollStyle, Selection, WidgetVisuals},
+    vec2,
 };
 
-use super::fonts::{font_definitions, semibold};
 use super::tokens::{Palette, radius, space, type_size};
 
 /// Loads the fonts and both styles. Once, before the first frame.
@@ -117,4 +122,46 @@ fn shadow(blur: u8, is_dark: bool) -> Shadow {
         spread: 0,
         color: Color32::from_black_alpha(alpha),
     }
+}
+
+const REGULAR: &str = "Inter Tabular Regular";
+const SEMIBOLD: &str = "Inter Tabular SemiBold";
+
+/// The semi-bold face at a size in points.
+pub fn semibold(size: f32) -> FontId {
+    FontId::new(size, FontFamily::Name(SEMIBOLD.into()))
+}
+
+/// The fonts of the window.
+pub fn font_definitions() -> FontDefinitions {
+    let mut fonts = FontDefinitions::default();
+    let faces: [(&str, &'static [u8]); 2] = [
+        (
+            REGULAR,
+            include_bytes!("../../../assets/fonts/InterTabular-Regular.ttf"),
+        ),
+        (
+            SEMIBOLD,
+            include_bytes!("../../../assets/fonts/InterTabular-SemiBold.ttf"),
+        ),
+    ];
+    for (name, bytes) in faces {
+        fonts
+            .font_data
+            .insert(name.to_owned(), Arc::new(FontData::from_static(bytes)));
+    }
+    let fallback: Vec<String> = [FontFamily::Proportional, FontFamily::Monospace]
+        .iter()
+        .flat_map(|family| fonts.families.get(family).cloned().unwrap_or_default())
+        .collect();
+    let with_fallback = |first: &str| {
+        std::iter::once(first.to_owned())
+            .chain(fallback.iter().cloned())
+            .collect()
+    };
+    fonts.families.insert(FontFamily::Proportional, with_fallback(REGULAR));
+    fonts
+        .families
+        .insert(FontFamily::Name(SEMIBOLD.into()), with_fallback(SEMIBOLD));
+    fonts
 }

@@ -8,20 +8,20 @@ use std::{
     time::Duration,
 };
 
+use decoupler_core::{
+    evaluation::{Baselines, PastNetworks, Problem, Run, RunDefect, RunError, RunSettings, StartRecord, TestErrors},
+    network::Networks,
+    training::{EpochRecord, Stage, StopReason, StoppingRules, TrainerState, TrainingError, TrainingSettings},
+};
+use decoupler_files::{
+    export::NetworkFile,
+    import::{Progress as Reading, Recorded, Setup},
+};
 use ndarray::Array2;
 
 use crate::window::{
     job::JobError,
     test_view::{Frame, TargetCharts, TestSet, TestViewError},
-};
-use decoupler_core::{
-    evaluation::{Baselines, PastNetworks, Problem, Run, RunDefect, RunSettings, StartRecord, TestErrors},
-    network::Networks,
-    training::{EpochRecord, Stage, StopReason, TrainerState, TrainingSettings},
-};
-use decoupler_files::{
-    export::NetworkFile,
-    import::{Progress as Reading, Recorded, Setup},
 };
 
 /// Request of the window to the worker.
@@ -189,6 +189,35 @@ pub struct RunResult {
     pub is_idle: bool,
     /// The networks.
     pub networks: Arc<Networks>,
+}
+
+/// Gives `run` more epochs, counted from the start that is furthest. With the method it has, it continues as if they had
+/// been given from the beginning; another method, or one that had ended for another reason, starts from the current
+/// weights.
+///
+/// # Errors
+/// A setting out of range, or networks too wide for the method; then nothing has changed.
+pub fn continue_run(run: &mut Run, training: TrainingSettings) -> Result<(), RunError> {
+    training.check().map_err(TrainingError::from)?;
+    let stopping = StoppingRules {
+        epochs: (furthest_epoch(run) + training.stopping.epochs).min(StoppingRules::MAX_EPOCHS),
+        ..training.stopping
+    };
+    let is_other = training.method != run.settings().training.method;
+    if is_other {
+        run.continue_with(training.method)?;
+    }
+    run.set_stopping(stopping).map_err(TrainingError::from)?;
+    if !is_other && run.stop_reason().is_some() {
+        run.continue_with(training.method)?;
+    }
+    Ok(())
+}
+
+/// The epoch of the start that is furthest.
+pub fn furthest_epoch(run: &Run) -> usize {
+    let epochs = run.trainers().iter().map(|trainer| trainer.latest().epoch);
+    epochs.max().unwrap_or(0)
 }
 
 #[cfg(test)]

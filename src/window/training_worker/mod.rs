@@ -1,7 +1,6 @@
 //! The worker: one named thread that trains and writes files about the training. Requests go in, events come out, and each
 //! event wakes the window.
 
-mod continuation;
 mod handle;
 mod message;
 mod training_loop;

@@ -12,7 +12,7 @@ use ndarray::Array2;
 
 use super::{
     Began, Event, Progress as Advance, Request, RunId, RunResult, TrainedRun,
-    continuation::{continue_run, furthest_epoch},
+    message::{continue_run, furthest_epoch},
 };
 use crate::window::{
     job::Report,

@@ -1,11 +1,16 @@
 //! The few components that egui lacks, each reachable by its label.
+//!
+//! Parts that all fields share: the reason for which typed text was not taken, and the menu of a value.
 
 use eframe::egui::{
-    self, Align, Button, Color32, Frame, Id, Key, KeyboardShortcut, Label, Layout, Margin, Modifiers, ProgressBar,
-    Rect, Response, RichText, ScrollArea, Sense, Stroke, Ui, UiBuilder, Vec2, Widget, WidgetInfo, WidgetText,
-    accesskit::Role, vec2,
+    self, Align, Button, CollapsingHeader, Color32, Context, Frame, Id, Key, KeyboardShortcut, Label, Layout, Margin,
+    Modifiers, ProgressBar, Rect, Response, RichText, ScrollArea, Sense, Stroke, StrokeKind, Ui, UiBuilder, Vec2,
+    Widget, WidgetInfo, WidgetText,
+    accesskit::{Invalid, Role},
+    vec2,
 };
 
+use super::fields::value_under;
 use crate::window::theme::{Theme, radius, semibold, space, type_size};
 
 /// Tooltip of an action with its shortcut: "Pauses the training (Ctrl+P).", with the Command key on macOS.
@@ -344,4 +349,170 @@ pub fn invitation_ui(ui: &mut Ui, text: &str, button: &str, is_possible: bool) -
         ui.add_enabled(is_possible, ghost_button(button)).clicked()
     });
     invited.inner
+}
+
+/// A figure with its name, and its meaning under the pointer.
+pub fn fact_ui(ui: &mut Ui, name: &str, meaning: &str, value: &str) {
+    let text = Theme::of(ui).palette.text;
+    coloured_fact_ui(ui, name, meaning, value, text);
+}
+
+/// As [`fact_ui`], in a colour that means something.
+pub fn coloured_fact_ui(ui: &mut Ui, name: &str, meaning: &str, value: &str, colour: Color32) {
+    let dim = Theme::of(ui).palette.dim;
+    ui.horizontal(|ui| {
+        let text = |text: &str| RichText::new(text).size(type_size().note);
+        ui.label(text(name).color(dim)).on_hover_text(meaning);
+        ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
+            let response = ui.add(Label::new(text(value).color(colour)).truncate());
+            let label = format!("{name}: {value}");
+            value_under(ui, response.rect, value);
+            response.widget_info(|| WidgetInfo::labeled(Role::Label, true, &label));
+            response.on_hover_text(meaning);
+        });
+    });
+}
+
+/// A place of the window that others point at.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Landmark {
+    /// The actual surface.
+    ActualSurface,
+    /// Array scale, hidden nodes and method.
+    Choices,
+    /// The button that begins a training.
+    Train,
+    /// The error table.
+    Errors,
+    /// The button of the Export menu.
+    Export,
+}
+
+impl Landmark {
+    fn id(self) -> Id {
+        Id::unique(("landmark", self))
+    }
+
+    /// Takes note of where the landmark is drawn in this frame.
+    pub fn stands_at(self, ui: &Ui, rect: Rect) {
+        let seen = rect.intersect(ui.clip_rect());
+        let frame = ui.ctx().cumulative_frame_nr();
+        ui.data_mut(|data| data.insert_temp(self.id(), (frame, seen)));
+    }
+
+    /// Returns where the landmark is drawn in this frame; `None` if it is not in view.
+    pub fn place(self, ctx: &Context) -> Option<Rect> {
+        let (frame, rect) = ctx.data(|data| data.get_temp::<(u64, Rect)>(self.id()))?;
+        (frame == ctx.cumulative_frame_nr() && rect.is_positive()).then_some(rect)
+    }
+}
+
+/// Rings what has the focus and shows it by nothing else.
+pub fn focus_ring_ui(ui: &Ui, response: &Response) {
+    if response.has_focus() {
+        let stroke = Stroke::new(1.0, Theme::of(ui).palette.accent);
+        let corner = f32::from(radius());
+        ui.painter()
+            .rect_stroke(response.rect, corner, stroke, StrokeKind::Inside);
+    }
+}
+
+/// A part of a form that is folded away until its name is clicked; `summary` tells next to the name the status of it.
+/// `contents` is added only while it is unfolded.
+pub fn fold_ui(ui: &mut Ui, name: &str, summary: &str, contents: impl FnOnce(&mut Ui)) {
+    let dim = Theme::of(ui).palette.dim;
+    // What stands above may come and go without a change to the ids in here: who types in a field keeps it.
+    let scope = UiBuilder::new().scope_id(ui.scope_id().with(name));
+    let header = ui
+        .scope_builder(scope, |ui| {
+            let visuals = ui.visuals_mut();
+            // The whole line can be clicked, and shows so under the pointer.
+            visuals.collapsing_header_frame = true;
+            visuals.widgets.inactive.weak_bg_fill = Color32::TRANSPARENT;
+            let shown = CollapsingHeader::new(name).id_salt(name).show_unindented(ui, |ui| {
+                let raised = Theme::of(ui).palette.raised;
+                let visuals = ui.visuals_mut();
+                visuals.collapsing_header_frame = false;
+                visuals.widgets.inactive.weak_bg_fill = raised;
+                contents(ui);
+                ui.add_space(space(2));
+            });
+            shown.header_response
+        })
+        .inner;
+    focus_ring_ui(ui, &header);
+    let text_width =
+        ui.painter()
+            .layout_no_wrap(name.to_owned(), eframe::egui::TextStyle::Body.resolve(ui.style()), dim);
+    let mut place = header.rect;
+    place.min.x += space(7) + text_width.size().x + space(2);
+    place.max.x -= space(1);
+    let layout = Layout::right_to_left(Align::Center);
+    let mut beside = ui.new_child(UiBuilder::new().max_rect(place).layout(layout));
+    let text = RichText::new(summary).size(type_size().note).color(dim);
+    beside.add(Label::new(text).truncate().selectable(false));
+}
+
+/// Text that was typed and could not be taken, with the reason.
+#[derive(Clone, Debug, PartialEq)]
+struct Refusal {
+    reason: String,
+    /// The value that stayed; the refusal goes when it changes.
+    kept: String,
+}
+
+fn refusal_id(field: Id) -> Id {
+    field.with("refusal")
+}
+
+/// Marks a field while what was `tried` last is refused; `value` is the text of its value.
+pub(super) fn take_refusal(ui: &Ui, response: &Response, tried: Option<Result<(), String>>, value: &str) {
+    let id = refusal_id(response.id);
+    match tried {
+        Some(Err(reason)) => {
+            let kept = value.to_owned();
+            ui.data_mut(|data| data.insert_temp(id, Refusal { reason, kept }));
+        }
+        Some(Ok(())) => ui.data_mut(|data| data.remove::<Refusal>(id)),
+        None => {}
+    }
+    let Some(refusal) = ui.data(|data| data.get_temp::<Refusal>(id)) else {
+        return;
+    };
+    let is_dismissed = response.has_focus() && ui.input(|input| input.key_pressed(Key::Escape));
+    if refusal.kept != value || is_dismissed {
+        ui.data_mut(|data| data.remove::<Refusal>(id));
+        return;
+    }
+    let stroke = Stroke::new(1.0, Theme::of(ui).palette.bad);
+    let corner = f32::from(radius());
+    ui.painter()
+        .rect_stroke(response.rect, corner, stroke, StrokeKind::Inside);
+    ui.ctx().accesskit_node_builder(response.id, |node| {
+        node.set_invalid(Invalid::True);
+        node.set_description(refusal.reason.as_str());
+    });
+}
+
+/// Tells below a field why what was typed was not taken.
+pub fn refusal_ui(ui: &mut Ui, field: &Response) {
+    let refusal = ui.data(|data| data.get_temp::<Refusal>(refusal_id(field.id)));
+    if let Some(refusal) = refusal {
+        let bad = Theme::of(ui).palette.bad;
+        ui.label(RichText::new(refusal.reason).size(type_size().note).color(bad));
+    }
+}
+
+/// Copies the value as `shown`, or sets the usual one, which has a text too.
+pub(super) fn menu_ui<T: Copy + PartialEq>(ui: &mut Ui, value: &mut T, shown: &str, usual: Option<(T, String)>) {
+    if ui.button(format!("Copy {shown}")).clicked() {
+        ui.ctx().copy_text(shown.to_owned());
+        ui.close();
+    }
+    if let Some((usual, text)) = usual.filter(|(usual, _)| usual != value)
+        && ui.button(format!("Reset to {text}")).clicked()
+    {
+        *value = usual;
+        ui.close();
+    }
 }

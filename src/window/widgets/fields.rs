@@ -1,20 +1,26 @@
 //! One row of the configuration: a name on the left, a value on the right.
+//!
+//! The one slider.
+//!
+//! The one field for values that are no numbers.
 
-use std::ops::RangeInclusive;
+use std::{fmt::Display, ops::RangeInclusive, str::FromStr};
 
-use eframe::egui::{Align, ComboBox, Layout, Response, Ui};
-
-use super::{
-    explained_options_ui,
-    number_field::{FIELD_SIZE, Limits, number_ui, whole_ui},
-    refusal::refusal_ui,
-};
-use crate::window::theme::space;
-
-pub use super::number_field::usually;
-/// A number as one would type it: all its digits, and no more.
 pub(crate) use decoupler_core::sensor::short as input_text;
 pub use decoupler_core::text::capitalised;
+use eframe::egui::{
+    Align, ComboBox, Context, CornerRadius, Id, Key, Layout, Rect, Response, Sense, Slider, Stroke, TextEdit, Ui, vec2,
+};
+
+pub use super::number_field::usually;
+use super::{
+    components::{menu_ui, refusal_ui, take_refusal},
+    explained_options_ui,
+    number_field::{FIELD_SIZE, Limits, number_ui, whole_ui},
+};
+use crate::window::theme::{Theme, space};
+
+/// A number as one would type it: all its digits, and no more.
 
 /// Lays out `name` and the widget made by `value_ui`; joins them for assistive technology and tests. Below it is why
 /// what was typed into it was not taken.
@@ -122,4 +128,102 @@ pub fn list_ui<T: Copy + PartialEq>(
         combo.response
     });
     picked
+}
+
+/// A slider `width` points wide. A double click asks for the usual value, which the caller sets where the response is
+/// double-clicked.
+pub fn slider_ui(ui: &mut Ui, slider: Slider<'_>, width: f32) -> Response {
+    ui.scope(|ui| {
+        slider_style(ui);
+        ui.spacing_mut().slider_width = width;
+        let dragged = ui.add(slider.show_value(false));
+        let clicked = dragged.interact(Sense::click());
+        dragged.union(clicked)
+    })
+    .inner
+}
+
+/// Makes the sliders of this `ui` look like ours: accent up to the handle, a ring as the handle.
+fn slider_style(ui: &mut Ui) {
+    let palette = Theme::of(ui).palette;
+    let visuals = ui.visuals_mut();
+    visuals.selection.bg_fill = palette.accent;
+    visuals.widgets.inactive.bg_fill = palette.line;
+    visuals.widgets.inactive.corner_radius = CornerRadius::same(2);
+    for state in [&mut visuals.widgets.hovered, &mut visuals.widgets.active] {
+        state.bg_fill = palette.accent;
+    }
+    for state in [
+        &mut visuals.widgets.inactive,
+        &mut visuals.widgets.hovered,
+        &mut visuals.widgets.active,
+    ] {
+        state.fg_stroke = Stroke::new(2.0, palette.accent);
+    }
+}
+
+/// A value as text, which counts when Enter is pressed or the field is left. What is none is refused: the old value stays,
+/// and below the field stands why. A right click copies, or sets the `usual` value.
+pub fn text_ui<T>(ui: &mut Ui, name: &str, hint: &str, value: &mut T, usual: T) -> Response
+where
+    T: Copy + Display + FromStr<Err: Display> + PartialEq,
+{
+    field_ui(ui, name, hint, |ui| {
+        let id = ui.scope_id().with(name);
+        let typed = ui.data(|data| data.get_temp::<String>(id));
+        let mut text = typed.clone().unwrap_or_else(|| value.to_string());
+        let edit = TextEdit::singleline(&mut text)
+            .desired_width(f32::INFINITY)
+            .margin(vec2(space(2), space(1)));
+        let response = ui.add(edit);
+        let is_taken_back = ui.input(|input| input.key_pressed(Key::Escape));
+        let typed = if response.changed() { Some(text) } else { typed };
+        let tried = if response.has_focus() {
+            ui.data_mut(|data| typed.map(|typed| data.insert_temp(id, typed)));
+            None
+        } else {
+            ui.data_mut(|data| data.remove_temp::<String>(id));
+            typed.filter(|_| !is_taken_back).map(|typed| {
+                let parsed = typed.parse().map(|parsed| *value = parsed);
+                parsed.map_err(|error: T::Err| error.to_string())
+            })
+        };
+        claim_right_click(ui, &response);
+        let shown = value.to_string();
+        response.context_menu(|ui| menu_ui(ui, value, &shown, Some((usual, usual.to_string()))));
+        take_refusal(ui, &response, tried, &value.to_string());
+        response
+    })
+}
+
+fn id() -> Id {
+    Id::unique("value under the pointer")
+}
+
+/// Tells that `text` is the value shown in `rect`, so that a right click there can copy it.
+pub fn value_under(ui: &Ui, rect: Rect, text: &str) {
+    if ui.input(|input| input.pointer.secondary_clicked()) && ui.rect_contains_pointer(rect) {
+        ui.data_mut(|data| data.insert_temp(id(), text.to_owned()));
+    }
+}
+
+/// Returns the value that was right-clicked in this frame, once.
+pub fn take_value_under(ctx: &Context) -> Option<String> {
+    ctx.data_mut(|data| data.remove_temp(id()))
+}
+
+fn claim_id() -> Id {
+    Id::unique("right click is answered")
+}
+
+/// Tells that a widget answers a right click on it by a menu of its own.
+pub fn claim_right_click(ui: &Ui, widget: &Response) {
+    if widget.secondary_clicked() {
+        ui.data_mut(|data| data.insert_temp(claim_id(), true));
+    }
+}
+
+/// Returns true if a widget answers the right click of this frame, once.
+pub fn take_claim(ctx: &Context) -> bool {
+    ctx.data_mut(|data| data.remove_temp(claim_id())).unwrap_or(false)
 }

@@ -5,10 +5,9 @@ use std::{cell::RefCell, ops::RangeInclusive};
 use eframe::egui::{DragValue, Response, Ui, Vec2, emath::Numeric};
 
 use super::{
-    fields::input_text,
+    components::{menu_ui, take_refusal},
+    fields::{claim_right_click, input_text},
     quantity_text::parse,
-    refusal::{menu_ui, take_refusal},
-    value_under::claim_right_click,
 };
 use crate::window::theme::space;
 

@@ -2,7 +2,7 @@ use std::time::Duration;
 
 use eframe::egui::Ui;
 
-use super::scene_words::{inputs_words, loading_words, movement_words, noise_words, rows_words};
+use super::view::{inputs_words, loading_words, movement_words, noise_words, rows_words};
 use crate::window::{
     shared::{PLACES, RunList},
     widgets::{TableColumn as Column, TableRow, TableView, fields::capitalised, note_ui},

@@ -2,7 +2,7 @@ use std::time::Duration;
 
 use eframe::egui::{Button, Id, RichText, TextEdit, Ui, WidgetInfo, accesskit::Role};
 
-use super::scene_words::unlike_paper;
+use super::view::unlike_paper;
 use crate::window::{
     shared::{Effect, PLACES, Phase, Shared},
     theme::{space, type_size},

@@ -1,9 +1,7 @@
 //! The Compare view: the run list, and two of its runs side by side.
 
-mod exports;
 mod figures_table;
 mod list;
-mod scene_words;
 mod state;
 mod view;
 

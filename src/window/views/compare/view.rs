@@ -1,23 +1,40 @@
+//! Exports of two runs side by side, and of each of them alone.
+//!
+//! A run's scene and inputs in words.
+
+use std::sync::Arc;
+
+use decoupler_core::{
+    evaluation::SimulatedSettings,
+    network::{InputChoice, Quantity, ScalingChoice},
+    scene::{Loading, Movement, Noise, NoisySets, Rows, Scene},
+};
+use decoupler_files::figure::{
+    Figure, PlotFigure, compared_losses_figure,
+    surface::{Surface, SurfaceFigure},
+    target_regression_figure,
+};
 use eframe::egui::{Align, Layout, Rect, RichText, Sense, Ui, Vec2};
 
 use super::{
-    CompareView, Compared, exports::compare_exports, figures_table::figures_ui, list::run_list_ui, state::Drawn,
+    CompareView, Compared,
+    figures_table::{compared_table, figures_ui},
+    list::run_list_ui,
+    state::Drawn,
 };
 use crate::window::{
     plotting::{Pointer, plots_ui, titled_plots_ui},
     shared::{
-        Effect, Export, Look, PLACES, RightCard, RunList, Shared, View, colour_scale_ui, follow_surface,
-        target_choice_ui, view_mode_ui,
+        Effect, Export, Look, NetworkSource, PLACES, RightCard, RunList, Shared, View, colour_scale_ui, copy_exports,
+        follow_surface, network_exports, picture_exports, target_choice_ui, view_mode_ui,
     },
     surface_view::{ColourBar, SurfaceView},
     test_view::TestSet,
     theme::{Theme, semibold, space, type_size},
-    widgets::{card_ui, note_ui, placeholder_ui, scrolled_ui, section_heading_ui, segmented_ui, snapshot_ui},
-};
-use decoupler_files::figure::{
-    PlotFigure, compared_losses_figure,
-    surface::{Surface, SurfaceFigure},
-    target_regression_figure,
+    widgets::{
+        card_ui, fields::input_text, note_ui, placeholder_ui, scrolled_ui, section_heading_ui, segmented_ui,
+        snapshot_ui,
+    },
 };
 
 impl View for CompareView {
@@ -246,4 +263,138 @@ pub(super) fn losses(runs: &RunList) -> Option<PlotFigure> {
     });
     let runs = [&a, &b].map(|run| run.as_ref().map(|(name, history)| (&**name, *history)));
     (a.is_some() || b.is_some()).then(|| compared_losses_figure(runs))
+}
+
+/// The networks of both runs, the pictures, and the table.
+pub(super) fn compare_exports<'a>(view: &'a CompareView, shared: &'a Shared) -> Vec<Export<'a>> {
+    let runs = &shared.runs;
+    let mut exports = Vec::new();
+    for (place, letter) in PLACES.into_iter().enumerate() {
+        let run = runs.pinned(place);
+        let source = run.map(|run| NetworkSource::Kept(run.name.clone(), Arc::clone(&run.file)));
+        let source = source.ok_or_else(|| format!("No run is chosen as {letter}: choose one in the list."));
+        exports.extend(network_exports(&format!("{letter}: "), &source, Vec::new));
+    }
+    // One part of the menu for the networks of both.
+    exports.sort_by_key(|export| export.group);
+    let nothing = || "No run is chosen: choose one in the list.".to_owned();
+    let figure = view.figure(shared);
+    let surfaces = if figure.surfaces.is_empty() {
+        Err(nothing())
+    } else {
+        Ok(move || Figure::from(figure.clone()))
+    };
+    exports.extend(picture_exports("Surfaces", "compared-surfaces".to_owned(), surfaces));
+    for (place, letter) in PLACES.into_iter().enumerate() {
+        if let Some(regression) = view.regression(place) {
+            let stem = format!("regression-{}", letter.to_lowercase());
+            let regression = Ok(move || Figure::from(regression.clone()));
+            exports.extend(picture_exports(&format!("Regression of {letter}"), stem, regression));
+        }
+    }
+    let losses = losses(runs).ok_or_else(nothing);
+    let losses = losses.map(|losses| move || Figure::from(losses.clone()));
+    exports.extend(picture_exports("Loss chart", "compared-loss".to_owned(), losses));
+    let is_any = (0..PLACES.len()).any(|place| runs.pinned(place).is_some());
+    let table = if is_any {
+        Ok(|| compared_table(runs))
+    } else {
+        Err(nothing())
+    };
+    exports.extend(copy_exports("Table of both runs", table));
+    exports
+}
+
+/// Returns the differences between a run and the paper's scene and inputs, in words; empty if there are none.
+pub fn unlike_paper(settings: &SimulatedSettings) -> Vec<String> {
+    let paper = SimulatedSettings::default();
+    let (scene, of_paper) = (&settings.source.scene, &paper.source.scene);
+    let words = [
+        (scene.rows != of_paper.rows).then(|| rows_words(scene.rows)),
+        (scene.movement != of_paper.movement).then(|| movement_words(scene.movement)),
+        (scene.loading != of_paper.loading).then(|| loading_words(scene)),
+        (!scene.noise.is_none()).then(|| format!("noise {}", noise_words(&scene.noise))),
+        (settings.inputs != paper.inputs).then(|| inputs_words(settings.inputs)),
+    ];
+    words.into_iter().flatten().collect()
+}
+
+pub fn rows_words(rows: Rows) -> String {
+    match rows {
+        Rows::All => "all rows".to_owned(),
+        Rows::Known => "known rows".to_owned(),
+        Rows::One(row) => format!("row {} alone", row + 1),
+    }
+}
+
+pub fn movement_words(movement: Movement) -> String {
+    match movement {
+        Movement::Z => "z".to_owned(),
+        Movement::Xyz { .. } => "x, y, z".to_owned(),
+    }
+}
+
+pub fn loading_words(scene: &Scene) -> String {
+    match scene.loading {
+        Loading::RandomNodes => "random nodes".to_owned(),
+        Loading::SmoothField { correlation_length_mm } => {
+            format!("smooth field, {} mm", input_text(correlation_length_mm))
+        }
+        Loading::Indenter(indenter) => indenter.name().to_owned(),
+    }
+}
+
+pub fn noise_words(noise: &Noise) -> String {
+    if noise.is_none() {
+        return "none".to_owned();
+    }
+    let parts = [
+        (noise.relative > 0.0).then(|| input_text(noise.relative)),
+        (noise.additive_ohm > 0.0).then(|| format!("{} ohm", input_text(noise.additive_ohm))),
+        noise.converter_bits.map(|bits| format!("{bits} bits")),
+        (noise.drift > 0.0).then(|| format!("drift {}", input_text(noise.drift))),
+        match noise.sets {
+            NoisySets::Both => None,
+            NoisySets::Training => Some("in training".to_owned()),
+            NoisySets::Test => Some("in test".to_owned()),
+        },
+    ];
+    parts.into_iter().flatten().collect::<Vec<_>>().join(", ")
+}
+
+pub fn inputs_words(inputs: InputChoice) -> String {
+    let quantity = match inputs.quantity {
+        Quantity::Resistance => "resistance",
+        Quantity::Conductance => "conductance",
+        Quantity::LogResistance => "log-resistance",
+        Quantity::Raw => "readings",
+    };
+    match inputs.scaling {
+        ScalingChoice::MinMax => quantity.to_owned(),
+        ScalingChoice::Whitening => format!("{quantity}, whitened"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use decoupler_core::{evaluation::Preset, scene::Indenter};
+
+    use super::*;
+
+    #[test]
+    fn what_differs_from_the_paper_is_said_and_nothing_else() {
+        assert!(unlike_paper(&SimulatedSettings::default()).is_empty());
+        let mut best = Preset::Best.settings_in(Noise {
+            relative: 1e-3,
+            converter_bits: Some(12),
+            sets: NoisySets::Test,
+            ..Noise::default()
+        });
+        let words = ["known rows", "noise 0.001, 12 bits, in test", "conductance, whitened"];
+        assert_eq!(unlike_paper(&best), words);
+        best = SimulatedSettings::default();
+        best.source.scene.rows = Rows::One(2);
+        best.source.scene.loading = Loading::Indenter(Indenter::all()[1]);
+        assert_eq!(unlike_paper(&best), ["row 3 alone", "flat punch"]);
+    }
 }

@@ -2,17 +2,10 @@
 //! window stays free.
 
 mod axis_form;
-mod exports;
 mod form;
-mod heat_map;
-mod open_cell;
 mod panel;
-mod results_card;
 mod state;
-mod status;
 mod sweep_folder;
-mod table;
-mod verdict_list;
 mod view;
 mod worker;
 

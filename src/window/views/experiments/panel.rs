@@ -1,30 +1,43 @@
-use eframe::egui::{Button, ComboBox, Key, TextEdit, Ui, vec2};
+//! Exports of an experiment.
 
-use super::{
-    AxisForm, ExperimentsView, Form, Running, Topic,
-    axis_form::{axis_example, axis_label},
-    sweep_folder::folder_form_ui,
-};
-use crate::window::{
-    shared::{Effect, Shared},
-    theme::space,
-    widgets::{
-        dim_ui,
-        fields::{count_ui, seed_ui},
-        ghost_button, note_ui, primary_button, progress_bar_ui, scrolled_ui, section_heading_ui, segmented_ui,
-        with_shortcut,
-    },
-};
+use std::sync::Arc;
+
 use decoupler_core::{
     dataset::FoldUnit,
     evaluation::{
         MAX_STARTS,
-        experiments::{AxisKind, PaperTable},
+        experiments::{AxisKind, PaperTable, verdicts},
     },
     text::counted,
     training::StoppingRules,
 };
-use decoupler_files::export::format_duration;
+use decoupler_files::{
+    export::{
+        atomic_write, cells_table, describe_conditions, format_duration, trials_table, write_experiment_markdown,
+    },
+    figure::{Figure, SequentialMap},
+    import::{Plan, Setup},
+};
+use eframe::egui::{Button, ComboBox, Key, TextEdit, Ui, vec2};
+
+use super::{
+    AxisForm, Ending, ExperimentsView, Form, Outcome, Running, Topic,
+    axis_form::{axis_example, axis_label},
+    sweep_folder::folder_form_ui,
+};
+use crate::window::{
+    shared::{
+        Ask, Contents, Effect, Export, ExportGroup, FileTask, FileWords, Shared, copy_exports, csv_export,
+        picture_exports,
+    },
+    theme::{Theme, space},
+    widgets::{
+        dim_ui,
+        fields::{count_ui, seed_ui},
+        ghost_button, note_ui, primary_button, progress_bar_ui, scrolled_ui, section_heading_ui, segmented_ui,
+        state_ui, with_shortcut,
+    },
+};
 
 /// The most seeds or repeats.
 const MAX_TRIALS: usize = 1000;
@@ -252,4 +265,123 @@ fn progress_ui(ui: &mut Ui, running: &Running) {
         None => "estimating the time left".to_owned(),
     };
     dim_ui(ui, &left);
+}
+
+/// Shows the state of the experiment in the line at the bottom.
+pub fn status_ui(ui: &mut Ui, experiments: &ExperimentsView) {
+    let palette = Theme::of(ui).palette;
+    let folder = experiments.shown_folder().filter(|_| experiments.running.is_none());
+    let of_folder = folder.and_then(|folder| Some((folder.name(), folder.trials()?)));
+    if let Some((name, (finished, trials))) = of_folder {
+        let colour = if finished == trials {
+            palette.good
+        } else {
+            palette.accent
+        };
+        let text = format!(
+            "Sweep folder {name}: {finished} of {} finished",
+            counted(trials, "trial")
+        );
+        ui.horizontal_centered(|ui| state_ui(ui, colour, &text));
+        return;
+    }
+    let (colour, text) = match (&experiments.running, experiments.outcome()) {
+        (Some(running), _) => (palette.accent, format!("Running {}", running.topic.name())),
+        (None, Some(outcome)) => {
+            let (done, all) = outcome.trials();
+            let took = outcome
+                .took
+                .map_or_else(String::new, |took| format!(" in {}", format_duration(took)));
+            let name = experiments.topic.name();
+            match outcome.ending {
+                Some(Ending::Complete) => (palette.good, format!("{name} finished: {all} trials{took}")),
+                _ => (
+                    palette.warning,
+                    format!("{name} ended early: {done} of {all} trials{took}"),
+                ),
+            }
+        }
+        (None, None) => (palette.dim, "Ready: press Run".to_owned()),
+    };
+    ui.horizontal_centered(|ui| state_ui(ui, colour, &text));
+}
+
+/// Takes a cell to the Train view: its settings with the seed of its median trial, and the network of that trial. One
+/// that was not kept, as none is of a cross-validation, is trained there.
+pub fn open_cell(shared: &Shared, outcome: &Outcome, cell: usize, effects: &mut Vec<Effect>) {
+    let cell = outcome.results.cells.get(cell).filter(|_| !shared.phase.is_busy());
+    let Some(cell) = cell else { return };
+    let mut settings = cell.cell.settings;
+    let median = cell.median_trial();
+    if let Some(trial) = median {
+        settings.seed = trial.seed;
+    }
+    let plan = outcome.plan.clone().zip(cell.cell.division);
+    let plan = plan.map(|(plan, division)| Plan { division, ..plan });
+    let Some(setup) = Setup::of(settings, plan).map(Box::new) else {
+        return;
+    };
+    match median {
+        Some(trial) if !trial.states.is_empty() => effects.push(Effect::TakeUp(setup, trial.states.clone())),
+        Some(_) => effects.extend([Effect::TakeSetup(setup), Effect::Train]),
+        None => effects.push(Effect::TakeSetup(setup)),
+    }
+    effects.push(Effect::ShowTraining);
+}
+
+const CELLS: FileWords = FileWords {
+    kind: "table",
+    description: "The values of every cell with every digit, as CSV.",
+    extensions: &["csv"],
+};
+
+const TRIALS: FileWords = FileWords {
+    kind: "trials",
+    description: "Every trial with its seed and errors, as CSV.",
+    extensions: &["csv"],
+};
+
+const MARKDOWN: FileWords = FileWords {
+    kind: "table and verdicts",
+    description: "The table as shown, the settings behind it and the verdicts, as Markdown.",
+    extensions: &["md"],
+};
+
+/// The figure, the tables, and the verdicts of the current experiment.
+pub(super) fn experiment_exports(view: &ExperimentsView, colours: SequentialMap) -> Vec<Export<'_>> {
+    let topic = view.topic;
+    let stem = topic.name().to_lowercase().replace(' ', "_");
+    let outcome = view.outcome().filter(|outcome| outcome.trials().0 > 0);
+    let outcome = outcome.ok_or_else(|| "No trial has finished yet: press Run first.".to_owned());
+    let figure = outcome.clone().map(|outcome| {
+        move || match outcome.figure.clone() {
+            Figure::HeatMap(map) => map.coloured(colours).into(),
+            figure => figure,
+        }
+    });
+    let mut exports: Vec<Export<'_>> = picture_exports("Figure", stem.clone(), figure).collect();
+    let cells = outcome.clone().map(|outcome| || cells_table(&outcome.results));
+    exports.push(csv_export("Table", CELLS, stem.clone(), cells));
+    let trials = outcome.clone().map(|outcome| || trials_table(&outcome.results));
+    exports.push(csv_export("Every trial", TRIALS, format!("{stem}_trials"), trials));
+    exports.push(Export {
+        group: ExportGroup::Tables,
+        name: "Table and verdicts".to_owned(),
+        form: "Markdown".to_owned(),
+        description: MARKDOWN.description,
+        ask: outcome.clone().map(|outcome| -> Ask<'_> {
+            Box::new(move || {
+                let results = Arc::clone(&outcome.results);
+                let contents = Contents::new(move |path| {
+                    let (conditions, verdicts) = (describe_conditions(&results.experiment), verdicts(&results));
+                    atomic_write(path, |writer| {
+                        write_experiment_markdown(&topic.heading(), &conditions, &results, &verdicts, writer)
+                    })
+                });
+                Effect::ChooseFile(FileTask::save(MARKDOWN, &stem, contents))
+            })
+        }),
+    });
+    exports.extend(copy_exports("Table", outcome.map(|outcome| || outcome.table.table())));
+    exports
 }

@@ -1,26 +1,34 @@
+//! The table of an experiment: every column orders it, every row can be marked.
+
 use std::time::Instant;
 
-use eframe::egui::{Key, Modifiers, Sense, Ui};
+use decoupler_core::{
+    evaluation::experiments::{Verdict, VerdictStatus},
+    text::counted,
+};
+use decoupler_files::{
+    export::{ExperimentColumn, ExperimentColumnKind, ExperimentTable, describe_conditions},
+    figure::{Figure, HeatMap},
+};
+use eframe::egui::{
+    Align, Color32, FontId, Frame, Key, Label, Layout, Margin, Modifiers, RichText, Sense, Ui, Vec2, vec2,
+};
 
 use super::{
     ExperimentLook, ExperimentsView, Outcome, Topic,
-    exports::experiment_exports,
-    heat_map::sweep_ui,
-    panel,
-    results_card::{results_card_height, results_card_ui},
-    status,
+    panel::{self, experiment_exports, open_cell},
     sweep_folder::folder_card_ui,
-    verdict_list::verdicts_ui,
     worker::ExperimentEvent,
 };
 use crate::window::{
-    plotting::{Pointer, legend_ui, plots_ui},
+    plotting::{CellPointed, Pointer, heat_map_ui, legend_ui, plots_ui},
     shared::{Effect, Export, Matter, Notice, Offers, Shared, Unfinished, View},
-    theme::space,
-    widgets::{card_ui, invitation_ui, placeholder_ui, scrolled_ui, section_heading_ui},
+    theme::{Palette, Theme, radius, semibold, space, type_size},
+    widgets::{
+        ColumnWidth, TableCell, TableClick, TableColumn, TableRow, TableView, card_ui, ghost_button, invitation_ui,
+        placeholder_ui, scrolled_ui, section_heading_ui,
+    },
 };
-use decoupler_core::text::counted;
-use decoupler_files::figure::Figure;
 
 impl View for ExperimentsView {
     fn name(&self) -> &'static str {
@@ -132,7 +140,7 @@ impl View for ExperimentsView {
     }
 
     fn status_ui(&self, ui: &mut Ui, _shared: &Shared) {
-        status::status_ui(ui, self);
+        panel::status_ui(ui, self);
     }
 }
 
@@ -167,4 +175,211 @@ fn picture_ui(
         // No experiment has any.
         Figure::Surfaces(_) => {}
     }
+}
+
+/// The map of a sweep. A click marks the cell, two open it in the Train view.
+pub fn sweep_ui(
+    ui: &mut Ui,
+    (outcome, map): (&Outcome, &HeatMap),
+    look: &mut ExperimentLook,
+    shared: &Shared,
+    effects: &mut Vec<Effect>,
+) {
+    let columns = map.columns.len().max(1);
+    let marked = look.marked.map(|cell| [cell / columns, cell % columns]);
+    if let Some(([row, column], pointed)) = heat_map_ui(ui, map, marked) {
+        let cell = row * columns + column;
+        look.marked = Some(cell);
+        if pointed == CellPointed::Twice {
+            open_cell(shared, outcome, cell, effects);
+        }
+    }
+}
+
+/// The claims that hold in this run, with the numbers; below, those that could not be tried.
+pub fn verdicts_ui(ui: &mut Ui, outcome: &Outcome) {
+    for verdict in &outcome.verdicts {
+        verdict_ui(ui, verdict);
+    }
+    let palette = Theme::of(ui).palette;
+    for failure in decoupler_files::export::describe_failures(&outcome.results) {
+        ui.label(RichText::new(failure).size(type_size().note).color(palette.bad));
+    }
+    for remark in decoupler_files::export::describe_worse_than_mean(&outcome.results) {
+        ui.label(RichText::new(remark).size(type_size().note).color(palette.warning));
+    }
+}
+
+fn verdict_ui(ui: &mut Ui, verdict: &Verdict) {
+    let palette = Theme::of(ui).palette;
+    let colour = colour_of(verdict.standing, &palette);
+    ui.horizontal_wrapped(|ui| {
+        Frame::new()
+            .fill(colour.gamma_multiply(0.16))
+            .corner_radius(radius())
+            .inner_margin(Margin::symmetric(6, 1))
+            .show(ui, |ui| {
+                ui.label(
+                    RichText::new(verdict.standing.to_string())
+                        .font(semibold(type_size().small))
+                        .color(colour),
+                );
+            });
+        ui.label(RichText::new(verdict.claim).font(semibold(type_size().note)));
+    });
+    ui.label(
+        RichText::new(&verdict.finding)
+            .size(type_size().note)
+            .color(palette.dim),
+    );
+    ui.add_space(space(2));
+}
+
+fn colour_of(standing: VerdictStatus, palette: &Palette) -> Color32 {
+    match standing {
+        VerdictStatus::Holds => palette.good,
+        VerdictStatus::HoldsInPart => palette.warning,
+        VerdictStatus::Fails => palette.bad,
+        VerdictStatus::Undecided => palette.dim,
+    }
+}
+
+/// Margins of a card, both sides together.
+const MARGINS: f32 = 24.0;
+
+/// Title, how it was made, and the table.
+pub fn results_card_ui(
+    ui: &mut Ui,
+    (topic, outcome): (Topic, &Outcome),
+    look: &mut ExperimentLook,
+    shared: &Shared,
+    effects: &mut Vec<Effect>,
+) {
+    let dim = Theme::of(ui).palette.dim;
+    ui.horizontal(|ui| {
+        ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
+            open_ui(ui, outcome, look.marked, shared, effects);
+            let heading = RichText::new(topic.heading()).font(semibold(type_size().title));
+            ui.with_layout(Layout::left_to_right(Align::Center), |ui| {
+                ui.add(Label::new(heading).truncate());
+            });
+        });
+    });
+    let conditions = RichText::new(describe_conditions(&outcome.results.experiment));
+    ui.label(conditions.size(type_size().note).color(dim));
+    let note_height = note_size(ui, &outcome.table, ui.available_width()).y + space(1);
+    let table = vec2(ui.available_width(), ui.available_height() - note_height);
+    ui.allocate_ui(table, |ui| table_ui(ui, outcome, look, shared, effects));
+    let note = RichText::new(outcome.table.note).size(type_size().small);
+    ui.label(note.color(dim));
+}
+
+/// Returns the height at which a card of this width shows every row, in points.
+pub fn results_card_height(ui: &Ui, outcome: &Outcome, width: f32) -> f32 {
+    let width = width - MARGINS;
+    let conditions = describe_conditions(&outcome.results.experiment);
+    let texts = text_size(ui, conditions, type_size().note, width).y + note_size(ui, &outcome.table, width).y;
+    let title = space(7);
+    let rows = space(6) * (outcome.table.rows.len() as f32 + 1.0);
+    // Gaps between the four.
+    (MARGINS + title + texts + rows + space(5)).ceil()
+}
+
+fn note_size(ui: &Ui, table: &ExperimentTable, width: f32) -> Vec2 {
+    text_size(ui, table.note.to_owned(), type_size().small, width)
+}
+
+fn text_size(ui: &Ui, text: String, size: f32, width: f32) -> Vec2 {
+    let colour = Theme::of(ui).palette.dim;
+    ui.painter()
+        .layout(text, FontId::proportional(size), colour, width)
+        .size()
+}
+
+/// Takes the marked cell to the Train view.
+fn open_ui(ui: &mut Ui, outcome: &Outcome, marked: Option<usize>, shared: &Shared, effects: &mut Vec<Effect>) {
+    let can_open = marked.is_some() && !shared.phase.is_busy();
+    let button = ui.add_enabled(can_open, ghost_button("Open in Train view"));
+    let why_not = if marked.is_some() {
+        "A training is running in the Train view: its settings cannot be changed now"
+    } else {
+        "Click a cell of the table or the figure first"
+    };
+    let button = button
+        .on_hover_text("Shows the network of the median trial of the marked cell, with its settings and surfaces.")
+        .on_disabled_hover_text(why_not);
+    if let (true, Some(cell)) = (button.clicked(), marked) {
+        open_cell(shared, outcome, cell, effects);
+    }
+}
+
+/// Lays out the table over the available space; it scrolls where it is larger.
+pub fn table_ui(ui: &mut Ui, outcome: &Outcome, look: &mut ExperimentLook, shared: &Shared, effects: &mut Vec<Effect>) {
+    let palette = &Theme::of(ui).palette;
+    let axes = outcome.results.experiment.axes().count();
+    let headings = &outcome.table.columns;
+    let column = |(place, of_table): (usize, &ExperimentColumn)| {
+        let texts = outcome.table.rows.iter().map(|row| row[place].as_str());
+        let column = if place < axes {
+            TableColumn::text(of_table.heading)
+        } else {
+            TableColumn::figure(of_table.heading)
+        };
+        column.width(ColumnWidth::of_longest(texts))
+    };
+    let columns: Vec<TableColumn<'_>> = headings.iter().enumerate().map(column).collect();
+    let values = &outcome.table.values;
+    let figure = |cell: usize, column: usize| (values[cell].get(column).copied().flatten(), "");
+    let order = look.sort.order(outcome.table.rows.len(), figure);
+    let row = |place: usize| {
+        let number = order[place];
+        let texts = &outcome.table.rows[number];
+        let name = texts[..axes].join(", ");
+        let loses = loses_to_linear_map(outcome, number);
+        let cells = headings
+            .iter()
+            .zip(texts)
+            .enumerate()
+            .map(|(column, (of_table, text))| {
+                let is_median = of_table.kind == ExperimentColumnKind::Ranking;
+                let is_beaten = loses && of_table.kind == ExperimentColumnKind::Linear;
+                let colour = match of_table.kind {
+                    ExperimentColumnKind::Ranking => palette.accent,
+                    ExperimentColumnKind::Published => palette.dim,
+                    _ if is_beaten => palette.warning,
+                    _ => palette.text,
+                };
+                let meaning = if is_beaten {
+                    "The linear baseline is more accurate here than the network."
+                } else {
+                    ""
+                };
+                TableCell::new(text)
+                    .colour(colour)
+                    .strong(is_median || column < axes)
+                    .meaning(meaning)
+            });
+        TableRow::new(cells)
+            .labelled(format!("Cell {name}"))
+            .named(name)
+            .selected(look.marked == Some(number))
+    };
+    let table = TableView::new("experiment table", &columns)
+        .sorted(look.sort)
+        .clickable();
+    match table.show(ui, order.len(), row) {
+        Some(TableClick::Sort(sort)) => look.sort = sort,
+        Some(TableClick::Select(place)) => look.marked = Some(order[place]),
+        Some(TableClick::Open(place)) => {
+            look.marked = Some(order[place]);
+            open_cell(shared, outcome, order[place], effects);
+        }
+        Some(TableClick::Point(_)) | None => {}
+    }
+}
+
+fn loses_to_linear_map(outcome: &Outcome, cell: usize) -> bool {
+    let summary = &outcome.summaries[cell];
+    let both = summary.percent.median.zip(summary.linear_percent);
+    both.is_some_and(|(network, linear)| network > linear)
 }

@@ -3,12 +3,10 @@
 
 mod analysis;
 mod array_view;
-mod facts;
 mod form;
 mod recording;
 mod state;
 mod view;
-mod worker;
 
 pub use analysis::{Analysis, Question};
 pub use state::IdentifiabilityView;

@@ -1,18 +1,29 @@
 use std::sync::Arc;
 
+use decoupler_core::live::ZeroGains;
+use decoupler_files::{
+    export::format_number,
+    figure::{
+        HeatMap, SequentialMap, readings_figure,
+        surface::{Quantity, Surface, SurfaceFigure},
+        zero_gains_figure,
+    },
+};
 use eframe::egui::{Align, Layout, Rect, RichText, Ui, Vec2};
+use ndarray::Array2;
 
-use super::{LiveView, engine::LiveFrame};
+use super::{
+    LiveView,
+    engine::{LiveFrame, SourcePlan, Watched},
+    source_form::SourceKind,
+};
 use crate::window::{
+    plotting::cells_ui,
     shared::{Effect, Look, Shared, colour_scale_ui, follow_surface, view_mode_ui},
     surface_view::{ColourBar, SurfaceView},
     test_view::{Frame, HeightScale},
     theme::{Theme, semibold, space, type_size},
-    widgets::card_ui,
-};
-use decoupler_files::{
-    export::format_number,
-    figure::surface::{Quantity, Surface, SurfaceFigure},
+    widgets::{card_ui, ghost_button, primary_button, segmented_ui},
 };
 
 /// The decoupled surface, the actual one next to it where it is known, and the scale of their colours.
@@ -105,4 +116,205 @@ fn surface_ui(
         }
         ui.label(RichText::new(text).size(type_size().note));
     });
+}
+
+/// End of the colours of the readings: it follows the largest drop, in round steps and slowly downwards, so that colours
+/// mean the same for a while.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct DropScale {
+    peak_percent: f64,
+    watched: Option<Watched>,
+}
+
+/// Smallest end of the colours, in percent.
+const MIN_PERCENT: f64 = 0.5;
+/// Remainder of the peak after a frame.
+const DECAY: f64 = 0.999;
+
+impl DropScale {
+    /// Takes a frame; wires at fault do not count.
+    pub fn take(&mut self, frame: &LiveFrame) {
+        let wire = match &frame.watched {
+            Watched::Named(diagnosis) => Some(diagnosis.wire),
+            Watched::Off(_) | Watched::Sound | Watched::Unexplained => None,
+        };
+        let is_sound = |row: usize, column: usize| {
+            wire.is_none_or(|wire| !wire.is_row(frame.rows[row]) && !wire.columns().contains(&Some(column)))
+        };
+        let drops = frame.drops_percent.indexed_iter();
+        let drops = drops.filter(|((row, column), drop)| is_sound(*row, *column) && drop.is_finite());
+        let largest = drops.map(|(_, &drop)| drop).fold(0.0, f64::max);
+        if self.watched.as_ref() != Some(&frame.watched) {
+            // What a fault has made of the scale is forgotten.
+            self.watched = Some(frame.watched.clone());
+            self.peak_percent = 0.0;
+        }
+        self.peak_percent = largest.max(DECAY * self.peak_percent);
+    }
+
+    /// The end of the colours in percent: 1, 2 or 5 times a power of ten.
+    pub fn largest_percent(&self) -> f64 {
+        let peak = self.peak_percent.max(MIN_PERCENT);
+        let decade = 10_f64.powf(peak.log10().floor());
+        let steps = [1.0, 2.0, 5.0].map(|step| step * decade);
+        steps
+            .into_iter()
+            .find(|step| *step >= peak * (1.0 - 1e-9))
+            .unwrap_or(10.0 * decade)
+    }
+}
+
+/// The text of an empty view, and the one click that fills it.
+pub fn invitation_ui(ui: &mut Ui, view: &mut LiveView, shared: &Shared, effects: &mut Vec<Effect>) {
+    let palette = Theme::of(ui).palette;
+    ui.vertical_centered(|ui| {
+        ui.add_space((0.5 * ui.available_height() - space(20)).max(0.0));
+        ui.set_max_width(ui.available_width().min(space(105)));
+        let (heading, text) = words(view, shared);
+        ui.label(RichText::new(heading).font(semibold(type_size().title)));
+        ui.add_space(space(1));
+        ui.label(RichText::new(text).color(palette.dim));
+        ui.add_space(space(4));
+        if view.running.is_some() {
+            return;
+        }
+        if view.network.network(&shared.runs).is_none() {
+            let is_free = !shared.phase.is_busy();
+            if is_free && ui.add(primary_button("Train a network now")).clicked() {
+                effects.extend([Effect::ShowTraining, Effect::Train]);
+            }
+        } else if view.source.kind == SourceKind::Simulated && view.has_sensor(shared) {
+            if ui.add(primary_button("Start the simulated source")).clicked() {
+                view.start(shared, effects);
+            }
+        } else if view.obstacle(shared).is_none() && ui.add(primary_button("Start this source")).clicked() {
+            view.start(shared, effects);
+        }
+        ui.add_space(space(2));
+        let hint = "Four seconds of a ball that wanders over a simulated array, with a network that decodes them.";
+        let sample = ui.add(ghost_button("Play the sample recording"));
+        if sample.on_hover_text(hint).clicked() {
+            view.ask_for_sample(shared);
+        }
+    });
+}
+
+fn words(view: &LiveView, shared: &Shared) -> (String, String) {
+    let (counts, network) = (&view.shown.counts, view.network.network(&shared.runs));
+    if let Some(running) = &view.running {
+        let source = match &running.source {
+            SourcePlan::Simulated { .. } => "the simulated source".to_owned(),
+            SourcePlan::Replay { path, .. } => format!("'{}'", path.display()),
+            SourcePlan::Stream(source) => source.to_string(),
+        };
+        let text = match &counts.last_bad {
+            Some(reason) => format!("Lines that are no frame: {}. The last: {reason}.", counts.bad),
+            None => "It appears here as soon as it comes.".to_owned(),
+        };
+        return (format!("Waiting for the first frame from {source}"), text);
+    }
+    let Some((name, _)) = network else {
+        let text = if shared.phase.is_busy() {
+            "Live decoding needs a trained network. One is being trained in the Train view: it can be used here as soon \
+             as it is finished."
+        } else {
+            "Live decoding needs a trained network. Train one with the settings of the Train view, which takes from \
+             seconds to minutes, or open a network file."
+        };
+        return ("No network yet".to_owned(), text.to_owned());
+    };
+    let text = match view.source.kind {
+        SourceKind::Simulated if view.has_sensor(shared) => format!(
+            "An indenter wanders over a simulated array and the network '{name}' decodes its readings, without any \
+             hardware. To decode your own, choose a replay, a serial port or a TCP address on the left."
+        ),
+        _ => match view.obstacle(shared) {
+            Some(obstacle) => obstacle,
+            None if view.has_sensor(shared) => format!("The network '{name}' decodes its frames as they come."),
+            None => format!("The network '{name}' decodes its samples as they come, by the names of their columns."),
+        },
+    };
+    ("Decode live readings".to_owned(), text)
+}
+
+/// Readings of the frame as a map of rows and columns, or the gains of the unloaded state.
+pub fn readings_ui(ui: &mut Ui, view: &mut LiveView, colours: SequentialMap) {
+    let Some(frame) = &view.shown.frame else { return };
+    let gains = view.zero.as_ref().and_then(|zero| gains_of(zero, frame));
+    ui.horizontal(|ui| {
+        ui.set_min_height(space(7));
+        ui.label(RichText::new("Readings").font(semibold(type_size().title)));
+        ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
+            if gains.is_some() {
+                let options = [(false, "Frame"), (true, "Zero")];
+                let picked = segmented_ui(ui, "Displayed readings", &options, view.shows_zero, false);
+                view.shows_zero = picked.unwrap_or(view.shows_zero);
+            }
+        });
+    });
+    let (label, map) = match &gains {
+        Some(gains) if view.shows_zero => ("Gains of the unloaded state", zero_gains_figure(gains, &frame.rows)),
+        _ => ("Live readings", figure_of(frame, view.drops.largest_percent())),
+    };
+    let map = map.coloured(colours);
+    let (rows, columns) = marked(frame);
+    let warning = Theme::of(ui).palette.warning;
+    let Some(([row, column], cell)) = cells_ui(ui, label, &map, (&rows, &columns, warning)) else {
+        return;
+    };
+    let value = format_number(map.values[[row, column]]);
+    let text = if gains.is_some() && view.shows_zero {
+        format!("gain − 1: {value} %")
+    } else {
+        format!("drop from unloaded: {value} %")
+    };
+    let row = frame.rows.get(row).map_or(0, |row| row + 1);
+    cell.on_hover_text_at_pointer(format!("Row-wire {row}, column-wire {}\n{text}", column + 1));
+}
+
+/// The map of the readings of a frame.
+pub fn figure_of(frame: &LiveFrame, largest_percent: f64) -> HeatMap {
+    readings_figure(frame.drops_percent.clone(), &frame.rows, largest_percent)
+}
+
+/// Gains in the shape of the frame.
+fn gains_of(zero: &ZeroGains, frame: &LiveFrame) -> Option<Array2<f64>> {
+    Array2::from_shape_vec(frame.drops_percent.dim(), zero.gains.clone()).ok()
+}
+
+/// Places of the rows and columns whose wires are at fault.
+fn marked(frame: &LiveFrame) -> (Vec<usize>, Vec<usize>) {
+    let Watched::Named(diagnosis) = &frame.watched else {
+        return (Vec::new(), Vec::new());
+    };
+    let rows = frame.rows.iter().enumerate();
+    let rows = rows
+        .filter(|(_, row)| diagnosis.wire.is_row(**row))
+        .map(|(place, _)| place);
+    let columns = diagnosis.wire.columns().into_iter().flatten();
+    (rows.collect(), columns.collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_scale_ends_at_round_numbers() {
+        for (peak_percent, expected) in [
+            (0.0, 0.5),
+            (0.6, 1.0),
+            (1.0, 1.0),
+            (1.3, 2.0),
+            (4.9, 5.0),
+            (73.0, 100.0),
+        ] {
+            let scale = DropScale {
+                peak_percent,
+                watched: None,
+            };
+            let found = scale.largest_percent();
+            assert!((found / expected - 1.0).abs() < 1e-9, "{peak_percent}: {found}");
+        }
+    }
 }

@@ -5,18 +5,10 @@
 //! files show the form on the left and the cards in the middle.
 
 mod cards;
-mod drop_scale;
 mod engine;
-mod exports;
 mod fault_form;
 mod figures_card;
 mod files;
-mod form;
-mod invitation;
-mod network_choice;
-mod readings_card;
-mod replay_bar;
-mod sample;
 mod source_form;
 mod state;
 mod targets_card;

@@ -1,24 +1,33 @@
 use std::{
     path::PathBuf,
-    sync::mpsc::{Receiver, channel},
+    sync::{
+        Arc,
+        mpsc::{Receiver, channel},
+    },
 };
 
-use eframe::egui::{TextEdit, Ui, vec2};
+use decoupler_core::{
+    evaluation::SimulatedSettings,
+    live::{Motion, Source},
+    scene::{Fault, Rows},
+};
+use decoupler_files::export::{NetworkFile, format_percent};
+use eframe::egui::{ComboBox, TextEdit, Ui, vec2};
 
-use super::{engine::SourcePlan, files::LiveFile};
+use super::{
+    LiveView,
+    engine::{Command, SourcePlan},
+    files::LiveFile,
+};
 use crate::window::{
-    shared::Effect,
+    job::{Job, Wake},
+    shared::{Effect, RunList, Shared},
     theme::space,
     widgets::{
         dim_ui,
         fields::{count_ui, quantity_ui},
-        ghost_button, segmented_ui,
+        ghost_button, note_ui, scrolled_ui, section_heading_ui, segmented_ui,
     },
-};
-use decoupler_core::{
-    evaluation::SimulatedSettings,
-    live::{Motion, Source},
-    scene::Fault,
 };
 
 /// The source of the frames, as the user sets it up.
@@ -251,4 +260,195 @@ fn text_ui(ui: &mut Ui, name: &str, hint: &str, text: &mut String) {
         .desired_width(f32::INFINITY)
         .margin(vec2(space(2), space(1)));
     ui.add(edit).labelled_by(label.id).on_hover_text(hint);
+}
+
+/// Network, source and fault.
+pub fn form_ui(ui: &mut Ui, view: &mut LiveView, shared: &Shared, effects: &mut Vec<Effect>) {
+    scrolled_ui(ui, "live form", |ui| {
+        section_heading_ui(ui, "Network");
+        let is_another = view.network.form_ui(ui, &shared.runs, effects);
+        if is_another && view.running.is_some() {
+            view.start_again(shared);
+        }
+        section_heading_ui(ui, "Source");
+        let network = view.network.network(&shared.runs).map(|(_, file)| file.clone());
+        let settings = network.as_ref().and_then(|file| file.settings.simulated());
+        let motion = view.source.motion;
+        let has_sensor = view.has_sensor(shared);
+        view.source
+            .form_ui(ui, (settings.as_ref(), has_sensor), view.running.is_some(), effects);
+        if view.source.motion != motion {
+            view.command(Command::Move(view.source.motion));
+        }
+        if let (SourceKind::Simulated, Some(settings)) = (view.source.kind, settings) {
+            let scale = settings.source.sensor.scale;
+            let read = settings.source.scene.rows.read(scale.rows()).unwrap_or_default();
+            let fault = |view: &LiveView| {
+                let is_possible = view.fault.problem(scale, &read).is_none();
+                view.fault.fault(scale).filter(|_| is_possible)
+            };
+            let before = fault(view);
+            view.fault.form_ui(ui, scale, &read);
+            let after = fault(view);
+            if after != before {
+                view.command(Command::Break(after));
+            }
+        }
+        if let (Some(obstacle), true) = (view.obstacle(shared), network.is_some()) {
+            ui.add_space(space(1));
+            note_ui(ui, &obstacle);
+        }
+        ui.add_space(space(4));
+    });
+}
+
+/// The network that decodes.
+#[derive(Debug)]
+pub struct NetworkChoice {
+    pick: NetworkPick,
+    file: Option<(String, Arc<NetworkFile>)>,
+    problem: Option<String>,
+    chosen: Option<Receiver<PathBuf>>,
+    loading: Job<Result<(PathBuf, Box<NetworkFile>), String>>,
+}
+
+/// Place of the network.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum NetworkPick {
+    /// The newest run of the list.
+    Newest,
+    /// The run with this number.
+    Run(u64),
+    /// The file that was opened.
+    File,
+}
+
+impl NetworkChoice {
+    /// The newest run.
+    pub fn new(wake: Wake) -> Self {
+        Self {
+            pick: NetworkPick::Newest,
+            file: None,
+            problem: None,
+            chosen: None,
+            loading: Job::prompt("network file", wake),
+        }
+    }
+
+    /// The network chosen and its name; `None` if there is none.
+    pub fn network<'a>(&'a self, runs: &'a RunList) -> Option<(&'a str, &'a Arc<NetworkFile>)> {
+        let run = match self.pick {
+            NetworkPick::File => {
+                let (name, file) = self.file.as_ref()?;
+                return Some((name, file));
+            }
+            NetworkPick::Run(id) => runs.run(id),
+            NetworkPick::Newest => None,
+        };
+        // A run that was removed gives way to the newest.
+        let run = run.or(runs.workspace.runs.last())?;
+        Some((&run.name, &run.file))
+    }
+
+    /// Decodes with this network, which is of no run.
+    pub fn take(&mut self, name: &str, file: Arc<NetworkFile>) {
+        self.problem = None;
+        self.file = Some((name.to_owned(), file));
+        self.pick = NetworkPick::File;
+    }
+
+    /// Takes the file that the user has opened; returns `true` once its network is there.
+    pub fn take_events(&mut self) -> bool {
+        if let Some(path) = self.chosen.as_ref().and_then(|chosen| chosen.try_recv().ok()) {
+            self.chosen = None;
+            self.loading.start(
+                move |_| {
+                    let file = NetworkFile::load(&path).map_err(|error| error.to_string())?;
+                    Ok((path, Box::new(file)))
+                },
+                |loaded| loaded.unwrap_or_else(|error| Err(error.to_string())),
+            );
+        }
+        match self.loading.next_event() {
+            Some(Ok((path, file))) => {
+                let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy();
+                self.take(&name, Arc::from(file));
+                true
+            }
+            Some(Err(reason)) => {
+                self.problem = Some(reason);
+                false
+            }
+            None => false,
+        }
+    }
+
+    /// Shows the list of networks; returns `true` if another one is chosen.
+    pub fn form_ui(&mut self, ui: &mut Ui, runs: &RunList, effects: &mut Vec<Effect>) -> bool {
+        let before = self.pick;
+        let newest = runs.workspace.runs.last();
+        let newest = newest.map_or_else(|| "no run yet".to_owned(), |run| format!("Newest run: {}", run.name));
+        let file = self.file.as_ref().map(|(name, _)| format!("File: {name}"));
+        let shown = match (self.pick, self.network(runs)) {
+            (NetworkPick::Run(id), Some((name, _))) if runs.run(id).is_some() => name.to_owned(),
+            (NetworkPick::File, _) => file.clone().unwrap_or_default(),
+            _ => newest.clone(),
+        };
+        let width = ui.available_width();
+        let label = ui.label("Decode with");
+        let combo = ComboBox::from_id_salt("live network")
+            .selected_text(shown)
+            .width(width)
+            .truncate();
+        let combo = combo.show_ui(ui, |ui| {
+            ui.selectable_value(&mut self.pick, NetworkPick::Newest, newest);
+            for run in runs.workspace.runs.iter().rev() {
+                ui.selectable_value(&mut self.pick, NetworkPick::Run(run.id), &run.name);
+            }
+            if let Some(file) = file {
+                ui.selectable_value(&mut self.pick, NetworkPick::File, file);
+            }
+        });
+        let hint = "The network that decodes the frames: a finished run, or a network file. A replay is decoded again as \
+                    soon as another one is chosen.";
+        combo.response.labelled_by(label.id).on_hover_text(hint);
+        if let Some((_, network)) = self.network(runs) {
+            let (array, error) = in_words(network);
+            dim_ui(ui, &array);
+            dim_ui(ui, &error);
+        }
+        ui.add_space(space(1));
+        let file = LiveFile::Network;
+        let button = ui.add(ghost_button(file.button()));
+        if button.on_hover_text(file.words().description).clicked() {
+            let (send, chosen) = channel();
+            self.chosen = Some(chosen);
+            effects.push(Effect::ChooseFile(file.choose(send)));
+        }
+        if let Some(problem) = &self.problem {
+            note_ui(ui, problem);
+        }
+        self.pick != before
+    }
+}
+
+/// Array and rows of a network, and its error, each in a line.
+fn in_words(file: &NetworkFile) -> (String, String) {
+    let rows = file
+        .settings
+        .simulated()
+        .map(|settings| match settings.source.scene.rows {
+            Rows::All => ", all rows".to_owned(),
+            Rows::Known => ", known rows".to_owned(),
+            Rows::One(row) => format!(", row {} alone", row + 1),
+        });
+    let source = format!(
+        "{}, {} hidden{}",
+        file.source_name(),
+        file.settings.hidden,
+        rows.unwrap_or_default()
+    );
+    let error = format_percent(file.scores.network.percent());
+    let name = if file.problem.has_nodes { "Z error" } else { "Error" };
+    (source, format!("{name} on its test set {error}"))
 }

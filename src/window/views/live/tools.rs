@@ -1,11 +1,24 @@
-use eframe::egui::{Button, Key, Modifiers, Ui};
+use std::sync::Arc;
 
-use super::{LiveView, engine::Command};
+use decoupler_core::evaluation::Channel;
+use decoupler_files::{
+    export::{Cell, Table, TableColumn},
+    figure::Figure,
+};
+use eframe::egui::{Align, Button, Key, Label, Layout, Modifiers, RichText, Slider, Ui, WidgetInfo};
+
+use super::{
+    LiveView,
+    cards::{figure_of, surface_figure},
+    engine::{Command, LiveTargets},
+    files::{save_recording, save_zero},
+    targets_card,
+};
 use crate::window::{
     glossary,
-    shared::{Effect, Offers, Shared},
-    theme::{Theme, space},
-    widgets::{ghost_button, primary_button, with_shortcut},
+    shared::{Ask, Effect, Export, ExportGroup, FileTask, FileWords, Offers, Shared, csv_export, picture_exports},
+    theme::{Theme, space, type_size},
+    widgets::{dim_ui, ghost_button, primary_button, slider_ui, with_shortcut},
 };
 
 /// The buttons that run the source, from right to left.
@@ -94,5 +107,143 @@ pub fn offer_actions(view: &mut LiveView, offers: &mut Offers<'_>, shared: &Shar
     let is_pressed = offers.offer_keys("Pause or resume replay", Modifiers::COMMAND, Key::P, replay.is_some());
     if let Some(replay) = replay.filter(|_| is_pressed) {
         view.command(Command::Play(!replay.is_playing));
+    }
+}
+
+/// Height of the bar, in points.
+pub const REPLAY_BAR_HEIGHT: f32 = space(12);
+
+/// The place in the recording, and the speed.
+pub fn replay_bar_ui(ui: &mut Ui, view: &mut LiveView) {
+    let Some(replay) = view.shown.replay else { return };
+    let is_running = view.running.is_some();
+    ui.add_enabled_ui(is_running, |ui| {
+        ui.with_layout(Layout::left_to_right(Align::Center), |ui| {
+            let text = if replay.is_playing { "⏸ Pause" } else { "▶ Play" };
+            let play = ui.add(ghost_button(text).min_size([space(18), space(6)].into()));
+            if play
+                .on_hover_text(with_shortcut(ui, "Plays or pauses the recording", Key::P))
+                .clicked()
+            {
+                view.command(Command::Play(!replay.is_playing));
+            }
+            ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
+                speed_ui(ui, view);
+                ui.add_space(space(2));
+                let text = format!("{:.2} of {:.2} s", replay.at_s, replay.length_s);
+                ui.label(RichText::new(text).size(type_size().note));
+                let mut at_s = replay.at_s;
+                let slider = Slider::new(&mut at_s, 0.0..=replay.length_s.max(f64::MIN_POSITIVE));
+                let width = ui.available_width() - space(2);
+                let slider = slider_ui(ui, slider, width);
+                slider.widget_info(|| WidgetInfo::slider(is_running, replay.at_s, "Replay position"));
+                if slider.double_clicked() {
+                    view.command(Command::Seek(0.0));
+                } else if slider.changed() {
+                    view.command(Command::Seek(at_s));
+                }
+            });
+        });
+    });
+}
+
+fn speed_ui(ui: &mut Ui, view: &mut LiveView) {
+    let colour = Theme::of(ui).palette.text;
+    let text = format!("{:.1}×", view.source.speed);
+    ui.add_sized(
+        [space(8), space(6)],
+        Label::new(RichText::new(text).size(type_size().note).color(colour)),
+    );
+    let before = view.source.speed;
+    let slider = Slider::new(&mut view.source.speed, 0.1..=10.0).logarithmic(true);
+    let slider = slider_ui(ui, slider, space(24));
+    if slider.double_clicked() {
+        view.source.speed = 1.0;
+    }
+    slider.widget_info(|| WidgetInfo::slider(true, before, "Replay speed"));
+    slider.on_hover_text("Recorded seconds per second, from 0.1 to 10. A double click sets it to 1.");
+    if view.source.speed != before {
+        view.command(Command::Speed(view.source.speed));
+    }
+    dim_ui(ui, "Speed");
+}
+
+/// The pictures of the latest frame, the recording and the unloaded state.
+pub fn live_exports<'a>(view: &'a LiveView, shared: &'a Shared) -> Vec<Export<'a>> {
+    if let Some(targets) = &view.shown.targets {
+        return target_exports(targets, shared);
+    }
+    let frame = view.shown.frame.as_ref();
+    let frame = frame.ok_or_else(|| "There is no frame yet: start a source.".to_owned());
+    let surfaces = frame
+        .clone()
+        .map(|frame| || Figure::from(surface_figure(frame, None, shared.look)));
+    let readings = frame
+        .map(|frame| || Figure::from(figure_of(frame, view.drops.largest_percent()).coloured(shared.look.colours)));
+    let recording = view.recorded.as_ref().map(save_recording);
+    let zero = view.zero.as_ref().map(save_zero);
+    let files = [
+        file_export(
+            "Recording",
+            "CSV",
+            recording,
+            "Nothing is recorded: press Record while a source runs.",
+        ),
+        file_export(
+            "Unloaded state",
+            "JSON",
+            zero,
+            "There is none: press Re-zero while a source runs.",
+        ),
+    ];
+    picture_exports("Surface", "live-surface".to_owned(), surfaces)
+        .chain(picture_exports("Readings", "live-readings".to_owned(), readings))
+        .chain(files)
+        .collect()
+}
+
+const VALUES: FileWords = FileWords {
+    kind: "decoded values",
+    description: "The displayed decoded values with their times, in full precision, as CSV.",
+    extensions: &["csv"],
+};
+
+/// The displayed values of a network of a recording.
+fn target_exports<'a>(targets: &'a LiveTargets, shared: &'a Shared) -> Vec<Export<'a>> {
+    let chart = Ok(move || Figure::from(targets_card::chart(targets)));
+    let mut exports: Vec<Export<'a>> = picture_exports("Decoded values", "live-values".to_owned(), chart).collect();
+    if let Some(figure) = targets_card::surface_figure(targets, None, shared.look) {
+        let surface = Ok(move || Figure::from(figure.clone()));
+        exports.extend(picture_exports("Surface", "live-surface".to_owned(), surface));
+    }
+    let values = Ok(move || values_table(targets));
+    exports.push(csv_export("Decoded values", VALUES, "live-values".to_owned(), values));
+    exports
+}
+
+fn values_table(targets: &LiveTargets) -> Table {
+    let names = targets.problem.targets.iter().map(Channel::title);
+    let row = |(time_s, values): &(f64, Arc<[f64]>)| {
+        let values = std::iter::once(time_s).chain(values.iter());
+        values.map(|&value| Cell::from(value)).collect()
+    };
+    Table {
+        columns: std::iter::once("time_s".to_owned())
+            .chain(names)
+            .map(TableColumn::field)
+            .collect(),
+        rows: targets.history.iter().map(row).collect(),
+    }
+}
+
+fn file_export(name: &str, form: &str, task: Option<FileTask>, reason: &str) -> Export<'static> {
+    Export {
+        group: ExportGroup::Tables,
+        name: name.to_owned(),
+        form: form.to_owned(),
+        description: task.as_ref().map_or("", |task| task.words.description),
+        ask: task
+            .map(|task| -> Ask<'static> { Box::new(move || Effect::ChooseFile(task)) })
+            .ok_or_else(|| reason.to_owned()),
     }
 }

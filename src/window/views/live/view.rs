@@ -2,16 +2,12 @@ use eframe::egui::{RichText, Sense, Ui};
 
 use super::{
     LiveView,
-    cards::surfaces_ui,
+    cards::{invitation_ui, readings_ui, surfaces_ui},
     engine::{SourcePlan, Watched},
-    exports::live_exports,
     figures_card::figures_ui,
-    form,
-    invitation::invitation_ui,
-    readings_card::readings_ui,
-    replay_bar::{REPLAY_BAR_HEIGHT, replay_bar_ui},
+    source_form,
     targets_card::targets_ui,
-    tools,
+    tools::{self, REPLAY_BAR_HEIGHT, live_exports, replay_bar_ui},
 };
 use crate::window::{
     shared::{Effect, Export, FileInUse, Offers, Shared, View},
@@ -60,7 +56,7 @@ impl View for LiveView {
     }
 
     fn form_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) {
-        form::form_ui(ui, self, shared, effects);
+        source_form::form_ui(ui, self, shared, effects);
     }
 
     fn body_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) {

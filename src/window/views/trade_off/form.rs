@@ -4,7 +4,7 @@ use thiserror::Error;
 
 use super::{
     TradeOffPlan,
-    plan::{PlannedLevel, PlannedRun},
+    state::{PlannedLevel, PlannedRun},
 };
 use decoupler_core::{
     dataset::LARGEST_SAMPLES,

@@ -3,17 +3,12 @@
 
 mod chart;
 mod choices;
-mod exports;
 mod form;
-mod names;
 mod panel;
-mod plan;
 mod state;
-mod table;
 mod view;
 mod worker;
 
 pub use form::{Thoroughness, TradeOffForm, WhichPresets};
-pub use plan::{PlannedLevel, PlannedRun, TradeOffPlan};
 use state::PointWish;
-pub use state::{TradeOffEnding, TradeOffLook, TradeOffOutcome, TradeOffView};
+pub use state::{PlannedLevel, PlannedRun, TradeOffEnding, TradeOffLook, TradeOffOutcome, TradeOffPlan, TradeOffView};

@@ -1,6 +1,6 @@
 use eframe::egui::{Key, TextEdit, Ui, vec2};
 
-use super::{Thoroughness, TradeOffForm, TradeOffView, WhichPresets, names::noise_name};
+use super::{Thoroughness, TradeOffForm, TradeOffView, WhichPresets, chart::noise_name};
 use crate::window::{
     shared::{Effect, Shared, SourceKind},
     theme::space,

@@ -1,19 +1,30 @@
+//! Exports of a measurement.
+
 use std::time::Instant;
 
+use decoupler_core::text::counted;
+use decoupler_files::{
+    export::{format_duration, trade_off_points, trade_off_summary},
+    figure::{Figure, trade_off_figure},
+};
 use eframe::egui::{Align, ComboBox, Key, Layout, Modifiers, RichText, Sense, Ui};
 
 use super::{
-    PointWish, TradeOffEnding, TradeOffLook, TradeOffOutcome, TradeOffView, chart::charts_ui, choices::choices_ui,
-    exports::trade_off_exports, names::noise_name, panel, table::table_ui, worker::TradeOffEvent,
+    PointWish, TradeOffEnding, TradeOffLook, TradeOffOutcome, TradeOffView,
+    chart::{charts_ui, noise_name, table_ui},
+    choices::choices_ui,
+    panel,
+    worker::TradeOffEvent,
 };
 use crate::window::{
     plotting::legend_ui,
-    shared::{Effect, Export, Matter, Notice, Offers, Shared, SourceKind, Unfinished, View, sentence},
+    shared::{
+        Effect, Export, FileWords, Matter, Notice, Offers, Shared, SourceKind, Unfinished, View, copy_exports,
+        csv_export, picture_exports, sentence,
+    },
     theme::{Theme, semibold, space, type_size},
     widgets::{card_ui, dim_ui, invitation_ui, note_ui, placeholder_ui, scrolled_ui, segmented_ui, state_ui},
 };
-use decoupler_core::text::counted;
-use decoupler_files::{export::format_duration, figure::trade_off_figure};
 
 impl View for TradeOffView {
     fn name(&self) -> &'static str {
@@ -252,4 +263,35 @@ fn status_ui(ui: &mut Ui, trade: &TradeOffView) {
             ui.label(RichText::new(text).size(type_size().note).color(palette.dim));
         }
     });
+}
+
+const POINTS: FileWords = FileWords {
+    kind: "points",
+    description: "Every point, of an array at every noise level, with every digit, as CSV.",
+    extensions: &["csv"],
+};
+
+/// The charts and the table at the displayed noise level, and every point.
+pub(super) fn trade_off_exports(view: &TradeOffView) -> Vec<Export<'_>> {
+    let stem = || "trade_off".to_owned();
+    let outcome = view.outcome.as_ref().filter(|outcome| outcome.points().0 > 0);
+    let outcome = outcome.ok_or_else(|| "No point is measured yet: press Measure first.".to_owned());
+    let level = outcome.clone().and_then(|outcome| {
+        let level = outcome
+            .levels
+            .get(view.look.level)
+            .filter(|level| !level.points.is_empty());
+        level.ok_or_else(|| "No point is measured here yet.".to_owned())
+    });
+    let charts = level
+        .clone()
+        .map(|level| move || Figure::from(trade_off_figure(level, &view.look.limits)));
+    let mut exports: Vec<Export<'_>> = picture_exports("Charts", stem(), charts).collect();
+    let points = outcome.map(|outcome| || trade_off_points(&outcome.levels));
+    exports.push(csv_export("All points", POINTS, stem(), points));
+    exports.extend(copy_exports(
+        "Trade-off table",
+        level.map(|level| move || trade_off_summary(level)),
+    ));
+    exports
 }

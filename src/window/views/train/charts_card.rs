@@ -1,8 +1,7 @@
 use eframe::egui::{Key, Modifiers, Ui, UiBuilder};
 
 use super::{
-    bottom_tab::BottomTab,
-    chart::{Chart, chart},
+    chart::{BottomTab, Chart, chart},
     inspect::{Along, bar_nodes_ui, section_bar_ui, take_pointed},
     press::readings_ui,
     scrub::{self, scrub_bar_ui},

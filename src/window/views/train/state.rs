@@ -3,11 +3,11 @@ use std::sync::Arc;
 use ndarray::Array2;
 
 use super::{
-    bottom_tab::BottomTab,
+    chart::BottomTab,
     decoders::{DecoderMeasuring, DecodersState},
     drawn::{Drawn, Frames},
+    exports::PaperFigure,
     inspect::{Lighting, SectionChoice, TestPlace, drawn_nodes},
-    paper_figure::PaperFigure,
     press::PressState,
     recording::RecordingEditor,
     scrub::ScrubState,

@@ -1,26 +1,28 @@
+//! What takes the place of the surfaces where a recording has none: all displayed targets of the sample.
+
 use std::ops::RangeInclusive;
 
+use decoupler_files::{
+    export::format_number,
+    figure::surface::{Section, Surface, SurfaceFigure},
+};
 use eframe::egui::{Align, Layout, Rect, RichText, Ui, Vec2};
 use glam::DVec2;
 
 use super::{
-    bottom_tab::{BottomTab, has_target_surface},
+    chart::{BottomTab, all_targets_figure, has_target_surface},
     drawn::Frames,
-    inspect::{lit_nodes, target_of_node},
+    inspect::{lit_nodes, take_pointed_target, target_of_node, with_lit_targets},
     press::{Hand, Shown},
-    sample_card::sample_card_ui,
     state::TrainView,
 };
 use crate::window::{
-    shared::{Effect, Look, RightCard, Shared, SourceKind, colour_scale_ui, follow_surface, view_mode_ui},
+    plotting::{Pointer, legend_behind_ui, legend_ui, plots_ui},
+    shared::{Effect, Look, Phase, RightCard, Shared, SourceKind, colour_scale_ui, follow_surface, view_mode_ui},
     surface_view::{ColourBar, SurfaceView},
-    test_view::{HeightScale, TestView},
+    test_view::{HeightScale, Positions, TestView},
     theme::{Theme, semibold, space, type_size},
     widgets::{Landmark, card_ui, dim_ui, explained_options_ui, ghost_button, placeholder_ui, segmented_ui},
-};
-use decoupler_files::{
-    export::format_number,
-    figure::surface::{Section, Surface, SurfaceFigure},
 };
 
 /// Work of the pointer on the actual surface.
@@ -331,4 +333,38 @@ fn node_values_ui(ui: &mut Ui, frames: &Frames, words: &NodeWords, node: usize) 
         text += &format!(", {found} {decoupled}{unit}, error {error}{unit}");
     }
     ui.label(RichText::new(text).size(type_size().note));
+}
+
+/// All displayed targets of the sample, actual next to decoded.
+pub fn sample_card_ui(ui: &mut Ui, view: &mut TrainView, shared: &Shared) {
+    let Some(figure) = all_targets_figure(view, shared) else {
+        let text = match shared.phase {
+            Phase::Preparing => "The recording is being read; the first epoch follows.",
+            _ => "Press Train: the targets of each test sample appear here, actual next to decoded.",
+        };
+        placeholder_ui(ui, text);
+        return;
+    };
+    let figure = with_lit_targets(figure, view, shared);
+    let has_room = ui.horizontal(|ui| {
+        ui.set_min_height(space(7));
+        let title = format!("Test sample {}", view.snapshot + 1);
+        ui.label(RichText::new(title).font(semibold(type_size().title)));
+        legend_behind_ui(ui, &figure.keys)
+    });
+    if !has_room.inner {
+        legend_ui(ui, &figure.keys);
+    }
+    if let Some(Positions::NoSurface(reason)) = shared.recorded_test().map(|test| &test.positions) {
+        dim_ui(
+            ui,
+            &format!("No surface goes through the positions of the targets: {reason}."),
+        );
+    }
+    let lit = view.lights.node;
+    let drawn = plots_ui(ui, "all targets", &figure, Pointer::Moves);
+    take_pointed_target(view, &drawn, shared);
+    if view.lights.node != lit {
+        ui.request_repaint();
+    }
 }

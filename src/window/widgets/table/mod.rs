@@ -6,14 +6,12 @@
 
 mod row;
 mod show;
-mod sort;
 mod widths;
 
 use crate::window::theme::space;
 use decoupler_files::export;
 
-pub use row::{TableCell, TableRow};
-pub use sort::SortBy;
+pub use row::{SortBy, TableCell, TableRow};
 
 /// Height of a row of text.
 const ROW_HEIGHT: f32 = space(6);

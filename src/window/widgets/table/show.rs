@@ -11,7 +11,7 @@ use super::{
 };
 use crate::window::{
     theme::{Theme, radius, space, type_size},
-    widgets::{fold::focus_ring_ui, value_under::value_under},
+    widgets::{components::focus_ring_ui, fields::value_under},
 };
 
 /// Width of the strip of a scroll bar.

@@ -1,14 +1,17 @@
+use decoupler_core::text::counted;
+use decoupler_files::export::atomic_write;
 use eframe::egui::{Align, Label, Layout, RichText, Ui, vec2};
+use serde_json::Value;
 
 use super::{SweepFolder, state::OpenFolder, table::SweepTable};
 use crate::window::{
+    shared::{Contents, Effect, FileTask, FileWords},
     theme::{Theme, semibold, space, type_size},
     widgets::{
         ColumnWidth, SortBy, TableCell, TableClick, TableColumn, TableRow, TableView, dim_ui, ghost_button, note_ui,
-        placeholder_ui, progress_bar_ui,
+        placeholder_ui, progress_bar_ui, section_heading_ui,
     },
 };
-use decoupler_core::text::counted;
 
 /// Most problems that are spelled out.
 const MAX_PROBLEMS: usize = 3;
@@ -104,4 +107,53 @@ fn table_ui<'a>(ui: &mut Ui, table: &'a SweepTable, sort: &mut SortBy) {
     if let Some(TableClick::Sort(chosen)) = view.show(ui, order.len(), row) {
         *sort = chosen;
     }
+}
+
+/// The specification of a sweep.
+const SPECIFICATION: FileWords = FileWords {
+    kind: "specification",
+    description: "This sweep for the terminal, on one machine or many: decoupler sweep --spec FILE --out FOLDER trains it, \
+                  and --engine writes the job script of a cluster.",
+    extensions: &["json"],
+};
+
+/// The file of a specification.
+fn specification_task(specification: Value) -> FileTask {
+    let contents = Contents::new(move |path| {
+        atomic_write(path, |writer| {
+            serde_json::to_writer_pretty(&mut *writer, &specification)?;
+            writeln!(writer)
+        })
+    });
+    FileTask::save(SPECIFICATION, "sweep", contents)
+}
+
+/// Sweeps on other machines: saves the sweep of the form as a specification, opens a folder that is being filled.
+pub(in crate::window::views::experiments) fn folder_form_ui(
+    ui: &mut Ui,
+    folder: &SweepFolder,
+    specification: &Result<Value, String>,
+    effects: &mut Vec<Effect>,
+) {
+    section_heading_ui(ui, "On many machines");
+    dim_ui(
+        ui,
+        "The command decoupler sweep trains a specification on any number of machines and fills a folder, which is shown here.",
+    );
+    let refusal = specification.as_ref().err().map_or("", String::as_str);
+    ui.horizontal_wrapped(|ui| {
+        ui.spacing_mut().item_spacing.y = space(1);
+        let save = ui.add_enabled(refusal.is_empty(), ghost_button("Save specification…"));
+        let save = save
+            .on_hover_text(SPECIFICATION.description)
+            .on_disabled_hover_text(refusal);
+        if let (true, Ok(specification)) = (save.clicked(), specification) {
+            effects.push(Effect::ChooseFile(specification_task(specification.clone())));
+        }
+        let open = ui.add(ghost_button("Open sweep folder…"));
+        let open = open.on_hover_text("Shows the trials of a folder that decoupler sweep fills, as they finish.");
+        if open.clicked() {
+            effects.push(Effect::ChooseFile(folder.choose()));
+        }
+    });
 }

@@ -1,11 +1,8 @@
 //! A folder that `decoupler sweep` fills, on this machine or on others: its trials in a table that grows with it.
 
 mod card;
-mod form;
 mod state;
 mod table;
-mod watching;
 
-pub(super) use card::folder_card_ui;
-pub(super) use form::folder_form_ui;
+pub(super) use card::{folder_card_ui, folder_form_ui};
 pub(super) use state::{OpenFolder, SweepFolder};

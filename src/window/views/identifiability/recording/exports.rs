@@ -1,6 +1,6 @@
 //! Exports of the analysis and of the cross-validation of a recording.
 
-use super::{RecordingStudy, findings_card::shown_curve_figure, work::RecordingFindings};
+use super::{RecordingStudy, study::RecordingFindings, view::shown_curve_figure};
 use crate::window::shared::{Export, FileWords, copy_exports, csv_export, picture_exports};
 use decoupler_files::{
     export::{Cell, Table, TableColumn, error_table},

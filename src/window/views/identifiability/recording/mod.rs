@@ -1,12 +1,9 @@
 //! What the readings of a recording determine, measured by cross-validation on a thread of its own.
 
 mod exports;
-mod findings_card;
-mod folds_card;
 mod form;
 mod study;
 mod view;
-mod work;
 
 pub use exports::study_exports;
 pub use form::form_ui;

@@ -4,22 +4,15 @@
 //! [`LiveEvent`]s report it. A [`LiveShown`] goes to the window only once the one before has been drawn, so that nothing
 //! queues up and no frame is drawn for no one.
 
-mod counts;
 mod decoding;
 mod frame_source;
 mod live_loop;
 mod message;
-mod opening;
 mod recording_file;
 mod replay;
-mod replay_file;
 mod session;
-mod simulated;
-mod source_lines;
 mod stream;
 mod target_session;
-mod target_source;
-mod watch;
 
 pub use live_loop::run;
 pub use message::{Command, LiveEvent, LiveFrame, LivePlan, LiveShown, LiveTargets, Recorded, SourcePlan, Watched};

@@ -1,14 +1,14 @@
-use std::time::Instant;
+use std::time::{Duration, Instant};
+
+use decoupler_core::{evaluation::SimulatedSettings, live::Latencies};
 
 use super::{
-    counts::Tally,
     decoding::Decoding,
     frame_source::{FrameSource, Next},
     live_loop::LiveSession,
-    message::{Arrived, Command, LiveEvent, LiveFrame, LivePlan, LiveShown},
+    message::{Arrived, Command, Counts, LiveEvent, LiveFrame, LivePlan, LiveShown},
     recording_file::RecordingFile,
 };
-use decoupler_core::evaluation::SimulatedSettings;
 
 /// A source and what decodes and records its frames.
 #[derive(Debug)]
@@ -173,5 +173,139 @@ impl LiveSession for Session {
     fn show(&mut self) -> LiveShown {
         self.has_events = false;
         self.shown()
+    }
+}
+
+/// Counts frames, and the errors of their answers, over spans of about half a second.
+#[derive(Debug)]
+pub(super) struct Tally {
+    counts: Counts,
+    latencies: Latencies,
+    span: Span,
+    /// Mean error over the last whole span, in millimetres.
+    error_mm: Option<f64>,
+    /// When the last frame came, or counting began.
+    last: Instant,
+}
+
+#[derive(Debug)]
+struct Span {
+    begun: Instant,
+    frames: u32,
+    errors: u32,
+    error_sum_mm: f64,
+}
+
+/// Length of a span.
+const SPAN: Duration = Duration::from_millis(500);
+/// Time without a frame after which a source counts as silent.
+const SILENCE: Duration = Duration::from_secs(2);
+
+impl Tally {
+    pub(super) fn new(now: Instant) -> Self {
+        Self {
+            counts: Counts::default(),
+            latencies: Latencies::default(),
+            span: Span::new(now),
+            error_mm: None,
+            last: now,
+        }
+    }
+
+    /// Counts a frame that was decoded `now`, with its error in millimetres where that is known.
+    pub(super) fn good(&mut self, read_at: Instant, now: Instant, error_mm: Option<f64>) {
+        self.counts.decoded += 1;
+        self.counts.is_waiting = false;
+        self.latencies.add(now.saturating_duration_since(read_at));
+        self.last = now;
+        let span = &mut self.span;
+        span.frames += 1;
+        if let Some(error_mm) = error_mm {
+            span.errors += 1;
+            span.error_sum_mm += error_mm;
+        }
+        let length = now.saturating_duration_since(span.begun);
+        if length >= SPAN {
+            self.counts.frames_per_second = f64::from(span.frames) / length.as_secs_f64();
+            self.error_mm = (span.errors > 0).then(|| span.error_sum_mm / f64::from(span.errors));
+            *span = Span::new(now);
+        }
+    }
+
+    pub(super) fn bad(&mut self, reason: String) {
+        self.counts.bad += 1;
+        self.counts.last_bad = Some(reason);
+    }
+
+    /// Counts frames that newer ones overtook.
+    pub(super) fn dropped(&mut self, frames: u64) {
+        self.counts.dropped += frames;
+    }
+
+    /// Returns `true` once, when no frame has come for [`SILENCE`].
+    pub(super) fn falls_silent(&mut self, now: Instant) -> bool {
+        let is_silent = now.saturating_duration_since(self.last) >= SILENCE;
+        if is_silent && !self.counts.is_waiting {
+            self.counts.frames_per_second = 0.0;
+            self.span = Span::new(now);
+            self.counts.is_waiting = true;
+            return true;
+        }
+        false
+    }
+
+    /// Mean error of the answers shown recently, in millimetres.
+    pub(super) fn error_mm(&self) -> Option<f64> {
+        self.error_mm
+    }
+
+    pub(super) fn counts(&self) -> Counts {
+        let quantile = |share| self.latencies.quantile(share);
+        Counts {
+            latency: quantile(0.5).zip(quantile(0.99)).map(|(median, high)| [median, high]),
+            ..self.counts.clone()
+        }
+    }
+}
+
+impl Span {
+    fn new(begun: Instant) -> Self {
+        Self {
+            begun,
+            frames: 0,
+            errors: 0,
+            error_sum_mm: 0.0,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rate_and_error_are_those_of_the_last_half_second() {
+        let start = Instant::now();
+        let after = |millis| start + Duration::from_millis(millis);
+        let mut tally = Tally::new(start);
+        assert_eq!((tally.counts(), tally.error_mm()), (Counts::default(), None));
+        (1..=50).for_each(|k| tally.good(after(10 * k - 2), after(10 * k), Some(0.1)));
+        (51..=75).for_each(|k| tally.good(after(20 * k - 502), after(20 * k - 500), Some(0.3)));
+        let counts = tally.counts();
+        assert_eq!((counts.decoded, counts.frames_per_second), (75, 50.0));
+        assert!((tally.error_mm().unwrap() - 0.3).abs() < 1e-12);
+        let [median, high] = counts.latency.unwrap();
+        assert!(median == high && (2.0..2.1).contains(&(median.as_secs_f64() * 1e3)));
+    }
+
+    #[test]
+    fn silence_is_told_once_and_ends_with_a_frame() {
+        let start = Instant::now();
+        let mut tally = Tally::new(start);
+        assert!(!tally.falls_silent(start + Duration::from_secs(1)));
+        assert!(tally.falls_silent(start + SILENCE) && !tally.falls_silent(start + 2 * SILENCE));
+        let now = start + 2 * SILENCE;
+        tally.good(now, now, None);
+        assert!(!tally.counts().is_waiting && tally.falls_silent(now + SILENCE));
     }
 }

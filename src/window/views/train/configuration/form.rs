@@ -1,23 +1,27 @@
+//! The folded parts of the configuration, in a few words each.
+
+use decoupler_core::{
+    evaluation::{Measured, Outlook, Preset, RunSettings, SimulatedSettings, Simulation},
+    network::{InputChoice, Quantity, ScalingChoice},
+    scene::{Loading, Movement, RowModel, Rows, Scene},
+    sensor::Geometry,
+    text::counted,
+    training::TrainingSettings,
+};
 use eframe::egui::Ui;
 
 use super::{
-    choices::{array_choice_ui, hidden_choice_ui, workload_ui},
-    network_section::{array_inputs_ui, recording_inputs_ui},
-    preset_section::{applied, present, preset_section_ui},
-    scene_choice::scene_choice_ui,
-    scene_section::{outlook_notes_ui, samples_section_ui, scene_section_ui},
-    sensor_section::geometry_ui,
-    summaries,
+    scene_section::{
+        array_choice_ui, hidden_choice_ui, outlook_notes_ui, samples_section_ui, scene_choice_ui, scene_section_ui,
+        workload_ui,
+    },
+    sensor_section::{array_inputs_ui, geometry_ui, recording_inputs_ui},
 };
 use crate::window::{
     shared::{Effect, Phase, Shared, SourceKind, method_choice_ui, method_settings_ui, stopping_ui},
     theme::space,
-    views::train::{paper_figure::PaperFigure, recording::RecordingEditor},
-    widgets::{Landmark, explained_options_ui, fold_ui, ghost_button, scrolled_ui},
-};
-use decoupler_core::{
-    evaluation::{Measured, Outlook, RunSettings, SimulatedSettings},
-    scene::RowModel,
+    views::train::{exports::PaperFigure, recording::RecordingEditor},
+    widgets::{Landmark, explained_options_ui, fields::input_text, fold_ui, ghost_button, scrolled_ui},
 };
 
 /// The source and the settings of the next training. Returns the paper's figure that is to be shown, if the user picked
@@ -89,19 +93,19 @@ fn array_ui(ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) -> Option<P
         ui.add_space(space(2));
         ui.separator();
         outlook_notes_ui(ui, &draft, outlook(shared));
-        fold_ui(ui, "Scene", &summaries::of_scene(&draft), |ui| {
+        fold_ui(ui, "Scene", &of_scene(&draft), |ui| {
             scene_section_ui(ui, &mut draft, outlook(shared));
         });
         // How many samples are best depends on whether there is noise.
         if let Some(preset) = followed.filter(|_| draft.source.scene.noise != scene.noise) {
             draft = applied(preset, &draft);
         }
-        fold_ui(ui, "Samples", &summaries::of_samples(&draft), |ui| {
+        fold_ui(ui, "Samples", &of_samples(&draft), |ui| {
             samples_section_ui(ui, &mut draft);
         });
-        let geometry = summaries::of_geometry(&draft.source.sensor.geometry);
+        let geometry = of_geometry(&draft.source.sensor.geometry);
         fold_ui(ui, "Geometry", &geometry, |ui| geometry_ui(ui, &mut draft));
-        fold_ui(ui, "Network inputs", &summaries::of_inputs(&draft.inputs), |ui| {
+        fold_ui(ui, "Network inputs", &of_inputs(&draft.inputs), |ui| {
             array_inputs_ui(ui, &mut draft);
         });
     });
@@ -138,7 +142,7 @@ fn recording_ui(ui: &mut Ui, recording: &mut RecordingEditor, shared: &Shared, e
     ui.separator();
     ui.add_enabled_ui(!is_busy, |ui| {
         recording.folds_ui(ui, &mut settings, effects);
-        fold_ui(ui, "Network inputs", &summaries::of_inputs(&settings.inputs), |ui| {
+        fold_ui(ui, "Network inputs", &of_inputs(&settings.inputs), |ui| {
             let has_row_wires = recording.has_row_wires();
             recording_inputs_ui(ui, &mut settings, recording.channels(), has_row_wires);
         });
@@ -163,10 +167,10 @@ fn method_ui<S>(ui: &mut Ui, settings: &mut RunSettings<S>, phase: Phase) {
 /// The folded settings of the training.
 fn training_ui<S>(ui: &mut Ui, settings: &mut RunSettings<S>, phase: Phase) {
     ui.add_enabled_ui(!phase.is_busy() || phase == Phase::Paused, |ui| {
-        fold_ui(ui, "When to stop", &summaries::of_stopping(&settings.training), |ui| {
+        fold_ui(ui, "When to stop", &of_stopping(&settings.training), |ui| {
             stopping_ui(ui, &mut settings.training.stopping);
         });
-        fold_ui(ui, "Method settings", &summaries::of_method(settings), |ui| {
+        fold_ui(ui, "Method settings", &of_method(settings), |ui| {
             method_settings_ui(
                 ui,
                 &mut settings.training.method,
@@ -223,4 +227,122 @@ fn paper_section_ui(ui: &mut Ui) -> Option<PaperFigure> {
         });
     }
     picked
+}
+
+/// Shows the presets on which the settings are based; changes `draft`.
+pub fn preset_section_ui(ui: &mut Ui, draft: &mut SimulatedSettings) {
+    ui.add_space(space(2));
+    let options = [
+        (
+            Some(Preset::Paper),
+            "Paper",
+            "One network for all rows, resistances between −1 and 1, 1000 training samples.\n\nArray, axes, loading, \
+             noise, hidden nodes and seed stay as they are.",
+        ),
+        (
+            Some(Preset::Best),
+            "Best",
+            "A small network for each known row, whitened conductances, 5000 training samples, or 50 000 if the \
+             readings are noisy.\n\nChosen by measurement: of all and known rows, resistance, conductance and its \
+             logarithm, min-max and whitening, this has the lowest test error for the same hidden nodes.\n\nArray, \
+             axes, loading, noise, hidden nodes and seed stay as they are.",
+        ),
+    ];
+    if let Some(Some(picked)) = explained_options_ui(ui, "Preset", &options, present(draft), true) {
+        *draft = applied(picked, draft);
+    }
+}
+
+/// The preset that `draft` follows, if any.
+pub fn present(draft: &SimulatedSettings) -> Option<Preset> {
+    Preset::ALL.into_iter().find(|&preset| applied(preset, draft) == *draft)
+}
+
+/// `draft` with what `preset` decides: how readings are decoded and trained on, not what happens to the sensor.
+pub fn applied(preset: Preset, draft: &SimulatedSettings) -> SimulatedSettings {
+    let settings = preset.settings_in(draft.source.scene.noise);
+    SimulatedSettings {
+        source: Simulation {
+            sensor: draft.source.sensor,
+            scene: Scene {
+                rows: settings.source.scene.rows,
+                ..draft.source.scene
+            },
+            test_samples: draft.source.test_samples,
+            ..settings.source
+        },
+        hidden: draft.hidden,
+        starts: draft.starts,
+        seed: draft.seed,
+        ..settings
+    }
+}
+
+/// Loading, rows, axes and noise.
+pub(super) fn of_scene(draft: &SimulatedSettings) -> String {
+    let scene = &draft.source.scene;
+    let loading = match scene.loading {
+        Loading::RandomNodes => "random nodes".to_owned(),
+        Loading::SmoothField { .. } => "smooth field".to_owned(),
+        Loading::Indenter(indenter) => indenter.name().to_owned(),
+    };
+    let rows = match scene.rows {
+        Rows::All => "all rows".to_owned(),
+        Rows::Known => "known rows".to_owned(),
+        Rows::One(row) => format!("row {}", row + 1),
+    };
+    let axes = match scene.movement {
+        Movement::Z => "",
+        Movement::Xyz { .. } => ", x y z",
+    };
+    let noise = if scene.noise.is_none() { "" } else { ", noise" };
+    format!("{loading}, {rows}{axes}{noise}")
+}
+
+/// Numbers of training, validation and test samples, and the seed.
+pub(super) fn of_samples(draft: &SimulatedSettings) -> String {
+    let source = &draft.source;
+    format!(
+        "{} + {} + {}, seed {}",
+        source.samples, source.validation_samples, source.test_samples, draft.seed.0
+    )
+}
+
+/// Height, and whether anything else differs from what is assumed.
+pub(super) fn of_geometry(geometry: &Geometry) -> String {
+    let height = input_text(geometry.height_mm);
+    if *geometry == Geometry::default() {
+        format!("assumed, {height} mm high")
+    } else {
+        format!("yours, {height} mm high")
+    }
+}
+
+/// Quantity and scaling of the inputs.
+pub(super) fn of_inputs(inputs: &InputChoice) -> String {
+    let quantity = match inputs.quantity {
+        Quantity::Raw => "readings",
+        Quantity::Resistance => "resistance",
+        Quantity::Conductance => "conductance",
+        Quantity::LogResistance => "log-resistance",
+    };
+    let scaling = match inputs.scaling {
+        ScalingChoice::MinMax => "min-max",
+        ScalingChoice::Whitening => "whitening",
+    };
+    format!("{quantity}, {scaling}")
+}
+
+/// The rule that ends every training.
+pub(super) fn of_stopping(training: &TrainingSettings) -> String {
+    counted(training.stopping.epochs, "epoch")
+}
+
+/// The first of the method's own settings, and the number of starts.
+pub(super) fn of_method<S>(settings: &RunSettings<S>) -> String {
+    let mut method = settings.training.method;
+    let first = method.settings().into_iter().next();
+    let first = first.map(|setting| format!("{} {}, ", setting.name, input_text(*setting.value)));
+    let starts = counted(settings.starts, "start");
+    format!("{}{starts}", first.unwrap_or_default())
 }

@@ -1,21 +1,27 @@
-use eframe::egui::Ui;
-
-use super::noise_section::noise_ui;
-use crate::window::{
-    glossary,
-    widgets::{
-        dim_ui,
-        fields::{capitalised, count_ui, list_ui, options_ui, percent_ui, quantity_ui, seed_ui, usually},
-        note_ui,
-    },
-};
 use decoupler_core::{
     dataset::LARGEST_SAMPLES,
-    evaluation::{Outlook, SimulatedSettings},
-    scene::{Indenter, IndenterShape, Loading, Movement, Rows, Scene},
+    evaluation::{Outlook, SimulatedSettings, Workload},
+    network::{HiddenSuggestions, LARGEST_HIDDEN},
+    scene::{Indenter, IndenterShape, Loading, Movement, Noise, NoisySets, Rows, Scene},
+    sensor::ArrayScale,
     text::counted,
 };
-use decoupler_files::export::format_number;
+use decoupler_files::export::{describe_workload, format_number};
+use eframe::egui::{CollapsingHeader, RichText, Slider, Stroke, Ui};
+
+use crate::window::{
+    glossary,
+    shared::opening_settings,
+    theme::{Theme, space, type_size},
+    widgets::{
+        dim_ui, explained_options_ui,
+        fields::{
+            capitalised, count_ui, in_percent, input_text, list_ui, options_ui, percent_ui, quantity_ui, seed_ui,
+            usually,
+        },
+        focus_ring_ui, note_ui, segmented_ui, slider_ui, text_ui,
+    },
+};
 
 /// Shows rows, axes, loading and noise of the scene; changes `draft`. `outlook` is that of the scene, once
 /// it is known.
@@ -275,5 +281,210 @@ fn sideways_in_words(outlook: &Outlook) -> String {
             "Sideways shifts are hard to see: 1 mm of the worst-seen movement changes the readings by {change} %. \
              Noise above that hides it."
         )
+    }
+}
+
+/// The scenes that stand ready, one click each; changes `draft`. Everything else about a scene is folded beneath them.
+pub fn scene_choice_ui(ui: &mut Ui, draft: &mut SimulatedSettings) {
+    ui.add_space(space(1));
+    // Which rows share a network is the preset's.
+    let scene = &mut draft.source.scene;
+    let [print, paper] = [opening_settings().source.scene, Scene::default()].map(|ready| Scene {
+        rows: scene.rows,
+        ..ready
+    });
+    let options = [
+        (
+            print,
+            "Indenter's print",
+            "Each sample is the print of a ball of 2 to 6 mm radius, pressed somewhere onto the surface: what a touch \
+             looks like.",
+        ),
+        (paper, "Paper's scene", glossary::RANDOM_NODES.hint),
+    ];
+    if let Some(picked) = explained_options_ui(ui, "Ready scenes", &options, *scene, true) {
+        *scene = picked;
+    }
+}
+
+/// Shows the noise of the readings; changes `noise`. A line tells it where the settings are folded away.
+pub fn noise_ui(ui: &mut Ui, noise: &mut Noise) {
+    let shown = CollapsingHeader::new("Noise on resistance").show(ui, |ui| settings_ui(ui, noise));
+    focus_ring_ui(ui, &shown.header_response);
+    if shown.body_response.is_none() && !noise.is_none() {
+        let dim = Theme::of(ui).palette.dim;
+        ui.label(RichText::new(in_words(noise)).size(type_size().note).color(dim));
+    }
+}
+
+fn settings_ui(ui: &mut Ui, noise: &mut Noise) {
+    let hint = glossary::RELATIVE_NOISE.hint;
+    percent_ui(ui, "Relative noise", hint, &mut noise.relative, 0.0, 0.0..=100.0);
+    let hint = "Noise of each reading (standard deviation), in Ω.";
+    quantity_ui(
+        ui,
+        "Additive noise",
+        hint,
+        &mut noise.additive_ohm,
+        usually(0.0, 0.0..=1e12),
+        "Ω",
+    );
+    let mut bits = noise.converter_bits.map_or(0, usize::from);
+    let most = usize::from(Noise::MAX_BITS);
+    let hint = "Resolution of the analogue-to-digital converter, in bits; its range is 0 to twice the largest \
+                resistance at rest. 0 for no quantisation.";
+    count_ui(ui, "Converter bits", hint, &mut bits, usually(0, 0..=most));
+    noise.converter_bits = u8::try_from(bits).ok().filter(|&bits| bits > 0);
+    percent_ui(ui, "Drift", glossary::DRIFT.hint, &mut noise.drift, 0.0, 0.0..=100.0);
+    if !noise.is_none() {
+        let options = [
+            (
+                NoisySets::Both,
+                "Both",
+                "Training and test samples: the network learns to handle the noise.",
+            ),
+            (NoisySets::Training, "Training", "Training samples only."),
+            (
+                NoisySets::Test,
+                "Test",
+                "Test samples only: the network is trained on clean readings.",
+            ),
+        ];
+        let hint = "Samples to which noise is added. Validation samples are treated like training samples.";
+        if let Some(picked) = options_ui(ui, "Noise in", hint, &options, noise.sets) {
+            noise.sets = picked;
+        }
+    }
+}
+
+/// The noise in a line: `0.1 % relative, 12 bits, in test only`.
+fn in_words(noise: &Noise) -> String {
+    let percent = |share: f64| input_text(in_percent(share));
+    let sources = [
+        (noise.relative > 0.0).then(|| format!("{} % relative", percent(noise.relative))),
+        (noise.additive_ohm > 0.0).then(|| format!("{} Ω", input_text(noise.additive_ohm))),
+        noise.converter_bits.map(|bits| format!("{bits} bits")),
+        (noise.drift > 0.0).then(|| format!("{} % drift", percent(noise.drift))),
+        match noise.sets {
+            NoisySets::Both => None,
+            NoisySets::Training => Some("in training only".to_owned()),
+            NoisySets::Test => Some("in test only".to_owned()),
+        },
+    ];
+    sources.into_iter().flatten().collect::<Vec<_>>().join(", ")
+}
+
+/// The scale of the array: one of the paper's, or any other typed; changes `scale`.
+pub fn array_choice_ui(ui: &mut Ui, scale: &mut ArrayScale) {
+    text_ui(
+        ui,
+        "Array scale",
+        glossary::ARRAY_SCALE.hint,
+        scale,
+        ArrayScale::default(),
+    );
+    let names = ArrayScale::PRESETS.map(|scale| (scale, format!("{}×{}", scale.rows(), scale.nodes_per_row())));
+    let options: Vec<_> = names.iter().map(|(scale, name)| (*scale, name.as_str())).collect();
+    if let Some(picked) = segmented_ui(ui, "Array scale of the paper", &options, *scale, true) {
+        *scale = picked;
+    }
+    let dim = Theme::of(ui).palette.dim;
+    let text = format!(
+        "{} of {} over {} of {}",
+        counted(scale.rows(), "row-wire"),
+        counted(scale.nodes_per_row(), "node"),
+        counted(scale.columns(), "column-wire"),
+        counted(scale.nodes_per_column(), "node")
+    );
+    let wires = [glossary::ROW_WIRE, glossary::COLUMN_WIRE, glossary::NODE];
+    let wires = wires.map(|term| format!("{}: {}", term.name, term.hint)).join("\n\n");
+    ui.label(RichText::new(text).size(type_size().note).color(dim))
+        .on_hover_text(wires);
+    if let Some(note) = scale.note() {
+        note_ui(ui, &note);
+    }
+    ui.add_space(space(1));
+}
+
+/// The number of hidden nodes, with the rules of thumb for these numbers of inputs and outputs; changes `hidden`.
+pub fn hidden_choice_ui(ui: &mut Ui, hidden: &mut usize, channels: Option<(usize, usize)>) {
+    let usual = SimulatedSettings::default().hidden;
+    let limits = usually(usual, 1..=LARGEST_HIDDEN);
+    count_ui(ui, "Hidden nodes", glossary::HIDDEN_NODES.hint, hidden, limits);
+    let Some((n, m)) = channels else {
+        hidden_slider_ui(ui, hidden, &[]);
+        return;
+    };
+    let suggestions = HiddenSuggestions::new(n, m);
+    let (low, high) = (*suggestions.square_root.start(), *suggestions.square_root.end());
+    hidden_slider_ui(ui, hidden, &[suggestions.logarithm, low, high]);
+    let text = format!("Rules of thumb: {}, or {low} to {high}", suggestions.logarithm);
+    dim_ui(ui, &text).on_hover_text(format!(
+        "Rules of the paper for n = {n} inputs and m = {m} outputs: log₂ n (Eq. 13), or √(n + m) + a with a from 1 to 10 \
+         (Eq. 12). A starting point, not a limit."
+    ));
+}
+
+/// Memory and time of a training that takes much of either.
+pub fn workload_ui(ui: &mut Ui, draft: &SimulatedSettings) {
+    if let Ok(workload) = Workload::of(draft)
+        && workload.is_large()
+    {
+        let warning = Theme::of(ui).palette.warning;
+        let text = capitalised(&describe_workload(&workload));
+        ui.label(RichText::new(text).size(type_size().note).color(warning));
+    }
+}
+
+/// A slider for small networks, with small marks at the suggestions.
+fn hidden_slider_ui(ui: &mut Ui, hidden: &mut usize, suggestions: &[usize]) {
+    const MAX: usize = 64;
+    let slider = Slider::new(hidden, 1..=MAX).clamping(eframe::egui::SliderClamping::Never);
+    let width = ui.available_width();
+    let response = slider_ui(ui, slider, width);
+    if response.double_clicked() {
+        *hidden = SimulatedSettings::default().hidden;
+    }
+    let rail = response.rect.x_range().shrink(0.4 * response.rect.height());
+    let stroke = Stroke::new(1.5, Theme::of(ui).palette.warning);
+    for &suggestion in suggestions.iter().filter(|suggestion| **suggestion <= MAX) {
+        let share = (suggestion - 1) as f32 / (MAX - 1) as f32;
+        let (x, bottom) = (rail.min + share * rail.span(), response.rect.bottom() + space(1));
+        ui.painter().vline(x, bottom - space(1)..=bottom, stroke);
+    }
+    let value = *hidden as f64;
+    response.widget_info(|| eframe::egui::WidgetInfo::slider(true, value, "Hidden nodes slider"));
+    ui.add_space(space(1));
+}
+
+#[cfg(test)]
+mod tests {
+    use egui_kittest::{Harness, kittest::Queryable as _};
+
+    use super::*;
+
+    #[test]
+    fn noise_is_told_in_a_line() {
+        let noise = Noise {
+            relative: 0.07,
+            converter_bits: Some(12),
+            sets: NoisySets::Test,
+            ..Noise::default()
+        };
+        assert_eq!(in_words(&noise), "7 % relative, 12 bits, in test only");
+    }
+
+    #[test]
+    fn a_large_training_tells_its_memory_and_time_before_it_begins() {
+        for (hidden, is_told) in [(12, false), (512, true)] {
+            let mut draft = SimulatedSettings {
+                hidden,
+                ..SimulatedSettings::default()
+            };
+            draft.source.sensor.scale = "10x10_5x512".parse().unwrap();
+            let harness = Harness::new_ui(move |ui| workload_ui(ui, &draft));
+            let found = harness.query_by_label_contains("of memory");
+            assert_eq!(found.is_some(), is_told, "{hidden} hidden nodes");
+        }
     }
 }

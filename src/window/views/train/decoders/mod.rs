@@ -2,8 +2,7 @@
 //! user has unfolded their table, and shown as they come.
 
 mod measuring;
-mod state;
 mod table;
 
-pub use state::{DecoderResult, DecodersState};
-pub use {measuring::DecoderMeasuring, table::decoders_ui};
+pub use measuring::{DecoderMeasuring, DecoderResult, DecodersState};
+pub use table::decoders_ui;

@@ -1,6 +1,6 @@
 use std::sync::Arc;
 
-use super::{shown::Shown, subject::Subject};
+use super::{section::Shown, state::Subject};
 use crate::window::job::{Job, JobError, Report, Wake};
 use decoupler_core::{
     decoupling::{Decoder, DecoderKind, Precision},

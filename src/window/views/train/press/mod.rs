@@ -6,19 +6,9 @@
 //! `comparing` asks the other decoders in the background. The rest shows it.
 
 mod comparing;
-mod finger;
-mod outline;
 mod pointer;
-mod readings_card;
-mod ready;
 mod section;
-mod shown;
 mod state;
-mod subject;
-mod target;
 
-pub use finger::Hand;
-pub use readings_card::{readings_head_ui, readings_ui};
-pub use section::press_section_ui;
-pub use shown::Shown;
-pub use state::PressState;
+pub use section::{Shown, press_section_ui, readings_head_ui, readings_ui};
+pub use state::{Hand, PressState};

@@ -1,13 +1,22 @@
-use eframe::egui::{Context, Key, Modifiers, PointerButton, Pos2, Response};
+use std::sync::Arc;
+
+use decoupler_core::{
+    evaluation::{Run, RunError, SimulatedSettings, ready_settings},
+    network::Networks,
+    scene::{Contact, Print, Touch},
+};
+use decoupler_files::figure::surface::Ray;
+use eframe::egui::{Context, Key, Modifiers, Painter, PointerButton, Pos2, Response, Shape, Stroke, pos2};
 use glam::{DVec2, DVec3};
 
-use super::{
-    finger::{Hand, Tool},
-    state::PressState,
-    target::{Grip, Target},
+use super::state::{Grip, Hand, PressState, Subject, Target, Tool};
+use crate::window::{
+    job::{Job, JobError, Wake},
+    shared::Shared,
+    test_view::TestView,
+    theme::Palette,
+    views::train::drawn::Frames,
 };
-use crate::window::{test_view::TestView, views::train::drawn::Frames};
-use decoupler_core::scene::Touch;
 
 /// Deeper by a turn of the wheel of this many points: the whole stroke in about ten turns of a usual wheel.
 const SHARE_PER_POINT: f64 = 0.002;
@@ -198,4 +207,169 @@ fn of_frame(test: &TestView, frames: &Frames) -> Touch {
         print: None,
         nodes_mm: depths.collect(),
     }
+}
+
+/// Pieces of a circle.
+const PIECES: usize = 64;
+/// Length of a dash and of the gap behind it, in points.
+const DASH: [f32; 2] = [4.0, 3.0];
+
+impl PressState {
+    /// Draws where the finger touches the surface: around what is pressed, otherwise under the pointer.
+    pub fn outline_ui(&self, painter: &Painter, palette: &Palette, pointer: Option<Pos2>, stroke_mm: f64) {
+        let Some(target) = self.target.as_ref().filter(|_| self.hand == Hand::Press) else {
+            return;
+        };
+        let pressed = self.touch.as_ref().map(|touch| touch.print);
+        let hovered = || {
+            let at = pointer?;
+            let at = DVec2::new(f64::from(at.x), f64::from(at.y));
+            let met = target.surface.pick(&target.sight.ray(at))?;
+            self.finger.print(met.truncate(), stroke_mm)
+        };
+        let Some(print) = pressed.unwrap_or_else(hovered) else {
+            return;
+        };
+        let painter = painter.with_clip_rect(target.rect.intersect(painter.clip_rect()));
+        let lines = outline(target, &print);
+        for (width, colour) in [(3.5, palette.panel.gamma_multiply(0.7)), (1.5, palette.accent)] {
+            let stroke = Stroke::new(width, colour);
+            for line in &lines {
+                painter.add(Shape::line(line.clone(), stroke));
+            }
+            if let Some([foot, top]) = shaft(target, &print) {
+                painter.extend(Shape::dashed_line(&[foot, top], stroke, DASH[0], DASH[1]));
+            }
+        }
+    }
+}
+
+/// The rim of the contact on the surface, in pieces where the surface ends.
+fn outline(target: &Target, print: &Print) -> Vec<Vec<Pos2>> {
+    let middle = print.place_mm;
+    let grid = target.surface.map.grid();
+    let along_y = |x_mm: f64| -> Vec<DVec2> { grid.y_mm().iter().map(|&y_mm| DVec2::new(x_mm, y_mm)).collect() };
+    let lines = match print.indenter.contact(print.depth_mm) {
+        Contact::Disc { radius_mm } => {
+            let angle = |piece: usize| std::f64::consts::TAU * piece as f64 / PIECES as f64;
+            let circle = (0..=PIECES).map(|piece| middle + radius_mm * DVec2::from_angle(angle(piece)));
+            vec![circle.collect()]
+        }
+        Contact::Strip { half_width_mm } => [-1.0, 1.0].map(|side| along_y(middle.x + side * half_width_mm)).into(),
+        Contact::HalfPlane => vec![along_y(middle.x)],
+    };
+    let pieces = lines.into_iter().flat_map(|line: Vec<DVec2>| {
+        let seen: Vec<Option<Pos2>> = line.into_iter().map(|place| on_surface(target, place)).collect();
+        let pieces = seen.split(Option::is_none).filter(|piece| piece.len() > 1);
+        pieces
+            .map(|piece| piece.iter().copied().flatten().collect())
+            .collect::<Vec<Vec<Pos2>>>()
+    });
+    pieces.collect()
+}
+
+/// The finger itself: from the surface up to the top of the axes.
+fn shaft(target: &Target, print: &Print) -> Option<[Pos2; 2]> {
+    let foot = on_surface(target, print.place_mm)?;
+    let top = print.place_mm.extend(*target.surface.range.end());
+    let [over, under] = [top, top - DVec3::Z].map(|place| target.sight.point(place));
+    let top = to_egui(over);
+    // From above there is nothing of it to be seen.
+    (over.distance(under) > 1.0 && top.distance(foot) > DASH[0]).then_some([foot, top])
+}
+
+/// The point on the screen of the surface at a place; `None` where there is none.
+fn on_surface(target: &Target, place_mm: DVec2) -> Option<Pos2> {
+    let down = Ray {
+        from_mm: place_mm.extend(0.0),
+        direction: DVec3::NEG_Z,
+    };
+    Some(to_egui(target.sight.point(target.surface.pick(&down)?)))
+}
+
+fn to_egui(at: DVec2) -> Pos2 {
+    pos2(at.x as f32, at.y as f32)
+}
+
+/// Message of the thread to the window.
+type Trained = Result<Result<Option<Networks>, RunError>, JobError>;
+
+/// A small network for the sensor displayed, trained in the background in a moment once somebody is about to press and there
+/// is no other.
+#[derive(Debug)]
+pub struct ReadyNetwork {
+    job: Job<Trained>,
+    /// Settings of the network that is there or being trained.
+    of: Option<SimulatedSettings>,
+    networks: Option<Arc<Networks>>,
+    /// Reason why there is none.
+    pub(super) failure: Option<String>,
+}
+
+impl ReadyNetwork {
+    pub(super) fn new(wake: Wake) -> Self {
+        Self {
+            job: Job::prompt("ready network", wake),
+            of: None,
+            networks: None,
+            failure: None,
+        }
+    }
+
+    /// Takes the network once it is trained.
+    pub(super) fn take_events(&mut self) {
+        while let Some(trained) = self.job.next_event() {
+            match trained {
+                Ok(Ok(networks)) => self.networks = networks.map(Arc::new),
+                Ok(Err(error)) => self.failure = Some(error.to_string()),
+                Err(error) => self.failure = Some(error.to_string()),
+            }
+        }
+    }
+
+    /// Trains the network of the current test set, unless it is there or too large to be trained in a moment.
+    pub(super) fn ask(&mut self, shared: &Shared) {
+        let Some(settings) = settings_of(shared) else { return };
+        if self.of == Some(settings) {
+            return;
+        }
+        (self.of, self.networks, self.failure) = (Some(settings), None, None);
+        self.job.start(
+            move |report| {
+                let is_cancelled = || report.is_cancelled();
+                let Some(mut run) = Run::prepare_unless(settings, &is_cancelled)? else {
+                    return Ok(None);
+                };
+                while run.step().is_none() && !is_cancelled() {}
+                Ok(Some(run.network()))
+            },
+            |trained| trained,
+        );
+    }
+
+    /// Returns true while the network of the current test set is being trained.
+    pub(super) fn is_awaited(&self, shared: &Shared) -> bool {
+        self.of.is_some() && self.of == settings_of(shared) && self.job.is_under_way()
+    }
+
+    /// The network, if it is that of the current test set.
+    pub(super) fn subject(&self, shared: &Shared) -> Option<Subject> {
+        let settings = settings_of(shared).filter(|settings| self.of == Some(*settings))?;
+        Some(Subject {
+            networks: Arc::clone(self.networks.as_ref()?),
+            settings,
+            is_ready_made: true,
+            is_idle: true,
+        })
+    }
+}
+
+/// Settings of the ready-made network for the current test set; `None` where it would take long.
+fn settings_of(shared: &Shared) -> Option<SimulatedSettings> {
+    let settings = match (&shared.preview, &shared.run) {
+        (Some(preview), _) => preview.settings,
+        (None, Some(run)) => run.simulated()?,
+        (None, None) => return None,
+    };
+    ready_settings(&settings.source)
 }

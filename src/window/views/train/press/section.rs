@@ -1,28 +1,35 @@
-use std::time::Duration;
+use std::{sync::Arc, time::Duration};
 
-use eframe::egui::{Align, Layout, Response, Slider, Ui, Vec2, WidgetInfo};
+use decoupler_core::{
+    decoupling::{CompiledNetworks, DecoderKind, Precision},
+    evaluation::{Pressed, PressedAnswer},
+    network::Networks,
+    scene::Touch,
+    text::counted,
+};
+use decoupler_files::{
+    export::format_number,
+    figure::{HeatMap, SequentialMap, readings_figure},
+};
+use eframe::egui::{Align, Layout, Response, RichText, Slider, Ui, Vec2, WidgetInfo};
+use ndarray::Array2;
 
 use super::{
     comparing::Compared,
-    finger::{Finger, Tool},
-    shown::Shown,
-    state::PressState,
+    state::{Finger, PressState, Subject, Tool},
 };
 use crate::window::{
+    glossary,
+    plotting::cells_ui,
     shared::{Phase, Shared},
     test_view::TestView,
-    theme::{Theme, space},
+    theme::{Theme, semibold, space, type_size},
+    views::train::drawn::Frames,
     widgets::{
-        TableColumn, TableRow, TableView, dim_ui, explained_options_ui, note_ui, number_ui, refusal_ui,
+        TableColumn, TableRow, TableView, dim_ui, explained_options_ui, note_ui, number_ui, placeholder_ui, refusal_ui,
         section_heading_ui, slider_ui, usually,
     },
 };
-use decoupler_core::{
-    decoupling::{DecoderKind, Precision},
-    evaluation::PressedAnswer,
-    text::counted,
-};
-use decoupler_files::export::format_number;
 
 const TOOLS: [(Tool, &str, &str); 5] = [
     (Tool::Sphere, "Sphere", "Presses a ball onto the surface."),
@@ -269,4 +276,162 @@ impl PressState {
             "This array is too large for a network in a moment: press Train, and yours answers here."
         }
     }
+}
+
+/// A reading under the pointer.
+#[derive(Clone, Copy, Debug)]
+pub struct ReadingPointed {
+    /// Places of its row-wire among those read, and of its column-wire.
+    pub cell: [usize; 2],
+    /// True if it was clicked.
+    pub is_clicked: bool,
+}
+
+/// The head of the card of the readings.
+pub fn readings_head_ui(ui: &mut Ui, drops_percent: Option<&Array2<f64>>) {
+    ui.horizontal(|ui| {
+        ui.set_min_height(space(6));
+        ui.label(RichText::new("Readings").font(semibold(type_size().title)))
+            .on_hover_text(glossary::READING.hint);
+        if let Some(drops_percent) = drops_percent {
+            let (rows, columns) = drops_percent.dim();
+            let [rows, columns] =
+                [(rows, "row-wire"), (columns, "column-wire")].map(|(count, noun)| counted(count, noun));
+            dim_ui(ui, &format!("{rows} × {columns}"));
+        }
+    });
+}
+
+/// Readings of the displayed surface as a map of row-wires and column-wires, in `colours` and with one row pointed out;
+/// `drops_percent` are their drops below those at rest. Returns the one under the pointer.
+pub fn readings_ui(
+    ui: &mut Ui,
+    drops_percent: Option<&Array2<f64>>,
+    test: Option<&TestView>,
+    lit_row: Option<usize>,
+    colours: SequentialMap,
+) -> Option<ReadingPointed> {
+    let Some((drops_percent, test)) = drops_percent.zip(test) else {
+        placeholder_ui(ui, "The readings of the surface appear here.");
+        return None;
+    };
+    let map = readings_map(drops_percent, &test.rows).coloured(colours);
+    let marked = (lit_row.as_slice(), &[][..], Theme::of(ui).palette.text);
+    let ([row, column], cell) = cells_ui(ui, "Readings of the actual surface", &map, marked)?;
+    let is_clicked = cell.clicked();
+    let value = format_number(map.values[[row, column]]);
+    let wire = test.rows.get(row).map_or(0, |row| row + 1);
+    cell.on_hover_text_at_pointer(format!(
+        "Row-wire {wire}, column-wire {}\ndrop from unloaded: {value} %\n{}\nClick for the section along it.",
+        column + 1,
+        glossary::DROP.equation
+    ));
+    Some(ReadingPointed {
+        cell: [row, column],
+        is_clicked,
+    })
+}
+
+/// Colours from none to the largest drop, up to a round number so that they hold while the finger moves a little.
+fn readings_map(drops_percent: &Array2<f64>, rows: &[usize]) -> HeatMap {
+    /// The end of the colours of a sensor at rest.
+    const MIN_PERCENT: f64 = 0.01;
+    let largest = drops_percent.iter().copied().filter(|drop| drop.is_finite());
+    let largest = largest.fold(MIN_PERCENT, f64::max);
+    let decade = 10_f64.powf(largest.log10().floor());
+    let ends = [1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0].map(|end| end * decade);
+    let end = ends.into_iter().find(|end| *end >= largest).unwrap_or(10.0 * decade);
+    readings_figure(drops_percent.clone(), rows, end)
+}
+
+/// Everything that a touch and the network's answer depend on.
+#[derive(Clone, Debug)]
+pub(super) struct Question {
+    pub(super) touch: Touch,
+    pub(super) test: TestView,
+    pub(super) subject: Option<Subject>,
+}
+
+/// A touch with everything that is shown of it.
+#[derive(Clone, Debug)]
+pub struct Shown {
+    pub(super) question: Question,
+    /// The touched sensor.
+    pub(super) pressed: Arc<Pressed>,
+    /// Its surface, the network's, and their difference.
+    pub(super) frames: Frames,
+    /// Drops of its readings below those at rest, in percent: rows read × M4.
+    pub drops_percent: Option<Array2<f64>>,
+    /// The network's answer, if there is a network, or why it has none.
+    pub(super) answer: Option<Result<PressedAnswer, String>>,
+    /// Number of readings outside the range of the network's training.
+    pub(super) outside: usize,
+}
+
+impl Question {
+    /// Returns true if both ask the same.
+    pub(super) fn is(&self, other: &Self) -> bool {
+        let is_same_subject = match (&self.subject, &other.subject) {
+            (Some(one), Some(other)) => one.is(other),
+            (one, other) => one.is_none() && other.is_none(),
+        };
+        is_same_subject && self.is_of(&other.test) && self.touch == other.touch
+    }
+
+    /// Returns true if it is about this sensor, with its rows and its stroke: a training begins with another test set of the
+    /// same.
+    pub(super) fn is_of(&self, test: &TestView) -> bool {
+        let of = |test: &TestView| (test.sensor, test.stroke_mm);
+        of(&self.test) == of(test) && self.test.rows == test.rows
+    }
+
+    /// Returns true if the answer takes a few milliseconds at most.
+    pub(super) fn is_light(&self) -> bool {
+        /// About three milliseconds.
+        const MAX_PAIRS: f64 = 2e6;
+        /// Weights of the networks: as long.
+        const MAX_WEIGHTS: usize = 2_000_000;
+        let weights = self.subject.as_ref().map_or(0, |subject| subject.networks.weights());
+        Pressed::node_pairs(&self.test.sensor, &self.test.rows) <= MAX_PAIRS && weights <= MAX_WEIGHTS
+    }
+
+    /// Presses, reads and decodes.
+    pub(super) fn answer(self) -> Result<Shown, String> {
+        let test = &self.test;
+        let pressed = Pressed::new(&test.sensor, &test.rows, &self.touch, test.stroke_mm);
+        let pressed = pressed.map_err(|error| error.to_string())?;
+        let networks = self.subject.as_ref().map(|subject| &*subject.networks);
+        let answer = networks.map(|networks| {
+            let mut decoder = CompiledNetworks::<f64>::new(networks, test.rows.len());
+            let answer = pressed.answer(&mut decoder, &|| false);
+            let answer = answer.map_err(|error| error.to_string())?;
+            answer.ok_or_else(|| "it was not decoded".to_owned())
+        });
+        let actual = test.frame_of(pressed.nodes_mm());
+        let decoupled = answer.as_ref().and_then(|answer| answer.as_ref().ok()).map(|answer| {
+            let decoupled = test.frame_of(answer.nodes_mm());
+            let error = actual.error_of(&decoupled);
+            (decoupled, error)
+        });
+        Ok(Shown {
+            frames: Frames { actual, decoupled },
+            drops_percent: test.drops_percent(pressed.readings_ohm()),
+            outside: networks.map_or(0, |networks| outside(networks, pressed.readings_ohm())),
+            answer,
+            pressed: Arc::new(pressed),
+            question: self,
+        })
+    }
+}
+
+/// Number of readings outside the range that the networks were trained in.
+fn outside(networks: &Networks, readings_ohm: &Array2<f64>) -> usize {
+    let rows = readings_ohm.rows().into_iter().enumerate();
+    let of_row = rows.map(|(row_index, readings)| {
+        let inputs = networks.at(row_index).inputs();
+        let readings = readings.to_slice().expect("a row of a standard array is contiguous");
+        let range = inputs.range();
+        range.map_or(0, |range| range.outside(inputs.quantity(), readings).count())
+    });
+    of_row.sum()
 }

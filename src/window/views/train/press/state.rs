@@ -1,14 +1,18 @@
 use std::sync::Arc;
 
+use decoupler_core::{
+    evaluation::SimulatedSettings,
+    network::Networks,
+    scene::{Indenter, IndenterShape, Print, Span, Touch},
+};
+use decoupler_files::figure::surface::{Sight, Surface};
+use eframe::egui::{Id, Rect};
 use glam::DVec2;
 
 use super::{
     comparing::{Compared, Comparing},
-    finger::{Finger, Hand, Tool},
-    ready::ReadyNetwork,
-    shown::{Question, Shown},
-    subject::Subject,
-    target::{Grip, Target},
+    pointer::ReadyNetwork,
+    section::{Question, Shown},
 };
 use crate::window::{
     job::{Job, JobError, Wake},
@@ -17,8 +21,6 @@ use crate::window::{
     test_view::TestView,
     views::train::drawn::Frames,
 };
-use decoupler_core::scene::Touch;
-use decoupler_files::figure::surface::Surface;
 
 /// The touch, and everything known of it.
 #[derive(Debug)]
@@ -207,5 +209,143 @@ impl PressState {
             Ok(shown) => (self.shown, self.failed) = (Some(shown), None),
             Err(reason) => self.failed = Some((question.clone(), reason)),
         }
+    }
+}
+
+/// The network that answers the finger.
+#[derive(Clone, Debug)]
+pub struct Subject {
+    /// The network, or one for each row.
+    pub networks: Arc<Networks>,
+    /// Settings that it was trained with.
+    pub settings: SimulatedSettings,
+    /// True for the small one that was not asked for.
+    pub is_ready_made: bool,
+    /// True once it changes no more.
+    pub is_idle: bool,
+}
+
+impl Subject {
+    pub(super) fn is(&self, other: &Self) -> bool {
+        Arc::ptr_eq(&self.networks, &other.networks)
+    }
+}
+
+/// A surface on the screen that can be touched.
+#[derive(Clone, Debug)]
+pub(super) struct Target {
+    pub(super) id: Id,
+    pub(super) rect: Rect,
+    pub(super) sight: Sight,
+    pub(super) surface: Surface,
+}
+
+/// Hold of the pointer on the surface while its button is down.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Grip {
+    /// An indenter moves in the level in which the surface was met, so that it does not jump as the surface gives way.
+    Level(f64),
+    /// A node moves up and down.
+    Node {
+        /// Its place among those drawn.
+        node: usize,
+        /// Height of the node above the pointer's.
+        above_mm: f64,
+        /// Height of the node, and of the pointer on the screen, when it was taken.
+        begin: (f64, f32),
+    },
+    /// The button went down next to the surface.
+    Missed,
+}
+
+/// Work of the pointer on the actual surface.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Hand {
+    /// It presses.
+    #[default]
+    Press,
+    /// It turns the surface.
+    Turn,
+}
+
+/// Body that presses.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Tool {
+    /// A ball.
+    #[default]
+    Sphere,
+    /// The flat end of a round bar.
+    FlatPunch,
+    /// A bar along a row of nodes.
+    Cylinder,
+    /// The edge of a block.
+    Edge,
+    /// Two fingertips that move one node up and down.
+    OneNode,
+}
+
+/// Tool of the user with its size and depth.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Finger {
+    /// The body.
+    pub tool: Tool,
+    /// Its radius, where it has one.
+    pub radius_mm: f64,
+    /// Depth as a part of the stroke, from 0 to 1.
+    pub depth_share: f64,
+}
+
+impl Default for Finger {
+    fn default() -> Self {
+        Self {
+            tool: Tool::default(),
+            radius_mm: 4.0,
+            depth_share: 0.8,
+        }
+    }
+}
+
+impl Finger {
+    /// Radii offered.
+    pub const RADIUS_MM: std::ops::RangeInclusive<f64> = 0.5..=20.0;
+
+    /// The finger pressed onto a place; `None` for a tool that moves one node.
+    pub(super) fn print(&self, place_mm: DVec2, stroke_mm: f64) -> Option<Print> {
+        let radius_mm = Span {
+            smallest: self.radius_mm,
+            largest: self.radius_mm,
+        };
+        let largest_tilt_degrees = 0.0;
+        let shape = match self.tool {
+            Tool::Sphere => IndenterShape::Sphere { radius_mm },
+            Tool::FlatPunch => IndenterShape::FlatPunch {
+                radius_mm,
+                largest_tilt_degrees,
+            },
+            Tool::Cylinder => IndenterShape::Cylinder {
+                radius_mm,
+                largest_tilt_degrees,
+            },
+            Tool::Edge => IndenterShape::Edge { largest_tilt_degrees },
+            Tool::OneNode => return None,
+        };
+        Some(Print {
+            indenter: Indenter {
+                shape,
+                ..Indenter::default()
+            },
+            place_mm,
+            depth_mm: self.depth_share * stroke_mm,
+        })
+    }
+
+    /// Returns true if the tool has a radius.
+    pub(super) fn has_radius(&self) -> bool {
+        matches!(self.tool, Tool::Sphere | Tool::FlatPunch | Tool::Cylinder)
+    }
+
+    /// Deeper by a part of the stroke.
+    pub(super) fn deepen(&mut self, share: f64) {
+        self.depth_share = (self.depth_share + share).clamp(0.0, 1.0);
     }
 }

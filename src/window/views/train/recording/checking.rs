@@ -2,7 +2,7 @@
 
 use std::{ops::ControlFlow, path::Path, sync::Arc};
 
-use super::remarks::in_window;
+use super::columns_card::in_window;
 use crate::window::job::{Job, JobError, Report, Wake};
 use decoupler_core::{
     dataset::{Dataset, Seed},

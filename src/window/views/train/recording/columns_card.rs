@@ -1,15 +1,27 @@
 //! The middle of the Train view while a recording is imported: its columns, and the samples that they give.
+//!
+//! Sentences about splits and imports.
 
+use std::{collections::BTreeMap, path::Path};
+
+use decoupler_core::{dataset::SplitBy, text::counted};
+use decoupler_files::{
+    export::format_number,
+    import::{Condition, Cure, ImportError, InspectedFile},
+};
 use eframe::egui::{Align, Layout, RichText, Sense, Ui, WidgetInfo, accesskit::Role};
 
-use super::{checking::Checked, draft::Draft, editor::RecordingEditor, files_section::FILES};
+use super::{
+    checking::Checked,
+    draft::{Draft, joined, missing},
+    editor::RecordingEditor,
+    files_section::FILES,
+};
 use crate::window::{
     shared::{Effect, Shared, sentence},
     theme::{Theme, semibold, space, type_size},
     widgets::{card_ui, dim_ui, ghost_button, note_ui, primary_button, scrolled_ui, section_heading_ui},
 };
-use decoupler_core::{dataset::SplitBy, text::counted};
-use decoupler_files::export::format_number;
 
 impl RecordingEditor {
     /// Shows the columns of the files with the samples below, or an invitation to open files.
@@ -130,9 +142,139 @@ fn checked_ui(ui: &mut Ui, checked: &Checked, draft: &Draft) {
         dim_ui(ui, &sentence(positions));
     }
     if !draft.has_tests() && draft.plan.division.by == SplitBy::Random {
-        note_ui(ui, super::remarks::bias(SplitBy::Random));
+        note_ui(ui, bias(SplitBy::Random));
     }
     for warning in &checked.warnings {
         note_ui(ui, &sentence(warning));
+    }
+}
+
+/// New full names of columns: the columns of a joined file have its stem in front, those of the first file have none.
+#[derive(Debug)]
+pub(super) struct Renaming(BTreeMap<String, String>);
+
+impl Renaming {
+    /// The names that change where `older` files are read with these stems; `None` is that of the first file.
+    pub(super) fn new<'a>(older: &[InspectedFile], stems: impl Iterator<Item = (&'a Path, Option<&'a str>)>) -> Self {
+        let mut names = BTreeMap::new();
+        for (path, stem) in stems {
+            let Some(file) = older.iter().find(|file| file.path == path) else {
+                continue;
+            };
+            if file.stem.as_deref() == stem {
+                continue;
+            }
+            for (column, summary) in file.inspection.columns.iter().enumerate() {
+                let name = match stem {
+                    None => summary.name.clone(),
+                    Some(stem) => format!("{stem}.{}", summary.name),
+                };
+                names.insert(file.full_name(column), name);
+            }
+        }
+        Self(names)
+    }
+
+    /// Conditions as typed, with the new names. A text that is no condition yet stays.
+    pub(super) fn conditions(&self, text: &str) -> String {
+        match text.parse::<Condition>() {
+            Ok(condition) if !self.0.is_empty() => condition.renamed(|name| self.0.get(name).cloned()).to_string(),
+            _ => text.to_owned(),
+        }
+    }
+
+    /// Cells that mean missing as typed, with the new names.
+    pub(super) fn missing(&self, text: &str) -> String {
+        if self.0.is_empty() {
+            return text.to_owned();
+        }
+        let mut items = missing(text);
+        for column in items.iter_mut().filter_map(|item| item.column.as_mut()) {
+            if let Some(name) = self.0.get(column) {
+                column.clone_from(name);
+            }
+        }
+        joined(&items, ", ")
+    }
+}
+
+/// Returns a sentence on the bias of test errors by a rule of division.
+pub(in crate::window::views::train) fn bias(by: SplitBy) -> &'static str {
+    match by {
+        SplitBy::Time => "The last part of the recording is held out for testing.",
+        SplitBy::Group => "Whole groups are held out for testing: no press or session is in two sets.",
+        SplitBy::Random => {
+            "A random split is optimistic when neighbouring rows are similar. Compare with a split by group, or by time \
+             if there are no groups."
+        }
+    }
+}
+
+/// Returns an error of the import, with its cure in terms of the window.
+pub(super) fn in_window(error: &ImportError) -> String {
+    error.with_cure(|cure| match cure {
+        Cure::CallMissing(text) => {
+            format!("correct it, or add it to the missing cells under “Filter”: \"{text}\"")
+        }
+        Cure::NameTimes => "make the columns of their times “time” in both".to_owned(),
+        Cure::NameJoinedTime => "make the column of its times “time”".to_owned(),
+        Cure::GiveLimit => "give the limit under “Joined files”".to_owned(),
+        Cure::GiveTestFiles => "open the joined files of the test too".to_owned(),
+        other => other.to_string(),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use decoupler_files::import::{Joined, Recipe};
+
+    use super::*;
+
+    fn recipe() -> Recipe {
+        Recipe {
+            data: "one.csv".into(),
+            inputs: vec!["a".to_owned()],
+            targets: vec!["b".to_owned()],
+            ..Recipe::default()
+        }
+    }
+
+    fn error(one: &str, other: Option<&str>, recipe: Recipe) -> String {
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::write(folder.path().join("one.csv"), one).unwrap();
+        std::fs::write(folder.path().join("two.csv"), other.unwrap_or_default()).unwrap();
+        let watch = &mut |_| std::ops::ControlFlow::Continue(());
+        let imported: Result<_, ImportError> = recipe.import(Path::new(folder.path()), watch);
+        in_window(&imported.unwrap_err())
+    }
+
+    #[test]
+    fn errors_of_the_import_name_no_argument_of_the_terminal() {
+        let joined = |time: Option<&str>| Recipe {
+            join: vec![Joined {
+                file: "two.csv".into(),
+                time: time.map(str::to_owned),
+                ..Joined::default()
+            }],
+            ..recipe()
+        };
+        let timed = |time| Recipe {
+            time: Some("t".to_owned()),
+            ..joined(time)
+        };
+        let cases = [
+            error("a,b\n1,bad\n2,3\n", None, recipe()),
+            error("a,b\n1,2\n2,3\n", Some("c\n1\n"), joined(None)),
+            error("t,a,b\n1,1,2\n2,2,3\n", Some("c\n1\n"), timed(Some("s"))),
+            error("t,a,b\n1,1,2\n2,2,3\n", Some("s,c\n1,1\n1,2\n"), timed(Some("s"))),
+        ];
+        for text in cases {
+            assert!(
+                !text.contains("--") && (text.contains("“") || text.contains("“Filter”")),
+                "{text}"
+            );
+        }
     }
 }

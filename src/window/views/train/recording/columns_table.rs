@@ -1,20 +1,27 @@
 //! Table of the columns of all files with their meanings.
+//!
+//! Cells of the table of columns.
 
 use std::{cell::Cell, rc::Rc};
 
-use eframe::egui::{ComboBox, Label, RichText, Sense, Ui, WidgetInfo, accesskit::Role, vec2};
+use decoupler_files::{
+    export::format_number,
+    figure::tick_text,
+    import::{ColumnKind, ColumnSummary, InspectedFile, Meaning},
+};
+use eframe::egui::{
+    Color32, ComboBox, FontId, Label, Rect, Response, RichText, Sense, TextEdit, Ui, WidgetInfo, accesskit::Role, pos2,
+    vec2,
+};
 
 use super::{
-    column_cells::{figure_ui, meaning_ui, missing_texts, range_texts, remark, unit_ui},
     draft::{Draft, file_name},
     editor::RecordingEditor,
-    histogram::paint_histogram,
 };
 use crate::window::{
     theme::{Palette, Theme, space, type_size},
     widgets::{ColumnWidth, TableCell, TableColumn, TableRow, TableView},
 };
-use decoupler_files::import::{InspectedFile, Meaning};
 
 const ROW_HEIGHT: f32 = space(7);
 const MEANING_WIDTH: f32 = space(26);
@@ -203,4 +210,199 @@ fn column_row<'a>(
         TableCell::controls(missing_cell),
         TableCell::controls(remark_cell),
     ])
+}
+
+/// The choice of a meaning. Returns the one newly picked.
+pub(super) fn meaning_ui(ui: &mut Ui, name: &str, meaning: Meaning, width: f32) -> Option<Meaning> {
+    let mut picked = None;
+    let palette = Theme::of(ui).palette;
+    let text = RichText::new(meaning.to_string()).color(if meaning == Meaning::Unused {
+        palette.dim
+    } else {
+        palette.text
+    });
+    let combo = ComboBox::from_id_salt(name).selected_text(text).width(width);
+    let shown = combo.show_ui(ui, |ui| {
+        for option in Meaning::ALL {
+            let choice = ui.selectable_label(option == meaning, option.to_string());
+            if choice.on_hover_text(explanation(option)).clicked() && option != meaning {
+                picked = Some(option);
+            }
+        }
+    });
+    let label = format!("Meaning of {name}");
+    let value = meaning.to_string();
+    shown
+        .response
+        .widget_info(|| WidgetInfo::labeled(Role::ComboBox, true, &label));
+    ui.ctx()
+        .accesskit_node_builder(shown.response.id, |node| node.set_value(value));
+    picked
+}
+
+fn explanation(meaning: Meaning) -> &'static str {
+    match meaning {
+        Meaning::Input => "Reading of the sensor: an input of the network.",
+        Meaning::Target => "Predicted by the network from the inputs.",
+        Meaning::Time => "Time of the row, by which files are joined and samples are put in order.",
+        Meaning::Group => "Rows of equal value, such as one press or one session, stay together in one set.",
+        Meaning::RowWire => "Number of the row-wire that was read, from 1.",
+        Meaning::Unused => "Not used.",
+    }
+}
+
+/// The unit, to be changed in place. What is typed counts at once: a row that scrolls out of view reports no end of typing. Returns it
+/// if it has changed.
+pub(super) fn unit_ui(ui: &mut Ui, name: &str, unit: &str, width: f32) -> Option<String> {
+    let id = ui.scope_id().with(("unit", name));
+    // As typed, with the spaces that a unit does not end with.
+    let kept: Option<String> = ui.data(|data| data.get_temp(id));
+    let mut typed = kept.clone().unwrap_or_else(|| unit.to_owned());
+    let edit = ui.add(TextEdit::singleline(&mut typed).id(id).desired_width(width));
+    let label = format!("Unit of {name}");
+    ui.ctx().accesskit_node_builder(edit.id, |node| node.set_label(label));
+    if !edit.has_focus() && kept.is_some() {
+        ui.data_mut(|data| data.remove::<String>(id));
+    } else if edit.changed() {
+        ui.data_mut(|data| data.insert_temp(id, typed.clone()));
+    }
+    (edit.changed() && typed.trim() != unit).then_some(typed)
+}
+
+/// A figure at the right of its cell: the first of `texts` for which there is room, for a figure that is cut is another one.
+/// `label` names it.
+pub(super) fn figure_ui(ui: &mut Ui, texts: &[String], label: &str, colour: Color32) -> Response {
+    let rect: Rect = ui.max_rect();
+    let room = rect.width() - space(2);
+    let mut shown = None;
+    for text in texts {
+        let galley = ui
+            .painter()
+            .layout_no_wrap(text.clone(), FontId::proportional(type_size().note), colour);
+        let has_room = galley.size().x <= room;
+        shown = Some((galley, text));
+        if has_room {
+            break;
+        }
+    }
+    let response = ui.interact(rect, ui.scope_id().with("figure"), Sense::hover());
+    if let Some((galley, text)) = shown {
+        response.widget_info(|| WidgetInfo::labeled(Role::Label, true, format!("{label}: {text}")));
+        let at = rect.right_center() - vec2(space(1) + galley.size().x, 0.5 * galley.size().y);
+        ui.painter().galley(at, galley, colour);
+    }
+    response
+}
+
+/// The ends of a range, the most exact text first: with decimals that distinguish them well, with fewer, and at last
+/// rounded, with the width where they would look the same.
+pub(super) fn range_texts(min: f64, max: f64) -> Vec<String> {
+    let span = max - min;
+    let largest = min.abs().max(max.abs());
+    let number = |value: f64| format_number(value).replace('-', "−");
+    let has_decimals = (1e-6..1e12).contains(&span) && largest < 1e12;
+    if min == max {
+        return vec![number(min)];
+    }
+    let mut texts = Vec::new();
+    if has_decimals {
+        for step in [span / 100.0, span / 10.0] {
+            texts.push(format!("{} – {}", tick_text(min, step), tick_text(max, step)));
+        }
+    }
+    let ends = [number(min), number(max)];
+    texts.push(if ends[0] == ends[1] {
+        format!("{}, width {}", ends[0], number(span))
+    } else {
+        ends.join(" – ")
+    });
+    texts
+}
+
+/// Number of rows in which a cell is missing; where there is no room for it, its share.
+pub(super) fn missing_texts(missing: usize, rows: usize) -> Vec<String> {
+    if missing == 0 {
+        return vec!["–".to_owned()];
+    }
+    let percent = 100.0 * missing as f64 / rows.max(1) as f64;
+    vec![missing.to_string(), format!("{} %", format_number(percent))]
+}
+
+/// Returns a remark on an unusual column, and true if the column cannot be used as it is.
+pub(super) fn remark(summary: &ColumnSummary, column: usize) -> Option<(String, bool)> {
+    if let Some((line, text)) = &summary.first_text {
+        let others = match summary.texts {
+            1 => String::new(),
+            texts => format!(", and {} other cells", texts - 1),
+        };
+        return Some((
+            format!("line {line}, column {}: '{text}' is not a number{others}", column + 1),
+            true,
+        ));
+    }
+    if summary.kind == ColumnKind::Empty {
+        return Some(("empty".to_owned(), true));
+    }
+    if summary.is_constant {
+        return Some(("constant: carries no information".to_owned(), true));
+    }
+    summary
+        .duplicate_of
+        .as_ref()
+        .map(|other| (format!("same as {other}"), true))
+}
+
+/// Paints a small histogram over `rect`, as high as its fullest bar.
+pub(super) fn paint_histogram(ui: &Ui, rect: Rect, bars: &[usize], colour: Color32) {
+    let Some(most) = bars.iter().copied().max().filter(|most| *most > 0) else {
+        return;
+    };
+    let width = rect.width() / bars.len() as f32;
+    for (place, &count) in bars.iter().enumerate() {
+        if count == 0 {
+            continue;
+        }
+        let left = rect.left() + width * place as f32;
+        // One sample among thousands is still seen.
+        let height = (rect.height() * count as f32 / most as f32).max(1.0);
+        let top_left = pos2(left, rect.bottom() - height);
+        let bar = Rect::from_min_max(top_left, pos2(left + width - 1.0, rect.bottom()));
+        ui.painter().rect_filled(bar, 0.0, colour);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_ends_of_a_range_differ_where_its_numbers_do() {
+        for (min, max, text) in [
+            (-108.0, 288.4, "−108 – 288"),
+            (142.95, 143.0, "142.9500 – 143.0000"),
+            (1_742_233_313.2, 1_742_253_720.9, "1742233313 – 1742253721"),
+            (-1.0, 1.0, "−1.00 – 1.00"),
+            (4.0, 4.0, "4.00"),
+            (0.0, 1e-9, "0 – 1.00e−9"),
+            (-1e300, 1e300, "−1.00e300 – 1.00e300"),
+        ] {
+            assert_eq!(range_texts(min, max)[0], text);
+        }
+    }
+
+    #[test]
+    fn every_range_has_a_short_text_that_is_right() {
+        for (min, max, last) in [
+            (314.999_969, 315.0, "315, width 3.10e−5"),
+            (-314.999_969, -314.9, "−315, width 0.100"),
+            (1e11, 1e11 + 1.0 / 1024.0, "1.00e11, width 9.77e−4"),
+            (0.0, f64::MIN_POSITIVE, "0 – 2.23e−308"),
+            (-f64::MAX, f64::MAX, "−1.80e308 – 1.80e308"),
+        ] {
+            let texts = range_texts(min, max);
+            assert_eq!(texts.last().unwrap(), last);
+        }
+        assert_eq!(missing_texts(0, 10), ["–"]);
+        assert_eq!(missing_texts(123_456_789, 200_000_000), ["123456789", "61.7 %"]);
+    }
 }

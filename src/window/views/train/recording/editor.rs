@@ -9,7 +9,7 @@ use std::{
 use super::{
     checking::Checking,
     draft::{Draft, file_name},
-    missing::Reopened,
+    files_section::Reopened,
     opening::{Files, Opened, Opening, ToOpen},
 };
 use crate::window::{

@@ -4,24 +4,14 @@
 //! [`checking`] tries out whenever they change; [`missing`] describes files that are not where they were.
 
 mod checking;
-mod column_cells;
 mod columns_card;
 mod columns_table;
 mod draft;
 mod editor;
-mod exports;
 mod files_section;
-mod histogram;
-mod import_folds;
 mod layout_form;
-mod missing;
 mod opening;
-mod planned;
-mod positions_form;
-mod remarks;
-mod renaming;
-mod sample;
 
+pub(super) use columns_card::bias;
 pub use editor::RecordingEditor;
-pub use exports::recipe_export;
-pub(super) use remarks::bias;
+pub use files_section::recipe_export;

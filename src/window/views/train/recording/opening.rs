@@ -6,11 +6,9 @@ use std::{
 };
 
 use super::{
+    columns_card::{Renaming, in_window},
     draft::{Draft, file_name, missing},
-    missing::Reopened,
-    remarks::in_window,
-    renaming::Renaming,
-    sample::write_sample,
+    files_section::{Reopened, write_sample},
 };
 use crate::window::job::{Job, JobError, Report, Wake};
 use decoupler_core::evaluation::Simulation;

@@ -1,30 +1,38 @@
+//! Note of the report on ill-conditioned scenes.
+
 use std::time::Duration;
 
+use decoupler_core::{
+    dataset::SplitBy,
+    evaluation::{
+        Baselines, ErrorTable, Errors, NodeAddress, Outlook, Problem, ReferenceNote, Scores, SimulatedSettings, Spread,
+        StartRecord, TestErrors, best_start, error_remarks,
+    },
+    sensor::Identifiability,
+    training::StopReason,
+};
+use decoupler_files::{
+    export::{Cell, Table, TableColumn, format_duration, format_number},
+    figure::frame_time,
+};
 use eframe::egui::{Align, Layout, RichText, Ui, WidgetInfo, accesskit::Role};
 
-use super::{conditioning::conditioning_ui, spread::spread_ui};
 use crate::window::{
     glossary,
+    plotting::{StripChart, strip_ui},
     shared::{
         DecoderSource, Effect, NetworkSource, Phase, RunResult, RunView, Shared, SourceKind, error_table_ui, sentence,
     },
-    theme::{space, type_size},
+    test_view::TestView,
+    theme::{Theme, space, type_size},
     views::train::{
         decoders::decoders_ui, exports::open_task, inspect::TestPlace, press::press_section_ui, recording::bias,
         state::TrainView,
     },
-    widgets::{Landmark, dim_ui, fields::capitalised, ghost_button, note_ui, scrolled_ui, section_heading_ui},
-};
-use decoupler_core::{
-    dataset::SplitBy,
-    evaluation::{
-        Baselines, ErrorTable, Errors, NodeAddress, ReferenceNote, Scores, SimulatedSettings, TestErrors, error_remarks,
+    widgets::{
+        Landmark, described_table_ui, dim_ui, fields::capitalised, ghost_button, note_ui, scrolled_ui,
+        section_heading_ui,
     },
-    training::StopReason,
-};
-use decoupler_files::{
-    export::{format_duration, format_number},
-    figure::frame_time,
 };
 
 /// The error table, what can be opened, and what it cost. Before a training, what the network has to beat.
@@ -282,4 +290,74 @@ fn open_ui(ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) {
             effects.push(Effect::TypePath(task));
         }
     });
+}
+
+fn is_badly_conditioned(outlook: &Outlook) -> bool {
+    outlook.worst_row.condition() >= Identifiability::LARGEST_CONDITION
+}
+
+/// Says that the scene is ill-conditioned, lest its errors be taken for the network's fault.
+pub fn conditioning_ui(ui: &mut Ui, test: &TestView) {
+    let Some(outlook) = test.outlook.as_ref().filter(|outlook| is_badly_conditioned(outlook)) else {
+        return;
+    };
+    ui.add_space(space(2));
+    let condition = match outlook.worst_row.condition() {
+        condition if condition.is_finite() => format!("{condition:.0e}"),
+        _ => "infinite".to_owned(),
+    };
+    let text = format!(
+        "This scene is ill-conditioned (condition number {condition}): whatever the decoder, some deformations cannot \
+         be told apart. The note under Scene says what to change."
+    );
+    note_ui(ui, &text);
+}
+
+/// Shows the spread of the results of several starts: a strip of dots and three figures. Nothing for one start.
+pub fn spread_ui(ui: &mut Ui, problem: &Problem, starts: &[StartRecord]) {
+    let Some(best) = best_start(starts).filter(|_| starts.len() > 1) else {
+        return;
+    };
+    let palette = Theme::of(ui).palette;
+    section_heading_ui(ui, &format!("Spread over {} starts", starts.len()));
+    let percents: Vec<Option<f64>> = starts.iter().map(StartRecord::percent).collect();
+    let spread = Spread::of(percents.iter().copied().flatten());
+    let of_test = problem.test_percent_name();
+    if let Some(spread) = spread {
+        strip_ui(
+            ui,
+            &StripChart {
+                label: &format!("Spread of {of_test}"),
+                axis: of_test,
+                values: &percents,
+                marked: best,
+                spread,
+            },
+        );
+    }
+    let is_held_out = starts.iter().all(|start| start.validation_mse.is_some());
+    let error = if is_held_out { "validation mse" } else { "training mse" };
+    let errors = Spread::of(starts.iter().map(StartRecord::deciding_mse));
+    described_table_ui(ui, "spread", &spread_table(&[(of_test, spread), (error, errors)]));
+    let text = format!("Start {} is kept: it has the lowest {error}.", best + 1);
+    ui.label(RichText::new(text).size(type_size().note).color(palette.dim));
+}
+
+/// The figures of each spread.
+fn spread_table(spreads: &[(&'static str, Option<Spread>)]) -> Table {
+    let row = |(name, spread): &(&'static str, Option<Spread>)| {
+        let figures = spread.map(|spread| [spread.smallest, spread.median, spread.largest]);
+        let cells = figures?.map(Cell::from);
+        Some([vec![(*name).into()], cells.into()].concat())
+    };
+    Table {
+        columns: vec![
+            TableColumn::new("error", "", ""),
+            TableColumn::new("min", "min", "").meaning("Best start."),
+            TableColumn::new("median", "median", "")
+                .meaning("Median of all starts: the typical result of a single start."),
+            TableColumn::new("max", "max", "").meaning("Worst start."),
+        ],
+        rows: spreads.iter().filter_map(row).collect(),
+    }
 }

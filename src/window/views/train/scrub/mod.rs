@@ -1,9 +1,7 @@
 //! Scrubbing: the networks of past epochs, brought back by a slider under the loss curves or replayed one after the
 //! other. What they make of the test set is computed in the background, the newest wish first.
 
-mod bar;
 mod state;
 
-pub(super) use bar::HEIGHT;
-pub use bar::scrub_bar_ui;
-pub use state::ScrubState;
+pub(super) use state::HEIGHT;
+pub use state::{ScrubState, scrub_bar_ui};
