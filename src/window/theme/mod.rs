@@ -4,12 +4,10 @@
 
 #[cfg(test)]
 mod contrast;
-mod fonts;
 mod style;
 mod tokens;
 
-pub use fonts::{font_definitions, semibold};
-pub use style::{apply, install};
+pub use style::{apply, font_definitions, install, semibold};
 pub use tokens::{Palette, SPACE, TypeSizes, radius, space, type_size};
 
 use std::sync::OnceLock;
