@@ -9,8 +9,9 @@ use super::{
     output::{print, print_object},
 };
 use decoupler_core::{
+    calibration::{Calibration, ParameterStatus, PressLimits, SensorParameter},
     evaluation::pressed_rows,
-    sensor::{ArrayScale, Calibration, ParameterStatus, PressLimits, SensorModel, SensorParameter},
+    sensor::{ArrayScale, SensorModel},
 };
 use decoupler_files::export::{SensorFile, check_writable, format_number};
 
@@ -122,7 +123,7 @@ impl Calibrate {
 
 impl Report {
     fn of(calibration: &Calibration, frames: usize) -> Self {
-        let parameter = |fitted: &decoupler_core::sensor::CalibratedParameter| Parameter {
+        let parameter = |fitted: &decoupler_core::calibration::CalibratedParameter| Parameter {
             name: SensorParameterName(fitted.parameter),
             unit: fitted.parameter.unit(),
             nominal: fitted.nominal,

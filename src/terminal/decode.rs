@@ -9,10 +9,11 @@ use std::{
 
 use clap::Args;
 use decoupler_core::{
+    calibration::PressLimits,
     dataset::{Dataset, SimulationError},
     decoupling::{CompiledNetworks, Decoder},
     evaluation::{Problem, pressed_rows},
-    sensor::{PressLimits, SensorModel},
+    sensor::SensorModel,
     text::inert,
 };
 use decoupler_files::export::{AtomicFile, NetworkFile, WriteError, is_same, write_decoded, write_decoded_header};

@@ -6,11 +6,12 @@ use std::{
 };
 
 use decoupler_core::{
+    calibration::CalibrationError,
     dataset::{SimulationError, SplitBy},
     evaluation::{RunError, experiments::ExperimentError},
     live::{LineError, Source, SourceError},
     scene::Rows,
-    sensor::{CalibrationError, SensorError},
+    sensor::SensorError,
     text::{ReadError, system_cause},
     training::SettingError,
 };

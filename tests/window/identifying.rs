@@ -9,7 +9,8 @@ use decoupler_core::{
         CrossValidated, RunSettings,
         recorded::{Findings, FittedModel},
     },
-    sensor::{Identifiability, SensorModel},
+    identifiability::Identifiability,
+    sensor::SensorModel,
 };
 use decoupler_files::{
     export::{describe_target, format_number},

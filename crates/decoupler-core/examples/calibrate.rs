@@ -5,11 +5,12 @@
 use std::error::Error;
 
 use decoupler_core::{
+    calibration::{Calibration, ParameterStatus, SensorParameter},
     dataset::{Dataset, Division, Seed, Stream},
     evaluation::{Errors, Preset, Run, SimulatedSettings, fine_tune, pressed_rows, rebased},
     network::Networks,
     scene::{Loading, Noise},
-    sensor::{Calibration, ParameterStatus, SensorModel, SensorParameter},
+    sensor::SensorModel,
 };
 
 fn main() -> Result<(), Box<dyn Error>> {

@@ -7,7 +7,9 @@
 //! | module | contents |
 //! |---|---|
 //! | [`text`] | numbers, names and CSV as text |
-//! | [`sensor`] | array scale, geometry, the resistance model and its Jacobian, identifiability |
+//! | [`sensor`] | array scale, geometry, the resistance model and its Jacobian |
+//! | [`calibration`] | geometry and resistivity fitted to the readings of known deformations |
+//! | [`identifiability`] | deformation patterns that the readings determine, and how well |
 //! | [`scene`] | what happens to the sensor: rows, movement, loading, noise |
 //! | [`dataset`] | samples with their row-wire and snapshot, simulated or recorded; frames, folds, splits |
 //! | [`network`] | the three-layer network, its initialisation and scaling |
@@ -94,9 +96,11 @@
 //! The programs in `examples/` go on from here: training with an error table, decoding frames, and measured pairs of
 //! readings and targets without any geometry.
 
+pub mod calibration;
 pub mod dataset;
 pub mod decoupling;
 pub mod evaluation;
+pub mod identifiability;
 pub mod live;
 pub mod network;
 pub mod scene;

@@ -15,7 +15,8 @@ use decoupler_core::{
         experiments::{Axis, Experiment, ExperimentResults, PaperTable, TrialSamples, run_experiments},
         measure_trade_off,
     },
-    sensor::{Axes, Identifiability},
+    identifiability::Identifiability,
+    sensor::Axes,
     training::EpochRecord,
 };
 use decoupler_files::figure::{

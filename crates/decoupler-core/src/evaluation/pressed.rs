@@ -8,11 +8,12 @@ use ndarray::Array2;
 
 use super::{RunError, Simulation, run_sets::check_networks, workload::node_pairs_per_row};
 use crate::{
+    calibration::{PressLimits, PressedRow},
     dataset::{Dataset, PerRow, Split},
     decoupling::{DecodeError, Decoder},
     network::{DecouplingNetwork, Networks},
     scene::Touch,
-    sensor::{PressLimits, PressedRow, SensorError, SensorModel},
+    sensor::{SensorError, SensorModel},
     training::{Examples, Problem, Trainer, TrainingSettings},
 };
 
@@ -153,7 +154,7 @@ impl PressedAnswer {
     }
 }
 
-/// Returns the samples of `set` as readings of known deformations, for [`Calibration::fit`](crate::sensor::Calibration::fit).
+/// Returns the samples of `set` as readings of known deformations, for [`Calibration::fit`](crate::calibration::Calibration::fit).
 /// Its targets are the absolute coordinates of the row's nodes in millimetres, as `sensor` places its nodes at rest.
 ///
 /// # Errors

@@ -3,8 +3,8 @@ use super::{
 };
 use crate::{
     decoupling::DecoderKind,
+    identifiability::{Identifiability, IdentifiabilityError, IdentifiabilityWarning},
     scene::{RelativeNoise, Rows},
-    sensor::{Identifiability, IdentifiabilityError, IdentifiabilityWarning},
     training::Method,
 };
 

@@ -179,7 +179,7 @@ impl RelativeNoise {
     /// Factor on the part that `readings` have in common, by which readings with a common error count as if each had its own
     /// alone: own / √(own² + readings · common²), from the eigenvalues of the covariance own² I + common² 1 1ᵀ. Exact
     /// readings have the rounding of double precision as their own error.
-    pub(super) fn weight_of_mean(self, readings: usize) -> f64 {
+    pub(crate) fn weight_of_mean(self, readings: usize) -> f64 {
         if self.common == 0.0 {
             return 1.0;
         }

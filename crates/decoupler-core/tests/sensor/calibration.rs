@@ -1,11 +1,12 @@
 //! A sensor of unknown geometry: calibrated, trained on its calibrated model, fine-tuned on its frames.
 
 use decoupler_core::{
+    calibration::Calibration,
     dataset::{Dataset, Division, Seed, Stream},
     evaluation::{Errors, Preset, Run, SimulatedSettings, fine_tune, pressed_rows, rebased},
     network::Networks,
     scene::{Loading, Noise},
-    sensor::{Calibration, SensorModel},
+    sensor::SensorModel,
 };
 
 fn settings() -> SimulatedSettings {

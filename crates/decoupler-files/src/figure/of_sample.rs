@@ -2,7 +2,7 @@
 //!
 //! The figure of what the readings of each row determine.
 
-use decoupler_core::{evaluation::Channel, sensor::Identifiability, text::format_number};
+use decoupler_core::{evaluation::Channel, identifiability::Identifiability, text::format_number};
 
 use super::{
     axis::{PlotAxis, TickRule},

@@ -6,8 +6,9 @@ use thiserror::Error;
 use crate::window::test_view::Frame;
 use decoupler_core::{
     evaluation::SimulatedSettings,
+    identifiability::{Identifiability, IdentifiabilityError, IdentifiabilityWarning, RowPair},
     scene::{RelativeNoise, RowModel, Scene, SceneError},
-    sensor::{Identifiability, IdentifiabilityError, IdentifiabilityWarning, RowPair, SensorError, SensorModel},
+    sensor::{SensorError, SensorModel},
     surface::{SurfaceError, SurfaceMap},
 };
 

@@ -8,7 +8,7 @@ use decoupler_core::{
         Baselines, ErrorTable, Errors, NodeAddress, Outlook, Problem, ReferenceNote, Scores, SimulatedSettings, Spread,
         StartRecord, TestErrors, best_start, error_remarks,
     },
-    sensor::Identifiability,
+    identifiability::Identifiability,
     training::StopReason,
 };
 use decoupler_files::{

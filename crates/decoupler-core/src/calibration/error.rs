@@ -1,6 +1,6 @@
 use thiserror::Error;
 
-use super::super::{SensorError, short};
+use crate::sensor::{SensorError, short};
 
 /// Reason why a sensor cannot be calibrated.
 #[derive(Clone, Debug, PartialEq, Error)]

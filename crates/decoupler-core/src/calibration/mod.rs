@@ -15,7 +15,7 @@ pub use equations::PressLimits;
 pub use error::CalibrationError;
 pub use report::{CalibratedParameter, Calibration, CalibrationWarning, ParameterStatus, SensorParameter};
 
-use super::DVec3;
+use crate::sensor::DVec3;
 
 /// Readings of one row-wire under a known deformation.
 #[derive(Clone, Debug, PartialEq)]

@@ -6,8 +6,7 @@ use faer::Mat;
 use glam::DVec3;
 use thiserror::Error;
 
-use super::{Axes, RelativeNoise, RowConductance, SensorModel};
-use crate::sensor::SensorError;
+use crate::sensor::{Axes, RelativeNoise, RowConductance, SensorError, SensorModel};
 
 /// Deformation patterns that the readings of one row-wire see, from the singular values of the Jacobian of ln R.
 ///
@@ -316,8 +315,9 @@ impl Identifiability {
 mod tests {
     use glam::DVec3;
 
+    use super::Identifiability;
     use super::*;
-    use crate::sensor::{ArrayScale, Axes, Identifiability, SensorModel};
+    use crate::sensor::{ArrayScale, Axes, SensorModel};
 
     pub(super) fn at_rest(model: &SensorModel, row: usize, axes: Axes) -> Identifiability {
         let rest = vec![DVec3::ZERO; model.scale.nodes_per_row()];

@@ -3,10 +3,10 @@ use std::collections::HashMap;
 use faer::Mat;
 
 use super::{
-    super::SensorModel,
     CalibrationError, PressedRow, SensorParameter,
     equations::{COUNT, Slopes, log_resistances},
 };
+use crate::sensor::SensorModel;
 
 /// Sums of the linearised equations at one sensor model, with every parameter in proportion to its reference.
 pub(super) struct Linearised {

@@ -1,8 +1,5 @@
-use super::{
-    super::{DVec3, SensorModel},
-    CalibrationError, PressedRow, SensorParameter,
-};
-use crate::sensor::SensorError;
+use super::{CalibrationError, PressedRow, SensorParameter};
+use crate::sensor::{DVec3, SensorError, SensorModel};
 
 /// Number of parameters.
 pub(super) const COUNT: usize = SensorParameter::COUNT;

@@ -1,11 +1,11 @@
 use std::{collections::BTreeMap, fmt};
 
 use super::{
-    super::{SensorModel, short},
     CalibrationError, PressLimits, PressedRow,
     equations::{COUNT, Slopes},
     levenberg_marquardt::{Decomposition, Fitted, Linearised, fit, fit_with_prior, residuals, variances},
 };
+use crate::sensor::{SensorModel, short};
 
 /// A sensor model fitted to readings of known deformations.
 #[derive(Clone, Debug, PartialEq)]
