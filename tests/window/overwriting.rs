@@ -97,9 +97,11 @@ fn a_network_kept_in_the_list_is_not_overwritten() {
     driver.limit_epochs("2");
     driver.train_recording();
     let kept = folder.path().join("runs");
-    driver.wait("the network", |_| kept.is_dir() && !names(&kept).is_empty());
+    // A file that is being written has a temporary name.
+    let written = || names(&kept).into_iter().find(|name| name.ends_with(".json"));
+    driver.wait("the network", |_| kept.is_dir() && written().is_some());
     driver.settle();
-    let kept = kept.join(&names(&kept)[0]);
+    let kept = kept.join(written().unwrap());
     ask(&mut driver, RECIPE, &kept);
     driver.wait("the refusal", |driver| driver.says("is in use"));
     assert!(NetworkFile::load(&kept).is_ok());

@@ -20,8 +20,6 @@ use super::{
 };
 use crate::window::theme::{Theme, space};
 
-/// A number as one would type it: all its digits, and no more.
-
 /// Lays out `name` and the widget made by `value_ui`; joins them for assistive technology and tests. Below it is why
 /// what was typed into it was not taken.
 pub fn field_ui(ui: &mut Ui, name: &str, hint: &str, value_ui: impl FnOnce(&mut Ui) -> Response) -> Response {
