@@ -32,6 +32,7 @@ mod plain_newton;
 mod posterior;
 mod radial_basis;
 mod ridge;
+mod row_prior;
 mod row_problem;
 mod side_by_side;
 mod takagi_sugeno;
@@ -47,5 +48,7 @@ pub use newton::{LARGEST_ERROR, Newton, NewtonReport, NewtonRules, NewtonStop, S
 pub(crate) use posterior::SampledPosterior;
 pub use posterior::{Posterior, PosteriorReport};
 pub use radial_basis::{Centres, RadialBasisNetwork, RadialBasisSettings};
+pub(crate) use row_prior::GaussianPrior;
+pub(crate) use row_problem::{Range, ranges};
 pub use row_problem::{RowChoice, RowProblemDescription};
 pub use takagi_sugeno::TakagiSugeno;

@@ -1,6 +1,6 @@
 use glam::DVec3;
 
-use super::faults::{Diagnosis, FaultCause, FaultyWire, GaussianPrior, RowFit, View};
+use super::faults::{Diagnosis, FaultCause, FaultyWire, FitPrior, RowFit, View};
 use crate::{
     dataset::{Seed, Stream},
     decoupling::{DecodeError, Decoder},
@@ -20,7 +20,7 @@ pub struct LeftOutDecoder {
     model: SensorModel,
     fault: Option<Diagnosis>,
     rows: Vec<usize>,
-    priors: Vec<GaussianPrior>,
+    priors: Vec<FitPrior>,
     one: RowFit,
     two: RowFit,
     /// True if the deformations of neighbouring rows are correlated.
@@ -41,7 +41,7 @@ impl LeftOutDecoder {
             model: *model,
             fault: None,
             rows: rows.to_vec(),
-            priors: GaussianPrior::of_rows(model, scene, rows, &mut Seed(0).rng(Stream::Expectation)),
+            priors: FitPrior::of_rows(model, scene, rows, &mut Seed(0).rng(Stream::Expectation)),
             one: RowFit::new(model, scene, 1)?,
             two: RowFit::new(model, scene, 2)?,
             has_neighbours: scene.loading != Loading::RandomNodes,

@@ -3,7 +3,7 @@ use std::{fmt, str::FromStr};
 use thiserror::Error;
 
 use super::{Deformation, Noise};
-use crate::sensor::{ArrayScale, SensorError, SensorModel, short};
+use crate::sensor::{ArrayScale, Axes, RowConductance, SensorError, SensorModel, short};
 
 /// A fault of the wires or of the electronics.
 ///
@@ -228,29 +228,31 @@ impl FaultySensor {
         let scale = self.model.scale;
         let (columns, full_scale_ohm) = (scale.columns(), self.range_ohm.1);
         let row_index = |row: usize| read.iter().position(|&other| other == row);
-        let near_ohm = |row: usize, nodes: usize, column: usize, electrodes: usize| {
-            let displacements_mm = deformation.row_mm(row);
-            let sum = self
-                .model
-                .partial_sum((row, 0..nodes), (column, 0..electrodes), displacements_mm, |_, _| ());
-            // Without any node there is no current; what noise makes of that is the converter's full scale.
-            if sum > 0.0 {
-                self.model.resistivity_ohm_per_mm / sum
-            } else {
-                full_scale_ohm
-            }
+        let mut conductance = RowConductance::new(&self.model, Axes::Z);
+        let mut near_ohm = |row: usize, nodes: usize, electrodes: usize| -> Vec<f64> {
+            let displacements_mm = &deformation.row_mm(row)[..nodes];
+            conductance.evaluate_broken(&self.model, row, displacements_mm, electrodes);
+            let of_sum = |&sum: &f64| {
+                // Without any node there is no current; what noise makes of that is the converter's full scale.
+                if sum > 0.0 {
+                    self.model.resistivity_ohm_per_mm / sum
+                } else {
+                    full_scale_ohm
+                }
+            };
+            conductance.sums().iter().map(of_sum).collect()
         };
         let shared_ohm = |one: f64, other: f64| 2.0 / (1.0 / one + 1.0 / other);
         match self.fault {
             Fault::OpenRow { row, before_node } => {
                 if let Some(index) = row_index(row) {
-                    let of_row = resistances_ohm[index * columns..].iter_mut().take(columns).enumerate();
-                    of_row.for_each(|(k, ohm)| *ohm = near_ohm(row, before_node, k, scale.nodes_per_column()));
+                    let of_row = near_ohm(row, before_node, scale.nodes_per_column());
+                    resistances_ohm[index * columns..][..columns].copy_from_slice(&of_row);
                 }
             }
             Fault::OpenColumn { column, before_node } => {
                 for (&row, ohms) in read.iter().zip(resistances_ohm.chunks_exact_mut(columns)) {
-                    ohms[column] = near_ohm(row, scale.nodes_per_row(), column, before_node);
+                    ohms[column] = near_ohm(row, scale.nodes_per_row(), before_node)[column];
                 }
             }
             Fault::ShortedRows { row } => {

@@ -1,5 +1,3 @@
-use std::ops::Range;
-
 use glam::DVec3;
 
 use super::{Axes, SensorModel, reciprocal_distances::sum_reciprocal_distances};
@@ -50,13 +48,26 @@ impl RowConductance {
     /// # Panics
     /// If there are not M2 displacements.
     pub fn evaluate(&mut self, model: &SensorModel, row: usize, displacements_mm: &[DVec3]) {
-        self.evaluate_by::<Divided>(model, row, displacements_mm);
+        assert_eq!(displacements_mm.len(), model.scale.nodes_per_row());
+        self.evaluate_by::<Divided>(model, row, displacements_mm, model.scale.nodes_per_column());
+    }
+
+    /// Evaluates sums and derivatives of a row-wire, or of column-wires, broken after the first nodes: those displaced by
+    /// `displacements_mm` (up to M2) and the first `electrodes` (up to M3) of every column-wire. Derivatives by other nodes
+    /// stay as they are.
+    ///
+    /// # Panics
+    /// If there are more displacements or electrodes than nodes.
+    pub fn evaluate_broken(&mut self, model: &SensorModel, row: usize, displacements_mm: &[DVec3], electrodes: usize) {
+        assert!(displacements_mm.len() <= model.scale.nodes_per_row() && electrodes <= model.scale.nodes_per_column());
+        self.evaluate_by::<Divided>(model, row, displacements_mm, electrodes);
     }
 
     /// Evaluates as [`Self::evaluate`], by [refined](Refined) reciprocal roots, in half the time and to within a few more
     /// units in the last place. Distances must be [within reach](Self::is_within_reach).
     pub(crate) fn evaluate_refined(&mut self, model: &SensorModel, row: usize, displacements_mm: &[DVec3]) {
-        self.evaluate_by::<Refined>(model, row, displacements_mm);
+        assert_eq!(displacements_mm.len(), model.scale.nodes_per_row());
+        self.evaluate_by::<Refined>(model, row, displacements_mm, model.scale.nodes_per_column());
     }
 
     /// Evaluates the sums alone, with the same bits as [`Self::evaluate`]; derivatives stay those of the last evaluation.
@@ -89,44 +100,23 @@ impl RowConductance {
     fn evaluate_sums_by<R: ReciprocalRoot>(&mut self, model: &SensorModel, row: usize, displacements_mm: &[DVec3]) {
         assert_eq!(displacements_mm.len(), model.scale.nodes_per_row());
         let sensor = (model.scale, &model.geometry);
-        sum_reciprocal_distances::<0, R>(sensor, row, displacements_mm, &mut self.sums, &mut []);
+        let electrodes = model.scale.nodes_per_column();
+        sum_reciprocal_distances::<0, R>(sensor, row, displacements_mm, electrodes, &mut self.sums, &mut []);
     }
 
-    fn evaluate_by<R: ReciprocalRoot>(&mut self, model: &SensorModel, row: usize, displacements_mm: &[DVec3]) {
-        assert_eq!(displacements_mm.len(), model.scale.nodes_per_row());
+    fn evaluate_by<R: ReciprocalRoot>(
+        &mut self,
+        model: &SensorModel,
+        row: usize,
+        displacements_mm: &[DVec3],
+        electrodes: usize,
+    ) {
         let (sums, derivatives) = (&mut self.sums[..], &mut self.derivatives[..]);
         let sensor = (model.scale, &model.geometry);
         match self.axes {
-            Axes::Z => sum_reciprocal_distances::<1, R>(sensor, row, displacements_mm, sums, derivatives),
-            Axes::Xyz => sum_reciprocal_distances::<3, R>(sensor, row, displacements_mm, sums, derivatives),
+            Axes::Z => sum_reciprocal_distances::<1, R>(sensor, row, displacements_mm, electrodes, sums, derivatives),
+            Axes::Xyz => sum_reciprocal_distances::<3, R>(sensor, row, displacements_mm, electrodes, sums, derivatives),
         }
-    }
-}
-
-impl SensorModel {
-    /// Sum of the reciprocal distances of Eq. (2) in 1/mm over some `nodes` of row-wire `row` and some `electrodes` of
-    /// column-wire `column`: what is left of a reading where a wire is broken. `add_slope` is given every node with the
-    /// derivatives of its part by x, y, z of its displacement, in 1/mm².
-    pub(crate) fn partial_sum(
-        &self,
-        (row, nodes): (usize, Range<usize>),
-        (column, electrodes): (usize, Range<usize>),
-        displacements_mm: &[DVec3],
-        mut add_slope: impl FnMut(usize, DVec3),
-    ) -> f64 {
-        let mut sum = 0.0;
-        for node in nodes {
-            let position_mm = self.displaced_mm(row, node, displacements_mm[node]);
-            for electrode in electrodes.clone() {
-                let apart_mm = position_mm - self.geometry.column_node_mm(column, electrode);
-                let reciprocal = apart_mm.length().recip();
-                sum += reciprocal;
-                // z of a displacement counts downwards.
-                let slope = DVec3::new(-apart_mm.x, -apart_mm.y, apart_mm.z);
-                add_slope(node, reciprocal.powi(3) * slope);
-            }
-        }
-        sum
     }
 }
 
@@ -253,27 +243,40 @@ mod tests {
         }
     }
 
+    /// Against the whole sums of an array that has no more nodes, moved so that those left are where they were.
     #[test]
-    fn parts_add_up_to_the_whole() {
+    fn a_broken_wire_has_the_sums_of_a_shorter_one() {
         let model = SensorModel::new("3x4_3x12".parse().unwrap());
         let displacements_mm: Vec<DVec3> = (0..4)
             .map(|node| DVec3::new(0.1, -0.2, 0.2 * f64::from(node)))
             .collect();
-        let mut whole = RowConductance::new(&model, Axes::Xyz);
-        whole.evaluate(&model, 1, &displacements_mm);
-        for column in 0..12 {
-            let mut slopes = [DVec3::ZERO; 4];
-            let mut part = |nodes, electrodes| {
-                model.partial_sum((1, nodes), (column, electrodes), &displacements_mm, |node, slope| {
-                    slopes[node] += slope;
-                })
+        for (nodes, electrodes) in [(1, 3), (3, 2), (4, 1), (4, 3)] {
+            let mut short = SensorModel {
+                scale: format!("3x{nodes}_{electrodes}x12").parse().unwrap(),
+                ..model
             };
-            let sum = part(0..1, 0..3) + part(1..4, 0..2) + part(1..4, 2..3);
-            assert!((sum / whole.sums()[column] - 1.0).abs() < 1e-13);
-            for (unknown, slope) in slopes.iter().flat_map(|slope| slope.to_array()).enumerate() {
-                assert!((slope - whole.derivatives(unknown)[column]).abs() < 1e-13);
+            let apart_mm =
+                model.geometry.row_node_mm(model.scale, 1, 0) - short.geometry.row_node_mm(short.scale, 1, 0);
+            let moved: Vec<DVec3> = displacements_mm[..nodes].iter().map(|u| *u + apart_mm).collect();
+            short.geometry.height_mm = model.geometry.height_mm;
+            let (mut broken, mut whole) = (
+                RowConductance::new(&model, Axes::Xyz),
+                RowConductance::new(&short, Axes::Xyz),
+            );
+            broken.evaluate_broken(&model, 1, &displacements_mm[..nodes], electrodes);
+            whole.evaluate(&short, 1, &moved);
+            for column in 0..12 {
+                assert!((broken.sums()[column] / whole.sums()[column] - 1.0).abs() < 1e-13);
+                for unknown in 0..3 * nodes {
+                    assert!((broken.derivatives(unknown)[column] - whole.derivatives(unknown)[column]).abs() < 1e-13);
+                }
             }
         }
+        let mut none = RowConductance::new(&model, Axes::Xyz);
+        none.evaluate_broken(&model, 1, &[], 3);
+        assert!(none.sums().iter().all(|sum| *sum == 0.0));
+        none.evaluate_broken(&model, 1, &displacements_mm, 0);
+        assert!(none.sums().iter().all(|sum| *sum == 0.0));
     }
 
     /// y is right to 2 units in the last place if x y² is right to twice as many: y (1 + δ) gives 1 + 2δ.

@@ -19,6 +19,9 @@ const ELECTRODES: usize = 8;
 /// (M2), into `sums` (M4); and its derivatives by the displacements along no axis (`AXES` = 0), z (1) or x, y and z (3)
 /// into `derivatives` (M2 × `AXES` × M4, in 1/mm²).
 ///
+/// Where a wire is broken, the sum is over the nodes before the break: the first ones of the row-wire, if fewer
+/// displacements are given, and the first `electrodes` of every column-wire.
+///
 /// With d² = dx² + dy² + z²: ∂(1/d)/∂ux = −dx/d³, ∂(1/d)/∂uy = −dy/d³ and, uz counting downwards, ∂(1/d)/∂uz = z/d³.
 ///
 /// Differences of coordinates are right to the last place wherever the origin is, and the sum over nodes is compensated
@@ -30,6 +33,7 @@ pub(super) fn sum_reciprocal_distances<const AXES: usize, R: ReciprocalRoot>(
     (scale, geometry): (ArrayScale, &Geometry),
     row: usize,
     displacements_mm: &[DVec3],
+    electrodes: usize,
     sums: &mut [f64],
     derivatives: &mut [f64],
 ) {
@@ -38,6 +42,7 @@ pub(super) fn sum_reciprocal_distances<const AXES: usize, R: ReciprocalRoot>(
         geometry,
         row,
         displacements_mm,
+        electrodes,
         sums,
         derivatives,
         root: PhantomData,
@@ -50,6 +55,7 @@ struct Summation<'a, const AXES: usize, R> {
     geometry: &'a Geometry,
     row: usize,
     displacements_mm: &'a [DVec3],
+    electrodes: usize,
     sums: &'a mut [f64],
     derivatives: &'a mut [f64],
     root: PhantomData<R>,
@@ -67,7 +73,7 @@ impl<const AXES: usize, R: ReciprocalRoot> WithSimd for Summation<'_, AXES, R> {
         self.sums.fill(0.0);
         // The first chunk, nearly always the only one, has code of its own, which does not read derivatives.
         self.add_electrodes(&differences, 0, true);
-        for first in (ELECTRODES..self.scale.nodes_per_column()).step_by(ELECTRODES) {
+        for first in (ELECTRODES..self.electrodes).step_by(ELECTRODES) {
             self.add_electrodes(&differences, first, false);
         }
     }
@@ -77,11 +83,13 @@ impl<const AXES: usize, R: ReciprocalRoot> Summation<'_, AXES, R> {
     /// Adds the terms of electrodes `first_electrode` and on of every column-wire.
     #[inline(always)]
     fn add_electrodes(&mut self, differences: &Differences, first_electrode: usize, are_first: bool) {
-        let Self { scale, geometry, .. } = *self;
+        let Self {
+            geometry, electrodes, ..
+        } = *self;
         let columns = self.sums.len();
         let electrodes_x: [Parts; ELECTRODES] =
             std::array::from_fn(|electrode| differences.electrode_x(first_electrode + electrode));
-        let electrodes_x = &electrodes_x[..ELECTRODES.min(scale.nodes_per_column() - first_electrode)];
+        let electrodes_x = &electrodes_x[..ELECTRODES.min(electrodes - first_electrode)];
         for (block, sums) in self.sums.chunks_mut(LANES).enumerate() {
             let first = block * LANES;
             let columns_y: [Parts; LANES] = std::array::from_fn(|lane| differences.column_y(first + lane));

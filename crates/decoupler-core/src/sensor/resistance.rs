@@ -116,6 +116,7 @@ impl SensorModel {
             (self.scale, &self.geometry),
             row,
             displacements_mm,
+            self.scale.nodes_per_column(),
             resistances_ohm,
             &mut [],
         );
@@ -154,7 +155,8 @@ impl SensorModel {
         let (columns, nodes) = (self.scale.columns(), self.scale.nodes_per_row());
         let (mut sums, mut derivatives) = (vec![0.0; columns], vec![0.0; 3 * nodes * columns]);
         let sensor = (self.scale, &self.geometry);
-        sum_reciprocal_distances::<3, Divided>(sensor, row, displacements_mm, &mut sums, &mut derivatives);
+        let electrodes = self.scale.nodes_per_column();
+        sum_reciprocal_distances::<3, Divided>(sensor, row, displacements_mm, electrodes, &mut sums, &mut derivatives);
         Ok(Array3::from_shape_fn((columns, nodes, 3), |(column, node, axis)| {
             -resistances_ohm[column] / sums[column] * derivatives[(3 * node + axis) * columns + column]
         }))

@@ -347,7 +347,9 @@ impl Posterior {
             });
         }
         let unknowns = model.ranges.len();
-        self.priors[self.place(row)].append_to(&mut model.equations, unknowns, &at.displacements_mm, &self.ranges);
+        if let Some(prior) = self.priors.get(self.place(row)) {
+            prior.append_to(&mut model.equations, unknowns, &at.displacements_mm, &self.ranges);
+        }
         model.first_factors.clear();
         if let Some(earlier) = earlier {
             earlier.append_factors(&mut model.first_factors, at, &self.widths);

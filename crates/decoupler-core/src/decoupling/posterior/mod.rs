@@ -6,7 +6,6 @@ mod gaussian;
 mod iteration;
 mod likelihood;
 mod pack;
-mod row_prior;
 mod sampled;
 mod truncated;
 
@@ -17,14 +16,14 @@ use gaussian::{LinearModel, Point};
 use likelihood::Likelihood;
 use pack::LANES;
 use rand::Rng;
-use row_prior::RowPrior;
 
 use super::{
     DecodeError,
+    row_prior::GaussianPrior,
     row_problem::{Range, RowProblem, ranges},
 };
 use crate::{
-    scene::Scene,
+    scene::{Loading, Scene},
     sensor::{SensorError, SensorModel},
 };
 
@@ -40,13 +39,16 @@ pub struct Posterior {
     ranges: Vec<Range>,
     widths: Vec<f64>,
     rows: Vec<usize>,
-    priors: Vec<RowPrior>,
+    /// One for each row, cut to the ranges; none where nodes move on their own, uniformly within their ranges.
+    priors: Vec<GaussianPrior>,
     likelihood: Likelihood,
     propagation: Propagation,
     /// Rounds that each of the rows took when it was last solved: those that take the most begin.
     rounds: Vec<usize>,
 }
 
+/// A standard deviation, in proportion to the range, below which no pattern is taken as known beforehand.
+const SMALLEST_SPREAD: f64 = 1e-3;
 /// Largest number of linearisations. Six do as a rule, for conductance is nearly linear.
 const STEPS: usize = 60;
 
@@ -63,7 +65,10 @@ impl Posterior {
             widths: ranges.iter().map(|range| range.width()).collect(),
             ranges,
             rows: rows.to_vec(),
-            priors: RowPrior::of_rows(model, scene, rows, rng),
+            priors: match scene.loading {
+                Loading::RandomNodes => Vec::new(),
+                _ => GaussianPrior::of_rows(model, scene, rows, SMALLEST_SPREAD, rng),
+            },
             likelihood: Likelihood::new(scene.noise.in_test().source(model)?),
             propagation: Propagation::default(),
             rounds: vec![0; rows.len()],
@@ -72,7 +77,7 @@ impl Posterior {
 
     /// About how many bytes the priors of this many rows take while they are estimated.
     pub(crate) fn prior_bytes(scene: &Scene, rows: usize, unknowns_per_row: usize) -> u64 {
-        RowPrior::bytes(scene.loading, rows, unknowns_per_row)
+        GaussianPrior::bytes(scene.loading, rows, unknowns_per_row)
     }
 
     /// The same posterior of readings rounded to a part of `parts` of what they are taken to be rounded to: how finely they

@@ -2,7 +2,7 @@ use std::f64::consts::TAU;
 
 use super::{
     monitor::{Diagnosis, FaultCause, FaultyWire},
-    prior::GaussianPrior,
+    prior::FitPrior,
     row_fit::{Fitted, RowFit, View},
 };
 
@@ -41,7 +41,7 @@ pub(super) struct Evidence<'a> {
     /// Fit of one row-wire, and of two that touch.
     pub(super) one: &'a mut RowFit,
     pub(super) two: &'a mut RowFit,
-    pub(super) prior: &'a GaussianPrior,
+    pub(super) prior: &'a FitPrior,
     /// Row-wires read.
     pub(super) rows: &'a [usize],
     pub(super) columns: usize,

@@ -7,5 +7,5 @@ mod row_fit;
 mod shorts;
 
 pub use monitor::{Diagnosis, FaultCause, FaultEvent, FaultMonitor, FaultyWire};
-pub(super) use prior::GaussianPrior;
+pub(super) use prior::FitPrior;
 pub(super) use row_fit::{RowFit, View};

@@ -2,7 +2,7 @@ use std::fmt;
 
 use super::{
     evidence::{Evidence, Explained},
-    prior::GaussianPrior,
+    prior::FitPrior,
     row_fit::{RowFit, View},
     shorts::Shorts,
 };
@@ -30,7 +30,7 @@ use crate::{
 pub struct FaultMonitor {
     one: RowFit,
     two: RowFit,
-    prior: GaussianPrior,
+    prior: FitPrior,
     shorts: Shorts,
     rows: Vec<usize>,
     columns: usize,
@@ -94,7 +94,7 @@ impl FaultMonitor {
         let (one, scale) = (RowFit::new(model, scene, 1)?, model.scale);
         Ok(Self {
             two: RowFit::new(model, scene, 2)?,
-            prior: GaussianPrior::weak(model, scene),
+            prior: FitPrior::weak(model, scene),
             shorts: Shorts::new(
                 model,
                 scene,

@@ -2,8 +2,9 @@ use std::f64::consts::TAU;
 
 use glam::DVec3;
 
-use super::prior::{GaussianPrior, ranges_mm};
+use super::prior::FitPrior;
 use crate::{
+    decoupling::{Range, ranges},
     scene::Scene,
     sensor::{RowConductance, SensorError, SensorModel},
 };
@@ -26,7 +27,7 @@ pub(in crate::live) struct RowFit {
     pub(super) model: SensorModel,
     pub(super) axes: &'static [usize],
     conductance: RowConductance,
-    ranges_mm: Vec<(f64, f64)>,
+    ranges: Vec<Range>,
     /// Standard deviation of each reading relative to it: rows of the array × M4.
     deviations: Vec<f64>,
     /// Standard deviation of the gain error of a row; 0 for none.
@@ -56,7 +57,7 @@ pub(in crate::live) struct RowFit {
 #[derive(Clone, Copy)]
 pub(in crate::live) struct View<'a> {
     /// Row-wires with their priors: one, or two that touch.
-    pub(in crate::live) rows: &'a [(usize, &'a GaussianPrior)],
+    pub(in crate::live) rows: &'a [(usize, &'a FitPrior)],
     /// Readings in ohm: M4.
     pub(in crate::live) readings_ohm: &'a [f64],
     /// Column-wires that are left out.
@@ -99,13 +100,13 @@ impl RowFit {
                     .map(|&ohm| source.relative_to(ohm).own.max(SMALLEST_NOISE)),
             );
         }
-        let one_row_mm = ranges_mm(model, scene);
-        let unknowns = rows * one_row_mm.len() + usize::from(noise.drift > 0.0);
+        let ranges = ranges(model, scene);
+        let unknowns = rows * ranges.len() + usize::from(noise.drift > 0.0);
         Ok(Self {
             model: *model,
             axes: scene.movement.axes().indices(),
             conductance: RowConductance::new(model, scene.movement.axes()),
-            ranges_mm: one_row_mm,
+            ranges,
             deviations,
             // The rows of a snapshot, which are fitted one by one, share it: together they must not be charged for it more
             // than once.
@@ -132,7 +133,7 @@ impl RowFit {
 
     /// Finds the most probable deformation.
     pub(in crate::live) fn solve(&mut self, view: View<'_>) -> Fitted {
-        let n = self.ranges_mm.len();
+        let n = self.ranges.len();
         for (unknowns, (_, prior)) in self.unknowns.chunks_exact_mut(n).zip(view.rows) {
             unknowns.copy_from_slice(&prior.mean_mm);
         }
@@ -173,13 +174,13 @@ impl RowFit {
     }
 
     /// Takes the mean of a prior for the answer, where no reading determines anything.
-    pub(in crate::live) fn set_to(&mut self, prior: &GaussianPrior) {
+    pub(in crate::live) fn set_to(&mut self, prior: &FitPrior) {
         self.unknowns[..prior.mean_mm.len()].copy_from_slice(&prior.mean_mm);
     }
 
     /// Evaluates misfits and slopes at the unknowns; returns χ².
     fn evaluate(&mut self, view: View<'_>) -> f64 {
-        let (n, columns) = (self.ranges_mm.len(), self.model.scale.columns());
+        let (n, columns) = (self.ranges.len(), self.model.scale.columns());
         self.slopes.fill(0.0);
         self.log_ohm.fill(0.0);
         // First sums s and their slopes, of all rows, then logarithms of the resistances g/s̄ with s̄ the mean.
@@ -195,27 +196,16 @@ impl RowFit {
                 }
             }
             let slopes = &mut self.slopes[place * n * columns..(place + 1) * n * columns];
-            if view.nodes < self.model.scale.nodes_per_row() {
-                for k in 0..columns {
-                    let electrodes = 0..self.model.scale.nodes_per_column();
-                    let add = |node: usize, slope: DVec3| {
-                        for (place, &axis) in self.axes.iter().enumerate() {
-                            slopes[(node * self.axes.len() + place) * columns + k] += slope[axis];
-                        }
-                    };
-                    let nodes = (row, 0..view.nodes);
-                    self.log_ohm[k] += self
-                        .model
-                        .partial_sum(nodes, (k, electrodes), &self.displacements_mm, add);
-                }
-            } else {
-                self.conductance.evaluate(&self.model, row, &self.displacements_mm);
-                for (total, sum) in self.log_ohm.iter_mut().zip(self.conductance.sums()) {
-                    *total += sum;
-                }
-                for (unknown, slopes) in slopes.chunks_exact_mut(columns).enumerate() {
-                    slopes.copy_from_slice(self.conductance.derivatives(unknown));
-                }
+            let before_break = &self.displacements_mm[..view.nodes];
+            let electrodes = self.model.scale.nodes_per_column();
+            self.conductance
+                .evaluate_broken(&self.model, row, before_break, electrodes);
+            for (total, sum) in self.log_ohm.iter_mut().zip(self.conductance.sums()) {
+                *total += sum;
+            }
+            let slopes = slopes.chunks_exact_mut(columns).take(view.nodes * self.axes.len());
+            for (unknown, slopes) in slopes.enumerate() {
+                slopes.copy_from_slice(self.conductance.derivatives(unknown));
             }
         }
         let moving = view.rows.len() * n * columns;
@@ -253,7 +243,7 @@ impl RowFit {
     }
 
     fn misfit_of_prior(&self, view: View<'_>) -> f64 {
-        let n = self.ranges_mm.len();
+        let n = self.ranges.len();
         let mut total = 0.0;
         for (unknowns, (_, prior)) in self.unknowns.chunks_exact(n).zip(view.rows) {
             for (i, precision) in prior.precision.chunks_exact(n).enumerate() {
@@ -270,7 +260,7 @@ impl RowFit {
 
     /// Linearises where the misfits were evaluated: factors H, and sets the step to L⁻¹ of the gradient of −χ²/2.
     fn find_step(&mut self, view: View<'_>) {
-        let (n, columns, order) = (self.ranges_mm.len(), self.model.scale.columns(), self.unknowns.len());
+        let (n, columns, order) = (self.ranges.len(), self.model.scale.columns(), self.unknowns.len());
         for i in 0..order {
             let slopes = &self.slopes[i * columns..(i + 1) * columns];
             for (weighted, (slope, weight)) in self.weighted.iter_mut().zip(slopes.iter().zip(&self.weights)) {
@@ -313,7 +303,7 @@ impl RowFit {
     /// Takes the step, halved until χ² falls below `chi_squared`, which is returned; `None` leaves the unknowns where they
     /// were. No node leaves the ranges by more than their width, nor comes near a column-wire.
     fn take_step(&mut self, view: View<'_>, chi_squared: f64) -> Option<f64> {
-        let (n, moving) = (self.ranges_mm.len(), view.rows.len() * self.ranges_mm.len());
+        let (n, moving) = (self.ranges.len(), view.rows.len() * self.ranges.len());
         self.trial.copy_from_slice(&self.unknowns);
         let height_mm = self.model.geometry.height_mm;
         let deepest_mm = |high_mm: f64| 0.5 * (high_mm + height_mm);
@@ -322,16 +312,16 @@ impl RowFit {
             for (i, unknown) in self.unknowns.iter_mut().enumerate() {
                 *unknown = self.trial[i] + share * self.step[i];
                 if i < moving {
-                    let (low_mm, high_mm) = self.ranges_mm[i % n];
-                    let width_mm = high_mm - low_mm;
+                    let Range { lowest, highest } = self.ranges[i % n];
+                    let width_mm = highest - lowest;
                     let is_depth = self.axes[i % self.axes.len()] == 2;
-                    let highest_mm = high_mm + width_mm;
+                    let highest_mm = highest + width_mm;
                     let highest_mm = if is_depth {
-                        highest_mm.min(deepest_mm(high_mm))
+                        highest_mm.min(deepest_mm(highest))
                     } else {
                         highest_mm
                     };
-                    *unknown = unknown.clamp(low_mm - width_mm, highest_mm);
+                    *unknown = unknown.clamp(lowest - width_mm, highest_mm);
                 }
             }
             let next = self.evaluate(view);
@@ -345,21 +335,22 @@ impl RowFit {
 
     /// Coordinates in mm (3·M2) of the nodes of a row-wire, the `place`-th of the view, within the ranges of the scene.
     pub(in crate::live) fn coordinates(&self, row: usize, place: usize, coordinates_mm: &mut [f64]) {
-        let n = self.ranges_mm.len();
+        let n = self.ranges.len();
         let unknowns = self.unknowns[place * n..(place + 1) * n].chunks_exact(self.axes.len());
-        let ranges = self.ranges_mm.chunks_exact(self.axes.len());
+        let ranges = self.ranges.chunks_exact(self.axes.len());
         let nodes = coordinates_mm.chunks_exact_mut(3).zip(unknowns.zip(ranges)).enumerate();
         for (node, (coordinates_mm, (unknowns, ranges))) in nodes {
             let mut displacement = DVec3::ZERO;
-            for (&axis, (unknown, (low, high))) in self.axes.iter().zip(unknowns.iter().zip(ranges)) {
-                displacement[axis] = unknown.clamp(*low, *high);
+            for (&axis, (unknown, range)) in self.axes.iter().zip(unknowns.iter().zip(ranges)) {
+                displacement[axis] = range.clamp(*unknown);
             }
             coordinates_mm.copy_from_slice(&self.model.displaced_mm(row, node, displacement).to_array());
         }
     }
 }
 
-/// Cholesky factor L Lᵀ of a small symmetric positive definite matrix, kept between uses so that none allocates.
+/// Cholesky factor L Lᵀ of a small symmetric positive definite matrix, kept between uses so that none allocates. Up
+/// to order 16, that of usual row-wires, it is faster than the factorisation of faer, which is made for large ones.
 #[derive(Clone, Debug)]
 pub(super) struct Cholesky {
     order: usize,
@@ -412,12 +403,6 @@ impl Cholesky {
         }
     }
 
-    /// Replaces b by A⁻¹ b.
-    pub(super) fn solve(&self, b: &mut [f64]) {
-        self.solve_lower(b);
-        self.solve_upper(b);
-    }
-
     /// Replaces b by L⁻ᵀ b.
     pub(super) fn solve_upper(&self, b: &mut [f64]) {
         let n = self.order;
@@ -454,18 +439,17 @@ impl RowFit {
 
     /// ln R of a column that is broken before node `electrodes`, with its slopes as in [`Self::slopes_of`], after a fit of
     /// one row-wire.
-    pub(super) fn broken_column(&self, (row, column, electrodes): (usize, usize, usize), slopes: &mut [f64]) -> f64 {
-        slopes.fill(0.0);
-        let nodes = (row, 0..self.model.scale.nodes_per_row());
-        let add = |node: usize, slope: DVec3| {
-            for (place, &axis) in self.axes.iter().enumerate() {
-                slopes[node * self.axes.len() + place] += slope[axis];
-            }
-        };
-        let sum = self
-            .model
-            .partial_sum(nodes, (column, 0..electrodes), &self.displacements_mm, add);
-        slopes.iter_mut().for_each(|slope| *slope /= sum);
+    pub(super) fn broken_column(
+        &mut self,
+        (row, column, electrodes): (usize, usize, usize),
+        slopes: &mut [f64],
+    ) -> f64 {
+        self.conductance
+            .evaluate_broken(&self.model, row, &self.displacements_mm, electrodes);
+        let sum = self.conductance.sums()[column];
+        for (unknown, slope) in slopes.iter_mut().enumerate().take(self.ranges.len()) {
+            *slope = self.conductance.derivatives(unknown)[column] / sum;
+        }
         let gain = match slopes.last_mut().zip(self.unknowns.last()) {
             Some((slope, gain)) if self.common > 0.0 => {
                 *slope = -1.0;
@@ -488,7 +472,8 @@ mod tests {
         assert!(cholesky.factor(&matrix));
         // A x for x = (1, −2, 3), with the upper triangle that mirrors the lower one.
         let mut b = [-3.0, -3.5, 5.0];
-        cholesky.solve(&mut b);
+        cholesky.solve_lower(&mut b);
+        cholesky.solve_upper(&mut b);
         for (found, expected) in b.iter().zip([1.0, -2.0, 3.0]) {
             assert!((found - expected).abs() < 1e-14);
         }
