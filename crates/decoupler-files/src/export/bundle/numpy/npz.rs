@@ -1,5 +1,8 @@
-//! Arrays in NumPy's format 1.0 (`.npy`), kept in an uncompressed ZIP archive (`.npz`). Written and read here: the crates
-//! for it bring a parser of Python literals, and with that a C compiler, or compression and encryption.
+//! Arrays in NumPy's format 1.0 (`.npy`) in an uncompressed ZIP archive (`.npz`).
+
+use std::io::{Cursor, Read, Write};
+
+use zip::{CompressionMethod, DateTime, ZipArchive, ZipWriter, result::ZipResult, write::SimpleFileOptions};
 
 use crate::export::bundle::weights::Digits;
 
@@ -14,52 +17,21 @@ pub(super) struct NamedArray {
 }
 
 const MAGIC: &[u8] = b"\x93NUMPY\x01\x00";
-const LOCAL_FILE: u32 = 0x0403_4b50;
-const CENTRAL_FILE: u32 = 0x0201_4b50;
-const END: u32 = 0x0605_4b50;
-/// 1 January 1980, the first day of the format: the same network gives the same file.
-const DATE: u16 = (1 << 5) | 1;
-/// Version 2.0 of the format.
-const VERSION: u16 = 20;
 
-/// Writes the archive.
+/// Writes the archive. The same arrays always give the same bytes.
 pub(super) fn write(arrays: &[NamedArray]) -> Vec<u8> {
-    let (mut bytes, mut directory) = (Vec::new(), Vec::new());
-    for array in arrays {
-        let contents = write_array(array);
-        let (name, offset) = (format!("{}.npy", array.name), bytes.len() as u32);
-        let mut common = Vec::new();
-        for part in [VERSION, 0, 0, 0, DATE] {
-            common.extend(part.to_le_bytes());
+    let archive = || -> ZipResult<Vec<u8>> {
+        let options = SimpleFileOptions::default()
+            .compression_method(CompressionMethod::Stored)
+            .last_modified_time(DateTime::default());
+        let mut archive = ZipWriter::new(Cursor::new(Vec::new()));
+        for array in arrays {
+            archive.start_file(format!("{}.npy", array.name), options)?;
+            archive.write_all(&write_array(array))?;
         }
-        let size = contents.len() as u32;
-        for part in [crc32fast::hash(&contents), size, size] {
-            common.extend(part.to_le_bytes());
-        }
-        common.extend((name.len() as u16).to_le_bytes());
-        // No extra field.
-        common.extend(0_u16.to_le_bytes());
-        bytes.extend(LOCAL_FILE.to_le_bytes());
-        bytes.extend(&common);
-        bytes.extend(name.as_bytes());
-        bytes.extend(&contents);
-        directory.extend(CENTRAL_FILE.to_le_bytes());
-        directory.extend(VERSION.to_le_bytes());
-        directory.extend(&common);
-        // Comment, disk and attributes.
-        directory.extend([0; 10]);
-        directory.extend(offset.to_le_bytes());
-        directory.extend(name.as_bytes());
-    }
-    let (offset, count) = (bytes.len() as u32, arrays.len() as u16);
-    bytes.extend(&directory);
-    bytes.extend(END.to_le_bytes());
-    bytes.extend([0; 4]);
-    bytes.extend([count.to_le_bytes(), count.to_le_bytes()].concat());
-    bytes.extend((directory.len() as u32).to_le_bytes());
-    bytes.extend(offset.to_le_bytes());
-    bytes.extend([0; 2]);
-    bytes
+        Ok(archive.finish()?.into_inner())
+    };
+    archive().expect("writing to memory does not fail, and every array has a short name of its own and less than 4 GB")
 }
 
 fn write_array(array: &NamedArray) -> Vec<u8> {
@@ -95,19 +67,18 @@ fn write_array(array: &NamedArray) -> Vec<u8> {
 /// # Errors
 /// A description of the first damage.
 pub(super) fn read(bytes: &[u8]) -> Result<Vec<NamedArray>, String> {
-    let mut arrays = Vec::new();
-    let mut rest = bytes;
-    while u32_at(rest, 0)? == LOCAL_FILE {
-        let (checksum, size) = (u32_at(rest, 14)?, u32_at(rest, 22)? as usize);
-        let name_size = usize::from(u16_at(rest, 26)?);
-        let name = part(rest, 30, name_size)?;
-        let contents = part(rest, 30 + name_size, size)?;
-        let name = String::from_utf8_lossy(name).trim_end_matches(".npy").to_owned();
-        if crc32fast::hash(contents) != checksum {
-            return Err(format!("the checksum of '{name}' is wrong"));
-        }
-        arrays.push(read_array(name, contents)?);
-        rest = &rest[30 + name_size + size..];
+    let mut archive = ZipArchive::new(Cursor::new(bytes)).map_err(|error| error.to_string())?;
+    let mut arrays = Vec::with_capacity(archive.len());
+    for index in 0..archive.len() {
+        let mut entry = archive.by_index(index).map_err(|error| error.to_string())?;
+        let name = entry.name().map_err(|error| error.to_string())?;
+        let name = name.trim_end_matches(".npy").to_owned();
+        let mut contents = Vec::new();
+        // The checksum is verified at the end of the entry.
+        entry
+            .read_to_end(&mut contents)
+            .map_err(|error| format!("'{name}': {error}"))?;
+        arrays.push(read_array(name, &contents)?);
     }
     Ok(arrays)
 }
@@ -158,10 +129,6 @@ fn part(bytes: &[u8], start: usize, size: usize) -> Result<&[u8], String> {
 fn u16_at(bytes: &[u8], start: usize) -> Result<u16, String> {
     let two = part(bytes, start, 2)?;
     Ok(u16::from_le_bytes([two[0], two[1]]))
-}
-
-fn u32_at(bytes: &[u8], start: usize) -> Result<u32, String> {
-    Ok(u32::from(u16_at(bytes, start)?) | u32::from(u16_at(bytes, start + 2)?) << 16)
 }
 
 #[cfg(test)]
