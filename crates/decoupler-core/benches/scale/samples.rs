@@ -1,4 +1,4 @@
-//! Growth of an epoch's time and memory with the samples of a whole run, past those that it holds.
+//! Growth of an epoch's time and memory with the samples of a whole run.
 
 use std::{fs, process::Command};
 
@@ -16,10 +16,7 @@ const SAMPLES: [usize; 5] = [1000, 10_000, 100_000, 300_000, 999_000];
 
 pub(crate) fn print() {
     println!("\n## A run of 10×10_5×30 with 12 hidden nodes, Levenberg-Marquardt, one thread\n");
-    println!(
-        "Up to 100 000 samples are held; further ones are drawn again whenever they are needed. Memory is the most that"
-    );
-    println!("a process held, less what one holds that trains 100 samples.\n");
+    println!("Memory is the most that a process held, less what one holds that trains 100 samples.\n");
     println!("| samples | an epoch, ms | peak, MB | stated, MB |\n|---:|---:|---:|---:|");
     let min_mb = peak_mb(100);
     let mut times = Vec::new();
@@ -33,11 +30,7 @@ pub(crate) fn print() {
         let stated = Workload::of(&settings(samples)).unwrap().bytes as f64 * 1e-6;
         println!("| {samples} | {ms:.1} | {peak} | {stated:.0} |");
     }
-    println!(
-        "\nExponent {:.2} where all are held; beyond, a sample takes {:.1} times as long.",
-        exponent(&SAMPLES[..3], &times[..3]),
-        (times[4] - times[2]) / (SAMPLES[4] - SAMPLES[2]) as f64 / (times[2] / SAMPLES[2] as f64)
-    );
+    println!("\nExponent {:.2}.", exponent(&SAMPLES, &times));
 }
 
 fn settings(samples: usize) -> SimulatedSettings {

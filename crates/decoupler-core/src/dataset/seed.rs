@@ -41,13 +41,6 @@ pub enum Stream {
 /// Stream of the random initialisations after the first: this number plus the number of the initialisation.
 const FURTHER_STARTS: u64 = 1 << 32;
 
-/// Streams of the blocks of training samples that are drawn whenever they are needed: this number plus that of the block.
-const BLOCKS: u64 = 1 << 40;
-/// Streams of their noise: this number plus [`NOISES_OF_A_BLOCK`] times that of the block, plus that of the row-wire.
-const BLOCK_NOISE: u64 = 1 << 41;
-/// More than an array has row-wires.
-const NOISES_OF_A_BLOCK: u64 = 1024;
-
 impl Seed {
     /// Random number generator of one purpose.
     pub fn rng(self, stream: Stream) -> ChaCha8Rng {
@@ -62,23 +55,6 @@ impl Seed {
         if start > 0 {
             rng.set_stream(FURTHER_STARTS + start as u64);
         }
-        rng
-    }
-}
-
-impl Seed {
-    /// Random number generator of the deformations in a block of further training samples.
-    pub(crate) fn block_rng(self, block: usize) -> ChaCha8Rng {
-        let mut rng = self.rng(Stream::Training);
-        rng.set_stream(BLOCKS + block as u64);
-        rng
-    }
-
-    /// Random number generator of the noise in a block of further training samples, of one row or of all.
-    pub(crate) fn block_noise_rng(self, block: usize, row_index: Option<usize>) -> ChaCha8Rng {
-        let mut rng = self.rng(Stream::TrainingNoise);
-        let row = row_index.map_or(0, |index| index as u64 + 1);
-        rng.set_stream(BLOCK_NOISE + NOISES_OF_A_BLOCK * block as u64 + row);
         rng
     }
 }

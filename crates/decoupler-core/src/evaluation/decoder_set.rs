@@ -71,7 +71,7 @@ impl DecoderSet {
     /// # Errors
     /// If the settings are invalid.
     pub fn new(settings: &SimulatedSettings, networks: Option<Networks>) -> Result<Self, RunError> {
-        let training = settings.draw_held()?.0.training;
+        let training = settings.draw()?.0.training;
         Ok(Self::on_set((*settings).into(), training, networks))
     }
 

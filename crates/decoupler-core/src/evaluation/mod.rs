@@ -10,7 +10,6 @@ mod cross_validation;
 mod decoder_set;
 mod errors;
 pub mod experiments;
-mod further_samples;
 mod past_networks;
 mod preparation;
 mod pressed;

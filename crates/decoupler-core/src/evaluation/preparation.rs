@@ -156,16 +156,11 @@ impl Run {
     /// As [`Self::with_baselines`], without baselines and reference, on settings and sets that were checked.
     fn of_networks(
         settings: RunSettings,
-        RunSets {
-            split,
-            further,
-            test,
-            problem,
-        }: RunSets,
+        RunSets { split, test, problem }: RunSets,
         is_cancelled: &dyn Fn() -> bool,
         begin: impl FnOnce(&[Task]) -> Result<Vec<StartTrainer>, RunError>,
     ) -> Result<Option<Self>, RunError> {
-        let tasks = tasks(&settings, &split, further.as_ref(), &test)?;
+        let tasks = tasks(&settings, &split, &test)?;
         // The tasks hold the samples scaled; large sets need not be held twice.
         drop(split);
         let first = tasks.at(0);

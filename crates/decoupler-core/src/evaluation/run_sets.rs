@@ -1,9 +1,6 @@
 use std::sync::Arc;
 
-use super::{
-    Problem, RunError, RunSettings, SimulatedSettings, Simulation, Source, Workload,
-    further_samples::{FurtherSamples, MAX_HELD},
-};
+use super::{Problem, RunError, RunSettings, SimulatedSettings, Simulation, Source, Workload};
 use crate::{
     dataset::{Dataset, LARGEST_SAMPLES, Split, Stream, hold_out},
     network::Networks,
@@ -16,8 +13,6 @@ use crate::{
 pub struct RunSets {
     /// Training samples, and those held out for validation.
     pub split: Split,
-    /// Training samples beyond those held in memory.
-    pub(super) further: Option<Arc<FurtherSamples>>,
     /// Test samples.
     pub test: Arc<Dataset>,
     /// Description of the readings and targets.
@@ -30,7 +25,6 @@ impl RunSets {
         Self {
             problem: Arc::new(Problem::unnamed(test.channels(), test.outputs())),
             split,
-            further: None,
             test: Arc::new(test),
         }
     }
@@ -69,19 +63,8 @@ impl SimulatedSettings {
     /// # Errors
     /// If the settings are invalid.
     pub(crate) fn sets_unless(&self, is_cancelled: &dyn Fn() -> bool) -> Result<Option<RunSets>, RunError> {
-        let Some((split, test)) = self.draw_held_unless(is_cancelled)? else {
-            return Ok(None);
-        };
-        let further = FurtherSamples::of(self)?.map(Arc::new);
-        if let Some(further) = &further
-            && !further.check(is_cancelled)?
-        {
-            return Ok(None);
-        }
-        Ok(Some(RunSets {
-            further,
-            ..RunSets::new(split, test).described(self.source.problem())
-        }))
+        let sets = self.draw_unless(is_cancelled)?;
+        Ok(sets.map(|(split, test)| RunSets::new(split, test).described(self.source.problem())))
     }
 }
 
@@ -174,22 +157,6 @@ impl SimulatedSettings {
     /// If the settings are invalid.
     pub fn draw(&self) -> Result<(Split, Dataset), RunError> {
         Ok(self.draw_unless(&|| false)?.expect("nothing cancels it"))
-    }
-
-    /// As [`Self::draw`], but only those training samples that a run holds.
-    pub(crate) fn draw_held(&self) -> Result<(Split, Dataset), RunError> {
-        Ok(self.draw_held_unless(&|| false)?.expect("nothing cancels it"))
-    }
-
-    /// As [`Self::draw_held`]; returns `None` once `is_cancelled`, which is called after each set.
-    pub(super) fn draw_held_unless(
-        &self,
-        is_cancelled: &dyn Fn() -> bool,
-    ) -> Result<Option<(Split, Dataset)>, RunError> {
-        self.check_counts()?;
-        let mut held = *self;
-        held.source.samples = self.source.samples.min(MAX_HELD);
-        held.draw_unless(is_cancelled)
     }
 
     fn draw_unless(&self, is_cancelled: &dyn Fn() -> bool) -> Result<Option<(Split, Dataset)>, RunError> {

@@ -33,8 +33,7 @@ pub struct Simulation {
     pub sensor: SensorModel,
     /// Rows, axes, loading and noise that are modelled.
     pub scene: Scene,
-    /// Number of training samples, of all row-wires read together. A run holds up to 100 000; further ones are drawn again
-    /// whenever the training walks over them.
+    /// Number of training samples, of all row-wires read together.
     pub samples: usize,
     /// Number of held-out samples, drawn in addition to choose the best weights and to stop the training; 0 for none.
     pub validation_samples: usize,

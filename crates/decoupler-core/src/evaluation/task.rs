@@ -1,9 +1,4 @@
-use std::sync::Arc;
-
-use super::{
-    RunError, RunSettings, Simulation, Source,
-    further_samples::{FurtherSamples, ScaledFurther},
-};
+use super::{RunError, RunSettings, Simulation, Source};
 use crate::{
     dataset::{Dataset, PerRow, Split},
     network::{Inputs, MinMax, Shape},
@@ -19,11 +14,10 @@ pub(super) struct Task {
 }
 
 impl Task {
-    /// Scales the sets into a training problem. `further` are training samples that are not held, of one row or of all.
+    /// Scales the sets into a training problem.
     pub(super) fn new(
         settings: &RunSettings,
         training: &Dataset,
-        further: Option<(&Arc<FurtherSamples>, Option<usize>)>,
         validation: Option<&Dataset>,
         test: &Dataset,
     ) -> Result<Self, RunError> {
@@ -33,17 +27,8 @@ impl Task {
             let scaled = inputs.of(set.readings());
             Examples::new(scaled.view(), outputs.scale(set.targets()).view())
         };
-        let held = examples(training);
         let problem = Problem {
-            training: match further {
-                Some((further, row_index)) => held.followed_by(Arc::new(ScaledFurther {
-                    further: further.clone(),
-                    row_index,
-                    inputs: inputs.clone(),
-                    outputs: outputs.clone(),
-                })),
-                None => held,
-            },
+            training: examples(training),
             validation: validation.map(examples),
             test: Some(examples(test)),
         };
@@ -61,27 +46,20 @@ impl Task {
 }
 
 /// Returns the tasks of a run: one, or one per row-wire.
-pub(super) fn tasks(
-    settings: &RunSettings,
-    split: &Split,
-    further: Option<&Arc<FurtherSamples>>,
-    test: &Dataset,
-) -> Result<PerRow<Task>, RunError> {
+pub(super) fn tasks(settings: &RunSettings, split: &Split, test: &Dataset) -> Result<PerRow<Task>, RunError> {
     let Split { training, validation } = split;
     match settings.source.row_model() {
         RowModel::Shared => Ok(PerRow::shared(Task::new(
             settings,
             training,
-            further.map(|further| (further, None)),
             validation.as_ref(),
             test,
         )?)),
         RowModel::Each => {
             let of_row = |row| {
                 let validation = validation.as_ref().map(|set| set.of_row(row));
-                let further = further.map(|further| (further, Some(row)));
                 let (training, test) = (training.of_row(row), test.of_row(row));
-                Task::new(settings, &training, further, validation.as_ref(), &test)
+                Task::new(settings, &training, validation.as_ref(), &test)
             };
             let tasks = (0..training.row_count()).map(of_row);
             Ok(PerRow::each(tasks.collect::<Result<_, _>>()?))
@@ -115,7 +93,7 @@ mod tests {
             ..noise
         };
         let (split, test) = settings.draw().unwrap();
-        let task = Task::new(&settings.into(), &split.training, None, None, &test).unwrap();
+        let task = Task::new(&settings.into(), &split.training, None, &test).unwrap();
         task.scaling.0
     }
 

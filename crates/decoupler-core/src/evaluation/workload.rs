@@ -9,7 +9,7 @@ use std::{
 use faer::{Accum, Mat, Par, linalg::matmul::matmul};
 use glam::DVec3;
 
-use super::{RunError, SimulatedSettings, further_samples::MAX_HELD};
+use super::{RunError, SimulatedSettings};
 use crate::{
     decoupling::{DecoderKind, Posterior},
     network::{ScalingChoice, Shape},
@@ -23,12 +23,8 @@ use crate::{
 pub struct Workload {
     /// Memory at its peak, in bytes: samples, drawn and scaled, equations of all trainings, and priors of the rows.
     pub bytes: u64,
-    /// Number of training samples that are not held but drawn again whenever they are needed.
-    pub drawn_again: usize,
     /// Pairs of nodes in the resistances of all samples that are drawn.
     node_pairs: f64,
-    /// Pairs of nodes in the resistances of the samples that are drawn again in an epoch.
-    epoch_node_pairs: f64,
     /// Multiplications of an epoch of all trainings.
     epoch_multiplications: f64,
     /// Largest number of epochs.
@@ -57,12 +53,11 @@ impl Workload {
         let scale = source.sensor.scale;
         let whole = |samples: usize| samples.div_ceil(size.rows) * size.rows;
         let training = whole(source.samples);
-        let held = whole(source.samples.min(MAX_HELD));
         let held_out = whole(source.validation_samples) + whole(source.test_samples);
         let shape = largest_shape(settings);
         // Readings and targets: drawn, split, scaled, and in blocks for the training.
         let per_sample = 3 * scale.columns() + 3 * scale.coordinates_per_row() + shape.inputs + 1 + shape.outputs;
-        let samples = float_bytes(held.saturating_add(held_out), per_sample);
+        let samples = float_bytes(training.saturating_add(held_out), per_sample);
         let trainings = settings.starts * size.networks;
         let of_each = training.div_ceil(size.networks);
         let method = &settings.training.method;
@@ -77,19 +72,13 @@ impl Workload {
         let equations_bytes = (fewest..=shape.inputs).map(with_inputs).max().unwrap_or(0);
         let training_bytes = (equations_bytes as u64).saturating_add(float_bytes(shape.weights(), VECTORS));
         let priors = Posterior::prior_bytes(&source.scene, size.rows, size.unknowns / size.rows);
-        /// Times that an epoch walks over the samples: for a step that is rejected, one that is accepted, and its products.
-        const WALKS: f64 = 3.0;
-        let drawn_again = training - held;
         let per_row = node_pairs_per_row(&source.sensor);
         let bytes = samples
             .saturating_add(training_bytes.saturating_mul(trainings as u64))
             .saturating_add(priors);
         Ok(Self {
             bytes,
-            drawn_again,
-            // What is drawn again is also checked once.
             node_pairs: (training + held_out) as f64 * per_row,
-            epoch_node_pairs: WALKS * (settings.starts * drawn_again) as f64 * per_row,
             epoch_multiplications: trainings as f64 * method.epoch_multiplications(shape, of_each),
             epochs: settings.training.stopping.epochs,
         })
@@ -114,19 +103,16 @@ impl Workload {
     }
 
     /// Returns `true` if it takes this much memory or time that the user should know before it begins: a gigabyte, some
-    /// seconds to draw the samples, more samples than are held, or a second an epoch.
+    /// seconds to draw the samples, or a second an epoch.
     pub fn is_large(&self) -> bool {
-        self.bytes > 1_000_000_000
-            || self.node_pairs > 1e10
-            || self.drawn_again > 0
-            || self.epoch_multiplications > 1e10
+        self.bytes > 1_000_000_000 || self.node_pairs > 1e10 || self.epoch_multiplications > 1e10
     }
 
     /// Computes the time on this machine. The first time its speed is measured, which takes some 20 ms.
     pub fn time(&self) -> WorkloadTime {
         let speed = Speed::measured();
         let duration = |seconds: f64| Duration::try_from_secs_f64(seconds).unwrap_or(Duration::MAX);
-        let epoch = self.epoch_multiplications / speed.multiplications + self.epoch_node_pairs / speed.node_pairs;
+        let epoch = self.epoch_multiplications / speed.multiplications;
         WorkloadTime {
             drawing: duration(self.node_pairs / speed.node_pairs),
             epoch: duration(epoch),
@@ -263,20 +249,6 @@ mod tests {
             let workload = Workload::of(&settings(array, method, hidden)).unwrap();
             assert_eq!(workload.is_large(), is_large, "{array} {method} {hidden}: {workload:?}");
         }
-    }
-
-    /// Beyond those that are held, samples cost time and no memory except for the equations, which are bounded too.
-    #[test]
-    fn memory_does_not_grow_with_the_samples() {
-        let workload = |samples| {
-            let mut settings = settings("10x10_5x30", "lm", 12);
-            settings.source.samples = samples;
-            Workload::of(&settings).unwrap()
-        };
-        let (held, all) = (workload(MAX_HELD), workload(1_000_000));
-        assert_eq!((held.drawn_again, all.drawn_again), (0, 900_000));
-        assert!(all.bytes < held.bytes + 100_000_000, "{held:?} {all:?}");
-        assert!(all.time().epoch > 20 * held.time().epoch, "{held:?} {all:?}");
     }
 
     #[test]

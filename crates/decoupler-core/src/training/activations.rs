@@ -69,7 +69,11 @@ impl Activations {
 
     /// Mean squared error of `mlp` over samples and outputs.
     pub(super) fn mse(&mut self, mlp: &Mlp, examples: &Examples) -> f64 {
-        let squares = examples.blocks().map(|block| self.forward(mlp, &block)).sum::<f64>();
+        let squares = examples
+            .blocks()
+            .iter()
+            .map(|block| self.forward(mlp, block))
+            .sum::<f64>();
         squares / examples.errors()
     }
 }
@@ -97,7 +101,7 @@ impl KeptActivations {
     /// Allocates for samples that are worked on in up to `parts` parts.
     pub(super) fn new(shape: Shape, examples: &Examples, parts: usize) -> Self {
         let recomputed = all_bytes(shape, examples.samples()) > LARGEST_KEPT_BYTES;
-        let count = if recomputed { parts } else { examples.block_count() };
+        let count = if recomputed { parts } else { examples.blocks().len() };
         Self {
             buffers: vec![Activations::new(shape); count],
             recomputed,
@@ -125,10 +129,10 @@ impl KeptActivations {
             buffers = others;
             (blocks, own, 0.0)
         };
-        let mut parts: Vec<_> = parts(examples.block_count(), self.parts).map(part).collect();
+        let mut parts: Vec<_> = parts(examples.blocks().len(), self.parts).map(part).collect();
         for_each_part(&mut parts, |(numbers, own, squares)| {
             for (index, number) in numbers.clone().enumerate() {
-                *squares += own[index % own.len()].forward(mlp, &examples.block(number));
+                *squares += own[index % own.len()].forward(mlp, &examples.blocks()[number]);
             }
         });
         parts.iter().map(|(.., squares)| squares).sum()
@@ -143,14 +147,14 @@ impl KeptActivations {
         sums: &mut [S],
         work: impl Fn(&mut S, &BlockNow<'_>) + Sync + Send,
     ) {
-        let numbers = parts(examples.block_count(), sums.len());
+        let numbers = parts(examples.blocks().len(), sums.len());
         if self.recomputed {
             let mut parts: Vec<_> = numbers.zip(sums).zip(&mut self.buffers).collect();
             for_each_part(&mut parts, |((numbers, sums), activations)| {
                 for number in numbers.clone() {
-                    let block = examples.block(number);
-                    activations.forward(mlp, &block);
-                    work(sums, &BlockNow::new(number, &block, activations));
+                    let block = &examples.blocks()[number];
+                    activations.forward(mlp, block);
+                    work(sums, &BlockNow::new(number, block, activations));
                 }
             });
         } else {
@@ -159,7 +163,7 @@ impl KeptActivations {
                 for number in numbers.clone() {
                     work(
                         sums,
-                        &BlockNow::new(number, &examples.block(number), &self.buffers[number]),
+                        &BlockNow::new(number, &examples.blocks()[number], &self.buffers[number]),
                     );
                 }
             });

@@ -4,27 +4,22 @@
 
 use std::{
     fmt::Debug,
-    ops::Deref,
     sync::{Arc, OnceLock},
 };
 
 use faer::{Mat, MatMut, MatRef};
-use ndarray::{Array2, ArrayView2, Axis, Slice};
+use ndarray::{ArrayView2, Axis, Slice};
 
 use super::activations::scale_into;
 
 /// Number of samples in a block. Products run block by block, so that their operands stay in the cache and memory does
 /// not grow with the number of samples.
-pub(crate) const BLOCK: usize = 512;
+pub(super) const BLOCK: usize = 512;
 
 /// Scaled inputs and targets, cut into blocks of samples for the products of training. A clone shares the samples.
-///
-/// Blocks are held, or drawn whenever they are needed (`DrawnBlocks`).
 #[derive(Clone, Debug)]
 pub struct Examples {
     data: Arc<Data>,
-    /// Blocks that follow those held.
-    drawn: Option<Arc<dyn DrawnBlocks>>,
     samples: usize,
     inputs: usize,
     outputs: usize,
@@ -36,36 +31,6 @@ struct Data {
     blocks: Vec<Block>,
     /// Products of two input columns, block by block, once a method has asked for them.
     input_pairs: OnceLock<Vec<Mat<f64>>>,
-}
-
-/// Blocks of samples that are made again at each use, so that memory does not grow with their number. A block is the same
-/// each time.
-pub(crate) trait DrawnBlocks: Debug + Send + Sync {
-    /// Number of blocks.
-    fn blocks(&self) -> usize;
-
-    /// Number of samples of all blocks together.
-    fn samples(&self) -> usize;
-
-    /// Scaled inputs (samples × n) and targets (samples × m) of a block: at least one sample, at most [`BLOCK`].
-    fn block(&self, index: usize) -> (Array2<f64>, Array2<f64>);
-}
-
-/// A block that is held or was drawn for this use.
-pub(super) enum BlockRef<'a> {
-    Held(&'a Block),
-    Drawn(Box<Block>),
-}
-
-impl Deref for BlockRef<'_> {
-    type Target = Block;
-
-    fn deref(&self) -> &Block {
-        match self {
-            Self::Held(block) => block,
-            Self::Drawn(block) => block,
-        }
-    }
 }
 
 /// Up to [`BLOCK`] samples, each channel contiguous.
@@ -108,21 +73,9 @@ impl Examples {
                 blocks: (0..samples).step_by(BLOCK).map(cut).collect(),
                 input_pairs: OnceLock::new(),
             }),
-            drawn: None,
             samples,
             inputs: n,
             outputs: targets.ncols(),
-        }
-    }
-
-    /// The samples of `self`, then those of `drawn`, which have the same channels.
-    #[must_use]
-    pub(crate) fn followed_by(self, drawn: Arc<dyn DrawnBlocks>) -> Self {
-        debug_assert!(self.drawn.is_none() && self.data.input_pairs.get().is_none());
-        Self {
-            samples: self.samples + drawn.samples(),
-            drawn: Some(drawn),
-            ..self
         }
     }
 
@@ -149,42 +102,22 @@ impl Examples {
     /// Mean of each target.
     pub(super) fn target_means(&self) -> Vec<f64> {
         let sum = |index| -> f64 {
-            let of_block = |block: BlockRef<'_>| column(block.targets.as_ref(), index).iter().sum::<f64>();
-            self.blocks().map(of_block).sum()
+            let of_block = |block: &Block| column(block.targets.as_ref(), index).iter().sum::<f64>();
+            self.blocks().iter().map(of_block).sum()
         };
         (0..self.outputs)
             .map(|index| sum(index) / self.samples.max(1) as f64)
             .collect()
     }
 
-    /// The blocks that are held.
-    pub(super) fn held(&self) -> &[Block] {
+    pub(super) fn blocks(&self) -> &[Block] {
         &self.data.blocks
-    }
-
-    pub(super) fn block_count(&self) -> usize {
-        self.data.blocks.len() + self.drawn.as_ref().map_or(0, |drawn| drawn.blocks())
-    }
-
-    pub(super) fn block(&self, index: usize) -> BlockRef<'_> {
-        match (self.data.blocks.get(index), &self.drawn) {
-            (Some(block), _) => BlockRef::Held(block),
-            (None, Some(drawn)) => {
-                let (inputs, targets) = drawn.block(index - self.data.blocks.len());
-                BlockRef::Drawn(Box::new(Block::new(inputs.view(), targets.view())))
-            }
-            (None, None) => panic!("there is no block {index}"),
-        }
-    }
-
-    pub(super) fn blocks(&self) -> impl Iterator<Item = BlockRef<'_>> {
-        (0..self.block_count()).map(|index| self.block(index))
     }
 
     /// Returns the products of two input columns of each block, computed by `make` on the first call. `make` must not
     /// wait for other threads, which may be waiting here.
     pub(super) fn input_pairs(&self, mut make: impl FnMut(&Block) -> Mat<f64>) -> &[Mat<f64>] {
-        let all = || self.blocks().map(|block| make(&block)).collect();
+        let all = || self.blocks().iter().map(&mut make).collect();
         self.data.input_pairs.get_or_init(all)
     }
 }
@@ -212,10 +145,7 @@ pub(super) mod tests {
     use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
 
     use super::*;
-    use crate::{
-        network::{Mlp, Shape},
-        training::{Method, Problem, Trainer, TrainingSettings},
-    };
+    use crate::network::{Mlp, Shape};
 
     pub(in crate::training) fn random_examples(samples: usize, inputs: usize, outputs: usize, seed: u64) -> Examples {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
@@ -234,69 +164,6 @@ pub(super) mod tests {
             shape,
             (0..shape.weights()).map(|_| rng.random_range(-1.0..1.0)).collect(),
         )
-    }
-
-    /// Blocks that a test set holds, as if they were drawn.
-    #[derive(Debug)]
-    struct Kept {
-        inputs: Array2<f64>,
-        targets: Array2<f64>,
-    }
-
-    impl DrawnBlocks for Kept {
-        fn blocks(&self) -> usize {
-            self.samples().div_ceil(BLOCK)
-        }
-
-        fn samples(&self) -> usize {
-            self.inputs.nrows()
-        }
-
-        fn block(&self, index: usize) -> (Array2<f64>, Array2<f64>) {
-            let chunk = Slice::from(index * BLOCK..self.samples().min((index + 1) * BLOCK));
-            let part = |values: &Array2<f64>| values.slice_axis(Axis(0), chunk).to_owned();
-            (part(&self.inputs), part(&self.targets))
-        }
-    }
-
-    #[test]
-    fn every_method_takes_the_same_steps_on_drawn_samples_as_on_held_ones() {
-        let mut rng = ChaCha8Rng::seed_from_u64(7);
-        let samples = 2 * BLOCK + 90;
-        let mut draw = |columns| Array2::from_shape_simple_fn((samples, columns), || rng.random_range(-1.0..1.0));
-        let (inputs, targets) = (draw(4), draw(2));
-        let part = |values: &Array2<f64>, range: std::ops::Range<usize>| {
-            values.slice_axis(Axis(0), Slice::from(range)).to_owned()
-        };
-        let held = Examples::new(inputs.view(), targets.view());
-        let first = Examples::new(part(&inputs, 0..BLOCK).view(), part(&targets, 0..BLOCK).view());
-        let drawn = first.followed_by(Arc::new(Kept {
-            inputs: part(&inputs, BLOCK..samples),
-            targets: part(&targets, BLOCK..samples),
-        }));
-        assert_eq!(
-            (drawn.samples(), drawn.block_count(), drawn.held().len()),
-            (samples, 3, 1)
-        );
-        for method in Method::all() {
-            let trained = |training: &Examples| {
-                let problem = Problem {
-                    training: training.clone(),
-                    validation: None,
-                    test: None,
-                };
-                let settings = TrainingSettings {
-                    method,
-                    ..TrainingSettings::default()
-                };
-                let mut trainer = Trainer::new(random_mlp(4, 3, 2, 1), problem, settings).unwrap();
-                (0..4).for_each(|_| {
-                    trainer.step();
-                });
-                trainer.present().weights().to_vec()
-            };
-            assert_eq!(trained(&held), trained(&drawn), "{method}");
-        }
     }
 }
 

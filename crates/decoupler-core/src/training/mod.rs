@@ -27,7 +27,6 @@ pub use bayesian_regularization::RegularizationSettings;
 pub use checkpoint::{ResumeError, TrainerState};
 pub use epoch_columns::History;
 pub use examples::Examples;
-pub(crate) use examples::{BLOCK, DrawnBlocks};
 pub use gradient_descent::{AdaptiveDescentSettings, GradientDescentSettings, MomentumSettings, StepMomentumSettings};
 pub use levenberg_marquardt::Damping;
 pub use memory::{MachineMemory, MemorySource};

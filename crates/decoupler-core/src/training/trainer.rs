@@ -384,8 +384,7 @@ impl Evaluation {
 pub(super) fn correlation_time(mlp: &Mlp, examples: &Examples, lags: usize) -> f64 {
     let mut outputs = vec![Vec::new(); examples.outputs()];
     let mut activations = Activations::new(mlp.shape());
-    // Samples that are drawn again are independent, and their errors need not be held either.
-    for block in examples.held() {
+    for block in examples.blocks() {
         activations.forward(mlp, block);
         for (index, errors) in outputs.iter_mut().enumerate() {
             errors.extend_from_slice(&column(activations.errors.as_ref(), index)[..block.samples()]);

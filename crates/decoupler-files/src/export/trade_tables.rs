@@ -136,16 +136,9 @@ pub fn describe_workload(workload: &Workload) -> String {
         epoch,
         all_epochs,
     } = workload.time();
-    let drawn_again = match workload.drawn_again {
-        0 => String::new(),
-        samples => format!(
-            "; the last {} of the training are drawn again in every epoch instead of held, and fit the network only",
-            counted(samples, "sample")
-        ),
-    };
     format!(
         "about {}{machine} of memory; on one thread about {} to draw the samples and {} per epoch, {} for {}; the \
-         figures of the decoders take further time{drawn_again}",
+         figures of the decoders take further time",
         gigabytes(workload.bytes),
         format_duration(drawing),
         format_duration(epoch),

@@ -84,7 +84,7 @@ impl HiddenSolver for ConjugateGradient {
             sum: Mat::zeros(n1, h),
             hidden: [const { BLOCK }; 2].map(|block| Mat::zeros(block, h)),
         };
-        let parts = parts(shape, examples.block_count());
+        let parts = parts(shape, examples.blocks().len());
         Self {
             shape,
             mixing: Mat::zeros(h, h),

@@ -22,8 +22,7 @@ pub(super) fn jacobian(mlp: &Mlp, examples: &Examples) -> Mat<f64> {
     let (inputs, hidden, outputs) = (shape.inputs, shape.hidden, shape.outputs);
     let (w, v) = (mlp.hidden_layer(), mlp.output_layer());
     let mut jacobian = Mat::zeros(examples.samples() * outputs, shape.weights());
-    let blocks = Vec::from_iter(examples.blocks());
-    let samples = blocks.iter();
+    let samples = examples.blocks().iter();
     let samples = samples.flat_map(|block| (0..block.samples()).map(move |s| (block, s)));
     for (sample, (block, s)) in samples.enumerate() {
         let net = |i: usize| (0..=inputs).map(|a| block.inputs[(s, a)] * w[[a, i]]).sum::<f64>();

@@ -119,7 +119,7 @@ impl NormalEquations<SchurComplement> {
 impl<S: HiddenSolver + ?Sized> NormalEquations<S> {
     fn with_solver(solver: Box<S>, cost: &Cost, examples: &Examples) -> Self {
         let shape = cost.shape;
-        let gathering = cost.gathering_parts(examples.block_count());
+        let gathering = cost.gathering_parts(examples.blocks().len());
         Self {
             activations: KeptActivations::new(shape, examples, gathering.max(solver.parts())),
             products: Products::new(&*solver, cost, gathering),

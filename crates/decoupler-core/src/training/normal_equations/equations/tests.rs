@@ -141,7 +141,7 @@ fn every_class_of_weights_decays_at_its_own_rate() {
 fn parts_of_the_samples_add_up() {
     let (mlp, examples) = (random_mlp(20, 12, 5, 3), random_examples(40_000, 20, 5, 4));
     let expected = Backpropagation::new(&mlp).evaluate(&mlp, &examples);
-    let blocks = examples.block_count();
+    let blocks = examples.blocks().len();
     assert!(SchurComplement::cost(mlp.shape(), 40_000).gathering_parts(blocks) > 1);
     assert!(ConjugateGradient::cost(mlp.shape(), 40_000).gathering_parts(blocks) > 1);
     let [factored, iterated] = solvers(mlp.shape(), &examples).map(|(name, mut equations)| {
