@@ -11,7 +11,7 @@ use decoupler_core::{
     evaluation::{
         Channel, Measured, RunSettings, TargetErrors,
         recorded::{
-            ChannelImportance, Determinacy, Determination, Findings, FittedModel, Interval, LearningCurve, Stage,
+            ChannelImportance, Determinacy, Determination, Findings, FittedModel, Interval, LearningCurve, StudyStep,
         },
     },
     network::LARGEST_HIDDEN,
@@ -80,7 +80,7 @@ impl StudyArguments {
         let by = plan.division.by;
         let folds = import.folds.unwrap_or_else(|| by.folds_of(&recording.set, FOLDS));
         let bar = progress_bar(is_json, 4, "{bar:20} {msg}");
-        let begin = |stage: Stage| {
+        let begin = |stage: StudyStep| {
             bar.inc(1);
             bar.set_message(stage.to_string());
         };

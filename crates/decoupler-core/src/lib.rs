@@ -10,6 +10,7 @@
 //! | [`sensor`] | array scale, geometry, the resistance model and its Jacobian |
 //! | [`calibration`] | geometry and resistivity fitted to the readings of known deformations |
 //! | [`identifiability`] | deformation patterns that the readings determine, and how well |
+//! | [`machine`] | memory and speed of the machine |
 //! | [`scene`] | what happens to the sensor: rows, movement, loading, noise |
 //! | [`dataset`] | samples with their row-wire and snapshot, simulated or recorded; frames, folds, splits |
 //! | [`network`] | the three-layer network, its initialisation and scaling |
@@ -21,6 +22,28 @@
 //!
 //! The crate reads and writes no files and opens no window: `decoupler-files` has recordings, figures and exports, and the
 //! program `decoupler` the window and the commands.
+//!
+//! # Glossary
+//!
+//! One word for one thing, in the code, on screen and in print; the window explains further terms under the pointer.
+//!
+//! | word | meaning |
+//! |---|---|
+//! | row-wire, column-wire | a wire on top of the rubber, whose nodes move; a wire below it, at rest |
+//! | node | an electrode on a wire |
+//! | reading | the resistance between a row-wire and a column-wire in ohm, or one channel of another sensor |
+//! | target | a number to be decoded: a coordinate of a node in millimetres, or a measured quantity |
+//! | sample | the readings and targets of one row-wire at one moment; one row of a recording |
+//! | snapshot | the samples of all row-wires at one moment, which share one deformation |
+//! | frame | the readings of all row-wires at one moment, without targets: what a decoder in use receives |
+//! | group | samples that a division into training and test set keeps together: a snapshot, a subject, a session |
+//! | channel, output | column of the readings, column of the targets |
+//! | unknown | displacement of a node along an axis that moves |
+//! | residual | relative difference m/R − 1 between a reading and the model's resistance |
+//! | decoder | whatever computes targets from readings; [`decoupling::DecoderKind`] lists them |
+//! | run | a training with its settings, samples, networks and errors |
+//!
+//! A *row* is a row-wire in the numerics and a line of a table in files; a *line* is a line of text.
 //!
 //! # A tour
 //!
@@ -102,6 +125,7 @@ pub mod decoupling;
 pub mod evaluation;
 pub mod identifiability;
 pub mod live;
+pub mod machine;
 pub mod network;
 pub mod scene;
 pub mod sensor;

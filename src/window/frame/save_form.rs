@@ -20,12 +20,12 @@ pub struct Saving {
     pub task: FileTask,
     /// The path typed so far.
     pub path: String,
-    stage: Stage,
+    stage: PathEntry,
 }
 
-/// Stage of giving a path.
+/// PathEntry of giving a path.
 #[derive(Clone, Debug, PartialEq, Eq)]
-enum Stage {
+enum PathEntry {
     /// The form has just opened.
     Opening,
     /// The path is being typed.
@@ -54,7 +54,7 @@ impl Saving {
         Self {
             task,
             path,
-            stage: Stage::Opening,
+            stage: PathEntry::Opening,
         }
     }
 
@@ -65,19 +65,19 @@ impl Saving {
 
     /// Waits for what is at the path.
     pub(super) fn wait_for_look(&mut self) {
-        self.stage = Stage::Looking;
+        self.stage = PathEntry::Looking;
     }
 
     /// Takes what was found at a path; returns true if the file can be written there without a question.
     pub(super) fn take(&mut self, path: &Path, found: Found) -> bool {
         // Another path may have been typed since.
-        if self.stage != Stage::Looking || self.path() != path {
+        if self.stage != PathEntry::Looking || self.path() != path {
             return false;
         }
         match found {
             Found::Nothing => return true,
-            Found::File => self.stage = Stage::Asking,
-            Found::InUse(reason) => self.stage = Stage::Refused(reason),
+            Found::File => self.stage = PathEntry::Asking,
+            Found::InUse(reason) => self.stage = PathEntry::Refused(reason),
         }
         false
     }
@@ -98,7 +98,7 @@ pub fn save_form_ui(ui: &mut Ui, saving: &mut Saving) -> Option<Reply> {
         let has_entered = path_ui(ui, saving);
         ui.add_space(space(3));
         reply = match &saving.stage {
-            Stage::Asking => question_ui(ui, saving),
+            PathEntry::Asking => question_ui(ui, saving),
             _ => buttons_ui(ui, saving, has_entered),
         };
     });
@@ -119,18 +119,18 @@ fn path_ui(ui: &mut Ui, saving: &mut Saving) -> bool {
     if ui.memory(|memory| memory.focused().is_none()) {
         edit.request_focus();
     }
-    if saving.stage == Stage::Opening {
+    if saving.stage == PathEntry::Opening {
         select_all(ui.ctx(), id, &saving.path);
-        saving.stage = Stage::Typing;
+        saving.stage = PathEntry::Typing;
     }
     if edit.changed() {
-        saving.stage = Stage::Typing;
+        saving.stage = PathEntry::Typing;
     }
     match &saving.stage {
-        Stage::Refused(reason) => {
+        PathEntry::Refused(reason) => {
             note_ui(ui, &format!("{reason}."));
         }
-        Stage::Asking => {
+        PathEntry::Asking => {
             let name = saving.path();
             let name = name.file_name().unwrap_or(name.as_os_str()).to_string_lossy();
             note_ui(
@@ -138,10 +138,10 @@ fn path_ui(ui: &mut Ui, saving: &mut Saving) -> bool {
                 &format!("{name} exists already. Replacing it deletes its contents."),
             );
         }
-        Stage::Looking => {
+        PathEntry::Looking => {
             dim_ui(ui, "Looking whether a file of this name exists…");
         }
-        Stage::Opening | Stage::Typing => {}
+        PathEntry::Opening | PathEntry::Typing => {}
     }
     has_entered
 }
@@ -157,7 +157,7 @@ fn select_all(ctx: &Context, id: Id, path: &str) {
 fn buttons_ui(ui: &mut Ui, saving: &Saving, has_entered: bool) -> Option<Reply> {
     let mut reply = None;
     ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
-        let may_go = !saving.path.trim().is_empty() && saving.stage == Stage::Typing;
+        let may_go = !saving.path.trim().is_empty() && saving.stage == PathEntry::Typing;
         let is_clicked = ui.add_enabled(may_go, primary_button(saving.task.verb())).clicked();
         if is_clicked || (has_entered && may_go) {
             reply = Some(Reply::Path(saving.path()));

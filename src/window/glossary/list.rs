@@ -185,10 +185,15 @@ terms! { SENSOR_TERMS:
         "How far a reading has fallen below its value in the unloaded state, in percent.",
         "drop = 100 · (1 − R / R unloaded)";
     SNAPSHOT = "Snapshot",
-        "One reading of every row-wire at one moment, also called a frame. The samples of a snapshot share one \
-         deformation.";
+        "Samples of all row-wires at one moment, which share one deformation. Its readings alone, as they come from the \
+         sensor, are a frame.";
+    FRAME = "Frame",
+        "Readings of every row-wire at one moment, as they come from the sensor: what a decoder in use receives.";
     SAMPLE = "Sample",
-        "The readings of one row-wire at one moment, with the coordinates of its nodes.";
+        "The readings of one row-wire at one moment, with the coordinates of its nodes: one row of a recording.";
+    GROUP = "Group",
+        "Samples that belong together, such as those of a snapshot or of one subject, and are never divided between \
+         training and test.";
     DECOUPLING = "Decoupling",
         "Recovering the coordinates of each node from readings every one of which mixes many nodes.";
     HEIGHT = "Height",

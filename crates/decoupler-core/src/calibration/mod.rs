@@ -6,7 +6,7 @@
 
 mod equations;
 mod error;
-mod levenberg_marquardt;
+mod fit;
 mod report;
 #[cfg(test)]
 mod tests;

@@ -3,7 +3,7 @@ use std::{collections::BTreeMap, fmt};
 use super::{
     CalibrationError, PressLimits, PressedRow,
     equations::{COUNT, Slopes},
-    levenberg_marquardt::{Decomposition, Fitted, Linearised, fit, fit_with_prior, residuals, variances},
+    fit::{CalibratedFit, Decomposition, LinearisedFit, fit, fit_with_prior, residuals, variances},
 };
 use crate::sensor::{SensorModel, short};
 
@@ -85,13 +85,13 @@ impl Calibration {
             });
         }
         let references: Slopes = SensorParameter::ALL.map(|parameter| parameter.reference(nominal));
-        let start = Linearised::at(nominal, &references, samples);
+        let start = LinearisedFit::at(nominal, &references, samples);
         // A parameter that moves no reading, such as the row pitch where only the first row is read.
         let mut free: Vec<usize> = (0..COUNT).filter(|&index| start.gram[index][index] > 0.0).collect();
         let mut with_prior = true;
         let mut from = *nominal;
         loop {
-            let Fitted {
+            let CalibratedFit {
                 model,
                 here,
                 iterations,
@@ -162,7 +162,7 @@ impl Calibration {
 
 /// Variances that nominal values of the held parameters, wrong by their tolerance (two standard deviations), give to the
 /// fitted ones: those of −(J_fᵀJ_f)⁻¹ J_fᵀJ_h.
-fn held_variances(here: &Linearised, free: &[usize], decomposition: &Decomposition) -> Vec<f64> {
+fn held_variances(here: &LinearisedFit, free: &[usize], decomposition: &Decomposition) -> Vec<f64> {
     let mut sums = vec![0.0; free.len()];
     for held in (0..COUNT).filter(|index| !free.contains(index)) {
         let right: Vec<f64> = free.iter().map(|&index| here.gram[index][held]).collect();
@@ -307,7 +307,7 @@ impl fmt::Display for SensorParameter {
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum CalibrationWarning {
-    /// Fitted values are far from their nominal ones.
+    /// CalibratedFit values are far from their nominal ones.
     FarFromNominal {
         /// The parameters.
         parameters: Vec<CalibratedParameter>,

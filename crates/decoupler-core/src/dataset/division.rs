@@ -21,7 +21,7 @@ pub struct Division {
 
 /// Samples of each part of a divided set, as ascending indices.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Parts {
+pub struct DividedSamples {
     /// Samples that the training method fits.
     pub training: Vec<usize>,
     /// Samples that select the best weights; empty if nothing is held out.
@@ -76,7 +76,7 @@ impl Division {
     ///
     /// # Errors
     /// If a share is out of range, or the set is a single unit.
-    pub fn divide(&self, set: &Dataset, rng: &mut impl Rng) -> Result<Parts, DivisionError> {
+    pub fn divide(&self, set: &Dataset, rng: &mut impl Rng) -> Result<DividedSamples, DivisionError> {
         self.check()?;
         let mut units = self.by.ordered_units(set, rng);
         if units.len() < 2 {
@@ -93,7 +93,7 @@ impl Division {
     ///
     /// # Errors
     /// If a share is out of range.
-    pub fn divide_for_training(&self, set: &Dataset, rng: &mut impl Rng) -> Result<Parts, DivisionError> {
+    pub fn divide_for_training(&self, set: &Dataset, rng: &mut impl Rng) -> Result<DividedSamples, DivisionError> {
         self.check()?;
         Ok(self.parts(self.by.ordered_units(set, rng), Vec::new()))
     }
@@ -118,13 +118,13 @@ impl Division {
         })
     }
 
-    fn parts(&self, mut units: Vec<Vec<usize>>, test: Vec<usize>) -> Parts {
+    fn parts(&self, mut units: Vec<Vec<usize>>, test: Vec<usize>) -> DividedSamples {
         let validation = if units.len() > 1 && self.validation_fraction > 0.0 {
             take_last(&mut units, self.validation_fraction)
         } else {
             Vec::new()
         };
-        Parts {
+        DividedSamples {
             training: ascending(units),
             validation,
             test,
@@ -149,7 +149,7 @@ impl Division {
     }
 }
 
-impl Parts {
+impl DividedSamples {
     /// Returns the training and validation samples of `set`, the set that was divided.
     ///
     /// # Panics
@@ -203,7 +203,7 @@ mod tests {
         Dataset::new(values.clone(), values, None, groups).unwrap()
     }
 
-    fn divide(set: &Dataset, by: SplitBy, seed: u64) -> Result<Parts, DivisionError> {
+    fn divide(set: &Dataset, by: SplitBy, seed: u64) -> Result<DividedSamples, DivisionError> {
         let division = Division {
             by,
             test_fraction: 0.2,

@@ -13,7 +13,7 @@ mod seed;
 mod simulation;
 mod split;
 
-pub use division::{Division, DivisionError, Parts};
+pub use division::{DividedSamples, Division, DivisionError};
 pub use folds::{FoldUnit, Folds, FoldsError};
 pub use frames::{Frames, FramesError, PerRow};
 pub use samples::{Dataset, DatasetError, LARGEST_SAMPLES};

@@ -25,7 +25,7 @@ pub struct Dataset {
     targets: Array2<f64>,
     /// `None` if there are no row-wires, or those of the samples are unknown.
     rows: Option<SampleRows>,
-    /// Snapshot of each sample; equal numbers mean the same moment.
+    /// Group of each sample, which divisions keep together: its snapshot where row-wires are read together.
     groups: Vec<usize>,
 }
 

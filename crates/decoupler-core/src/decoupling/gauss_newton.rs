@@ -8,10 +8,10 @@ use crate::{
     sensor::{Axes, SensorModel},
 };
 
-/// Linearised equations for one step, in proportion to the ranges of the unknowns. Kept between steps so that none
+/// LinearisedRow equations for one step, in proportion to the ranges of the unknowns. Kept between steps so that none
 /// allocates.
 #[derive(Clone, Debug)]
-pub(super) struct Linearised {
+pub(super) struct LinearisedRow {
     /// Unknowns that may move: all, or those not held at a bound.
     free: Vec<usize>,
     /// Jacobian with −ρ as its last column: readings × (free unknowns + 1), row by row.
@@ -24,7 +24,7 @@ pub(super) struct Linearised {
     pub(super) step_mm: Vec<f64>,
 }
 
-impl Linearised {
+impl LinearisedRow {
     pub(super) fn new(unknowns: usize) -> Self {
         Self {
             free: Vec::with_capacity(unknowns),

@@ -2,6 +2,8 @@ use std::{fmt, str::FromStr};
 
 use thiserror::Error;
 
+use super::fitting::{self, Fit, FitProblem};
+
 /// Method of decoding the readings of a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum DecoderKind {
@@ -19,25 +21,6 @@ pub enum DecoderKind {
     Newton,
     /// Network followed by at most [`DecoderKind::POLISH_STEPS`] Gauss-Newton steps.
     Polish,
-}
-
-/// Colour of a decoder in charts, on screen and in print.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum ColourKey {
-    /// Grey, for decoders that serve only as a comparison.
-    Grey,
-    /// Violet.
-    Violet,
-    /// Blue, the network's own colour.
-    Blue,
-    /// Orange.
-    Orange,
-    /// Red.
-    Red,
-    /// Green.
-    Green,
-    /// Cyan.
-    Cyan,
 }
 
 /// Floating-point precision in which a network computes.
@@ -63,8 +46,8 @@ struct Entry {
     word: &'static str,
     name: &'static str,
     meaning: &'static str,
-    colour: ColourKey,
     needs: Needs,
+    fit: fn(&FitProblem<'_>) -> Fit,
 }
 
 /// Requirements of a decoder beyond training samples.
@@ -97,50 +80,50 @@ impl DecoderKind {
                 word: "mean",
                 name: "Training mean",
                 meaning: "Always answers the mean of the training set",
-                colour: ColourKey::Grey,
                 needs: Needs::Nothing,
+                fit: fitting::mean,
             },
             Self::Ridge => Entry {
                 word: "ridge",
                 name: "Ridge",
                 meaning: "The best affine map of the chosen inputs, ridge-regularised",
-                colour: ColourKey::Violet,
                 needs: Needs::Nothing,
+                fit: fitting::ridge,
             },
             Self::Network => Entry {
                 word: "network",
                 name: "Network",
                 meaning: "The trained network, in 64 or in 32 bits",
-                colour: ColourKey::Blue,
                 needs: Needs::Network,
+                fit: fitting::network,
             },
             Self::RadialBasis => Entry {
                 word: "rbf",
                 name: "Radial basis",
                 meaning: "A radial-basis network: Gaussians around centres among the training samples, fitted by least squares",
-                colour: ColourKey::Orange,
                 needs: Needs::Nothing,
+                fit: fitting::radial_basis,
             },
             Self::Fuzzy => Entry {
                 word: "fuzzy",
                 name: "Fuzzy rules",
                 meaning: "A Takagi-Sugeno system: fuzzy rules with affine consequents, as many as a cross-validation chooses",
-                colour: ColourKey::Cyan,
                 needs: Needs::Nothing,
+                fit: fitting::fuzzy,
             },
             Self::Newton => Entry {
                 word: "newton",
                 name: "Newton",
                 meaning: "Newton's method on Eq. (2) from mid-stroke, and other starts where that fails; with noise and prior where the scene has noise or the readings leave the answer open",
-                colour: ColourKey::Red,
                 needs: Needs::Sensor,
+                fit: fitting::newton,
             },
             Self::Polish => Entry {
                 word: "polish",
                 name: "Network + Newton",
                 meaning: "The network's answer, improved by at most three Newton steps",
-                colour: ColourKey::Green,
                 needs: Needs::NetworkAndSensor,
+                fit: fitting::polish,
             },
         }
     }
@@ -158,9 +141,9 @@ impl DecoderKind {
         self.entry().meaning
     }
 
-    /// Returns the colour in charts.
-    pub fn colour(self) -> ColourKey {
-        self.entry().colour
+    /// Returns the function that fits a decoder of this kind.
+    pub(super) fn fit_function(self) -> fn(&FitProblem<'_>) -> Fit {
+        self.entry().fit
     }
 
     /// Returns `true` if the decoder uses the trained network.
@@ -216,13 +199,5 @@ mod tests {
         }
         let message = "neural".parse::<DecoderKind>().unwrap_err().to_string();
         assert!(message.ends_with("newton or polish"), "{message}");
-    }
-
-    #[test]
-    fn colours_tell_decoders_apart() {
-        for (index, kind) in DecoderKind::ALL.into_iter().enumerate() {
-            let others = &DecoderKind::ALL[..index];
-            assert!(others.iter().all(|other| other.colour() != kind.colour()), "{kind}");
-        }
     }
 }

@@ -12,7 +12,7 @@
 //! | [`PolishedDecoder`] | another decoder's answer, improved by a few Gauss-Newton steps |
 //! | [`PosteriorDecoder`] | the Gauss-Newton method with noise and prior |
 //!
-//! [`DecoderKind`] lists them with their names, meanings and colours. Decoders of readings alone come as
+//! [`DecoderKind`] lists them with their names and meanings, and fits each. Decoders of readings alone come as
 //! [`PerRow`](crate::dataset::PerRow): one shared by all row-wires, or one per row-wire. [`resistance_residual`] tells
 //! how well an answer explains the readings, without ground truth. [`Description`] is what a decoder computes, in plain
 //! numbers, for programs that decode without this one.
@@ -23,6 +23,7 @@ mod compiled;
 mod decoder;
 mod description;
 mod equation_decoders;
+mod fitting;
 mod gauss_newton;
 mod kind;
 mod least_squares;
@@ -43,7 +44,8 @@ pub use compiled::{CompiledNetworks, Real};
 pub use decoder::{DecodeError, Decoder, SolvedRows, decode_set, resistance_residual};
 pub use description::{AffineLayer, Description, Layer, LayeredMap, NotDescribed};
 pub use equation_decoders::{NewtonDecoder, PolishedDecoder, PosteriorDecoder};
-pub use kind::{ColourKey, DecoderKind, DecoderKindError, Precision};
+pub use fitting::{Fit, FitError, FitProblem};
+pub use kind::{DecoderKind, DecoderKindError, Precision};
 pub use newton::{LARGEST_ERROR, Newton, NewtonReport, NewtonRules, NewtonStop, Solution};
 pub(crate) use posterior::SampledPosterior;
 pub use posterior::{Posterior, PosteriorReport};

@@ -4,7 +4,7 @@ use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
 
 use super::{
     DecodeError,
-    gauss_newton::{Linearised, Twins},
+    gauss_newton::{LinearisedRow, Twins},
     plain_newton::{PlainNewton, SHORTEST_SHARE},
     row_problem::{Range, RowProblem, ranges, wide_ranges},
     side_by_side::LANES,
@@ -29,7 +29,7 @@ pub struct Newton {
     /// Ranges that plain steps may not leave.
     wide: Vec<Range>,
     rules: NewtonRules,
-    linearised: Linearised,
+    linearised: LinearisedRow,
     twins: Twins,
     /// Buffer for the start of a row that is polished.
     start_mm: Vec<f64>,
@@ -53,7 +53,7 @@ impl Newton {
         let problem = RowProblem::new(model, scene.movement.axes());
         Self {
             plain: PlainNewton::new(model, scene),
-            linearised: Linearised::new(problem.unknowns()),
+            linearised: LinearisedRow::new(problem.unknowns()),
             problem,
             wide: wide_ranges(model, scene),
             ranges: ranges(model, scene),

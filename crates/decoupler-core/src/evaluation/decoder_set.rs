@@ -7,12 +7,8 @@ use super::{
     table::frame_us, task::unseen_noise,
 };
 use crate::{
-    dataset::{Dataset, PerRow, Stream},
-    decoupling::{
-        AffineMap, CompiledNetworks, Decoder, DecoderKind, NewtonDecoder, PolishedDecoder, Posterior, PosteriorDecoder,
-        Precision, RadialBasisNetwork, RadialBasisSettings, SolvedRows, TakagiSugeno, TrainingMean, decode_set,
-        resistance_residual,
-    },
+    dataset::Dataset,
+    decoupling::{Decoder, DecoderKind, FitProblem, Precision, SolvedRows, decode_set, resistance_residual},
     network::Networks,
     scene::RowModel,
     sensor::SensorModel,
@@ -65,7 +61,7 @@ pub struct DecoderSet {
 }
 
 impl DecoderSet {
-    /// Draws the training set of `settings`, as far as a run holds it: up to 100 000 samples. `networks` are those trained
+    /// Draws the training set of `settings`. `networks` are those trained
     /// with these settings.
     ///
     /// # Errors
@@ -95,50 +91,20 @@ impl DecoderSet {
     /// # Errors
     /// If samples cannot be scaled, or the sensor has no resistances at rest.
     pub fn decoder(&self, kind: DecoderKind, precision: Precision) -> Result<Option<Box<dyn Decoder>>, RunError> {
-        let Self { settings, training, .. } = self;
-        let (row_model, unseen) = (settings.source.row_model(), unseen_noise(&settings.source)?);
-        let mut rng = settings.seed.rng(Stream::Expectation);
-        Ok(Some(match kind {
-            DecoderKind::Mean => {
-                let fit = |set: &Dataset| Ok::<_, RunError>(TrainingMean::fit(set));
-                Box::new(PerRow::fit(training, row_model, fit)?)
-            }
-            DecoderKind::Ridge => {
-                let fit = |set: &Dataset| AffineMap::ridge(set, settings.inputs, unseen);
-                Box::new(PerRow::fit(training, row_model, fit)?)
-            }
-            DecoderKind::RadialBasis => {
-                let basis = RadialBasisSettings::default();
-                let fit = |set: &Dataset| RadialBasisNetwork::fit(set, settings.inputs, unseen, basis, &mut rng);
-                Box::new(PerRow::fit(training, row_model, fit)?) as Box<dyn Decoder>
-            }
-            DecoderKind::Fuzzy => {
-                let quantity = settings.inputs.quantity;
-                let fit = |set: &Dataset| TakagiSugeno::fit(set, quantity, unseen, &mut rng);
-                Box::new(PerRow::fit(training, row_model, fit)?)
-            }
-            DecoderKind::Network => return Ok(self.network(precision)),
-            DecoderKind::Newton | DecoderKind::Polish => {
-                let (Source::Simulated(simulation), Some(rows)) = (&settings.source, training.row_wires_read()) else {
-                    return Ok(None);
-                };
-                let (sensor, scene) = (&simulation.sensor, &simulation.scene);
-                if kind == DecoderKind::Polish {
-                    let Some(first) = self.network(Precision::Double) else {
-                        return Ok(None);
-                    };
-                    let steps = DecoderKind::POLISH_STEPS;
-                    Box::new(PolishedDecoder::new(first, sensor, scene, rows, steps, &mut rng)?)
-                } else {
-                    let posterior = Posterior::new(sensor, scene, rows, &mut rng)?;
-                    if scene.noise.in_test().is_none() {
-                        Box::new(NewtonDecoder::with_posterior(posterior, sensor, scene, rows)?)
-                    } else {
-                        Box::new(PosteriorDecoder::new(posterior, sensor, scene, rows)?)
-                    }
-                }
-            }
-        }))
+        Ok(kind.fit(&FitProblem {
+            training: &self.training,
+            row_model: self.settings.source.row_model(),
+            inputs: self.settings.inputs,
+            unseen: unseen_noise(&self.settings.source)?,
+            sensor: self
+                .settings
+                .source
+                .simulation()
+                .map(|simulation| (&simulation.sensor, &simulation.scene)),
+            networks: self.networks.as_ref(),
+            precision,
+            seed: self.settings.seed,
+        })?)
     }
 
     /// Fits the linear map of the error table.
@@ -147,16 +113,6 @@ impl DecoderSet {
     /// If samples cannot be scaled.
     pub fn linear(&self) -> Result<Box<dyn Decoder>, RunError> {
         Ok(Box::new(fit_baselines(&self.training, &self.settings)?.1))
-    }
-
-    /// Compiles the networks for decoding.
-    fn network(&self, precision: Precision) -> Option<Box<dyn Decoder>> {
-        let networks = self.networks.as_ref()?;
-        let rows = self.training.row_count();
-        Some(match precision {
-            Precision::Double => Box::new(CompiledNetworks::<f64>::new(networks, rows)),
-            Precision::Single => Box::new(CompiledNetworks::<f32>::new(networks, rows)),
-        })
     }
 
     /// Decoders that can be measured for this source, with the precisions of each, in the order offered to the user.
@@ -204,9 +160,11 @@ impl DecoderSet {
 
     /// Answers of the training mean to `test`.
     fn mean_answers(&self, test: &Dataset) -> Result<Array2<f64>, RunError> {
-        let fit = |set: &Dataset| Ok::<_, RunError>(TrainingMean::fit(set));
-        let mut mean = PerRow::fit(&self.training, self.settings.source.row_model(), fit)?;
-        Ok(decode_set(&mut mean, test)?)
+        let mean = self.decoder(DecoderKind::Mean, Precision::Double)?;
+        Ok(decode_set(
+            &mut *mean.expect("the mean needs neither networks nor a sensor"),
+            test,
+        )?)
     }
 
     /// Training samples of each fit, and readings of each sample.

@@ -6,11 +6,12 @@ use std::{
 use glam::DVec3;
 use ndarray::Array2;
 
-use super::{RunError, Simulation, run_sets::check_networks, workload::node_pairs_per_row};
+use super::{RunError, Simulation, run_sets::check_networks};
 use crate::{
     calibration::{PressLimits, PressedRow},
     dataset::{Dataset, PerRow, Split},
     decoupling::{DecodeError, Decoder},
+    machine::node_pairs_per_row,
     network::{DecouplingNetwork, Networks},
     scene::Touch,
     sensor::{SensorError, SensorModel},

@@ -13,13 +13,14 @@ use super::{
 };
 use crate::{
     dataset::{Dataset, DivisionError, FoldsError, PerRow, SimulationError},
-    decoupling::DecodeError,
+    decoupling::{DecodeError, FitError},
+    machine::MachineMemory,
     network::{DecouplingNetwork, Inputs, MinMax, Mlp, Networks, ScalingError},
     scene::SceneError,
     sensor::SensorError,
     training::{
-        MachineMemory, Method, ResumeError, SettingError, StopReason, StoppingRules, TrainerState, TrainingDefect,
-        TrainingError, check_width,
+        Method, ResumeError, SettingError, StopReason, StoppingRules, TrainerState, TrainingDefect, TrainingError,
+        check_width,
     },
 };
 
@@ -297,6 +298,9 @@ pub enum RunError {
     /// Samples cannot be drawn.
     #[error(transparent)]
     Simulation(#[from] SimulationError),
+    /// A decoder cannot be fitted.
+    #[error(transparent)]
+    Fit(#[from] FitError),
     /// Folds cannot be filled.
     #[error(transparent)]
     Folds(#[from] FoldsError),

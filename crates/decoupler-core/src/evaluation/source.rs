@@ -3,8 +3,9 @@ use std::{fmt, str::FromStr};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-use super::{SimulatedSettings, workload::node_pairs_per_row};
+use super::SimulatedSettings;
 use crate::{
+    machine::node_pairs_per_row,
     network::{InputChoice, Quantity, ScalingChoice},
     scene::{Indenter, Loading, Noise, RowModel, Rows, Scene, SceneError},
     sensor::{ArrayScale, SensorModel},

@@ -1,21 +1,11 @@
-//! Speed of the machine.
-
-use std::{
-    hint::black_box,
-    sync::OnceLock,
-    time::{Duration, Instant},
-};
-
-use faer::{Accum, Mat, Par, linalg::matmul::matmul};
-use glam::DVec3;
+use std::time::Duration;
 
 use super::{RunError, SimulatedSettings};
 use crate::{
     decoupling::{DecoderKind, Posterior},
+    machine::{MachineMemory, Speed, node_pairs_per_row},
     network::{ScalingChoice, Shape},
     scene::{Movement, Rows},
-    sensor::{ArrayScale, SensorModel},
-    training::MachineMemory,
 };
 
 /// Memory and work of a run, from the sizes in its settings alone, so that both are known before it begins.
@@ -155,68 +145,6 @@ fn largest_shape(settings: &SimulatedSettings) -> Shape {
 /// Bytes of this many rows of numbers.
 fn float_bytes(rows: usize, columns: usize) -> u64 {
     (rows as u64).saturating_mul((columns * size_of::<f64>()) as u64)
-}
-
-/// Work per second on one thread.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Speed {
-    /// Multiplications of large products.
-    pub(super) multiplications: f64,
-    /// Pairs of a node on a row-wire and one on a column-wire, in resistances.
-    pub(super) node_pairs: f64,
-}
-
-impl Speed {
-    /// Returns the speed, which is measured the first time; that takes some 20 ms.
-    pub(super) fn measured() -> Self {
-        static SPEED: OnceLock<Speed> = OnceLock::new();
-        *SPEED.get_or_init(|| Self {
-            multiplications: multiplications_per_second(),
-            node_pairs: node_pairs_per_second(),
-        })
-    }
-}
-
-/// Returns the best rate of a few repetitions, the first of which fills the caches.
-fn rate(work: f64, mut run: impl FnMut()) -> f64 {
-    const REPETITIONS: usize = 4;
-    let seconds = (0..REPETITIONS).map(|_| {
-        let begun = Instant::now();
-        run();
-        begun.elapsed().as_secs_f64()
-    });
-    work / seconds.fold(f64::INFINITY, f64::min).max(1e-9)
-}
-
-fn multiplications_per_second() -> f64 {
-    const SIZE: usize = 256;
-    let factor = Mat::from_fn(SIZE, SIZE, |row, column| (row * 7 + column * 3) as f64 * 1e-3);
-    let mut product = Mat::zeros(SIZE, SIZE);
-    rate(SIZE.pow(3) as f64, || {
-        matmul(product.as_mut(), Accum::Replace, &factor, &factor, 1.0, Par::Seq);
-        black_box(&product);
-    })
-}
-
-fn node_pairs_per_second() -> f64 {
-    const ROWS: usize = 200;
-    let sensor = SensorModel::new(ArrayScale::default());
-    let scale = sensor.scale;
-    let at_rest = vec![DVec3::ZERO; scale.nodes_per_row()];
-    let mut resistances_ohm = vec![0.0; scale.columns()];
-    rate(ROWS as f64 * node_pairs_per_row(&sensor), || {
-        for row in 0..ROWS {
-            // The default sensor has resistances at rest.
-            let _ = sensor.row_resistances_into(row % scale.rows(), &at_rest, &mut resistances_ohm);
-            black_box(&resistances_ohm);
-        }
-    })
-}
-
-/// Pairs of nodes in the resistances of a row-wire.
-pub(super) fn node_pairs_per_row(sensor: &SensorModel) -> f64 {
-    let scale = sensor.scale;
-    scale.nodes_per_row() as f64 * scale.nodes_per_column() as f64 * scale.columns() as f64
 }
 
 #[cfg(test)]

@@ -1,6 +1,6 @@
 use glam::DVec3;
 
-use super::faults::{Diagnosis, FaultCause, FaultyWire, FitPrior, RowFit, View};
+use super::faults::{Diagnosis, FaultCause, FaultyWire, FitPrior, RowFit, RowReadings};
 use crate::{
     dataset::{Seed, Stream},
     decoupling::{DecodeError, Decoder},
@@ -126,7 +126,7 @@ impl Decoder for LeftOutDecoder {
         let nodes = self.model.scale.nodes_per_row();
         let prior = &self.priors[row_index];
         let wire = self.fault.map(|fault| fault.wire);
-        let whole = View {
+        let whole = RowReadings {
             rows: &[(row, prior)],
             readings_ohm: readings,
             left_out: wire.map_or([None; 2], FaultyWire::columns),
@@ -134,7 +134,7 @@ impl Decoder for LeftOutDecoder {
         };
         match (wire, self.fault.map(|fault| fault.cause)) {
             (Some(FaultyWire::Row(faulty)), Some(FaultCause::Broken { before_node: nodes })) if faulty == row => {
-                self.one.solve(View { nodes, ..whole });
+                self.one.solve(RowReadings { nodes, ..whole });
                 self.one.coordinates(row, 0, targets);
             }
             (Some(FaultyWire::Row(faulty)), _) if faulty == row => {
@@ -148,7 +148,7 @@ impl Decoder for LeftOutDecoder {
                     (first, &self.priors[first_index]),
                     (first + 1, &self.priors[first_index + 1]),
                 ];
-                self.two.solve(View { rows: &rows, ..whole });
+                self.two.solve(RowReadings { rows: &rows, ..whole });
                 self.two.coordinates(row, place, targets);
             }
             _ => {

@@ -12,7 +12,7 @@ pub(super) struct FixedPoint {
 
 /// Length as a multiple of a grid and what is left.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Parts {
+pub(super) struct SplitLength {
     pub(super) upper: f64,
     pub(super) lower: f64,
 }
@@ -28,9 +28,9 @@ impl FixedPoint {
     }
 
     #[inline(always)]
-    pub(super) fn split(self, length: f64) -> Parts {
+    pub(super) fn split(self, length: f64) -> SplitLength {
         let upper = (length + self.shift) - self.shift;
-        Parts {
+        SplitLength {
             upper,
             lower: length - upper,
         }
@@ -38,17 +38,17 @@ impl FixedPoint {
 
     /// Returns a + b.
     #[inline(always)]
-    pub(super) fn sum(self, a: f64, b: f64) -> Parts {
+    pub(super) fn sum(self, a: f64, b: f64) -> SplitLength {
         let (sum, rest) = two_sum(a, b);
-        let Parts { upper, lower } = self.split(sum);
-        Parts {
+        let SplitLength { upper, lower } = self.split(sum);
+        SplitLength {
             upper,
             lower: lower + rest,
         }
     }
 }
 
-impl Parts {
+impl SplitLength {
     #[inline(always)]
     pub(super) fn plus(self, other: Self) -> Self {
         Self {

@@ -4,7 +4,7 @@ use thiserror::Error;
 
 use super::{
     ArrayScale,
-    fixed_point::{FixedPoint, Parts},
+    fixed_point::{FixedPoint, SplitLength},
     short,
 };
 
@@ -178,10 +178,10 @@ impl Geometry {
 pub(super) struct Differences {
     grid: FixedPoint,
     /// x of the row-wire minus that of the first node on the column-wires.
-    row_x: Parts,
-    electrode_pitch: Parts,
-    half_node_pitch: Parts,
-    half_column_pitch: Parts,
+    row_x: SplitLength,
+    electrode_pitch: SplitLength,
+    half_node_pitch: SplitLength,
+    half_column_pitch: SplitLength,
     nodes: usize,
     columns: usize,
 }
@@ -189,19 +189,19 @@ pub(super) struct Differences {
 impl Differences {
     /// x of a node shifted by `shift_mm` minus that of the first node on the column-wires.
     #[inline(always)]
-    pub(super) fn node_x(&self, shift_mm: f64) -> Parts {
+    pub(super) fn node_x(&self, shift_mm: f64) -> SplitLength {
         self.row_x.plus(self.grid.split(shift_mm))
     }
 
     /// x of the first node on the column-wires minus that of node `electrode`.
     #[inline(always)]
-    pub(super) fn electrode_x(&self, electrode: usize) -> Parts {
+    pub(super) fn electrode_x(&self, electrode: usize) -> SplitLength {
         self.electrode_pitch.times(-(electrode as f64))
     }
 
     /// y of node `node` shifted by `shift_mm` minus that of the middle of the array.
     #[inline(always)]
-    pub(super) fn node_y(&self, node: usize, shift_mm: f64) -> Parts {
+    pub(super) fn node_y(&self, node: usize, shift_mm: f64) -> SplitLength {
         let twice_from_centre = (2 * node) as f64 - (self.nodes - 1) as f64;
         self.half_node_pitch
             .times(twice_from_centre)
@@ -210,7 +210,7 @@ impl Differences {
 
     /// y of the middle of the array minus that of column-wire `column`.
     #[inline(always)]
-    pub(super) fn column_y(&self, column: usize) -> Parts {
+    pub(super) fn column_y(&self, column: usize) -> SplitLength {
         let twice_to_centre = (self.columns - 1) as f64 - (2 * column) as f64;
         self.half_column_pitch.times(twice_to_centre)
     }

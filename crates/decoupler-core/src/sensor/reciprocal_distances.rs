@@ -6,7 +6,7 @@ use pulp::{Simd, WithSimd};
 use super::{
     ArrayScale, Geometry,
     conductance::ReciprocalRoot,
-    fixed_point::{Parts, two_sum},
+    fixed_point::{SplitLength, two_sum},
     geometry::Differences,
 };
 
@@ -87,12 +87,12 @@ impl<const AXES: usize, R: ReciprocalRoot> Summation<'_, AXES, R> {
             geometry, electrodes, ..
         } = *self;
         let columns = self.sums.len();
-        let electrodes_x: [Parts; ELECTRODES] =
+        let electrodes_x: [SplitLength; ELECTRODES] =
             std::array::from_fn(|electrode| differences.electrode_x(first_electrode + electrode));
         let electrodes_x = &electrodes_x[..ELECTRODES.min(electrodes - first_electrode)];
         for (block, sums) in self.sums.chunks_mut(LANES).enumerate() {
             let first = block * LANES;
-            let columns_y: [Parts; LANES] = std::array::from_fn(|lane| differences.column_y(first + lane));
+            let columns_y: [SplitLength; LANES] = std::array::from_fn(|lane| differences.column_y(first + lane));
             let mut totals = [0.0; LANES];
             let mut rests = [0.0; LANES];
             totals[..sums.len()].copy_from_slice(sums);

@@ -14,10 +14,13 @@ use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use super::{
-    Examples, MachineMemory, Method, SettingError, StopReason, StoppingRules, activations::Activations,
-    examples::column, method::Running,
+    Examples, Method, SettingError, StopReason, StoppingRules, activations::Activations, examples::column,
+    method::Running,
 };
-use crate::network::{Mlp, Shape};
+use crate::{
+    machine::MachineMemory,
+    network::{Mlp, Shape},
+};
 
 /// The method and the stopping rules of a training.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]

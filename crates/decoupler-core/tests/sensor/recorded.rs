@@ -1,7 +1,7 @@
 //! What the recorded readings determine, judged on sets whose truth is known by construction.
 
 use decoupler_core::{
-    dataset::{Dataset, Division, Folds, Parts, Seed, SplitBy, Stream},
+    dataset::{Dataset, DividedSamples, Division, Folds, Seed, SplitBy, Stream},
     evaluation::{
         CrossValidated, Measured, RunSettings,
         recorded::{
@@ -126,7 +126,7 @@ fn a_learning_curve_foretells_the_error_with_twice_the_samples() {
     // Least squares with p = 20 readings: the error is σ √(1 + p/(n − p − 1)) for n samples, on average.
     let all = set(4000, 20, 6, |c, rng| c.iter().sum::<f64>() + 3.0 * normal(rng));
     let curve = |samples: usize, by| {
-        let parts = Parts {
+        let parts = DividedSamples {
             training: (0..samples).collect(),
             validation: Vec::new(),
             test: (2000..4000).collect(),

@@ -1,10 +1,9 @@
 //! Networks too wide for their equations to be factored.
 
 use decoupler_core::{
+    machine::MachineMemory,
     network::{Mlp, Shape},
-    training::{
-        Examples, MachineMemory, Method, Problem, StoppingRules, Trainer, TrainerState, TrainingError, TrainingSettings,
-    },
+    training::{Examples, Method, Problem, StoppingRules, Trainer, TrainerState, TrainingError, TrainingSettings},
 };
 use ndarray::Array2;
 

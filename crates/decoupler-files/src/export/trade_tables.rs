@@ -1,8 +1,8 @@
 use decoupler_core::{
     decoupling::Precision,
     evaluation::{TradeOffCost, TradeOffLevel, TradeOffPoint, Workload, WorkloadTime},
+    machine::{MachineMemory, MemorySource},
     text::counted,
-    training::{MachineMemory, MemorySource},
 };
 
 use super::{Cell, Table, TableColumn, format_duration};

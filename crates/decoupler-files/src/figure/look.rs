@@ -1,4 +1,4 @@
-use decoupler_core::decoupling::ColourKey;
+use decoupler_core::decoupling::DecoderKind;
 
 /// Role of a colour. The window resolves it by its theme, print by a palette for white paper; both tell the hues apart
 /// in grey and for most colour-blind readers.
@@ -22,16 +22,17 @@ pub enum Hue {
     Ink,
 }
 
-impl From<ColourKey> for Hue {
-    fn from(key: ColourKey) -> Self {
-        match key {
-            ColourKey::Grey => Self::Grey,
-            ColourKey::Violet => Self::Violet,
-            ColourKey::Blue => Self::Blue,
-            ColourKey::Orange => Self::Orange,
-            ColourKey::Red => Self::Red,
-            ColourKey::Green => Self::Green,
-            ColourKey::Cyan => Self::Cyan,
+impl Hue {
+    /// The hue of a decoder in charts, a different one for each.
+    pub fn of_decoder(kind: DecoderKind) -> Self {
+        match kind {
+            DecoderKind::Mean => Self::Grey,
+            DecoderKind::Ridge => Self::Violet,
+            DecoderKind::Network => Self::Blue,
+            DecoderKind::RadialBasis => Self::Orange,
+            DecoderKind::Fuzzy => Self::Cyan,
+            DecoderKind::Newton => Self::Red,
+            DecoderKind::Polish => Self::Green,
         }
     }
 }
@@ -130,5 +131,23 @@ impl Key {
     pub fn new(name: impl Into<String>, look: Look) -> Self {
         let name = name.into();
         Self { name, look }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn colours_tell_decoders_apart() {
+        for (index, kind) in DecoderKind::ALL.into_iter().enumerate() {
+            let others = &DecoderKind::ALL[..index];
+            assert!(
+                others
+                    .iter()
+                    .all(|&other| Hue::of_decoder(other) != Hue::of_decoder(kind)),
+                "{kind}"
+            );
+        }
     }
 }

@@ -45,7 +45,7 @@ pub fn trade_off_figure(level: &TradeOffLevel, limits: &TradeOffLimits) -> PlotF
     let mut keys = Vec::new();
     for kind in DecoderKind::ALL {
         let is_there = level.points.iter().any(|point| point.report.kind == kind);
-        let look = Look::marker(kind.colour().into(), Marker::Disc);
+        let look = Look::marker(Hue::of_decoder(kind), Marker::Disc);
         keys.extend(is_there.then(|| Key::new(kind.name(Precision::Double), look)));
     }
     for preset in Preset::ALL {
@@ -109,7 +109,7 @@ fn plot(level: &TradeOffLevel, limits: &TradeOffLimits, cost: TradeOffCost) -> P
                     label: is_on_front.then(|| point_label(point)),
                     ..PlotPoint::from(at(point))
                 });
-                let look = Look::marker(kind.colour().into(), marker(preset, precision));
+                let look = Look::marker(Hue::of_decoder(kind), marker(preset, precision));
                 let name = match preset {
                     Some(preset) => format!("{}, {preset} preset", kind.name(precision)),
                     None => kind.name(precision).to_owned(),

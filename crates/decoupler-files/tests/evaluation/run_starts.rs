@@ -3,8 +3,9 @@
 use decoupler_core::{
     dataset::Seed,
     evaluation::{MAX_STARTS, Run, RunError, SimulatedSettings, Simulation, StartTrainer, Workload, best_start},
+    machine::MachineMemory,
     sensor::SensorModel,
-    training::{MachineMemory, Method, StopReason, StoppingRules, Trainer},
+    training::{Method, StopReason, StoppingRules, Trainer},
 };
 
 fn settings(starts: usize) -> SimulatedSettings {

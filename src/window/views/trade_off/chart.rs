@@ -5,7 +5,7 @@
 use decoupler_core::evaluation::{TradeOffCost, TradeOffLevel, TradeOffPoint};
 use decoupler_files::{
     export::format_number,
-    figure::{PlotFigure, frame_time, point_facts, point_name, training_time},
+    figure::{Hue, PlotFigure, frame_time, point_facts, point_name, training_time},
 };
 use eframe::egui::{
     CursorIcon, Id, Pos2, Rect, Response, RichText, Sense, Stroke, Ui, Vec2, WidgetInfo, accesskit::Role,
@@ -193,7 +193,7 @@ pub fn table_ui(ui: &mut Ui, level: &TradeOffLevel, marked: &mut Option<usize>) 
             .labelled(label)
             .selected(*marked == Some(number))
             .meaning(MEANING)
-            .dot(hue_colour(point.report.kind.colour().into(), palette))
+            .dot(hue_colour(Hue::of_decoder(point.report.kind), palette))
     };
     let click = TableView::new("trade table", &columns)
         .clickable()

@@ -88,8 +88,8 @@ struct Shown<'a> {
     rows: usize,
 }
 
-/// Parts of the view that scroll apart from each other.
-struct Parts {
+/// TablePanes of the view that scroll apart from each other.
+struct TablePanes {
     /// Left end of the lines, scrolled.
     left: f32,
     /// Shift of the first column, which stays in sight.
@@ -100,7 +100,7 @@ struct Parts {
     columns: Rangef,
 }
 
-impl Parts {
+impl TablePanes {
     /// The part of `line` that the column in this place may be seen in.
     fn clip(&self, line: Rect, place: usize) -> Rect {
         if place == 0 || self.pin == 0.0 {
@@ -135,7 +135,7 @@ impl<'a> Shown<'a> {
         let scrolled = view.left() - origin.x;
         let first = self.widths.columns.first().map_or(0.0, |column| column.right);
         let is_pinned = scrolled > 0.0 && first <= MAX_PINNED * view.width();
-        let parts = Parts {
+        let parts = TablePanes {
             left: origin.x,
             pin: if is_pinned { scrolled } else { 0.0 },
             head: Rect::from_min_size(view.min, vec2(view.width(), height)),
@@ -159,7 +159,7 @@ impl<'a> Shown<'a> {
         click
     }
 
-    fn head_ui(&self, ui: &mut Ui, parts: &Parts) -> Option<TableClick> {
+    fn head_ui(&self, ui: &mut Ui, parts: &TablePanes) -> Option<TableClick> {
         let mut click = None;
         let clip = ui.clip_rect();
         let y = parts.head.y_range();
@@ -227,7 +227,7 @@ impl<'a> Shown<'a> {
         chosen
     }
 
-    fn line_ui(&self, ui: &mut Ui, parts: &Parts, place: usize, row: TableRow<'_>) -> Option<TableClick> {
+    fn line_ui(&self, ui: &mut Ui, parts: &TablePanes, place: usize, row: TableRow<'_>) -> Option<TableClick> {
         let line = ui.max_rect();
         let click = self.ground_ui(ui, parts, place, &row);
         if row.is_section {
@@ -309,7 +309,7 @@ impl<'a> Shown<'a> {
     }
 
     /// Shows the ground of a row. Returns what the user did with the row.
-    fn ground_ui(&self, ui: &Ui, parts: &Parts, place: usize, row: &TableRow<'_>) -> Option<TableClick> {
+    fn ground_ui(&self, ui: &Ui, parts: &TablePanes, place: usize, row: &TableRow<'_>) -> Option<TableClick> {
         let palette = Theme::of(ui).palette;
         let line = ui.max_rect();
         let underline = || {

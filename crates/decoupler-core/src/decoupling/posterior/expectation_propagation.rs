@@ -1,7 +1,7 @@
 use pulp::{Simd, WithSimd};
 
 use super::{
-    gaussian::{Direction, Gaussians, LinearModel},
+    gaussian::{Direction, LinearModel, RowPosteriors},
     pack::{LANES, Pack},
     truncated::{Marginal, Site},
 };
@@ -29,7 +29,7 @@ pub(super) const TOLERANCE: f64 = 1e-7;
 /// whatever is in the other lanes.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Propagation {
-    gaussians: Gaussians,
+    gaussians: RowPosteriors,
     of_unknowns: Vec<Site>,
     of_rounded: Vec<Site>,
     /// Forms of the rounded readings: rounded readings × unknowns.

@@ -15,7 +15,7 @@ use crate::decoupling::row_problem::Range;
 /// later update L, not Σ (Potter's square-root filter; Bierman, Factorization Methods for Discrete Sequential
 /// Estimation, 1977, section V.2). Variances are sums of squares.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Gaussians {
+pub(super) struct RowPosteriors {
     unknowns: usize,
     mean: Vec<Pack>,
     /// L, row by row: unknowns × unknowns.
@@ -48,7 +48,7 @@ pub(super) enum Direction<'a> {
     Form(&'a [Pack]),
 }
 
-impl Gaussians {
+impl RowPosteriors {
     /// Makes room for this many equations of all unknowns.
     pub(super) fn make_room(&mut self, unknowns: usize, equations: usize) {
         if (self.unknowns, self.equations) == (unknowns, equations) {
@@ -303,7 +303,7 @@ pub(super) struct Point {
 }
 
 /// The posterior of the equations linearised at a point.
-pub(super) struct Linearised {
+pub(super) struct LinearisedPosterior {
     at: Point,
     pub(super) marginals: Marginals,
     pub(super) means: Point,
@@ -311,7 +311,7 @@ pub(super) struct Linearised {
     pub(super) misfits: Vec<f64>,
 }
 
-impl Linearised {
+impl LinearisedPosterior {
     /// Appends the factors of the ranges, for displacements measured from another point.
     fn append_factors(&self, factors: &mut Vec<Factor>, at: &Point, widths: &[f64]) {
         let points = at.displacements_mm.iter().zip(&self.at.displacements_mm);
@@ -329,7 +329,7 @@ impl Posterior {
         model: &mut LinearModel,
         row: usize,
         (at, blur): (&Point, f64),
-        earlier: Option<&Linearised>,
+        earlier: Option<&LinearisedPosterior>,
     ) {
         self.likelihood
             .linearise(model, &self.problem, (at.drift, blur), &self.widths);
@@ -363,7 +363,7 @@ impl Posterior {
         at: &Point,
         blur: f64,
         mut marginals: Marginals,
-    ) -> Linearised {
+    ) -> LinearisedPosterior {
         let n = self.widths.len();
         let misfits = expected_misfits(model, self.problem.equations(), &marginals.of_unknowns, blur);
         let drift = marginals
@@ -372,7 +372,7 @@ impl Posterior {
             .map_or(0.0, |marginal| at.drift + marginal.mean);
         marginals.of_unknowns.truncate(n);
         let displacements_mm = self.displacements_mm(at, marginals.of_unknowns.iter().map(|marginal| marginal.mean));
-        Linearised {
+        LinearisedPosterior {
             at: at.clone(),
             means: Point {
                 displacements_mm,
@@ -384,7 +384,7 @@ impl Posterior {
     }
 
     /// The medians of the displacements.
-    pub(super) fn medians_mm(&self, found: &Linearised) -> Vec<f64> {
+    pub(super) fn medians_mm(&self, found: &LinearisedPosterior) -> Vec<f64> {
         self.displacements_mm(&found.at, medians(&found.marginals.of_unknowns).into_iter())
     }
 

@@ -5,7 +5,7 @@ use faer::Mat;
 use super::{
     Posterior, PosteriorReport,
     expectation_propagation::{Marginals, TOLERANCE},
-    gaussian::{LinearModel, Linearised, Point, RoundedReading},
+    gaussian::{LinearModel, LinearisedPosterior, Point, RoundedReading},
     pack::LANES,
 };
 use crate::{decoupling::LARGEST_ERROR, scene::normal_cdf};
@@ -28,7 +28,7 @@ struct Approach {
     /// Misfits there, and as the linearisation before expected them.
     misfits: Vec<f64>,
     expected: Option<Vec<f64>>,
-    last: Option<Linearised>,
+    last: Option<LinearisedPosterior>,
     variance: f64,
     determined: bool,
     converged: bool,

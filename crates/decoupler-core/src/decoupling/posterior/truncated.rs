@@ -1,6 +1,6 @@
 use super::{
     factor::{Factor, Ranges},
-    gaussian::Gaussians,
+    gaussian::RowPosteriors,
     pack::{LANES, Pack},
 };
 use crate::decoupling::row_problem::Range;
@@ -231,7 +231,7 @@ impl Site {
     #[inline(always)]
     pub(super) fn meet_range(
         &mut self,
-        gaussians: &mut Gaussians,
+        gaussians: &mut RowPosteriors,
         (mean, variance): (Pack, Pack),
         share: Pack,
     ) -> (Pack, Pack) {

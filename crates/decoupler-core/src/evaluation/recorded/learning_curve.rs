@@ -2,7 +2,7 @@ use rand::{Rng, RngExt, seq::SliceRandom};
 
 use super::{FittedModel, Interval, evidence::Resampling};
 use crate::{
-    dataset::{Dataset, Parts, Seed, Split, SplitBy, Stream},
+    dataset::{Dataset, DividedSamples, Seed, Split, SplitBy, Stream},
     decoupling::decode_set,
     evaluation::{Run, RunError, RunSettings, baselines::fit_baselines, cross_validation::nth_seed},
 };
@@ -38,7 +38,7 @@ pub struct Doubling {
 }
 
 /// Squared errors of one fit on the test set.
-struct Fitted {
+struct TestSquares {
     samples: usize,
     /// Samples × outputs.
     squares: ndarray::Array2<f64>,
@@ -58,7 +58,7 @@ impl LearningCurve {
     const WORTH_SAYING: f64 = 0.01;
 
     /// Fits `model` to all training samples of `parts`, to 1/√2 of them, and so on down to an eighth, and measures the
-    /// test samples, target by target; `None` if cancelled. Parts of the training set are stretches of the recording, whole
+    /// test samples, target by target; `None` if cancelled. DividedSamples of the training set are stretches of the recording, whole
     /// groups or single samples as `by` says, so that twice as many samples mean twice as long a recording, or twice as
     /// many groups. Takes up to 28 fits.
     ///
@@ -67,7 +67,7 @@ impl LearningCurve {
     pub fn measure(
         settings: &RunSettings,
         set: &Dataset,
-        (parts, by): (&Parts, SplitBy),
+        (parts, by): (&DividedSamples, SplitBy),
         model: FittedModel,
         is_cancelled: &dyn Fn() -> bool,
     ) -> Result<Option<Vec<Self>>, RunError> {
@@ -99,7 +99,7 @@ impl LearningCurve {
                 let Some(squares) = squared_errors(settings, seed, split, &test, model, is_cancelled)? else {
                     return Ok(None);
                 };
-                fits.push(Fitted {
+                fits.push(TestSquares {
                     samples: chosen.len(),
                     squares,
                 });
@@ -109,9 +109,9 @@ impl LearningCurve {
         Ok(Some((0..set.outputs()).map(curve).collect()))
     }
 
-    fn of_target(fits: &[Fitted], test: &Dataset, target: usize, by: SplitBy, rng: &mut impl Rng) -> Self {
-        let levels: Vec<&[Fitted]> = fits.chunk_by(|one, other| near(one.samples, other.samples)).collect();
-        let rmse = |fit: &Fitted| fit.squares.column(target).mean().unwrap_or(0.0).sqrt();
+    fn of_target(fits: &[TestSquares], test: &Dataset, target: usize, by: SplitBy, rng: &mut impl Rng) -> Self {
+        let levels: Vec<&[TestSquares]> = fits.chunk_by(|one, other| near(one.samples, other.samples)).collect();
+        let rmse = |fit: &TestSquares| fit.squares.column(target).mean().unwrap_or(0.0).sqrt();
         let points: Vec<LearningPoint> = levels.iter().map(|level| point(level, rmse)).collect();
         let law = law_of(&points);
         let doubling = law.and(points.last()).and_then(|all| {
@@ -194,7 +194,7 @@ fn near(one: usize, other: usize) -> bool {
     (0.85..1.18).contains(&ratio)
 }
 
-fn point(level: &[Fitted], rmse: impl Fn(&Fitted) -> f64) -> LearningPoint {
+fn point(level: &[TestSquares], rmse: impl Fn(&TestSquares) -> f64) -> LearningPoint {
     let errors: Vec<f64> = level.iter().map(rmse).collect();
     let count = level.len();
     LearningPoint {

@@ -16,4 +16,4 @@ pub use determination::{Determinacy, Determination, NonlinearGain, Undetermined}
 pub use evidence::FittedModel;
 pub use interval::Interval;
 pub use learning_curve::{Doubling, LearningCurve, LearningPoint, PowerLaw};
-pub use split_comparison::{Findings, SplitComparison, Stage, TargetFindings};
+pub use split_comparison::{Findings, SplitComparison, StudyStep, TargetFindings};

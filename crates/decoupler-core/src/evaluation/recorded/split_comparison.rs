@@ -137,7 +137,7 @@ pub struct TargetFindings {
 /// Part of the work of [`Findings::measure`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
-pub enum Stage {
+pub enum StudyStep {
     /// Cross-validation by the rule of the split.
     Folds,
     /// Cross-validation by other rules, to compare.
@@ -148,7 +148,7 @@ pub enum Stage {
     Samples,
 }
 
-impl fmt::Display for Stage {
+impl fmt::Display for StudyStep {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
             Self::Folds => "cross-validation",
@@ -176,7 +176,7 @@ impl Findings {
         set: &Dataset,
         (division, folds): (&Division, usize),
         model: Option<FittedModel>,
-        begin: &dyn Fn(Stage),
+        begin: &dyn Fn(StudyStep),
         is_cancelled: &dyn Fn() -> bool,
     ) -> Result<Option<Self>, RunError> {
         let by = division.by;
@@ -184,7 +184,7 @@ impl Findings {
         let validate = |by| -> Result<Option<CrossValidated>, RunError> {
             CrossValidated::on_folds(settings, set, folds_by(by)?, is_cancelled)
         };
-        begin(Stage::Folds);
+        begin(StudyStep::Folds);
         let judged = |answers: &Array2<f64>| Determination::measure(set, answers.view(), by);
         let (network, ridge, gains, comparison);
         if model == Some(FittedModel::Ridge) {
@@ -196,7 +196,7 @@ impl Findings {
             let Some(validated) = validate(by)? else {
                 return Ok(None);
             };
-            begin(Stage::OtherFolds);
+            begin(StudyStep::OtherFolds);
             let compared = SplitComparison::complete(settings, set, folds, (by, &validated), is_cancelled)?;
             let Some(compared) = compared else { return Ok(None) };
             network = judged(&validated.network).into_iter().map(Result::ok).collect();
@@ -217,11 +217,11 @@ impl Findings {
             FittedModel::Ridge
         };
         let model = model.unwrap_or(best);
-        begin(Stage::Channels);
+        begin(StudyStep::Channels);
         let Some(importance) = channel_importance(settings, set, (&folds_by(by)?, by), model, is_cancelled)? else {
             return Ok(None);
         };
-        begin(Stage::Samples);
+        begin(StudyStep::Samples);
         let parts = division.divide(set, &mut settings.seed.rng(Stream::Split))?;
         let Some(curves) = LearningCurve::measure(settings, set, (&parts, by), model, is_cancelled)? else {
             return Ok(None);

@@ -3,7 +3,7 @@ use std::f64::consts::TAU;
 use super::{
     monitor::{Diagnosis, FaultCause, FaultyWire},
     prior::FitPrior,
-    row_fit::{Fitted, RowFit, View},
+    row_fit::{RowFit, RowFitReport, RowReadings},
 };
 
 /// A hypothesis on the fault behind some frames, and how well it explains them.
@@ -70,7 +70,7 @@ struct Predicted {
 impl Evidence<'_> {
     /// Returns the most probable fault.
     pub(super) fn compare(mut self) -> Option<Explained> {
-        let sound: Vec<Fitted> = (0..self.lines())
+        let sound: Vec<RowFitReport> = (0..self.lines())
             .map(|line| self.fit(line, [None; 2], self.nodes_per_row))
             .collect();
         let mut hypotheses = Vec::new();
@@ -125,10 +125,10 @@ impl Evidence<'_> {
             .collect()
     }
 
-    fn fit(&mut self, line: usize, left_out: [Option<usize>; 2], nodes: usize) -> Fitted {
+    fn fit(&mut self, line: usize, left_out: [Option<usize>; 2], nodes: usize) -> RowFitReport {
         let rows = [(self.row(line), self.prior)];
         let readings_ohm = &self.frames_ohm[line * self.columns..(line + 1) * self.columns];
-        self.one.solve(View {
+        self.one.solve(RowReadings {
             rows: &rows,
             readings_ohm,
             left_out,
@@ -137,7 +137,7 @@ impl Evidence<'_> {
     }
 
     /// Faults of row-wires.
-    fn add_rows(&mut self, sound: &[Fitted], hypotheses: &mut Vec<Hypothesis>) {
+    fn add_rows(&mut self, sound: &[RowFitReport], hypotheses: &mut Vec<Hypothesis>) {
         let total = sum(sound);
         for index in 0..self.rows.len() {
             let row = self.rows[index];
@@ -168,7 +168,7 @@ impl Evidence<'_> {
             let (score, chi_squared, count) = self.no_signal(readings);
             add(wire, FaultCause::NoSignal, score, chi_squared, count);
             for before_node in 1..self.nodes_per_row {
-                let broken: Vec<Fitted> = lines
+                let broken: Vec<RowFitReport> = lines
                     .iter()
                     .map(|&line| self.fit(line, [None; 2], before_node))
                     .collect();
@@ -187,7 +187,7 @@ impl Evidence<'_> {
                 let next_lines: Vec<usize> = (next..self.lines()).step_by(self.rows.len()).collect();
                 let of_next = sum_of(sound, &next_lines);
                 let pairs = lines.iter().zip(&next_lines);
-                let both: Vec<Fitted> = pairs.map(|(&line, &next)| self.fit_shorted_rows(line, next)).collect();
+                let both: Vec<RowFitReport> = pairs.map(|(&line, &next)| self.fit_shorted_rows(line, next)).collect();
                 let both = sum(&both);
                 hypotheses.push(Hypothesis {
                     wire: FaultyWire::Rows(row),
@@ -203,7 +203,7 @@ impl Evidence<'_> {
     }
 
     /// Two rows that touch: their readings differ by noise only, and their geometric means are those of both rows.
-    fn fit_shorted_rows(&mut self, line: usize, next: usize) -> Fitted {
+    fn fit_shorted_rows(&mut self, line: usize, next: usize) -> RowFitReport {
         let (row, next_row) = (self.row(line), self.row(next));
         let (mut score, mut chi_squared) = (0.0, 0.0);
         let mut means_ohm = Vec::with_capacity(self.columns);
@@ -215,13 +215,13 @@ impl Evidence<'_> {
             chi_squared += misfit;
             score += misfit + (TAU * variance).ln();
         }
-        let fitted = self.two.solve(View {
+        let fitted = self.two.solve(RowReadings {
             rows: &[(row, self.prior), (next_row, self.prior)],
             readings_ohm: &means_ohm,
             left_out: [None; 2],
             nodes: self.nodes_per_row,
         });
-        Fitted {
+        RowFitReport {
             score: score + fitted.score,
             chi_squared: chi_squared + fitted.chi_squared,
             readings: self.columns + fitted.readings,
@@ -229,7 +229,7 @@ impl Evidence<'_> {
     }
 
     /// The column-wires without which Eq. (2) explains the worst lines of the last frame best, in ascending order.
-    fn suspects(&mut self, sound: &[Fitted]) -> Vec<usize> {
+    fn suspects(&mut self, sound: &[RowFitReport]) -> Vec<usize> {
         let mut lines: Vec<usize> = (self.lines() - self.rows.len()..self.lines()).collect();
         lines.sort_by(|&a, &b| sound[b].chi_squared.total_cmp(&sound[a].chi_squared));
         lines.truncate(WORST_LINES);
@@ -254,7 +254,7 @@ impl Evidence<'_> {
 
 /// Fits of all lines without one or two columns, and what they predict of those.
 struct ColumnLeftOut {
-    rest: Fitted,
+    rest: RowFitReport,
     /// The first column left out, unbroken and then broken before each node from 1 on; each for every line. `None` where the
     /// reading is certain, beyond the range of the converter.
     predicted: Vec<Vec<Option<Predicted>>>,
@@ -271,7 +271,7 @@ impl Evidence<'_> {
         let mut slopes = vec![0.0; self.one.unknowns.len()];
         let mut others = slopes.clone();
         let mut found = ColumnLeftOut {
-            rest: Fitted {
+            rest: RowFitReport {
                 score: 0.0,
                 chi_squared: 0.0,
                 readings: 0,
@@ -417,14 +417,14 @@ impl Level {
     }
 }
 
-fn sum(fits: &[Fitted]) -> Fitted {
-    Fitted {
+fn sum(fits: &[RowFitReport]) -> RowFitReport {
+    RowFitReport {
         score: fits.iter().map(|fit| fit.score).sum(),
         chi_squared: fits.iter().map(|fit| fit.chi_squared).sum(),
         readings: fits.iter().map(|fit| fit.readings).sum(),
     }
 }
 
-fn sum_of(fits: &[Fitted], lines: &[usize]) -> Fitted {
+fn sum_of(fits: &[RowFitReport], lines: &[usize]) -> RowFitReport {
     sum(&lines.iter().map(|&line| fits[line]).collect::<Vec<_>>())
 }

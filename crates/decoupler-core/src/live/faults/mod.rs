@@ -8,4 +8,4 @@ mod shorts;
 
 pub use monitor::{Diagnosis, FaultCause, FaultEvent, FaultMonitor, FaultyWire};
 pub(super) use prior::FitPrior;
-pub(super) use row_fit::{RowFit, View};
+pub(super) use row_fit::{RowFit, RowReadings};

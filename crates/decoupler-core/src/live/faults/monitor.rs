@@ -3,7 +3,7 @@ use std::fmt;
 use super::{
     evidence::{Evidence, Explained},
     prior::FitPrior,
-    row_fit::{RowFit, View},
+    row_fit::{RowFit, RowReadings},
     shorts::Shorts,
 };
 use crate::{
@@ -213,7 +213,7 @@ impl FaultMonitor {
             if left_out.is_some_and(|wire| wire.is_row(row)) {
                 continue;
             }
-            let fitted = self.one.solve(View {
+            let fitted = self.one.solve(RowReadings {
                 rows: &[(row, &self.prior)],
                 readings_ohm,
                 left_out: left_out.map_or([None; 2], FaultyWire::columns),
@@ -383,7 +383,7 @@ mod tests {
             let mut frame_ohm = [&[1e-3; 3], &of_row[..]].concat();
             frame_ohm[3] *= 1.0 + 1e-4 * f64::from(tenths);
             let is_explained = monitor.is_explained(&frame_ohm, Some(FaultyWire::Row(0)));
-            let fitted = monitor.one.solve(View {
+            let fitted = monitor.one.solve(RowReadings {
                 rows: &[(1, &monitor.prior)],
                 readings_ohm: &frame_ohm[3..],
                 left_out: [None; 2],

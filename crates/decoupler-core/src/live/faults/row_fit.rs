@@ -55,7 +55,7 @@ pub(in crate::live) struct RowFit {
 
 /// Readings of one row-wire, or the geometric means of those of two that touch, and how they are understood.
 #[derive(Clone, Copy)]
-pub(in crate::live) struct View<'a> {
+pub(in crate::live) struct RowReadings<'a> {
     /// Row-wires with their priors: one, or two that touch.
     pub(in crate::live) rows: &'a [(usize, &'a FitPrior)],
     /// Readings in ohm: M4.
@@ -68,7 +68,7 @@ pub(in crate::live) struct View<'a> {
 
 /// Fit of one row-wire.
 #[derive(Clone, Copy, Debug)]
-pub(in crate::live) struct Fitted {
+pub(in crate::live) struct RowFitReport {
     /// −2 ln of the probability density of the logarithms of the readings.
     pub(super) score: f64,
     /// Smallest χ².
@@ -132,7 +132,7 @@ impl RowFit {
     }
 
     /// Finds the most probable deformation.
-    pub(in crate::live) fn solve(&mut self, view: View<'_>) -> Fitted {
+    pub(in crate::live) fn solve(&mut self, view: RowReadings<'_>) -> RowFitReport {
         let n = self.ranges.len();
         for (unknowns, (_, prior)) in self.unknowns.chunks_exact_mut(n).zip(view.rows) {
             unknowns.copy_from_slice(&prior.mean_mm);
@@ -166,7 +166,7 @@ impl RowFit {
         } else {
             0.0
         };
-        Fitted {
+        RowFitReport {
             score: chi_squared + self.cholesky.log_determinant() - of_priors - of_gain + noise,
             chi_squared,
             readings: self.weights.iter().filter(|weight| **weight > 0.0).count(),
@@ -179,7 +179,7 @@ impl RowFit {
     }
 
     /// Evaluates misfits and slopes at the unknowns; returns χ².
-    fn evaluate(&mut self, view: View<'_>) -> f64 {
+    fn evaluate(&mut self, view: RowReadings<'_>) -> f64 {
         let (n, columns) = (self.ranges.len(), self.model.scale.columns());
         self.slopes.fill(0.0);
         self.log_ohm.fill(0.0);
@@ -242,7 +242,7 @@ impl RowFit {
         chi_squared
     }
 
-    fn misfit_of_prior(&self, view: View<'_>) -> f64 {
+    fn misfit_of_prior(&self, view: RowReadings<'_>) -> f64 {
         let n = self.ranges.len();
         let mut total = 0.0;
         for (unknowns, (_, prior)) in self.unknowns.chunks_exact(n).zip(view.rows) {
@@ -259,7 +259,7 @@ impl RowFit {
     }
 
     /// Linearises where the misfits were evaluated: factors H, and sets the step to L⁻¹ of the gradient of −χ²/2.
-    fn find_step(&mut self, view: View<'_>) {
+    fn find_step(&mut self, view: RowReadings<'_>) {
         let (n, columns, order) = (self.ranges.len(), self.model.scale.columns(), self.unknowns.len());
         for i in 0..order {
             let slopes = &self.slopes[i * columns..(i + 1) * columns];
@@ -302,7 +302,7 @@ impl RowFit {
 
     /// Takes the step, halved until χ² falls below `chi_squared`, which is returned; `None` leaves the unknowns where they
     /// were. No node leaves the ranges by more than their width, nor comes near a column-wire.
-    fn take_step(&mut self, view: View<'_>, chi_squared: f64) -> Option<f64> {
+    fn take_step(&mut self, view: RowReadings<'_>, chi_squared: f64) -> Option<f64> {
         let (n, moving) = (self.ranges.len(), view.rows.len() * self.ranges.len());
         self.trial.copy_from_slice(&self.unknowns);
         let height_mm = self.model.geometry.height_mm;

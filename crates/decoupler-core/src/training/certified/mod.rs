@@ -35,7 +35,7 @@ struct Problem {
 }
 
 /// Residuals at some parameters, and their Jacobian with respect to the parameters in units of the start.
-struct Linearised {
+struct LinearisedProblem {
     residuals: Mat<f64>,
     jacobian: Mat<f64>,
 }
@@ -48,7 +48,7 @@ struct Fit<'a> {
 }
 
 impl Fit<'_> {
-    fn linearised(&self, scaled: &[f64]) -> Linearised {
+    fn linearised(&self, scaled: &[f64]) -> LinearisedProblem {
         let parameters: Vec<Dual> = (0..scaled.len())
             .map(|k| Dual::parameter(k, scaled[k]) * self.units[k])
             .collect();
@@ -59,7 +59,7 @@ impl Fit<'_> {
             (self.model)(&parameters, &predictors) - response
         });
         let residuals: Vec<Dual> = responses.collect();
-        Linearised {
+        LinearisedProblem {
             residuals: Mat::from_fn(residuals.len(), 1, |row, _| residuals[row].value),
             jacobian: Mat::from_fn(residuals.len(), scaled.len(), |row, k| residuals[row].slopes[k]),
         }
@@ -100,7 +100,7 @@ impl Fit<'_> {
 }
 
 /// min ‖[J; √mu I] δ + [e; 0]‖
-fn step(at: &Linearised, mu: f64) -> Vec<f64> {
+fn step(at: &LinearisedProblem, mu: f64) -> Vec<f64> {
     let (rows, columns) = (at.jacobian.nrows(), at.jacobian.ncols());
     let matrix = Mat::from_fn(rows + columns, columns, |row, column| match row.checked_sub(rows) {
         None => at.jacobian[(row, column)],

@@ -12,7 +12,7 @@ pub(super) struct Exact {
     /// Outputs, exact except for their own last digits.
     pub(super) answers: Vec<f64>,
     /// Sums of magnitudes by which rounding errors grow.
-    pub(super) growth: Growth,
+    pub(super) growth: ErrorGrowth,
     /// Slopes of the outputs (outputs × channels) with respect to the changes of the readings.
     slopes: Array2<f64>,
 }
@@ -23,9 +23,9 @@ pub(super) struct Exact {
 /// An error bound of a sum is a multiple of its magnitudes (N. J. Higham, Accuracy and Stability of Numerical Algorithms,
 /// section 3.1), here carried through the layers behind it to the outputs.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Growth(pub(super) Vec<f64>);
+pub(super) struct ErrorGrowth(pub(super) Vec<f64>);
 
-impl Growth {
+impl ErrorGrowth {
     pub(super) fn largest(&self, other: &Self) -> Self {
         let at = |growth: &Self, layer: usize| growth.0.get(layer).copied().unwrap_or(0.0);
         let layers = self.0.len().max(other.0.len());
@@ -73,7 +73,7 @@ pub(super) fn decode_exactly(portable: &Portable, map: &FoldedMap, readings: &[f
     growth.reverse();
     Exact {
         answers: values.iter().map(|value| value.to_f64()).collect(),
-        growth: Growth(growth),
+        growth: ErrorGrowth(growth),
         slopes,
     }
 }

@@ -7,7 +7,7 @@ use decoupler_core::{
 use super::{
     choice::{ReadingRounding, Taking},
     error::BundleError,
-    exact::{Growth, decode_exactly},
+    exact::{ErrorGrowth, decode_exactly},
     exported_decoder::{Drawn, ExportedDecoder},
     meaning::Meaning,
     portable::Portable,
@@ -23,8 +23,8 @@ pub(super) struct Vectors {
     /// few of those drawn.
     all: Vec<Vector>,
     golden: usize,
-    /// Growth of rounding errors in the worst of them.
-    pub(super) growth: Growth,
+    /// ErrorGrowth of rounding errors in the worst of them.
+    pub(super) growth: ErrorGrowth,
     /// Changes of the answers by rounding the readings to the form that the bundle takes.
     pub(super) rounding: ReadingRounding,
     /// The bound of [`Self::rounding`] if a constant in the middle of each channel had been subtracted from the readings.
@@ -89,7 +89,7 @@ impl Vectors {
         let mut vectors = Self {
             all: Vec::new(),
             golden: readings.len() + golden,
-            growth: Growth::default(),
+            growth: ErrorGrowth::default(),
             rounding: ReadingRounding::default(),
             centred_bound: 0.0,
             program_deviation: 0.0,
@@ -314,7 +314,7 @@ impl Tolerance {
     /// The usual limit. Where the `deviation` of an evaluation comes near it, because the decoder's own sums let rounding
     /// errors grow this much, the bound on these: each of n numbers that are added up has a relative error of at most some
     /// n units (N. J. Higham, Accuracy and Stability of Numerical Algorithms, section 3.1).
-    pub(super) fn of(portable: &Portable, arithmetic: Arithmetic, growth: &Growth, deviation: f64) -> Self {
+    pub(super) fn of(portable: &Portable, arithmetic: Arithmetic, growth: &ErrorGrowth, deviation: f64) -> Self {
         /// Other programs add up in another order, and may be this much closer or farther.
         const NEAR: f64 = 0.5;
         // Next to the sums: difference, division, logarithm, weight and the function of a layer.

@@ -62,14 +62,14 @@ impl Surface {
                 let [width, height] = (card.bounds.size() - LABELS).max(Vec2::ONE).into();
                 let plot_box = PlotBox::new(min_mm, max_mm, height / width);
                 let axes = BoxAxes::new(card.measure, inner, plot_box, camera, &field.range, names);
-                let painted = self.paint(&field, &Stage::Space(&axes.projection), card);
+                let painted = self.paint(&field, &Projector::Space(&axes.projection), card);
                 let sight = Sight::of_projection(&axes.projection);
                 (axes.lines(), axes.labels, painted, sight)
             }
             ViewMode::Top => {
                 let names = [names[0], names[1]];
                 let axes = PlanAxes::new(card.measure, inner, min_mm.truncate(), max_mm.truncate(), names);
-                let painted = self.paint(&field, &Stage::Plan(&axes), card);
+                let painted = self.paint(&field, &Projector::Plan(&axes), card);
                 let sight = Sight::of_plan(&axes);
                 (axes.lines(), axes.labels, painted, sight)
             }
@@ -84,7 +84,7 @@ impl Surface {
         }
     }
 
-    fn paint(&self, field: &Field<'_>, stage: &Stage<'_>, card: &Card<'_>) -> (Mesh, Dots) {
+    fn paint(&self, field: &Field<'_>, stage: &Projector<'_>, card: &Card<'_>) -> (Mesh, Dots) {
         if field.values.is_empty() {
             return <(Mesh, Dots)>::default();
         }
@@ -107,14 +107,14 @@ fn note(has_plateau: bool, nodes: usize) -> Option<String> {
 }
 
 /// Mapping of places to points on the screen.
-pub(super) enum Stage<'a> {
+pub(super) enum Projector<'a> {
     /// In space, lit.
     Space(&'a Projection),
     /// From above.
     Plan(&'a PlanAxes<'a>),
 }
 
-impl Stage<'_> {
+impl Projector<'_> {
     /// Returns the position on the screen of a place with a value.
     pub(super) fn point(&self, place: DVec3) -> Vec2 {
         match self {

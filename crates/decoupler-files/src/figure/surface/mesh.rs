@@ -7,7 +7,7 @@ use glam::{DVec3, Vec2, Vec3};
 use super::{
     camera::Shade,
     cut::{cross_cell, cut_cell, plateau_marks},
-    drawing::Stage,
+    drawing::Projector,
     field::{CellPart, Field},
 };
 use crate::figure::{
@@ -56,7 +56,7 @@ pub struct Mesh {
 
 impl Mesh {
     /// The surface in the colours of `map`.
-    pub(super) fn new(field: &Field<'_>, stage: &Stage<'_>, map: &ColourMap) -> Self {
+    pub(super) fn new(field: &Field<'_>, stage: &Projector<'_>, map: &ColourMap) -> Self {
         let (x_mm, y_mm) = (field.grid.x_mm(), field.grid.y_mm());
         let mut mesh = Self {
             vertices: vertices(field, stage, map),
@@ -95,7 +95,7 @@ impl Mesh {
     }
 
     /// Appends what the box leaves of a cell.
-    fn cut(&mut self, ix: usize, iy: usize, field: &Field<'_>, stage: &Stage<'_>) {
+    fn cut(&mut self, ix: usize, iy: usize, field: &Field<'_>, stage: &Projector<'_>) {
         let of_cell = field.corners(ix, iy).map(|corner| self.vertices[corner]);
         let (low, high) = (*field.shown().start(), *field.shown().end());
         let keeps_plateau = field.keeps_plateau(ix, iy);
@@ -120,7 +120,7 @@ impl Mesh {
         &mut self,
         cells: &[(usize, usize)],
         field: &Field<'_>,
-        stage: &Stage<'_>,
+        stage: &Projector<'_>,
         is_black: impl Fn(f64) -> bool,
     ) {
         let is_beyond =
@@ -144,7 +144,7 @@ impl Mesh {
         &mut self,
         cells: &[(usize, usize)],
         field: &Field<'_>,
-        stage: &Stage<'_>,
+        stage: &Projector<'_>,
         (levels, inks): (&[f64], &[bool]),
     ) {
         for &(ix, iy) in cells {
@@ -233,7 +233,7 @@ pub struct Vertex {
 }
 
 /// One vertex for every grid point, in their order.
-pub(super) fn vertices(field: &Field<'_>, stage: &Stage<'_>, map: &ColourMap) -> Vec<Vertex> {
+pub(super) fn vertices(field: &Field<'_>, stage: &Projector<'_>, map: &ColourMap) -> Vec<Vertex> {
     let (x_mm, y_mm) = (field.grid.x_mm(), field.grid.y_mm());
     let across = y_mm.len();
     let places = field.values.iter().enumerate().map(|(index, &value)| {
@@ -253,10 +253,10 @@ pub(super) fn vertices(field: &Field<'_>, stage: &Stage<'_>, map: &ColourMap) ->
         }
     };
     match stage {
-        Stage::Plan(plan) => places
+        Projector::Plan(plan) => places
             .map(|(ix, iy, place)| vertex(ix, iy, plan.point(place.truncate()), place.z, 1.0))
             .collect(),
-        Stage::Space(projection) => {
+        Projector::Space(projection) => {
             let plot_box = projection.plot_box;
             let (low, high) = (plot_box.min_mm.z, plot_box.max_mm.z);
             let in_box = |place: DVec3| plot_box.unit(place.with_z(place.z.clamp(low, high)));
@@ -340,7 +340,7 @@ mod tests {
         for turn in 0..6 {
             let camera = OrbitCamera::default().dragged(140.0 * turn as f32, 12.0 * turn as f32 - 40.0);
             let projection = Projection::fit(plot_box, camera, screen);
-            let mesh = Mesh::new(&field, &Stage::Space(&projection), colours);
+            let mesh = Mesh::new(&field, &Projector::Space(&projection), colours);
             let distance = |index: usize| {
                 let (x_mm, y_mm) = (field.grid.x_mm(), field.grid.y_mm());
                 let z = field.values[index].clamp(min_mm.z, max_mm.z);

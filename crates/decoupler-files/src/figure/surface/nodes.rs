@@ -3,7 +3,7 @@
 use glam::{DVec3, Vec2};
 
 use super::{
-    drawing::Stage,
+    drawing::Projector,
     field::Field,
     shapes::{Bounds, Disc, Ink},
 };
@@ -32,14 +32,14 @@ pub struct Dots {
 }
 
 impl Dots {
-    pub(super) fn new(nodes: &[DVec3], field: &Field<'_>, stage: &Stage<'_>) -> Self {
+    pub(super) fn new(nodes: &[DVec3], field: &Field<'_>, stage: &Projector<'_>) -> Self {
         let (low, high) = field.box_mm();
         let dot = |node: &DVec3| {
             node.is_finite().then(|| {
                 let within = node.clamp(low, high);
                 let is_beyond = match stage {
-                    Stage::Space(_) => within != *node,
-                    Stage::Plan(_) => within.truncate() != node.truncate(),
+                    Projector::Space(_) => within != *node,
+                    Projector::Plan(_) => within.truncate() != node.truncate(),
                 };
                 Dot {
                     at: stage.point(within),
@@ -131,8 +131,10 @@ impl Dots {
 }
 
 /// Walks from the node towards the eye and looks whether the surface rises above the line of sight.
-fn is_hidden(node: DVec3, field: &Field<'_>, stage: &Stage<'_>) -> bool {
-    let Stage::Space(projection) = stage else { return false };
+fn is_hidden(node: DVec3, field: &Field<'_>, stage: &Projector<'_>) -> bool {
+    let Projector::Space(projection) = stage else {
+        return false;
+    };
     let plot_box = projection.plot_box;
     let (low, high) = (plot_box.min_mm.z, plot_box.max_mm.z);
     let sight = plot_box.place_mm(projection.eye) - node;
@@ -233,7 +235,7 @@ mod tests {
             let (min_mm, max_mm) = field.box_mm();
             let screen = Bounds::of([Vec2::ZERO, Vec2::splat(400.0)]);
             let projection = Projection::fit(PlotBox::new(min_mm, max_mm, 1.0), camera, screen);
-            is_hidden(DVec3::new(1.0, 1.0, 4.2), &field, &Stage::Space(&projection))
+            is_hidden(DVec3::new(1.0, 1.0, 4.2), &field, &Projector::Space(&projection))
         };
         assert!(hidden(5.0), "walls around it hide it");
         assert!(!hidden(f64::NAN), "nothing does");

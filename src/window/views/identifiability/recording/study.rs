@@ -8,7 +8,7 @@ use decoupler_core::{
     dataset::{Folds, SplitBy, Stream},
     evaluation::{
         Channel, CrossValidated, ErrorTable,
-        recorded::{Determination, Findings, FittedModel, NonlinearGain, SplitComparison, Stage},
+        recorded::{Determination, Findings, FittedModel, NonlinearGain, SplitComparison, StudyStep},
     },
 };
 use decoupler_files::import::{Plan, Progress, Recording, Setup};
@@ -51,7 +51,7 @@ pub struct FoldsChoice {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum UnderWay {
     /// Findings, and their part once the files are read.
-    Findings(Option<Stage>),
+    Findings(Option<StudyStep>),
     /// A cross-validation.
     CrossValidation,
 }
@@ -62,7 +62,7 @@ pub enum StudyEvent {
     /// Progress of reading a file.
     Reading(Progress),
     /// A part of the work has begun.
-    Began(Stage),
+    Began(StudyStep),
     /// Findings on the recording.
     Found(Box<RecordingFindings>),
     /// The result of a cross-validation.

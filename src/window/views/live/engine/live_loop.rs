@@ -121,12 +121,12 @@ fn show(session: &mut dyn LiveSession, report: &Report<LiveEvent>) {
 #[derive(Debug)]
 pub(super) struct Watch {
     state: Watched,
-    parts: Option<Parts>,
+    parts: Option<LiveParts>,
     checked: Option<Instant>,
 }
 
 #[derive(Debug)]
-struct Parts {
+struct LiveParts {
     monitor: FaultMonitor,
     left_out: LeftOutDecoder,
 }
@@ -149,7 +149,7 @@ impl Watch {
         };
         let parts = match reason {
             Some(_) => None,
-            None => Some(Parts {
+            None => Some(LiveParts {
                 monitor: FaultMonitor::new(sensor, scene, rows)?,
                 left_out: LeftOutDecoder::new(sensor, scene, rows)?,
             }),

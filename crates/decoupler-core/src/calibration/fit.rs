@@ -9,7 +9,7 @@ use super::{
 use crate::sensor::SensorModel;
 
 /// Sums of the linearised equations at one sensor model, with every parameter in proportion to its reference.
-pub(super) struct Linearised {
+pub(super) struct LinearisedFit {
     /// JᵀJ.
     pub(super) gram: [[f64; COUNT]; COUNT],
     /// Jᵀr, with r = ln of the readings − ln R.
@@ -18,7 +18,7 @@ pub(super) struct Linearised {
     pub(super) squares: f64,
 }
 
-impl Linearised {
+impl LinearisedFit {
     pub(super) fn at(model: &SensorModel, references: &Slopes, samples: &[PressedRow]) -> Self {
         let mut sums = Self {
             gram: [[0.0; COUNT]; COUNT],
@@ -59,10 +59,10 @@ pub(super) fn residuals(
 }
 
 /// Outcome of a fit.
-pub(super) struct Fitted {
+pub(super) struct CalibratedFit {
     pub(super) model: SensorModel,
     /// The equations linearised there, without the prior.
-    pub(super) here: Linearised,
+    pub(super) here: LinearisedFit,
     pub(super) iterations: usize,
 }
 
@@ -79,7 +79,7 @@ pub(super) fn fit(
     references: &Slopes,
     samples: &[PressedRow],
     prior_weight: f64,
-) -> Result<Fitted, CalibrationError> {
+) -> Result<CalibratedFit, CalibrationError> {
     /// Iterations after which a fit that has not ended will not.
     const MAX: usize = 200;
     /// Length of the step that is left, in standard deviations of the parameters.
@@ -102,7 +102,7 @@ pub(super) fn fit(
     };
     let penalty = |changes: &[f64]| prior_weight * changes.iter().map(|change| change * change).sum::<f64>();
     let (mut model, mut damping) = (*start, 1e-6);
-    let mut here = Linearised::at(&model, references, samples);
+    let mut here = LinearisedFit::at(&model, references, samples);
     let mut moved = changes(&model);
     for iteration in 1..=MAX {
         let mut gram = here.gram;
@@ -116,7 +116,7 @@ pub(super) fn fit(
         let newton = decomposition.solve(&gradient, 0.0);
         let gain: f64 = newton.iter().zip(&gradient).map(|(step, slope)| step * slope).sum();
         if gain <= share * squares + readings as f64 * ROUNDING * ROUNDING {
-            return Ok(Fitted {
+            return Ok(CalibratedFit {
                 model,
                 here,
                 iterations: iteration,
@@ -129,7 +129,7 @@ pub(super) fn fit(
                 *SensorParameter::ALL[index].field(&mut candidate) += change * references[index];
             }
             let is_possible = candidate.check().is_ok() && is_above_columns(&candidate, samples);
-            let next = is_possible.then(|| (Linearised::at(&candidate, references, samples), changes(&candidate)));
+            let next = is_possible.then(|| (LinearisedFit::at(&candidate, references, samples), changes(&candidate)));
             // False for NaN.
             if let Some(next) = next.filter(|(next, moved)| next.squares + penalty(moved) < squares) {
                 model = candidate;
@@ -155,14 +155,14 @@ pub(super) fn fit_with_prior(
     references: &Slopes,
     samples: &[PressedRow],
     tolerance: f64,
-) -> Result<Fitted, CalibrationError> {
+) -> Result<CalibratedFit, CalibrationError> {
     /// Rounds in which the noise settles, and the relative change at which it has.
     const ROUNDS: usize = 20;
     const SETTLED: f64 = 1e-2;
     let readings: usize = samples.iter().map(|sample| sample.resistances_ohm.len()).sum();
     let redundancy = readings.saturating_sub(free.len()).max(1) as f64;
-    let variance_of = |here: &Linearised| (here.squares / redundancy).max(f64::EPSILON * f64::EPSILON);
-    let mut variance = variance_of(&Linearised::at(nominal, references, samples));
+    let variance_of = |here: &LinearisedFit| (here.squares / redundancy).max(f64::EPSILON * f64::EPSILON);
+    let mut variance = variance_of(&LinearisedFit::at(nominal, references, samples));
     let mut start = *nominal;
     for round in 1.. {
         let weight = variance / (tolerance * tolerance);
