@@ -5,17 +5,15 @@
 //! [`PressLimits::check`] refuses samples that no press can give, before a calibration or a training on them.
 
 mod equations;
-mod error;
 mod fit;
 mod report;
-#[cfg(test)]
-mod tests;
 
 pub use equations::PressLimits;
-pub use error::CalibrationError;
 pub use report::{CalibratedParameter, Calibration, CalibrationWarning, ParameterStatus, SensorParameter};
 
-use crate::sensor::DVec3;
+use thiserror::Error;
+
+use crate::sensor::{DVec3, SensorError, short};
 
 /// Readings of one row-wire under a known deformation.
 #[derive(Clone, Debug, PartialEq)]
@@ -29,3 +27,147 @@ pub struct PressedRow {
     /// Resistance to each column-wire (M4).
     pub resistances_ohm: Vec<f64>,
 }
+
+/// Reason why a sensor cannot be calibrated.
+#[derive(Clone, Debug, PartialEq, Error)]
+#[non_exhaustive]
+pub enum CalibrationError {
+    /// The nominal sensor is impossible.
+    #[error(transparent)]
+    Sensor(#[from] SensorError),
+    /// The array has no such row-wire, or a row has another number of nodes or readings.
+    #[error("sample {}: {found} {what}, where the array {scale} has {expected}; give samples of this array", .sample + 1)]
+    Shape {
+        /// Index of the sample, from 0.
+        sample: usize,
+        /// Part at fault.
+        what: &'static str,
+        /// Number found.
+        found: usize,
+        /// Number of the array.
+        expected: usize,
+        /// Name of the array scale.
+        scale: String,
+    },
+    /// A reading is not a resistance.
+    #[error(
+        "sample {}, column {}: the reading {} is not a resistance; leave this sample out",
+        .sample + 1, .column + 1, short(*.ohm)
+    )]
+    Reading {
+        /// Index of the sample, from 0.
+        sample: usize,
+        /// Column-wire, from 0.
+        column: usize,
+        /// The reading.
+        ohm: f64,
+    },
+    /// A displacement is not finite, or puts a node on or below the column-wires of the nominal sensor.
+    #[error(
+        "sample {}, node {}: this displacement puts the node on or below the column-wires; check the unit (mm, downwards \
+         positive) and the height of the nominal sensor",
+        .sample + 1, .node + 1
+    )]
+    Displacement {
+        /// Index of the sample, from 0.
+        sample: usize,
+        /// Node on the row-wire, from 0.
+        node: usize,
+    },
+    /// A displacement is upwards, or further down than nodes may be pressed.
+    #[error(
+        "sample {}, node {}: it is pressed down by {} mm, where 0 to {} mm is possible; correct it, or leave this sample out",
+        .sample + 1, .node + 1, rounded(*.depth_mm), short(*.largest_mm)
+    )]
+    Depth {
+        /// Index of the sample, from 0.
+        sample: usize,
+        /// Node on the row-wire, from 0.
+        node: usize,
+        /// Displacement downwards.
+        depth_mm: f64,
+        /// Largest possible one.
+        largest_mm: f64,
+    },
+    /// A displacement sideways is larger than those of nodes may be.
+    #[error(
+        "sample {}, node {}: it is shifted sideways by {} mm, where up to {} mm is possible; correct it, or leave this sample \
+         out",
+        .sample + 1, .node + 1, rounded(*.shift_mm), short(*.largest_mm)
+    )]
+    Shift {
+        /// Index of the sample, from 0.
+        sample: usize,
+        /// Node on the row-wire, from 0.
+        node: usize,
+        /// Displacement sideways.
+        shift_mm: f64,
+        /// Largest possible one.
+        largest_mm: f64,
+    },
+    /// A reading is out of all proportion to the others.
+    #[error(
+        "sample {}, column {}: the reading {} ohm is out of all proportion: the sensor model and the other readings suggest \
+         {} ohm; correct it, or leave this sample out",
+        .sample + 1, .column + 1, short(*.ohm), rounded(*.expected_ohm)
+    )]
+    Absurd {
+        /// Index of the sample, from 0.
+        sample: usize,
+        /// Column-wire, from 0.
+        column: usize,
+        /// The reading.
+        ohm: f64,
+        /// Reading that the sensor model and the other readings suggest.
+        expected_ohm: f64,
+    },
+    /// All samples are of one row-wire, from which the pitch of the row-wires and the place of the columns cannot be told
+    /// apart.
+    #[error(
+        "all samples are of row-wire {}: its place and that of the column-wires shift the readings alike; give presses on at \
+         least two row-wires, or on the first",
+        .row + 1
+    )]
+    OneRow {
+        /// The row-wire, from 0.
+        row: usize,
+    },
+    /// There are fewer readings than parameters, or none.
+    #[error("{readings} readings are too few to fit {parameters} parameters; give more frames")]
+    TooFew {
+        /// Number of readings.
+        readings: usize,
+        /// Number of parameters.
+        parameters: usize,
+    },
+    /// The fit did not come to an end.
+    #[error(
+        "the fit did not converge: the readings do not follow Eq. (2) from this nominal geometry; check the array scale, the \
+         order of the wires, and that displacements are in millimetres"
+    )]
+    NotConverged,
+}
+
+/// [`short`] of four significant digits.
+fn rounded(value: f64) -> String {
+    let digits = format!("{value:.3e}");
+    digits.parse().map_or(digits, short)
+}
+
+impl CalibrationError {
+    /// Index of the sample at fault, from 0; `None` if it is no single one.
+    pub fn sample(&self) -> Option<usize> {
+        match *self {
+            Self::Shape { sample, .. }
+            | Self::Reading { sample, .. }
+            | Self::Displacement { sample, .. }
+            | Self::Depth { sample, .. }
+            | Self::Shift { sample, .. }
+            | Self::Absurd { sample, .. } => Some(sample),
+            Self::Sensor(_) | Self::OneRow { .. } | Self::TooFew { .. } | Self::NotConverged => None,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;

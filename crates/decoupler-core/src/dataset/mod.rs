@@ -11,12 +11,10 @@ mod frames;
 mod samples;
 mod seed;
 mod simulation;
-mod split;
 
-pub use division::{DividedSamples, Division, DivisionError};
+pub use division::{DividedSamples, Division, DivisionError, Split, SplitBy, SplitByError, hold_out};
 pub use folds::{FoldUnit, Folds, FoldsError};
 pub use frames::{Frames, FramesError, PerRow};
 pub use samples::{Dataset, DatasetError, LARGEST_SAMPLES};
 pub use seed::{Seed, Stream};
 pub use simulation::SimulationError;
-pub use split::{Split, SplitBy, SplitByError, hold_out};

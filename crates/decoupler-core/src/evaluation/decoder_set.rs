@@ -4,7 +4,7 @@ use ndarray::Array2;
 
 use super::{
     MissingFigures, Remark, RunError, RunSettings, SimulatedSettings, Source, TestErrors, baselines::fit_baselines,
-    table::frame_us, task::unseen_noise,
+    preparation::unseen_noise, table::frame_us,
 };
 use crate::{
     dataset::Dataset,

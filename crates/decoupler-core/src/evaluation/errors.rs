@@ -1,6 +1,7 @@
-use ndarray::Array2;
+use ndarray::{Array2, ArrayView1, ArrayView2};
 use serde::{Deserialize, Serialize};
 
+use super::Source;
 use crate::dataset::Dataset;
 
 /// Errors of decoupled coordinates on the nodes of a test set.
@@ -95,8 +96,246 @@ impl Errors {
     }
 }
 
+/// Errors of answers to a test set: on the nodes of an array, or target by target.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum TestErrors {
+    /// Errors on the nodes of a simulated array.
+    Nodes(Errors),
+    /// Errors of each target of a recording.
+    Targets(Vec<TargetErrors>),
+}
+
+impl TestErrors {
+    /// Measures `answers` (samples × targets, in the units of the targets) to `test`, whose samples are of `source`.
+    ///
+    /// # Panics
+    /// If the shapes differ.
+    pub fn measure(source: &Source, test: &Dataset, answers: &Array2<f64>) -> Self {
+        match source {
+            Source::Simulated(simulation) => Self::Nodes(Errors::measure(test, answers, simulation.stroke_mm())),
+            Source::Measured(_) => Self::of_targets(test, answers.view()),
+        }
+    }
+
+    /// Measures `answers` (samples × targets) to `test` target by target.
+    ///
+    /// # Panics
+    /// If the shapes differ.
+    pub fn of_targets(test: &Dataset, answers: ArrayView2<'_, f64>) -> Self {
+        Self::Targets(TargetErrors::measure(test.targets(), answers))
+    }
+
+    /// Errors on the nodes, if the targets are nodes of an array.
+    pub fn nodes(&self) -> Option<&Errors> {
+        match self {
+            Self::Nodes(errors) => Some(errors),
+            Self::Targets(_) => None,
+        }
+    }
+
+    /// Errors of each target; empty if the targets are nodes of an array.
+    pub fn targets(&self) -> &[TargetErrors] {
+        match self {
+            Self::Nodes(_) => &[],
+            Self::Targets(targets) => targets,
+        }
+    }
+
+    /// Error in percent, by which decoders are ranked: AveZerr for nodes, else the mean absolute error in percent of
+    /// the range, averaged over the targets that vary. `None` if an error is not finite or no target varies.
+    pub fn percent(&self) -> Option<f64> {
+        match self {
+            Self::Nodes(errors) => errors.z_percent,
+            Self::Targets(targets) => {
+                if targets.iter().any(|target| !target.mae.is_finite()) {
+                    return None;
+                }
+                let percents = Vec::from_iter(targets.iter().filter_map(|target| target.percent_of_range));
+                (!percents.is_empty()).then(|| percents.iter().sum::<f64>() / percents.len() as f64)
+            }
+        }
+    }
+
+    /// Returns the error in proportion to that of the Bayesian `reference`: [`Errors::times`].
+    pub fn times(&self, reference: &Self) -> Option<f64> {
+        self.nodes()?.times(reference.nodes()?)
+    }
+
+    /// Returns the name of the first figure that is not a finite number.
+    pub fn infinite_figure(&self) -> Option<String> {
+        let figures: Vec<(String, Option<f64>)> = match self {
+            Self::Nodes(errors) => [
+                ("z_percent", errors.z_percent),
+                ("x_percent", errors.x_percent),
+                ("y_percent", errors.y_percent),
+                ("z_mm", Some(errors.z_mm)),
+                ("z_full_scale_percent", Some(errors.z_full_scale_percent)),
+                ("worst_mm", Some(errors.worst_mm)),
+            ]
+            .map(|(name, figure)| (name.to_owned(), figure))
+            .into(),
+            Self::Targets(targets) => {
+                let of_target = |(index, errors): (usize, &TargetErrors)| {
+                    [
+                        ("rmse", Some(errors.rmse)),
+                        ("mae", Some(errors.mae)),
+                        ("r2", errors.r2),
+                        ("worst", Some(errors.worst)),
+                        ("percent_of_range", errors.percent_of_range),
+                    ]
+                    .map(|(name, figure)| (format!("{index}.{name}"), figure))
+                };
+                targets.iter().enumerate().flat_map(of_target).collect()
+            }
+        };
+        let is_infinite = |figure: &Option<f64>| figure.is_some_and(|figure| !figure.is_finite());
+        let mut infinite = figures.into_iter().filter(|(_, figure)| is_infinite(figure));
+        infinite.next().map(|(name, _)| name)
+    }
+}
+
+/// Errors of answers for one target, in the unit of the target.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TargetErrors {
+    /// Root mean squared error.
+    pub rmse: f64,
+    /// Mean absolute error.
+    pub mae: f64,
+    /// Coefficient of determination R²: 1 for exact answers, 0 for always answering the mean of these very targets,
+    /// negative for worse. `None` if the target is constant, where it is undefined.
+    pub r2: Option<f64>,
+    /// Largest absolute error; NaN if an answer is NaN.
+    pub worst: f64,
+    /// Index of the sample with the largest error, among those measured.
+    pub worst_sample: usize,
+    /// [`Self::mae`] in percent of the range of the target. `None` if the target is constant.
+    pub percent_of_range: Option<f64>,
+}
+
+impl TargetErrors {
+    /// Measures `answers` against `targets` (both samples × outputs), target by target.
+    ///
+    /// # Panics
+    /// If the shapes differ.
+    pub fn measure(targets: ArrayView2<'_, f64>, answers: ArrayView2<'_, f64>) -> Vec<Self> {
+        assert_eq!(targets.dim(), answers.dim());
+        let pairs = targets.columns().into_iter().zip(answers.columns());
+        pairs.map(|(targets, answers)| Self::of_one(targets, answers)).collect()
+    }
+
+    /// Returns the errors over targets in one unit: the root of the mean squared error, the mean absolute error, the mean R²
+    /// (uniform average), the largest error and the mean of the errors in percent of the range. R² and percent are over the
+    /// targets that vary. `None` without targets.
+    pub fn over_all(targets: &[Self]) -> Option<Self> {
+        let worst = targets.iter().max_by(|one, other| one.worst.total_cmp(&other.worst))?;
+        let mean = |values: &mut dyn Iterator<Item = f64>| {
+            let (sum, count) = values.fold((0.0, 0), |(sum, count), value| (sum + value, count + 1));
+            (count > 0).then(|| sum / f64::from(count))
+        };
+        Some(Self {
+            rmse: mean(&mut targets.iter().map(|errors| errors.rmse * errors.rmse))?.sqrt(),
+            mae: mean(&mut targets.iter().map(|errors| errors.mae))?,
+            r2: mean(&mut targets.iter().filter_map(|errors| errors.r2)),
+            worst: worst.worst,
+            worst_sample: worst.worst_sample,
+            percent_of_range: mean(&mut targets.iter().filter_map(|errors| errors.percent_of_range)),
+        })
+    }
+
+    fn of_one(targets: ArrayView1<'_, f64>, answers: ArrayView1<'_, f64>) -> Self {
+        let count = targets.len() as f64;
+        let mean = targets.sum() / count;
+        let (lowest, highest) = targets
+            .iter()
+            .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), &value| {
+                (low.min(value), high.max(value))
+            });
+        let (mut squares, mut sum, mut worst, mut worst_sample, mut variation) = (0.0, 0.0, 0.0_f64, 0, 0.0);
+        for (sample, (target, answer)) in targets.iter().zip(answers).enumerate() {
+            let error = (answer - target).abs();
+            squares += error * error;
+            sum += error;
+            if error > worst || (error.is_nan() && !worst.is_nan()) {
+                (worst, worst_sample) = (error, sample);
+            }
+            variation += (target - mean) * (target - mean);
+        }
+        let varies = highest > lowest;
+        Self {
+            rmse: (squares / count).sqrt(),
+            mae: sum / count,
+            r2: Some(1.0 - squares / variation).filter(|r2| varies && r2.is_finite()),
+            worst,
+            worst_sample,
+            percent_of_range: Some(100.0 * sum / count / (highest - lowest))
+                .filter(|percent| varies && percent.is_finite()),
+        }
+    }
+}
+
+/// Minimum, quartiles and maximum of a set of numbers.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Spread {
+    /// Minimum of the numbers.
+    pub smallest: f64,
+    /// Value below which a quarter of the numbers lie.
+    pub lower_quartile: f64,
+    /// Value below which half of the numbers lie.
+    pub median: f64,
+    /// Value below which three quarters of the numbers lie.
+    pub upper_quartile: f64,
+    /// Maximum of the numbers.
+    pub largest: f64,
+}
+
+impl Spread {
+    /// Summarises the finite numbers among `values`; returns `None` if there are none. Quartiles are interpolated
+    /// linearly (Hyndman and Fan 1996, definition 7).
+    pub fn of(values: impl IntoIterator<Item = f64>) -> Option<Self> {
+        let mut sorted: Vec<f64> = values.into_iter().filter(|value| value.is_finite()).collect();
+        sorted.sort_by(f64::total_cmp);
+        let last = sorted.len().checked_sub(1)?;
+        let quantile = |share: f64| {
+            let place = share * last as f64;
+            let below = place.floor() as usize;
+            let (low, high) = (sorted[below], sorted[(below + 1).min(last)]);
+            low + (place - below as f64) * (high - low)
+        };
+        Some(Self {
+            smallest: sorted[0],
+            lower_quartile: quantile(0.25),
+            median: quantile(0.5),
+            upper_quartile: quantile(0.75),
+            largest: sorted[last],
+        })
+    }
+}
+
+/// Root mean square of decoupled z − z for each node over the snapshots of `truth`, in millimetres, row by row (M1·M2
+/// values). `decoupled_mm` has the shape of its coordinates.
+///
+/// # Panics
+/// If the shapes differ.
+pub fn node_rms_mm(truth: &Dataset, decoupled_mm: &Array2<f64>) -> Vec<f64> {
+    assert_eq!(truth.targets().dim(), decoupled_mm.dim());
+    let (rows, per_row) = (truth.row_count(), decoupled_mm.ncols() / 3);
+    let mut squares = vec![0.0; rows * per_row];
+    for (sample, (decoupled, actual)) in decoupled_mm.rows().into_iter().zip(truth.targets().rows()).enumerate() {
+        for node in 0..per_row {
+            squares[truth.row_index(sample) * per_row + node] +=
+                (decoupled[3 * node + 2] - actual[3 * node + 2]).powi(2);
+        }
+    }
+    let snapshots = (truth.samples() / rows).max(1) as f64;
+    squares.into_iter().map(|sum: f64| (sum / snapshots).sqrt()).collect()
+}
+
 #[cfg(test)]
 mod tests {
+    use ndarray::array;
+
     use super::*;
     use crate::{
         dataset::{Seed, Stream},
@@ -163,5 +402,89 @@ mod tests {
         let errors = Errors::measure(&truth, &truth.targets().mapv(|value| value + 0.1), 1.0);
         assert_eq!(errors.x_percent, None);
         assert!(errors.z_percent.is_some());
+    }
+
+    #[test]
+    fn errors_are_those_of_scikit_learn() {
+        // sklearn.metrics: mean_squared_error, mean_absolute_error, r2_score, max_error of these columns.
+        let targets = array![[3.0, 1.0], [-0.5, 1.0], [2.0, 1.0], [7.0, 1.0]];
+        let answers = array![[2.5, 1.5], [0.0, 1.0], [2.0, 1.0], [8.0, 0.0]];
+        let [varying, constant] = TargetErrors::measure(targets.view(), answers.view())[..] else {
+            panic!("one for each target")
+        };
+        assert!((varying.rmse - 0.375_f64.sqrt()).abs() < 1e-15);
+        assert!((varying.mae - 0.5).abs() < 1e-15);
+        assert!((varying.r2.unwrap() - 0.948_608_137_044_967_8).abs() < 1e-15);
+        assert_eq!((varying.worst, varying.worst_sample), (1.0, 3));
+        assert!((varying.percent_of_range.unwrap() - 100.0 * 0.5 / 7.5).abs() < 1e-13);
+        assert_eq!(
+            (constant.r2, constant.percent_of_range, constant.mae),
+            (None, None, 0.375)
+        );
+    }
+
+    #[test]
+    fn a_target_of_nan_is_the_worst() {
+        let targets = array![[1.0], [2.0], [6.0]];
+        let answers = array![[0.0], [f64::NAN], [9.0]];
+        let errors = TargetErrors::measure(targets.view(), answers.view())[0];
+        assert!(errors.worst.is_nan() && errors.rmse.is_nan());
+        assert_eq!((errors.worst_sample, errors.r2), (1, None));
+    }
+
+    #[test]
+    fn the_mean_scores_an_r2_of_zero() {
+        let targets = array![[1.0], [2.0], [6.0]];
+        let answers = array![[3.0], [3.0], [3.0]];
+        assert_eq!(TargetErrors::measure(targets.view(), answers.view())[0].r2, Some(0.0));
+    }
+
+    #[test]
+    fn figures_are_numbers_or_missing_whatever_the_size_of_the_targets() {
+        for size in [0.0, 1e-300, 1e-160, 1e160, 1e308] {
+            let targets = array![[size], [-size], [0.0]];
+            for answer in [0.0, size] {
+                let answers = array![[answer], [answer], [answer]];
+                let errors = &TargetErrors::measure(targets.view(), answers.view())[0];
+                let figures = [errors.r2, errors.percent_of_range];
+                assert!(figures.into_iter().flatten().all(f64::is_finite), "{errors:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn quartiles_are_those_of_definition_7() {
+        // R: quantile(c(1, 2, 4, 8, 16, 32), type = 7)
+        let spread = Spread::of([32.0, 1.0, f64::NAN, 4.0, 16.0, 8.0, 2.0]).unwrap();
+        let expected = Spread {
+            smallest: 1.0,
+            lower_quartile: 2.5,
+            median: 6.0,
+            upper_quartile: 14.0,
+            largest: 32.0,
+        };
+        assert_eq!(spread, expected);
+    }
+
+    #[test]
+    fn one_value_is_all_of_its_spread_and_none_has_none() {
+        let spread = Spread::of([3.0]).unwrap();
+        assert_eq!((spread.smallest, spread.median, spread.largest), (3.0, 3.0, 3.0));
+        assert_eq!(Spread::of([f64::INFINITY]), None);
+    }
+
+    #[test]
+    fn each_node_has_the_spread_of_its_own_errors() {
+        let model = SensorModel::new("4x3_2x9".parse().unwrap());
+        let truth = Dataset::simulate(&model, &Scene::default(), 8, &mut Seed(0).rng(Stream::Test)).unwrap();
+        let mut decoupled = truth.targets().to_owned();
+        // Row 2, node 1: off by 0.3 and −0.4 mm in the two snapshots; row 0, node 2: off on x, which does not count.
+        decoupled[[2, 5]] += 0.3;
+        decoupled[[6, 5]] -= 0.4;
+        decoupled[[0, 6]] += 1.0;
+        let spread = node_rms_mm(&truth, &decoupled);
+        assert_eq!(spread.len(), 12);
+        assert!((spread[2 * 3 + 1] - 0.125_f64.sqrt()).abs() < 1e-12);
+        assert_eq!(spread.iter().filter(|spread| **spread > 0.0).count(), 1);
     }
 }

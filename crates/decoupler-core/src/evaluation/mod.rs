@@ -23,15 +23,12 @@ mod settings;
 mod source;
 mod starts;
 mod table;
-mod task;
-mod test_errors;
 mod trade;
-mod workload;
 
 pub use baselines::{Baselines, PublishedErrors, Scores, published_errors};
 pub use cross_validation::{CrossValidated, CrossValidation, Effort};
 pub use decoder_set::{DecoderCost, DecoderReport, DecoderSet};
-pub use errors::{Errors, NodeAddress};
+pub use errors::{Errors, NodeAddress, Spread, TargetErrors, TestErrors, node_rms_mm};
 pub use past_networks::{PastNetwork, PastNetworks};
 pub use pressed::{Pressed, PressedAnswer, fine_tune, press_limits, pressed_rows, rebased};
 pub use problem::{Channel, Problem, TargetPosition};
@@ -39,13 +36,11 @@ pub use reference::{NoReference, ReferenceNote, reference_errors};
 pub use remark::{Cause, MissingFigures, Remark, error_remarks};
 pub use run::{Run, RunDefect, RunError};
 pub use run_sets::RunSets;
-pub use settings::{CountError, MAX_STARTS, MeasuredSettings, RunSettings, SimulatedSettings};
+pub use settings::{CountError, MAX_STARTS, MeasuredSettings, RunSettings, SimulatedSettings, Workload, WorkloadTime};
 pub use source::{Measured, ModelSize, Preset, PresetError, Simulation, Source, ready_settings};
 pub use starts::{StartRecord, StartTrainer, best_start};
 pub use table::{ErrorBlock, ErrorMeasure, ErrorRow, ErrorTable, decoded_unit, network_frame_time};
-pub use test_errors::{Spread, TargetErrors, TestErrors, node_rms_mm};
 pub use trade::{
     Outlook, OutlookError, TradeOffCost, TradeOffLevel, TradeOffLimits, TradeOffPoint, fastest_under,
     measure_trade_off, most_accurate_under,
 };
-pub use workload::{Workload, WorkloadTime};

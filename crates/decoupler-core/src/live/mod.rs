@@ -10,7 +10,6 @@ mod line_parser;
 mod lines;
 mod re_zero;
 mod recording;
-mod simulated;
 mod source;
 
 pub use faults::{Diagnosis, FaultCause, FaultEvent, FaultMonitor, FaultyWire};
@@ -19,5 +18,4 @@ pub use line_parser::{LineError, LineParser, ParsedLine};
 pub use lines::{Keeping, Line, Lines, NextLine};
 pub use re_zero::{ReZero, ReZeroError, ZeroGains};
 pub use recording::{Latencies, Recorder, Recording, RecordingError};
-pub use simulated::{Motion, Simulated, SimulatedError};
-pub use source::{Source, SourceError};
+pub use source::{Motion, Simulated, SimulatedError, Source, SourceError};

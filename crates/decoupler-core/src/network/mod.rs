@@ -3,7 +3,6 @@
 //! A [`DecouplingNetwork`] is an [`Mlp`] with the scaling on both sides ([`Inputs`], [`MinMax`]); [`Networks`] are one
 //! network shared by all row-wires or one per row-wire. Weights are initialised at random by [`nguyen_widrow`].
 
-mod decoupling_network;
 mod inputs;
 mod mlp;
 mod networks;
@@ -12,11 +11,10 @@ mod scaling;
 mod tanh;
 mod whitening;
 
-pub use decoupling_network::{DecouplingNetwork, NetworkError};
 pub(crate) use inputs::channel_noise;
 pub use inputs::{InputChoice, InputScaling, Inputs, ScalingChoice, ScalingChoiceError};
 pub use mlp::{Mlp, Shape, nguyen_widrow};
-pub use networks::{HiddenSuggestions, LARGEST_HIDDEN, Networks};
+pub use networks::{DecouplingNetwork, HiddenSuggestions, LARGEST_HIDDEN, NetworkError, Networks};
 pub use quantity::{ChannelNoise, Quantity, QuantityError};
 pub use scaling::{MinMax, ReadingRange, ScalingError};
 pub(crate) use tanh::exp;

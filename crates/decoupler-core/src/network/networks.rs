@@ -1,12 +1,13 @@
 use std::{fmt, ops::RangeInclusive};
 
-use ndarray::Array2;
+use ndarray::{Array2, ArrayView2};
 use serde::{
     Deserialize, Deserializer, Serialize, Serializer,
     de::{MapAccess, SeqAccess, Visitor, value::MapAccessDeserializer},
 };
+use thiserror::Error;
 
-use super::DecouplingNetwork;
+use super::{InputScaling, Inputs, MinMax, Mlp, Quantity, ReadingRange, Shape};
 use crate::dataset::{Dataset, PerRow};
 
 /// Trained networks: one shared by all row-wires read, or one per row-wire where the row is known.
@@ -102,6 +103,156 @@ impl HiddenSuggestions {
             square_root: (root + 1.0).round() as usize..=(root + 10.0).round() as usize,
             logarithm: ((inputs as f64).log2().round() as usize).max(1),
         }
+    }
+}
+
+/// A network together with its scaling, from resistances in ohm to coordinates in millimetres.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "Record", into = "Record")]
+pub struct DecouplingNetwork {
+    inputs: Inputs,
+    mlp: Mlp,
+    outputs: MinMax,
+}
+
+/// Error in a saved network.
+#[derive(Clone, Debug, PartialEq, Error)]
+#[non_exhaustive]
+pub enum NetworkError {
+    /// The limits of a scaling, or of the readings in training, are missing, not finite, or out of order.
+    #[error("the {0} scaling is damaged: its limits are missing, not finite, or out of order")]
+    Scaling(&'static str),
+    /// The number of weights in a layer does not match the scaling and the hidden nodes.
+    #[error("the {layer} layer has {found} weights, but {expected} follow from the scaling and the hidden nodes")]
+    LayerSize {
+        /// Name of the layer.
+        layer: &'static str,
+        /// Number of weights found.
+        found: usize,
+        /// Number of weights expected.
+        expected: usize,
+    },
+    /// A weight is NaN or infinite.
+    #[error("weight {index} of the {layer} layer is not a finite number")]
+    Weight {
+        /// Name of the layer.
+        layer: &'static str,
+        /// Index of the weight, row by row from 0.
+        index: usize,
+    },
+}
+
+impl DecouplingNetwork {
+    /// Combines a network with the scaling it was trained with.
+    ///
+    /// # Panics
+    /// If the inputs or outputs of the network do not match the scaling.
+    pub fn new(inputs: impl Into<Inputs>, mlp: Mlp, outputs: MinMax) -> Self {
+        let inputs = inputs.into();
+        assert_eq!(inputs.count(), mlp.shape().inputs);
+        assert_eq!(outputs.varying().len(), mlp.shape().outputs);
+        Self { inputs, mlp, outputs }
+    }
+
+    /// Returns the network without its scaling.
+    pub fn mlp(&self) -> &Mlp {
+        &self.mlp
+    }
+
+    /// Returns the preprocessing of the resistances.
+    pub fn inputs(&self) -> &Inputs {
+        &self.inputs
+    }
+
+    /// Returns the scaling of the coordinates.
+    pub fn outputs(&self) -> &MinMax {
+        &self.outputs
+    }
+
+    /// Returns the coordinates in millimetres (samples × 3·M2) for resistances in ohm (samples × M4).
+    pub fn decouple(&self, resistances_ohm: ArrayView2<'_, f64>) -> Array2<f64> {
+        let scaled = self.inputs.of(resistances_ohm);
+        self.outputs.restore(self.mlp.forward(scaled.view()).view())
+    }
+}
+
+/// File format of a network: one array per layer, row by row, biases last.
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Record {
+    #[serde(default)]
+    input_quantity: Quantity,
+    input_scaling: InputScaling,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    reading_range: Option<ReadingRange>,
+    hidden_nodes: usize,
+    /// (varying inputs + 1) × hidden nodes.
+    hidden_layer: Vec<f64>,
+    /// (hidden nodes + 1) × varying outputs.
+    output_layer: Vec<f64>,
+    output_scaling: MinMax,
+}
+
+impl From<DecouplingNetwork> for Record {
+    fn from(network: DecouplingNetwork) -> Self {
+        let (hidden_layer, output_layer) = network.mlp.layers();
+        Self {
+            hidden_nodes: network.mlp.shape().hidden,
+            hidden_layer: hidden_layer.to_vec(),
+            output_layer: output_layer.to_vec(),
+            input_quantity: network.inputs.quantity(),
+            input_scaling: network.inputs.scaling().clone(),
+            reading_range: network.inputs.range().cloned(),
+            output_scaling: network.outputs,
+        }
+    }
+}
+
+impl TryFrom<Record> for DecouplingNetwork {
+    type Error = NetworkError;
+
+    fn try_from(record: Record) -> Result<Self, NetworkError> {
+        let inputs = Inputs::new(record.input_quantity, record.input_scaling).with_range(record.reading_range);
+        for (side, is_sound) in [
+            ("input", inputs.is_sound()),
+            ("output", record.output_scaling.is_sound()),
+        ] {
+            if !is_sound {
+                return Err(NetworkError::Scaling(side));
+            }
+        }
+        let shape = Shape {
+            inputs: inputs.count(),
+            hidden: record.hidden_nodes,
+            outputs: record.output_scaling.varying().len(),
+        };
+        let layers = [
+            (
+                "hidden",
+                &record.hidden_layer,
+                (shape.inputs + 1).checked_mul(shape.hidden),
+            ),
+            (
+                "output",
+                &record.output_layer,
+                shape.hidden.saturating_add(1).checked_mul(shape.outputs),
+            ),
+        ];
+        for (layer, weights, expected) in layers {
+            let found = weights.len();
+            if Some(found) != expected {
+                return Err(NetworkError::LayerSize {
+                    layer,
+                    found,
+                    expected: expected.unwrap_or(usize::MAX),
+                });
+            }
+            if let Some(index) = weights.iter().position(|weight| !weight.is_finite()) {
+                return Err(NetworkError::Weight { layer, index });
+            }
+        }
+        let mlp = Mlp::from_weights(shape, [record.hidden_layer, record.output_layer].concat());
+        Ok(Self::new(inputs, mlp, record.output_scaling))
     }
 }
 

@@ -3,9 +3,7 @@
 
 mod array_scale;
 mod conductance;
-mod fixed_point;
 mod geometry;
-mod reciprocal_distances;
 mod resistance;
 
 pub use array_scale::{ArrayScale, ArrayScaleError, LARGEST_COUNT};

@@ -4,7 +4,8 @@ use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use super::{
-    ArrayScale, Geometry, GeometryError, conductance::Divided, reciprocal_distances::sum_reciprocal_distances,
+    ArrayScale, Geometry, GeometryError,
+    conductance::{Divided, sum_reciprocal_distances},
 };
 
 /// Default resistance per millimetre of rubber. The paper gives none: g scales every

@@ -5,11 +5,9 @@
 //! through scattered nodes, as a curve where the nodes are on one line, bilinearly where neither is feasible. All of them
 //! reproduce constants and planes, and none depends on the unit of length or the origin. [`Lattice`] finds the lines of a lattice among places in any order.
 
-mod bilinear;
 mod grid;
 mod map;
 mod scattered;
-mod thin_plate;
 
 pub use grid::{Grid, Lattice};
 pub use map::{Axis, Interpolation, SurfaceError, SurfaceMap};

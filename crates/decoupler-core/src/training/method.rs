@@ -12,12 +12,12 @@ use super::{
     RegularizationSettings, ResilientSettings, ScaledConjugateGradientSettings, Setting, SettingError,
     StepMomentumSettings, StopReason,
     bayesian_regularization::{BayesianRegularization, BayesianState},
-    gradient_descent::{AdaptiveDescent, AdaptiveState, GradientDescent, Momentum, StepMomentum},
-    levenberg_marquardt::{DampedState, LevenbergMarquardt},
-    resilient::{Resilient, ResilientState},
+    gradient_descent::{
+        AdaptiveDescent, AdaptiveState, GradientDescent, Momentum, Resilient, ResilientState, StepMomentum,
+    },
+    levenberg_marquardt::{DampedState, LevenbergMarquardt, ProjectionState, VariableProjection},
     scaled_conjugate_gradient::{ConjugateState, ScaledConjugateGradient},
     setting::Settings,
-    variable_projection::{ProjectionState, VariableProjection},
 };
 use crate::{
     network::{Mlp, Shape},

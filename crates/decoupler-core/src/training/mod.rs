@@ -3,7 +3,6 @@
 //! Everything here works on scaled values and knows nothing of sensors.
 
 mod activations;
-mod backpropagation;
 mod bayesian_regularization;
 #[cfg(test)]
 mod certified;
@@ -15,26 +14,23 @@ mod levenberg_marquardt;
 mod method;
 mod normal_equations;
 mod parallel;
-mod resilient;
 mod scaled_conjugate_gradient;
 mod setting;
-mod stopping;
 mod trainer;
-mod variable_projection;
 
 pub use bayesian_regularization::RegularizationSettings;
 pub use checkpoint::{ResumeError, TrainerState};
 pub use epoch_columns::History;
 pub use examples::Examples;
-pub use gradient_descent::{AdaptiveDescentSettings, GradientDescentSettings, MomentumSettings, StepMomentumSettings};
+pub use gradient_descent::{
+    AdaptiveDescentSettings, GradientDescentSettings, MomentumSettings, ResilientSettings, StepMomentumSettings,
+};
 pub use levenberg_marquardt::Damping;
 pub use method::Method;
 use method::MethodState;
 use normal_equations::{FactoredEquations, NormalEquations};
-pub use resilient::ResilientSettings;
 pub use scaled_conjugate_gradient::ScaledConjugateGradientSettings;
-pub use setting::{Setting, SettingError, TrainingDefect};
-pub use stopping::{StopReason, StoppingRules};
+pub use setting::{Setting, SettingError, StopReason, StoppingRules, TrainingDefect};
 use trainer::Evaluation;
 pub(crate) use trainer::check_width;
 pub use trainer::{EpochRecord, Problem, Stage, Trainer, TrainingError, TrainingSettings};

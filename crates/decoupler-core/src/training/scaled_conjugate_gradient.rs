@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{
     Evaluation, Examples, StopReason,
-    backpropagation::Backpropagation,
+    activations::Backpropagation,
     method::{Algorithm, Checked, Description},
     setting::settings,
 };

@@ -2,11 +2,9 @@
 
 mod newton;
 mod polished;
-mod posterior;
 mod row_search;
 #[cfg(test)]
 mod tests;
 
-pub use newton::NewtonDecoder;
+pub use newton::{NewtonDecoder, PosteriorDecoder};
 pub use polished::PolishedDecoder;
-pub use posterior::PosteriorDecoder;

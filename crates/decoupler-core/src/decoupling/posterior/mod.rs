@@ -19,8 +19,7 @@ use rand::Rng;
 
 use super::{
     DecodeError,
-    row_prior::GaussianPrior,
-    row_problem::{Range, RowProblem, ranges},
+    row_problem::{GaussianPrior, Range, RowProblem, ranges},
 };
 use crate::{
     scene::{Loading, Scene},

@@ -10,15 +10,13 @@ mod experiment;
 mod growth;
 mod results;
 mod runner;
-mod summary;
 mod trial;
 mod verdict;
 
 pub use axis::{Axis, AxisKind};
 pub use experiment::{Cell, Experiment, ExperimentError, ExperimentRecording, PaperTable};
 pub use growth::Growth;
-pub use results::{CellResults, ExperimentResults};
+pub use results::{CellResults, CellSummary, ExperimentResults, Figure, SummaryErrors};
 pub use runner::{Finished, run_experiments, worker_threads};
-pub use summary::{CellSummary, Figure, SummaryErrors};
 pub use trial::{Bottleneck, RecordedSamples, Trial, TrialFailure, TrialSamples};
 pub use verdict::{Verdict, VerdictStatus, verdicts};

@@ -5,7 +5,7 @@ use serde::Serialize;
 use super::{
     Axis, CellResults, ExperimentResults, Growth,
     growth::GrowthLaw,
-    summary::{CellErrors, sorted_by},
+    results::{CellErrors, sorted_by},
 };
 use crate::text::format_number;
 

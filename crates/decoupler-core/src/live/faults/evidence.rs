@@ -2,8 +2,7 @@ use std::f64::consts::TAU;
 
 use super::{
     monitor::{Diagnosis, FaultCause, FaultyWire},
-    prior::FitPrior,
-    row_fit::{RowFit, RowFitReport, RowReadings},
+    row_fit::{FitPrior, RowFit, RowFitReport, RowReadings},
 };
 
 /// A hypothesis on the fault behind some frames, and how well it explains them.

@@ -2,10 +2,8 @@
 
 mod evidence;
 mod monitor;
-mod prior;
 mod row_fit;
 mod shorts;
 
 pub use monitor::{Diagnosis, FaultCause, FaultEvent, FaultMonitor, FaultyWire};
-pub(super) use prior::FitPrior;
-pub(super) use row_fit::{RowFit, RowReadings};
+pub(super) use row_fit::{FitPrior, RowFit, RowReadings};

@@ -2,8 +2,7 @@ use std::fmt;
 
 use super::{
     evidence::{Evidence, Explained},
-    prior::FitPrior,
-    row_fit::{RowFit, RowReadings},
+    row_fit::{FitPrior, RowFit, RowReadings},
     shorts::Shorts,
 };
 use crate::{

@@ -3,7 +3,6 @@
 mod indenter;
 mod press;
 mod sampler;
-mod smooth_field;
 
 pub use indenter::{Indenter, IndenterShape, Span};
 pub use press::Contact;

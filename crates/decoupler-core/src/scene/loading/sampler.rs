@@ -1,10 +1,11 @@
+use faer::{Mat, Side};
 use glam::DVec3;
 use rand::{Rng, RngExt};
 
-use super::{Indenter, Loading, press::Press, smooth_field::SmoothField};
+use super::{Indenter, Loading, press::Press};
 use crate::{
-    scene::{Deformation, Movement, Scene, normal_cdf},
-    sensor::SensorModel,
+    scene::{Deformation, Movement, Scene, normal_cdf, standard_normal},
+    sensor::{ArrayScale, Geometry, SensorModel},
 };
 
 /// Draws deformations of one array in one scene; what all draws share is computed once.
@@ -207,6 +208,127 @@ impl LatentRow {
     }
 }
 
+/// A stationary Gaussian random field on the nodes with covariance exp(−distance² / (2 length²)), turned into a field
+/// that is uniform on [0, 1] at every node by its distribution function (a Gaussian copula).
+///
+/// On a grid the covariance is a Kronecker product of one along x and one along y, so Rx Z Ryᵀ has it, with Z white and
+/// R a square root of each factor.
+#[derive(Clone, Debug)]
+pub(super) struct SmoothField {
+    /// Row-wires × row-wires.
+    along_x: Mat<f64>,
+    /// Nodes × nodes.
+    along_y: Mat<f64>,
+}
+
+impl SmoothField {
+    pub(super) fn new(scale: ArrayScale, geometry: &Geometry, length_mm: f64) -> Self {
+        let row_step = geometry.row_pitch_mm / length_mm;
+        let node_step = geometry.node_pitch_mm / length_mm;
+        Self {
+            along_x: root(scale.rows(), row_step),
+            along_y: root(scale.nodes_per_row(), node_step),
+        }
+    }
+
+    /// Returns a square root of the covariance of the nodes of one row-wire, row by row, and its number of columns. Patterns
+    /// whose standard deviation is below 1e-9 are left out.
+    pub(super) fn root_of_row(&self) -> (Vec<f64>, usize) {
+        const SMALLEST_DEVIATION: f64 = 1e-9;
+        let root = &self.along_y;
+        let seen = |&column: &usize| root.col(column).norm_max() >= SMALLEST_DEVIATION;
+        let columns: Vec<usize> = (0..root.ncols()).filter(seen).collect();
+        let entries = (0..root.nrows()).flat_map(|node| columns.iter().map(move |&column| root[(node, column)]));
+        (entries.collect(), columns.len())
+    }
+
+    /// Draws the field: row-wires × nodes, in [0, 1].
+    pub(super) fn draw(&self, rng: &mut impl Rng) -> Mat<f64> {
+        let mut white = Mat::zeros(self.along_x.ncols(), self.along_y.ncols());
+        for row in 0..white.nrows() {
+            for node in 0..white.ncols() {
+                white[(row, node)] = standard_normal(rng);
+            }
+        }
+        let field = &self.along_x * white * self.along_y.transpose();
+        Mat::from_fn(field.nrows(), field.ncols(), |row, node| normal_cdf(field[(row, node)]))
+    }
+}
+
+/// Returns a square root of the covariance of `count` points `step` correlation lengths apart. The matrix is positive
+/// definite, but nearly singular for small steps: eigenvalues that rounding turned negative count as zero.
+fn root(count: usize, step: f64) -> Mat<f64> {
+    // A step that overflowed would make 0 · ∞ of the diagonal.
+    let step = step.min(f64::MAX);
+    let covariance = Mat::from_fn(count, count, |i, j| {
+        (-0.5 * (step * (i as f64 - j as f64)).powi(2)).exp()
+    });
+    let eigen = covariance.self_adjoint_eigen(Side::Lower);
+    let eigen = eigen.expect("QR iterations with Wilkinson's shift converge for every finite symmetric matrix");
+    let values = eigen.S().column_vector();
+    Mat::from_fn(count, count, |i, k| eigen.U()[(i, k)] * values[k].max(0.0).sqrt())
+}
+
+/// Returns `exp(x) K₀(x)` and `exp(x) K₁(x)`, the modified Bessel functions of the second kind scaled so that large `x`
+/// does not underflow, to about 1e-15. `x` is above 0; values beyond the range of normal numbers count as its ends.
+///
+/// Up to x = 2 by their power series (NIST Digital Library of Mathematical Functions, 10.31.1 and 10.31.2). Beyond, by
+/// `K_ν(x) = ∫ exp(−x cosh t) cosh νt dt` over t > 0 (10.32.9), which v² = x (cosh t − 1) turns into
+///
+/// `exp(x) K₀(x) = ∫ 2 exp(−v²) / √(2x + v²) dv`, and the same with a factor 1 + v²/x for K₁:
+///
+/// even functions that decay as a Gaussian, for which the trapezoidal rule converges exponentially.
+pub(super) fn scaled_k0_k1(x: f64) -> (f64, f64) {
+    // A quarter of the largest number leaves room for 2x + v².
+    let x = x.clamp(f64::MIN_POSITIVE, 0.25 * f64::MAX);
+    if x <= LARGEST_OF_SERIES {
+        by_series(x)
+    } else {
+        by_integral(x)
+    }
+}
+
+/// Argument at which the series, which cancels beyond, hands over to the integral, whose integrand is analytic only up to
+/// √(2x) from the real axis.
+const LARGEST_OF_SERIES: f64 = 2.0;
+
+/// With y = x²/4, H_k the harmonic numbers and L = ln(x/2) + γ:
+/// K₀ = Σ (H_k − L) y^k/(k!)² and K₁ = 1/x + x Σ (L − (H_k + H_{k+1})/2) y^k/(2 k! (k+1)!).
+fn by_series(x: f64) -> (f64, f64) {
+    /// y is at most 1: the terms that follow are below 1e-19.
+    const TERMS: u32 = 12;
+    const EULER: f64 = 0.577_215_664_901_532_9;
+    let y = 0.25 * x * x;
+    let logarithm = (0.5 * x).ln() + EULER;
+    let (mut k0, mut k1) = (0.0, 0.0);
+    let (mut term, mut harmonic) = (1.0, 0.0);
+    for k in 0..TERMS {
+        let next = f64::from(k + 1);
+        k0 += term * (harmonic - logarithm);
+        k1 += term / next * (logarithm - harmonic - 0.5 / next);
+        harmonic += 1.0 / next;
+        term *= y / (next * next);
+    }
+    let scale = x.exp();
+    (scale * k0, scale * (1.0 / x + 0.5 * x * k1))
+}
+
+fn by_integral(x: f64) -> (f64, f64) {
+    /// exp(−4π/STEP) and exp(−(π/STEP)²), the errors of the trapezoidal rule, are below 1e-17.
+    const STEP: f64 = 0.3;
+    /// exp(−(POINTS · STEP)²) is below 1e-17.
+    const POINTS: u32 = 21;
+    let half_first = 0.5 / (2.0 * x).sqrt();
+    let (mut k0, mut k1) = (half_first, half_first);
+    for point in 1..POINTS {
+        let v2 = (STEP * f64::from(point)).powi(2);
+        let value = (-v2).exp() / (2.0 * x + v2).sqrt();
+        k0 += value;
+        k1 += value * (1.0 + v2 / x);
+    }
+    (2.0 * STEP * k0, 2.0 * STEP * k1)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -261,6 +383,79 @@ mod tests {
                     );
                 }
             }
+        }
+    }
+
+    #[test]
+    fn roots_square_to_the_covariance() {
+        for step in [0.0, 1e-300, 1e-9, 0.1, 1.0, 30.0, f64::MAX, f64::INFINITY] {
+            let root = root(12, step);
+            let square = &root * root.transpose();
+            for (i, j) in [(0, 0), (3, 4), (0, 11), (7, 5)] {
+                let apart: f64 = if i == j { 0.0 } else { step * (i as f64 - j as f64) };
+                let expected = (-0.5 * apart.powi(2)).exp();
+                assert!((square[(i, j)] - expected).abs() < 1e-12);
+            }
+        }
+    }
+
+    #[test]
+    fn nodes_are_uniform_and_correlated_as_the_copula_says() {
+        let scale = "4x3_1x9".parse().unwrap();
+        let field = SmoothField::new(scale, &Geometry::default(), 2.0);
+        let mut rng = Seed(1).rng(Stream::Training);
+        let draws: Vec<Mat<f64>> = (0..20_000).map(|_| field.draw(&mut rng)).collect();
+        let mean = |f: &dyn Fn(&Mat<f64>) -> f64| draws.iter().map(f).sum::<f64>() / draws.len() as f64;
+        assert!((mean(&|d| d[(1, 2)]) - 0.5).abs() < 0.01);
+        let variance = mean(&|d| (d[(1, 2)] - 0.5).powi(2));
+        assert!((variance * 12.0 - 1.0).abs() < 0.03);
+        // Nodes one row pitch (1 mm) apart: Gaussian correlation exp(−1/8), rank correlation (6/π) asin(ρ/2).
+        let covariance = mean(&|d| (d[(1, 2)] - 0.5) * (d[(2, 2)] - 0.5));
+        let expected = 6.0 / std::f64::consts::PI * (0.5 * (-0.125_f64).exp()).asin();
+        assert!((covariance / variance - expected).abs() < 0.02);
+    }
+
+    /// `scipy.special.k0e(x)` and `k1e(x)`, SciPy 1.17.1.
+    const SCIPY: [(f64, f64, f64); 13] = [
+        (1e-300, 690.8914594138721, 9.999999999999999e299),
+        (1e-8, 18.536612444976903, 100000000.99999991),
+        (0.1, 2.6823261022628944, 10.890182683049698),
+        (0.999, 1.1449550968457312, 1.6372990143017032),
+        (1.0, 1.1444630798068947, 1.636153486263258),
+        (1.001, 1.1439717155411275, 1.6350100860707517),
+        (1.5, 0.9582100532948961, 1.2431658735525528),
+        (2.0, 0.8415682150707712, 1.0334768470686888),
+        (3.5, 0.6490263376886884, 0.7364675480289125),
+        (10.0, 0.39163193443659866, 0.4107665705957887),
+        (100.0, 0.1251756216591266, 0.12579995047957854),
+        (1e8, 0.00012533141357488577, 0.00012533141420154284),
+        (1e300, 1.2533141373155004e-150, 1.2533141373155002e-150),
+    ];
+
+    #[test]
+    fn values_are_those_of_scipy() {
+        for (x, k0, k1) in SCIPY {
+            let ours = scaled_k0_k1(x);
+            assert!((ours.0 / k0 - 1.0).abs() < 3e-15, "{x}: {} {k0}", ours.0);
+            assert!((ours.1 / k1 - 1.0).abs() < 3e-15, "{x}: {} {k1}", ours.1);
+        }
+    }
+
+    #[test]
+    fn series_and_integral_meet() {
+        let (series, integral) = (by_series(2.0), by_integral(2.0));
+        assert!((series.0 / integral.0 - 1.0).abs() < 5e-15);
+        assert!((series.1 / integral.1 - 1.0).abs() < 5e-15);
+    }
+
+    #[test]
+    fn no_argument_gives_nan_or_infinity() {
+        for x in [0.0, 5e-324, f64::MIN_POSITIVE, f64::MAX, f64::INFINITY] {
+            let (k0, k1) = scaled_k0_k1(x);
+            assert!(
+                k0 > 0.0 && k0.is_finite() && k1 > 0.0 && k1.is_finite(),
+                "{x}: {k0} {k1}"
+            );
         }
     }
 }

@@ -9,8 +9,7 @@ use super::{
     cholesky::{Elimination, output_weights, write_negative},
     conjugate::{ConjugateGradient, HiddenSolver, System},
     factoring_is_cheaper,
-    output_layer::{OutputLayer, ridge},
-    products::Products,
+    products::{OutputLayer, Products, ridge},
     schur::{Decay, PerClass, SchurComplement},
 };
 use crate::{

@@ -22,7 +22,6 @@
 mod cholesky;
 mod conjugate;
 mod equations;
-mod output_layer;
 mod products;
 mod schur;
 

@@ -5,7 +5,7 @@ use super::{
     *,
 };
 use crate::training::{
-    backpropagation::Backpropagation,
+    activations::Backpropagation,
     examples::tests::{random_examples, random_mlp},
 };
 
