@@ -4,7 +4,9 @@ use serde::{Deserialize, Serialize};
 use serde_json::value::to_raw_value;
 
 use super::{
-    AtomicFile, DocumentError, DocumentKind, document::PROGRAM, network_file::Sealed, soundness::settings_defect,
+    AtomicFile, DocumentError, DocumentKind,
+    document::PROGRAM,
+    network_file::{Sealed, settings_defect},
     unfinished::folder_of,
 };
 use crate::import::{Progress, Recorded, Setup, SetupError, SetupSets};

@@ -32,7 +32,6 @@ pub mod bundle;
 mod checkpoint_file;
 mod document;
 mod experiment_tables;
-mod experiment_words;
 pub mod figures;
 mod network_file;
 mod recipe_file;
@@ -40,7 +39,6 @@ pub mod report;
 mod run_folder;
 mod samples;
 mod sensor_file;
-mod soundness;
 mod sweep;
 mod table;
 mod tables;
@@ -54,9 +52,9 @@ pub use checkpoint_file::CheckpointFile;
 pub use decoupler_core::text::{format_decimals, format_duration, format_number, format_percent, format_r2};
 pub use document::{DocumentError, DocumentKind};
 pub use experiment_tables::{
-    ExperimentColumn, ExperimentColumnKind, ExperimentTable, cells_table, trials_table, write_experiment_markdown,
+    ExperimentColumn, ExperimentColumnKind, ExperimentTable, cells_table, describe_conditions, describe_failures,
+    describe_worse_than_mean, trials_table, write_experiment_markdown,
 };
-pub use experiment_words::{describe_conditions, describe_failures, describe_worse_than_mean};
 pub use network_file::NetworkFile;
 pub use recipe_file::{RecipeFile, RecipeSource};
 pub use run_folder::{KeptRun, KeptRuns, RunFolder};

@@ -6,42 +6,34 @@
 
 mod axis;
 mod colour_map;
-mod heat_map;
-mod look;
 mod of_epochs;
 mod of_errors;
 mod of_experiment;
-mod of_learning;
 mod of_live;
-mod of_nodes;
 mod of_recorded;
 mod of_sample;
 mod of_section;
-mod of_targets;
 mod of_trade_off;
 mod plot;
-mod regression;
 mod summary;
 pub mod surface;
 
 pub use axis::{AxisScale, PlotAxis, TickRule, Ticks, multiples, share, step_for, tick_text};
-pub use colour_map::{ColourMap, Rgb, SequentialMap, is_light};
-pub use heat_map::HeatMap;
-pub use look::{Hue, Key, LineStyle, Look, Marker};
-pub use of_epochs::{EpochOutline, compared_losses_figure, loss_figure, training_state_figure};
-pub use of_errors::{ErrorBins, error_histogram_figure, pair_sample, target_histogram_figure, target_pairs};
+pub use colour_map::{ColourMap, HeatMap, Rgb, SequentialMap, is_light};
+pub use of_epochs::{EpochOutline, compared_losses_figure, learning_curve_figure, loss_figure, training_state_figure};
+pub use of_errors::{
+    ErrorBins, RegressionLine, error_histogram_figure, pair_sample, regression_figure, target_histogram_figure,
+    target_pairs, target_regression_figure,
+};
 pub use of_experiment::experiment_figure;
-pub use of_learning::learning_curve_figure;
 pub use of_live::{readings_figure, targets_over_time_figure, zero_gains_figure};
-pub use of_nodes::{node_figure, pair_address, z_pairs_mm};
-pub use of_recorded::position_error_map;
-pub use of_sample::{sample_figure, singular_values_figure};
+pub use of_recorded::{TargetSurface, position_error_map};
+pub use of_sample::{node_figure, pair_address, sample_figure, singular_values_figure, z_pairs_mm};
 pub use of_section::{SectionNodes, section_figure};
-pub use of_targets::TargetSurface;
 pub use of_trade_off::{frame_time, point_facts, point_name, trade_off_figure, training_time};
 pub use plot::{LineAt, Plot, PlotFigure, PlotPoint, PointLabel, ReferenceLine, Series, Span, along, place_labels};
-pub use regression::{RegressionLine, regression_figure, target_regression_figure};
 
+use decoupler_core::decoupling::DecoderKind;
 use surface::SurfaceFigure;
 
 /// Any picture.
@@ -70,5 +62,157 @@ impl From<HeatMap> for Figure {
 impl From<SurfaceFigure> for Figure {
     fn from(surfaces: SurfaceFigure) -> Self {
         Self::Surfaces(surfaces)
+    }
+}
+
+/// Role of a colour. The window resolves it by its theme, print by a palette for white paper; both tell the hues apart
+/// in grey and for most colour-blind readers.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Hue {
+    /// The network's own result.
+    Blue,
+    /// A comparison that went wrong or differs most.
+    Red,
+    /// The validation set; a bound.
+    Green,
+    /// The test set; a second run.
+    Orange,
+    /// A further series.
+    Violet,
+    /// A further series.
+    Cyan,
+    /// References and baselines.
+    Grey,
+    /// As strong as text: published values.
+    Ink,
+}
+
+impl Hue {
+    /// The hue of a decoder in charts, a different one for each.
+    pub fn of_decoder(kind: DecoderKind) -> Self {
+        match kind {
+            DecoderKind::Mean => Self::Grey,
+            DecoderKind::Ridge => Self::Violet,
+            DecoderKind::Network => Self::Blue,
+            DecoderKind::RadialBasis => Self::Orange,
+            DecoderKind::Fuzzy => Self::Cyan,
+            DecoderKind::Newton => Self::Red,
+            DecoderKind::Polish => Self::Green,
+        }
+    }
+}
+
+/// Style of a line.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum LineStyle {
+    /// A curve.
+    Solid,
+    /// A reference, or the lesser of two curves.
+    Dashed,
+    /// A limit set by the user.
+    Dotted,
+    /// Thin and pale: one of many.
+    Fine,
+}
+
+/// Symbol at a point.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Marker {
+    /// A small filled circle: one of many.
+    Dot,
+    /// A filled circle.
+    Disc,
+    /// A hollow circle.
+    Ring,
+    /// A hollow circle around another symbol.
+    Halo,
+    /// A hollow square.
+    Square,
+    /// A filled diamond.
+    Diamond,
+    /// A hollow diamond.
+    HollowDiamond,
+}
+
+/// Appearance of a series.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct Look {
+    /// Colour of everything.
+    pub hue: Hue,
+    /// Line from point to point.
+    pub line: Option<LineStyle>,
+    /// Symbol at each point.
+    pub marker: Option<Marker>,
+}
+
+impl Look {
+    /// A line without symbols.
+    pub fn line(hue: Hue, style: LineStyle) -> Self {
+        Self {
+            hue,
+            line: Some(style),
+            marker: None,
+        }
+    }
+
+    /// Symbols without a line.
+    pub fn marker(hue: Hue, marker: Marker) -> Self {
+        Self {
+            hue,
+            line: None,
+            marker: Some(marker),
+        }
+    }
+
+    /// Symbols joined by a solid line.
+    pub fn joined(self) -> Self {
+        Self {
+            line: Some(LineStyle::Solid),
+            ..self
+        }
+    }
+
+    /// A filled area: the bars of a histogram or a span of an axis.
+    pub fn area(hue: Hue) -> Self {
+        Self {
+            hue,
+            line: None,
+            marker: None,
+        }
+    }
+}
+
+/// Entry of a legend.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Key {
+    /// Meaning of the sample.
+    pub name: String,
+    /// The sample.
+    pub look: Look,
+}
+
+impl Key {
+    /// A key of this name.
+    pub fn new(name: impl Into<String>, look: Look) -> Self {
+        let name = name.into();
+        Self { name, look }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn colours_tell_decoders_apart() {
+        for (index, kind) in DecoderKind::ALL.into_iter().enumerate() {
+            let others = &DecoderKind::ALL[..index];
+            assert!(
+                others
+                    .iter()
+                    .all(|&other| Hue::of_decoder(other) != Hue::of_decoder(kind)),
+                "{kind}"
+            );
+        }
     }
 }

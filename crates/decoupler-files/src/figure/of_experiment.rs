@@ -3,10 +3,9 @@
 use ndarray::Array2;
 
 use super::{
+    Hue, Key, LineStyle, Look, Marker,
     axis::{PlotAxis, TickRule},
-    colour_map::SequentialMap,
-    heat_map::HeatMap,
-    look::{Hue, Key, LineStyle, Look, Marker},
+    colour_map::{HeatMap, SequentialMap},
     plot::{LineAt, Plot, PlotFigure, PlotPoint, ReferenceLine, Series, Span},
 };
 use crate::figure::Figure;

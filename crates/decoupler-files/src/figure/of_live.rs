@@ -8,10 +8,9 @@ use decoupler_core::evaluation::Channel;
 use ndarray::Array2;
 
 use super::{
+    Hue, Key, LineStyle, Look,
     axis::PlotAxis,
-    colour_map::SequentialMap,
-    heat_map::HeatMap,
-    look::{Hue, Key, LineStyle, Look},
+    colour_map::{HeatMap, SequentialMap},
     plot::{Plot, PlotFigure, Series},
 };
 

@@ -5,8 +5,8 @@ use std::ops::RangeInclusive;
 use glam::DVec3;
 
 use super::{
+    Hue, Key, LineStyle, Look, Marker,
     axis::PlotAxis,
-    look::{Hue, Key, LineStyle, Look, Marker},
     plot::{Plot, PlotFigure, PlotPoint, Series, Span},
     surface::{Section, SectionLine},
 };

@@ -11,8 +11,8 @@ use decoupler_core::{
 };
 
 use super::{
+    Hue, Key, LineStyle, Look, Marker,
     axis::PlotAxis,
-    look::{Hue, Key, LineStyle, Look, Marker},
     plot::{LineAt, Plot, PlotFigure, PlotPoint, ReferenceLine, Series},
 };
 

@@ -2,10 +2,7 @@ use std::ops::RangeInclusive;
 
 use glam::DVec2;
 
-use super::{
-    axis::PlotAxis,
-    look::{Hue, Key, LineStyle, Look, Marker},
-};
+use super::{Hue, Key, LineStyle, Look, Marker, axis::PlotAxis};
 
 /// A plot of series of points: curves, scatter, bars.
 #[derive(Clone, Debug, PartialEq)]

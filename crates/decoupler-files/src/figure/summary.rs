@@ -1,9 +1,9 @@
 //! Figures in a sentence or two, for readers who cannot see them.
 
 use super::{
+    LineStyle,
     axis::{AxisScale, PlotAxis},
-    heat_map::HeatMap,
-    look::LineStyle,
+    colour_map::HeatMap,
     plot::{LineAt, Plot, PlotFigure, PlotPoint, Series},
     surface::{Quantity, Surface},
 };

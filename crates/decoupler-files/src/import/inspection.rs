@@ -7,8 +7,8 @@ use serde::Serialize;
 
 use super::{
     Cells, Column, DialectChoice, Format, ImportError, Meaning, Recipe, Table, Watch,
+    inputs::{ColumnId, Names},
     join::median_interval,
-    names::{ColumnId, Names},
     read_table,
 };
 
@@ -111,7 +111,7 @@ impl Inspection {
         let mut columns: Vec<ColumnSummary> = table.columns.iter().map(ColumnSummary::of).collect();
         name_duplicates(table, &mut columns);
         let chosen = match time {
-            Some(name) => Some((super::names::Names::of(&[table], &[]).find(name)?.column, false)),
+            Some(name) => Some((super::inputs::Names::of(&[table], &[]).find(name)?.column, false)),
             None => guess_time(table, &columns).map(|column| (column, true)),
         };
         let time = chosen.and_then(|(column, is_guessed)| TimeSummary::of(table, column, is_guessed));

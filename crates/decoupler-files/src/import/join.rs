@@ -1,6 +1,6 @@
 use ndarray::Array2;
 
-use super::{Table, names::ColumnId, table::Cells};
+use super::{Table, inputs::ColumnId, table::Cells};
 
 /// Partners in a joined recording.
 pub(super) struct Partners {

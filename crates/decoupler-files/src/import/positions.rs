@@ -9,7 +9,7 @@ use std::{
 use thiserror::Error;
 
 use super::{
-    Cells, Column, DialectChoice, Format, ImportError, Table, TableError, Watch, csv_table::Reading, read::read,
+    Cells, Column, DialectChoice, Format, ImportError, Table, TableError, Watch, csv_table::Reading, importing::read,
 };
 use decoupler_core::evaluation::{Channel, TargetPosition};
 

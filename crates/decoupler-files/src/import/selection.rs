@@ -2,9 +2,9 @@ use std::{collections::HashMap, path::PathBuf};
 
 use super::{
     Cells, Dropped, FileReport, ImportError, JoinReport, Recipe, Table,
+    inputs::{ColumnId, Names},
     join::Partners,
-    meanings::Meanings,
-    names::{ColumnId, Names},
+    suggestion::Meanings,
 };
 use decoupler_core::evaluation::Channel;
 

@@ -3,12 +3,11 @@ use std::{fs, path::Path};
 use super::{
     c99::{self, Compiled, run_self_test},
     choice::{BundleFormat, BundlePrecision, ReadingRounding, Taking},
-    error::BundleError,
     exported_decoder::{ExportedDecoder, Metadata},
     fixed_point::{FixedNetworks, HiddenWidth, USUAL_BOUND},
     folder::{AtomicFolder, Draft, deviation, identifier},
     portable::Portable,
-    report::{BundleCheck, BundleReport, VectorCounts, readme},
+    report::{BundleCheck, BundleError, BundleReport, VectorCounts, readme},
     vectors::{Deviation, Tolerance, Vectors, golden_csv},
     weights::{self, Arithmetic, Weights},
 };

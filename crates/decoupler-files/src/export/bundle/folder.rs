@@ -5,11 +5,11 @@ use std::{
 
 use super::{
     choice::BundlePrecision,
-    error::BundleError,
     exported_decoder::Metadata,
     fixed_point::FixedNetworks,
     iteration::Iteration,
     portable::Portable,
+    report::BundleError,
     vectors::{Deviation, Vector, Vectors},
     weights::Weights,
 };

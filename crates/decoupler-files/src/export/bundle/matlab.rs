@@ -3,13 +3,11 @@
 use std::fmt::Write;
 
 use super::{
-    error::BundleError,
     folder::{Call, Draft},
     meaning::Meaning,
     portable::Portable,
-    report::BundleCheck,
-    tables::names,
-    weights::{Arithmetic, Weights},
+    report::{BundleCheck, BundleError},
+    weights::{Arithmetic, Weights, names},
 };
 use decoupler_core::{
     decoupling::{AffineLayer, Layer},

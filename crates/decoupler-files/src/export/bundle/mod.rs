@@ -8,13 +8,11 @@
 
 mod c99;
 mod choice;
-mod error;
 mod exact;
 mod exported_decoder;
 mod exporting;
 mod fixed_point;
 mod folder;
-mod folding;
 mod iteration;
 mod matlab;
 mod meaning;
@@ -22,8 +20,6 @@ mod numpy;
 mod onnx;
 mod portable;
 mod report;
-mod tables;
-mod twofold;
 mod vectors;
 mod weights;
 
@@ -32,7 +28,6 @@ mod tests;
 
 pub use self::{
     choice::{BundleFormat, BundlePrecision, ChoiceError},
-    error::BundleError,
     exported_decoder::ExportedDecoder,
     exporting::export_bundle,
     fixed_point::FixedPointError,
@@ -40,3 +35,4 @@ pub use self::{
     report::{BundleCheck, BundleReport, VectorCounts},
 };
 pub use choice::{BundleDecoder, ReadingRounding};
+pub use report::BundleError;

@@ -9,7 +9,7 @@ use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
 use super::{
     BundleError, BundleFormat, BundlePrecision, FoldError, c99,
     choice::Taking,
-    exact::decode_exactly,
+    exact::{Twofold, decode_exactly},
     export_bundle,
     exported_decoder::ExportedDecoder,
     fixed_point::{FixedNetworks, HiddenWidth},
@@ -17,7 +17,6 @@ use super::{
     meaning::Meaning,
     numpy, onnx,
     portable::Portable,
-    twofold::Twofold,
     vectors::{Deviation, Vectors},
     weights::{Arithmetic, Weights},
 };

@@ -6,14 +6,12 @@ use decoupler_core::{
 
 use super::{
     choice::{ReadingRounding, Taking},
-    error::BundleError,
     exact::{ErrorGrowth, decode_exactly},
     exported_decoder::{Drawn, ExportedDecoder},
     meaning::Meaning,
     portable::Portable,
-    report::VectorCounts,
-    tables::names,
-    weights::{Arithmetic, Digits},
+    report::{BundleError, VectorCounts},
+    weights::{Arithmetic, Digits, names},
 };
 
 /// Readings with the answers that the decoder gives to them.

@@ -5,7 +5,6 @@
 
 mod canvas;
 mod frame;
-mod heat_map;
 mod picture;
 mod plot;
 mod surfaces;

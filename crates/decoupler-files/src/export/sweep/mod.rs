@@ -2,10 +2,8 @@
 //! trained. Both are named by the hash of what they are for and never change, so any number of programs may write to
 //! one folder.
 
-mod merging;
 mod plan_file;
 mod row;
-mod train_options;
 mod trial_file;
 
 use std::{
@@ -20,14 +18,12 @@ use super::{AtomicFile, DocumentError, DocumentKind, WriteError, network_file::S
 use decoupler_core::text::system_cause;
 
 pub use self::{
-    merging::{MergedSweep, SweepFolderError},
     plan_file::{PlanAxis, SweepPlan},
     row::SweepRow,
-    train_options::{decoders_in_order, recording_options, train_options},
     trial_file::{Trial, TrialOptions},
 };
-pub use plan_file::sweep_specification;
-pub use row::SweepTableFormat;
+pub use plan_file::{decoders_in_order, recording_options, sweep_specification, train_options};
+pub use row::{MergedSweep, SweepFolderError, SweepTableFormat};
 pub use trial_file::TrialId;
 
 /// Trial and plan files of a folder.

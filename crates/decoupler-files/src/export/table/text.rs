@@ -1,6 +1,6 @@
 use std::fmt;
 
-use super::{Cell, Table, TableColumn, description::latex};
+use super::{Cell, Table, TableColumn, latex};
 use decoupler_core::text::inert;
 
 /// Form in which a table is copied into other documents.

@@ -7,11 +7,10 @@ use std::ops::RangeInclusive;
 use glam::{DVec2, DVec3, Vec2};
 
 use super::{
-    camera::OrbitCamera,
+    camera::{OrbitCamera, PlotBox, Projection},
     cut::{Edge, GAP, SHORTEST_AXIS, TICK},
     drawing::Labels,
-    projection::{PlotBox, Projection},
-    shapes::{Bounds, Ink, Line},
+    nodes::{Bounds, Ink, Line},
 };
 use crate::figure::axis::{multiples, round_steps, tick_text};
 
@@ -283,7 +282,7 @@ impl<'a> PlanAxes<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::figure::surface::shapes::Text;
+    use crate::figure::surface::nodes::Text;
 
     #[test]
     fn labels_neither_overlap_nor_leave_the_card() {

@@ -6,14 +6,12 @@ use decoupler_core::text::counted;
 use glam::{DVec3, Vec2};
 
 use super::{
+    Surface, ViewMode,
     box_axes::{BoxAxes, PlanAxes},
-    camera::{OrbitCamera, Sight},
+    camera::{OrbitCamera, PlotBox, Projection, Sight},
     field::Field,
     mesh::Mesh,
-    nodes::Dots,
-    projection::{PlotBox, Projection},
-    shapes::{Bounds, Line, Text},
-    surface_figure::{Surface, ViewMode},
+    nodes::{Bounds, Dots, Line, Text},
 };
 use crate::figure::colour_map::ColourMap;
 

@@ -8,10 +8,10 @@ use decoupler_core::surface::{Grid, SurfaceMap};
 use glam::{DVec3, Vec2};
 
 use super::{
+    Surface, ViewMode,
     cut::TICK,
     drawing::Labels,
-    shapes::{Bounds, Ink, Line, Text},
-    surface_figure::{Surface, ViewMode},
+    nodes::{Bounds, Ink, Line, Text},
 };
 use crate::figure::{
     axis::{multiples, round_steps, tick_text},

@@ -295,7 +295,7 @@ mod tests {
     use super::*;
     use crate::figure::surface::{
         Bounds, OrbitCamera, Quantity, Surface, ViewMode,
-        projection::{PlotBox, Projection},
+        camera::{PlotBox, Projection},
     };
 
     /// Returns the distance from the eye to a triangle at a place on the screen; `None` next to it.

@@ -7,6 +7,8 @@
 //! `camera` and `projection` say where things lie; `box_axes` and `plan_axes` lay out the frame with its ticks, for which
 //! `labels` finds room; `mesh` is the height field with its contour lines from far to near, `plateau` marks what lies beyond the axes; `nodes` are the dots on it. `sight` leads back from the
 //! screen, and `pick` to the surface; `section` cuts it along a wire.
+//!
+//! Figure of surfaces, described for the renderers.
 
 mod box_axes;
 mod camera;
@@ -16,16 +18,128 @@ mod field;
 mod mesh;
 mod nodes;
 mod pick;
-mod projection;
-mod section;
-mod shapes;
-mod surface_figure;
 
 pub use camera::{AboveSight, EyeSight, OrbitCamera, Ray, Sight};
+pub use cut::{Section, SectionLine};
 pub use drawing::{Card, Drawing};
 pub use field::{ColourScale, Quantity, ScaleDrawing};
 pub use mesh::{ContourLine, Mesh, Vertex};
-pub use nodes::Dots;
-pub use section::{Section, SectionLine};
-pub use shapes::{Bounds, Disc, Ink, Line, Text};
-pub use surface_figure::{Surface, SurfaceFigure, ViewMode};
+pub use nodes::{Bounds, Disc, Dots, Ink, Line, Text};
+
+use std::{ops::RangeInclusive, sync::Arc};
+
+use decoupler_core::surface::SurfaceMap;
+use glam::DVec3;
+use serde::{Deserialize, Serialize};
+
+use crate::figure::colour_map::SequentialMap;
+
+/// View of a surface.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+pub enum ViewMode {
+    /// In space.
+    #[default]
+    ThreeD,
+    /// From above, as a map.
+    Top,
+}
+
+/// One surface with its nodes.
+#[derive(Clone, Debug)]
+pub struct Surface {
+    /// Title of its card: "Actual".
+    pub title: String,
+    /// The lattice of the nodes, and the interpolation between them.
+    pub map: Arc<SurfaceMap>,
+    /// Values on the grid of the map, `x points × y points`. NaN leaves a gap.
+    pub values: Arc<[f64]>,
+    /// The nodes: x and y in millimetres, and the value. NaN hides one.
+    pub nodes: Arc<[DVec3]>,
+    /// Meaning of the values.
+    pub quantity: Quantity,
+    /// Values at the ends of the colours and of the value axis.
+    pub range: RangeInclusive<f64>,
+    /// In space or from above.
+    pub mode: ViewMode,
+    /// Colours of values that do not diverge.
+    pub colours: SequentialMap,
+}
+
+impl Surface {
+    /// Colours of the values.
+    pub fn scale(&self) -> ColourScale {
+        ColourScale {
+            quantity: self.quantity.clone(),
+            range: self.range.clone(),
+            colours: self.colours,
+        }
+    }
+
+    /// Returns `true` if both look alike. Values count as the same if they are the same in memory, so that this costs
+    /// nothing.
+    pub fn looks_like(&self, other: &Self) -> bool {
+        let bits = |surface: &Self| [*surface.range.start(), *surface.range.end()].map(f64::to_bits);
+        Arc::ptr_eq(&self.map, &other.map)
+            && Arc::ptr_eq(&self.values, &other.values)
+            && Arc::ptr_eq(&self.nodes, &other.nodes)
+            && self.quantity == other.quantity
+            && (self.mode, self.colours, bits(self)) == (other.mode, other.colours, bits(other))
+    }
+}
+
+/// Surfaces side by side, seen by one camera.
+#[derive(Clone, Debug, Default)]
+pub struct SurfaceFigure {
+    /// From left to right.
+    pub surfaces: Vec<Surface>,
+    /// The camera of those in space.
+    pub camera: OrbitCamera,
+    /// Index of the node that is marked on each.
+    pub marked_node: Option<usize>,
+    /// Indices of nodes that are lit on each.
+    pub lit_nodes: Vec<usize>,
+    /// Line along which the surfaces are cut in a figure of their section.
+    pub section: Option<Section>,
+}
+
+impl SurfaceFigure {
+    /// Gives surfaces of one quantity one scale, so that colours and heights mean the same.
+    #[must_use]
+    pub fn with_common_scales(mut self) -> Self {
+        let scales = self.scales();
+        for surface in &mut self.surfaces {
+            let alike = scales.iter().filter(|scale| scale.quantity == surface.quantity);
+            let union =
+                |a: RangeInclusive<f64>, b: RangeInclusive<f64>| a.start().min(*b.start())..=a.end().max(*b.end());
+            let range = alike.map(|scale| scale.range.clone()).reduce(union);
+            surface.range = range.unwrap_or(0.0..=1.0);
+        }
+        self
+    }
+
+    /// The scales of colours, each once, from left to right.
+    pub fn scales(&self) -> Vec<ColourScale> {
+        let mut scales: Vec<ColourScale> = Vec::new();
+        for scale in self.surfaces.iter().map(Surface::scale) {
+            if !scales.contains(&scale) {
+                scales.push(scale);
+            }
+        }
+        scales
+    }
+
+    /// Returns the note common to all surfaces: "Between the nodes: bilinear."
+    pub fn note(&self) -> String {
+        let mut kinds: Vec<String> = Vec::new();
+        for kind in self
+            .surfaces
+            .iter()
+            .map(|surface| surface.map.interpolation().to_string())
+        {
+            if !kinds.contains(&kind) {
+                kinds.push(kind);
+            }
+        }
+        format!("Between the nodes: {}.", kinds.join("; "))
+    }
+}

@@ -3,9 +3,9 @@
 use glam::DVec3;
 
 use super::{
+    Surface,
     camera::Ray,
     field::{CellPart, Field},
-    surface_figure::Surface,
 };
 
 /// Part of a triangle by which a ray may miss it, so that none slips through between two.

@@ -5,8 +5,7 @@ use super::{
 use crate::export::bundle::{
     meaning::Meaning,
     portable::Portable,
-    tables::names,
-    weights::{Arithmetic, Digits, Weights},
+    weights::{Arithmetic, Digits, Weights, names},
 };
 use decoupler_core::{decoupling::Layer, network::Quantity};
 

@@ -4,7 +4,6 @@ mod fixed;
 mod floating;
 mod header;
 mod iteration;
-mod selftest;
 
 use std::{
     fmt::{Display, Write},
@@ -13,23 +12,19 @@ use std::{
     process::{Command, Output},
 };
 
-use self::{
-    fixed::readings,
-    header::Header,
-    selftest::{SelfTest, WholeNumbers},
-};
+use self::{fixed::readings, header::Header};
 use super::{
     choice::BundlePrecision,
-    error::BundleError,
     fixed_point::FixedNetworks,
     folder::{Call, Draft},
     meaning::Meaning,
     portable::Portable,
-    report::BundleCheck,
+    report::{BundleCheck, BundleError},
     vectors::{Deviation, Vector},
     weights::Weights,
 };
 use crate::export::bundle::weights::Digits;
+use header::{SelfTest, WholeNumbers};
 
 /// Files of a bundle: names and contents.
 pub(super) type Files = Vec<(String, String)>;

@@ -7,7 +7,6 @@
 //!
 //! The decoder in whole numbers, step by step as the C source has it.
 
-mod logarithm;
 mod quantise;
 mod scaled;
 
@@ -15,17 +14,13 @@ use decoupler_core::{decoupling::Layer, network::Quantity};
 use ndarray::Array2;
 use thiserror::Error;
 
-pub(super) use self::{
-    logarithm::LogTable,
-    quantise::{FixedNetwork, FixedNetworks, USUAL_BOUND},
-};
+pub(super) use self::quantise::{FixedNetwork, FixedNetworks, USUAL_BOUND};
 use crate::export::bundle::{
+    exact::Twofold,
     meaning::Meaning,
     portable::{ChannelRanges, Portable},
-    twofold::Twofold,
 };
-pub(super) use logarithm::TangentTable;
-pub(super) use scaled::{CONDUCTANCE_BITS, HiddenWidth};
+pub(super) use scaled::{CONDUCTANCE_BITS, HiddenWidth, LogTable, TangentTable};
 
 /// Reasons for which a network cannot leave in fixed point.
 #[derive(Clone, Debug, PartialEq, Error)]

@@ -1,7 +1,6 @@
 use super::{
     FixedPointError, TwoLayers, Units,
-    logarithm::{LogTable, TangentTable},
-    scaled::{Change, HiddenWidth, ScaledRow},
+    scaled::{Change, HiddenWidth, LogTable, ScaledRow, TangentTable},
 };
 use crate::export::bundle::portable::Portable;
 use decoupler_core::network::Quantity;

@@ -11,7 +11,6 @@
 //! | `readings_outside`, if the range in training is known | batch | int64 |
 
 mod evaluator;
-mod operations;
 mod schema;
 mod writer;
 
@@ -20,9 +19,8 @@ use prost::Message;
 use self::{evaluator::evaluate, schema::Model};
 use super::{
     choice::BundlePrecision,
-    error::BundleError,
     folder::{Call, Draft},
-    report::BundleCheck,
+    report::{BundleCheck, BundleError},
     vectors::Vector,
     weights::Digits,
 };

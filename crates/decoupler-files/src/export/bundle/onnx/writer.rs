@@ -11,8 +11,7 @@ use crate::export::bundle::{
     exported_decoder::Metadata,
     meaning::{Meaning, comment},
     portable::Portable,
-    tables::{Table, names},
-    weights::{Arithmetic, Digits, Weights},
+    weights::{Arithmetic, Digits, Table, Weights, names},
 };
 use decoupler_core::{decoupling::Layer, evaluation::Channel, network::Quantity};
 

@@ -8,8 +8,12 @@ use super::{run_of, trained_settings};
 use crate::export::{
     NetworkFile,
     bundle::{
-        BundleDecoder, BundleError, BundleFormat, BundlePrecision, BundleReport, ExportedDecoder, choice::Taking,
-        exact::decode_exactly, export_bundle, folding::FoldedMap, portable::Portable, vectors::Vectors,
+        BundleDecoder, BundleError, BundleFormat, BundlePrecision, BundleReport, ExportedDecoder,
+        choice::Taking,
+        exact::decode_exactly,
+        export_bundle,
+        portable::{FoldedMap, Portable},
+        vectors::Vectors,
     },
 };
 use decoupler_core::{
