@@ -11,9 +11,9 @@ use serde::Serialize;
 use super::{
     errors_report::{Target, targets},
     failure::Failure,
+    inspect::{FileFound, files, write_files, write_warnings},
     interruption::Graceful,
     output::{print, print_object, progress_bar},
-    recording_report::{FileFound, files, write_files, write_warnings},
     samples::{with_bar, working_folder},
     train::Train,
 };

@@ -25,12 +25,13 @@ use decoupler_files::{
 use serde::Serialize;
 
 use super::{
-    arguments::{count, seed},
+    count,
     failure::Failure,
     import_arguments::ImportArguments,
+    inspect::{FileFound, files, write_files, write_warnings},
     output::{print, print_object, progress_bar},
-    recording_report::{FileFound, files, write_files, write_warnings},
     samples::{with_bar, working_folder},
+    seed,
 };
 
 // Models that are fitted to measure how well the readings determine the targets.

@@ -27,10 +27,10 @@ use decoupler_files::{
 };
 
 use super::{
-    arguments::number,
     failure::Failure,
     follow_report::{Answers, Form, Report},
     interruption::Graceful,
+    number,
 };
 
 // Decoding of frames as they come.

@@ -14,9 +14,8 @@ use ndarray::ArrayView1;
 use serde_json::{Map, Value, json};
 
 use super::{
-    decode::{rows_read, write_heading},
+    decode::{OutsideTraining, rows_read, write_heading},
     failure::Failure,
-    outside_training::OutsideTraining,
 };
 
 /// Counts of what came, and messages on standard error.

@@ -3,8 +3,9 @@
 //!
 //! A command ends with status 0 when its work is done, 1 when it failed, 2 when its arguments were wrong; the last two
 //! with one line on standard error. Ctrl-C ends it with status 130; `train` first saves what it has.
+//!
+//! Parsers of values that several commands take.
 
-mod arguments;
 mod calibrate;
 mod cross_validation;
 mod decode;
@@ -18,13 +19,9 @@ mod import_arguments;
 mod inspect;
 mod interruption;
 mod output;
-mod outside_training;
-mod recording_report;
 mod reproduce;
-mod reproduce_report;
 mod samples;
 mod scene_arguments;
-mod spread_plot;
 mod sweep;
 mod trade;
 mod trade_report;
@@ -32,4 +29,197 @@ mod train;
 mod train_report;
 mod training_arguments;
 
-pub use arguments::{Window, run};
+pub use decoupler_files::export::exit_leaving_nothing;
+
+use std::{
+    borrow::Cow,
+    error::Error,
+    ffi::OsString,
+    io::{Write, stderr},
+    ops::RangeInclusive,
+    process::ExitCode,
+};
+
+use calibrate::Calibrate;
+use clap::{Parser, Subcommand, error::ErrorKind};
+use decode::{Decode, FineTune};
+use export::Export;
+use failure::Failure;
+use inspect::Inspect;
+use reproduce::Reproduce;
+use samples::Simulate;
+use sweep::Sweep;
+use trade::Trade;
+use train::Train;
+
+/// Opens the window and returns when it is closed.
+pub type Window = fn() -> Result<(), Box<dyn Error>>;
+
+/// Decouples flexible tactile sensor arrays with back-propagation networks.
+///
+/// Without a command it opens the window.
+#[derive(Parser)]
+#[command(name = "decoupler", version, max_term_width = 100)]
+struct Arguments {
+    #[command(subcommand)]
+    command: Option<Command>,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    Train(Box<Train>),
+    Inspect(Box<Inspect>),
+    Decode(Decode),
+    Export(Export),
+    Calibrate(Box<Calibrate>),
+    FineTune(Box<FineTune>),
+    Simulate(Box<Simulate>),
+    Reproduce(Reproduce),
+    Trade(Box<Trade>),
+    Sweep(Box<Sweep>),
+}
+
+/// Runs the command that `arguments` (the program's name first) name, and returns the exit status. Without a command
+/// it opens `window`.
+pub fn run<A: Into<OsString> + Clone>(arguments: impl IntoIterator<Item = A>, window: Window) -> ExitCode {
+    let done = match Arguments::try_parse_from(arguments) {
+        Ok(arguments) => arguments.run(window),
+        // Help and version are no errors; a reader that has gone away needs neither.
+        Err(told) if matches!(told.kind(), ErrorKind::DisplayHelp | ErrorKind::DisplayVersion) => {
+            told.print().map_err(Failure::Output)
+        }
+        Err(error) => Err(Failure::Arguments(one_line(&error))),
+    };
+    match done {
+        Err(failure) if !failure.is_broken_pipe() => {
+            // There is no one to report to if this fails.
+            let _ = match &failure {
+                Failure::Interrupted(_)
+                | Failure::InterruptedTrials { .. }
+                | Failure::InterruptedTrade { .. }
+                | Failure::InterruptedSweep { .. }
+                | Failure::InterruptedFollow => {
+                    writeln!(stderr(), "{failure}")
+                }
+                _ => writeln!(stderr(), "error: {failure}"),
+            };
+            ExitCode::from(failure.status())
+        }
+        _ => ExitCode::SUCCESS,
+    }
+}
+
+impl Arguments {
+    fn run(self, window: Window) -> Result<(), Failure> {
+        if self.command.is_some() {
+            interruption::install();
+        }
+        match self.command {
+            Some(Command::Train(train)) => train.run(),
+            Some(Command::Inspect(inspect)) => inspect.run(),
+            Some(Command::Decode(decode)) => decode.run(),
+            Some(Command::Export(export)) => export.run(),
+            Some(Command::Calibrate(calibrate)) => calibrate.run(),
+            Some(Command::FineTune(fine_tune)) => fine_tune.run(),
+            Some(Command::Simulate(simulate)) => simulate.run(),
+            Some(Command::Reproduce(reproduce)) => reproduce.run(),
+            Some(Command::Trade(trade)) => trade.run(),
+            Some(Command::Sweep(sweep)) => sweep.run(),
+            None => {
+                window().map_err(Failure::Window)?;
+                // A file that took too long to be written is not left half-written.
+                exit_leaving_nothing(0)
+            }
+        }
+    }
+}
+
+/// Returns a parser of whole numbers in `allowed`.
+pub(super) fn count(allowed: RangeInclusive<usize>) -> impl Fn(&str) -> Result<usize, String> + Clone {
+    move |text| {
+        let count = text.parse().ok().filter(|count| allowed.contains(count));
+        count.ok_or_else(|| format!("give a whole number from {} to {}", allowed.start(), allowed.end()))
+    }
+}
+
+/// Parses a finite number that is not negative.
+pub(super) fn number(text: &str) -> Result<f64, String> {
+    let number = text
+        .parse()
+        .ok()
+        .filter(|number: &f64| number.is_finite() && *number >= 0.0);
+    number.ok_or_else(|| "give a number from 0, for example 1e-7".to_owned())
+}
+
+/// Parses a seed.
+pub(super) fn seed(text: &str) -> Result<u64, String> {
+    text.parse()
+        .map_err(|_| format!("give a whole number from 0 to {}", u64::MAX))
+}
+
+/// The parser's message in one line, without its usage text.
+pub(super) fn one_line(error: &clap::Error) -> String {
+    let text = error.render().to_string();
+    let paragraphs = text.split("\n\n").map(|paragraph| {
+        let lines: Vec<_> = paragraph.lines().map(str::trim).collect();
+        lines.join(" ")
+    });
+    let said = paragraphs.filter(|paragraph| {
+        let aside = ["Usage:", "For more information"];
+        !paragraph.is_empty() && !aside.iter().any(|start| paragraph.starts_with(start))
+    });
+    let line = said.collect::<Vec<_>>().join("; ");
+    let line = line.strip_prefix("error: ").unwrap_or(&line);
+    line.split(' ').map(shortened).collect::<Vec<_>>().join(" ")
+}
+
+/// A word as given, unless it is too long to be read.
+fn shortened(word: &str) -> Cow<'_, str> {
+    const LONGEST: usize = 200;
+    const BEGINNING: usize = 40;
+    if word.chars().count() <= LONGEST {
+        return Cow::Borrowed(word);
+    }
+    let beginning: String = word.chars().take(BEGINNING).collect();
+    Cow::Owned(format!("{beginning}…"))
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::CommandFactory;
+
+    use super::*;
+
+    #[test]
+    fn endless_values_are_cut_in_messages() {
+        let long = "1".repeat(5000);
+        let error = Arguments::try_parse_from(["decoupler", "simulate", "--array", &long]);
+        let line = one_line(&error.err().unwrap());
+        assert!(line.contains("is not an array scale") && line.len() < 500, "{line}");
+    }
+
+    #[test]
+    fn the_commands_are_declared_without_contradiction() {
+        Arguments::command().debug_assert();
+    }
+
+    #[test]
+    fn whatever_is_wrong_takes_one_line() {
+        let cases = [
+            ("train --hiden 3", "unexpected argument '--hiden' found"),
+            ("train --hidden 0", "'0' for '--hidden"),
+            ("train --array 10x6", "10x10_5x30"),
+            ("train --method sgd", "lm, br, varpro"),
+            ("train extra", "unexpected argument 'extra'"),
+            ("decode --network n", "--input <FILE> --output <FILE>"),
+            ("trian", "unrecognized subcommand 'trian'"),
+            ("train --seed", "a value is required"),
+        ];
+        for (arguments, expected) in cases {
+            let arguments = std::iter::once("decoupler").chain(arguments.split(' '));
+            let line = one_line(&Arguments::try_parse_from(arguments).err().unwrap());
+            assert!(line.contains(expected), "{line}");
+            assert!(!line.contains('\n') && !line.contains("Usage"), "{line}");
+        }
+    }
+}

@@ -19,12 +19,7 @@ use decoupler_files::{
     import::{Progress, Setup, SetupError, SetupSets},
 };
 
-use super::{
-    arguments::{count, seed},
-    failure::Failure,
-    output::progress_bar,
-    scene_arguments::SceneArguments,
-};
+use super::{count, failure::Failure, output::progress_bar, scene_arguments::SceneArguments, seed};
 
 /// Draws or reads the samples of `setup`.
 pub(super) fn sets(setup: &Setup, is_json: bool) -> Result<SetupSets, Failure> {

@@ -1,10 +1,6 @@
 use clap::Args;
 
-use super::{
-    arguments::{count, number},
-    failure::Failure,
-    interruption::check_same,
-};
+use super::{count, failure::Failure, interruption::check_same, number};
 use decoupler_core::{
     decoupling::DecoderKind,
     evaluation::{Measured, Preset, RunSettings, SimulatedSettings, Simulation},

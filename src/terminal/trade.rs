@@ -15,13 +15,15 @@ use decoupler_files::{
 };
 
 use super::{
-    arguments::{count, number, seed},
+    count,
     failure::Failure,
     import_arguments::ImportArguments,
     interruption::Graceful,
+    number,
     output::progress_bar,
     samples::{announce_workload, following, working_folder},
     scene_arguments::SceneArguments,
+    seed,
     trade_report::{Limits, MeasuredLevel, PointTraining, RecordedSource, TradeOff, TradeSource},
     training_arguments::{method, refuse_with_recordings},
 };

@@ -5,8 +5,8 @@ use serde::Serialize;
 use super::{
     errors_report::ErrorsReport,
     failure::Failure,
+    inspect::{RecordingReport, import_warnings, write_warnings},
     output::{print, print_object},
-    recording_report::{RecordingReport, import_warnings, write_warnings},
 };
 use decoupler_core::{
     dataset::SplitBy,

@@ -7,11 +7,10 @@ use std::{
 use serde::Serialize;
 
 use super::{
-    errors_report::{ErrorsReport, Target, targets},
+    errors_report::{ErrorsReport, Target, targets, write_starts},
     failure::Failure,
+    inspect::{RecordingReport, import_warnings, write_warnings},
     output::{print, print_object},
-    recording_report::{RecordingReport, import_warnings, write_warnings},
-    spread_plot::write_starts,
 };
 use decoupler_core::{
     evaluation::{

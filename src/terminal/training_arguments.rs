@@ -3,12 +3,7 @@ use clap::{
     builder::{PossibleValuesParser, TypedValueParser},
 };
 
-use super::{
-    arguments::{count, number, seed},
-    failure::Failure,
-    interruption::check_same,
-    scene_arguments::SceneArguments,
-};
+use super::{count, failure::Failure, interruption::check_same, number, scene_arguments::SceneArguments, seed};
 use decoupler_core::{
     dataset::{LARGEST_SAMPLES, Seed},
     evaluation::{MAX_STARTS, RunSettings, SimulatedSettings, Simulation, Source},

@@ -17,7 +17,7 @@ use rayon::{ThreadPool, ThreadPoolBuilder};
 
 use super::{
     command::{Claim, Claimed, Stop},
-    train_options::TrainOptions,
+    specification::TrainOptions,
     trials::{Trials, train},
 };
 use crate::terminal::failure::Failure;

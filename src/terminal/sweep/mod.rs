@@ -2,12 +2,9 @@
 //! is named by their hash and written whole or not at all, and anyone who trains it holds a lock: so any number of programs,
 //! on any machines that see the folder, may fill it together, end at any moment and be started again.
 
-mod arguments;
 mod command;
 mod filling;
-mod job_script;
 mod specification;
-mod train_options;
 mod trials;
 
 pub(super) use command::Sweep;

@@ -5,15 +5,24 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use decoupler_files::import::Plan;
+use clap::{ArgAction, Args, Command, FromArgMatches};
+use decoupler_core::decoupling::DecoderKind;
+use decoupler_files::{
+    export::RecipeSource,
+    import::{Plan, Setup},
+};
 use serde::{
     Deserialize, Deserializer,
     de::{Error, MapAccess, Visitor},
 };
 use serde_json::Value;
 
-use super::train_options::TrainOptions;
-use crate::terminal::failure::{MAX_TRIALS, SpecificationError};
+use crate::terminal::{
+    failure::{Failure, MAX_TRIALS, SpecificationError},
+    import_arguments::ImportArguments,
+    one_line,
+    training_arguments::TrainingArguments,
+};
 
 /// Largest file of a specification, in bytes.
 const LARGEST_BYTES: u64 = 1 << 24;
@@ -230,5 +239,217 @@ impl<'de> Visitor<'de> for Entries {
             entries.push((key, value));
         }
         Ok(UniqueKeys(entries))
+    }
+}
+
+/// Options of `train` that name its files and its output; a sweep has its own.
+const OF_ONE_RUN: [&str; 7] = [
+    "checkpoint",
+    "resume",
+    "checkpoint-interval",
+    "out",
+    "json",
+    "save-recipe",
+    "folds",
+];
+
+/// Options whose values are paths.
+const PATHS: [&str; 6] = ["data", "join", "positions", "recipe", "test-data", "test-join"];
+
+/// Arguments that determine the result of a trial.
+pub(super) struct TrialArguments {
+    pub(super) training: TrainingArguments,
+    import: ImportArguments,
+}
+
+impl TrialArguments {
+    /// Setup of the trial, on samples of `recording` if it is given; paths are absolute.
+    pub(super) fn setup(&self, recording: Option<&Plan>) -> Result<Setup, Failure> {
+        let columns = self.training.scene.columns();
+        let source = match recording {
+            Some(_) if self.import.is_given() || !columns.is_empty() => {
+                let message = "the specification has a recording; leave --data, --recipe and --inputs out";
+                return Err(Failure::Arguments(message.to_owned()));
+            }
+            Some(recording) => Some(RecipeSource::Recording(self.import.divided(recording.clone())?)),
+            None => self.import.source(columns)?,
+        };
+        let holds_out =
+            self.import.holds_out() || recording.is_some_and(|plan| plan.division.validation_fraction > 0.0);
+        let source = source.map(|source| match source {
+            RecipeSource::Recording(plan) => RecipeSource::Recording(plan.absolute()),
+            simulated @ RecipeSource::Simulated(_) => simulated,
+        });
+        self.training.setup(source, holds_out)
+    }
+
+    /// Decoders to measure: those given, by default all of a simulated array and none of a recording.
+    pub(super) fn decoders(&self, setup: &Setup) -> Vec<DecoderKind> {
+        match setup.plan() {
+            None => self.training.scene.decoders(),
+            Some(_) => self.training.scene.decoder.clone(),
+        }
+    }
+}
+
+/// The parser of the options of `train` that determine its result.
+pub(super) struct TrainOptions(Command);
+
+impl TrainOptions {
+    pub(super) fn new() -> Self {
+        let command = Command::new("train").disable_help_flag(true);
+        Self(ImportArguments::augment_args(TrainingArguments::augment_args(command)))
+    }
+
+    /// Writes an option with the value from a specification as arguments of the terminal. Each is one word, so that no
+    /// value can be taken for an option.
+    ///
+    /// # Errors
+    /// A message about an unknown option, or a value that is neither a number, a text nor a list of them.
+    pub(super) fn words(&self, option: &str, value: &Value) -> Result<Vec<String>, String> {
+        let mut arguments = self.0.get_arguments();
+        if OF_ONE_RUN.contains(&option) {
+            return Err("a sweep keeps its results and checkpoints itself; leave this option out".to_owned());
+        }
+        let Some(argument) = arguments.find(|argument| argument.get_long() == Some(option)) else {
+            return Err(self.unknown());
+        };
+        let is_repeated = matches!(argument.get_action(), ArgAction::Append);
+        let word = |value: &Value| {
+            let text = match value {
+                Value::String(text) => text.clone(),
+                Value::Number(number) => number.to_string(),
+                _ => return Err(format!("{value} is neither a number nor a text in quotes")),
+            };
+            Ok(format!("--{option}={text}"))
+        };
+        match value {
+            Value::Array(values) if is_repeated && !values.is_empty() => values.iter().map(word).collect(),
+            Value::Array(values) if is_repeated || values.is_empty() => {
+                Err("an empty list says nothing; leave the option out".to_owned())
+            }
+            Value::Array(_) => Err(format!(
+                "{option} takes one value; several are an axis: move it to \"axes\""
+            )),
+            value => Ok(vec![word(value)?]),
+        }
+    }
+
+    fn unknown(&self) -> String {
+        let names: Vec<_> = self
+            .0
+            .get_arguments()
+            .filter_map(|argument| argument.get_long())
+            .filter(|name| !OF_ONE_RUN.contains(name))
+            .collect();
+        format!("train has no such option; it has {}", names.join(", "))
+    }
+
+    /// Returns `true` if the option can be understood without others.
+    pub(super) fn stands_alone(&self, option: &str) -> bool {
+        let of_import = ImportArguments::augment_args(Command::new("import"));
+        let is_division = ["split", "test-fraction", "validation-fraction"].contains(&option);
+        let mut names = of_import.get_arguments().filter_map(|argument| argument.get_long());
+        is_division || !names.any(|name| name == option)
+    }
+
+    /// Returns `true` if the values of the option are paths.
+    pub(super) fn is_path(option: &str) -> bool {
+        PATHS.contains(&option)
+    }
+
+    /// Parses arguments of [`Self::words`] as `train` does.
+    ///
+    /// # Errors
+    /// The message of `train` in one line.
+    pub(super) fn parse<'a>(&mut self, words: impl IntoIterator<Item = &'a String>) -> Result<TrialArguments, String> {
+        let line = std::iter::once("train").chain(words.into_iter().map(String::as_str));
+        let mut matches = self
+            .0
+            .try_get_matches_from_mut(line)
+            .map_err(|error| one_line(&error))?;
+        let training = TrainingArguments::from_arg_matches_mut(&mut matches);
+        let import = ImportArguments::from_arg_matches_mut(&mut matches);
+        Ok(TrialArguments {
+            training: training.map_err(|error| one_line(&error))?,
+            import: import.map_err(|error| one_line(&error))?,
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use decoupler_files::export::{TrialOptions, decoders_in_order, train_options};
+
+    use super::*;
+
+    fn read_back(options: &TrialOptions) -> TrainingArguments {
+        let mut train = TrainOptions::new();
+        let words = options.iter().flat_map(|(option, value)| match value {
+            Value::Array(values) if values.is_empty() => Vec::new(),
+            _ => train.words(option, value).unwrap(),
+        });
+        let words: Vec<String> = words.collect();
+        train.parse(&words).unwrap().training
+    }
+
+    /// Every option of `train`, so that none can be forgotten here when `train` has a new one.
+    #[test]
+    fn every_option_is_written_out_and_read_back() {
+        let cases = [
+            ("preset", "best", ""),
+            ("rows", "3", ""),
+            ("axes", "xyz", ""),
+            ("loading", "smooth:2.5", ""),
+            ("inputs", "log", ""),
+            ("scaling", "whiten", ""),
+            ("noise", "0.001", ""),
+            ("noise-ohm", "1e-3", ""),
+            ("adc-bits", "12", ""),
+            ("drift", "0.01", ""),
+            ("noise-in", "training", "--noise=0.1"),
+            ("decoder", "polish,mean", ""),
+            ("array", "10x6_3x18", ""),
+            ("hidden", "7", ""),
+            ("starts", "3", ""),
+            ("method", "gdm", ""),
+            ("set", "mu=0.3", ""),
+            ("epochs", "17", ""),
+            ("goal", "1e-7", ""),
+            ("max-fail", "9", ""),
+            ("min-gradient", "0", ""),
+            ("samples", "321", ""),
+            ("test-samples", "11", ""),
+            ("validation-samples", "0", ""),
+            ("seed", "18446744073709551615", ""),
+        ];
+        let mut train = TrainOptions::new();
+        let defaults = {
+            let arguments = train.parse(&[]).unwrap().training;
+            train_options(&arguments.settings().unwrap().into(), &arguments.scene.decoders())
+        };
+        for (option, value, with) in cases {
+            let words: Vec<_> = [format!("--{option}={value}"), with.to_owned()].into();
+            let words: Vec<_> = words.into_iter().filter(|word| !word.is_empty()).collect();
+            let arguments = train.parse(&words).unwrap().training;
+            let (settings, decoders) = (
+                arguments.settings().unwrap(),
+                decoders_in_order(&arguments.scene.decoders()),
+            );
+            let options = train_options(&settings.into(), &decoders);
+            assert_ne!(options, defaults, "{option}");
+            let back = read_back(&options);
+            assert_eq!(back.settings().unwrap(), settings, "{option}");
+            assert_eq!(decoders_in_order(&back.scene.decoders()), decoders, "{option}");
+        }
+        let training = TrainingArguments::augment_args(Command::new("train"));
+        let offered: Vec<_> = training
+            .get_arguments()
+            .filter_map(|argument| argument.get_long())
+            .collect();
+        let tested = cases.map(|(option, ..)| option);
+        for option in &offered {
+            assert!(tested.contains(option), "{option}");
+        }
     }
 }

@@ -6,12 +6,10 @@ mod applying;
 mod clipboard;
 mod closing;
 mod decoupler_window;
-mod dropping;
 mod events;
 mod files;
 mod help;
 mod notices;
-mod palette;
 mod remembered;
 mod save_form;
 #[cfg(test)]

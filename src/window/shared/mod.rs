@@ -1,9 +1,6 @@
 //! State shared by all views (the settings, the current training, the run list, the look of surfaces) and the effects
 //! that a view may ask for.
 
-mod colour_scale;
-mod decoder_exports;
-mod effect;
 mod error_table;
 mod export;
 mod network_exports;
@@ -12,27 +9,24 @@ mod run_list;
 mod run_view;
 mod state;
 mod training_form;
-mod training_status;
 mod view;
 
 pub use super::training_worker::RunResult;
-pub use colour_scale::colour_scale_ui;
-pub use decoder_exports::{DecoderSource, decoder_export_ui, decoder_forms_ui};
-pub use effect::{Effect, Matter, Notice};
 pub use error_table::error_table_ui;
 pub use export::{
     Ask, Contents, Export, ExportGroup, FileTask, FileWords, Purpose, copy_exports, csv_export, error_table_export,
     loss_export, picture_exports,
 };
-pub use network_exports::{NetworkSource, file_stem, network_exports};
+pub use network_exports::{
+    DecoderSource, NetworkSource, decoder_export_ui, decoder_forms_ui, file_stem, network_exports,
+};
 pub use offers::{Action, FileInUse, Offers, refuse_in_use};
 pub use run_list::{PLACES, RunList, RunsWorker};
-pub use run_view::{RunView, RunWish, run_buttons_ui};
+pub use run_view::{RunView, RunWish, run_buttons_ui, sentence};
 pub use state::{Phase, Preview, RecordingDraft, Shared, SourceKind, opening_settings};
-pub use training_form::{method_choice_ui, method_settings_ui, stopping_ui};
-pub use training_status::sentence;
-pub use view::{Look, RightCard, follow_surface, target_choice_ui, view_mode_ui};
+pub use training_form::{Effect, Matter, Notice, method_choice_ui, method_settings_ui, stopping_ui};
+pub use view::{Look, RightCard, colour_scale_ui, follow_surface, target_choice_ui, view_mode_ui};
 
+use run_view::training_status_ui;
 pub use state::Unfinished;
-use training_status::training_status_ui;
 pub use view::{Columns, View};

@@ -3,9 +3,8 @@
 //! `view` is the widget, `painted` what it paints: the surface as laid out in its card, kept for as long as nothing in it
 //! changes.
 
-mod colour_bar;
 mod painted;
 mod view;
 
-pub use colour_bar::ColourBar;
+pub use painted::ColourBar;
 pub use view::{SurfaceView, SurfaceViewResponse};

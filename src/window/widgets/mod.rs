@@ -2,7 +2,6 @@
 
 mod components;
 pub mod fields;
-mod number_field;
 mod quantity_text;
 mod snapshot;
 mod table;
@@ -12,7 +11,8 @@ pub use components::{
     invitation_ui, note_ui, placeholder_ui, primary_button, progress_bar_ui, refusal_ui, scrolled_ui,
     section_heading_ui, segmented_ui, state_ui, status_progress_ui, tabs_ui, with_shortcut,
 };
-pub use fields::{claim_right_click, slider_ui, take_claim, take_value_under, text_ui, value_under};
-pub use number_field::{number_ui, usually};
+pub use fields::{
+    claim_right_click, number_ui, slider_ui, take_claim, take_value_under, text_ui, usually, value_under,
+};
 pub use snapshot::snapshot_ui;
 pub use table::{ColumnWidth, SortBy, TableCell, TableClick, TableColumn, TableRow, TableView, described_table_ui};

@@ -1,7 +1,5 @@
 //! The Compare view: the run list, and two of its runs side by side.
 
-mod figures_table;
-mod list;
 mod state;
 mod view;
 

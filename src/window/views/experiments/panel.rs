@@ -22,7 +22,7 @@ use eframe::egui::{Button, ComboBox, Key, TextEdit, Ui, vec2};
 
 use super::{
     AxisForm, Ending, ExperimentsView, Form, Outcome, Running, Topic,
-    axis_form::{axis_example, axis_label},
+    form::{axis_example, axis_label},
     sweep_folder::folder_form_ui,
 };
 use crate::window::{

@@ -1,32 +1,37 @@
+//! Runs an experiment in the background: one thread hands over what is finished, and as many train as there are cores.
+
 use std::{
     collections::HashMap,
+    path::Path,
     sync::Arc,
     time::{Duration, Instant},
 };
 
-use serde_json::Value;
-
-use super::{
-    Form,
-    sweep_folder::{OpenFolder, SweepFolder},
-    worker::{self, ExperimentEvent},
-};
-use crate::window::{
-    job::{Job, Wake},
-    shared::{Effect, Matter},
-    widgets::SortBy,
-};
 use decoupler_core::{
     evaluation::{
         Problem,
-        experiments::{CellSummary, Experiment, ExperimentResults, Finished, PaperTable, Trial, Verdict, verdicts},
+        experiments::{
+            CellSummary, Experiment, ExperimentResults, Finished, PaperTable, Trial, TrialSamples, Verdict,
+            run_experiments, verdicts, worker_threads,
+        },
     },
     training::EpochRecord,
 };
 use decoupler_files::{
     export::{ExperimentTable, sweep_specification},
     figure::{Figure, experiment_figure},
-    import::Plan,
+    import::{Plan, Setup},
+};
+use serde_json::Value;
+
+use super::{
+    Form,
+    sweep_folder::{OpenFolder, SweepFolder},
+};
+use crate::window::{
+    job::{Job, Wake},
+    shared::{Effect, Matter},
+    widgets::SortBy,
 };
 
 /// Experiment of the view: a table of the paper, or a sweep.
@@ -278,7 +283,7 @@ impl ExperimentsView {
             self.folder.close();
         }
         self.begin(experiment.clone(), setup.plan().cloned());
-        worker::run(&mut self.job, experiment, setup);
+        run(&mut self.job, experiment, setup);
     }
 
     /// Ends the one that runs; what is finished stays.
@@ -362,4 +367,43 @@ fn bytes_of(trial: &Trial, hidden: usize, problem: Option<&Problem>) -> usize {
     // The current and the best weights, and up to as many numbers of the method's own.
     let of_start = 4 * weights * size_of::<f64>();
     trial.states.len() * of_start + trial.epochs * size_of::<EpochRecord>()
+}
+
+/// Events of the experiment begun last.
+#[derive(Debug)]
+pub enum ExperimentEvent {
+    /// A recording has been read, with these channels.
+    Read(Arc<Problem>),
+    /// A trial has come to something.
+    Finished(Box<Finished>),
+    /// The experiment has ended, or why it could not go on.
+    Ended(Result<(), String>),
+}
+
+/// Runs `experiment` on the samples of `setup`; one that still runs is cancelled, and ends after the epochs in progress.
+pub fn run(job: &mut Job<ExperimentEvent>, experiment: Experiment, setup: Setup) {
+    job.start(
+        move |report| {
+            // The paths of the window's plans are absolute.
+            let samples = setup.trial_samples(Path::new(""), &|| report.is_cancelled(), &mut |_| {});
+            let Some(samples) = samples.map_err(|error| error.to_string())? else {
+                return Ok(());
+            };
+            if let TrialSamples::Recorded(recorded) = &samples {
+                report.send(ExperimentEvent::Read(Arc::clone(&recorded.problem)));
+            }
+            let run = run_experiments(
+                &[experiment],
+                &samples,
+                worker_threads(false),
+                || report.is_cancelled(),
+                |finished| report.send(ExperimentEvent::Finished(Box::new(finished))),
+            );
+            run.map_err(|error| error.to_string())
+        },
+        |ended| {
+            let ended = ended.map_err(|error| format!("{error}; the finished trials are kept"));
+            ExperimentEvent::Ended(ended.and_then(|run| run))
+        },
+    );
 }

@@ -17,8 +17,8 @@ use eframe::egui::{
 use super::{
     ExperimentLook, ExperimentsView, Outcome, Topic,
     panel::{self, experiment_exports, open_cell},
+    state::ExperimentEvent,
     sweep_folder::folder_card_ui,
-    worker::ExperimentEvent,
 };
 use crate::window::{
     plotting::{CellPointed, Pointer, heat_map_ui, legend_ui, plots_ui},

@@ -3,7 +3,6 @@
 
 mod analysis;
 mod array_view;
-mod form;
 mod recording;
 mod state;
 mod view;

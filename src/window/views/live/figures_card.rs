@@ -3,7 +3,7 @@ use eframe::egui::{RichText, Ui};
 use super::{
     LiveView,
     engine::{LiveFrame, Recorded, Watched},
-    files::{save_recording, save_zero},
+    tools::{save_recording, save_zero},
 };
 use crate::window::{
     glossary,

@@ -6,9 +6,7 @@
 
 mod cards;
 mod engine;
-mod fault_form;
 mod figures_card;
-mod files;
 mod source_form;
 mod state;
 mod targets_card;

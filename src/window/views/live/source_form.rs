@@ -17,7 +17,7 @@ use eframe::egui::{ComboBox, TextEdit, Ui, vec2};
 use super::{
     LiveView,
     engine::{Command, SourcePlan},
-    files::LiveFile,
+    tools::LiveFile,
 };
 use crate::window::{
     job::{Job, Wake},

@@ -11,9 +11,8 @@ use decoupler_core::live::ZeroGains;
 use decoupler_files::export::{NetworkFile, atomic_write};
 
 use super::{
-    cards::DropScale,
+    cards::{DropScale, FaultForm},
     engine::{Command, LiveEvent, LivePlan, LiveShown, Recorded, SourcePlan, run},
-    fault_form::FaultForm,
     source_form::{NetworkChoice, SourceForm, SourceKind},
 };
 use crate::window::{

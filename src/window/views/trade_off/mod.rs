@@ -2,12 +2,9 @@
 //! array at several levels of noise. A thread of its own measures while the window stays free.
 
 mod chart;
-mod choices;
 mod form;
-mod panel;
 mod state;
 mod view;
-mod worker;
 
 pub use form::{Thoroughness, TradeOffForm, WhichPresets};
 use state::PointWish;

@@ -10,9 +10,9 @@ use decoupler_files::{
 };
 
 use super::{
-    chart::{BottomTab, all_targets_figure, chart, has_target_surface},
-    state::TrainView,
+    charts_card::{BottomTab, all_targets_figure, chart, has_target_surface},
     surfaces::surface_figure,
+    view::TrainView,
 };
 use crate::window::shared::{
     Ask, Contents, Effect, Export, ExportGroup, FileTask, FileWords, NetworkSource, Phase, Purpose, RunResult, RunView,

@@ -1,6 +1,5 @@
 //! The Train view: one training and what it makes of the sensor.
 
-mod chart;
 mod charts_card;
 mod configuration;
 mod decoders;
@@ -11,11 +10,10 @@ mod press;
 mod recording;
 mod report;
 mod scrub;
-mod state;
 mod surfaces;
 mod view;
 
-pub use chart::BottomTab;
+pub use charts_card::BottomTab;
 pub use decoders::DecoderResult;
 pub use exports::CHECKPOINT;
-pub use state::TrainView;
+pub use view::TrainView;

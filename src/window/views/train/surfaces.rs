@@ -10,11 +10,11 @@ use eframe::egui::{Align, Layout, Rect, RichText, Ui, Vec2};
 use glam::DVec2;
 
 use super::{
-    chart::{BottomTab, all_targets_figure, has_target_surface},
+    charts_card::{BottomTab, all_targets_figure, has_target_surface},
     drawn::Frames,
     inspect::{lit_nodes, take_pointed_target, target_of_node, with_lit_targets},
     press::{Hand, Shown},
-    state::TrainView,
+    view::TrainView,
 };
 use crate::window::{
     plotting::{Pointer, legend_behind_ui, legend_ui, plots_ui},

@@ -6,7 +6,6 @@
 
 mod row;
 mod show;
-mod widths;
 
 use crate::window::theme::space;
 use decoupler_files::export;
@@ -19,7 +18,7 @@ const ROW_HEIGHT: f32 = space(6);
 /// Width of a column.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum ColumnWidth<'a> {
-    /// As wide as the widest of its cells: for tables of few rows, as the first [`widths::MEASURED_ROWS`] are made for it.
+    /// As wide as the widest of its cells: for tables of few rows, as the first [`row::MEASURED_ROWS`] are made for it.
     Content,
     /// As wide as this text, the longest of its cells.
     Fits(&'a str),

@@ -7,7 +7,7 @@ use eframe::egui::{
 
 use super::{
     SortBy, TableCell, TableClick, TableColumn, TableRow, TableView,
-    widths::{ColumnPlace, DOT, DOT_WIDTH, MARK_WIDTH, MEASURED_ROWS, Request, Widths, font},
+    row::{ColumnPlace, DOT, DOT_WIDTH, MARK_WIDTH, MEASURED_ROWS, Request, Widths, font},
 };
 use crate::window::{
     theme::{Theme, radius, space, type_size},

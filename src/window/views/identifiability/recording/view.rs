@@ -1,26 +1,38 @@
+//! Exports of the analysis and of the cross-validation of a recording.
+
 use decoupler_core::{
-    evaluation::{Channel, recorded::FittedModel},
+    evaluation::{
+        Channel,
+        recorded::{Findings, FittedModel},
+    },
     text::counted,
 };
 use decoupler_files::{
-    export::{describe_target, describe_warnings, format_duration, format_number},
-    figure::{PlotFigure, learning_curve_figure},
+    export::{
+        Cell, Table, TableColumn as ExportColumn, describe_target, describe_warnings, error_table, format_duration,
+        format_number,
+    },
+    figure::{Figure, PlotFigure, learning_curve_figure},
     import::Setup,
 };
 use eframe::egui::{Key, Modifiers, RichText, Sense, Ui, vec2};
 
 use super::{
     RecordingStudy,
-    form::progress,
-    study::{FoldsResult, RecordingFindings},
+    study::{FoldsChoice, FoldsResult, RecordingFindings, UnderWay},
 };
 use crate::window::{
     plotting::{Pointer, legend_ui, plots_ui},
-    shared::{Offers, Shared, error_table_ui, sentence, target_choice_ui},
+    shared::{
+        Export, FileWords, Offers, Shared, copy_exports, csv_export, error_table_ui, picture_exports, sentence,
+        target_choice_ui,
+    },
     theme::{Theme, space, type_size},
     widgets::{
-        TableCell, TableColumn, TableRow, TableView, card_ui, dim_ui, invitation_ui, note_ui, placeholder_ui,
-        scrolled_ui, section_heading_ui, state_ui,
+        TableCell, TableColumn, TableRow, TableView, card_ui, dim_ui, explained_options_ui,
+        fields::{capitalised, count_ui},
+        ghost_button, invitation_ui, note_ui, placeholder_ui, primary_button, scrolled_ui, section_heading_ui,
+        state_ui, with_shortcut,
     },
 };
 
@@ -267,4 +279,226 @@ fn name_of(model: FittedModel) -> &'static str {
         FittedModel::Ridge => "ridge",
         FittedModel::Network => "the network",
     }
+}
+
+const CHANNELS: FileWords = FileWords {
+    kind: "channel table",
+    description: "How much the error of each target grows without each channel, with every digit, as CSV.",
+    extensions: &["csv"],
+};
+
+const HELD_OUT: FileWords = FileWords {
+    kind: "cross-validation table",
+    description: "Errors of each target over all samples, each tested by models fitted to the other folds, with every \
+                  digit, as CSV.",
+    extensions: &["csv"],
+};
+
+/// The learning curve, the channels, and the errors of the cross-validation.
+pub fn study_exports(study: &RecordingStudy) -> Vec<Export<'_>> {
+    let nothing = || "The readings are not analysed yet: press “Analyse readings” first.".to_owned();
+    let of_source = |source: &str, what: &str| format!("{source}-{what}");
+    let found = study.found.as_deref().ok_or_else(nothing);
+    let stem = |what: &str| {
+        let source = found.as_ref().map_or(String::new(), |found| found.setup.source_name());
+        of_source(&source, what)
+    };
+    let curve = shown_curve_figure(study).ok_or_else(nothing);
+    let curve = curve.map(|figure| move || Figure::from(figure.clone()));
+    let mut exports: Vec<Export<'_>> = picture_exports("Learning curve", stem("learning-curve"), curve).collect();
+    let channels = found.clone().map(|found| move || channel_table(found));
+    exports.push(csv_export(
+        "Channel table",
+        CHANNELS,
+        stem("channels"),
+        channels.clone(),
+    ));
+    exports.extend(copy_exports("Channel table", channels));
+    let validated = study.validated.as_deref();
+    let name = validated.map_or(String::new(), |validated| validated.setup.source_name());
+    let validated = validated.ok_or_else(|| "Nothing is cross-validated yet: press “Cross-validate” first.".to_owned());
+    let errors = validated.map(|validated| move || error_table(&validated.table));
+    exports.push(csv_export(
+        "Cross-validation table",
+        HELD_OUT,
+        of_source(&name, "cross-validation"),
+        errors.clone(),
+    ));
+    exports.extend(copy_exports("Cross-validation table", errors));
+    exports
+}
+
+/// Growth of the error of each target without each channel.
+fn channel_table(found: &RecordingFindings) -> Table {
+    let mut rows = Vec::new();
+    for channel in &found.findings.importance {
+        for (target, growth) in found.targets.iter().zip(&channel.growth) {
+            let names = [&found.inputs[channel.channel].name, &target.name];
+            let figures = [
+                growth.map(|growth| growth.value),
+                growth.map(|growth| growth.low),
+                growth.map(|growth| growth.high),
+            ];
+            let names = names.into_iter().map(|name| Cell::from(name.clone()));
+            rows.push(names.chain(figures.map(Cell::Number)).collect());
+        }
+    }
+    let columns = [
+        ("channel", "Channel"),
+        ("target", "Target"),
+        ("rmse_ratio", "RMSE without it / with all"),
+        ("low", "from"),
+        ("high", "to"),
+    ];
+    Table {
+        columns: columns
+            .map(|(field, heading)| ExportColumn::new(field, heading, ""))
+            .into(),
+        rows,
+    }
+}
+
+/// Largest number of folds offered.
+const MAX_FOLDS: usize = 1000;
+
+const MODELS: [(Option<FittedModel>, &str, &str); 3] = [
+    (
+        None,
+        "better of the two",
+        "The network where it is better than ridge regression for a target, else ridge.",
+    ),
+    (
+        Some(FittedModel::Ridge),
+        "ridge",
+        "Ridge regression alone: takes seconds, but finds linear relations only.",
+    ),
+    (
+        Some(FittedModel::Network),
+        "network",
+        "The network of these settings: each fit is a training.",
+    ),
+];
+
+/// Model and folds of the analysis, and the buttons that begin and end it.
+pub fn form_ui(ui: &mut Ui, study: &mut RecordingStudy, shared: &Shared) {
+    scrolled_ui(ui, "recording study form", |ui| {
+        section_heading_ui(ui, "Recording");
+        let setup = shared.setup();
+        match &setup {
+            Ok(setup) => dim_ui(
+                ui,
+                &format!("{}, with the network settings of the Train view.", setup.source_name()),
+            ),
+            Err(obstacle) => note_ui(ui, obstacle),
+        };
+        ui.add_enabled_ui(!study.is_under_way(), |ui| {
+            choices_ui(ui, study);
+            if let Ok(setup) = &setup {
+                dim_ui(ui, &cost(study, setup, shared));
+            }
+        });
+        ui.add_space(space(2));
+        buttons_ui(ui, study, setup.ok().filter(|_| !shared.phase.is_busy()));
+        ui.add_space(space(4));
+    });
+}
+
+fn choices_ui(ui: &mut Ui, study: &mut RecordingStudy) {
+    section_heading_ui(ui, "Cross-validation");
+    let FoldsChoice { folds, compares_random } = &mut study.choice;
+    let hint = "Number of parts. Each part is tested by models fitted to the other parts.";
+    count_ui(ui, "Folds", hint, folds, 2..=MAX_FOLDS);
+    let hint = "Repeats the cross-validation with random folds and reports how optimistic their errors are. It takes twice \
+                as long.";
+    ui.checkbox(compares_random, "Compare with random folds")
+        .on_hover_text(hint);
+    section_heading_ui(ui, "Model");
+    dim_ui(ui, "Model that is fitted without each channel and to fewer samples.");
+    if let Some(model) = explained_options_ui(ui, "Fitted model", &MODELS, study.model, true) {
+        study.model = model;
+    }
+    ui.add_space(space(1));
+}
+
+fn buttons_ui(ui: &mut Ui, study: &mut RecordingStudy, ready: Option<Setup>) {
+    if let Some(under_way) = study.under_way {
+        dim_ui(ui, &progress(under_way, study));
+        let cancel = ui.vertical_centered_justified(|ui| ui.add(ghost_button("■ Cancel")));
+        if cancel
+            .inner
+            .on_hover_text(with_shortcut(
+                ui,
+                "Ends the work under way without a result",
+                Key::Period,
+            ))
+            .clicked()
+        {
+            study.cancel();
+        }
+        return;
+    }
+    let why_not = "Open a recording in the Train view, and wait for the end of a training.";
+    ui.vertical_centered_justified(|ui| {
+        let analyse = ui.add_enabled(ready.is_some(), primary_button("Analyse readings"));
+        let hint = "Measures by cross-validation how well the readings determine each target, what each channel contributes, \
+                    and what more samples would bring";
+        let is_analysed = analyse.on_hover_text(with_shortcut(ui, hint, Key::Enter)).on_disabled_hover_text(why_not).clicked();
+        let validate = ui.add_enabled(ready.is_some(), ghost_button("Cross-validate"));
+        let hint = "Tests on every sample with networks trained on the other folds: one training per fold.";
+        let is_validated = validate.on_hover_text(hint).on_disabled_hover_text(why_not).clicked();
+        if let Some(setup) = ready {
+            if is_analysed {
+                study.analyse(setup);
+            } else if is_validated {
+                study.cross_validate(setup);
+            }
+        }
+    });
+}
+
+/// The work under way in words.
+pub(super) fn progress(under_way: UnderWay, study: &RecordingStudy) -> String {
+    let reading = study.reading.map(|progress| match progress.of {
+        Some(of) if of > 0 => format!("Reading the files… {:.0} %", 100.0 * progress.bytes as f64 / of as f64),
+        _ => "Reading the files…".to_owned(),
+    });
+    match under_way {
+        UnderWay::Findings(None) => reading.unwrap_or_else(|| "Reading the files…".to_owned()),
+        UnderWay::Findings(Some(stage)) => format!("{}…", capitalised(&stage.to_string())),
+        UnderWay::CrossValidation => "Cross-validation…".to_owned(),
+    }
+}
+
+/// Cost of the analysis in words.
+fn cost(study: &RecordingStudy, setup: &Setup, shared: &Shared) -> String {
+    let folds = study.choice.folds;
+    if study.model == Some(FittedModel::Ridge) {
+        return format!("The analysis trains no network with ridge alone; {folds} folds.");
+    }
+    // Inputs of a plan may be patterns; those of the last analysis are known.
+    let known = study.found.as_ref().filter(|found| found.setup.plan() == setup.plan());
+    let channels = known.map_or_else(
+        || setup.plan().map_or(0, |plan| plan.import.inputs.len()),
+        |found| found.inputs.len(),
+    );
+    let most = Findings::max_trainings(channels, folds);
+    let least = match study.model {
+        Some(_) => most,
+        // Ridge may turn out to do as well.
+        None => 2 * folds,
+    };
+    let range = if least == most {
+        format!("up to {most}")
+    } else {
+        format!("{least} to {most}")
+    };
+    let last = shared.result().and_then(|result| result.wall_time);
+    let time = last.map_or_else(String::new, |last| {
+        let [least, most] = [least, most].map(|count| format_duration(last.saturating_mul(count as u32)));
+        format!(
+            "; the last training took {}, so {least} to {most}",
+            format_duration(last)
+        )
+    });
+    format!("The analysis takes {range} trainings with {folds} folds{time}.")
 }

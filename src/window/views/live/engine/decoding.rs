@@ -4,8 +4,8 @@ use glam::DVec3;
 use ndarray::Array2;
 
 use super::{
-    live_loop::Watch,
     message::{TruthErrors, Watched},
+    session::Watch,
 };
 use crate::window::test_view::Frame;
 use decoupler_core::{

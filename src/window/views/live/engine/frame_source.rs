@@ -1,18 +1,24 @@
-use std::time::{Duration, Instant};
+use std::{
+    fmt,
+    io::Read,
+    sync::mpsc::{RecvTimeoutError, channel},
+    thread,
+    time::{Duration, Instant},
+};
 
 use decoupler_core::{
     dataset::Seed,
     evaluation::SimulatedSettings,
-    live::{Lines, Simulated},
+    live::{Keeping, LineParser, Lines, NextLine, ParsedLine, Simulated, Source},
     scene::{Deformation, Fault, Noise, Rows, Scene},
-    sensor::SensorModel,
+    sensor::{ArrayScale, SensorModel},
+    text::system_cause,
 };
 
 use super::{
     message::{Arrived, Command, LivePlan, SourcePlan},
     replay::{ReplayFrames, read_replay},
     session::Tally,
-    stream::{StreamFrames, open},
 };
 
 /// A source of frames under way.
@@ -195,5 +201,203 @@ impl SimulatedFrames {
         self.due += self.between;
         let read_at = Instant::now();
         Ok(Some(Arrived { time_s, read_at }))
+    }
+}
+
+/// Frames from the lines of a device or socket.
+#[derive(Debug)]
+pub(super) struct StreamFrames {
+    lines: SourceLines,
+    parser: LineParser,
+    columns: usize,
+    /// Latest readings of every row read: rows × M4.
+    latest_ohm: Vec<f64>,
+    /// Rows of which readings came since the last frame.
+    is_new: Vec<bool>,
+}
+
+impl StreamFrames {
+    pub(super) fn new(
+        source: &Source,
+        opened: Box<dyn Read + Send>,
+        scale: ArrayScale,
+        rows: Rows,
+        read: usize,
+    ) -> Result<Self, String> {
+        let keeping = source.keeping();
+        let parser = LineParser::new(scale, rows, keeping == Keeping::All).map_err(|error| error.to_string())?;
+        Ok(Self {
+            lines: SourceLines::new(source, opened, read)?,
+            parser,
+            columns: scale.columns(),
+            latest_ohm: vec![0.0; read * scale.columns()],
+            is_new: vec![false; read],
+        })
+    }
+
+    /// Waits for a line, at most so long, and writes the frame if it is whole with this line.
+    pub(super) fn next(&mut self, patience: Duration, frame_ohm: &mut [f64], tally: &mut Tally) -> Next {
+        let next = self.take_line(patience, frame_ohm);
+        self.lines.count_dropped(tally);
+        next
+    }
+
+    fn take_line(&mut self, patience: Duration, frame_ohm: &mut [f64]) -> Next {
+        let SourceLine {
+            number,
+            arrived,
+            text,
+            is_fragment,
+        } = match self.lines.take(patience) {
+            Ok(line) => line,
+            Err(next) => {
+                if matches!(next, Next::Bad(_)) {
+                    self.parser.count_bad();
+                }
+                return next;
+            }
+        };
+        let is_snapshot = match self.parser.parse(number, text) {
+            Ok(ParsedLine::NoReadings) => return Next::Nothing,
+            Ok(ParsedLine::Snapshot(readings_ohm)) => {
+                frame_ohm.copy_from_slice(readings_ohm);
+                true
+            }
+            Ok(ParsedLine::Row {
+                row_index,
+                readings_ohm,
+            }) => {
+                let index = row_index.unwrap_or(0);
+                self.latest_ohm[index * self.columns..][..self.columns].copy_from_slice(readings_ohm);
+                self.is_new[index] = true;
+                if !self.is_new.iter().all(|is_new| *is_new) {
+                    return Next::Nothing;
+                }
+                self.is_new.fill(false);
+                frame_ohm.copy_from_slice(&self.latest_ohm);
+                false
+            }
+            Err(error) if error.is_final() && !is_fragment => {
+                return Next::End(Err(self.lines.failed(&error)));
+            }
+            Err(error) => return Next::Bad(error.to_string()),
+        };
+        if is_snapshot {
+            self.lines.set_kept(1);
+        }
+        Next::Frame(arrived)
+    }
+}
+
+/// Time between looks at whether the source is still wanted.
+const BETWEEN_LOOKS: Duration = Duration::from_millis(20);
+
+/// Opens a source on a thread of its own: connecting may take minutes, and ending must not. Returns `None` if the source
+/// is no longer wanted.
+///
+/// # Errors
+/// If it cannot be opened.
+pub(super) fn open(source: &Source, is_wanted: &dyn Fn() -> bool) -> Result<Option<Box<dyn Read + Send>>, String> {
+    let (send, opened) = channel();
+    let wanted = source.clone();
+    let open = move || {
+        // No one waits for a source that is no longer wanted.
+        let _ = send.send(wanted.open());
+    };
+    let thread = thread::Builder::new().name("open source".to_owned()).spawn(open);
+    thread.map_err(|error| format!("no thread could be started: {error}"))?;
+    while is_wanted() {
+        match opened.recv_timeout(BETWEEN_LOOKS) {
+            Ok(opened) => return opened.map(Some).map_err(|error| error.to_string()),
+            Err(RecvTimeoutError::Timeout) => {}
+            Err(RecvTimeoutError::Disconnected) => return Err(format!("opening {source} failed unexpectedly")),
+        }
+    }
+    Ok(None)
+}
+
+/// Lines of a device or socket.
+#[derive(Debug)]
+pub(super) struct SourceLines {
+    name: String,
+    begins_anywhere: bool,
+    lines: Lines,
+    dropped: u64,
+    /// When reading began.
+    begun: Instant,
+}
+
+/// A line that has arrived.
+pub(super) struct SourceLine<'a> {
+    pub(super) number: u64,
+    pub(super) arrived: Arrived,
+    pub(super) text: &'a [u8],
+    /// True for a first line of which only the end may have been read.
+    pub(super) is_fragment: bool,
+}
+
+impl SourceLines {
+    /// Reads what was `opened` in a thread of its own; the latest `kept` lines wait to be taken.
+    pub(super) fn new(source: &Source, opened: Box<dyn Read + Send>, kept: usize) -> Result<Self, String> {
+        let lines = Lines::spawn(opened, source.keeping(), source.begins_anywhere());
+        let mut lines = lines.map_err(|error| format!("no thread could be started: {error}"))?;
+        lines.set_kept(kept);
+        Ok(Self {
+            name: source.to_string(),
+            begins_anywhere: source.begins_anywhere(),
+            lines,
+            dropped: 0,
+            begun: Instant::now(),
+        })
+    }
+
+    /// Changes the number of lines that wait to be taken.
+    pub(super) fn set_kept(&mut self, kept: usize) {
+        self.lines.set_kept(kept);
+    }
+
+    /// Waits for a line, at most so long.
+    ///
+    /// # Errors
+    /// What came in its place: nothing, a line that is too long, or the end.
+    pub(super) fn take(&mut self, patience: Duration) -> Result<SourceLine<'_>, Next> {
+        let line = match self.lines.next(patience) {
+            NextLine::Line(line) => line,
+            NextLine::None => return Err(Next::Nothing),
+            NextLine::End(None) => return Err(Next::End(Ok(()))),
+            NextLine::End(Some(error)) => {
+                let cause = system_cause(&error);
+                return Err(Next::End(Err(format!(
+                    "{} is lost: {cause}; connect it again",
+                    self.name
+                ))));
+            }
+        };
+        let (number, read_at) = (line.number, line.read_at);
+        let Some(text) = line.text else {
+            return Err(Next::Bad(format!(
+                "line {number}: it is longer than {} bytes",
+                Lines::LONGEST
+            )));
+        };
+        let time_s = read_at.saturating_duration_since(self.begun).as_secs_f64();
+        Ok(SourceLine {
+            number,
+            arrived: Arrived { time_s, read_at },
+            text,
+            is_fragment: self.begins_anywhere && number == 1,
+        })
+    }
+
+    /// Adds the lines dropped since this was last called to `tally`.
+    pub(super) fn count_dropped(&mut self, tally: &mut Tally) {
+        let dropped = self.lines.dropped();
+        tally.dropped(dropped - self.dropped);
+        self.dropped = dropped;
+    }
+
+    /// Message of an error that ends the reading.
+    pub(super) fn failed(&self, error: &impl fmt::Display) -> String {
+        format!("{}: {error}", self.name)
     }
 }

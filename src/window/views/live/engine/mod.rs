@@ -6,13 +6,11 @@
 
 mod decoding;
 mod frame_source;
-mod live_loop;
 mod message;
 mod recording_file;
 mod replay;
 mod session;
-mod stream;
 mod target_session;
 
-pub use live_loop::run;
 pub use message::{Command, LiveEvent, LiveFrame, LivePlan, LiveShown, LiveTargets, Recorded, SourcePlan, Watched};
+pub use session::run;

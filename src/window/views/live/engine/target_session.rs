@@ -20,12 +20,10 @@ use decoupler_files::{
 use ndarray::Array3;
 
 use super::{
-    frame_source::Next,
-    live_loop::LiveSession,
+    frame_source::{Next, SourceLine, SourceLines, open},
     message::{Arrived, Command, LiveEvent, LivePlan, LiveShown, LiveTargets, SourcePlan},
     replay::{RATE_WITHOUT_TIMES, ReplayFrames},
-    session::Tally,
-    stream::{SourceLine, SourceLines, open},
+    session::{LiveSession, Tally},
 };
 
 /// Length of the history in seconds.

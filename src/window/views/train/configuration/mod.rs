@@ -3,6 +3,5 @@
 
 mod form;
 mod scene_section;
-mod sensor_section;
 
 pub use form::configuration_ui;

@@ -12,10 +12,10 @@ use decoupler_files::{
 use eframe::egui::{Align, Layout, RichText, Sense, Ui, WidgetInfo, accesskit::Role};
 
 use super::{
-    checking::Checked,
     draft::{Draft, joined, missing},
     editor::RecordingEditor,
     files_section::FILES,
+    opening::Checked,
 };
 use crate::window::{
     shared::{Effect, Shared, sentence},

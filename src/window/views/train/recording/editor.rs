@@ -7,10 +7,9 @@ use std::{
 };
 
 use super::{
-    checking::Checking,
     draft::{Draft, file_name},
     files_section::Reopened,
-    opening::{Files, Opened, Opening, ToOpen},
+    opening::{Checking, Files, Opened, Opening, ToOpen},
 };
 use crate::window::{
     job::Wake,

@@ -3,7 +3,6 @@
 //! [`editor`] owns the import. [`opening`] reads files in the background; a [`draft`] holds the choices of the user, which
 //! [`checking`] tries out whenever they change; [`missing`] describes files that are not where they were.
 
-mod checking;
 mod columns_card;
 mod columns_table;
 mod draft;

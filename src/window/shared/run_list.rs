@@ -1,3 +1,6 @@
+//! Every finished training is kept, and all of them survive a restart. A thread of its own keeps their
+//! folder.
+//!
 //! The thread that keeps the run list in its folder. Requests go in, the list as it then is comes out, which wakes the
 //! window. When the window closes it waits for what is still to be written.
 //!

@@ -1,3 +1,5 @@
+//! Report of a training in figures.
+//!
 //! Note of the report on ill-conditioned scenes.
 
 use std::time::Duration;
@@ -27,7 +29,7 @@ use crate::window::{
     theme::{Theme, space, type_size},
     views::train::{
         decoders::decoders_ui, exports::open_task, inspect::TestPlace, press::press_section_ui, recording::bias,
-        state::TrainView,
+        view::TrainView,
     },
     widgets::{
         Landmark, described_table_ui, dim_ui, fields::capitalised, ghost_button, note_ui, scrolled_ui,

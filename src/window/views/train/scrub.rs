@@ -1,3 +1,6 @@
+//! Scrubbing: the networks of past epochs, brought back by a slider under the loss curves or replayed one after the
+//! other. What they make of the test set is computed in the background, the newest wish first.
+
 use std::{sync::Arc, time::Duration};
 
 use decoupler_core::{

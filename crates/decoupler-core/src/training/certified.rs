@@ -127,7 +127,7 @@ fn correct_digits(found: &[f64], certified: &[f64]) -> f64 {
 /// The best published solver reaches 9.4 digits on average.
 #[test]
 fn certified_parameters_are_found_to_more_than_nine_digits() {
-    let text = include_str!("../../../tests/certified/nist_strd.json");
+    let text = include_str!("../../tests/certified/nist_strd.json");
     let problems = serde_json::from_str::<Certified>(text).unwrap().problems;
     assert_eq!(problems.len(), 27);
     let mut table = String::new();
