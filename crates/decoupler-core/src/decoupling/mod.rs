@@ -27,7 +27,6 @@ mod gauss_newton;
 mod kind;
 mod least_squares;
 mod newton;
-mod normal_equations;
 mod plain_newton;
 mod posterior;
 mod radial_basis;

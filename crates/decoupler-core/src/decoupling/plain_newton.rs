@@ -4,9 +4,8 @@ use super::{
     affine_map::AffineStart,
     gauss_newton::Twins,
     newton::{NewtonReport, NewtonRules, NewtonStop, ROUNDING, Solution},
-    normal_equations::write_normal_equations,
     row_problem::{Range, ranges, wide_ranges},
-    side_by_side::{LANES, SideBySide},
+    side_by_side::{LANES, SideBySide, write_normal_equations},
 };
 use crate::{
     scene::Scene,

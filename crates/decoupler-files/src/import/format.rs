@@ -2,7 +2,7 @@
 
 use std::{fmt, fs::File, io::BufReader, path::Path};
 
-use super::{Decimal, Dialect, TableError, Watch, input_lines::Watched, matlab, npz, numpy};
+use super::{Decimal, Dialect, TableError, Watch, input_lines::Watched, matlab, numpy};
 
 /// Kind of a file.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -46,7 +46,9 @@ impl Format {
                 })?;
                 Ok((vec![array], Vec::new()))
             })),
-            [b'P', b'K', 3 | 5, ..] => Some((Self::Npz, |file, _, watch| npz::read(BufReader::new(file), watch))),
+            [b'P', b'K', 3 | 5, ..] => Some((Self::Npz, |file, _, watch| {
+                numpy::read_archive(BufReader::new(file), watch)
+            })),
             _ if has_extension("mat") || beginning.starts_with(b"MATLAB") => {
                 Some((Self::Matlab, |file, size, watch| {
                     matlab::read(BufReader::new(Watched::new(file, size, watch)))

@@ -19,7 +19,6 @@ mod inspection;
 mod join;
 mod matlab;
 mod missing;
-mod npz;
 mod numpy;
 mod plan;
 mod positions;

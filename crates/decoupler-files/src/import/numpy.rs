@@ -2,15 +2,20 @@
 //! The header is one line with three known keys, for which a parser of all literals of Python would be too much: nested
 //! brackets of a damaged header would exhaust its stack.
 
-use std::{io::Read, path::Path};
+use std::{
+    io::{Read, Seek},
+    path::Path,
+};
 
 use decoupler_core::text::clean_name;
+use zip::{ZipArchive, result::ZipError};
 
 use super::{
-    Cells, Column, Fault, Format, Table, TableError,
+    Cells, Column, Fault, Format, Table, TableError, Watch,
     csv_table::Reading,
     format::{Array, Element, Endian},
-    input_lines::table_error,
+    input_lines::{Watched, table_error},
+    numpy,
     table::{Excess, Labels, Lines, stem},
 };
 
@@ -252,6 +257,39 @@ fn column(name: String, mut numbers: Vec<f64>, reading: &Reading<'_>) -> Column 
         column.cells = Cells::Numbers(numbers);
     }
     column
+}
+
+/// Reads the arrays of an archive, and says which entries are none.
+pub(super) fn read_archive(
+    source: impl Read + Seek,
+    watch: Watch<'_>,
+) -> Result<(Vec<Array>, Vec<String>), TableError> {
+    let mut archive = ZipArchive::new(source).map_err(|error| defect("the archive", error))?;
+    let mut arrays = Vec::new();
+    let mut left_out = Vec::new();
+    for index in 0..archive.len() {
+        let entry = archive.by_index(index).map_err(|error| defect("the archive", error))?;
+        let file_name = entry.name().map_err(|error| defect("the archive", error))?.into_owned();
+        let Some(name) = file_name.strip_suffix(".npy").map(str::to_owned) else {
+            left_out.push(format!("{file_name} is no .npy file"));
+            continue;
+        };
+        let size = entry.size();
+        match numpy::read(&name, Watched::new(entry, Some(size), watch)) {
+            Ok(array) => arrays.push(array),
+            // A text or a number next to the arrays is no reason to refuse them.
+            Err(TableError::Array { what, reason }) => left_out.push(format!("{what}: {reason}")),
+            Err(error) => return Err(error),
+        }
+    }
+    Ok((arrays, left_out))
+}
+
+fn defect(what: &str, error: ZipError) -> TableError {
+    match error {
+        ZipError::Io(error) => super::input_lines::table_error(error),
+        error => TableError::array(what, format!("{error}; save it again with numpy.savez")),
+    }
 }
 
 #[cfg(test)]
