@@ -13,7 +13,6 @@ pub mod experiments;
 mod past_networks;
 mod preparation;
 mod pressed;
-mod problem;
 pub mod recorded;
 mod reference;
 mod remark;
@@ -31,13 +30,14 @@ pub use decoder_set::{DecoderCost, DecoderReport, DecoderSet};
 pub use errors::{Errors, NodeAddress, Spread, TargetErrors, TestErrors, node_rms_mm};
 pub use past_networks::{PastNetwork, PastNetworks};
 pub use pressed::{Pressed, PressedAnswer, fine_tune, press_limits, pressed_rows, rebased};
-pub use problem::{Channel, Problem, TargetPosition};
 pub use reference::{NoReference, ReferenceNote, reference_errors};
 pub use remark::{Cause, MissingFigures, Remark, error_remarks};
 pub use run::{Run, RunDefect, RunError};
 pub use run_sets::RunSets;
 pub use settings::{CountError, MAX_STARTS, MeasuredSettings, RunSettings, SimulatedSettings, Workload, WorkloadTime};
-pub use source::{Measured, ModelSize, Preset, PresetError, Simulation, Source, ready_settings};
+pub use source::{
+    Channel, Measured, ModelSize, Preset, PresetError, Problem, Simulation, Source, TargetPosition, ready_settings,
+};
 pub use starts::{StartRecord, StartTrainer, best_start};
 pub use table::{ErrorBlock, ErrorMeasure, ErrorRow, ErrorTable, decoded_unit, network_frame_time};
 pub use trade::{

@@ -334,7 +334,7 @@ impl Backpropagation {
         let mut squares = 0.0;
         for block in examples.blocks() {
             let samples = block.samples();
-            squares += self.activations.forward(mlp, &block);
+            squares += self.activations.forward(mlp, block);
             let hidden = self.activations.hidden.as_ref().subrows(0, samples);
             let errors = self.activations.errors.as_ref().subrows(0, samples);
             matmul(
