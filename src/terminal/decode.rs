@@ -438,7 +438,7 @@ impl FineTune {
             simulated_z_mm_before: file.scores.network.nodes().map_or(f64::NAN, |errors| errors.z_mm),
             simulated_z_mm_after: errors(&simulated, &tuned).z_mm,
         };
-        // Its errors stay those on the simulated test set, next to which the baselines stand.
+        // Its errors stay those on the simulated test set, where the baselines are listed.
         file.scores.network = TestErrors::Nodes(errors(&simulated, &tuned));
         file.network = tuned;
         file.save(&self.out)?;

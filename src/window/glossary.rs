@@ -67,7 +67,7 @@ pub struct Term {
     pub definition: &'static str,
     /// Equation; empty for none.
     pub equation: &'static str,
-    /// Definition and equation: what stands under the pointer.
+    /// Definition and equation: the text of the tooltip.
     pub hint: &'static str,
 }
 
@@ -258,7 +258,11 @@ mod tests {
     fn every_term_stands_once_with_a_sentence() {
         let mut names = BTreeSet::new();
         for term in groups().into_iter().flat_map(|group| group.terms) {
-            assert!(names.insert((term.name, term.definition)), "{} stands twice", term.name);
+            assert!(
+                names.insert((term.name, term.definition)),
+                "{} is listed twice",
+                term.name
+            );
             assert!(
                 term.definition.len() > 8 && term.hint.starts_with(term.definition),
                 "{term:?}"

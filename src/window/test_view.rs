@@ -411,7 +411,7 @@ fn position_pair(targets: &[Channel]) -> Option<[usize; 2]> {
     pairs.find(|[one, other]| targets[*one].unit == targets[*other].unit)
 }
 
-/// Tells whether a full name ends as that of a coordinate, such as `probe_x`, or is that of a column without a header.
+/// Returns `true` if a full name ends as that of a coordinate, such as `probe_x`, or is that of a column without a header.
 fn is_coordinate(name: &str) -> bool {
     let own = name.rsplit('.').next().unwrap_or(name).to_lowercase();
     let has_no_header = own

@@ -95,7 +95,7 @@ impl Identifiability {
             DVec3::from_array(vector)
         };
         let rms = |unknown: usize| jacobian.col(unknown).norm_l2() / (equations as f64).sqrt();
-        // Which way a pattern points means nothing; downwards is what presses.
+        // The sign of a pattern is arbitrary; downwards is the direction of a press.
         let sign = if worst.sum() < 0.0 { -1.0 } else { 1.0 };
         Ok(Self {
             row,
@@ -132,7 +132,7 @@ impl Identifiability {
 
     /// Share of a prior spread of `prior_mm` (standard deviation of each unknown) that remains after a reading with
     /// `noise` (relative): the root mean over patterns of 1 / (1 + (s·prior/noise)²). 0 means that everything is known, 1
-    /// that the reading told nothing. Of a pattern that no reading sees (s = 0) everything remains, also without noise.
+    /// that the reading carries no information. Of a pattern that no reading sees (s = 0) everything remains, also without noise.
     pub fn remaining_share(&self, noise: f64, prior_mm: f64) -> f64 {
         let remaining = |&s: &f64| {
             let seen = s * prior_mm / noise;

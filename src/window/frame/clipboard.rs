@@ -190,7 +190,7 @@ impl DecouplerWindow {
         }
     }
 
-    /// Tells of what was copied.
+    /// Shows a notice of what was copied.
     pub(super) fn take_copied(&mut self) {
         while let Some(copied) = self.copying.job.next_event() {
             self.tell_copied(copied.unwrap_or_else(|error| (None, not_copied(&error.to_string()))));

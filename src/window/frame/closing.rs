@@ -215,7 +215,7 @@ impl DecouplerWindow {
         true
     }
 
-    /// Asks about unfinished work, or tells what closing waits for.
+    /// Asks about unfinished work, or shows what closing waits for.
     pub(super) fn closing_ui(&mut self, ui: &Ui) {
         match &self.closing {
             Some(Closing::Asking(question)) => {
@@ -340,7 +340,7 @@ fn line_ui(ui: &mut Ui, line: &Line, height: f32) {
     );
 }
 
-/// Tells what closing waits for.
+/// Shows what closing waits for.
 fn finishing_ui(ui: &Ui, text: &str) -> Option<Answer> {
     card_ui(ui, "Finishing files", |ui| {
         ui.label(text);

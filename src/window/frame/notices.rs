@@ -48,7 +48,7 @@ impl Notices {
         }
     }
 
-    /// Tells that it failed.
+    /// Shows that it failed.
     pub(super) fn fail(&mut self, matter: Matter, reason: impl ToString) {
         self.tell(matter, Notice::Failed(reason.to_string()));
     }
@@ -163,7 +163,7 @@ mod tests {
         let mut notices = Notices::default();
         notices.tell(Matter::File, done("saved"));
         notices.fail(Matter::RunList, "unreadable");
-        // It is told long before it is shown.
+        // It is added long before it is shown.
         assert_eq!(notices.pass(1000.0), Some(10.0));
         assert_eq!(notices.pass(1004.0), Some(6.0));
         assert_eq!(notices.pass(1010.0), None);

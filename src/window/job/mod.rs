@@ -1,6 +1,6 @@
 //! Background work: a [`Job`] runs one piece of work at a time on a named thread, and the newest wins.
 //!
-//! The work tells what it has through a [`Report`], which wakes the window; the window takes it with
+//! The work reports through a [`Report`], which wakes the window; the window takes it with
 //! [`Job::next_event`]. Every piece of work has a mailbox of its own, so nothing of an older one is ever seen.
 
 use std::{
@@ -270,7 +270,7 @@ impl<E> Report<E> {
         self.mailbox.is_cancelled.load(Ordering::Relaxed)
     }
 
-    /// Tells an event that must not be lost.
+    /// Sends an event that must not be lost.
     pub(in crate::window) fn send(&self, event: E) {
         self.put(|inside| {
             inside.events.push_back(event);
@@ -278,7 +278,7 @@ impl<E> Report<E> {
         });
     }
 
-    /// Tells the status of the work. It replaces the progress before, if the window has not taken that and nothing was told
+    /// Sends the status of the work. It replaces the progress before, if the window has not taken that and nothing was told
     /// since: a window that looks away finds the latest only. `keep` moves what must not be lost from the older one.
     pub(in crate::window) fn progress(&self, event: E, keep: impl FnOnce(E, &mut E)) {
         self.put(|inside| {
@@ -293,7 +293,7 @@ impl<E> Report<E> {
         });
     }
 
-    /// Tells the last event.
+    /// Sends the last event.
     pub(super) fn end(&self, event: E) {
         self.put(|inside| {
             inside.events.push_back(event);

@@ -31,12 +31,12 @@ const SPAN_TINT: f32 = 0.12;
 /// Width of a tick's number with the room around it, in points.
 const NUMBER_WIDTH: f64 = 50.0;
 const NUMBER_HEIGHT: f64 = 16.0;
-/// The least distance of grid lines, in points; the plot tells its scale by it.
+/// The least distance of grid lines, in points; the plot derives its scale from it.
 const MIN_GRID: f32 = 8.0;
 /// Points of a stepped line closer than this part of an axis are one: a sharp turn between them would be a spike.
 const COINCIDENT: f64 = 5e-4;
 
-/// Draws the plot over the space of `ui`; `id` tells it apart from others in the window.
+/// Draws the plot over the space of `ui`; `id` distinguishes it from others in the window.
 pub(super) fn plot_ui(ui: &mut Ui, id: Id, plot: &Plot, pointer: Pointer) -> (PlotTransform, Response) {
     let palette = Theme::of(ui).palette;
     let [x, y] = plot.ranges();

@@ -299,7 +299,7 @@ pub enum Purpose {
     Save(Contents),
 }
 
-/// Writes a file and tells what was written, or says why not.
+/// Writes a file and returns what was written, or why not.
 #[derive(Clone)]
 pub struct Contents(Arc<Write>);
 

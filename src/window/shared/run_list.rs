@@ -52,7 +52,7 @@ pub(super) struct Listed {
     pub(super) problems: Vec<String>,
 }
 
-/// News from the thread.
+/// Event from the thread.
 pub(super) enum RunsEvent {
     /// The run list after a request.
     Listed(Listed),

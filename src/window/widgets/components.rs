@@ -494,7 +494,7 @@ pub(super) fn take_refusal(ui: &Ui, response: &Response, tried: Option<Result<()
     });
 }
 
-/// Tells below a field why what was typed was not taken.
+/// Shows below a field why the typed value was refused.
 pub fn refusal_ui(ui: &mut Ui, field: &Response) {
     let refusal = ui.data(|data| data.get_temp::<Refusal>(refusal_id(field.id)));
     if let Some(refusal) = refusal {

@@ -2,7 +2,7 @@
 //!
 //! The one slider.
 //!
-//! The one field for values that are no numbers.
+//! The one field for values that are not numbers.
 //!
 //! The one field for numbers.
 
@@ -163,7 +163,7 @@ fn slider_style(ui: &mut Ui) {
 }
 
 /// A value as text, which counts when Enter is pressed or the field is left. What is none is refused: the old value stays,
-/// and below the field stands why. A right click copies, or sets the `usual` value.
+/// and the reason is shown below the field. A right click copies, or sets the `usual` value.
 pub fn text_ui<T>(ui: &mut Ui, name: &str, hint: &str, value: &mut T, usual: T) -> Response
 where
     T: Copy + Display + FromStr<Err: Display> + PartialEq,
@@ -200,7 +200,7 @@ fn id() -> Id {
     Id::unique("value under the pointer")
 }
 
-/// Tells that `text` is the value shown in `rect`, so that a right click there can copy it.
+/// Registers that `text` is the value shown in `rect`, so that a right click there can copy it.
 pub fn value_under(ui: &Ui, rect: Rect, text: &str) {
     if ui.input(|input| input.pointer.secondary_clicked()) && ui.rect_contains_pointer(rect) {
         ui.data_mut(|data| data.insert_temp(id(), text.to_owned()));
@@ -216,7 +216,7 @@ fn claim_id() -> Id {
     Id::unique("right click is answered")
 }
 
-/// Tells that a widget answers a right click on it by a menu of its own.
+/// Registers that a widget answers a right click on it by a menu of its own.
 pub fn claim_right_click(ui: &Ui, widget: &Response) {
     if widget.secondary_clicked() {
         ui.data_mut(|data| data.insert_temp(claim_id(), true));

@@ -176,7 +176,7 @@ pub(super) fn fit_with_prior(
     Err(CalibrationError::NotConverged)
 }
 
-/// Tells whether every node stays above the column-wires.
+/// Returns `true` if every node stays above the column-wires.
 fn is_above_columns(model: &SensorModel, samples: &[PressedRow]) -> bool {
     let mut nodes = samples.iter().flat_map(|sample| &sample.displacements_mm);
     nodes.all(|displacement| displacement.z < model.geometry.height_mm)

@@ -55,7 +55,7 @@ fn frames(real: &SensorModel, rows: &[usize], frames: usize, noise: f64, rng: &m
     samples
 }
 
-/// Tells whether every interval holds the truth.
+/// Returns `true` if every interval holds the truth.
 fn holds(calibration: &Calibration, real: &SensorModel) -> bool {
     let mut told = calibration.parameters.iter();
     told.all(|fitted| match fitted.standing {

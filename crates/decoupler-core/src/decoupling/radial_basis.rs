@@ -276,7 +276,7 @@ impl Gaussians {
         (root, Array2::from_shape_fn((inputs, count), centre))
     }
 
-    /// Writes the Gaussians at `x`, one for each centre with padding, whose values mean nothing.
+    /// Writes the Gaussians at `x`, one for each centre; padding lanes are unspecified.
     #[inline(always)]
     pub(super) fn evaluate(&self, x: &[f64], values: &mut [f64]) {
         let mut first = 0;

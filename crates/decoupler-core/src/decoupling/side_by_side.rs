@@ -13,7 +13,7 @@ pub(super) struct SideBySide {
     reciprocals: Vec<[f64; LANES]>,
     solution: Vec<[f64; LANES]>,
     /// Smallest share of a diagonal entry of AᵀA that the columns before leave.
-    least_left: [f64; LANES],
+    min_left: [f64; LANES],
 }
 
 /// Problems side by side.
@@ -29,7 +29,7 @@ impl SideBySide {
             lower: vec![[0.0; LANES]; width * (width + 1) / 2],
             reciprocals: vec![[0.0; LANES]; unknowns],
             solution: vec![[0.0; LANES]; unknowns],
-            least_left: [0.0; LANES],
+            min_left: [0.0; LANES],
         }
     }
 
@@ -45,9 +45,9 @@ impl SideBySide {
         pulp::Arch::new().dispatch(Solving(self));
     }
 
-    /// Returns `true` if the problem in `lane` is so well conditioned that its normal equations tell the solution.
+    /// Returns `true` if the problem in `lane` is so well conditioned that its normal equations determine the solution.
     pub(super) fn is_sound(&self, lane: usize) -> bool {
-        self.least_left[lane] > MIN_LEFT
+        self.min_left[lane] > MIN_LEFT
     }
 
     /// Returns one unknown of the solution in `lane`.
@@ -80,25 +80,21 @@ impl WithSimd for Solving<'_> {
             lower,
             reciprocals,
             solution,
-            least_left,
+            min_left,
         } = self.0;
         let n = *unknowns;
         // What columns before leave of the diagonal is found next to what it was.
         for (i, diagonal) in solution.iter_mut().enumerate() {
             *diagonal = lower[begin(i) + i];
         }
-        *least_left = [f64::INFINITY; LANES];
+        *min_left = [f64::INFINITY; LANES];
         for p in 0..n {
             let pivot = lower[begin(p) + p];
             let mut reciprocal = [0.0; LANES];
             for lane in 0..LANES {
                 let left = pivot[lane] / solution[p][lane];
                 // Written so that NaN counts as least.
-                least_left[lane] = if left >= least_left[lane] {
-                    least_left[lane]
-                } else {
-                    left
-                };
+                min_left[lane] = if left >= min_left[lane] { min_left[lane] } else { left };
                 reciprocal[lane] = 1.0 / pivot[lane].sqrt();
             }
             reciprocals[p] = reciprocal;

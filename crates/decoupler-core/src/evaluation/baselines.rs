@@ -68,7 +68,7 @@ impl Scores {
 }
 
 /// Fits the baselines: the training mean and an affine map on the readings, of each row-wire where networks know theirs.
-/// For simulated samples of row-wires that are not told, or of one, the map is that of least squares; samples of each of
+/// For simulated samples of unknown row-wires, or of one, the map is that of least squares; samples of each of
 /// several row-wires can be fewer than its readings, and measured ones too few or too alike, so theirs is ridge regression.
 pub(super) fn fit_baselines(
     training: &Dataset,

@@ -2,7 +2,7 @@
 //! published figures.
 //!
 //! A [`Run`] goes from [`RunSettings`] to trained networks and error tables; [`CrossValidation`] tests on every sample;
-//! [`measure_trade_off`] weighs speed against accuracy; [`experiments`] repeats runs over a grid of settings;
+//! [`measure_trade_off`] compares speed with accuracy; [`experiments`] repeats runs over a grid of settings;
 //! [`recorded`] says what the recorded readings determine.
 
 mod baselines;

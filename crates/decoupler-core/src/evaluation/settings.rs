@@ -69,8 +69,8 @@ impl From<Measured> for RunSettings {
     /// Recordings are short, noisy, and differ from one stretch to the next, so a validation part in time costs samples
     /// and can end the training by chance: Levenberg-Marquardt stopped by the last fifth of a recording of forces has
     /// errors that vary twofold with the seed, which Bayesian regularisation on all of it has not. It measures the
-    /// correlation of neighbouring frames, which tell less than as many independent ones, and gives each class of weights a
-    /// strength of its own: with one for all, 20 samples are told worse than by ridge regression. The best of several starts
+    /// correlation of neighbouring frames, which carry less information than as many independent ones, and gives each class of weights a
+    /// strength of its own: with one for all, with 20 samples it is worse than ridge regression. The best of several starts
     /// by their training error gains nothing.
     fn from(measured: Measured) -> Self {
         let mut settings = Self::of(measured.into(), InputChoice::MEASURED);

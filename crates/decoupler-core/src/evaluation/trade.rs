@@ -148,7 +148,7 @@ pub fn most_accurate_under(points: &[TradeOffPoint], microseconds: f64) -> Optio
     quick.min_by(|a, b| a.percent().total_cmp(&b.percent()))
 }
 
-/// Cost weighed against the error.
+/// Cost that is plotted against the error.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum TradeOffCost {
     /// Time to decode a frame on one thread.

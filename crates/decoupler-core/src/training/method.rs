@@ -262,7 +262,7 @@ impl Method {
 }
 
 impl MethodState {
-    /// Tells whether the state has finite values for this many weights.
+    /// Returns `true` if the state has finite values for this many weights.
     pub(super) fn fits(&self, weights: usize) -> bool {
         let fits = |vector: &&[f64]| vector.len() == weights && vector.iter().all(|value| value.is_finite());
         self.vectors().iter().all(fits)

@@ -65,7 +65,7 @@ pub(super) fn for_each_part<P: Send>(parts: &mut [P], work: impl Fn(&mut P) + Sy
     }
 }
 
-/// Tells whether a product of this many multiplications is split.
+/// Returns `true` if a product of this many multiplications is split.
 pub(super) fn is_large(multiplications: usize) -> bool {
     multiplications >= 2 * LARGE
 }

@@ -315,7 +315,7 @@ pub enum StopReason {
 }
 
 impl StopReason {
-    /// Tells whether the error fell as it should until the training ended.
+    /// Returns `true` if the error fell as it should until the training ended.
     pub fn was_successful(self) -> bool {
         self != Self::Diverged
     }
@@ -335,7 +335,7 @@ impl StopReason {
         }
     }
 
-    /// Tells whether other stopping rules could have let the training continue: not if the user stopped it or the method
+    /// Returns `true` if other stopping rules could have let the training continue: not if the user stopped it or the method
     /// found no further step.
     pub(super) fn depends_on_rules(self) -> bool {
         !matches!(self, Self::Stopped | Self::Diverged | Self::MuLarge | Self::LambdaLarge)

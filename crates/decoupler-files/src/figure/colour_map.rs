@@ -183,7 +183,7 @@ pub(super) fn outline<T>(items: &[T], of: impl Fn(&T) -> Option<f64>) -> Vec<usi
     kept
 }
 
-/// Tells the places at which `of` is least and largest, and the first without a number.
+/// Returns the places at which `of` is least and largest, and the first without a number.
 pub(super) fn extremes<T>(items: &[T], of: impl Fn(&T) -> Option<f64>, mut tell: impl FnMut(usize)) {
     let (mut least, mut largest, mut missing) = (None, None, None);
     for (place, item) in items.iter().enumerate() {

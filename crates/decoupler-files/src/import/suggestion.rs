@@ -228,7 +228,7 @@ fn time(file: &InspectedFile) -> Option<&ColumnSummary> {
     is_time.then_some(column)
 }
 
-/// Tells whether both files have times, and these overlap.
+/// Returns `true` if both files have times, and these overlap.
 fn share_time(one: &InspectedFile, other: &InspectedFile) -> bool {
     let range = |file: &InspectedFile| {
         let column = time(file)?;

@@ -144,7 +144,7 @@ impl DropScale {
     pub fn take(&mut self, frame: &LiveFrame) {
         let wire = match &frame.watched {
             Watched::Named(diagnosis) => Some(diagnosis.wire),
-            Watched::Off(_) | Watched::Sound | Watched::Unexplained => None,
+            Watched::Off(_) | Watched::Normal | Watched::Unexplained => None,
         };
         let is_sound = |row: usize, column: usize| {
             wire.is_none_or(|wire| !wire.is_row(frame.rows[row]) && !wire.columns().contains(&Some(column)))

@@ -53,7 +53,7 @@ fn warnings_ui(ui: &mut Ui, frame: &LiveFrame) {
                  Check the wiring, the geometry, the order of the rows, and the relative noise on the left.",
             );
         }
-        Watched::Off(_) | Watched::Sound => {}
+        Watched::Off(_) | Watched::Normal => {}
     }
 }
 
@@ -106,7 +106,7 @@ fn confidence_ui(ui: &mut Ui, view: &LiveView, frame: &LiveFrame, shared: &Share
         Watched::Off(reason) => {
             dim_ui(ui, &format!("Faults of wires are {reason}."));
         }
-        Watched::Sound => fact_ui(ui, "Fault", hint, "none"),
+        Watched::Normal => fact_ui(ui, "Fault", hint, "none"),
         Watched::Unexplained => fact_ui(ui, "Fault", hint, "not a single-wire fault"),
         Watched::Named(diagnosis) => fact_ui(ui, "Fault", hint, &diagnosis.wire.to_string()),
     }

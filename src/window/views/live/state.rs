@@ -27,7 +27,7 @@ const NOTHING_TO_SIMULATE: &str = "A network of a recording decodes a file, a se
 /// The Live view.
 #[derive(Debug)]
 pub struct LiveView {
-    /// The latest frame, and how decoding stands; it stays in view after the end.
+    /// The latest frame, with the status of decoding; it stays in view after the end.
     pub shown: LiveShown,
     /// Decoding under way. It is dropped before the job, which then ends at once.
     pub running: Option<Running>,
@@ -168,7 +168,7 @@ impl LiveView {
         }
     }
 
-    /// Continues with the network that is chosen now, where a replay stands.
+    /// Continues with the network that is chosen now, from the present place of a replay.
     pub(super) fn start_again(&mut self, shared: &Shared) {
         let replay = self.shown.replay;
         let Ok((network, mut plan)) = self.plan(shared, replay.map_or(0.0, |replay| replay.at_s)) else {

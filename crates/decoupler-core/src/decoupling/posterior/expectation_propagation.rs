@@ -143,7 +143,7 @@ impl WithSimd for Rounds<'_> {
 }
 
 impl Propagation {
-    /// Lets every site meet its range once. Returns the largest change of a mean, or NaN where numbers overflow.
+    /// One EP sweep over all sites. Returns the largest change of a mean, or NaN where numbers overflow.
     #[inline(always)]
     fn meet_ranges(&mut self, share: Pack, defects: Pack) -> Pack {
         let Self {
@@ -169,7 +169,7 @@ impl Propagation {
 }
 
 impl Rounds<'_> {
-    /// Closes the lanes in which means moved by less than the tolerance, or no numbers are left, or no round.
+    /// Closes the lanes in which means moved by less than the tolerance, became NaN, or no round.
     fn close_lanes(&mut self, moved: Pack, share: f64, rounds: usize) {
         for (lane, (open, model)) in self.open.iter_mut().zip(self.models).enumerate() {
             let Some(model) = model.as_ref().filter(|_| *open) else {

@@ -222,7 +222,7 @@ impl Posterior {
 }
 
 /// Share of step number `steps` that is taken: all of the first ones, which nearly always arrive, then less, lest means go
-/// round in a circle.
+/// in a cycle.
 fn share_of_step(steps: usize) -> f64 {
     match steps {
         ..=5 => 1.0,

@@ -235,7 +235,7 @@ pub(super) fn add_to_both([a, b]: [&mut [Pack]; 2], factors: [Pack; 2], from: &[
     }
 }
 
-/// Adds `factor` times `from`; returns the sum of the squares of what comes out.
+/// Adds `factor` times `from`; returns the sum of squares of the result.
 #[inline(always)]
 pub(super) fn add(to: &mut [Pack], factor: Pack, from: &[Pack]) -> Pack {
     let ((blocks_to, rest_to), (blocks_from, rest_from)) = (to.as_chunks_mut::<STRANDS>(), from.as_chunks::<STRANDS>());

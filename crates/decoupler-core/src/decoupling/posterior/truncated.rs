@@ -181,7 +181,7 @@ pub(super) struct Site {
     /// Variance of what is added to the unknown before it meets the range.
     noise: f64,
     pub(super) factor: Factor<Pack>,
-    /// The word of the other factors and of the equations on the unknown.
+    /// Cavity distribution of the unknown: that of the equations and all other factors.
     seen: Factor<Pack>,
     /// Moments of that within the range.
     moments: Moments,

@@ -115,7 +115,7 @@ fn unit_vector(channel: ArrayView1<'_, f64>) -> Option<Vec<f64>> {
     Some(off.into_iter().map(|value| value / length).collect())
 }
 
-/// Tells whether two unit vectors are the same except for their sign and for rounding.
+/// Returns `true` if two unit vectors are the same except for their sign and for rounding.
 fn is_parallel(one: &[f64], other: &[f64]) -> bool {
     /// Distance of unit vectors that rounding of the readings explains.
     const ROUNDING: f64 = 1e-9;
@@ -233,7 +233,7 @@ impl ChannelImportance {
         growth.max_by(|one, other| one.value.total_cmp(&other.value))
     }
 
-    /// Tells whether no target's error grows without the channel by more than its interval shows.
+    /// Returns `true` if no target's error grows without the channel by more than its interval shows.
     pub fn is_dispensable(&self) -> bool {
         self.growth.iter().flatten().all(|growth| growth.low <= 1.0)
     }

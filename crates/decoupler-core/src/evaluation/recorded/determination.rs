@@ -220,7 +220,7 @@ impl NonlinearGain {
     /// Part of ridge's error that a network must save to be worth its weights.
     const WORTH_HAVING: f64 = 0.05;
 
-    /// Tells whether the network is better than ridge by at least 5 %, and by more than the interval shows.
+    /// Returns `true` if the network is better than ridge by at least 5 %, and by more than the interval shows.
     pub fn is_supported(&self) -> bool {
         self.ratio.high < 1.0 && self.ratio.value <= 1.0 - Self::WORTH_HAVING
     }

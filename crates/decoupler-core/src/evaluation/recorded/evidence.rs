@@ -33,7 +33,7 @@ pub(super) struct SumVariance {
 }
 
 impl SumVariance {
-    /// Tells whether a few units make up most of the variance, as with heavy tails: the estimate of the variance then
+    /// Returns `true` if a few units make up most of the variance, as with heavy tails: the estimate of the variance then
     /// depends on extreme values that short data rarely contain.
     pub(super) fn is_heavy_tailed(&self) -> bool {
         self.freedom < 0.15 * self.units as f64

@@ -161,7 +161,7 @@ impl LearningCurve {
         Self { points, law, doubling }
     }
 
-    /// Tells whether twice the samples would lower the error by more than the interval shows.
+    /// Returns `true` if twice the samples would lower the error by more than the interval shows.
     pub fn gains(&self) -> bool {
         self.doubling
             .is_some_and(|doubling| doubling.ratio.high < 1.0 - Self::WORTH_SAYING)
@@ -282,7 +282,7 @@ fn squared_errors(
 /// follow (Viering and Loog 2023, doi:10.1109/TPAMI.2022.3220744).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PowerLaw {
-    /// Error that no number of samples falls below.
+    /// Error in the limit of infinitely many samples.
     pub floor: f64,
     /// Error above the floor at one sample.
     pub scale: f64,

@@ -69,12 +69,12 @@ struct Predicted {
 impl Evidence<'_> {
     /// Returns the most probable fault.
     pub(super) fn compare(mut self) -> Option<Explained> {
-        let sound: Vec<RowFitReport> = (0..self.lines())
+        let normal: Vec<RowFitReport> = (0..self.lines())
             .map(|line| self.fit(line, [None; 2], self.nodes_per_row))
             .collect();
         let mut hypotheses = Vec::new();
-        self.add_rows(&sound, &mut hypotheses);
-        let suspects = self.suspects(&sound);
+        self.add_rows(&normal, &mut hypotheses);
+        let suspects = self.suspects(&normal);
         let left_out: Vec<ColumnLeftOut> = suspects
             .iter()
             .map(|&column| self.leave_out([Some(column), None]))
@@ -136,12 +136,12 @@ impl Evidence<'_> {
     }
 
     /// Faults of row-wires.
-    fn add_rows(&mut self, sound: &[RowFitReport], hypotheses: &mut Vec<Hypothesis>) {
-        let total = sum(sound);
+    fn add_rows(&mut self, normal: &[RowFitReport], hypotheses: &mut Vec<Hypothesis>) {
+        let total = sum(normal);
         for index in 0..self.rows.len() {
             let row = self.rows[index];
             let lines: Vec<usize> = (index..self.lines()).step_by(self.rows.len()).collect();
-            let of_row = sum_of(sound, &lines);
+            let of_row = sum_of(normal, &lines);
             let rest = (total.score - of_row.score, total.chi_squared - of_row.chi_squared);
             let (rest_readings, rest_rows) = (total.readings - of_row.readings, self.lines() - lines.len());
             let mut add = |wire, cause, score: f64, chi_squared: f64, readings: usize| {
@@ -184,7 +184,7 @@ impl Evidence<'_> {
             add(wire, FaultCause::Unknown, unknown, 0.0, 0);
             if let Some(next) = self.rows.iter().position(|&other| other == row + 1) {
                 let next_lines: Vec<usize> = (next..self.lines()).step_by(self.rows.len()).collect();
-                let of_next = sum_of(sound, &next_lines);
+                let of_next = sum_of(normal, &next_lines);
                 let pairs = lines.iter().zip(&next_lines);
                 let both: Vec<RowFitReport> = pairs.map(|(&line, &next)| self.fit_shorted_rows(line, next)).collect();
                 let both = sum(&both);
@@ -228,9 +228,9 @@ impl Evidence<'_> {
     }
 
     /// The column-wires without which Eq. (2) explains the worst lines of the last frame best, in ascending order.
-    fn suspects(&mut self, sound: &[RowFitReport]) -> Vec<usize> {
+    fn suspects(&mut self, normal: &[RowFitReport]) -> Vec<usize> {
         let mut lines: Vec<usize> = (self.lines() - self.rows.len()..self.lines()).collect();
-        lines.sort_by(|&a, &b| sound[b].chi_squared.total_cmp(&sound[a].chi_squared));
+        lines.sort_by(|&a, &b| normal[b].chi_squared.total_cmp(&normal[a].chi_squared));
         lines.truncate(WORST_LINES);
         let mut order: Vec<(f64, usize)> = Vec::with_capacity(self.columns);
         for column in 0..self.columns {

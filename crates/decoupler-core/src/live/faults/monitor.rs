@@ -14,7 +14,7 @@ use crate::{
 /// Watches whether Eq. (2) explains the frames, and names the wire at fault if it does not.
 ///
 /// A frame is suspicious if no deformation explains its readings: if the smallest χ² of all rows, by weak priors, exceeds
-/// the value that a sound frame exceeds with a probability of at most 10⁻³. At the true deformation χ² of the readings is
+/// the value that a normal frame exceeds with a probability of at most 10⁻³. At the true deformation χ² of the readings is
 /// that of their noise, with as many degrees of freedom as readings, and the smallest is never more. When
 /// [`FaultMonitor::PERSISTENCE`] frames in a row are suspicious, the faults that a single wire can have are compared by
 /// their evidence. One is named if its probability is at least [`FaultMonitor::SURE`] and it explains these frames by the
@@ -24,7 +24,7 @@ use crate::{
 /// equal while the array is pressed in different ways, which is improbable in the scene of wires that do not touch. They
 /// stay named until their readings differ in [`FaultMonitor::PERSISTENCE`] frames in a row.
 ///
-/// Checking a sound frame allocates nothing.
+/// Checking a normal frame allocates nothing.
 #[derive(Clone, Debug)]
 pub struct FaultMonitor {
     one: RowFit,
@@ -45,12 +45,12 @@ pub struct FaultMonitor {
     /// Number of suspicious frames at which faults are compared again.
     next_comparison: usize,
     /// Number of frames in a row without any fault.
-    sound: usize,
+    normal: usize,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum State {
-    Sound,
+    Normal,
     Named(Diagnosis),
     Unexplained,
 }
@@ -75,7 +75,7 @@ const MAX_COLUMNS: usize = 128;
 const LONGEST_WAIT: usize = 1024;
 
 impl FaultMonitor {
-    /// Frames in a row that must be suspicious for a fault to be named, or sound for it to be forgotten.
+    /// Frames in a row that must be suspicious for a fault to be named, or normal for it to be forgotten.
     pub const PERSISTENCE: usize = 4;
     /// Smallest probability at which a fault is named.
     pub const SURE: f64 = 0.99;
@@ -107,11 +107,11 @@ impl FaultMonitor {
             nodes_per_column: scale.nodes_per_column(),
             // Unknowns within their ranges are at most half a width from the middle.
             of_priors: 0.25 * scene.unknowns_per_row(scale) as f64,
-            state: State::Sound,
+            state: State::Normal,
             suspicious_ohm: Vec::with_capacity(Self::PERSISTENCE * rows.len() * scale.columns()),
             suspicious: 0,
             next_comparison: Self::PERSISTENCE,
-            sound: 0,
+            normal: 0,
             one,
         })
     }
@@ -120,7 +120,7 @@ impl FaultMonitor {
     pub fn named(&self) -> Option<Diagnosis> {
         match self.state {
             State::Named(diagnosis) => Some(diagnosis),
-            State::Sound | State::Unexplained => None,
+            State::Normal | State::Unexplained => None,
         }
     }
 
@@ -146,7 +146,7 @@ impl FaultMonitor {
         if let Some(shorted) = shorted
             && (is_explained || self.named().is_none())
         {
-            (self.suspicious, self.sound) = (0, 0);
+            (self.suspicious, self.normal) = (0, 0);
             let is_known = self.named().is_some_and(|named| named.wire == shorted.wire);
             if is_known {
                 return None;
@@ -163,18 +163,18 @@ impl FaultMonitor {
                     && self.shorts.are_equal(named.wire)
             };
             if self.named().is_some_and(is_shorted) {
-                self.sound = 0;
+                self.normal = 0;
                 return None;
             }
-            self.sound += 1;
-            if self.sound == Self::PERSISTENCE && self.state != State::Sound {
-                self.state = State::Sound;
+            self.normal += 1;
+            if self.normal == Self::PERSISTENCE && self.state != State::Normal {
+                self.state = State::Normal;
                 self.next_comparison = Self::PERSISTENCE;
                 return Some(FaultEvent::Recovered);
             }
             return None;
         }
-        self.sound = 0;
+        self.normal = 0;
         if self
             .named()
             .is_some_and(|named| self.is_explained(frame_ohm, Some(named.wire)))
@@ -225,7 +225,7 @@ impl FaultMonitor {
         chi_squared <= self.limit(readings, rows)
     }
 
-    /// Largest χ² of a sound fit of this many readings and rows.
+    /// Largest χ² of a normal fit of this many readings and rows.
     fn limit(&self, readings: usize, rows: usize) -> f64 {
         quantile(readings, DEVIATE) + self.of_priors * rows as f64
     }

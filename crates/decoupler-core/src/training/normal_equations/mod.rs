@@ -43,7 +43,7 @@ use crate::{
 /// Speed of the large products of the factored solver relative to the small ones of conjugate gradients.
 const SPEED: f64 = 2.0;
 
-/// Tells whether factoring is cheaper than conjugate gradients.
+/// Returns `true` if factoring is cheaper than conjugate gradients.
 pub(super) fn factoring_is_cheaper(shape: Shape, samples: usize) -> bool {
     let factored = SchurComplement::cost(shape, samples);
     let iterated = ConjugateGradient::cost(shape, samples);

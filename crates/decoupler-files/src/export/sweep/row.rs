@@ -17,7 +17,7 @@ pub use crate::export::DocumentError;
 /// Fields of a report that are times: they differ from run to run, and nothing is compared by them.
 const TIMES: [&str; 4] = ["epoch_ms", "frame_us", "fit_seconds", "training_seconds"];
 
-/// A trial in a table: what it was, what came out, and how long it took.
+/// A trial in a table: what it was, its results, and how long it took.
 #[derive(Clone, Debug, Serialize)]
 pub struct SweepRow {
     pub(crate) trial: TrialId,

@@ -99,12 +99,12 @@ pub enum Command {
     Play(bool),
 }
 
-/// News from the thread.
+/// Event from the thread.
 #[derive(Debug)]
 pub enum LiveEvent {
     /// The source, by what was found at its path.
     Source(SourcePlan),
-    /// The latest frame, and how decoding stands.
+    /// The latest frame, with the status of decoding.
     Shown(Box<LiveShown>),
     /// Gains of the unloaded state, or the reason for which there are none.
     Zeroed(Result<ZeroGains, String>),
@@ -212,7 +212,7 @@ pub enum Watched {
     /// Faults are not looked for, and why.
     Off(&'static str),
     /// Eq. (2) explains the readings.
-    Sound,
+    Normal,
     /// Neither Eq. (2) nor a fault of a single wire explains them.
     Unexplained,
     /// A fault of these wires, whose readings are left out.

@@ -77,7 +77,7 @@ impl Session {
         }
     }
 
-    /// The last frame with an answer, and how decoding stands.
+    /// The last frame with an answer, with the status of decoding.
     fn shown(&self) -> LiveShown {
         let time_s = self.arrived.map_or(0.0, |arrived| arrived.time_s);
         LiveShown {
@@ -317,7 +317,7 @@ pub(super) trait LiveSession {
     /// Ends the recording, if there is one.
     fn end_recording(&mut self, reason: Option<String>, send: &dyn Fn(LiveEvent));
 
-    /// The last frame with an answer, and how decoding stands, to be shown now.
+    /// The last frame with an answer, with the status of decoding, to be shown now.
     fn show(&mut self) -> LiveShown;
 }
 
@@ -338,7 +338,7 @@ pub fn run(plan: LivePlan, commands: &Receiver<Command>, report: &Report<LiveEve
     let Some(mut session) = session else { return Ok(()) };
     let end = decode(&mut *session, commands, report);
     session.end_recording(None, &send);
-    // What came last stays in view.
+    // The last frame stays in view.
     show(&mut *session, report);
     end
 }
@@ -427,7 +427,7 @@ impl Watch {
             }),
         };
         Ok(Self {
-            state: reason.map_or(Watched::Sound, Watched::Off),
+            state: reason.map_or(Watched::Normal, Watched::Off),
             parts,
             checked: None,
         })
@@ -441,7 +441,7 @@ impl Watch {
     pub(super) fn leaves_out(&self, row: usize, column: usize) -> bool {
         match &self.state {
             Watched::Named(diagnosis) => diagnosis.wire.is_row(row) || diagnosis.wire.columns().contains(&Some(column)),
-            Watched::Off(_) | Watched::Sound | Watched::Unexplained => false,
+            Watched::Off(_) | Watched::Normal | Watched::Unexplained => false,
         }
     }
 
@@ -460,7 +460,7 @@ impl Watch {
         self.state = match event {
             FaultEvent::Named(diagnosis) => Watched::Named(diagnosis),
             FaultEvent::Unexplained => Watched::Unexplained,
-            FaultEvent::Recovered => Watched::Sound,
+            FaultEvent::Recovered => Watched::Normal,
         };
         parts.left_out.leave_out(parts.monitor.named());
         matches!(event, FaultEvent::Named(_))

@@ -200,7 +200,7 @@ impl Draft {
         };
     }
 
-    /// Tells whether a column of any file has this meaning.
+    /// Returns `true` if a column of any file has this meaning.
     pub(super) fn has(&self, meaning: Meaning) -> bool {
         self.files.iter().any(|file| file.meanings.contains(&meaning))
     }
@@ -249,7 +249,7 @@ impl Draft {
         found.map(|(recording, test)| (recording.as_path(), test.as_path()))
     }
 
-    /// Tells whether the test samples have files of their own.
+    /// Returns `true` if the test samples have files of their own.
     pub(super) fn has_tests(&self) -> bool {
         !self.tests.is_empty()
     }
@@ -371,7 +371,7 @@ impl Draft {
         }
     }
 
-    /// Tells whether [`Self::made_of`] is still this.
+    /// Returns `true` if [`Self::made_of`] is still this.
     pub(super) fn is_made_of(&self, made_of: &MadeOf) -> bool {
         let MadeOf {
             plan,
@@ -405,7 +405,7 @@ impl Draft {
     }
 }
 
-/// Tells whether a column of the same file or of another one must give up a meaning that a column gets.
+/// Returns `true` if a column of the same file or of another one must give up a meaning that a column gets.
 fn is_taken(meaning: Meaning, is_same_file: bool) -> bool {
     match meaning {
         Meaning::Time => is_same_file,

@@ -77,7 +77,7 @@ pub(super) fn joined_ui(ui: &mut Ui, draft: &mut Draft) {
     }
 }
 
-/// Tells whether the layout is as found.
+/// Returns `true` if the layout is as found.
 pub(super) fn layout_summary(draft: &Draft) -> String {
     if draft.plan.import.dialect == DialectChoice::default() {
         "found".to_owned()
