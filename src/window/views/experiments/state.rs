@@ -205,7 +205,7 @@ impl Outcome {
 }
 
 impl ExperimentsView {
-    /// Every form as the paper has it, nothing run. `wake` is called when there is events.
+    /// Every form as the paper has it, nothing run. `wake` is called when there are events.
     pub fn new(wake: Wake) -> Self {
         let mut state = Self {
             topic: Topic::ALL[0],

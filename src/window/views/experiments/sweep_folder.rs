@@ -50,7 +50,7 @@ pub(in crate::window::views::experiments) struct OpenFolder {
 }
 
 impl SweepFolder {
-    /// No folder. `wake` is called when there is events of one.
+    /// No folder. `wake` is called when there are events of one.
     pub(in crate::window::views::experiments) fn new(wake: Wake) -> Self {
         let (choices, chosen) = channel();
         Self {

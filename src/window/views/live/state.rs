@@ -64,7 +64,7 @@ pub struct Running {
 }
 
 impl LiveView {
-    /// Nothing decoded yet. `wake` is called when there is events.
+    /// Nothing decoded yet. `wake` is called when there are events.
     pub fn new(wake: Wake) -> Self {
         Self {
             shown: LiveShown::default(),

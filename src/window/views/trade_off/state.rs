@@ -137,7 +137,7 @@ impl TradeOffOutcome {
 }
 
 impl TradeOffView {
-    /// Nothing measured yet. `wake` is called when there is events.
+    /// Nothing measured yet. `wake` is called when there are events.
     pub fn new(wake: Wake) -> Self {
         Self {
             form: TradeOffForm::default(),

@@ -84,7 +84,7 @@ impl ChosenPaths {
 }
 
 impl RecordingEditor {
-    /// Nothing open yet. `wake` is called when there is events.
+    /// Nothing open yet. `wake` is called when there are events.
     pub fn new(wake: &Wake) -> Self {
         Self {
             draft: None,
