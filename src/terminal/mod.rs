@@ -85,8 +85,8 @@ pub fn run<A: Into<OsString> + Clone>(arguments: impl IntoIterator<Item = A>, wi
     let done = match Arguments::try_parse_from(arguments) {
         Ok(arguments) => arguments.run(window),
         // Help and version are no errors; a reader that has gone away needs neither.
-        Err(told) if matches!(told.kind(), ErrorKind::DisplayHelp | ErrorKind::DisplayVersion) => {
-            told.print().map_err(Failure::Output)
+        Err(message) if matches!(message.kind(), ErrorKind::DisplayHelp | ErrorKind::DisplayVersion) => {
+            message.print().map_err(Failure::Output)
         }
         Err(error) => Err(Failure::Arguments(one_line(&error))),
     };

@@ -151,11 +151,6 @@ impl DecoderKind {
         self.entry().meaning
     }
 
-    /// Returns the function that fits a decoder of this kind.
-    pub(super) fn fit_function(self) -> fn(&FitProblem<'_>) -> Fit {
-        self.entry().fit
-    }
-
     /// Returns `true` if the decoder uses the trained network.
     pub fn needs_network(self) -> bool {
         matches!(self.entry().needs, Needs::Network | Needs::NetworkAndSensor)
@@ -240,7 +235,7 @@ impl DecoderKind {
     /// # Errors
     /// If samples cannot be scaled, or the sensor has no resistances at rest.
     pub fn fit(self, problem: &FitProblem<'_>) -> Fit {
-        (self.fit_function())(problem)
+        (self.entry().fit)(problem)
     }
 }
 

@@ -183,8 +183,8 @@ pub(super) fn outline<T>(items: &[T], of: impl Fn(&T) -> Option<f64>) -> Vec<usi
     kept
 }
 
-/// Returns the places at which `of` is least and largest, and the first without a number.
-pub(super) fn extremes<T>(items: &[T], of: impl Fn(&T) -> Option<f64>, mut tell: impl FnMut(usize)) {
+/// Calls `report` with the places at which `of` is least and largest, and the first without a number.
+pub(super) fn extremes<T>(items: &[T], of: impl Fn(&T) -> Option<f64>, mut report: impl FnMut(usize)) {
     let (mut least, mut largest, mut missing) = (None, None, None);
     for (place, item) in items.iter().enumerate() {
         match of(item).filter(|value| value.is_finite()) {
@@ -200,7 +200,7 @@ pub(super) fn extremes<T>(items: &[T], of: impl Fn(&T) -> Option<f64>, mut tell:
         }
     }
     let found = [least, largest].into_iter().flatten().map(|(place, _)| place);
-    found.chain(missing).for_each(&mut tell);
+    found.chain(missing).for_each(&mut report);
 }
 
 #[cfg(test)]

@@ -248,7 +248,7 @@ pub(super) trait PlainFirst: Decoder {
 pub struct PosteriorDecoder {
     posterior: Posterior,
     search: RowSearch,
-    /// Noise leaves every answer undetermined, which the reference tells.
+    /// Noise leaves every answer undetermined, as the reference shows.
     is_noisy: bool,
     solved: SolvedRows,
 }

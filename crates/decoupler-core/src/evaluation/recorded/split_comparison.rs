@@ -285,7 +285,7 @@ impl Interval {
         })
     }
 
-    /// Returns the percentile interval (Efron 1979) of `replicates`, of which those that are no number are left out;
+    /// Returns the percentile interval (Efron 1979) of `replicates`, of which NaNs are left out;
     /// `None` if the figure itself is none, or fewer than half of the replicates are left.
     pub(super) fn of_replicates(value: f64, replicates: &[f64]) -> Option<Self> {
         let mut sorted: Vec<f64> = replicates.iter().copied().filter(|value| value.is_finite()).collect();

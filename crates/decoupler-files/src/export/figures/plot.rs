@@ -264,7 +264,7 @@ impl HeatMap {
         let (rows, columns) = self.values.dim();
         let left = 26.0 + CHARACTER * longest(&self.rows) as f64;
         let width = WIDTH - left - COLOUR_BAR_WIDTH - 16.0;
-        // Names that do not fit side by side stand upright.
+        // Names that do not fit side by side are set upright.
         let column = width / columns.max(1) as f64;
         let name = CHARACTER * longest(&self.columns) as f64;
         let is_upright = name > column - 4.0;
