@@ -15,16 +15,16 @@ use super::{
 };
 use decoupler_core::text::clean_name;
 
-/// Largest number of rows: those of ten hours at 1 kHz, and more.
+/// Maximum number of rows; ten hours at 1 kHz are fewer.
 const LARGEST_ROWS: usize = 50_000_000;
-/// Number of rows whose commonest length is the number of columns, if there is no header.
+/// Number of rows that determine the number of columns, by their most common length, if there is no header.
 const FIRST_ROWS: usize = 500;
 
-/// Columns that are read otherwise than as numbers, and what means missing in them.
+/// Columns that are not read as numbers, and markers of missing values.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Reading<'a> {
     pub(super) choice: DialectChoice,
-    /// Rules of this file: the column, or none for all, and the text.
+    /// Markers of missing values in this file: the column, or `None` for all, and the text.
     pub(super) missing: Vec<(Option<String>, &'a Missing)>,
     /// Columns that hold labels.
     pub(super) labels: Vec<String>,
@@ -66,7 +66,7 @@ fn read_rows(path: &Path, text: impl Read, dialect: Dialect, reading: &Reading<'
 struct Body<'a> {
     dialect: Dialect,
     reading: &'a Reading<'a>,
-    /// Rows that wait until the number of columns is known, with their lines.
+    /// Rows buffered until the number of columns is known, with their line numbers.
     first: Vec<(u64, Vec<Vec<u8>>)>,
     builders: Vec<Builder<'a>>,
     rows: usize,
@@ -108,7 +108,7 @@ impl<'a> Body<'a> {
         self.add(rows.line(), rows.len(), rows.cells())
     }
 
-    /// Makes the columns, and adds the rows that waited for them.
+    /// Creates the columns and adds the buffered rows.
     fn begin(&mut self, headers: &[String]) -> Result<(), TableError> {
         let waiting = std::mem::take(&mut self.first);
         let width = match headers.len() {
@@ -134,7 +134,7 @@ impl<'a> Body<'a> {
         mut cells: impl Iterator<Item = &'c [u8]> + Clone,
     ) -> Result<(), TableError> {
         let width = self.builders.len();
-        // A separator at the end of a row begins no cell.
+        // A separator at the end of a row does not start another cell.
         if count > width && (count > width + 1 || cells.clone().last().is_some_and(|cell| !cell.is_empty())) {
             self.too_long.add(line);
             return Ok(());
@@ -248,7 +248,7 @@ pub(super) fn named(headers: &[String], width: usize) -> Vec<Column> {
     columns
 }
 
-/// Gives columns of the same name a number each.
+/// Numbers columns of the same name.
 fn name_apart(columns: &mut [Column]) {
     let mut counts: HashMap<String, usize> = HashMap::new();
     for column in columns {
@@ -267,7 +267,7 @@ fn commonest(widths: impl Iterator<Item = usize>) -> usize {
     runs.max_by_key(|run| run.len()).map_or(0, |run| run[0])
 }
 
-/// Text of a cell. What is no UTF-8 is taken for Latin-1, whose characters are the first of Unicode.
+/// Returns the text of a cell. Invalid UTF-8 is read as Latin-1, which maps to the first 256 characters of Unicode.
 fn text_of(cell: &[u8], encoding: Encoding) -> String {
     match std::str::from_utf8(cell) {
         Ok(text) if encoding != Encoding::Latin1 => text.to_owned(),
@@ -275,7 +275,7 @@ fn text_of(cell: &[u8], encoding: Encoding) -> String {
     }
 }
 
-/// Text for a message: the first 40 characters, control characters escaped.
+/// Returns the text for a message: the first 40 characters, with control characters escaped.
 fn excerpt(text: &str) -> String {
     let text: String = text.chars().take(40).collect();
     if text.contains(char::is_control) {

@@ -5,16 +5,16 @@ use super::{
     rows::Rows,
 };
 
-/// Length of the beginning from which the layout is found.
+/// Number of bytes from which the layout is detected.
 pub(super) const BEGINNING: usize = 1 << 18;
-/// Number of rows that are looked at.
+/// Number of rows from which the layout is detected.
 const MAX_ROWS: usize = 500;
 
-/// Finds the layout of a file from its `beginning`; `is_whole` if nothing follows.
+/// Detects the layout of a file from its `beginning`; `is_whole` if nothing follows.
 ///
-/// The separator and the decimal separator are those with which most cells of the commonest length of row are numbers,
-/// and of those that make most cells. The first row has names if at least half of its cells are no numbers, and a column under
-/// them is one of numbers.
+/// Of all pairs of separator and decimal separator, the one is chosen with which most cells, in rows of the most common
+/// length, are numbers; ties go to the pair with most cells. The first row contains names if at least half of its cells are
+/// not numbers and at least one of them is above a column of numbers.
 pub(super) fn detect(beginning: &[u8], is_whole: bool, choice: &DialectChoice) -> Result<Dialect, TableError> {
     let encoding = choice.encoding.unwrap_or_else(|| encoding(beginning));
     let decoded;
@@ -28,18 +28,18 @@ pub(super) fn detect(beginning: &[u8], is_whole: bool, choice: &DialectChoice) -
     let text = text.strip_prefix(b"\xef\xbb\xbf").unwrap_or(text);
     let carriage_returns = text.contains(&b'\r') && !text.contains(&b'\n');
     let line_break = if carriage_returns { b'\r' } else { b'\n' };
-    let said = sep_line(text, line_break);
+    let declared = sep_line(text, line_break);
     let skipped_lines = choice.skip_lines.unwrap_or(0);
-    let skipped = skipped_lines + usize::from(said.is_some());
+    let skipped = skipped_lines + usize::from(declared.is_some());
     let table = rest_after(text, line_break, skipped);
-    // The last row may be cut off.
+    // The last row may be truncated.
     let end = table.iter().rposition(|&byte| byte == line_break);
     let table = if is_whole {
         table
     } else {
         end.map_or(table, |end| &table[..=end])
     };
-    let separators = match choice.separator.or(said) {
+    let separators = match choice.separator.or(declared) {
         Some(separator) => vec![separator],
         None => Separator::ALL.to_vec(),
     };
@@ -82,13 +82,13 @@ pub(super) fn detect(beginning: &[u8], is_whole: bool, choice: &DialectChoice) -
     })
 }
 
-/// Fit of a choice of separators.
+/// Score of a pair of separators.
 struct Score {
-    /// Commonest number of cells in a row.
+    /// Most common number of cells in a row.
     width: usize,
-    /// Share of the rows of that number of cells.
+    /// Fraction of the rows with that number of cells.
     regular: f64,
-    /// Share of the cells of these rows, after the first, that are numbers or missing.
+    /// Fraction of the cells of these rows, except the first row, that are numbers or missing.
     numeric: f64,
 }
 
@@ -109,7 +109,7 @@ impl Score {
         Self {
             width,
             regular: count as f64 / rows.len().max(1) as f64,
-            // A table of empty cells is no table of numbers.
+            // A table of empty cells is not a table of numbers.
             numeric: (numbers as f64 + 0.9 * missing as f64) / cells.len().max(1) as f64,
         }
     }
@@ -129,7 +129,7 @@ fn sample(text: &[u8], separator: Separator, decimal: Decimal, crs: bool) -> Res
         match rows.advance() {
             Ok(true) => sample.push(rows.cells().map(|cell| parse(cell, decimal)).collect()),
             Ok(false) => break,
-            // The quote may close after the beginning.
+            // The closing quote may lie beyond the beginning.
             Err(TableError::Quote { .. }) if !sample.is_empty() => break,
             Err(error) => return Err(error),
         }
@@ -176,7 +176,7 @@ fn encoding(beginning: &[u8]) -> Encoding {
         _ if even(0) && !even(1) => Encoding::Utf16Be,
         _ => match std::str::from_utf8(beginning) {
             Ok(_) => Encoding::Utf8,
-            // A character may be cut off at the end of the beginning.
+            // The last character of the beginning may be truncated.
             Err(error) if error.error_len().is_none() => Encoding::Utf8,
             Err(_) => Encoding::Latin1,
         },
@@ -189,7 +189,7 @@ fn decode(bytes: &[u8], is_little_endian: bool) -> Result<Vec<u8>, TableError> {
     Ok(text)
 }
 
-/// The separator that a first line `sep=` names.
+/// Returns the separator given by a first line `sep=`.
 fn sep_line(text: &[u8], line_break: u8) -> Option<Separator> {
     let line = text.split(|&byte| byte == line_break).next()?;
     let line = line.strip_suffix(b"\r").unwrap_or(line);
@@ -226,7 +226,7 @@ mod tests {
     }
 
     #[test]
-    fn layouts_are_found_from_the_text() {
+    fn layouts_are_detected() {
         let cases = [
             ("1,2,3\n4,5,6\n", "separator comma, decimal point, no header, utf-8"),
             ("t,x\n1,2.5\n", "separator comma, decimal point, a header, utf-8"),
@@ -250,12 +250,12 @@ mod tests {
                 "a,b\r1,2\r3,4\r",
                 "separator comma, decimal point, a header, utf-8, lines end with CR",
             ),
-            // A missing value among numbers is no name.
+            // A missing value among numbers is not a name.
             (
                 "0.1,NA,3\n0.2,1,3\n",
                 "separator comma, decimal point, no header, utf-8",
             ),
-            // Texts next to numbers in every row.
+            // Text next to numbers in every row.
             ("A,1,2\nB,3,4\n", "separator comma, decimal point, no header, utf-8"),
             (
                 "\"time (s)\",\"x, mm\"\n1,2\n",
@@ -278,7 +278,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_said_is_not_searched_for() {
+    fn given_choices_override_detection() {
         let choice = DialectChoice {
             separator: Some(Separator::Comma),
             header: Some(true),
@@ -293,7 +293,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_and_no_text_are_no_tables() {
+    fn empty_and_binary_files_are_refused() {
         for text in ["", "\n\n", "\u{feff}", "sep=;\n"] {
             let error = detect(text.as_bytes(), true, &DialectChoice::default()).unwrap_err();
             assert!(matches!(error, TableError::Empty), "{text:?}: {error}");
@@ -301,7 +301,7 @@ mod tests {
         let error = detect(b"1,2\n\0\x01\x02\x03,\n", true, &DialectChoice::default()).unwrap_err();
         assert_eq!(
             error.to_string().split(';').next(),
-            Some("it is not text: line 2 holds a zero byte")
+            Some("it is not text: line 2 contains a zero byte")
         );
     }
 }

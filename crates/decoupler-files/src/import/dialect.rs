@@ -14,11 +14,11 @@ pub enum Separator {
     Comma,
     /// `;`
     Semicolon,
-    /// Tabulator.
+    /// Tab.
     Tab,
     /// `|`
     Bar,
-    /// Any number of spaces or tabulators.
+    /// Any number of spaces or tabs.
     Space,
 }
 
@@ -33,7 +33,7 @@ pub enum Decimal {
     Comma,
 }
 
-/// Encoding of a file of text.
+/// Encoding of a text file.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Encoding {
@@ -52,7 +52,7 @@ pub enum Encoding {
     Utf16Be,
 }
 
-/// Layout of a file of text, as found or as given.
+/// Layout of a text file, detected or given.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct Dialect {
     /// Encoding of the text.
@@ -61,11 +61,11 @@ pub struct Dialect {
     pub separator: Separator,
     /// Decimal separator.
     pub decimal: Decimal,
-    /// `true` if the first row has the names of the columns.
+    /// `true` if the first row contains the names of the columns.
     pub header: bool,
     /// `true` if every row ends with a separator after its last cell.
     pub trailing_separator: bool,
-    /// `true` if the first line is `sep=` and the separator.
+    /// `true` if the first line is `sep=` followed by the separator.
     pub sep_line: bool,
     /// Number of lines before the table, without the `sep=` line.
     pub skipped_lines: usize,
@@ -73,7 +73,7 @@ pub struct Dialect {
     pub carriage_returns: bool,
 }
 
-/// The user's word on a file's layout; the rest is found from its beginning.
+/// Layout given by the user; the rest is detected from the beginning of the file.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct DialectChoice {
@@ -86,7 +86,7 @@ pub struct DialectChoice {
     /// Decimal separator.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub decimal: Option<Decimal>,
-    /// `true` if the first row has the names of the columns.
+    /// `true` if the first row contains the names of the columns.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub header: Option<bool>,
     /// Number of lines before the table, without the `sep=` line.
@@ -94,7 +94,7 @@ pub struct DialectChoice {
     pub skip_lines: Option<usize>,
 }
 
-/// Error for a word that names no part of a layout.
+/// Error for a text that is not a valid choice.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 #[error("'{text}' is not a {what}: give {choices}")]
 pub struct DialectError {
@@ -225,7 +225,7 @@ impl fmt::Display for Dialect {
     }
 }
 
-/// UTF-8 text of a source in UTF-16, with its byte order mark. Unpaired surrogates become U+FFFD.
+/// Returns the text of a UTF-16 source as UTF-8, including its byte order mark. Unpaired surrogates become U+FFFD.
 pub(super) fn utf8_of_utf16<R: Read>(source: R, is_little_endian: bool) -> impl Read {
     let encoding = if is_little_endian { UTF_16LE } else { UTF_16BE };
     DecodeReaderBytesBuilder::new().encoding(Some(encoding)).build(source)
@@ -236,7 +236,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn text_of_both_byte_orders_is_decoded_across_blocks() {
+    fn both_byte_orders_are_decoded_across_blocks() {
         let text = format!("{}𝒳;°C\n", "ä1,5;".repeat(10_000));
         for is_little_endian in [true, false] {
             let to = if is_little_endian {
@@ -244,7 +244,7 @@ mod tests {
             } else {
                 u16::to_be_bytes
             };
-            // One byte more shifts the surrogates over the end of a block.
+            // An additional byte shifts the surrogates across the end of a block.
             let bytes: Vec<u8> = text.encode_utf16().flat_map(to).collect();
             let mut decoded = String::new();
             utf8_of_utf16(&bytes[..], is_little_endian)
@@ -255,11 +255,11 @@ mod tests {
     }
 
     #[test]
-    fn damage_becomes_replacement_characters() {
+    fn invalid_utf_16_becomes_replacement_characters() {
         let mut decoded = String::new();
         let bytes = [0x41, 0x00, 0x00, 0xd8, 0x42, 0x00, 0x00, 0xd8, 0x43];
         utf8_of_utf16(&bytes[..], true).read_to_string(&mut decoded).unwrap();
-        // What is cut off at the end is one defect.
+        // A truncated end becomes one replacement character.
         assert_eq!(decoded, "A\u{fffd}B\u{fffd}");
     }
 }

@@ -25,7 +25,7 @@ pub enum ImportError {
     File {
         /// The file.
         path: PathBuf,
-        /// Defect of its contents.
+        /// Error in its contents.
         source: TableError,
     },
     /// A column is not in the files.
@@ -33,18 +33,18 @@ pub enum ImportError {
     Unknown {
         /// Name given.
         name: String,
-        /// Names that are like it, or all names, in words.
+        /// Similar names, or all names, as a phrase.
         near: String,
     },
-    /// A name stands for several columns.
-    #[error("the name '{name}' stands for several columns: {candidates}; write one of them")]
+    /// A name is ambiguous.
+    #[error("the name '{name}' is ambiguous: it matches {candidates}; write one of them")]
     Ambiguous {
         /// Name given.
         name: String,
         /// Full names of the columns.
         candidates: String,
     },
-    /// The range of columns runs backwards, or over two files.
+    /// A range of columns is reversed, or spans two files.
     #[error(
         "'{0}' is not a range of columns: write FIRST..LAST, both in one file and in its order, for example c2..c16"
     )]
@@ -59,10 +59,10 @@ pub enum ImportError {
         /// Second meaning.
         other: &'static str,
     },
-    /// Nothing is an input, or nothing a target.
+    /// There is no input, or no target.
     #[error("no column is {0}; name at least one")]
     NoColumns(&'static str),
-    /// A cell of a column that is used is not a number.
+    /// A cell of a used column is not a number.
     #[error("'{}': line {line}, column {column} ('{name}'): '{text}' is not a finite number{others}; {}", .path.display(), Cure::CallMissing(.text.clone()))]
     NotANumber {
         /// The file.
@@ -75,7 +75,7 @@ pub enum ImportError {
         name: String,
         /// Text of the cell.
         text: String,
-        /// Number of further cells of this column that are no numbers, in words.
+        /// Number of further cells of this column that are not numbers, as a phrase.
         others: String,
     },
     /// The columns of a file are not the inputs of a network.
@@ -83,7 +83,7 @@ pub enum ImportError {
     Inputs {
         /// The file.
         path: PathBuf,
-        /// What is wrong with its columns.
+        /// Error in its columns.
         source: InputError,
     },
     /// A reading that a network needs is missing.
@@ -96,12 +96,12 @@ pub enum ImportError {
         /// Name of the column.
         name: String,
     },
-    /// A condition cannot be understood.
+    /// A condition cannot be parsed.
     #[error("the condition '{text}' is not understood: {reason}; write for example \"c4<145.1 and c5!=0\"")]
     Condition {
         /// The condition.
         text: String,
-        /// The part at fault.
+        /// Cause.
         reason: String,
     },
     /// Two files cannot be joined.
@@ -114,23 +114,23 @@ pub enum ImportError {
         /// Cure.
         cure: Cure,
     },
-    /// A file for the test is one of those that are trained on.
-    #[error("'{}' is trained on, so it cannot test: give another file for the test", .0.display())]
+    /// A test file is also used for training.
+    #[error("'{}' is trained on, so it cannot be a test file; give another one", .0.display())]
     TrainedOn(PathBuf),
     /// No row is left.
     #[error("none of the {rows} rows is left: {reasons}")]
     NoRows {
         /// Number of rows read.
         rows: usize,
-        /// Reasons for which rows were dropped, with their numbers.
+        /// Reasons for dropping rows, each with the number of rows.
         reasons: String,
     },
-    /// The column of row-wires does not hold numbers of row-wires.
+    /// The column of row-wires contains other values than numbers of row-wires.
     #[error("'{name}': {value} is not the number of a row-wire; give whole numbers from 1 to 10000")]
     RowWire {
         /// Full name of the column.
         name: String,
-        /// The first value at fault.
+        /// First invalid value.
         value: f64,
     },
     /// A file of positions cannot be used.
@@ -138,23 +138,23 @@ pub enum ImportError {
     Positions {
         /// The file.
         path: PathBuf,
-        /// Its defect.
+        /// Error in its contents.
         source: PositionsError,
     },
-    /// The samples do not make a set.
+    /// The samples are not a valid dataset.
     #[error(transparent)]
     Dataset(#[from] DatasetError),
-    /// The samples cannot be divided.
+    /// The samples cannot be split.
     #[error(transparent)]
     Division(#[from] DivisionError),
-    /// The caller ended the import.
+    /// The caller cancelled the import.
     #[error("the import was cancelled")]
     Cancelled,
 }
 
 impl ImportError {
-    /// The message with its cure in other words than the library's, which know no window and no arguments.
-    pub fn with_cure(&self, words: impl Fn(&Cure) -> String) -> String {
+    /// Returns the message with the cure in the caller's wording, for example with the names of fields or arguments.
+    pub fn with_cure(&self, phrase: impl Fn(&Cure) -> String) -> String {
         let text = self.to_string();
         let cure = match self {
             Self::NotANumber { text, .. } => Cure::CallMissing(text.clone()),
@@ -162,27 +162,27 @@ impl ImportError {
             _ => return text,
         };
         match text.strip_suffix(&cure.to_string()) {
-            Some(cause) => format!("{cause}{}", words(&cure)),
+            Some(cause) => format!("{cause}{}", phrase(&cure)),
             None => text,
         }
     }
 }
 
-/// Defect in the contents of a file. Lines and columns are counted from 1.
+/// Error in the contents of a file. Lines and columns are counted from 1.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum TableError {
-    /// The file could not be read to its end.
+    /// The file could not be read to the end.
     #[error("{}", system_cause(.0))]
     Io(#[from] io::Error),
-    /// The caller ended the reading.
+    /// The caller cancelled the import.
     #[error("the import was cancelled")]
     Cancelled,
-    /// There is nothing in the file.
+    /// The file is empty.
     #[error("it has no rows; choose a file with a table of numbers")]
     Empty,
-    /// The file holds other data than text.
-    #[error("it is not text: line {line} holds a zero byte; give {}", Format::NAMES)]
+    /// The file is not text.
+    #[error("it is not text: line {line} contains a zero byte; give {}", Format::NAMES)]
     Binary {
         /// Line of the first zero byte.
         line: u64,
@@ -190,15 +190,15 @@ pub enum TableError {
     /// No row ends within the limit.
     #[error("line {line}: no row ends within {} MiB; check its quotes and line breaks", .limit >> 20)]
     Endless {
-        /// Line on which the row begins.
+        /// Line on which the row starts.
         line: u64,
-        /// Largest length of a row in bytes.
+        /// Maximum length of a row in bytes.
         limit: usize,
     },
-    /// A quote opens and never closes.
-    #[error("line {line}: a quote opens here and never closes; close it, or remove it")]
+    /// A quote is not closed.
+    #[error("line {line}: the quote that opens here is never closed; close it, or remove it")]
     Quote {
-        /// Line on which the row begins.
+        /// Line on which the row starts.
         line: u64,
     },
     /// A row has too many cells.
@@ -206,19 +206,19 @@ pub enum TableError {
     Wide {
         /// Line of the row.
         line: u64,
-        /// Largest number of cells.
+        /// Maximum number of cells.
         limit: usize,
     },
     /// A row has more cells than there are columns.
-    #[error("line {line}: it has more cells than there are columns; correct it")]
+    #[error("line {line}: the row has more cells than there are columns; correct it")]
     Uneven {
         /// Line of the row.
         line: u64,
     },
-    /// More rows than a set may have.
-    #[error("it has more than {0} rows; take every second one, or a part")]
+    /// The file has too many rows.
+    #[error("it has more than {0} rows; use every second row, or a part of the file")]
     Long(usize),
-    /// A file of NumPy or MATLAB contradicts itself or has what is not read.
+    /// A NumPy or MATLAB file is invalid, or contains data of an unsupported type.
     #[error("{what}: {reason}")]
     Array {
         /// The array or part of the file.
@@ -237,22 +237,22 @@ impl TableError {
     }
 }
 
-/// What to do about an import that fails. [`ImportError::with_cure`](super::ImportError::with_cure) puts it in the words of a
-/// surface: fields, or arguments.
+/// Remedy for a failed import. [`ImportError::with_cure`](super::ImportError::with_cure) phrases it for the window (fields)
+/// or the terminal (arguments).
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Cure {
-    /// Correct a cell, or say that this text means missing.
+    /// Correct a cell, or declare this text a missing value.
     CallMissing(String),
-    /// Name the columns of the times in both files.
+    /// Name the time columns of both files.
     NameTimes,
-    /// Name the column of the times in the joined file.
+    /// Name the time column of the joined file.
     NameJoinedTime,
     /// Give a column one meaning.
     GiveOneMeaning,
-    /// Give the largest time between partners.
+    /// Give the maximum time difference between joined rows.
     GiveLimit,
-    /// Give as many joined files for the test as there are.
+    /// Give as many joined test files as there are joined files.
     GiveTestFiles,
 }
 
@@ -260,7 +260,7 @@ impl fmt::Display for Cure {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::CallMissing(text) => write!(f, "correct it, or say that \"{text}\" means missing"),
-            Self::NameTimes => f.write_str("name the columns of the times of both"),
+            Self::NameTimes => f.write_str("name the time columns of both"),
             Self::NameJoinedTime => f.write_str("name it"),
             Self::GiveOneMeaning => f.write_str("give the column one meaning"),
             Self::GiveLimit => f.write_str("give the limit"),

@@ -1,10 +1,10 @@
-//! Formats of recordings. A further format is a variant of [`Format`] here, and a module that reads its arrays.
+//! File formats of recordings. To add one, add a variant of [`Format`] here and a module that reads its arrays.
 
 use std::{fmt, fs::File, io::BufReader, path::Path};
 
 use super::{Decimal, Dialect, TableError, Watch, input_lines::Watched, matlab, numpy};
 
-/// Kind of a file.
+/// File format.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Format {
     /// Text in this layout.
@@ -17,21 +17,21 @@ pub enum Format {
     Matlab,
 }
 
-/// Reads the arrays of a file of this size, and names what is in it that is no array of numbers.
+/// Reads the arrays of a file of this size; returns them and the names of the items that are not arrays of numbers.
 type ReadArrays = fn(File, Option<u64>, Watch<'_>) -> Result<(Vec<Array>, Vec<String>), TableError>;
 
 impl Format {
-    /// All formats in words, for messages and help.
+    /// Names of all formats, for messages and help.
     pub const NAMES: &str = "CSV, .npy, .npz or .mat";
 
-    /// Usual extensions of the files, those of text first.
+    /// Usual file extensions, those of text files first.
     pub const EXTENSIONS: [&str; 7] = ["csv", "txt", "tsv", "dat", "npy", "npz", "mat"];
 
-    /// Number of bytes by which a format is recognised.
+    /// Number of bytes from which a format is recognised.
     pub(super) const BEGINNING: u64 = 10;
 
-    /// Returns the format of arrays that the file at `path` has, by its `beginning`, with the function that reads it;
-    /// `None` for text.
+    /// Returns the array format of the file at `path`, recognised by its `beginning`, with the function that reads it; `None`
+    /// for text.
     pub(super) fn of_arrays(path: &Path, beginning: &[u8]) -> Option<(Self, ReadArrays)> {
         let has_extension = |extension: &str| {
             path.extension()
@@ -70,7 +70,7 @@ impl fmt::Display for Format {
     }
 }
 
-/// Type of the numbers in a file of NumPy or MATLAB.
+/// Type of the numbers in a NumPy or MATLAB file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Element {
     F32,
@@ -85,7 +85,7 @@ pub(super) enum Element {
     U64,
 }
 
-/// Order of the bytes of a number.
+/// Byte order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Endian {
     Little,
@@ -103,7 +103,7 @@ impl Element {
         }
     }
 
-    /// Reads the numbers in `bytes`, of which no part is left over.
+    /// Reads the numbers in `bytes`, whose length must be a multiple of [`Self::size`].
     pub(super) fn read(self, bytes: &[u8], endian: Endian) -> Vec<f64> {
         macro_rules! numbers {
             ($type:ty) => {
@@ -146,7 +146,7 @@ pub(super) struct Array {
 }
 
 impl Array {
-    /// Divides `numbers` into columns.
+    /// Splits `numbers` into columns.
     pub(super) fn new(
         name: String,
         rows: usize,
@@ -173,28 +173,28 @@ impl Array {
     }
 }
 
-/// A cell as a number.
+/// Parsed cell.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Cell {
     /// A finite number.
     Number(f64),
     /// Empty, or "NaN".
     Missing,
-    /// Anything else, infinities included.
+    /// Anything else, including infinities.
     Text,
 }
 
-/// Longest number that is copied to the stack.
+/// Maximum length of a number that is copied to the stack.
 const LONGEST: usize = 64;
 
-/// Reads a cell without surrounding spaces; the number is the one nearest to the text.
+/// Parses a cell without surrounding spaces; the number is correctly rounded.
 pub(super) fn parse(cell: &[u8], decimal: Decimal) -> Cell {
     if cell.is_empty() {
         return Cell::Missing;
     }
     let number = match decimal {
         Decimal::Point => parse_point(cell),
-        // A point would be a separator of thousands, or a point after all.
+        // A point would be a thousands separator, or a decimal point after all.
         Decimal::Comma if cell.contains(&b'.') || cell.len() > LONGEST => None,
         Decimal::Comma => {
             let mut copy = [0; LONGEST];

@@ -24,10 +24,10 @@ use super::{
 };
 
 impl Recipe {
-    /// Reads the files, relative to `folder`, and makes the samples.
+    /// Imports the samples of the files, whose paths are relative to `folder`.
     ///
     /// # Errors
-    /// If a file cannot be read, a column is missing, a cell that is used is not a number, or no row is left; or `watch` breaks.
+    /// If a file cannot be read, a column is missing, a used cell is not a number, no row is left, or `watch` breaks.
     pub fn import(&self, folder: &Path, watch: Watch<'_>) -> Result<Recording, ImportError> {
         let stems = self.stems();
         let mut files = vec![self.read(folder, 0, &self.data, None, watch)?];
@@ -95,7 +95,7 @@ impl Recipe {
         })
     }
 
-    /// Names in front of the columns of the joined files.
+    /// Returns the name prefixed to the columns of each joined file.
     pub fn stems(&self) -> Vec<String> {
         let mut stems: Vec<String> = Vec::new();
         for joined in &self.join {
@@ -144,7 +144,7 @@ impl Recipe {
         Ok((path, table))
     }
 
-    /// Finds the partners in the joined file `number`; `None` if it is joined row by row.
+    /// Returns the matching rows of the joined file `number`; `None` if it is joined row by row.
     fn partners(
         &self,
         number: usize,
@@ -200,7 +200,7 @@ impl Recipe {
         if 10 * several > table.rows {
             let file = path.display();
             warnings.push(format!(
-                "{several} of {} rows of '{file}' are partners of several rows each; it is slower, so its values are stale by up to {limit}",
+                "{several} of {} rows of '{file}' are joined to several rows each; it is slower, so its values are stale by up to {limit}",
                 table.rows
             ));
         }
@@ -208,7 +208,7 @@ impl Recipe {
     }
 }
 
-/// Notes on the files themselves.
+/// Returns the notes on each file.
 fn notes(files: &[(PathBuf, Table)]) -> Vec<String> {
     let mut notes = Vec::new();
     for (path, table) in files {
@@ -217,7 +217,7 @@ fn notes(files: &[(PathBuf, Table)]) -> Vec<String> {
         for (excess, what) in [
             (
                 table.too_short,
-                "end before the last column; the cells they lack are missing",
+                "end before the last column; their other cells are missing",
             ),
             (
                 table.too_long,
@@ -235,10 +235,10 @@ fn notes(files: &[(PathBuf, Table)]) -> Vec<String> {
     notes
 }
 
-/// Reads the table in the file at `path`: arrays by the beginning of the file, all others as text.
+/// Reads the table in the file at `path`; a file that does not start like a known array format is read as text.
 ///
 /// # Errors
-/// If the file cannot be read or holds no table, or `watch` breaks.
+/// If the file cannot be read or does not contain a table, or `watch` breaks.
 pub fn read_table(path: &Path, choice: DialectChoice, watch: Watch<'_>) -> Result<Table, ImportError> {
     let reading = Reading {
         choice,
@@ -277,7 +277,7 @@ fn read_file(
 ) -> Result<Table, TableError> {
     let mut start = Vec::new();
     if size.is_none() {
-        // A pipe cannot be looked into and read again.
+        // A pipe can be read only once.
         return csv_table::read(path, Watched::new(file, None, watch), reading);
     }
     (&file).take(Format::BEGINNING).read_to_end(&mut start)?;
@@ -291,11 +291,11 @@ fn read_file(
     }
 }
 
-/// Measured samples with the meaning of their columns.
+/// Measured samples with a description of their channels.
 #[derive(Clone, Debug)]
 pub struct Recording {
-    /// Samples in the order of their times, or of the file; readings and targets in the order of [`Self::inputs`] and
-    /// [`Self::targets`]. Without a column of groups each sample is a group of its own.
+    /// Samples sorted by time, or in the order of the file; readings and targets in the order of [`Self::inputs`] and
+    /// [`Self::targets`]. Without a group column, each sample is a group of its own.
     pub set: Dataset,
     /// Names and units of the readings.
     pub inputs: Vec<Channel>,
@@ -305,13 +305,13 @@ pub struct Recording {
     pub positions: Vec<TargetPosition>,
     /// Line of each sample in the first file, from 1.
     pub lines: Vec<u64>,
-    /// Time of each sample, if there is a column of times.
+    /// Time of each sample, if there is a time column.
     pub times: Option<Vec<f64>>,
-    /// `true` if the samples are grouped by a column.
+    /// `true` if there is a group column.
     pub has_groups: bool,
-    /// Number of rows in the file, dropped ones included.
+    /// Number of rows in the file, including dropped rows.
     pub rows: usize,
-    /// Rows that are no samples, by reason.
+    /// Dropped rows, by reason.
     pub dropped: Vec<Dropped>,
     /// The files read: the first, then those joined.
     pub files: Vec<FileReport>,
@@ -319,23 +319,23 @@ pub struct Recording {
     pub warnings: Vec<String>,
 }
 
-/// Rows that are no samples for one reason.
+/// Rows dropped for one reason.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Dropped {
     /// The reason.
     pub reason: String,
     /// Number of rows.
     pub rows: usize,
-    /// Line of the first, from 1.
+    /// Line of the first of them, from 1.
     pub first_line: u64,
 }
 
-/// A file as it was read.
+/// Summary of a file that was read.
 #[derive(Clone, Debug)]
 pub struct FileReport {
     /// The file.
     pub path: PathBuf,
-    /// Kind of the file, and its layout.
+    /// Format and layout of the file.
     pub format: Format,
     /// Number of rows.
     pub rows: usize,
@@ -347,16 +347,16 @@ pub struct FileReport {
     pub join: Option<JoinReport>,
 }
 
-/// Outcome of a join by time.
+/// Result of a join by time.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct JoinReport {
-    /// Largest time between partners, in the unit of the times.
+    /// Maximum time difference between joined rows, in the unit of the times.
     pub limit: f64,
-    /// Number of rows without a partner in the joined file.
+    /// Number of rows without a match in the joined file.
     pub without_partner: usize,
-    /// Number of rows of the joined file that are no row's partner.
+    /// Number of rows of the joined file that match no row.
     pub unused: usize,
-    /// Median of the time of a row minus that of its partner.
+    /// Median of the time of a row minus the time of its match.
     pub median_offset: Option<f64>,
 }
 

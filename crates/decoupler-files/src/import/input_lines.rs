@@ -11,8 +11,8 @@ use thiserror::Error;
 
 use super::{InputColumns, InputError, TableError};
 
-/// Parser of lines of CSV that come one by one and hold the inputs of a network: under the names of a header or, without
-/// one, in their order, after the number of the row-wire where each row-wire has a network.
+/// Parser of a stream of CSV lines with the inputs of a network. Columns are identified by a header or, without one, are
+/// the inputs in their order, after the number of the row-wire if each row-wire has a network.
 #[derive(Debug)]
 pub struct InputLines {
     inputs: Vec<Channel>,
@@ -21,21 +21,21 @@ pub struct InputLines {
     /// Row-wires of the networks, from 0, if each has one.
     row_wires: Option<Vec<usize>>,
     fields: CsvFields,
-    /// Columns of the lines, by their header or else by the first line that was parsed.
+    /// Columns of the lines, from the header or the first parsed line.
     columns: Option<InputColumns>,
-    /// Cells of the line as numbers, NaN where they are none.
+    /// Cells of the line as numbers; NaN if they are not numbers.
     cells: Vec<f64>,
     readings: Vec<f64>,
 }
 
-/// A line that was parsed.
+/// Parsed line.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum InputLine<'a> {
-    /// It has the names of the columns, or nothing.
+    /// Header, or an empty line.
     NoReadings,
-    /// It has the inputs of the network.
+    /// Inputs of the network.
     Readings {
-        /// Index of the network of its row-wire; 0 where there is one network.
+        /// Index of the network of its row-wire; 0 if there is one network.
         row_index: usize,
         /// Readings in the order of the inputs.
         readings: &'a [f64],
@@ -49,10 +49,10 @@ pub enum InputLineError {
     /// A header without the inputs of the network: no line after it can be read.
     #[error(transparent)]
     Header(InputError),
-    /// Another number of cells than inputs in the first line without a header.
+    /// Without a header, the first line has a different number of cells than there are inputs.
     #[error(transparent)]
     Unnamed(InputError),
-    /// Another number of cells than before.
+    /// The number of cells differs from that of earlier lines.
     #[error("{found} cells where {expected} are needed")]
     Cells {
         /// Number of cells.
@@ -76,8 +76,8 @@ impl InputLineError {
 }
 
 impl InputLines {
-    /// A parser of `inputs`. `row_wire` names the column of row-wires, and `row_wires` are those of the networks, from 0, if
-    /// each has one.
+    /// Returns a parser of `inputs`. `row_wire` is the name of the row-wire column; `row_wires` are the row-wires of the
+    /// networks, from 0, if each row-wire has one.
     pub fn new(inputs: Vec<Channel>, row_wire: Option<String>, row_wires: Option<Vec<usize>>) -> Self {
         Self {
             inputs,
@@ -105,7 +105,7 @@ impl InputLines {
         self.cells
             .extend(self.fields.iter().map(|field| number(field).unwrap_or(f64::NAN)));
         let row_wire = self.row_wire.as_deref();
-        // Only a line that is not made of numbers, or the first, may be a header: the others need no strings.
+        // Only the first line, or a line with cells that are not numbers, may be a header: other lines need no strings.
         if self.columns.is_none() || self.cells.iter().any(|value| value.is_nan()) {
             let cells: Vec<String> = self
                 .fields
@@ -160,10 +160,10 @@ impl InputLines {
     }
 }
 
-/// Number of bytes between two reports.
+/// Number of bytes between two progress reports.
 const INTERVAL: u64 = 1 << 20;
 
-/// Progress of the reading of one file.
+/// Progress of reading one file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Progress {
     /// Number of bytes read.
@@ -172,10 +172,10 @@ pub struct Progress {
     pub of: Option<u64>,
 }
 
-/// Called every megabyte; [`ControlFlow::Break`] cancels the import.
+/// Callback for every megabyte read; [`ControlFlow::Break`] cancels the import.
 pub type Watch<'a> = &'a mut dyn FnMut(Progress) -> ControlFlow<()>;
 
-/// A source that reports how far it has been read.
+/// Source that reports the number of bytes read.
 pub(super) struct Watched<'a, 'w, R> {
     source: R,
     progress: Progress,
@@ -212,12 +212,12 @@ impl<R: Read> Read for Watched<'_, '_, R> {
     }
 }
 
-/// Carries a cancellation through readers that know errors of input only.
+/// Cancellation, passed as an I/O error through readers that support no other.
 #[derive(Debug, thiserror::Error)]
 #[error("cancelled")]
 struct Cancelled;
 
-/// The error as the import reports it.
+/// Returns the error as reported by the import.
 pub(super) fn table_error(error: io::Error) -> TableError {
     if error.get_ref().is_some_and(|inner| inner.is::<Cancelled>()) {
         TableError::Cancelled
@@ -246,7 +246,7 @@ mod tests {
     }
 
     #[test]
-    fn inputs_are_found_by_their_names_or_in_their_order() {
+    fn inputs_are_found_by_name_or_by_order() {
         let mut lines = InputLines::new(channels(&["u1", "u2"]), None, None);
         assert_eq!(readings(&mut lines, 1, "time,u2,u1"), None);
         assert_eq!(readings(&mut lines, 2, "0.1,2,1"), Some((0, vec![1.0, 2.0])));
@@ -263,7 +263,7 @@ mod tests {
     }
 
     #[test]
-    fn the_row_wire_chooses_the_network() {
+    fn the_row_wire_selects_the_network() {
         let mut lines = InputLines::new(channels(&["u"]), Some("row".to_owned()), Some(vec![0, 2]));
         assert_eq!(readings(&mut lines, 1, "row,u"), None);
         assert_eq!(readings(&mut lines, 2, "3,5"), Some((1, vec![5.0])));

@@ -6,23 +6,23 @@ use thiserror::Error;
 
 use super::{Column, ImportError, Recipe, Table, TableError, Watch, csv_table::named, table::name_and_unit};
 
-/// Readings of a file for a network that was trained on others of its kind.
+/// Inputs of a network, read from a file.
 #[derive(Clone, Debug)]
 pub struct InputTable {
     /// Samples × inputs.
     pub readings: Array2<f64>,
-    /// Row-wire of each sample, from 0, if the recipe names a column of them and the file has it.
+    /// Row-wire of each sample, from 0, if the recipe names a row-wire column and the file has it.
     pub row_wires: Option<Vec<usize>>,
     /// Line of each sample, from 1.
     pub lines: Vec<u64>,
 }
 
-/// Columns of a table that hold the inputs of a network.
+/// Columns of a table that contain the inputs of a network.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct InputColumns {
     /// Column index of each input, in the order of the network.
     pub inputs: Vec<usize>,
-    /// Column index of the number of the row-wire, if there is such a column.
+    /// Index of the row-wire column, if there is one.
     pub row_wire: Option<usize>,
     /// Number of columns of the table.
     pub width: usize,
@@ -37,10 +37,10 @@ pub enum InputError {
     Missing {
         /// Name of the input.
         name: String,
-        /// Names that are similar, or all names, in words.
+        /// Similar names, or all names, as a phrase.
         near: String,
     },
-    /// A column has another unit than the input.
+    /// The unit of a column differs from that of the input.
     #[error("column '{name}' is in {found}, and the network was trained on {expected}; convert it")]
     Unit {
         /// Name of the input.
@@ -50,7 +50,7 @@ pub enum InputError {
         /// Unit of the input.
         expected: String,
     },
-    /// There are no names, and the number of columns is another one.
+    /// There is no header, and the number of columns is wrong.
     #[error("{found} cells where {expected} are needed; give the inputs of the network in their order, or a header")]
     Count {
         /// Number of columns.
@@ -61,20 +61,20 @@ pub enum InputError {
 }
 
 impl InputColumns {
-    /// Finds the inputs, and the column called `row_wire`, under the cells of a header.
+    /// Finds the inputs and the column `row_wire` in the cells of a header.
     ///
     /// # Errors
-    /// An input that no column has the name of, or that has another unit.
+    /// If an input has no column of its name, or a column with a different unit.
     pub fn of_header(header: &[String], inputs: &[Channel], row_wire: Option<&str>) -> Result<Self, InputError> {
         Self::find(&named(header, header.len()), inputs, row_wire)
     }
 
-    /// Finds the inputs among `width` columns without names. They are called c1, c2, … as in a recording without a header;
-    /// if the inputs have other names, the columns are the inputs in their order, after the number of the row-wire if
+    /// Finds the inputs among `width` columns without names, which are called c1, c2, … as in a recording without a header. If
+    /// the inputs have other names, the columns are the inputs in their order, after the number of the row-wire if
     /// `has_row_wire`.
     ///
     /// # Errors
-    /// Another number of columns.
+    /// If the number of columns is wrong.
     pub fn unnamed(
         width: usize,
         inputs: &[Channel],
@@ -98,8 +98,8 @@ impl InputColumns {
         })
     }
 
-    /// Returns `true` for cells that are names: of all inputs, or of some among other texts, or texts only and as many as
-    /// there are inputs. A single text is a name in the first line only: elsewhere it may be garbage.
+    /// Returns `true` if the cells are a header: the names of all inputs, the names of some inputs among other texts, or only
+    /// texts, as many as there are inputs. A single text is a header in the first line only: elsewhere it may be garbage.
     pub fn is_header(cells: &[String], inputs: &[Channel], is_first_line: bool) -> bool {
         let is_name = |cell: &String| inputs.iter().any(|input| input.name == name_and_unit(cell).0);
         let is_text = |cell: &&String| !cell.trim().is_empty() && cell.trim().parse::<f64>().is_err();
@@ -145,11 +145,11 @@ impl InputColumns {
 }
 
 impl Recipe {
-    /// Reads the inputs from the file at `path`: columns of their names or, without a header, as many columns as there are
-    /// inputs, after the number of the row-wire if `has_row_wire`.
+    /// Reads the inputs from the file at `path`: the columns with their names or, without a header, as many columns as there
+    /// are inputs, after the number of the row-wire if `has_row_wire`.
     ///
     /// # Errors
-    /// If the file cannot be read, lacks a column or has it in another unit, or a cell is missing or no number.
+    /// If the file cannot be read, a column is missing or has a different unit, or a cell is missing or not a number.
     pub fn read_inputs(
         &self,
         path: &Path,
@@ -218,7 +218,7 @@ impl Recipe {
     }
 }
 
-/// A column of one of the files of a recording.
+/// Column of one of the files of a recording.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(super) struct ColumnId {
     /// Number of the file: 0, or the number of the joined file from 1.
@@ -227,22 +227,22 @@ pub(super) struct ColumnId {
     pub(super) column: usize,
 }
 
-/// Full names of all columns: those of a joined file have its stem in front.
+/// Full names of all columns; the columns of a joined file are prefixed with its stem.
 pub(super) struct Names {
     names: Vec<(String, ColumnId)>,
 }
 
-/// Number of names from which only those that are like the name given are listed.
+/// Number of names above which a message lists only names similar to the one given.
 const FEW: usize = 24;
 
 impl Names {
-    /// Names the columns of the files; `stems` are those of the joined ones.
+    /// Names the columns of the files; `stems` are the stems of the joined files.
     pub(super) fn of(files: &[&Table], stems: &[String]) -> Self {
         let columns: Vec<&[Column]> = files.iter().map(|table| table.columns.as_slice()).collect();
         Self::of_columns(&columns, stems)
     }
 
-    /// Names the columns of each file; `stems` are those of the joined files.
+    /// Names the columns of each file; `stems` are the stems of the joined files.
     pub(super) fn of_columns(files: &[&[Column]], stems: &[String]) -> Self {
         let mut names = Vec::new();
         for (file, columns) in files.iter().enumerate() {
@@ -257,13 +257,13 @@ impl Names {
         Self { names }
     }
 
-    /// Full name of a column.
+    /// Returns the full name of a column.
     pub(super) fn name(&self, id: ColumnId) -> &str {
         let found = self.names.iter().find(|(_, other)| *other == id);
         found.map_or("", |(name, _)| name)
     }
 
-    /// Finds a column by its full name, with or without the unit that the header gives.
+    /// Finds a column by its full name, with or without the unit given in the header.
     pub(super) fn find(&self, given: &str) -> Result<ColumnId, ImportError> {
         let name = &clean_name(given.trim());
         let bare = super::table::name_and_unit(name).0;
@@ -292,11 +292,11 @@ impl Names {
         }
     }
 
-    /// Finds the columns of names and ranges such as `c2..c16`.
+    /// Returns the columns given by names and ranges such as `c2..c16`.
     pub(super) fn find_all(&self, given: &[String]) -> Result<Vec<ColumnId>, ImportError> {
         let mut all = Vec::new();
         for name in given {
-            // A header may have two points in its name.
+            // A name may contain two points.
             match (self.find(name), name.split_once("..")) {
                 (Ok(id), _) => all.push(id),
                 (Err(error), None) => return Err(error),
@@ -308,7 +308,7 @@ impl Names {
 
     fn range(&self, given: &str, first: &str, last: &str) -> Result<Vec<ColumnId>, ImportError> {
         let first_id = self.find(first)?;
-        // `states.c2..c4` is shorter than `states.c2..states.c4`.
+        // `states.c2..c4` is short for `states.c2..states.c4`.
         let prefix = first
             .trim()
             .rsplit_once('.')
@@ -327,7 +327,7 @@ impl Names {
             .collect())
     }
 
-    /// Says which columns there are, or which names are like `name`.
+    /// Lists the columns, or the names similar to `name`.
     fn near(&self, name: &str) -> String {
         if self.names.len() <= FEW {
             let all: Vec<&str> = self.names.iter().map(|(name, _)| name.as_str()).collect();
@@ -348,7 +348,7 @@ impl Names {
     }
 }
 
-/// Number of letters to be inserted, removed or replaced to make one name of the other, whatever their case.
+/// Edit distance of two names, ignoring case: the number of letters to be inserted, removed or replaced.
 fn distance(one: &str, other: &str) -> usize {
     let beginning = |text: &str| text.chars().take(64).collect::<String>().to_lowercase();
     strsim::levenshtein(&beginning(one), &beginning(other))
@@ -359,7 +359,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_distance_of_names_counts_changed_letters() {
+    fn the_edit_distance_ignores_case() {
         for (one, other, expected) in [
             ("force", "force", 0),
             ("force", "Forec", 2),

@@ -14,23 +14,23 @@ use super::{
 
 /// Number of bars of a histogram.
 const BARS: usize = 16;
-/// A gap is an interval that is this many times the median.
+/// Length of an interval, as a multiple of the median, above which it is a gap.
 const GAP: f64 = 5.0;
 
-/// A file column by column, to choose from.
+/// Summary of the columns of a file.
 #[derive(Clone, Debug, Serialize)]
 pub struct Inspection {
     /// Number of rows.
     pub rows: usize,
     /// Columns.
     pub columns: Vec<ColumnSummary>,
-    /// Intervals of the column of times, if there is one.
+    /// Intervals of the time column, if there is one.
     pub time: Option<TimeSummary>,
     /// Warnings for the user.
     pub warnings: Vec<String>,
 }
 
-/// A column in numbers.
+/// Summary of a column.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ColumnSummary {
     /// Name.
@@ -43,17 +43,17 @@ pub struct ColumnSummary {
     pub missing: usize,
     /// Number of cells that are neither numbers nor missing.
     pub texts: usize,
-    /// Line and text of the first cell that is neither a number nor missing.
+    /// Line and text of the first such cell.
     pub first_text: Option<(u64, String)>,
-    /// Least number.
+    /// Smallest number.
     pub min: Option<f64>,
     /// Largest number.
     pub max: Option<f64>,
-    /// `true` if all numbers are the same.
+    /// `true` if all numbers are equal.
     pub is_constant: bool,
     /// Name of an earlier column with the same cells.
     pub duplicate_of: Option<String>,
-    /// Number of cells in each part of the range, from the least to the largest number.
+    /// Histogram: number of cells in each bin, from the smallest to the largest number.
     pub histogram: Vec<usize>,
 }
 
@@ -61,22 +61,22 @@ pub struct ColumnSummary {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum ColumnKind {
-    /// Numbers of which some are not whole.
+    /// Numbers, not all of them whole.
     Number,
     /// Whole numbers.
     Integer,
-    /// Mostly texts.
+    /// Mostly text.
     Text,
-    /// Nothing.
+    /// No values.
     Empty,
 }
 
-/// Intervals of a column of times.
+/// Intervals of a time column.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct TimeSummary {
     /// Name of the column.
     pub column: String,
-    /// `true` if no one said that the column is the time.
+    /// `true` if the column was guessed to be the time.
     pub is_guessed: bool,
     /// Median interval, in the unit of the column.
     pub median_interval: Option<f64>,
@@ -84,15 +84,15 @@ pub struct TimeSummary {
     pub gaps: usize,
     /// Longest interval.
     pub longest: Option<f64>,
-    /// Line after which the longest interval is.
+    /// Line before the longest interval.
     pub longest_after_line: Option<u64>,
-    /// Number of times that are before the time on the line above.
+    /// Number of times that are earlier than the time on the line above.
     pub backwards: usize,
 }
 
 impl Inspection {
-    /// Reads the file at `path` and looks at each column; `time` is the column of times, else a first column that always grows
-    /// is taken for it.
+    /// Reads the file at `path` and summarises each column. `time` is the time column; if absent, a first column that always
+    /// increases is assumed to be the time.
     ///
     /// # Errors
     /// As [`read_table`], or if there is no column `time`.
@@ -106,7 +106,7 @@ impl Inspection {
         Ok((Self::of(&table, time)?, table))
     }
 
-    /// Looks at each column of `table`; see [`Self::read`].
+    /// Summarises each column of `table`; see [`Self::read`].
     pub(super) fn of(table: &Table, time: Option<&str>) -> Result<Self, ImportError> {
         let mut columns: Vec<ColumnSummary> = table.columns.iter().map(ColumnSummary::of).collect();
         name_duplicates(table, &mut columns);
@@ -181,14 +181,14 @@ fn histogram(numbers: impl Iterator<Item = f64>, min: f64, max: f64) -> Vec<usiz
     }
     let mut bars = vec![0; BARS];
     for number in numbers {
-        // Halves, since the range of the largest numbers is infinite.
+        // Halved, because the range of the largest numbers would overflow.
         let share = (number / 2.0 - min / 2.0) / (max / 2.0 - min / 2.0);
         bars[((share * BARS as f64) as usize).min(BARS - 1)] += 1;
     }
     bars
 }
 
-/// Names the columns that have the same cells as an earlier one.
+/// Marks the columns that have the same cells as an earlier one.
 fn name_duplicates(table: &Table, columns: &mut [ColumnSummary]) {
     let mut known: HashMap<u64, Vec<usize>> = HashMap::new();
     for index in 0..columns.len() {
@@ -217,7 +217,7 @@ fn name_duplicates(table: &Table, columns: &mut [ColumnSummary]) {
     }
 }
 
-/// The first column, if it always grows.
+/// Returns the first column if it always increases.
 fn guess_time(table: &Table, columns: &[ColumnSummary]) -> Option<usize> {
     let by_name = columns.iter().position(|column| {
         let name = column.name.to_lowercase();
@@ -254,23 +254,23 @@ impl TimeSummary {
     }
 }
 
-/// A file of a recipe, looked at column by column.
+/// File of a recipe with a summary of its columns.
 #[derive(Clone, Debug)]
 pub struct InspectedFile {
     /// The file, as the recipe names it.
     pub path: PathBuf,
-    /// Name in front of its columns; `None` for the first file.
+    /// Prefix of the names of its columns; `None` for the first file.
     pub stem: Option<String>,
-    /// Kind of the file, and its layout.
+    /// Format and layout of the file.
     pub format: Format,
-    /// Its columns in numbers. Cells that mean missing by the recipe count as missing.
+    /// Summary of its columns. Markers of missing values in the recipe count as missing.
     pub inspection: Inspection,
-    /// Meaning of each column by the recipe.
+    /// Meaning of each column according to the recipe.
     pub meanings: Vec<Meaning>,
 }
 
 impl InspectedFile {
-    /// Full name of a column: that of a joined file has the stem in front.
+    /// Returns the full name of a column; a column of a joined file is prefixed with the stem.
     pub fn full_name(&self, column: usize) -> String {
         let name = &self.inspection.columns[column].name;
         match &self.stem {
@@ -281,12 +281,12 @@ impl InspectedFile {
 }
 
 impl Recipe {
-    /// Reads the files, relative to `folder`, and looks at each column; the recipe need not be complete.
+    /// Reads the files, whose paths are relative to `folder`, and summarises each column; the recipe need not be complete.
     ///
     /// # Errors
-    /// If a file cannot be read, or the recipe names a column that is not there; or `watch` breaks.
+    /// If a file cannot be read, the recipe names a column that does not exist, or `watch` breaks.
     pub fn inspect(&self, folder: &Path, watch: Watch<'_>) -> Result<Vec<InspectedFile>, ImportError> {
-        // Labels of groups are looked at as any other cells.
+        // Group labels are summarised like any other cells.
         let plain = Self {
             group: None,
             ..self.clone()
@@ -309,7 +309,7 @@ impl Recipe {
                 inspection: Inspection::of(&table, None)?,
                 meanings: vec![Meaning::Unused; table.columns.len()],
             });
-            // Their names are all that is needed from here on.
+            // Only their names are needed from here on.
             for column in &mut table.columns {
                 column.cells = Default::default();
             }
@@ -330,7 +330,7 @@ impl Recipe {
         Ok(inspected)
     }
 
-    /// Columns with the meanings that the recipe gives them; times of joined files excepted.
+    /// Returns the columns with their meanings in the recipe, except the times of joined files.
     fn meant(&self, names: &Names) -> Result<Vec<(ColumnId, Meaning)>, ImportError> {
         let mut meant = Vec::new();
         for (one, meaning) in [

@@ -2,18 +2,18 @@ use ndarray::Array2;
 
 use super::{Table, inputs::ColumnId, table::Cells};
 
-/// Partners in a joined recording.
+/// Rows of a joined recording that match the rows of the first.
 pub(super) struct Partners {
-    /// Row of the joined file for each row; `None` if none is near enough.
+    /// Row of the joined file for each row; `None` if none is within the limit.
     pub(super) rows: Vec<Option<u32>>,
-    /// Largest time between partners.
+    /// Maximum time difference between joined rows.
     pub(super) limit: f64,
-    /// Median of the time of the row minus that of its partner.
+    /// Median of the time of a row minus the time of its match.
     pub(super) median_offset: Option<f64>,
 }
 
-/// Finds for each of `times` the nearest of `joined`, if it is within `limit`; of two as near the earlier. Times may be in any
-/// order, and NaN where they are missing.
+/// Finds the nearest of `joined` within `limit` for each of `times`; of two equally near ones, the earlier. Times may be in
+/// any order; NaN if missing.
 pub(super) fn nearest(times: &[f64], joined: &[f64], limit: f64) -> Partners {
     let mut order: Vec<u32> = (0..joined.len() as u32)
         .filter(|&row| !joined[row as usize].is_nan())
@@ -24,7 +24,7 @@ pub(super) fn nearest(times: &[f64], joined: &[f64], limit: f64) -> Partners {
     let rows = times
         .iter()
         .map(|&time| {
-            // Not the first that is not before: of equal times the first row is taken.
+            // Of equal times, the first row is the match.
             let after = order.partition_point(|&row| joined[row as usize] < time);
             let before = after
                 .checked_sub(1)
@@ -35,7 +35,7 @@ pub(super) fn nearest(times: &[f64], joined: &[f64], limit: f64) -> Partners {
                 .into_iter()
                 .flatten()
                 .min_by(|one, other| gap(one).total_cmp(&gap(other)))?;
-            // A missing time is near nothing.
+            // A missing time has no match.
             (gap(&nearest) <= limit).then(|| {
                 offsets.push(time - of(nearest));
                 order[nearest]
@@ -49,7 +49,7 @@ pub(super) fn nearest(times: &[f64], joined: &[f64], limit: f64) -> Partners {
     }
 }
 
-/// Median of the intervals between the times in ascending order; intervals of zero do not count.
+/// Returns the median of the intervals between the sorted times, ignoring intervals of zero.
 pub(super) fn median_interval(times: &[f64]) -> Option<f64> {
     let mut sorted: Vec<f64> = times.iter().copied().filter(|time| !time.is_nan()).collect();
     sorted.sort_by(f64::total_cmp);
@@ -69,13 +69,13 @@ fn median(values: &mut [f64]) -> Option<f64> {
     Some(*values.select_nth_unstable_by(middle, f64::total_cmp).1)
 }
 
-/// Number of rows that are moved at once.
+/// Number of rows moved at once.
 const BLOCK: usize = 1 << 14;
 
-/// Rows of a recording, whose columns are given up as they are moved.
+/// Rows of a recording; their columns are freed as they are moved.
 pub(super) struct Source<'a> {
     pub(super) tables: &'a mut [Table],
-    /// Partners in each joined file; `None` where rows are joined row by row.
+    /// Matching rows of each joined file; `None` if it is joined row by row.
     pub(super) partners: &'a [Option<Vec<Option<u32>>>],
     /// Rows of the first file that are samples.
     pub(super) rows: &'a [usize],
@@ -83,8 +83,8 @@ pub(super) struct Source<'a> {
 
 /// Moves columns into an array of samples × columns; those in `kept` are needed later.
 ///
-/// Works from the last row to the first and shortens the columns on the way, so that the numbers are not in memory
-/// twice.
+/// Works from the last row to the first and shortens the columns on the way, to avoid a second copy of the numbers in
+/// memory.
 pub(super) fn gather(source: &mut Source<'_>, columns: &[ColumnId], kept: &[ColumnId]) -> Array2<f64> {
     for (file, table) in source.tables.iter_mut().enumerate() {
         for (index, column) in table.columns.iter_mut().enumerate() {
@@ -131,10 +131,10 @@ mod tests {
     use super::*;
 
     #[test]
-    fn partners_are_those_of_a_full_search() {
+    fn matches_equal_those_of_an_exhaustive_search() {
         let mut rng = ChaCha8Rng::seed_from_u64(0);
         for _ in 0..200 {
-            // Few values, so that times are equal and as far from two others.
+            // Few distinct values, so that some times are equal and some are equally far from two others.
             let mut draw = |count: usize| -> Vec<f64> {
                 let missing_or = |time: i32| if time == 0 { f64::NAN } else { f64::from(time) };
                 (0..count).map(|_| missing_or(rng.random_range(0..30))).collect()

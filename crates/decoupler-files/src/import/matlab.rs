@@ -1,6 +1,6 @@
 //! MAT-files of level 5, which MATLAB writes with `save` as `-v6` and `-v7`:
-//! <https://www.mathworks.com/help/pdf_doc/matlab/matfile_format.pdf>. Numeric and logical arrays are read; what else is in the file is
-//! named. Of the crates that read them, none names what it skips or bounds what a damaged length allocates.
+//! <https://www.mathworks.com/help/pdf_doc/matlab/matfile_format.pdf>. Numeric and logical arrays are read; other variables are
+//! reported. No existing crate reports the variables it skips and limits the allocation for a corrupt length.
 
 use std::io::Read;
 
@@ -12,7 +12,7 @@ use super::{
     input_lines::table_error,
 };
 
-/// Number of bytes that are read at once, so that a length that lies costs no memory.
+/// Number of bytes read at once, so that a corrupt length allocates little memory.
 const BLOCK: usize = 1 << 20;
 const COMPRESSED: u32 = 15;
 const MATRIX: u32 = 14;
@@ -21,11 +21,11 @@ const MATRIX: u32 = 14;
 struct Tag {
     kind: u32,
     size: usize,
-    /// Data of an element that fits into its tag.
+    /// Data of a small element, stored in its tag.
     small: Option<[u8; 4]>,
 }
 
-/// Reads the numeric arrays of a file, and says which variables are none.
+/// Reads the numeric arrays of a file; returns them and the variables left out.
 pub(super) fn read(mut source: impl Read) -> Result<(Vec<Array>, Vec<String>), TableError> {
     let mut header = [0; 128];
     if !fill(&mut source, &mut header)? {
@@ -41,7 +41,7 @@ pub(super) fn read(mut source: impl Read) -> Result<(Vec<Array>, Vec<String>), T
         b"MI" => Endian::Big,
         _ => {
             return Err(wrong(
-                "it is no MAT-file of versions 5 to 7; save it with the option -v7",
+                "it is not a MAT-file of version 5 to 7; save it with the option -v7",
             ));
         }
     };
@@ -98,7 +98,7 @@ fn variable(
         .collect();
     let flags = flags.first().copied().unwrap_or(0.0) as u32;
     let mut leave_out = |what: &str| {
-        // MATLAB keeps notes of its own under no name.
+        // MATLAB stores internal data in variables without a name.
         if !name.is_empty() {
             left_out.push(format!("{name} is {what}"));
         }
@@ -145,7 +145,7 @@ fn variable(
         return Err(TableError::array(name, reason));
     }
     let numbers = element.read(&bytes, endian);
-    // A row vector is a column of a table.
+    // A row vector becomes a column of the table.
     let (rows, width) = if rows == 1 { (width, 1) } else { (rows, width) };
     arrays.push(Array::new(name, rows, width, numbers, true)?);
     Ok(())
@@ -188,7 +188,7 @@ impl Tag {
         let kind = from(first);
         let small_size = (kind >> 16) as usize;
         if small_size > 4 {
-            return Err(wrong("an element has an impossible length; copy it again"));
+            return Err(wrong("an element has an invalid length; copy it again"));
         }
         Ok(Some(if small_size > 0 {
             Self {
@@ -228,11 +228,11 @@ fn drain(source: &mut impl Read) -> Result<(), TableError> {
     Ok(())
 }
 
-/// Errors of decompression name no file of the system.
+/// Converts a decompression error; other I/O errors are passed on.
 fn damage(error: std::io::Error) -> TableError {
     match error.kind() {
         std::io::ErrorKind::InvalidInput | std::io::ErrorKind::InvalidData => {
-            wrong("its compressed data are damaged; copy it again")
+            wrong("its compressed data is corrupt; copy it again")
         }
         _ => table_error(error),
     }

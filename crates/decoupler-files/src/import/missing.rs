@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{ImportError, format::Cell};
 
-/// A text or number that means missing, in one column or in all.
+/// Marker of missing values: a text or number, in one column or in all.
 ///
 /// Written as `-1` or, for one column, as `states.c5=-1`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -14,12 +14,12 @@ pub struct Missing {
     pub column: Option<String>,
     /// Text of the cell.
     pub text: String,
-    /// The text as a number, which any other spelling of it means too.
+    /// The text as a number; any other spelling of the number is a marker, too.
     number: Option<f64>,
 }
 
 impl Missing {
-    /// Returns `true` for a cell that means missing.
+    /// Returns `true` for a cell with this marker.
     pub(super) fn is(&self, cell: &[u8], found: Cell) -> bool {
         match (found, self.number) {
             (Cell::Number(found), Some(number)) => found == number,
@@ -27,7 +27,7 @@ impl Missing {
         }
     }
 
-    /// Returns `true` for a number that means missing.
+    /// Returns `true` for a number equal to this marker.
     pub(super) fn is_number(&self, found: f64) -> bool {
         self.number == Some(found)
     }
@@ -71,7 +71,7 @@ impl fmt::Display for Missing {
     }
 }
 
-/// A condition on the rows that are used: comparisons of columns with numbers, joined by `and`.
+/// Condition on the rows that are used: comparisons of columns with numbers, joined by `and`.
 ///
 /// Written as `c4<145.1 and c5!=0`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -80,7 +80,7 @@ pub struct Condition {
     comparisons: Vec<Comparison>,
 }
 
-/// A comparison of a column with a number.
+/// Comparison of a column with a number.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Comparison {
     pub(super) column: String,
@@ -99,7 +99,7 @@ pub(super) enum Relation {
     Other,
 }
 
-/// The relations as written, longer ones before those they begin with.
+/// Relations and their operators; an operator that begins with another one comes before it.
 const WRITTEN: [(&str, Relation); 7] = [
     ("<=", Relation::AtMost),
     (">=", Relation::AtLeast),
@@ -115,7 +115,7 @@ impl Condition {
         &self.comparisons
     }
 
-    /// Returns this condition with other names of columns: `name` returns the new name of a column, or `None` if it stays.
+    /// Returns this condition with renamed columns: `name` returns the new name of a column, or `None` to keep it.
     #[must_use]
     pub fn renamed(&self, name: impl Fn(&str) -> Option<String>) -> Self {
         let renamed = |comparison: &Comparison| Comparison {

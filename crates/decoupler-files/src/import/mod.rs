@@ -1,11 +1,11 @@
-//! Measured data out of files: tables of text, NumPy and MATLAB, joined by time, with a meaning for each column.
+//! Import of measured data: text, NumPy and MATLAB tables, joined by time, with a meaning for each column.
 //!
-//! [`read_table`] reads one file and [`Inspection`] looks at its columns. A [`Recipe`] says which files are joined and what
-//! their columns mean, and gives a [`Recording`]: samples with names, units and times, and what was left out and why. A
-//! [`Plan`] adds how the samples are divided for training and test; [`suggested_plan`] guesses one from the files. A [`Setup`]
-//! is a plan or a simulated array with the settings of a run: everything that gives its samples again.
+//! [`read_table`] reads one file and [`Inspection`] summarises its columns. A [`Recipe`] defines which files are joined and
+//! what their columns mean; importing it returns a [`Recording`]: samples with names, units and times, and the dropped rows
+//! with reasons. A [`Plan`] adds the split into training and test samples; [`suggested_plan`] guesses one from the files. A
+//! [`Setup`] is a plan or a simulated array with the settings of a run: everything needed to reproduce its samples.
 //!
-//! [`Format`] lists the kinds of files. A further one is an entry there and a module that reads its arrays.
+//! [`Format`] lists the file formats. To add one, add a variant there and a module that reads its arrays.
 
 mod csv_table;
 mod detection;

@@ -1,6 +1,6 @@
 //! The `.npy` format, versions 1 to 3: <https://numpy.org/doc/stable/reference/generated/numpy.lib.format.html>.
-//! The header is one line with three known keys, for which a parser of all literals of Python would be too much: nested
-//! brackets of a damaged header would exhaust its stack.
+//! The header is one line with three known keys. A parser of all Python literals would not be safe: nested brackets in a
+//! corrupt header would overflow its stack.
 
 use std::{
     io::{Read, Seek},
@@ -19,9 +19,9 @@ use super::{
     table::{Excess, Labels, Lines, stem},
 };
 
-/// Longest header that is read, in bytes.
+/// Maximum length of a header in bytes.
 const LONGEST_HEADER: usize = 1 << 16;
-/// Number of bytes that are read at once, so that a header that lies costs no memory.
+/// Number of bytes read at once, so that a corrupt header allocates little memory.
 const BLOCK: usize = 1 << 20;
 
 /// Shape and type of an array.
@@ -33,14 +33,14 @@ struct Header {
     shape: Vec<usize>,
 }
 
-/// Reads an array of one or two dimensions.
+/// Reads a one- or two-dimensional array.
 pub(super) fn read(name: &str, mut source: impl Read) -> Result<Array, TableError> {
     let wrong = |reason: String| TableError::array(name, reason);
     let mut start = [0; 8];
     fill(&mut source, &mut start)
         .map_err(|error| error.unwrap_or_else(|| wrong("it is cut off; copy it again".to_owned())))?;
     let [b'\x93', b'N', b'U', b'M', b'P', b'Y', major, _] = start else {
-        return Err(wrong("it is no NumPy file; save it with numpy.save".to_owned()));
+        return Err(wrong("it is not a NumPy file; save it with numpy.save".to_owned()));
     };
     let mut length = [0; 4];
     let bytes = match major {
@@ -79,7 +79,7 @@ pub(super) fn read(name: &str, mut source: impl Read) -> Result<Array, TableErro
     let expected = rows.checked_mul(width).and_then(|count| count.checked_mul(size));
     let expected = expected.ok_or_else(|| wrong(format!("{rows} × {width} numbers fit in no memory")))?;
     if expected == 0 {
-        return Err(wrong(format!("it is {rows} × {width}, without a number")));
+        return Err(wrong(format!("it is empty ({rows} × {width})")));
     }
     let mut numbers = Vec::new();
     let mut left = expected;
@@ -94,7 +94,7 @@ pub(super) fn read(name: &str, mut source: impl Read) -> Result<Array, TableErro
         if block.len() < wanted {
             let found = (expected - left + block.len()) / size;
             return Err(wrong(format!(
-                "it is cut off: its header promises {rows} × {width} numbers, it has {found}; copy it again"
+                "it is cut off: its header states {rows} × {width} numbers, but it has {found}; copy it again"
             )));
         }
         left -= wanted;
@@ -174,8 +174,8 @@ impl Header {
     }
 }
 
-/// Puts the arrays of one file side by side: those with as many rows as the longest. A single array without a name has the columns
-/// c1, c2, …; the columns of an array X are X.c1, X.c2, …, or X if there is one.
+/// Combines the arrays of a file that have as many rows as the longest one into a table. A single array without a name has
+/// the columns c1, c2, …; the columns of an array X are X.c1, X.c2, …, or X if there is only one.
 pub(super) fn table(
     path: &Path,
     arrays: Vec<Array>,
@@ -189,7 +189,7 @@ pub(super) fn table(
         .collect();
     let Some(rows) = arrays.iter().map(|array| array.rows).max() else {
         let found = if notes.is_empty() {
-            "nothing is in it".to_owned()
+            "it is empty".to_owned()
         } else {
             notes.join("; ")
         };
@@ -259,7 +259,7 @@ fn column(name: String, mut numbers: Vec<f64>, reading: &Reading<'_>) -> Column 
     column
 }
 
-/// Reads the arrays of an archive, and says which entries are none.
+/// Reads the arrays of an archive; returns them and the entries left out.
 pub(super) fn read_archive(
     source: impl Read + Seek,
     watch: Watch<'_>,
@@ -271,13 +271,13 @@ pub(super) fn read_archive(
         let entry = archive.by_index(index).map_err(|error| defect("the archive", error))?;
         let file_name = entry.name().map_err(|error| defect("the archive", error))?.into_owned();
         let Some(name) = file_name.strip_suffix(".npy").map(str::to_owned) else {
-            left_out.push(format!("{file_name} is no .npy file"));
+            left_out.push(format!("{file_name} is not an .npy file"));
             continue;
         };
         let size = entry.size();
         match numpy::read(&name, Watched::new(entry, Some(size), watch)) {
             Ok(array) => arrays.push(array),
-            // A text or a number next to the arrays is no reason to refuse them.
+            // A text or a scalar next to the arrays does not make the file invalid.
             Err(TableError::Array { what, reason }) => left_out.push(format!("{what}: {reason}")),
             Err(error) => return Err(error),
         }
@@ -315,7 +315,7 @@ mod tests {
     }
 
     #[test]
-    fn headers_that_promise_what_is_not_read_say_so() {
+    fn unsupported_and_corrupt_headers_are_refused_with_a_reason() {
         let of = |descr: &str, shape: &str| {
             let header = format!("{{'descr': {descr}, 'fortran_order': False, 'shape': {shape}, }}");
             let mut bytes = b"\x93NUMPY\x01\x00".to_vec();
@@ -333,9 +333,9 @@ mod tests {
             (
                 "'<f8'",
                 "(99999999999, 2)",
-                "promises 99999999999 × 2 numbers, it has 2",
+                "states 99999999999 × 2 numbers, but it has 2",
             ),
-            ("'<f8'", "(0, 2)", "without a number"),
+            ("'<f8'", "(0, 2)", "it is empty (0 × 2)"),
             ("'<f8'", "(x, 2)", "no shape"),
             ("'<f8", "(2,)", "is not read"),
         ] {

@@ -8,36 +8,36 @@ use super::{
 };
 use decoupler_core::dataset::{Dataset, Division, Seed, Split, SplitBy};
 
-/// Files, the meanings of their columns, and the division of their samples: all that a run on measured samples needs to be
-/// repeated.
+/// Files, the meanings of their columns, and the split of their samples: everything needed to repeat a run on measured
+/// samples.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Plan {
-    /// Recipe by which samples are made of the files.
+    /// Recipe for importing the samples.
     pub import: Recipe,
-    /// Files of the test samples; without them a part of the samples tests.
+    /// Test files; if absent, a part of the samples is held out for testing.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub test: Option<TestFiles>,
-    /// Division of the samples. Only the share for validation counts if the test samples have files of their own.
+    /// Split of the samples. With separate test files, only the validation fraction is used.
     #[serde(default)]
     pub division: Division,
 }
 
-/// Files of the test samples, in the place of those of the recipe.
+/// Test files that replace the files of the recipe.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct TestFiles {
-    /// In the place of the first file.
+    /// Replaces the first file.
     pub data: PathBuf,
-    /// In the place of the joined files, in their order.
+    /// Replace the joined files, in the same order.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub join: Vec<PathBuf>,
 }
 
-/// Sets of a run on measured samples.
+/// Datasets of a run on measured samples.
 #[derive(Clone, Debug)]
 pub struct PlannedSets {
-    /// All samples but those of the test files.
+    /// All samples except those of the test files.
     pub recording: Recording,
     /// Samples of the test files, if there are any.
     pub test_recording: Option<Recording>,
@@ -48,10 +48,10 @@ pub struct PlannedSets {
 }
 
 impl Plan {
-    /// Imports the files, relative to `folder`, and divides the samples; `seed` is that of the run.
+    /// Imports the files, whose paths are relative to `folder`, and splits the samples; `seed` is the seed of the run.
     ///
     /// # Errors
-    /// If the files cannot be imported or the samples not be divided.
+    /// If the files cannot be imported or the samples cannot be split.
     pub fn sets(&self, folder: &Path, seed: Seed, watch: Watch<'_>) -> Result<PlannedSets, ImportError> {
         let (recording, test_recording) = self.recordings(folder, watch)?;
         let (split, test) = self.divide(&recording, test_recording.as_ref(), seed)?;
@@ -63,8 +63,8 @@ impl Plan {
         })
     }
 
-    /// Imports the files, relative to `folder`: all samples but those of the test files, and those of the test files, if there
-    /// are any.
+    /// Imports the files, whose paths are relative to `folder`: returns all samples except those of the test files, and the
+    /// samples of the test files, if there are any.
     ///
     /// # Errors
     /// If the files cannot be imported.
@@ -80,7 +80,8 @@ impl Plan {
         Ok((recording, test_recording))
     }
 
-    /// Refuses rows for the test that are trained on. A file joined to both may be the same: its times tell its rows apart.
+    /// Refuses test rows that are also used for training. The same file may be joined to both, because its rows are matched by
+    /// time.
     fn check_test_files(&self, folder: &Path, tests: &TestFiles) -> Result<(), ImportError> {
         let real = |path: &PathBuf| folder.join(path).canonicalize().ok();
         match (real(&self.import.data), real(&tests.data)) {
@@ -89,10 +90,10 @@ impl Plan {
         }
     }
 
-    /// Divides samples that were imported before; `seed` is that of the run.
+    /// Splits imported samples; `seed` is the seed of the run.
     ///
     /// # Errors
-    /// If the samples cannot be divided.
+    /// If the samples cannot be split.
     pub fn divide(
         &self,
         recording: &Recording,
@@ -103,38 +104,38 @@ impl Plan {
         Ok(self.division.sets(&recording.set, test, seed)?)
     }
 
-    /// Imports the samples without those of the test files.
+    /// Imports the samples, without the test files.
     ///
     /// # Errors
-    /// If the files cannot be imported, or a division by group has no groups.
+    /// If the files cannot be imported, or there are no groups for a split by group.
     pub fn recording(&self, folder: &Path, watch: Watch<'_>) -> Result<Recording, ImportError> {
         if self.division.by == SplitBy::Group && self.import.group.is_none() {
-            return Err(ImportError::NoColumns("the group, by which the samples are divided"));
+            return Err(ImportError::NoColumns("the group, by which the samples are split"));
         }
         self.import.import(folder, watch)
     }
 
-    /// This plan, whose paths are relative to the working folder, with paths for a file in `folder`: relative to that
-    /// folder; the name alone for a recording in the user's home if the folder lies elsewhere.
+    /// Converts paths relative to the working folder to paths relative to `folder`, for a file stored there. A recording in the
+    /// user's home is stored by name only if `folder` is not in the home.
     #[must_use]
     pub fn relative_to(&self, folder: &Path) -> Self {
         self.with_paths(|path| stored(path, folder))
     }
 
-    /// This plan, read from a file in `folder`, with paths relative to the working folder. A recording that is not where it
-    /// was may lie next to the file.
+    /// Converts the paths of a plan read from a file in `folder` to paths relative to the working folder. A recording that has
+    /// been moved is also looked up next to the file.
     #[must_use]
     pub fn restored(&self, folder: &Path) -> Self {
         self.with_paths(|path| restored(path, folder))
     }
 
-    /// Returns `true` if the test samples are random ones of the recording: errors on them are optimistic where neighbouring
+    /// Returns `true` if the test samples are a random part of the recording: errors on them are optimistic if neighbouring
     /// rows are similar.
     pub fn is_optimistic(&self) -> bool {
         self.division.by == SplitBy::Random && self.test.is_none()
     }
 
-    /// All files that it reads.
+    /// Returns all files of the plan.
     pub fn files(&self) -> impl Iterator<Item = &PathBuf> {
         let import = &self.import;
         let joined = import.join.iter().map(|joined| &joined.file);
@@ -148,19 +149,19 @@ impl Plan {
             .chain(tests)
     }
 
-    /// This plan with absolute paths.
+    /// Returns this plan with absolute paths.
     #[must_use]
     pub fn absolute(&self) -> Self {
         self.with_paths(|path| std::path::absolute(path).unwrap_or_else(|_| path.clone()))
     }
 
-    /// This plan with the paths in `folder`.
+    /// Returns this plan with its paths joined to `folder`.
     #[must_use]
     pub fn within(&self, folder: &Path) -> Self {
         self.with_paths(|path| folder.join(path))
     }
 
-    /// This plan with the names of its files in the place of their paths.
+    /// Returns this plan with file names instead of paths.
     #[must_use]
     pub fn named(&self) -> Self {
         self.with_paths(|path| path.file_name().map_or_else(|| path.clone(), PathBuf::from))
@@ -183,7 +184,7 @@ impl Plan {
 }
 
 impl Recipe {
-    /// This recipe with other files; the names of the columns stay.
+    /// Returns this recipe with other files; the names of the columns stay.
     fn of_test(&self, files: &TestFiles) -> Result<Self, ImportError> {
         if files.join.len() != self.join.len() {
             return Err(ImportError::Join {

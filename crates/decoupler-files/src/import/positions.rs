@@ -1,4 +1,4 @@
-//! Positions of targets on the skin, out of a table with the columns target, x and y.
+//! Positions of targets on the skin, read from a table with the columns target, x and y.
 
 use std::{
     collections::{BTreeMap, HashMap},
@@ -16,7 +16,7 @@ use decoupler_core::evaluation::{Channel, TargetPosition};
 /// Columns of the table.
 const COLUMNS: [&str; 3] = ["target", "x", "y"];
 
-/// Defect of a table of positions. Lines are counted from 1.
+/// Error in a table of positions. Lines are counted from 1.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
 pub enum PositionsError {
@@ -26,7 +26,7 @@ pub enum PositionsError {
         /// Name of the column.
         missing: &'static str,
     },
-    /// A coordinate is in another unit than millimetres.
+    /// A coordinate is not in millimetres.
     #[error("column '{column}' is in {unit}; give millimetres")]
     Unit {
         /// Name of the column.
@@ -34,17 +34,17 @@ pub enum PositionsError {
         /// Its unit.
         unit: String,
     },
-    /// A cell is missing or no number.
+    /// A cell is missing or not a number.
     #[error("line {line}: {column} is {cell}; each line needs the name of a target, and its x and y in millimetres")]
     Cell {
         /// Line of the cell.
         line: u64,
         /// Name of its column.
         column: &'static str,
-        /// The cell, in words.
+        /// The cell, as a phrase.
         cell: String,
     },
-    /// A name is that of no target.
+    /// There is no target of this name.
     #[error("line {line}: there is no target '{name}'; the targets are {targets}")]
     NoTarget {
         /// Line of the name.
@@ -64,7 +64,7 @@ pub enum PositionsError {
         /// Name of the target.
         name: String,
     },
-    /// Two targets have one position.
+    /// Two targets have the same position.
     #[error("lines {first} and {second}: two targets have the same position; correct one")]
     SamePlace {
         /// Line of the first.
@@ -74,7 +74,7 @@ pub enum PositionsError {
     },
     /// Targets with positions have different units.
     #[error(
-        "{one} and {other} have positions and not the same unit, so that there is no surface of both; leave one out, or \
+        "{one} and {other} have positions but different units, so they cannot share a surface; leave one out, or \
          correct its unit"
     )]
     Units {
@@ -85,9 +85,9 @@ pub enum PositionsError {
     },
 }
 
-/// Returns `true` if the file holds positions of targets: a table of text with the columns target, x and y and no others.
+/// Returns `true` if the file contains positions of targets: a text table with exactly the columns target, x and y.
 pub fn holds_positions(path: &Path) -> bool {
-    /// Positions of a hundred thousand targets.
+    /// Enough for a hundred thousand targets.
     const LARGEST: u64 = 4 << 20;
     let is_small = path
         .metadata()
@@ -99,7 +99,7 @@ pub fn holds_positions(path: &Path) -> bool {
     table.is_ok_and(|table| table.columns.iter().map(|column| column.name.as_str()).eq(COLUMNS))
 }
 
-/// Reads the positions in the file at `path`, each of one of `targets`.
+/// Reads the positions of `targets` from the file at `path`.
 pub(super) fn read_positions(
     path: &Path,
     targets: &[Channel],
@@ -171,7 +171,7 @@ fn positions(table: &Table, targets: &[Channel]) -> Result<Vec<TargetPosition>, 
                 name: name.to_owned(),
             });
         }
-        // −0 and 0 are one place.
+        // −0 and 0 are the same position.
         if let Some(first) = line_of_place.insert([x_mm, y_mm].map(|mm| (mm + 0.0).to_bits()), line) {
             return Err(PositionsError::SamePlace { first, second: line });
         }
@@ -188,7 +188,7 @@ fn positions(table: &Table, targets: &[Channel]) -> Result<Vec<TargetPosition>, 
     Ok(found)
 }
 
-/// Checks that the column holds a number in every row, in millimetres.
+/// Checks that the column contains a number in every row, in millimetres.
 fn check_numbers(table: &Table, column: &Column, name: &'static str) -> Result<(), PositionsError> {
     if let Some(unit) = column.unit.as_ref().filter(|unit| *unit != "mm") {
         return Err(PositionsError::Unit {
@@ -200,7 +200,7 @@ fn check_numbers(table: &Table, column: &Column, name: &'static str) -> Result<(
         return Err(PositionsError::Cell {
             line: fault.line,
             column: name,
-            cell: format!("'{}', which is no finite number", fault.text),
+            cell: format!("'{}', which is not a finite number", fault.text),
         });
     }
     match (0..table.rows).find(|&row| column.cells.is_missing(row)) {
@@ -213,7 +213,7 @@ fn check_numbers(table: &Table, column: &Column, name: &'static str) -> Result<(
     }
 }
 
-/// Names of the targets, or the first of them.
+/// Lists the names of the targets, or the first of them.
 fn listed(targets: &[Channel]) -> String {
     const MAX: usize = 12;
     let mut names = Vec::from_iter(targets.iter().take(MAX).map(|target| target.name.as_str()));

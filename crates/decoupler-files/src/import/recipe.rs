@@ -1,4 +1,4 @@
-//! Paths of recordings in files that name them: relative to the folder of the file.
+//! Recipes for importing recordings, and their paths: a stored file names recordings relative to its own folder.
 
 use std::{
     collections::BTreeMap,
@@ -12,10 +12,10 @@ use serde::{Deserialize, Serialize};
 
 use super::{Condition, DialectChoice, ImportError, Missing, Plan, PlannedSets};
 
-/// A recipe by which samples are made of files: those to read, those to join, and the meaning of each column.
+/// Recipe for importing samples: the files to read and to join, and the meaning of each column.
 ///
-/// A column is named as in the header, or c1, c2, … where there is none; `c2..c16` is a range; the columns of a joined
-/// file have its stem in front, as in `states.c2`. Columns that are not named are not used.
+/// A column is named as in the header, or c1, c2, … if there is none; `c2..c16` is a range; the columns of a joined
+/// file are prefixed with its stem, as in `states.c2`. Columns that are not named are not used.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Recipe {
@@ -24,29 +24,29 @@ pub struct Recipe {
     /// Files whose rows are joined to those of `data`.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub join: Vec<Joined>,
-    /// Layout of files of text, where it should not be found.
+    /// Layout of text files, where it should not be detected.
     #[serde(default)]
     pub dialect: DialectChoice,
     /// Readings of the sensor.
     pub inputs: Vec<String>,
-    /// Columns to be predicted from them.
+    /// Columns predicted from the readings.
     pub targets: Vec<String>,
-    /// Column of the time of `data`.
+    /// Time column of `data`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub time: Option<String>,
-    /// Column whose equal values belong together, as one press or one session.
+    /// Group column: rows with equal values belong together, such as one press or one session.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub group: Option<String>,
-    /// Column of the number of the row-wire, from 1.
+    /// Column with the number of the row-wire, from 1.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub row_wire: Option<String>,
-    /// Conditions that the rows used meet, all of them.
+    /// Conditions that every used row must meet.
     #[serde(default, rename = "where", skip_serializing_if = "Vec::is_empty")]
     pub conditions: Vec<Condition>,
-    /// Cells that mean missing, as well as empty ones.
+    /// Markers of missing values, in addition to empty cells.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub missing: Vec<Missing>,
-    /// Units of columns, where the header does not give them.
+    /// Units of columns that the header does not give.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub units: BTreeMap<String, String>,
     /// File with the positions of targets on the skin, relative to the folder of the recipe: a table with the columns
@@ -55,32 +55,32 @@ pub struct Recipe {
     pub positions: Option<PathBuf>,
 }
 
-/// A file joined to another, row by row or by time.
+/// File joined to the first, row by row or by time.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Joined {
     /// The file, relative to the folder of the recipe.
     pub file: PathBuf,
-    /// Name in front of its columns; the stem of the file if absent.
+    /// Prefix of the names of its columns; the stem of the file if absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub stem: Option<String>,
-    /// Column of its time, without the stem; that of `data` if absent.
+    /// Name of its time column, without the stem; that of `data` if absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub time: Option<String>,
-    /// Largest time between partners; half the median interval of this file if absent.
+    /// Maximum time difference between joined rows; half the median interval of this file if absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub limit: Option<f64>,
 }
 
-/// Path of a recording to be stored in a file in `folder`: relative to the folder; the name alone for a recording in the
-/// user's home if the folder lies elsewhere, so that no file names the home of its author.
+/// Returns the path of a recording as stored in a file in `folder`: relative to the folder. A recording in the user's home
+/// is stored by name only if the folder is not in the home, so that no file reveals the home folder of its author.
 pub fn stored(path: &Path, folder: &Path) -> PathBuf {
     let absolute = |path: &Path| std::path::absolute(path).map_or_else(|_| path.to_owned(), |path| normal(&path));
     relative(&absolute(path), &absolute(folder), std::env::home_dir().as_deref())
 }
 
-/// Path of a recording that a file in `folder` names as `stored`. A recording that is not where it was may lie next to the
-/// file.
+/// Returns the path of a recording that is `stored` in a file in `folder`. A recording that has been moved is also looked up
+/// next to the file.
 pub(super) fn restored(stored: &Path, folder: &Path) -> PathBuf {
     let path = normal(&folder.join(stored));
     let neighbour = path.file_name().map(|name| folder.join(name));
@@ -90,8 +90,8 @@ pub(super) fn restored(stored: &Path, folder: &Path) -> PathBuf {
     }
 }
 
-/// Path of a file as seen from `folder`, both absolute; the name alone if the way leads out of `home` or has no common
-/// beginning.
+/// Returns the path of a file relative to `folder`, both absolute; only the name if the relative path leaves `home`, or if
+/// the paths have no common prefix.
 fn relative(path: &Path, folder: &Path, home: Option<&Path>) -> PathBuf {
     let name = || path.file_name().map_or_else(|| path.to_owned(), PathBuf::from);
     if home.is_some_and(|home| path.starts_with(home) && !folder.starts_with(home)) {
@@ -110,7 +110,7 @@ fn relative(path: &Path, folder: &Path, home: Option<&Path>) -> PathBuf {
     up.chain(of_path[shared..].iter().copied()).collect()
 }
 
-/// Removes `..` by the names before it.
+/// Resolves `..` components.
 fn normal(path: &Path) -> PathBuf {
     let mut normal = PathBuf::new();
     for component in path.components() {
@@ -125,11 +125,11 @@ fn normal(path: &Path) -> PathBuf {
     normal
 }
 
-/// Origin of recorded samples: the plan that reads them, and checksums by which its files and samples are recognised.
+/// Origin of recorded samples: the plan that reads them, and checksums that identify its files and samples.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Recorded {
-    /// Files, meanings of their columns, and division of their samples.
+    /// Files, meanings of their columns, and split of their samples.
     pub plan: Plan,
     /// Checksums of the files.
     pub files: Vec<FileChecksum>,
@@ -148,10 +148,10 @@ pub struct FileChecksum {
 }
 
 impl Recorded {
-    /// Describes the samples that `plan`, whose paths do not depend on the working folder, has given.
+    /// Describes the samples read by `plan`, whose paths must not depend on the working folder.
     pub(super) fn of(plan: Plan, sets: &PlannedSets) -> Result<Self, ImportError> {
         let checksum = |path: &PathBuf| {
-            // A pipe has been read once and is empty now.
+            // A pipe can be read only once, and is empty now.
             let is_file = path.is_file();
             let crc32 = if is_file { file_crc32(path) } else { Ok(String::new()) };
             let crc32 = crc32.map_err(|source| ImportError::Read {
@@ -171,27 +171,28 @@ impl Recorded {
         })
     }
 
-    /// Returns it with paths for a file in `folder`: relative to the folder; the name alone for a file in the user's home
-    /// that the folder is not in, so that no file names the home of its author.
+    /// Returns it with paths relative to `folder`, for a file stored there. A recording in the user's home is stored by name
+    /// only if the folder is not in the home, so that no file reveals the home folder of its author.
     #[must_use]
     pub fn relative_to(&self, folder: &Path) -> Self {
         self.with_paths(|path| stored(path, folder))
     }
 
-    /// Returns it with the paths of a file in `folder`: a recording that is missing where it was may lie next to the file.
+    /// Returns it with its paths resolved for a file in `folder`. A recording that has been moved is also looked up next to the
+    /// file.
     #[must_use]
     pub fn within(&self, folder: &Path) -> Self {
         let folder = std::path::absolute(folder).unwrap_or_else(|_| folder.to_owned());
         self.with_paths(|path| restored(path, &folder))
     }
 
-    /// Returns it with another path of a recording.
+    /// Returns it with one path replaced.
     #[must_use]
     pub fn relocated(&self, from: &Path, to: &Path) -> Self {
         self.with_paths(|path| if path == from { to.to_owned() } else { path.to_owned() })
     }
 
-    /// Paths of recordings that are not where they were.
+    /// Returns the paths of recordings that no longer exist.
     pub fn missing(&self) -> Vec<&Path> {
         let files = self.files.iter().map(|file| file.path.as_path());
         files.filter(|path| !path.exists()).collect()
@@ -239,7 +240,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn no_stored_path_names_the_home_of_its_author() {
+    fn stored_paths_do_not_reveal_the_home_folder() {
         let home = Some(Path::new("/home/ada"));
         for (path, folder, expected) in [
             ("/home/ada/data/press.csv", "/home/ada/data", "press.csv"),

@@ -7,30 +7,30 @@ use csv_core::ReadRecordResult;
 
 use super::{Separator, TableError, input_lines::table_error};
 
-/// Largest length of a row in bytes: 16 MiB, of ten thousand columns and more.
+/// Maximum length of a row in bytes: 16 MiB, enough for more than ten thousand columns.
 pub(super) const LONGEST_ROW: usize = 1 << 24;
-/// Largest number of cells in a row.
+/// Maximum number of cells in a row.
 pub(super) const MAX_CELLS: usize = 20_000;
 const BUFFER: usize = 1 << 18;
 
-/// Rows of a file of text, cell by cell and with their line numbers. A row may extend over several lines if the line
-/// breaks are quoted.
+/// Rows of a text file, split into cells and with their line numbers. A row may span several lines if the line breaks are
+/// quoted.
 pub(super) struct Rows<R> {
     source: BufReader<R>,
     separator: Separator,
     line_break: u8,
     text: Vec<u8>,
-    /// Line on which the current row begins, from 1.
+    /// Line on which the current row starts, from 1.
     line: u64,
     /// Number of lines read.
     lines: u64,
     cells: Cells,
 }
 
-/// Cells of one row, kept between rows so that none allocates.
+/// Cells of one row; the buffers are reused to avoid allocations.
 #[derive(Default)]
 struct Cells {
-    /// Text of the cells of a row with quotes.
+    /// Unquoted text of the cells, for rows with quotes.
     unquoted: Vec<u8>,
     is_quoted: bool,
     ends: Vec<usize>,
@@ -76,7 +76,7 @@ impl<R: Read> Rows<R> {
                     self.text.drain(..mark.len());
                 }
             }
-            // Spaces only: an empty cell between tabulators is a cell.
+            // Spaces only: an empty cell between tabs is a cell.
             if self.text.iter().all(|byte| b" \r\n".contains(byte)) {
                 continue;
             }
@@ -121,7 +121,7 @@ impl<R: Read> Rows<R> {
         Ok(read > 0)
     }
 
-    /// Line on which the current row begins, from 1.
+    /// Line on which the current row starts, from 1.
     pub(super) fn line(&self) -> u64 {
         self.line
     }
@@ -185,7 +185,7 @@ impl Cells {
         let Self {
             unquoted, ends, ranges, ..
         } = self;
-        // The text of the cells is never longer than that of the row.
+        // The text of the cells is never longer than the row.
         unquoted.resize(unquoted.len().max(text.len() + 1), 0);
         ends.resize(MAX_CELLS + 2, 0);
         let (mut rest, mut written, mut count) = (text, 0, 0);
@@ -195,7 +195,7 @@ impl Cells {
             written += copied;
             count += found;
             match result {
-                // The parser takes the empty rest for the end of the record.
+                // The parser treats empty input as the end of the record.
                 ReadRecordResult::InputEmpty => {}
                 ReadRecordResult::Record
                 | ReadRecordResult::End
@@ -228,14 +228,14 @@ mod tests {
     }
 
     #[test]
-    fn rows_are_split_as_by_the_csv_crate_and_know_their_line() {
+    fn rows_are_split_as_by_the_csv_crate_with_line_numbers() {
         let text = "\u{feff}a, \"b\nc\" ,d\r\n\r\n1,\"say \"\"yes\"\"\",\n  \n,,\n\"x,y\",2\n3";
         let mut reader = csv::ReaderBuilder::new()
             .has_headers(false)
             .flexible(true)
             .trim(csv::Trim::All)
             .from_reader(
-                // The quotes are no longer at the beginning of their cell.
+                // The quotes are no longer at the start of their cell.
                 "a,\"b\nc\",d\n1,\"say \"\"yes\"\"\",\n,,\n\"x,y\",2\n3".as_bytes(),
             );
         let expected: Vec<Vec<String>> = reader
@@ -258,7 +258,7 @@ mod tests {
     }
 
     #[test]
-    fn an_open_quote_does_not_swallow_memory() {
+    fn an_unclosed_quote_does_not_exhaust_memory() {
         let text = format!("1,\"2\n{}", "3,4\n".repeat(5_000_000));
         let mut rows = Rows::new(text.as_bytes(), Separator::Comma, false);
         let error = rows.advance().unwrap_err().to_string();

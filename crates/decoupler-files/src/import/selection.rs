@@ -11,7 +11,7 @@ use decoupler_core::evaluation::Channel;
 /// Largest number of a row-wire.
 const LAST_ROW_WIRE: f64 = 10_000.0;
 
-/// Rows of the first file and their partners.
+/// Rows of the first file and their matches in the joined files.
 pub(super) struct Rows<'a> {
     pub(super) recipe: &'a Recipe,
     pub(super) files: &'a [(PathBuf, Table)],
@@ -42,7 +42,7 @@ impl Rows<'_> {
         &self.files[id.file].1.columns[id.column].cells
     }
 
-    /// Row of a file that belongs to a row of the first; `None` without a partner.
+    /// Returns the row of a file that is joined to a row of the first; `None` without a match.
     fn partner(&self, file: usize, row: usize) -> Option<usize> {
         match file.checked_sub(1).and_then(|joined| self.joins[joined].as_ref()) {
             None => Some(row),
@@ -50,7 +50,7 @@ impl Rows<'_> {
         }
     }
 
-    /// Cell of a row; NaN if it is missing, or the row has no partner.
+    /// Returns the cell of a row; NaN if it is missing or the row has no match.
     pub(super) fn number(&self, id: ColumnId, row: usize) -> f64 {
         self.partner(id.file, row)
             .map_or(f64::NAN, |row| self.column(id).number(row))
@@ -61,7 +61,7 @@ impl Rows<'_> {
             .is_none_or(|row| self.column(id).is_missing(row))
     }
 
-    /// Rows that are samples, and the others by reason.
+    /// Returns the rows that are samples, and the dropped rows by reason.
     pub(super) fn select(&self) -> Result<(Vec<usize>, Vec<Dropped>), ImportError> {
         let main = &self.files[0].1;
         let mut used: Vec<ColumnId> = Vec::new();
@@ -131,19 +131,19 @@ impl Rows<'_> {
         Ok((kept, dropped))
     }
 
-    /// Sorts the rows by their time; reports rows that were not in this order.
+    /// Sorts the rows by time; returns a note if they were not in order.
     pub(super) fn put_in_order(&self, time: ColumnId, kept: &mut [usize]) -> Option<String> {
         let falls = |pair: &[usize]| self.number(time, pair[1]) < self.number(time, pair[0]);
         let first = kept.windows(2).find(|pair| falls(pair))?[1];
         let count = kept.windows(2).filter(|pair| falls(pair)).count();
         kept.sort_by(|&one, &other| self.number(time, one).total_cmp(&self.number(time, other)));
         Some(format!(
-            "the times run backwards {count} times, first on line {}; the samples are put in the order of their times",
+            "the times go backwards {count} times, first on line {}; the samples are sorted by time",
             self.files[0].1.line(first)
         ))
     }
 
-    /// Number of each sample's group, in the order in which groups first occur.
+    /// Returns the group of each sample; groups are numbered in order of first occurrence.
     pub(super) fn groups(&self, kept: &[usize]) -> Vec<usize> {
         let Some(id) = self.meanings.group else {
             return (0..kept.len()).collect();
@@ -210,7 +210,7 @@ enum Reason {
     Missing(ColumnId),
 }
 
-/// Rows dropped, by reason in the order of their first.
+/// Dropped rows by reason, in order of first occurrence.
 #[derive(Default)]
 struct Counts(Vec<(Reason, Dropped)>);
 
@@ -247,7 +247,7 @@ pub(super) fn not_a_number(files: &[(PathBuf, Table)], names: &Names, id: Column
     })
 }
 
-/// Index of the row-wire with the number `value`.
+/// Returns the index of the row-wire with the number `value`.
 pub(super) fn row_wire(name: &str, value: f64) -> Result<usize, ImportError> {
     if value.fract() == 0.0 && (1.0..=LAST_ROW_WIRE).contains(&value) {
         Ok(value as usize - 1)

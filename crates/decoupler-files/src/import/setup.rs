@@ -11,28 +11,28 @@ use decoupler_core::{
     training::TrainerState,
 };
 
-/// Everything a run needs to be repeated: its settings and, if its source is a recording, the plan that reads it.
+/// Everything needed to repeat a run: its settings and, for a recording, the plan that reads it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Setup {
     settings: RunSettings,
     plan: Option<Plan>,
 }
 
-/// Sets of samples of a setup, and where recorded ones come from.
+/// Datasets of a setup, and the origin of recorded samples.
 #[derive(Clone, Debug)]
 pub struct SetupSets {
-    /// Sets of samples with the description of their channels.
+    /// Datasets with a description of their channels.
     pub sets: RunSets,
-    /// Recordings read; `None` for a simulated array.
+    /// Recordings; `None` for a simulated array.
     pub recordings: Option<Recordings>,
 }
 
-/// Recordings out of which sets were made.
+/// Recordings from which datasets were made.
 #[derive(Clone, Debug)]
 pub struct Recordings {
     /// Plan and checksums, to be saved with the run.
     pub recorded: Recorded,
-    /// All samples but those of the test files.
+    /// All samples except those of the test files.
     pub training: Recording,
     /// Samples of the test files, if there are any.
     pub test: Option<Recording>,
@@ -49,7 +49,7 @@ pub enum SetupError {
     #[error(transparent)]
     Run(#[from] RunError),
     /// The recording has changed.
-    #[error("'{0}' has other samples than when the run was saved; use the files of that time, or train again")]
+    #[error("'{0}' has other samples than when the run was saved; use the original files, or train again")]
     OtherSamples(String),
 }
 
@@ -78,13 +78,13 @@ impl Setup {
         }
     }
 
-    /// Returns the setup with these settings and, for a measured source, this plan; `None` if one of both is missing.
+    /// Returns the setup with these settings; `None` unless a plan is given for a measured source and only for that.
     pub fn of(settings: RunSettings, plan: Option<Plan>) -> Option<Self> {
         let is_recording = matches!(settings.source, Source::Measured(_));
         (is_recording == plan.is_some()).then_some(Self { settings, plan })
     }
 
-    /// Settings of the run.
+    /// Returns the settings of the run.
     pub fn settings(&self) -> &RunSettings {
         &self.settings
     }
@@ -98,17 +98,17 @@ impl Setup {
         }
     }
 
-    /// Settings of a simulated run, if it is one.
+    /// Returns the settings of a simulated run; `None` for a recording.
     pub fn simulated(&self) -> Option<SimulatedSettings> {
         self.settings.simulated()
     }
 
-    /// Plan by which a recording is read; `None` for a simulated array.
+    /// Returns the plan of a recording; `None` for a simulated array.
     pub fn plan(&self) -> Option<&Plan> {
         self.plan.as_ref()
     }
 
-    /// Name of the source: the array scale, or the stem of the first file.
+    /// Returns the name of the source: the array scale, or the stem of the first file.
     pub fn source_name(&self) -> String {
         match (&self.plan, &self.settings.source) {
             (Some(plan), _) => plan
@@ -124,11 +124,11 @@ impl Setup {
     }
 
     /// Draws the samples of a simulated array, or reads those of a recording, whose paths are relative to `folder`. Returns
-    /// `None` once `is_cancelled`, which is called between the parts of the work; `on_progress` follows the reading of
+    /// `None` if `is_cancelled`, which is polled throughout, returns `true`; `on_progress` reports the progress of reading
     /// files.
     ///
     /// # Errors
-    /// If the settings are invalid, or the files cannot be read or their samples not be divided.
+    /// If the settings are invalid, the files cannot be read, or their samples cannot be split.
     pub fn sets(
         &self,
         folder: &Path,
@@ -176,8 +176,8 @@ impl Setup {
         })
     }
 
-    /// Reads the samples for the trials of an experiment; those of a simulated array are drawn by each trial. Folder,
-    /// cancelling and progress are those of [`Self::sets`].
+    /// Reads the samples for the trials of an experiment; samples of a simulated array are drawn by each trial. The arguments
+    /// are those of [`Self::sets`].
     ///
     /// # Errors
     /// If the files cannot be read.
@@ -202,7 +202,7 @@ impl Setup {
     }
 }
 
-/// Passes on the progress of reading, and ends it once `is_cancelled`.
+/// Returns a callback that reports progress and cancels the import if `is_cancelled`.
 fn watch(
     is_cancelled: &dyn Fn() -> bool,
     on_progress: &mut dyn FnMut(Progress),
@@ -218,7 +218,7 @@ fn watch(
 }
 
 impl SetupSets {
-    /// Prepares a run of `setup` on these sets; returns `None` once `is_cancelled`.
+    /// Prepares a run of `setup` on these datasets; returns `None` if cancelled.
     ///
     /// # Errors
     /// As [`Run::on_sets`].
@@ -226,7 +226,7 @@ impl SetupSets {
         Run::on_unless(setup.settings, self.sets.clone(), is_cancelled)
     }
 
-    /// Resumes a run of `setup` on these sets from the states of its trainings; returns `None` once `is_cancelled`.
+    /// Resumes a run of `setup` on these datasets from the states of its trainings; returns `None` if cancelled.
     ///
     /// # Errors
     /// As [`Run::resume_on_sets`].
@@ -239,7 +239,7 @@ impl SetupSets {
         Run::resume_unless(setup.settings, states, self.sets, is_cancelled)
     }
 
-    /// Compares recorded samples with those that were `saved` with a run.
+    /// Checks that recorded samples are those `saved` with a run.
     ///
     /// # Errors
     /// [`SetupError::OtherSamples`] if the recording has changed.
@@ -252,7 +252,7 @@ impl SetupSets {
         }
     }
 
-    /// Origin of recorded samples, to be saved with the run; `None` for a simulated array.
+    /// Returns the origin of recorded samples, to be saved with the run; `None` for a simulated array.
     pub fn recorded(&self) -> Option<&Recorded> {
         self.recordings.as_ref().map(|recordings| &recordings.recorded)
     }

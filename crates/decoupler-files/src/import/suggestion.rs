@@ -9,7 +9,7 @@ use super::{
     table::stem,
 };
 
-/// Words in names of columns and files that speak for a target, and how strongly.
+/// Words in names of columns and files that suggest a target, with their weights.
 const TARGET_WORDS: [(&str, i32); 27] = [
     ("force", 3),
     ("torque", 3),
@@ -40,7 +40,7 @@ const TARGET_WORDS: [(&str, i32); 27] = [
     ("output", 2),
 ];
 
-/// Words that speak for an input.
+/// Words that suggest an input.
 const INPUT_WORDS: [&str; 19] = [
     "sensor",
     "reading",
@@ -63,7 +63,7 @@ const INPUT_WORDS: [&str; 19] = [
     "pixel",
 ];
 
-/// Units of what is to be predicted, and of what sensors give.
+/// Typical units of targets, and of sensor readings.
 const TARGET_UNITS: [&str; 22] = [
     "m", "mm", "cm", "µm", "um", "n", "mn", "kn", "nm", "n·m", "n m", "nmm", "n·mm", "mnm", "kg", "g", "deg", "°",
     "rad", "kpa", "pa", "mrad",
@@ -73,7 +73,7 @@ const INPUT_UNITS: [&str; 22] = [
     "counts", "lsb", "adc",
 ];
 
-/// Names of columns whose equal values belong together.
+/// Names of group columns.
 const GROUP_NAMES: [&str; 11] = [
     "group",
     "session",
@@ -88,14 +88,14 @@ const GROUP_NAMES: [&str; 11] = [
     "touch",
 ];
 
-/// Guesses from names, units and numbers what inspected files are for: which one has the readings, how the others are
-/// joined to it, which of them are for the test, and what each column means. A guess to be looked at: names may lie.
+/// Guesses a plan from the names, units and values in inspected files: which file has the readings, how the others are
+/// joined to it, which are test files, and what each column means. The guess should be checked: names may be misleading.
 ///
-/// Constant columns, texts and copies of other columns are not used.
+/// Constant columns, text and copies of other columns are not used.
 pub fn suggested_plan(files: &[InspectedFile]) -> Plan {
     let (training, test) = apart(files);
     let mut order: Vec<&InspectedFile> = training;
-    // The readings first: those that look least like targets, then the widest file.
+    // The file with the readings first: the one that looks least like targets; of equal ones, the widest.
     order.sort_by_key(|file| (score_of_file(&file.path), usize::MAX - numeric(file).count()));
     Plan {
         test,
@@ -103,12 +103,12 @@ pub fn suggested_plan(files: &[InspectedFile]) -> Plan {
     }
 }
 
-/// As [`suggested_plan`], of files of which it is known that the first has the readings, to which the others are joined.
+/// As [`suggested_plan`], if the first file is known to have the readings and the others are joined to it.
 pub fn suggested_plan_in_order(files: &[InspectedFile]) -> Plan {
     plan_of(&Vec::from_iter(files))
 }
 
-/// Guesses what the columns are for, of the file with the readings and of those joined to it.
+/// Guesses the meanings of the columns of the file with the readings and of the joined files.
 fn plan_of(order: &[&InspectedFile]) -> Plan {
     let Some((first, joined)) = order.split_first() else {
         return Plan::default();
@@ -139,7 +139,7 @@ fn plan_of(order: &[&InspectedFile]) -> Plan {
     let first_meanings = guesses(first, joined.is_empty());
     add(&mut plan.import, first, &first_meanings, None);
     for (file, stem) in joined.iter().zip(&stems) {
-        // What comes with the readings is to be predicted from them, whatever its columns are called.
+        // Columns of joined files are targets, whatever their names.
         let meanings = guesses(file, false).into_iter().map(|meaning| match meaning {
             Meaning::Input => Meaning::Target,
             other => other,
@@ -147,7 +147,7 @@ fn plan_of(order: &[&InspectedFile]) -> Plan {
         add(&mut plan.import, file, &Vec::from_iter(meanings), Some(stem));
     }
     let Recipe { inputs, targets, .. } = &mut plan.import;
-    // Where the names do not tell them apart, the last column is the target, as in most tables of samples.
+    // If the names do not distinguish them, the last column is the target, as in most tables of samples.
     if inputs.is_empty() {
         std::mem::swap(inputs, targets);
     }
@@ -163,14 +163,14 @@ fn plan_of(order: &[&InspectedFile]) -> Plan {
     plan
 }
 
-/// Name in front of the columns of a joined file, if it is not made from the name of the file.
+/// Returns the prefix of the columns of a joined file, if it is not derived from the name of the file.
 fn own_stem(file: &InspectedFile) -> Option<String> {
     let of_file = stem(&file.path);
     let is_own = |given: &&String| given.split_once('#').map_or(given.as_str(), |(before, _)| before) != of_file;
     file.stem.as_ref().filter(is_own).cloned()
 }
 
-/// Files for the training, and those for the test if there is one for each, as `trainPose` and `testPose`.
+/// Returns the training files, and the test files if each training file has one, such as `trainPose` and `testPose`.
 fn apart(files: &[InspectedFile]) -> (Vec<&InspectedFile>, Option<TestFiles>) {
     let all = || files.iter().collect::<Vec<_>>();
     let is_test = |file: &&InspectedFile| stem(&file.path).to_lowercase().contains("test");
@@ -193,7 +193,7 @@ fn apart(files: &[InspectedFile]) -> (Vec<&InspectedFile>, Option<TestFiles>) {
     (training, Some(TestFiles { data, join: partners }))
 }
 
-/// Name of a file without the part that it is for.
+/// Returns the name of a file without "training", "train" or "test".
 fn without_part(path: &Path) -> String {
     let mut name = stem(path).to_lowercase();
     for part in ["training", "train", "test"] {
@@ -202,7 +202,6 @@ fn without_part(path: &Path) -> String {
     name.chars().filter(|letter| letter.is_alphanumeric()).collect()
 }
 
-/// Columns of numbers.
 fn numeric(file: &InspectedFile) -> impl Iterator<Item = &ColumnSummary> {
     file.inspection.columns.iter().filter(|column| is_numeric(column))
 }
@@ -211,7 +210,7 @@ fn is_numeric(column: &ColumnSummary) -> bool {
     matches!(column.kind, ColumnKind::Number | ColumnKind::Integer) && column.texts == 0
 }
 
-/// Column of times, if its name or unit speaks for it or it has no name: any input may always grow.
+/// Returns the time column, if its name or unit suggests a time or it has no name: an input may increase steadily, too.
 fn time(file: &InspectedFile) -> Option<&ColumnSummary> {
     let time = file.inspection.time.as_ref()?;
     let column = file
@@ -228,7 +227,7 @@ fn time(file: &InspectedFile) -> Option<&ColumnSummary> {
     is_time.then_some(column)
 }
 
-/// Returns `true` if both files have times, and these overlap.
+/// Returns `true` if both files have times and the times overlap.
 fn share_time(one: &InspectedFile, other: &InspectedFile) -> bool {
     let range = |file: &InspectedFile| {
         let column = time(file)?;
@@ -240,7 +239,7 @@ fn share_time(one: &InspectedFile, other: &InspectedFile) -> bool {
     }
 }
 
-/// Points of a file's name for targets: negative for readings.
+/// Returns the score of a file name: positive for targets, negative for readings.
 fn score_of_file(path: &Path) -> i32 {
     let name = stem(path).to_lowercase();
     let targets = TARGET_WORDS
@@ -250,7 +249,7 @@ fn score_of_file(path: &Path) -> i32 {
     targets.map(|(_, weight)| *weight).max().unwrap_or(0) - 4 * i32::from(inputs.count() > 0)
 }
 
-/// Guesses of the meaning of each column.
+/// Guesses the meaning of each column.
 fn guesses(file: &InspectedFile, is_alone: bool) -> Vec<Meaning> {
     let inspection = &file.inspection;
     let time = time(file).map(|time| time.name.as_str());
@@ -275,7 +274,7 @@ fn guesses(file: &InspectedFile, is_alone: bool) -> Vec<Meaning> {
         if is_row_wire && column.kind == ColumnKind::Integer && column.min >= Some(1.0) {
             return Meaning::RowWire;
         }
-        // In one file the target stands among the inputs.
+        // A single file contains both inputs and targets.
         if is_alone && looks_like_target(&name, column.unit.as_deref()) {
             Meaning::Target
         } else {
@@ -316,7 +315,7 @@ fn add(recipe: &mut Recipe, file: &InspectedFile, meanings: &[Meaning], stem: Op
             Meaning::Target => recipe.targets.push(name),
             Meaning::Group if recipe.group.is_none() => recipe.group = Some(name),
             Meaning::RowWire if recipe.row_wire.is_none() => recipe.row_wire = Some(name),
-            // The first file alone has its time by then, if the files are joined by it.
+            // Only the first file has a time here, if the files are joined by time.
             Meaning::Time if stem.is_none() && recipe.join.is_empty() => recipe.time = Some(name),
             _ => {}
         }
@@ -390,26 +389,26 @@ impl Meanings {
     }
 }
 
-/// Meaning of a column for a recording.
+/// Meaning of a column in a recording.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Meaning {
-    /// The sensor gives it.
+    /// Reading of the sensor.
     Input,
     /// Target, predicted from the inputs.
     Target,
     /// Time of the row.
     Time,
-    /// Equal values belong together, as one press or one session.
+    /// Group: rows with equal values belong together, such as one press or one session.
     Group,
     /// Number of the row-wire, from 1.
     RowWire,
-    /// Nothing.
+    /// Not used.
     #[default]
     Unused,
 }
 
 impl Meaning {
-    /// Every meaning, in the order offered.
+    /// All meanings, in the order offered to the user.
     pub const ALL: [Self; 6] = [
         Self::Input,
         Self::Target,

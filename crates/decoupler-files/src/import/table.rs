@@ -4,32 +4,32 @@ use decoupler_core::text::clean_name;
 
 use super::{Dialect, Format};
 
-/// A file as columns of equal lengths.
+/// Table read from a file: columns of equal length.
 #[derive(Clone, Debug)]
 pub struct Table {
-    /// Name of the file without its folder and ending.
+    /// Name of the file without its folder and extension.
     pub stem: String,
     /// Columns.
     pub columns: Vec<Column>,
     /// Number of rows.
     pub rows: usize,
-    /// Kind of the file.
+    /// Format of the file.
     pub format: Format,
-    /// Notes for a reader of the table: rows of other lengths, arrays left out.
+    /// Notes for the user: rows of unusual length, arrays left out.
     pub notes: Vec<String>,
-    /// Rows of the file that are not in the table, because they have more cells than there are columns.
+    /// Rows that were left out because they have more cells than there are columns.
     pub too_long: Excess,
-    /// Rows that end before the last column; the cells they lack are missing.
+    /// Rows that end before the last column; their other cells are missing.
     pub too_short: Excess,
     pub(super) lines: Lines,
 }
 
-/// Rows of an unusual length.
+/// Rows of unusual length.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Excess {
     /// Number of such rows.
     pub rows: usize,
-    /// Line of the first, from 1.
+    /// Line of the first of them, from 1.
     pub first_line: Option<u64>,
 }
 
@@ -40,10 +40,10 @@ impl Excess {
     }
 }
 
-/// Line of each row, which mostly follow each other.
+/// Line of each row; compact, since rows are mostly on consecutive lines.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Lines {
-    /// Rows that do not begin on the line after the row before, with their line.
+    /// Rows that do not start on the line after the previous row, with their line.
     jumps: Vec<(usize, u64)>,
     next: u64,
 }
@@ -56,7 +56,7 @@ impl Lines {
         self.next = line + 1;
     }
 
-    /// Line of a row, or its number if the file has no lines; from 1.
+    /// Returns the line of a row, or its number if the file has no lines; from 1.
     pub(super) fn of(&self, row: usize) -> u64 {
         let after = self.jumps.partition_point(|(first, _)| *first <= row);
         match after.checked_sub(1).map(|index| self.jumps[index]) {
@@ -67,12 +67,12 @@ impl Lines {
 }
 
 impl Table {
-    /// Line of a row of a file of text, else the number of the row; from 1.
+    /// Returns the line of a row of a text file, else the number of the row; from 1.
     pub fn line(&self, row: usize) -> u64 {
         self.lines.of(row)
     }
 
-    /// Layout of a file of text.
+    /// Returns the layout of a text file; `None` for other formats.
     pub fn dialect(&self) -> Option<&Dialect> {
         match &self.format {
             Format::Text(dialect) => Some(dialect),
@@ -87,14 +87,14 @@ pub(super) fn stem(path: &Path) -> String {
         .map_or_else(|| "data".to_owned(), |stem| clean_name(&stem.to_string_lossy()))
 }
 
-/// A column of a table.
+/// Column of a table.
 #[derive(Clone, Debug, Default)]
 pub struct Column {
     /// Name without the unit.
     pub name: String,
     /// Unit, if the header has one in brackets.
     pub unit: Option<String>,
-    /// Cells, one for each row.
+    /// Cells, one per row.
     pub cells: Cells,
     /// Number of cells that are missing.
     pub missing: usize,
@@ -105,13 +105,13 @@ pub struct Column {
 /// Cells of a column.
 #[derive(Clone, Debug)]
 pub enum Cells {
-    /// Numbers; NaN where a cell is missing or no number.
+    /// Numbers; NaN if a cell is missing or not a number.
     Numbers(Vec<f64>),
     /// Labels of groups.
     Labels {
-        /// Number of each cell's label, in the order in which labels first occur; `None` where it is missing.
+        /// Index into `texts` for each cell; `None` if it is missing.
         numbers: Vec<Option<u32>>,
-        /// The labels, each with its number if it is one, else NaN.
+        /// Labels in order of first occurrence, each with its value as a number, or NaN.
         texts: Vec<(String, f64)>,
     },
 }
@@ -125,7 +125,7 @@ pub struct Faults {
     pub first: Option<Fault>,
 }
 
-/// A cell that is neither a number nor missing.
+/// Cell that is neither a number nor missing.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Fault {
     /// Line of the cell, from 1.
@@ -154,7 +154,7 @@ impl Cells {
         self.len() == 0
     }
 
-    /// Cell as a number: NaN where it is missing, or a label that is not a number.
+    /// Returns the cell as a number; NaN if it is missing, or a label that is not a number.
     pub(super) fn number(&self, row: usize) -> f64 {
         match self {
             Self::Numbers(numbers) => numbers[row],
@@ -162,7 +162,7 @@ impl Cells {
         }
     }
 
-    /// Returns `true` for a cell that is missing.
+    /// Returns `true` if the cell is missing.
     pub(super) fn is_missing(&self, row: usize) -> bool {
         match self {
             Self::Numbers(numbers) => numbers[row].is_nan(),
@@ -170,7 +170,7 @@ impl Cells {
         }
     }
 
-    /// Value that is equal for cells of the same group.
+    /// Returns a value that is equal for cells of the same group.
     pub(super) fn group(&self, row: usize) -> u64 {
         match self {
             Self::Numbers(numbers) => numbers[row].to_bits(),
@@ -178,7 +178,7 @@ impl Cells {
         }
     }
 
-    /// The first label that is not a number.
+    /// Returns the first label that is not a number.
     pub(super) fn wordy_label(&self) -> Option<&str> {
         match self {
             Self::Numbers(_) => None,
@@ -190,7 +190,7 @@ impl Cells {
     }
 }
 
-/// Labels in the order in which they first occur.
+/// Labels in order of first occurrence.
 #[derive(Debug, Default)]
 pub(super) struct Labels {
     pub(super) numbers: Vec<Option<u32>>,
@@ -199,7 +199,7 @@ pub(super) struct Labels {
 }
 
 impl Labels {
-    /// Adds a cell: its text and, if it is one, its number.
+    /// Adds a cell: its text and its value, if it is a number.
     pub(super) fn push(&mut self, label: Option<(&str, Option<f64>)>) {
         let number = label.map(|(text, value)| {
             self.known.get(text).copied().unwrap_or_else(|| {
@@ -220,7 +220,7 @@ impl Labels {
     }
 }
 
-/// Divides a header as "x (mm)" or "x [mm]" into name and unit.
+/// Splits a header such as "x (mm)" or "x [mm]" into name and unit.
 pub(super) fn name_and_unit(header: &str) -> (&str, Option<&str>) {
     let header = header.trim();
     for (open, close) in [('(', ')'), ('[', ']')] {
@@ -240,7 +240,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn lines_are_found_over_gaps() {
+    fn lines_are_found_across_gaps() {
         let mut lines = Lines::default();
         let known = [2, 3, 4, 7, 8, 12];
         for (row, line) in known.into_iter().enumerate() {
@@ -254,7 +254,7 @@ mod tests {
     }
 
     #[test]
-    fn units_stand_in_brackets_at_the_end() {
+    fn units_are_in_brackets_at_the_end() {
         let cases = [
             ("x (mm)", "x", Some("mm")),
             (" force [N] ", "force", Some("N")),

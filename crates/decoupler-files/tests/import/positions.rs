@@ -69,7 +69,7 @@ fn a_file_that_cannot_be_used_is_refused_with_line_and_cause() {
         ("target,x (cm),y\nd1,0,0\n", "column 'x' is in cm; give millimetres"),
         (
             "target,x,y\nd1,0,0\nd2,one,0\n",
-            "line 3: x is 'one', which is no finite number",
+            "line 3: x is 'one', which is not a finite number",
         ),
         ("target,x,y\nd1,0,0\nd2,0,\n", "line 3: y is missing"),
         ("target,x,y\nd1,0,0\nd2,inf,0\n", "line 3: x is 'inf'"),

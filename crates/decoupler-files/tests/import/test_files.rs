@@ -33,6 +33,6 @@ fn rows_that_are_trained_on_do_not_test() {
     assert_eq!(tested("test.csv"), Ok(40));
     for same in ["train.csv", "sub/../train.csv"] {
         let reason = tested(same).unwrap_err();
-        assert!(reason.contains("is trained on, so it cannot test"), "{reason}");
+        assert!(reason.contains("is trained on, so it cannot be a test file"), "{reason}");
     }
 }
