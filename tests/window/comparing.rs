@@ -407,7 +407,7 @@ fn two_runs_of_a_recording_are_compared_target_by_target() {
     let mut driver = Driver::open_keeping(&runs);
     wait_for_file(&mut driver);
     driver.click_button("Compare");
-    driver.wait("the reason", |driver| driver.says("is not there any more"));
+    driver.wait("the reason", |driver| driver.says("no longer exists"));
     driver.settle();
     assert!(driver.says("probe.csv") && driver.has(&format!("{name} as A")));
     let rmse = format_number(kept[0].scores.network.targets()[0].rmse);

@@ -133,7 +133,7 @@ fn noise_that_hides_everything_is_told_with_what_to_change() {
     assert!(driver.says(&format!("The noise hides {} of 10 deformation patterns", 10 - seen)));
     driver.enter("Relative noise", "1");
     wait_for_the_answer(&mut driver);
-    assert!(driver.says("the readings hardly narrow the deformation"));
+    assert!(driver.says("the readings hardly constrain the deformation"));
     assert!(driver.says("reduce the height, widen the node pitch, or add column-wires"));
 }
 

@@ -26,7 +26,7 @@ fn a_file_that_exists_is_replaced_only_if_the_user_says_so() {
     let (mut driver, _path, folder) = opened(40);
     let path = written(&folder, "mine.json", "mine");
     ask(&mut driver, RECIPE, &path);
-    driver.wait("the question", |driver| driver.says("mine.json exists already"));
+    driver.wait("the question", |driver| driver.says("mine.json already exists"));
     // Neither the key that asked nor a second click where it was clicked says yes.
     driver.press(Key::Enter);
     assert!(!driver.has("Save"));

@@ -62,7 +62,7 @@ fn a_place_that_cannot_be_written_is_told_once() {
     // A file where the folder should be.
     fs::write(folder.path().join("data"), "").unwrap();
     let mut driver = Driver::open_remembering(&path);
-    driver.wait("the reason", |driver| driver.says("will not be found again"));
+    driver.wait("the reason", |driver| driver.says("will not be restored"));
     driver.click("Dismiss");
     driver.click("Light theme");
     driver.settle();

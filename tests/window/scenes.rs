@@ -272,7 +272,7 @@ fn scenes_that_move_sideways_say_how_badly_conditioned_they_are() {
     assert!(driver.has("180 unknowns, 180 equations per frame"));
     wait_for_scene(&mut driver);
     assert_eq!(condition(&driver), of(&driver.state().draft));
-    assert!(driver.says("even rounding blurs it"));
+    assert!(driver.says("even rounding hides it"));
     driver.train();
     assert!(driver.says("This scene is ill-conditioned (condition number"));
     let table = driver.table();

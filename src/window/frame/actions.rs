@@ -17,7 +17,7 @@ use crate::window::{
     widgets::dim_ui,
 };
 
-/// A card that lies over the window for a moment.
+/// Modal card over the window.
 #[derive(Debug, Default)]
 pub(super) enum Overlay {
     /// Nothing.
@@ -43,9 +43,9 @@ const VIEW_KEYS: [Key; 9] = [
 ];
 
 impl DecouplerWindow {
-    /// Offers what can be done now, by the current view and by the window, and does what the user wants of that.
+    /// Offers the actions of the current view and of the window, and carries out the ones that the user asked for.
     pub(super) fn offer_actions(&mut self, ctx: &Context, effects: &mut Vec<Effect>) -> Vec<Action> {
-        // A question is to be answered first.
+        // A question must be answered first.
         let hears_keys = !self.is_asked();
         let is_listed = self.picked.is_some() || matches!(self.overlay, Overlay::Palette(_));
         let mut offers = Offers::new(ctx, self.picked.take(), hears_keys);
@@ -93,7 +93,7 @@ impl DecouplerWindow {
         offers.into_actions()
     }
 
-    /// Returns true while something lies over the window that is to be answered or closed first.
+    /// Returns true while a modal is open, which must be answered or closed first.
     pub(super) fn is_asked(&self) -> bool {
         self.saving.is_some() || self.closing.is_some() || !matches!(self.overlay, Overlay::None)
     }
@@ -106,7 +106,7 @@ impl DecouplerWindow {
         });
     }
 
-    /// Begins the tour in the view that it is about.
+    /// Starts the tour in the view that it describes.
     fn begin_tour(&mut self) {
         self.overlay = Overlay::None;
         self.tour = Some(Tour::default());
@@ -149,16 +149,16 @@ fn drafts(shared: &Shared) -> Drafts {
     (shared.source, shared.draft, shared.recording.clone())
 }
 
-/// The settings that were, and those that were taken back.
+/// Undo and redo history of the settings.
 ///
-/// A drag, or changes that follow one another within a second, count as one.
+/// A drag counts as one change, and so do changes less than a second apart.
 #[derive(Debug, Default)]
 pub(super) struct Undoing {
     undoer: Undoer<Drafts>,
 }
 
 impl Undoing {
-    /// Takes notice of the settings of this frame, at a time in seconds.
+    /// Records the settings of this frame, at a time in seconds.
     pub(super) fn follow(&mut self, time_s: f64, shared: &Shared) {
         self.undoer.feed_state(time_s, &drafts(shared));
     }
@@ -173,9 +173,9 @@ impl Undoing {
 }
 
 impl DecouplerWindow {
-    /// Offers to take a change of the settings back, and to make it again.
+    /// Offers to undo and redo a change of the settings.
     pub(super) fn offer_undoing(&mut self, offers: &mut Offers<'_>) {
-        // The settings of a training that runs stay.
+        // The settings of a running training cannot change.
         let is_free = !self.shared.phase.is_busy();
         let can_undo = is_free && self.undoing.can_undo(&self.shared);
         if offers.offer_keys("Undo change of settings", Modifiers::COMMAND, Key::Z, can_undo) {
@@ -195,7 +195,7 @@ impl DecouplerWindow {
         }
     }
 
-    /// Continues to the settings that were taken back last.
+    /// Restores the settings that were undone last.
     pub(super) fn redo(&mut self) {
         if let Some(drafts) = self.undoing.undoer.redo(&drafts(&self.shared)).cloned() {
             self.take_drafts(drafts);
@@ -215,11 +215,11 @@ impl DecouplerWindow {
     }
 }
 
-/// The list of all actions, open: typing narrows it, Enter does the one that is marked.
+/// The open list of all actions: typing filters it, and Enter runs the selected one.
 #[derive(Debug, Default)]
 pub(super) struct Palette {
     typed: String,
-    /// The place of the marked action among those that match.
+    /// Index of the selected action among the matches.
     marked: usize,
 }
 
@@ -242,7 +242,7 @@ pub(super) fn palette_ui(ui: &Ui, palette: &mut Palette, actions: &[Action]) -> 
         ui.set_width(space(110));
         let found = matching(actions, &palette.typed);
         let terms = terms(&palette.typed);
-        // Before the field, in which arrows and Enter mean something else.
+        // Before the field, which would otherwise handle arrows and Enter.
         let (down, up, enter) = ui.input_mut(|input| {
             let mut take = |key| input.consume_key(eframe::egui::Modifiers::NONE, key);
             (take(Key::ArrowDown), take(Key::ArrowUp), take(Key::Enter))
@@ -310,7 +310,7 @@ fn action_ui(ui: &mut Ui, action: &Action, is_marked: bool) -> eframe::egui::Res
                 .min_size(vec2(width, space(7)))
                 .right_text(RichText::new(keys.unwrap_or_default()).color(dim));
             let button = ui.add(text);
-            // Without the keys, by its name alone.
+            // The accessible name leaves out the keys.
             button.widget_info(|| WidgetInfo::labeled(Role::Button, action.is_possible, &action.name));
             button
         })
@@ -332,18 +332,18 @@ fn term_ui(ui: &mut Ui, term: &Term, is_marked: bool) -> eframe::egui::Response 
     button.on_hover_text(term.hint)
 }
 
-/// The terms in whose names the words of `typed` occur; none while nothing is typed.
+/// Returns the terms whose names contain the words in `typed`; none if it is empty.
 fn terms(typed: &str) -> Vec<Term> {
     let words: Vec<_> = typed.split_whitespace().map(str::to_lowercase).collect();
     let all = glossary::groups().into_iter().flat_map(|group| group.terms);
-    let is_called_so = |term: &Term| {
+    let is_match = |term: &Term| {
         let name = term.name.to_lowercase();
         !words.is_empty() && words.iter().all(|word| name.contains(word))
     };
-    all.filter(is_called_so).collect()
+    all.filter(is_match).collect()
 }
 
-/// The actions in whose names the words of `typed` occur in any order, those that can be done first.
+/// Returns the actions whose names contain the words in `typed` in any order, available ones first.
 fn matching<'a>(actions: &'a [Action], typed: &str) -> Vec<&'a Action> {
     let words: Vec<_> = typed.split_whitespace().map(str::to_lowercase).collect();
     let mut found: Vec<_> = actions

@@ -19,7 +19,7 @@ use decoupler_core::evaluation::SimulatedSettings;
 use decoupler_files::{figure::SequentialMap, import::Setup};
 
 impl DecouplerWindow {
-    /// Does what a view asks for.
+    /// Applies an effect requested by a view.
     pub fn apply(&mut self, effect: Effect) {
         let shared = &mut self.shared;
         match effect {
@@ -53,7 +53,7 @@ impl DecouplerWindow {
                 self.worker.ask(Request::Pause);
             }
             Effect::Resume => {
-                // The settings on the left are always those that are trained with.
+                // The settings on the left are always those of the running training.
                 if let Some(run) = &mut shared.run {
                     run.is_saved = false;
                     let training = run.asked.settings().training;
@@ -71,7 +71,7 @@ impl DecouplerWindow {
             Effect::Continue => {}
             Effect::Stop => {
                 self.worker.ask(Request::Stop);
-                // What was being prepared does not begin; the training before it stays.
+                // The training being prepared does not begin; the previous one stays.
                 if shared.phase == Phase::Preparing {
                     shared.phase = shared.phase_at_rest();
                 }
@@ -90,12 +90,12 @@ impl DecouplerWindow {
             Effect::RenameRun(id, name) => shared.runs.rename(id, &name, &self.runs),
             Effect::PinRun(place, id) => shared.runs.pin(place, id, &self.runs),
             Effect::RemoveRun(id) => shared.runs.remove(id, &self.runs),
-            Effect::Tell(matter, notice) => self.notices.tell(matter, notice),
+            Effect::Tell(matter, notice) => self.notices.add(matter, notice),
             Effect::Settle(matter) => self.notices.settle(matter),
         }
     }
 
-    /// Asks for another training than the displayed one.
+    /// Requests a training that replaces the displayed one.
     fn prepare(&mut self, request: Request) {
         self.shared.phase = Phase::Preparing;
         self.notices.settle(Matter::Training);
@@ -103,7 +103,7 @@ impl DecouplerWindow {
         self.worker.ask(request);
     }
 
-    /// Takes up the training saved in this checkpoint.
+    /// Opens the training saved in this checkpoint.
     fn open_training(&mut self, path: PathBuf) {
         self.opened = Some(path.clone());
         self.prepare(Request::Open(path));
@@ -112,7 +112,7 @@ impl DecouplerWindow {
     /// Shows the view in this place.
     pub(super) fn show(&mut self, place: usize) {
         self.shown = place;
-        // Another window may have been at work.
+        // Another window may have changed the list.
         self.runs.look();
         self.views.all()[place].enter(&self.shared);
     }
@@ -123,7 +123,7 @@ impl DecouplerWindow {
         self.remembered.is_dark = Some(is_dark);
     }
 
-    /// Draws all surfaces so, and remembers the colours that the user chose.
+    /// Sets the look of all surfaces, and remembers the colours that the user chose.
     fn look(&mut self, look: Look) {
         if look.colours != self.shared.look.colours {
             self.remembered.colours = Some(look.colours);
@@ -131,7 +131,7 @@ impl DecouplerWindow {
         self.shared.look = look;
     }
 
-    /// Offers the colours of values, and to lock or free what they span.
+    /// Offers the colour maps, and to lock or free the colour scales.
     pub(super) fn offer_colours(&mut self, offers: &mut Offers<'_>) {
         let look = self.shared.look;
         for colours in SequentialMap::ALL {
@@ -157,7 +157,7 @@ impl DecouplerWindow {
         theme::apply(&self.ctx, is_dark);
     }
 
-    /// Asks for a path in the window itself; the one last typed is offered again for the same file.
+    /// Asks for a path in the window itself, and suggests the path typed last for the same file.
     pub(super) fn type_path(&mut self, task: FileTask) {
         let is_same = |typed: &&Saving| typed.task.is_same_file(&task);
         let path = match self.typed.as_ref().filter(is_same) {
@@ -167,17 +167,17 @@ impl DecouplerWindow {
         self.saving = Some(Saving::new(task, path));
     }
 
-    /// Takes the path typed in the form. What exists there is found out first, unless the file is read or its contents
-    /// replace nothing.
+    /// Accepts the path typed in the form, after a check whether a file exists there. A file to be read and a folder are
+    /// not checked.
     pub(super) fn take_typed(&mut self, path: PathBuf) {
         let Some(task) = self.saving.as_ref().map(|saving| saving.task.clone()) else {
             return;
         };
-        // A folder is only ever filled again.
+        // A folder is never replaced as a whole.
         if task.is_read() || task.words.extensions.is_empty() {
             return self.take_path(path);
         }
-        // What is on its way there exists as good as already.
+        // A file that is being written counts as existing.
         let found = self.files.paths().any(|other| other == path).then_some(Found::File);
         let used = self.files_in_use(&task);
         if let Some(saving) = &mut self.saving {
@@ -192,7 +192,7 @@ impl DecouplerWindow {
         self.ctx.request_repaint();
     }
 
-    /// Takes what was found at typed paths.
+    /// Takes the results of checking typed paths.
     pub(super) fn take_looks(&mut self) {
         while let Some((path, found)) = self.looks.next_found() {
             if self.saving.as_mut().is_some_and(|saving| saving.take(&path, found)) {
@@ -201,7 +201,7 @@ impl DecouplerWindow {
         }
     }
 
-    /// Closes the form and does with the file in `path` what it was asked for.
+    /// Closes the form and carries out its task on the file at `path`.
     pub(super) fn take_path(&mut self, path: PathBuf) {
         self.typed = self.saving.take();
         if let Some(typed) = self.typed.clone() {
@@ -209,7 +209,7 @@ impl DecouplerWindow {
         }
     }
 
-    /// Files that the program needs, over which the file of `task` must not be saved.
+    /// Returns the files in use, which the file of `task` must not overwrite.
     fn files_in_use(&mut self, task: &FileTask) -> Vec<FileInUse> {
         let mut used: Vec<FileInUse> = self.views.all().iter().flat_map(|view| view.files_in_use()).collect();
         used.extend(self.opened.clone().map(FileInUse::Checkpoint));
@@ -220,9 +220,9 @@ impl DecouplerWindow {
         used
     }
 
-    /// Does with the file in `path` what it was asked for.
+    /// Carries out `task` on the file at `path`.
     pub(super) fn answer(&mut self, task: FileTask, path: PathBuf) {
-        // A dialog of the desktop has asked whether a file is to be replaced, but does not know what is in use.
+        // A dialog of the desktop has asked whether to replace a file, but does not know which files are in use.
         let used = self.files_in_use(&task);
         if !self.take_path_on_closing(&task, &path) {
             return;
@@ -232,7 +232,7 @@ impl DecouplerWindow {
                 let (send, taken) = channel();
                 let inspection = Inspection::new(move |run| {
                     let taken = run.map_err(str::to_owned).and_then(|run| contents.take(run));
-                    // Who asked waits for it.
+                    // The thread that writes the file is waiting for it.
                     let _ = send.send(taken);
                 });
                 self.worker.ask(Request::Inspect(run, inspection));
@@ -279,7 +279,7 @@ impl DecouplerWindow {
         }
     }
 
-    /// Trains on a source of this kind from now on.
+    /// Selects the kind of source to train on.
     pub(super) fn choose_source(&mut self, source: SourceKind) {
         self.shared.source = source;
         self.notices.settle(Matter::Settings);
@@ -289,7 +289,7 @@ impl DecouplerWindow {
         }
     }
 
-    /// Makes the setup of another run that of the next training.
+    /// Uses the setup of another run for the next training.
     pub(super) fn take_setup(&mut self, setup: &Setup) {
         match (setup.simulated(), setup.plan()) {
             (Some(settings), _) => {
@@ -309,7 +309,7 @@ impl DecouplerWindow {
         }
     }
 
-    /// Asks for what the settings are to show before a training and the window does not know yet.
+    /// Requests the test set and baselines shown before a training, unless they are known.
     pub(super) fn ask_for_what_is_missing(&mut self) {
         let shared = &self.shared;
         let draft = shared.draft;

@@ -1,6 +1,6 @@
-//! The clipboard, which reports whether it took what was put on it.
+//! The clipboard, which reports whether copying succeeded.
 //!
-//! Text and pictures on their way to the clipboard, and what a right click copies.
+//! Text and pictures are copied in the background; a context menu copies values, pictures and tables.
 
 use std::{
     env, fmt,
@@ -18,12 +18,12 @@ use crate::window::{
     widgets::{dim_ui, take_claim, take_value_under},
 };
 
-/// Something to be put on the clipboard.
+/// Content for the clipboard.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) enum Content {
     /// Text.
     Text(String),
-    /// Width and height in pixels, and four bytes a pixel, row by row.
+    /// Width and height in pixels, and four bytes per pixel, row by row.
     Picture { size: [usize; 2], rgba: Vec<u8> },
 }
 
@@ -32,12 +32,12 @@ type Put = dyn Fn(Content) -> Result<(), String> + Send + Sync;
 /// Place to which things are copied.
 #[derive(Clone)]
 pub(super) enum Clipboard {
-    /// The system's, which reports whether it took them.
+    /// The system's clipboard, which reports whether copying succeeded.
     System(Arc<Put>),
-    /// The system's under Wayland: a compositor may let a program copy by its focused window only, which reports nothing.
-    /// So text goes both ways.
+    /// The system's clipboard under Wayland. A compositor may let a program copy only through its focused window, which
+    /// reports nothing, so text is copied both ways.
     Wayland(Arc<Put>),
-    /// The toolkit's alone.
+    /// The toolkit's clipboard alone.
     Toolkit,
 }
 
@@ -54,14 +54,14 @@ impl Clipboard {
         }
     }
 
-    /// Puts `content` on the clipboard. Returns what the toolkit has to copy, and the message for the user then: `notice` if
-    /// the clipboard has it.
+    /// Puts `content` on the clipboard. Returns the content left for the toolkit to copy, and the message for the user:
+    /// `notice` on success.
     pub(super) fn take(&self, content: Content, notice: String) -> (Option<Content>, Notice) {
         match self {
             Self::Toolkit => (Some(content), Notice::Done(notice)),
-            Self::System(put) => (None, told(put(content), notice)),
+            Self::System(put) => (None, outcome(put(content), notice)),
             Self::Wayland(put) => match &content {
-                Content::Picture { .. } => (None, told(put(content), notice)),
+                Content::Picture { .. } => (None, outcome(put(content), notice)),
                 Content::Text(_) => {
                     let notice = match put(content.clone()) {
                         Ok(()) => notice,
@@ -74,17 +74,17 @@ impl Clipboard {
     }
 }
 
-const UNCONFIRMED: &str = "This desktop does not confirm it: if it cannot be pasted, export a file instead";
+const UNCONFIRMED: &str = "This desktop does not confirm copying: if pasting fails, export a file instead";
 
-fn told(put: Result<(), String>, notice: String) -> Notice {
+fn outcome(put: Result<(), String>, notice: String) -> Notice {
     match put {
         Ok(()) => Notice::Done(notice),
         Err(reason) => not_copied(&reason),
     }
 }
 
-/// The system's clipboard. Under X11 its contents last as long as what is returned here, for the program that copied hands
-/// them out itself.
+/// Returns access to the system's clipboard. Under X11 its contents last only as long as the returned value, because the
+/// program that copied serves them itself.
 fn system() -> Arc<Put> {
     let opened: Mutex<Option<arboard::Clipboard>> = Mutex::new(None);
     Arc::new(move |content| {
@@ -140,10 +140,10 @@ impl ToCopy {
     }
 }
 
-/// Outcome of copying: what the toolkit still has to copy, if anything, and the message for the user then.
+/// Outcome of copying: the content left for the toolkit to copy, if any, and the message for the user.
 type Copied = (Option<Content>, Notice);
 
-/// What is on its way to the clipboard; the newest wins.
+/// Content being copied in the background; the newest wins.
 #[derive(Debug)]
 pub(super) struct Copying {
     clipboard: Clipboard,
@@ -197,7 +197,7 @@ impl DecouplerWindow {
         }
     }
 
-    fn tell_copied(&mut self, (for_toolkit, notice): Copied) {
+    fn report_copied(&mut self, (for_toolkit, notice): Copied) {
         match for_toolkit {
             Some(Content::Text(text)) => self.ctx.copy_text(text),
             Some(Content::Picture { size, rgba }) => {
@@ -205,12 +205,11 @@ impl DecouplerWindow {
             }
             None => {}
         }
-        self.notices.tell(Matter::Clipboard, notice);
+        self.notices.add(Matter::Clipboard, notice);
     }
 }
 
-/// The menu at a right click on a part of the window: to copy the value under the pointer, and the pictures and tables of
-/// the current view.
+/// Context menu of a part of the window: copies the value under the pointer, or a picture or table of the current view.
 pub(super) fn copy_menu_ui<'a>(part: &Response, exports: impl FnOnce() -> Vec<Export<'a>>, effects: &mut Vec<Effect>) {
     let id = Id::unique("value to copy");
     let is_asked = part.container_secondary_clicked();
@@ -283,7 +282,7 @@ mod tests {
             let clipboard = Clipboard::System(Arc::new(|_| Ok(())));
             assert_eq!(copied(&clipboard, content), (None, done("Copied it")));
         }
-        // A window under Wayland may copy text though it cannot learn whether that worked.
+        // Under Wayland a window may copy text without learning whether that succeeded.
         let wayland = Clipboard::Wayland(refusing);
         let unconfirmed = done(&format!("Copied it. {UNCONFIRMED}"));
         assert_eq!(copied(&wayland, &text), (Some(text.clone()), unconfirmed));

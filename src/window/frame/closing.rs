@@ -12,7 +12,7 @@ use crate::window::{
 /// Stage of closing the window.
 #[derive(Debug)]
 pub(super) enum Closing {
-    /// The user is asked what becomes of unfinished work.
+    /// The user is asked what to do with unfinished work.
     Asking(Question),
     /// Checkpoints are to be saved, and the user is asked where.
     ChoosingPaths(Paths),
@@ -22,13 +22,13 @@ pub(super) enum Closing {
     Now,
 }
 
-/// The work that was unfinished when the user was asked, in lines that keep their places.
+/// Work that was unfinished when the user was asked, in lines that keep their positions.
 #[derive(Debug, Default)]
 pub(super) struct Question {
     lines: Vec<Line>,
     /// Number of lines when the question was first shown.
     height: usize,
-    /// True if something could be saved then: saving is what is suggested.
+    /// True if something could be saved then: saving is the default.
     suggests_saving: bool,
 }
 
@@ -38,11 +38,11 @@ struct Line {
     subject: (&'static str, String),
     progress: String,
     fate: Fate,
-    /// True if its result survives the window.
+    /// True if its result is kept after the window closes.
     is_kept: bool,
 }
 
-/// What becomes of a line's work.
+/// Consequence of closing for the work of a line.
 #[derive(Debug)]
 enum Fate {
     /// A checkpoint can be saved.
@@ -71,7 +71,7 @@ enum Answer {
 }
 
 impl Question {
-    /// Follows the work that is unfinished now: lines stay, also those whose work has ended, and new ones come below.
+    /// Updates the lines to the work that is unfinished now: lines stay even when their work has ended, new ones are appended.
     fn follow(&mut self, unfinished: Vec<Line>) {
         for line in &mut self.lines {
             line.fate = Fate::Ended;
@@ -117,7 +117,7 @@ impl Line {
         }
     }
 
-    /// What becomes of it, in words.
+    /// Consequence of closing as text, with its colour.
     fn fate(&self, palette: &Palette) -> (&'static str, Color32) {
         match (&self.fate, self.is_kept) {
             (Fate::Savable(_), _) => ("can be saved as a checkpoint", palette.text),
@@ -130,14 +130,14 @@ impl Line {
 }
 
 impl DecouplerWindow {
-    /// Lets the window close when nothing is lost by it.
+    /// Lets the window close if nothing would be lost.
     pub(super) fn take_close_request(&mut self) {
         let is_requested = self.ctx.input(|input| input.viewport().close_requested());
         match &mut self.closing {
             None if is_requested => {
                 let mut question = Question::default();
                 question.follow(self.unfinished());
-                // Files alone are no question: the window says that it waits for them.
+                // Files alone need no question: the window shows that it waits for them.
                 self.closing = Some(if question.is_idle() {
                     Closing::Finishing
                 } else {
@@ -150,7 +150,7 @@ impl DecouplerWindow {
                     question.follow(unfinished);
                 }
             }
-            // The user thought better of saving, and so of closing.
+            // Cancelling the save cancels closing too.
             Some(Closing::ChoosingPaths(_)) if !self.dialogs.is_asking() && self.saving.is_none() => {
                 self.closing = None;
             }
@@ -166,7 +166,7 @@ impl DecouplerWindow {
         }
         if is_requested && !may_close {
             self.ctx.send_viewport_cmd(ViewportCommand::CancelClose);
-            // The question must be seen.
+            // The question must be visible.
             self.ctx.send_viewport_cmd(ViewportCommand::Minimized(false));
         }
     }
@@ -188,8 +188,8 @@ impl DecouplerWindow {
         lines
     }
 
-    /// Takes the path of `task` where it is one of the checkpoints to be saved before closing. Returns false if another of
-    /// them is written there: then the path is asked for again.
+    /// Notes the path of `task` if it is one of the checkpoints to be saved before closing. Returns false if another of
+    /// them is being written there: the path is then asked for again.
     pub(super) fn take_path_on_closing(&mut self, task: &FileTask, path: &Path) -> bool {
         let Some(Closing::ChoosingPaths(paths)) = &mut self.closing else {
             return true;
@@ -240,7 +240,7 @@ impl DecouplerWindow {
             Some(Closing::Finishing) => {
                 let names = self.files.paths().map(|path| path.display().to_string());
                 let text = format!(
-                    "Still being written: {}. The window closes by itself after that.",
+                    "Still being written: {}. The window will close afterwards.",
                     names.collect::<Vec<_>>().join(", ")
                 );
                 match finishing_ui(ui, &text) {
@@ -255,7 +255,7 @@ impl DecouplerWindow {
     }
 }
 
-/// Shows a card over the window; leaving it is staying.
+/// Shows a modal card; dismissing it means staying.
 fn card_ui(ui: &Ui, heading: &str, add: impl FnOnce(&mut Ui) -> Option<Answer>) -> Option<Answer> {
     let frame = Frame::popup(ui.style()).inner_margin(Margin::same(16));
     let modal = Modal::new(Id::unique("closing")).frame(frame).show(ui.ctx(), |ui| {
@@ -268,13 +268,13 @@ fn card_ui(ui: &Ui, heading: &str, add: impl FnOnce(&mut Ui) -> Option<Answer>) 
     modal.inner.or(left)
 }
 
-/// Lists the unfinished work with what becomes of it, and asks. Neither lines nor buttons ever move.
+/// Lists the unfinished work with the consequences of closing, and asks. Lines and buttons never move.
 fn question_ui(ui: &Ui, question: &Question) -> Option<Answer> {
     /// Height of a line, in points.
     const LINE: f32 = space(6);
-    /// Lines to which the list grows before it is scrolled.
+    /// Number of lines above which the list scrolls.
     const MAX_LINES: usize = 8;
-    /// Least width of the buttons, in points, so that another name changes no place.
+    /// Minimum width of the buttons, in points, so that they do not move when a name changes.
     const BUTTON: f32 = space(34);
     const SAVE: &str = "Save checkpoints and close…";
     const STAY: &str = "Stay";
@@ -340,7 +340,7 @@ fn line_ui(ui: &mut Ui, line: &Line, height: f32) {
     );
 }
 
-/// Shows what closing waits for.
+/// Shows the files that closing waits for.
 fn finishing_ui(ui: &Ui, text: &str) -> Option<Answer> {
     card_ui(ui, "Finishing files", |ui| {
         ui.label(text);

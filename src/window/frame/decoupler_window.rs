@@ -22,7 +22,7 @@ use crate::window::{
     views::Views,
 };
 
-/// The window: what is shared, the views, and the one place where what they ask for is done.
+/// The window: the shared state, the views, and the one place where their effects are applied.
 pub struct DecouplerWindow {
     pub(super) shared: Shared,
     pub(super) views: Views,
@@ -45,11 +45,11 @@ pub struct DecouplerWindow {
     pub(super) copying: Copying,
     pub(super) dialogs: Dialogs,
     pub(super) closing: Option<Closing>,
-    /// A list that lies over the window.
+    /// Modal list over the window.
     pub(super) overlay: Overlay,
     /// The tour, unless it has ended.
     pub(super) tour: Option<Tour>,
-    /// The name of the action picked from the list, to be done in the next frame.
+    /// Name of the action picked from the list, which runs in the next frame.
     pub(super) picked: Option<String>,
     pub(super) undoing: Undoing,
     pub(super) remembered: Remembered,
@@ -60,21 +60,21 @@ pub struct DecouplerWindow {
 }
 
 impl DecouplerWindow {
-    /// Opens as the last window was left that kept `file`, and keeps it from now on. Without a file it opens on the default
+    /// Opens with the state remembered in `file`, and keeps that file up to date. Without a file it opens on the default
     /// array.
     pub fn new(ctx: &Context, desktop: Desktop, file: Option<WindowFile>) -> Self {
         let woken = ctx.clone();
         Self::woken_by(Arc::new(move || woken.request_repaint()), ctx, desktop, file)
     }
 
-    /// As [`Self::new`]; `wake` is called whenever there is events to take.
+    /// As [`Self::new`]; `wake` is called whenever there is an event to handle.
     pub(super) fn woken_by(wake: Wake, ctx: &Context, desktop: Desktop, file: Option<WindowFile>) -> Self {
         let remembered = file.as_ref().map(|file| file.remembered.clone()).unwrap_or_default();
         let is_dark = remembered
             .is_dark
             .unwrap_or(ctx.system_theme() != Some(egui::Theme::Light));
         theme::install(ctx, is_dark);
-        // Ours keep to sizes at which the window is whole.
+        // Our own shortcuts keep to sizes at which everything fits.
         ctx.options_mut(|options| options.zoom_with_keyboard = false);
         let mut views = Views::new(&wake);
         let names = views.all().into_iter().map(|view| view.name()).enumerate();
@@ -96,7 +96,7 @@ impl DecouplerWindow {
             dialogs: Dialogs::new(desktop),
             closing: None,
             overlay: Overlay::None,
-            // A window that cannot remember its end would begin it at every start.
+            // A window that cannot remember the end of the tour would begin it at every start.
             tour: (file.is_some() && remembered.has_toured != Some(true)).then(Tour::default),
             picked: None,
             undoing: Undoing::default(),
@@ -157,9 +157,9 @@ impl DecouplerWindow {
         self.notices.newest()
     }
 
-    /// Lays out the window and does what the user meant.
+    /// Lays out the window and handles the input of the user.
     pub fn show_ui(&mut self, ui: &mut Ui) {
-        // Another window may have been at work.
+        // Another window may have changed the run list.
         if ui.input(|input| input.events.contains(&egui::Event::WindowFocused(true))) {
             self.runs.look();
         }
@@ -242,7 +242,7 @@ impl DecouplerWindow {
         if changes_something(ui.ctx()) || !effects.is_empty() {
             self.ctx.request_repaint();
         }
-        // Before anything changes the places.
+        // Before the layout changes.
         for (place, reply) in replies.inner {
             match reply {
                 notices::Reply::Dismiss => self.notices.dismiss(place),
@@ -264,19 +264,19 @@ impl DecouplerWindow {
         self.tour_ui(ui, &actions);
         self.ask_for_path(ui);
         self.remember();
-        // What was begun in this frame must be finished too.
+        // Work begun in this frame must be finished too.
         self.take_close_request();
         self.closing_ui(ui);
     }
 
-    /// Does what views ask for.
+    /// Applies the effects requested by views.
     pub(super) fn apply_all(&mut self, effects: Vec<Effect>) {
         for effect in effects {
             self.apply(effect);
         }
     }
 
-    /// Shows the tour where nothing lies over the window, and does what the user wants of it.
+    /// Shows the tour unless a modal is open, and carries out the answer of the user.
     fn tour_ui(&mut self, ui: &Ui, actions: &[Action]) {
         let Some(tour) = self.tour.filter(|_| !self.is_asked()) else {
             return;
@@ -301,7 +301,7 @@ impl DecouplerWindow {
 }
 
 /// Returns `true` if the user did something in this frame that parts of the window already drawn may depend on: one
-/// frame more shows it everywhere. A pointer that merely moves changes nothing.
+/// frame more shows it everywhere. Merely moving the pointer does not count.
 pub(super) fn changes_something(ctx: &Context) -> bool {
     ctx.input(|input| {
         let is_change = |event: &Event| match event {
@@ -328,14 +328,14 @@ impl eframe::App for DecouplerWindow {
 pub enum Desktop {
     /// The desktop's own.
     Native,
-    /// None: the window asks for paths itself, and what is copied goes no further than the toolkit. For tests.
+    /// None: the window asks for paths itself, and copies stay within the toolkit. For tests.
     None,
 }
 
-/// Sizes of the interface between which the user can choose, as shares of the usual one.
+/// Interface scales offered to the user, relative to the default.
 pub(super) const SCALES: RangeInclusive<f32> = 0.8..=2.0;
 
-/// One step larger or smaller.
+/// Step between scales.
 const STEP: f32 = 0.1;
 
 impl DecouplerWindow {
@@ -356,12 +356,12 @@ impl DecouplerWindow {
             self.set_scale(scale - STEP);
         }
         let is_usual = (scale - 1.0).abs() < 0.5 * STEP;
-        if offers.offer_keys("Usual size of the interface", Modifiers::COMMAND, Key::Num0, !is_usual) {
+        if offers.offer_keys("Reset the interface size", Modifiers::COMMAND, Key::Num0, !is_usual) {
             self.set_scale(1.0);
         }
     }
 
-    /// Draws everything at this share of its usual size, kept to whole steps within [`SCALES`].
+    /// Sets the interface scale, rounded to whole steps and limited to [`SCALES`].
     pub(super) fn set_scale(&mut self, scale: f32) {
         let scale = ((scale / STEP).round() * STEP).clamp(*SCALES.start(), *SCALES.end());
         self.ctx.set_zoom_factor(scale);

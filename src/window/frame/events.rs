@@ -11,7 +11,7 @@ use crate::window::{
 use decoupler_core::evaluation::RunSettings;
 
 impl DecouplerWindow {
-    /// Takes what the threads and the dialogs have to report.
+    /// Handles the events of threads and dialogs.
     pub fn take_events(&mut self) {
         self.take_copied();
         while let Some(event) = self.worker.next_event() {
@@ -21,10 +21,10 @@ impl DecouplerWindow {
             self.take_preview(event);
         }
         if let Some(notice) = self.shared.runs.take_events(&self.runs) {
-            self.notices.tell(Matter::RunList, notice);
+            self.notices.add(Matter::RunList, notice);
         }
         while let Some(written) = self.files.next_written() {
-            self.tell_written(written);
+            self.report_written(written);
         }
         while let Some((task, answer)) = self.dialogs.next_answer() {
             match answer {
@@ -45,34 +45,35 @@ impl DecouplerWindow {
         self.take_close_request();
     }
 
-    /// A training could not begin: the one before stays. What came of the settings meanwhile was not taken.
+    /// Handles a training that could not begin: the previous one stays. Previews that arrived meanwhile were discarded.
     fn refuse(&mut self, matter: Matter, reason: String) {
         self.shared.phase = self.shared.phase_at_rest();
         self.notices.fail(matter, reason);
         self.ask_for_what_is_missing();
     }
 
-    fn tell_written(&mut self, written: Result<String, String>) {
+    fn report_written(&mut self, written: Result<String, String>) {
         let notice = match written {
-            Ok(told) => {
+{ => {
+            Ok(message) => {
                 self.typed = None;
-                Notice::Done(told)
+                Notice::Done(message)
             }
             Err(reason) => {
-                // The user has to see this.
+                // The user must see this.
                 self.closing = None;
                 Notice::Failed(reason)
             }
         };
-        self.notices.tell(Matter::File, notice);
+        self.notices.add(Matter::File, notice);
     }
 
     pub(super) fn take_preview(&mut self, event: PreviewEvent) {
         let shared = &mut self.shared;
         match event {
-            // Settings that have moved on meanwhile have asked for another test set, or need none.
+            // The settings have changed meanwhile, and have requested another test set or need none.
             PreviewEvent::Drawn(settings, _) if !have_same_test_set(&settings, &shared.draft) => {}
-            // A training has begun meanwhile, and shows the same.
+            // A training has begun meanwhile, with the same test set.
             PreviewEvent::Drawn(settings, _)
                 if shared.run.as_ref().is_some_and(|run| is_of_test_set(run, &settings)) => {}
             PreviewEvent::Drawn(settings, Ok(test)) => {
@@ -117,7 +118,7 @@ impl DecouplerWindow {
                 self.take_setup(&setup);
                 let shared = &mut self.shared;
                 self.typed = None;
-                // If it has ended, the events of it say so.
+                // If it has ended, its next event says so.
                 shared.phase = Phase::Paused;
             }
             Event::Opened(Err(reason)) => {
@@ -163,11 +164,11 @@ impl DecouplerWindow {
                 let text = format!("The training ended unexpectedly{reason}. The results shown remain available.");
                 self.notices.fail(Matter::Training, text);
             }
-            // The worker keeps these to itself.
+            // The worker does not pass these on.
             Event::Abandoned => {}
         }
         if self.worker.is_preparing() {
-            // This was events of the training before.
+            // The event belongs to the previous training.
             self.shared.phase = Phase::Preparing;
         }
     }

@@ -1,8 +1,8 @@
-//! Files in the making, each on a thread of its own.
+//! Files written in the background, each on its own thread.
 //!
-//! Native file dialogs, waited for on a thread of their own.
+//! Native file dialogs, each awaited on its own thread.
 //!
-//! Looks at typed paths on threads of their own: a network drive that does not answer must not hold the window.
+//! Checks of typed paths, each on its own thread: a network drive that does not answer must not block the window.
 
 use std::{
     fmt::{self, Display},
@@ -31,10 +31,10 @@ use crate::window::{
     theme::{Theme, radius, space, type_size},
 };
 
-/// Longest time that dropping waits for a file. What takes longer is removed when the program ends.
+/// Longest time that dropping waits for a file. A file that takes longer is removed when the program ends.
 const LONGEST_WAIT: Duration = Duration::from_secs(5);
 
-/// Sentence that reports a file, or the reason why it was not written, unless the thread failed.
+/// Message about a file, or the reason why it was not written, unless the thread failed.
 type Written = Result<Result<String, String>, JobError>;
 
 /// Files that are being written.
@@ -44,7 +44,7 @@ pub struct Files {
 }
 
 impl Files {
-    /// No file yet. `wake` is called when one is there.
+    /// No file yet. `wake` is called when one is written.
     pub fn new(wake: Wake) -> Self {
         Self {
             wake,
@@ -52,7 +52,7 @@ impl Files {
         }
     }
 
-    /// Writes the file `path` in the background. `write` returns the message for the user then.
+    /// Writes the file `path` in the background. `write` returns the message for the user.
     pub fn write<X: Display>(
         &mut self,
         path: PathBuf,
@@ -67,7 +67,7 @@ impl Files {
         self.under_way.push((path, job));
     }
 
-    /// Sentence that reports the next file that is there, or the reason why it is not.
+    /// Returns the message about the next file that was written, or the reason why it was not.
     pub fn next_written(&mut self) -> Option<Result<String, String>> {
         let mut jobs = self.under_way.iter().enumerate();
         let (number, written) = jobs.find_map(|(number, (_, job))| Some((number, job.next_event()?)))?;
@@ -98,8 +98,8 @@ impl fmt::Debug for Files {
     }
 }
 
-/// An answer sooner than this was no person's: the desktop has no dialog to show. On a busy machine that takes a while to
-/// be found out; a person who cancels as fast is asked in the window.
+/// A dialog answered sooner than this was never shown: the desktop has none. The limit allows for a busy machine; a user
+/// who cancels as fast is asked in the window.
 const NO_PERSON: Duration = Duration::from_secs(1);
 
 /// Answer to a question for a path.
@@ -107,13 +107,13 @@ const NO_PERSON: Duration = Duration::from_secs(1);
 pub enum Answer {
     /// The user chose this file.
     Chosen(PathBuf),
-    /// The user thought better of it.
+    /// The user cancelled.
     Cancelled,
     /// There is no dialog here; ask in the window.
     NoDialog,
 }
 
-/// Questions under way, each with the task that it was asked for.
+/// Open dialogs, each with its task.
 #[derive(Debug)]
 pub struct Dialogs {
     desktop: Desktop,
@@ -121,7 +121,7 @@ pub struct Dialogs {
 }
 
 impl Dialogs {
-    /// No questions yet.
+    /// No dialog yet.
     pub fn new(desktop: Desktop) -> Self {
         Self {
             desktop,
@@ -129,8 +129,8 @@ impl Dialogs {
         }
     }
 
-    /// Asks for the path of a file; returns whether there is a dialog to ask with. `wake` is called when the answer is
-    /// there. Must run on the window's thread, which some desktops require.
+    /// Asks for the path of a file; returns true if there is a dialog to ask with. `wake` is called when the answer has
+    /// come. Must run on the window's thread, which some desktops require.
     pub fn ask(&mut self, task: &FileTask, wake: Wake) -> bool {
         if self.desktop == Desktop::None {
             return false;
@@ -150,7 +150,7 @@ impl Dialogs {
         true
     }
 
-    /// The next answer, if one has come, with the task that it was asked for.
+    /// Returns the next answer, if one has come, with its task.
     pub fn next_answer(&mut self) -> Option<(FileTask, Answer)> {
         let mut jobs = self.asked.iter().enumerate();
         let (number, answer) = jobs.find_map(|(number, (_, job))| Some((number, job.next_event()?)))?;
@@ -158,7 +158,7 @@ impl Dialogs {
         Some((task, answer))
     }
 
-    /// Returns true while an answer is still to come.
+    /// Returns true while a dialog is open.
     pub fn is_asking(&self) -> bool {
         !self.asked.is_empty()
     }
@@ -180,7 +180,7 @@ fn choice(task: &FileTask) -> Pin<Box<dyn Future<Output = Option<FileHandle>> + 
     if task.is_read() && task.words.extensions.is_empty() {
         Box::pin(dialog.pick_folder())
     } else if task.is_read() {
-        // The terminal gives checkpoints any name.
+        // Checkpoints of the terminal may have any name.
         Box::pin(dialog.add_filter("All files", &["*"]).pick_file())
     } else {
         if let Some(name) = suggestion.file_name() {
@@ -190,18 +190,18 @@ fn choice(task: &FileTask) -> Pin<Box<dyn Future<Output = Option<FileHandle>> + 
     }
 }
 
-/// Reasons for which the window cannot open.
+/// Reasons why the window cannot open.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum OpenError {
-    /// Nothing to open it on.
+    /// There is no display.
     #[error("there is no display to open a window on; `decoupler train --help` does the same work in a terminal")]
     NoDisplay,
-    /// No OpenGL on it, or the display refuses.
+    /// There is no OpenGL, or the display refuses a window.
     #[error("no window can be opened here: {0}; {PACKAGES}")]
     NoWindow(String),
     /// A library that the window needs cannot be loaded, or the window itself failed.
-    #[error("the window failed as said above; {PACKAGES}")]
+    #[error("the window failed with the error above; {PACKAGES}")]
     Failed,
 }
 
@@ -212,7 +212,7 @@ const PACKAGES: &str = "on a bare Debian, install libxcursor1 libxi6 libxkbcommo
 /// Opens the window and returns when it is closed.
 ///
 /// # Errors
-/// There is no display, or no OpenGL on it.
+/// If there is no display, or no OpenGL on it.
 pub fn open() -> Result<(), OpenError> {
     let displays = ["DISPLAY", "WAYLAND_DISPLAY", "WAYLAND_SOCKET"];
     if cfg!(target_os = "linux") && displays.iter().all(|name| std::env::var_os(name).is_none()) {
@@ -250,7 +250,7 @@ pub fn open() -> Result<(), OpenError> {
         };
         Ok::<Box<dyn eframe::App>, Box<dyn std::error::Error + Send + Sync>>(Box::new(window))
     };
-    // A library that is not there makes the window system panic, with the library's name.
+    // A missing library makes the window system panic with the name of the library.
     let run = || eframe::run_native("Decoupler", options, Box::new(create));
     match std::panic::catch_unwind(std::panic::AssertUnwindSafe(run)) {
         Ok(Ok(())) => Ok(()),
@@ -259,25 +259,25 @@ pub fn open() -> Result<(), OpenError> {
     }
 }
 
-/// What is at a path to which a file is to be written.
+/// Result of checking a path to which a file is to be written.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) enum Found {
-    /// Nothing that would be lost. What else is wrong with the path is told when it is written to.
+    /// Nothing that would be lost. Other problems with the path are reported when the file is written.
     Nothing,
     /// Another file.
     File,
-    /// A file that the program needs, and why nothing may be saved over it.
+    /// A file in use, and why it must not be overwritten.
     InUse(String),
 }
 
-/// Paths that are being looked at.
+/// Paths that are being checked.
 pub(super) struct PathLooks {
     wake: Wake,
     under_way: Vec<(PathBuf, Job<Found>)>,
 }
 
 impl PathLooks {
-    /// None yet. `wake` is called when something was found.
+    /// None yet. `wake` is called when a path has been checked.
     pub(super) fn new(wake: Wake) -> Self {
         Self {
             wake,
@@ -285,19 +285,19 @@ impl PathLooks {
         }
     }
 
-    /// Looks at `path`, on which nothing is `used` that may be lost.
+    /// Checks `path`, which must not be one of the files `used`.
     pub(super) fn start(&mut self, path: PathBuf, used: Vec<FileInUse>) {
-        // Each has a thread of its own: one that never ends holds no other up.
+        // Each check has its own thread: one that never ends does not block the others.
         let mut job = Job::prompt("path", Arc::clone(&self.wake));
-        let looked_at = path.clone();
+        let checked = path.clone();
         job.start(
-            move |_| look(&looked_at, &used),
+            move |_| look(&checked, &used),
             |found| found.unwrap_or_else(|error| Found::InUse(error.to_string())),
         );
         self.under_way.push((path, job));
     }
 
-    /// The next path of which something is known.
+    /// Returns the next path that has been checked, with the result.
     pub(super) fn next_found(&mut self) -> Option<(PathBuf, Found)> {
         let mut jobs = self.under_way.iter().enumerate();
         let (number, found) = jobs.find_map(|(number, (_, job))| Some((number, job.next_event()?)))?;
@@ -309,7 +309,7 @@ impl PathLooks {
 fn look(path: &Path, used: &[FileInUse]) -> Found {
     match refuse_in_use(path, used) {
         Err(reason) => Found::InUse(reason),
-        // A folder is no file that could be lost, and a pipe or a device is there to be written to.
+        // A folder is not a file that could be lost, and a pipe or a device is meant to be written to.
         Ok(()) if fs::metadata(path).is_ok_and(|found| found.is_file()) => Found::File,
         Ok(()) => Found::Nothing,
     }
@@ -320,7 +320,7 @@ impl DecouplerWindow {
     pub(super) fn take_dropped(&mut self, ctx: &Context, effects: &mut Vec<Effect>) {
         let dropped = ctx.input_mut(|input| std::mem::take(&mut input.raw.dropped_files));
         let paths: Vec<PathBuf> = dropped.iter().map(|file| file.path().to_owned()).collect();
-        // A question is to be answered first.
+        // A question must be answered first.
         if paths.is_empty() || self.is_asked() {
             return;
         }
@@ -335,7 +335,7 @@ impl DecouplerWindow {
         }
     }
 
-    /// Says over the window what dropping the files under the pointer does.
+    /// Shows over the window what dropping the files under the pointer will do.
     pub(super) fn dropping_ui(&self, ui: &Ui) {
         let is_hovered = ui.input(|input| !input.raw.hovered_files.is_empty());
         if !is_hovered || self.is_asked() {
@@ -361,7 +361,7 @@ impl DecouplerWindow {
     }
 }
 
-/// Returns a sentence on what dropping these files does.
+/// Returns a sentence on what dropping these files will do.
 fn in_words(paths: &[PathBuf], is_busy: bool, has_recording: bool) -> &'static str {
     // Only their names: reading files would block the window.
     let is_document = |path: &PathBuf| {
@@ -388,32 +388,32 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_file_is_told_also_one_whose_writing_panicked() {
+    fn every_file_is_reported_even_if_writing_it_panicked() {
         let (woke, wakes) = channel();
         let mut files = Files::new(Arc::new(move || woke.send(()).unwrap_or(())));
         let folder = tempfile::tempdir().unwrap();
         let [whole, broken, missing] = ["whole", "broken", "none/missing"].map(|name| folder.path().join(name));
-        let told = "it is there".to_owned();
-        files.write(whole, move |path| fs::write(path, "text").map(|()| told));
+        let message = "it is there".to_owned();
+        files.write(whole, move |path| fs::write(path, "text").map(|()| message));
         files.write(broken.clone(), |_| -> Result<String, WriteError> { panic!("a defect") });
         files.write(missing, |path| {
             decoupler_files::export::atomic_write(path, |_| Ok(())).map(|()| String::new())
         });
         assert_eq!(files.paths().count(), 3);
-        let mut told = Vec::new();
-        while told.len() < 3 {
+        let mut written = Vec::new();
+        while written.len() < 3 {
             wakes.recv_timeout(Duration::from_secs(60)).unwrap();
-            told.extend(std::iter::from_fn(|| files.next_written()));
+            written.extend(std::iter::from_fn(|| files.next_written()));
         }
         assert_eq!(files.paths().count(), 0);
-        let has = |wanted: &dyn Fn(&Result<String, String>) -> bool| told.iter().any(wanted);
-        assert!(has(&|told| told.as_deref() == Ok("it is there")));
-        assert!(has(&|told| told
+        let has = |wanted: &dyn Fn(&Result<String, String>) -> bool| written.iter().any(wanted);
+        assert!(has(&|outcome| outcome.as_deref() == Ok("it is there")));
+        assert!(has(&|outcome| outcome
             .as_ref()
             .is_err_and(|reason| reason.contains("does not exist"))));
         let name = broken.display().to_string();
-        assert!(has(&|told| {
-            let reason = told.as_ref().err();
+        assert!(has(&|outcome| {
+            let reason = outcome.as_ref().err();
             reason.is_some_and(|reason| reason.contains(&name) && reason.contains("a defect"))
         }));
     }

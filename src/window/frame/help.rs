@@ -9,16 +9,16 @@ use crate::window::{
     },
 };
 
-/// Keys that the part of the window in focus hears.
+/// Keys handled by the focused part of the window.
 const IN_FOCUS: [(&str, &str); 8] = [
     ("Turn a surface", "Arrows"),
     ("Zoom a surface", "+ and −"),
-    ("Usual camera", "Home"),
-    ("Set a field to its usual value", "Double-click"),
+    ("Reset the camera", "Home"),
+    ("Reset a field to its default", "Double-click"),
     ("Copy a value, a table or a picture", "Right click"),
     ("Next control", "Tab"),
     ("Previous control", "Shift+Tab"),
-    ("Close what lies above the window", "Escape"),
+    ("Close a dialog", "Escape"),
 ];
 
 /// Page of the help.
@@ -31,11 +31,11 @@ pub(super) enum Page {
     Glossary,
 }
 
-/// The help, open.
+/// The open help.
 #[derive(Debug, Default)]
 pub(super) struct Help {
     pub(super) page: Page,
-    /// Text that the displayed terms contain.
+    /// Search text: only terms that contain it are displayed.
     pub(super) typed: String,
 }
 
@@ -97,7 +97,7 @@ fn keys_ui(ui: &mut Ui, actions: &[Action]) {
     });
 }
 
-/// The terms that contain what is typed, under the headings of their groups.
+/// Shows the terms that contain the search text, under the headings of their groups.
 fn glossary_ui(ui: &mut Ui, typed: &mut String) {
     let field = TextEdit::singleline(typed)
         .hint_text("Search terms")

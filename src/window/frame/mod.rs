@@ -1,5 +1,5 @@
-//! The window: it lays the views out, hears the events of the training and of files, and applies in one place what views
-//! ask for.
+//! The window: it lays out the views, handles the events of the training and of files, and applies the effects requested
+//! by views in one place.
 
 mod actions;
 mod applying;

@@ -5,97 +5,97 @@ use crate::window::{
     theme::{Theme, radius},
 };
 
-/// Most notices at a time: they take their room from the view below.
+/// Maximum number of notices shown at a time: they take space from the view below.
 const MAX: usize = 4;
 
-/// Time after which a notice that something worked closes by itself, from when it was first shown.
+/// Time after which a notice of success closes by itself, from when it was first shown.
 const DONE_SECONDS: f64 = 10.0;
 
 /// Notices to the user, from oldest to newest.
 #[derive(Debug, Default)]
-pub(super) struct Notices(Vec<Told>);
+pub(super) struct Notices(Vec<Entry>);
 
 #[derive(Debug)]
-struct Told {
+struct Entry {
     matter: Matter,
     notice: Notice,
     /// Time of the first frame that shows it, in seconds.
     since: Option<f64>,
 }
 
-impl Told {
+impl Entry {
     fn is_done(&self) -> bool {
         matches!(self.notice, Notice::Done(_))
     }
 }
 
 impl Notices {
-    /// Tells the user. What worked takes the place of all that was said about the same; a failure only that of the events
-    /// that it worked, or of the same words.
-    pub(super) fn tell(&mut self, matter: Matter, notice: Notice) {
-        let works = matches!(notice, Notice::Done(_));
-        let told = &mut self.0;
-        told.retain(|old| old.matter != matter || !(works || old.is_done() || old.notice == notice));
-        told.push(Told {
+    /// Adds a notice. A success replaces all notices about the same matter; a failure replaces only successes and an
+    /// identical failure.
+    pub(super) fn add(&mut self, matter: Matter, notice: Notice) {
+        let is_success = matches!(notice, Notice::Done(_));
+        let entries = &mut self.0;
+        entries.retain(|old| old.matter != matter || !(is_success || old.is_done() || old.notice == notice));
+        entries.push(Entry {
             matter,
             notice,
             since: None,
         });
-        if told.len() > MAX {
+        if entries.len() > MAX {
             // The newest is never the one to go.
-            let oldest = told[..MAX].iter().position(Told::is_done).unwrap_or(0);
-            told.remove(oldest);
+            let oldest = entries[..MAX].iter().position(Entry::is_done).unwrap_or(0);
+            entries.remove(oldest);
         }
     }
 
-    /// Shows that it failed.
+    /// Adds a failure.
     pub(super) fn fail(&mut self, matter: Matter, reason: impl ToString) {
-        self.tell(matter, Notice::Failed(reason.to_string()));
+        self.add(matter, Notice::Failed(reason.to_string()));
     }
 
-    /// Takes away all that was said about this.
+    /// Removes all notices about this.
     pub(super) fn settle(&mut self, matter: Matter) {
-        self.0.retain(|told| told.matter != matter);
+        self.0.retain(|entry| entry.matter != matter);
     }
 
-    /// Takes away the one in this place.
+    /// Removes the notice in this place.
     pub(super) fn dismiss(&mut self, place: usize) {
         self.0.remove(place);
     }
 
-    /// The newest.
+    /// Returns the newest notice.
     pub(super) fn newest(&self) -> Option<&Notice> {
-        self.0.last().map(|told| &told.notice)
+        self.0.last().map(|entry| &entry.notice)
     }
 
-    /// All, with what they are about.
+    /// Returns all notices with their subjects.
     pub(super) fn iter(&self) -> impl Iterator<Item = (Matter, &Notice)> {
-        self.0.iter().map(|told| (told.matter, &told.notice))
+        self.0.iter().map(|entry| (entry.matter, &entry.notice))
     }
 
-    /// Closes what has been shown long enough at the time `now`, that of a frame. Returns the seconds until the next
-    /// closes, if one does by itself.
+    /// Closes the notices that have been shown long enough at the frame time `now`. Returns the seconds until the next one
+    /// closes by itself, if any.
     pub(super) fn pass(&mut self, now: f64) -> Option<f64> {
-        let remaining = |told: &Told| DONE_SECONDS - (now - told.since.unwrap_or(now));
-        self.0.retain(|told| !told.is_done() || remaining(told) > 0.0);
-        for told in &mut self.0 {
-            told.since.get_or_insert(now);
+        let remaining = |entry: &Entry| DONE_SECONDS - (now - entry.since.unwrap_or(now));
+        self.0.retain(|entry| !entry.is_done() || remaining(entry) > 0.0);
+        for entry in &mut self.0 {
+            entry.since.get_or_insert(now);
         }
-        let closing = self.0.iter().filter(|told| told.is_done());
+        let closing = self.0.iter().filter(|entry| entry.is_done());
         closing.map(remaining).min_by(f64::total_cmp)
     }
 }
 
-/// Reply of the user to a notice.
+/// Answer of the user to a notice.
 pub enum Reply {
-    /// It has been read.
+    /// Dismiss it.
     Dismiss,
-    /// The training thread shall start again.
+    /// Restart the training thread.
     Restart,
 }
 
-/// A strip above the work: what went wrong and what to do, or that something worked. The training thread can be started
-/// again from it if it `can_restart`.
+/// Shows the notices in a strip above the view: failures with what to do, and successes. The training thread can be
+/// restarted from it if `can_restart`.
 pub fn notice_ui(ui: &mut Ui, notice: &Notice, can_restart: bool) -> Option<Reply> {
     let mut reply = None;
     let palette = Theme::of(ui).palette;
@@ -132,7 +132,7 @@ mod tests {
 
     fn texts(notices: &Notices) -> Vec<&str> {
         let all = notices.0.iter();
-        all.map(|told| match &told.notice {
+        all.map(|entry| match &entry.notice {
             Notice::Done(text) | Notice::Failed(text) => text.as_str(),
         })
         .collect()
@@ -150,7 +150,7 @@ mod tests {
         notices.fail(Matter::File, "read-only");
         notices.fail(Matter::RunList, "unreadable");
         assert_eq!(texts(&notices), ["no folder", "read-only", "unreadable"]);
-        notices.tell(Matter::File, done("saved"));
+        notices.add(Matter::File, done("saved"));
         assert_eq!(texts(&notices), ["unreadable", "saved"]);
         notices.fail(Matter::File, "full");
         assert_eq!(texts(&notices), ["unreadable", "full"]);
@@ -161,7 +161,7 @@ mod tests {
     #[test]
     fn what_works_closes_by_itself_and_what_failed_does_not() {
         let mut notices = Notices::default();
-        notices.tell(Matter::File, done("saved"));
+        notices.add(Matter::File, done("saved"));
         notices.fail(Matter::RunList, "unreadable");
         // It is added long before it is shown.
         assert_eq!(notices.pass(1000.0), Some(10.0));
@@ -176,12 +176,12 @@ mod tests {
     fn the_list_stays_short_and_keeps_failures_longest() {
         let mut notices = Notices::default();
         notices.fail(Matter::RunList, "0");
-        notices.tell(Matter::Training, done("1"));
+        notices.add(Matter::Training, done("1"));
         for number in 2..5 {
             notices.fail(Matter::File, number);
         }
         assert_eq!(texts(&notices), ["0", "2", "3", "4"]);
-        notices.tell(Matter::Memory, done("5"));
+        notices.add(Matter::Memory, done("5"));
         assert_eq!(texts(&notices), ["2", "3", "4", "5"]);
     }
 }

@@ -18,15 +18,15 @@ use crate::window::{
     shared::{Matter, SourceKind},
 };
 
-/// The size of a window that remembers none, in points.
+/// Default size of the window, in points.
 const DEFAULT_SIZE_POINTS: [f32; 2] = [1440.0, 900.0];
 
-/// The least size of a window, in points.
+/// Minimum size of the window, in points.
 pub(super) const MIN_SIZE_POINTS: [f32; 2] = [960.0, 640.0];
 
-/// State of a window that the next one finds again: each value only once the user has had it so.
+/// State of the window that is restored at the next start. A value is stored only once the user has set it.
 ///
-/// In the file, a value that cannot be read or is out of its limits counts as missing.
+/// In the file, a value that cannot be read or is outside its limits counts as missing.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub(super) struct Remembered {
@@ -57,10 +57,10 @@ pub(super) struct Remembered {
     /// Width and height of the window.
     #[serde(deserialize_with = "if_readable")]
     pub(super) size_points: Option<[f32; 2]>,
-    /// Size of text and controls as a share of the usual one, if the user has chosen one.
+    /// Interface scale relative to the default, if the user has chosen one.
     #[serde(deserialize_with = "if_readable")]
     pub(super) scale: Option<f32>,
-    /// Width of the column on the left, if the user has drawn it wider or narrower.
+    /// Width of the column on the left, if the user has changed it.
     #[serde(deserialize_with = "if_readable")]
     pub(super) form_points: Option<f32>,
     /// As for the column on the right.
@@ -68,7 +68,7 @@ pub(super) struct Remembered {
     pub(super) report_points: Option<f32>,
 }
 
-/// The file in which a window remembers how it was left, as it is at the start.
+/// The file of the remembered state, as read at the start.
 #[derive(Clone, Debug)]
 pub struct WindowFile {
     pub(super) path: PathBuf,
@@ -76,7 +76,7 @@ pub struct WindowFile {
 }
 
 impl WindowFile {
-    /// Reads the file at `path`; one that is missing or of another kind carries no information.
+    /// Reads the file at `path`; a missing or invalid file counts as empty.
     pub fn read(path: PathBuf) -> Self {
         let remembered = Remembered::read(&path);
         Self { path, remembered }
@@ -91,7 +91,7 @@ impl Remembered {
         read
     }
 
-    /// Writes the file at `path`, whose folder is made if it is missing.
+    /// Writes the file at `path`, and creates its folder if it is missing.
     pub(super) fn write(&self, path: &Path) -> Result<(), WriteError> {
         if let Some(folder) = path.parent() {
             fs::create_dir_all(folder).map_err(|source| WriteError::io(folder, source))?;
@@ -101,7 +101,7 @@ impl Remembered {
         })
     }
 
-    /// Width and height with which the window opens; the window system keeps them to the screen.
+    /// Returns the width and height with which the window opens; the window system limits them to the screen.
     pub(super) fn opening_size_points(&self) -> [f32; 2] {
         let is_possible = |size: &[f32; 2]| {
             let mut sides = size.iter().zip(MIN_SIZE_POINTS);
@@ -110,13 +110,13 @@ impl Remembered {
         self.size_points.filter(is_possible).unwrap_or(DEFAULT_SIZE_POINTS)
     }
 
-    /// Takes the size of a window.
+    /// Remembers the size of a window.
     pub(super) fn take_size_points(&mut self, size: [f32; 2]) {
         self.size_points = Some(size.map(f32::round));
     }
 }
 
-/// The value, or none if it is of another kind than this program writes.
+/// Returns the value, or none if it cannot be read as what this program writes.
 fn if_readable<'de, D: Deserializer<'de>, T: DeserializeOwned>(deserializer: D) -> Result<Option<T>, D::Error> {
     let value = serde_json::Value::deserialize(deserializer)?;
     Ok(serde_json::from_value(value).ok())
@@ -136,11 +136,11 @@ const LONGEST_WAIT: Duration = Duration::from_secs(2);
 
 type Written = Result<Result<(), WriteError>, JobError>;
 
-/// The file that keeps what a window remembers, written in the background.
+/// The file of the remembered state, written in the background.
 #[derive(Debug)]
 pub(super) struct Memory {
     path: PathBuf,
-    /// The contents of the file, or of the one on its way there.
+    /// Contents of the file, or those being written to it.
     written: Remembered,
     latest: Remembered,
     job: Job<Written>,
@@ -159,7 +159,7 @@ impl Memory {
         }
     }
 
-    /// Keeps what is to be remembered now; writes it if `may_write`, and else later.
+    /// Updates the state to be remembered; writes it if `may_write`, otherwise later.
     fn keep(&mut self, latest: Remembered, may_write: bool) {
         self.latest = latest;
         if may_write && self.latest != self.written && !self.job.is_under_way() {
@@ -169,7 +169,7 @@ impl Memory {
         }
     }
 
-    /// Returns the reason for which nothing is remembered, once.
+    /// Returns the reason why nothing is remembered, once.
     fn next_failure(&mut self) -> Option<String> {
         let reason = match self.job.next_event()? {
             Ok(Ok(())) => return None,
@@ -177,7 +177,7 @@ impl Memory {
             Err(error) => error.to_string(),
         };
         let is_first = !std::mem::replace(&mut self.has_told, true);
-        is_first.then(|| format!("View, theme and settings will not be found again at the next start: {reason}"))
+        is_first.then(|| format!("View, theme and settings will not be restored at the next start: {reason}"))
     }
 }
 
@@ -185,7 +185,7 @@ impl Drop for Memory {
     fn drop(&mut self) {
         self.job.wait(LONGEST_WAIT);
         if self.latest != self.written && !self.has_told {
-            // No one is left to be predicted.
+            // No one is left to notify.
             let _ = self.latest.write(&self.path);
         }
     }
@@ -204,7 +204,7 @@ impl DecouplerWindow {
                 self.remembered.plan = Some(Plan::clone(plan));
             }
             Ok(_) => {}
-            // An import that is incomplete now may be completed again.
+            // An import that is incomplete now may be completed later.
             Err(_) if self.views.has_recording() => {}
             Err(_) => self.remembered.plan = None,
         }
@@ -217,7 +217,7 @@ impl DecouplerWindow {
             let size = self.ctx.content_rect().size() * self.ctx.zoom_factor();
             self.remembered.take_size_points(size.into());
         }
-        // What is being dragged is written when it is let go.
+        // A drag is written when it ends.
         memory.keep(self.remembered.clone(), !is_held);
         if let Some(reason) = memory.next_failure() {
             self.notices.fail(Matter::Memory, reason);

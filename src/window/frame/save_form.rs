@@ -23,28 +23,28 @@ pub struct Saving {
     stage: PathEntry,
 }
 
-/// PathEntry of giving a path.
+/// State of the path entry.
 #[derive(Clone, Debug, PartialEq, Eq)]
 enum PathEntry {
     /// The form has just opened.
     Opening,
     /// The path is being typed.
     Typing,
-    /// The path is being looked at.
+    /// The path is being checked.
     Looking,
-    /// There is another file, and the user is asked whether it is to be replaced.
+    /// Another file exists there, and the user is asked whether to replace it.
     Asking,
-    /// Nothing may be saved there, and why.
+    /// Nothing may be saved there, with the reason.
     Refused(String),
 }
 
-/// Reply of the user to the question for a path.
+/// Answer of the user to the form.
 pub enum Reply {
-    /// This is it.
+    /// Use this path.
     Path(PathBuf),
-    /// This is it, even if the file there is lost.
+    /// Use this path and replace the file there.
     Replace(PathBuf),
-    /// There shall be no file.
+    /// Cancel.
     Cancel,
 }
 
@@ -58,17 +58,17 @@ impl Saving {
         }
     }
 
-    /// The path, as a path.
+    /// Returns the typed path.
     fn path(&self) -> PathBuf {
         PathBuf::from(self.path.trim())
     }
 
-    /// Waits for what is at the path.
+    /// Waits for the check of the path.
     pub(super) fn wait_for_look(&mut self) {
         self.stage = PathEntry::Looking;
     }
 
-    /// Takes what was found at a path; returns true if the file can be written there without a question.
+    /// Takes the result of checking a path; returns true if the file can be written there without a question.
     pub(super) fn take(&mut self, path: &Path, found: Found) -> bool {
         // Another path may have been typed since.
         if self.stage != PathEntry::Looking || self.path() != path {
@@ -108,14 +108,14 @@ pub fn save_form_ui(ui: &mut Ui, saving: &mut Saving) -> Option<Reply> {
     reply
 }
 
-/// The field for the path, with what is to be said about it. Returns true if Enter was pressed in it.
+/// The field for the path, with notes about it. Returns true if Enter was pressed in it.
 fn path_ui(ui: &mut Ui, saving: &mut Saving) -> bool {
     let label = ui.label("File");
     let id = Id::unique("path of a file");
     let edit = TextEdit::singleline(&mut saving.path).id(id);
     let edit = ui.add(edit.desired_width(f32::INFINITY)).labelled_by(label.id);
     let has_entered = edit.lost_focus() && ui.input(|input| input.key_pressed(Key::Enter));
-    // Typing and Enter are all it takes; Tab still reaches the buttons.
+    // Typing and Enter are enough; Tab still reaches the buttons.
     if ui.memory(|memory| memory.focused().is_none()) {
         edit.request_focus();
     }
@@ -135,18 +135,18 @@ fn path_ui(ui: &mut Ui, saving: &mut Saving) -> bool {
             let name = name.file_name().unwrap_or(name.as_os_str()).to_string_lossy();
             note_ui(
                 ui,
-                &format!("{name} exists already. Replacing it deletes its contents."),
+                &format!("{name} already exists. Replacing it deletes its contents."),
             );
         }
         PathEntry::Looking => {
-            dim_ui(ui, "Looking whether a file of this name exists…");
+            dim_ui(ui, "Checking whether a file of this name exists…");
         }
         PathEntry::Opening | PathEntry::Typing => {}
     }
     has_entered
 }
 
-/// Selects the whole path, so that what is typed takes its place.
+/// Selects the whole path, so that typing replaces it.
 fn select_all(ctx: &Context, id: Id, path: &str) {
     let mut state = TextEditState::load(ctx, id).unwrap_or_default();
     let whole = CCursorRange::two(CCursor::new(0), CCursor::new(path.chars().count()));
@@ -169,7 +169,7 @@ fn buttons_ui(ui: &mut Ui, saving: &Saving, has_entered: bool) -> Option<Reply> 
     reply
 }
 
-/// The question whether the file is to be replaced. Where the button to save was, a second click or Enter changes nothing.
+/// Asks whether to replace the file. Where the button to save was, a second click or Enter does nothing.
 fn question_ui(ui: &mut Ui, saving: &Saving) -> Option<Reply> {
     let mut reply = None;
     ui.with_layout(Layout::left_to_right(Align::Center), |ui| {

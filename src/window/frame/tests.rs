@@ -57,8 +57,8 @@ impl Opened {
             if holds(&self.window) {
                 return;
             }
-            let news = self.woken.recv_timeout(Duration::from_secs(60));
-            assert!(news.is_ok(), "it never came: {:?}", self.window.shared);
+            let event = self.woken.recv_timeout(Duration::from_secs(60));
+            assert!(event.is_ok(), "it never came: {:?}", self.window.shared);
         }
     }
 }
@@ -161,7 +161,7 @@ fn a_training_that_cannot_begin_leaves_the_one_before_to_be_exported() {
     window.apply(Effect::Train);
     window.wait(|window| window.notice().is_some());
     assert!(matches!(window.notice(), Some(Notice::Failed(_))));
-    assert_eq!(window.shared.phase, ended, "the current training has ended so");
+    assert_eq!(window.shared.phase, ended, "the current training has ended in this way");
     assert!(window.shared.result().is_some());
 
     window.apply(Effect::Settle(Matter::Settings));

@@ -1,4 +1,4 @@
-//! The Export menu: everything that the current view can export, drawn from one list.
+//! The top bar with the Export menu of the current view, and the widths of the columns below it.
 
 use std::ops::RangeInclusive;
 
@@ -14,13 +14,13 @@ use crate::window::{
     widgets::{Landmark, ghost_button, section_heading_ui, segmented_ui},
 };
 
-/// Width from which on there is room for everything, in points.
+/// Width from which everything fits, in points.
 const WIDE: f32 = 1280.0;
 
-/// Width below which the names of the views stand closer.
+/// Width below which the names of the views are closer together.
 const TIGHT: f32 = 1100.0;
 
-/// Width below which every point counts.
+/// Width below which the mark is left out.
 const NARROW: f32 = 1000.0;
 
 /// Names of the actions that change the theme.
@@ -35,8 +35,8 @@ pub(super) enum Reach {
     Action(String),
 }
 
-/// Name, views, and the tools of the displayed one, which `tools_ui` lays out from right to left, before what the window
-/// itself does.
+/// Name, views, and the tools of the displayed view, which `tools_ui` lays out from right to left, before the tools of the
+/// window itself.
 pub(super) fn top_bar_ui(
     ui: &mut Ui,
     views: &[(usize, &str)],
@@ -47,12 +47,12 @@ pub(super) fn top_bar_ui(
     ui.horizontal_centered(|ui| {
         ui.add_space(space(1));
         let width = ui.available_width();
-        // Where there is little room, what the list of actions does too goes first.
+        // In a narrow window, tools that are also in the list of actions are left out first.
         let (is_wide, is_narrow) = (width >= WIDE, width < NARROW);
         if !is_narrow {
             mark_ui(ui);
         }
-        // The title of the window says it too.
+        // The title of the window repeats the name.
         if is_wide {
             ui.add(Label::new(RichText::new("Decoupler").font(semibold(type_size().title))).selectable(false));
         }
@@ -107,7 +107,7 @@ fn action_button_ui(ui: &mut Ui, actions: &[Action], name: &str, text: &str) -> 
 fn mark_ui(ui: &mut Ui) {
     let theme = Theme::of(ui);
     let (rect, _) = ui.allocate_exact_size(Vec2::splat(space(5)), Sense::hover());
-    // Three wires crossed by three, with one node pressed: the sensor in small.
+    // Three wires crossed by three, with one node pressed: the sensor in miniature.
     let painter = ui.painter();
     let stroke = Stroke::new(1.2, theme.palette.dim);
     let inner = rect.shrink(space(1) - 1.0);
@@ -121,10 +121,10 @@ fn mark_ui(ui: &mut Ui) {
 
 const WIDTH: f32 = space(88);
 
-/// The button that opens the menu. `exports` lists what there is; it is called only while the menu is open.
+/// The button that opens the menu. `exports` lists the exports; it is called only while the menu is open.
 pub(super) fn export_menu_ui<'a>(ui: &mut Ui, exports: impl FnOnce() -> Vec<Export<'a>>, effects: &mut Vec<Effect>) {
     let (button, _) = MenuButton::from_button(ghost_button("Export")).ui(ui, |ui| {
-        // What the window cannot hold is scrolled to.
+        // A menu taller than the window scrolls.
         let most = ui.ctx().content_rect().height() - space(20);
         let scroll = ScrollArea::vertical().max_height(most).min_scrolled_height(most);
         let margin = Margin {
@@ -149,11 +149,11 @@ pub(super) fn export_menu_ui<'a>(ui: &mut Ui, exports: impl FnOnce() -> Vec<Expo
     button.on_hover_text("Networks, reports, figures and tables of this view, as files or to the clipboard.");
 }
 
-/// One line for each thing, with a button for each of its forms; a reason, where there is one, is told once for all that
-/// follow each other and share it. Returns what was asked for.
+/// One line for each item, with a button for each of its forms. Consecutive items that are unavailable for the same reason
+/// show it once. Returns the requested export.
 fn exports_ui<'a>(ui: &mut Ui, exports: Vec<Export<'a>>) -> Option<Ask<'a>> {
     let mut asked = None;
-    let mut told = String::new();
+    let mut last_reason = String::new();
     let mut group = None;
     let mut exports = gathered(exports).into_iter().peekable();
     while let Some(first) = exports.next() {
@@ -161,11 +161,11 @@ fn exports_ui<'a>(ui: &mut Ui, exports: Vec<Export<'a>>) -> Option<Ask<'a>> {
             section_heading_ui(ui, &first.group.heading());
         }
         let reason = first.ask.as_ref().err().cloned().unwrap_or_default();
-        if reason != told && !reason.is_empty() {
+        if reason != last_reason && !reason.is_empty() {
             let text = RichText::new(&reason).size(type_size().note);
             ui.label(text.color(Theme::of(ui).palette.dim));
         }
-        told = reason;
+        last_reason = reason;
         let name = first.name.clone();
         let mut forms = vec![first];
         while let Some(next) = exports.next_if(|next| next.group == forms[0].group && next.name == name) {
@@ -191,7 +191,7 @@ fn exports_ui<'a>(ui: &mut Ui, exports: Vec<Export<'a>>) -> Option<Ask<'a>> {
     asked
 }
 
-/// The exports with those of one group together, in the order in which the groups begin: each has one heading.
+/// Returns the exports grouped, with the groups in order of their first export: each has one heading.
 fn gathered(mut exports: Vec<Export<'_>>) -> Vec<Export<'_>> {
     let mut groups = Vec::new();
     for export in &exports {
@@ -218,38 +218,38 @@ fn form_ui<'a>(ui: &mut Ui, export: Export<'a>) -> Option<Ask<'a>> {
     }
 }
 
-/// Widths of the column on the left between which its names stand clear of their values.
+/// Widths of the column on the left at which its names do not touch their values.
 const FORM_POINTS: RangeInclusive<f32> = space(62)..=space(110);
 
-/// Width of the column on the right, unless the user has drawn it wider or narrower.
+/// Default width of the column on the right.
 const REPORT_POINTS: f32 = space(96);
 
-/// Widths of the column on the right at which its table is whole.
+/// Widths of the column on the right at which its table fits.
 const REPORT_LIMITS_POINTS: RangeInclusive<f32> = space(82)..=space(140);
 
-/// Least width of the middle, which columns drawn wider leave to it.
+/// Minimum width of the middle, which wider columns must leave.
 const MIN_MIDDLE_POINTS: f32 = space(176);
 
-/// Widths of the columns in this window: those that the user has drawn, as far as the middle allows.
+/// Returns the widths of the columns in this window: those chosen by the user, as far as the middle allows.
 pub(super) fn widths_points(columns: &Columns, remembered: &Remembered, window: f32) -> [f32; 2] {
     let room = window - MIN_MIDDLE_POINTS;
-    let beside = if columns.has_report {
+    let for_report = if columns.has_report {
         *REPORT_LIMITS_POINTS.start()
     } else {
         0.0
     };
-    let form = drawn(remembered.form_points, &FORM_POINTS, room - beside).unwrap_or(columns.form_width);
+    let form = drawn(remembered.form_points, &FORM_POINTS, room - for_report).unwrap_or(columns.form_width);
     let report = drawn(remembered.report_points, &REPORT_LIMITS_POINTS, room - form).unwrap_or(REPORT_POINTS);
     [form, report]
 }
 
 fn drawn(width: Option<f32>, limits: &RangeInclusive<f32>, room: f32) -> Option<f32> {
-    let (&least, &most) = (limits.start(), limits.end());
-    Some(width?.clamp(least, room.clamp(least, most)))
+    let (&min, &max) = (limits.start(), limits.end());
+    Some(width?.clamp(min, room.clamp(min, max)))
 }
 
-/// The edge of a column, to be dragged: `panel` is at the left of the window or at the right. A double click gives
-/// the column its usual width, which is none of its own.
+/// The draggable edge of a column: `panel` is on the left or on the right of the window. A double click restores the
+/// default width by clearing `width`.
 pub(super) fn edge_ui(ui: &Ui, label: &str, panel: Rect, is_left: bool, width: &mut Option<f32>) {
     let edge = if is_left { panel.right() } else { panel.left() };
     // The scroll bar of the column on the left ends where this begins.

@@ -13,7 +13,7 @@ use crate::window::{
 struct Step {
     title: &'static str,
     text: &'static str,
-    /// Its subject, which is ringed.
+    /// Its subject, which is outlined.
     landmark: Landmark,
     /// Name of the action that a button does.
     action: Option<&'static str>,
@@ -29,8 +29,8 @@ const STEPS: [Step; 5] = [
     },
     Step {
         title: "Choose an array and a network",
-        text: "Array scale, hidden nodes and method make a training. Everything else is folded beneath them and set \
-               already. Rest the pointer on a term to read what it means.",
+        text: "Array scale, hidden nodes and method define a training. Everything else is folded below and has default \
+               values. Rest the pointer on a term to read what it means.",
         landmark: Landmark::Choices,
         action: None,
     },
@@ -44,13 +44,13 @@ const STEPS: [Step; 5] = [
     Step {
         title: "Read the errors",
         text: "A network is worth its training if it beats the training mean and the linear map. Where it does not, a \
-               mark in the table says so, and a note what would help.",
+               mark in the table says so, and a note suggests a remedy.",
         landmark: Landmark::Errors,
         action: None,
     },
     Step {
         title: "Take the network with you",
-        text: "Export hands it out as ONNX, C99, MATLAB, NumPy or JSON. Each file is read back and compared with the \
+        text: "Export saves it as ONNX, C99, MATLAB, NumPy or JSON. Each file is read back and compared with the \
                network before you get it.",
         landmark: Landmark::Export,
         action: None,
@@ -77,18 +77,18 @@ pub(super) enum Reply {
     End,
 }
 
-/// Shows the card of the step next to what it is about, which is ringed; nothing while that is out of view.
+/// Shows the card of the step next to its subject, which is outlined; nothing while the subject is out of view.
 pub(super) fn tour_ui(ui: &Ui, tour: Tour, actions: &[Action]) -> Option<Reply> {
     let step = STEPS.get(tour.step)?;
     let place = step.landmark.place(ui.ctx())?;
     let palette = Theme::of(ui).palette;
     let id = Id::unique("tour");
     let size = size_of(ui.ctx(), id);
-    let at = beside(place, size, ui.ctx().content_rect());
+    let at = corner_near(place, size, ui.ctx().content_rect());
     let mut reply = None;
     let card = Area::new(id).order(Order::Foreground).fixed_pos(at).constrain(true);
     let card = card.show(ui.ctx(), |ui| {
-        // Around what the card is about, not within the card.
+        // Around the subject, not within the card.
         let ring = Stroke::new(2.0, palette.accent);
         let painter = ui.painter().with_clip_rect(ui.ctx().content_rect());
         painter.rect_stroke(place.expand(2.0), f32::from(radius()), ring, StrokeKind::Inside);
@@ -155,15 +155,15 @@ fn step_ui(ui: &mut Ui, tour: Tour, step: &Step, actions: &[Action]) -> Option<R
     reply
 }
 
-/// The size of the card when last drawn; before that about what it will be.
+/// Returns the size of the card when last drawn, or an estimate before that.
 fn size_of(ctx: &Context, id: Id) -> Vec2 {
     let known = ctx.data(|data| data.get_temp(id));
     known.unwrap_or(vec2(WIDTH + space(6), space(40)))
 }
 
-/// The corner of a card of this size near `place`, below it, next to it or above it: the first where it covers nothing of it
-/// and lies in the window.
-fn beside(place: Rect, size: Vec2, window: Rect) -> Pos2 {
+/// Returns the corner of a card of this size below, next to or above `place`: the first position in the window that does
+/// not cover it.
+fn corner_near(place: Rect, size: Vec2, window: Rect) -> Pos2 {
     const GAP: f32 = space(3);
     let window = window.shrink(space(1));
     let within = |at: Pos2| {
@@ -189,7 +189,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_card_covers_nothing_of_what_it_is_about() {
+    fn the_card_does_not_cover_its_subject() {
         let window = Rect::from_min_size(Pos2::ZERO, vec2(1024.0, 700.0));
         let size = vec2(364.0, 160.0);
         let places = [
@@ -200,10 +200,10 @@ mod tests {
             Rect::from_min_size(pos2(0.0, 0.0), vec2(600.0, 690.0)),
         ];
         for place in places {
-            let card = Rect::from_min_size(beside(place, size, window), size);
+            let card = Rect::from_min_size(corner_near(place, size, window), size);
             assert!(!card.intersects(place) && window.contains_rect(card), "{place}: {card}");
         }
-        // Nowhere is room: it stays in the window.
-        assert!(window.contains_rect(Rect::from_min_size(beside(window, size, window), size)));
+        // There is no room anywhere: the card stays in the window.
+        assert!(window.contains_rect(Rect::from_min_size(corner_near(window, size, window), size)));
     }
 }
