@@ -45,7 +45,7 @@ pub enum ScalingChoice {
     /// Each channel scaled to [−1, 1], as in the paper.
     #[default]
     MinMax,
-    /// Principal components scaled to unit variance, less where noise hides them.
+    /// Principal components scaled to unit variance, or to less where they are below the noise.
     Whitening,
 }
 
@@ -54,7 +54,7 @@ pub enum ScalingChoice {
 pub struct Inputs {
     quantity: Quantity,
     scaling: InputScaling,
-    /// `None` where the training set is not known.
+    /// `None` if the training set is not known.
     range: Option<ReadingRange>,
 }
 
@@ -68,7 +68,7 @@ pub enum InputScaling {
     Whitening(Whitening),
 }
 
-/// Error for a word that names no scaling.
+/// Error for an unknown scaling.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 #[error("'{0}' is not a scaling: give minmax or whiten")]
 pub struct ScalingChoiceError(String);
@@ -101,7 +101,7 @@ impl From<MinMax> for Inputs {
 }
 
 impl Inputs {
-    /// Creates inputs from a quantity and its fitted scaling, of an unknown training set.
+    /// Creates inputs from a quantity and its fitted scaling, without the range of the training set.
     pub fn new(quantity: Quantity, scaling: InputScaling) -> Self {
         Self {
             quantity,
@@ -110,7 +110,7 @@ impl Inputs {
         }
     }
 
-    /// Adds the range of the readings in training.
+    /// Adds the range of the readings in the training set.
     #[must_use]
     pub(super) fn with_range(self, range: Option<ReadingRange>) -> Self {
         Self { range, ..self }
@@ -118,9 +118,9 @@ impl Inputs {
 
     /// Fits the scaling to training resistances in ohm (samples × M4).
     ///
-    /// `unseen` is the noise of later readings that the training set lacks: none if the training set already contains it.
-    /// Whitening keeps at most half as many components as there are samples: of more, new samples are not the size of the
-    /// training set's, up to a multiple of it without bound where there are as many.
+    /// `unseen` is the noise of later readings that the training set lacks; none if the training set already contains
+    /// it. Whitening keeps at most half as many components as there are samples. With more, new samples are scaled to
+    /// larger values than the training set, without bound when there are as many components as samples.
     ///
     /// # Errors
     /// If there are no samples, a value is not finite or not in the domain of the quantity, or a range overflows.
@@ -129,26 +129,26 @@ impl Inputs {
         resistances_ohm: ArrayView2<'_, f64>,
         unseen: NoiseSource,
     ) -> Result<Self, ScalingError> {
-        Self::fit_most(choice, resistances_ohm, unseen, resistances_ohm.nrows() / 2)
+        Self::fit_components(choice, resistances_ohm, unseen, resistances_ohm.nrows() / 2)
     }
 
-    /// Fits the scaling with all components above the rounding of the readings, for a fit that itself penalises weak
-    /// components, and noise; see [`Self::fit`].
+    /// Fits the scaling with all components above the rounding of the readings, for a fit that itself penalises noise
+    /// and weak components; see [`Self::fit`].
     pub(crate) fn fit_all(choice: InputChoice, resistances_ohm: ArrayView2<'_, f64>) -> Result<Self, ScalingError> {
-        Self::fit_most(choice, resistances_ohm, NoiseSource::default(), usize::MAX)
+        Self::fit_components(choice, resistances_ohm, NoiseSource::default(), usize::MAX)
     }
 
-    fn fit_most(
+    fn fit_components(
         choice: InputChoice,
         resistances_ohm: ArrayView2<'_, f64>,
         unseen: NoiseSource,
-        most: usize,
+        max_components: usize,
     ) -> Result<Self, ScalingError> {
         let quantity = choice.quantity;
-        let foreign = resistances_ohm
+        let invalid = resistances_ohm
             .indexed_iter()
             .find(|(_, value)| !quantity.accepts(**value));
-        if let Some(((sample, channel), &value)) = foreign {
+        if let Some(((sample, channel), &value)) = invalid {
             return Err(ScalingError::Reading { sample, channel, value });
         }
         let values = resistances_ohm.mapv(|ohm| quantity.of(ohm));
@@ -157,13 +157,13 @@ impl Inputs {
             ScalingChoice::Whitening => {
                 let rounding = channel_rounding(quantity, resistances_ohm);
                 let unseen = channel_noise(quantity, resistances_ohm, unseen);
-                InputScaling::Whitening(Whitening::fit(values.view(), &rounding, &unseen, most)?)
+                InputScaling::Whitening(Whitening::fit(values.view(), &rounding, &unseen, max_components)?)
             }
         };
         Ok(Self::new(quantity, scaling).with_range(ReadingRange::of(resistances_ohm)))
     }
 
-    /// Returns the range of the readings in training, where that is known.
+    /// Returns the range of the readings in the training set, if it is known.
     pub fn range(&self) -> Option<&ReadingRange> {
         self.range.as_ref()
     }
@@ -203,8 +203,8 @@ impl Inputs {
         }
     }
 
-    /// Returns what each input is divided by to make it as large as any other: the deviations of whitened components; 1
-    /// for a channel scaled by its range.
+    /// Returns the divisor that equalises the size of each input: the deviation of a whitened component, or 1 for a
+    /// channel scaled by its range.
     pub(crate) fn deviations(&self) -> Vec<f64> {
         match &self.scaling {
             InputScaling::MinMax(_) => vec![1.0; self.count()],
@@ -212,8 +212,8 @@ impl Inputs {
         }
     }
 
-    /// Returns the changes of the inputs (sources × inputs) by one standard deviation of each source of `noise`: the
-    /// error of each channel that has one, and the common one.
+    /// Returns the changes of the inputs (sources × inputs) caused by one standard deviation of each source of `noise`:
+    /// the error of each channel that has one, and the common error.
     pub(crate) fn changes_of(&self, noise: &ChannelNoise) -> Array2<f64> {
         let (_, matrix) = self.affine();
         let own = noise.own.iter().enumerate().filter(|(_, deviation)| **deviation > 0.0);
@@ -233,19 +233,19 @@ impl Inputs {
     }
 
     /// Returns `true` if the limits, which may come from a file, are valid.
-    pub(crate) fn is_sound(&self) -> bool {
-        let is_scaling_sound = match &self.scaling {
-            InputScaling::MinMax(scaling) => scaling.is_sound(),
+    pub(crate) fn is_valid(&self) -> bool {
+        let is_scaling_valid = match &self.scaling {
+            InputScaling::MinMax(scaling) => scaling.is_valid(),
             // Validated when it is deserialised.
             InputScaling::Whitening(_) => true,
         };
         let (quantity, channels) = (self.quantity, self.channels());
         let mut range = self.range.iter();
-        is_scaling_sound && range.all(|range| range.is_sound(quantity, channels))
+        is_scaling_valid && range.all(|range| range.is_valid(quantity, channels))
     }
 }
 
-/// Returns the deviations of `quantity` that `noise` makes of `resistances_ohm` (samples × channels): root mean squares
+/// Returns the deviations of `quantity` caused by `noise` in `resistances_ohm` (samples × channels): root mean squares
 /// over the samples.
 pub(crate) fn channel_noise(
     quantity: Quantity,
@@ -268,7 +268,7 @@ pub(crate) fn channel_noise(
     }
 }
 
-/// Returns the deviations of `quantity` that the rounding of `resistances_ohm` (samples × channels) leaves.
+/// Returns the deviations of `quantity` caused by the rounding of `resistances_ohm` (samples × channels).
 fn channel_rounding(quantity: Quantity, resistances_ohm: ArrayView2<'_, f64>) -> Vec<f64> {
     let channels = resistances_ohm.columns().into_iter().zip(rounding(resistances_ohm));
     let deviation = |(channel, rounding_ohm): (ArrayView1<'_, f64>, f64)| {
@@ -283,7 +283,7 @@ mod tests {
     use ndarray::array;
 
     #[test]
-    fn the_affine_map_is_what_the_scaling_does() {
+    fn the_affine_map_agrees_with_the_scaling() {
         let resistances = array![
             [10.0, 20.0, 5.0],
             [11.0, 26.0, 5.0],

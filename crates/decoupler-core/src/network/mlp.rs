@@ -182,7 +182,7 @@ mod tests {
     }
 
     #[test]
-    fn without_inputs_it_answers_a_constant() {
+    fn without_inputs_the_output_is_constant() {
         let shape = Shape {
             inputs: 0,
             hidden: 1,
@@ -215,7 +215,7 @@ mod tests {
     }
 
     #[test]
-    fn the_smallest_networks_start_too() {
+    fn the_smallest_networks_can_be_initialised() {
         for (inputs, hidden, outputs) in [(1, 1, 1), (0, 1, 1), (1, 200, 1)] {
             let mlp = nguyen_widrow(
                 Shape {

@@ -25,7 +25,7 @@ impl PerRow<DecouplingNetwork> {
     /// targets.
     ///
     /// # Panics
-    /// If the set has another number of channels, or a row-wire without a network.
+    /// If the set has a different number of channels, or a row-wire without a network.
     pub fn decouple(&self, set: &Dataset) -> Array2<f64> {
         if let Some(only) = self.only() {
             return only.decouple(set.readings());
@@ -77,7 +77,7 @@ impl<'de> Visitor<'de> for OneOrMany {
             all.push(network);
         }
         if all.is_empty() {
-            return Err(serde::de::Error::custom("there is no network in the list"));
+            return Err(serde::de::Error::custom("the list of networks is empty"));
         }
         Ok(Networks::each(all))
     }
@@ -119,7 +119,7 @@ pub struct DecouplingNetwork {
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
 pub enum NetworkError {
-    /// The limits of a scaling, or of the readings in training, are missing, not finite, or out of order.
+    /// The limits of a scaling, or of the readings in the training set, are missing, not finite, or out of order.
     #[error("the {0} scaling is damaged: its limits are missing, not finite, or out of order")]
     Scaling(&'static str),
     /// The number of weights in a layer does not match the scaling and the hidden nodes.
@@ -213,11 +213,11 @@ impl TryFrom<Record> for DecouplingNetwork {
 
     fn try_from(record: Record) -> Result<Self, NetworkError> {
         let inputs = Inputs::new(record.input_quantity, record.input_scaling).with_range(record.reading_range);
-        for (side, is_sound) in [
-            ("input", inputs.is_sound()),
-            ("output", record.output_scaling.is_sound()),
+        for (side, is_valid) in [
+            ("input", inputs.is_valid()),
+            ("output", record.output_scaling.is_valid()),
         ] {
-            if !is_sound {
+            if !is_valid {
                 return Err(NetworkError::Scaling(side));
             }
         }

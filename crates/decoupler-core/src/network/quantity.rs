@@ -19,10 +19,10 @@ pub enum Quantity {
     Raw,
 }
 
-/// Largest relative error of a resistance towards 0: it is still above 0.
-const LARGEST_REACH: f64 = 1.0 - 1e-6;
+/// Largest relative error of a resistance towards 0, so that it stays above 0.
+const MAX_RELATIVE_ERROR: f64 = 1.0 - 1e-6;
 
-/// Error for a word that names no quantity.
+/// Error for an unknown input quantity.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 #[error("'{0}' is not an input: give resistance, conductance or log")]
 pub struct QuantityError(String);
@@ -59,11 +59,11 @@ impl Quantity {
         }
     }
 
-    /// Standard deviation of the value where the reading has `deviation_ohm`: a third of the change that three standard
-    /// deviations towards 0 make. For small errors it is |d value / d R| · deviation; a conductance whose resistance may
-    /// be read as next to nothing has no bound, and this is large.
+    /// Returns the standard deviation of the value for a reading with standard deviation `deviation_ohm`: a third of
+    /// the change caused by three standard deviations towards 0. For small errors it is |d value / d R| · deviation. It
+    /// is large for a conductance whose resistance may be read as almost 0.
     pub fn deviation(self, resistance_ohm: f64, deviation_ohm: f64) -> f64 {
-        let three = (3.0 * deviation_ohm / resistance_ohm).min(LARGEST_REACH);
+        let three = (3.0 * deviation_ohm / resistance_ohm).min(MAX_RELATIVE_ERROR);
         match self {
             Self::Resistance | Self::Raw => deviation_ohm,
             Self::Conductance => three / (1.0 - three) / (3.0 * resistance_ohm),
@@ -94,13 +94,13 @@ impl FromStr for Quantity {
     }
 }
 
-/// Errors of the last digits of a reading, in units of its last place: those of a computed resistance, and of the
-/// arithmetic that follows.
+/// Rounding error of a reading in units in the last place, from computing the resistance and from the arithmetic that
+/// follows.
 const LAST_PLACES: f64 = 4.0;
 
-/// Returns the smallest standard deviation of each channel of `readings` (samples × channels), in their unit, that is more
-/// than rounding: that of the last digits; or, where all readings of a channel are whole steps of a converter or of
-/// printed decimals, that of a single sample one step off, and of few samples that of rounding itself, step/√12.
+/// Returns the standard deviation that rounding can cause in each channel of `readings` (samples × channels), in the
+/// unit of the readings: that of the last digits or, where all readings of a channel are multiples of a converter step
+/// or of a printed decimal, that of a single sample one step off (for few samples, that of rounding itself, step/√12).
 pub(super) fn rounding(readings: ArrayView2<'_, f64>) -> Vec<f64> {
     let of_channel = |channel: ArrayView1<'_, f64>| {
         let digits = LAST_PLACES * f64::EPSILON * root_mean_square(channel.iter().map(|value| value.abs()));
@@ -109,12 +109,12 @@ pub(super) fn rounding(readings: ArrayView2<'_, f64>) -> Vec<f64> {
     readings.columns().into_iter().map(of_channel).collect()
 }
 
-/// Returns the step of which the values of a channel are whole multiples, up to a common offset.
+/// Returns the step of which the values of a channel are integer multiples, up to a common offset.
 fn step(channel: ArrayView1<'_, f64>) -> Option<f64> {
-    /// Distance from whole steps, in steps, of values that count as whole: by chance, one value in 500 is so close.
+    /// Tolerance in steps for an integer multiple; one value in 500 is that close by chance.
     const TOLERANCE: f64 = 1e-3;
-    /// Fewest distinct values that are not whole steps by chance.
-    const FEWEST: usize = 4;
+    /// Minimum number of distinct values that are unlikely to be integer multiples by chance.
+    const MIN_VALUES: usize = 4;
     let mut values = channel.to_vec();
     values.sort_by(f64::total_cmp);
     values.dedup();
@@ -122,8 +122,8 @@ fn step(channel: ArrayView1<'_, f64>) -> Option<f64> {
     let (&lowest, &highest) = (values.first()?, values.last()?);
     let gaps = values.windows(2).map(|pair| pair[1] - pair[0]);
     let step = gaps.min_by(f64::total_cmp)?;
-    // Readings that never repeat have too many values for their steps to matter, or too few to be sure of.
-    if values.len() < FEWEST && repeats == 0 {
+    // Readings that never repeat have steps too fine to matter, or too few values to be sure of the step.
+    if values.len() < MIN_VALUES && repeats == 0 {
         return None;
     }
     let rounding = LAST_PLACES * f64::EPSILON * lowest.abs().max(highest.abs());
@@ -134,7 +134,7 @@ fn step(channel: ArrayView1<'_, f64>) -> Option<f64> {
     (rounding < TOLERANCE * step && values.iter().all(is_whole)).then_some(step)
 }
 
-/// Root mean square of finite values of at least 0, without overflow.
+/// Returns the root mean square of finite nonnegative values, without overflow.
 pub(super) fn root_mean_square(values: impl ExactSizeIterator<Item = f64> + Clone) -> f64 {
     let count = values.len().max(1) as f64;
     let largest = values.clone().fold(0.0, f64::max);
@@ -150,12 +150,12 @@ pub(super) fn root_mean_square(values: impl ExactSizeIterator<Item = f64> + Clon
 pub struct ChannelNoise {
     /// Independent error of each channel.
     pub own: Vec<f64>,
-    /// Error common to all channels, which are all up or all down together: a drift.
+    /// Error common to all channels, with the same sign in each: a drift.
     pub common: Vec<f64>,
 }
 
 impl ChannelNoise {
-    /// No error in any channel.
+    /// Returns the noise of channels without errors.
     pub fn none(channels: usize) -> Self {
         Self {
             own: vec![0.0; channels],
@@ -163,7 +163,7 @@ impl ChannelNoise {
         }
     }
 
-    /// Variance of the error of Σ weight · value.
+    /// Returns the variance of the error of Σ weight · value.
     pub fn variance(&self, weights: impl IntoIterator<Item = f64>) -> f64 {
         let (mut own, mut common) = (0.0, 0.0);
         for (weight, (of_own, of_common)) in weights.into_iter().zip(self.own.iter().zip(&self.common)) {
@@ -188,7 +188,7 @@ mod tests {
     use crate::scene::standard_normal;
 
     #[test]
-    fn each_quantity_can_be_undone_and_named() {
+    fn each_quantity_can_be_inverted_and_parsed() {
         for quantity in Quantity::ALL {
             for ohm in [1e-3, 21.7, 4.2e5] {
                 assert!((quantity.resistance_ohm(quantity.of(ohm)) / ohm - 1.0).abs() < 1e-14);
@@ -231,7 +231,7 @@ mod tests {
     }
 
     #[test]
-    fn one_sample_one_step_off_is_the_most_that_counts_as_rounding() {
+    fn one_sample_one_step_off_is_the_most_that_rounding_explains() {
         for off in [1, 2] {
             let readings = Array2::from_shape_fn((100, 1), |(sample, _)| 31.0 + if sample < off { 0.25 } else { 0.0 });
             let deviation = readings.std(0.0);

@@ -34,7 +34,7 @@ pub enum ScalingError {
         value: f64,
     },
     /// A reading is outside the domain of the chosen input quantity.
-    #[error("sample {}, channel {}: {value:?} is not a resistance; give finite numbers above 0, or take readings as they are", .sample + 1, .channel + 1)]
+    #[error("sample {}, channel {}: {value:?} is not a resistance; give finite numbers above 0, or use the raw readings", .sample + 1, .channel + 1)]
     Reading {
         /// Index of the sample, from 0.
         sample: usize,
@@ -44,7 +44,7 @@ pub enum ScalingError {
         value: f64,
     },
     /// The range of a channel overflows.
-    #[error("channel {} ranges from {minimum:?} to {maximum:?}: too wide to scale; give it in larger units", .channel + 1)]
+    #[error("channel {} ranges from {minimum:?} to {maximum:?}: too wide to scale; use a larger unit", .channel + 1)]
     Range {
         /// Index of the channel, from 0.
         channel: usize,
@@ -103,7 +103,7 @@ impl MinMax {
     }
 
     /// Returns `true` if there are as many minima as maxima, finite and in order, which a file does not guarantee.
-    pub(crate) fn is_sound(&self) -> bool {
+    pub(crate) fn is_valid(&self) -> bool {
         self.minimum.len() == self.maximum.len()
             && self
                 .minimum
@@ -112,19 +112,19 @@ impl MinMax {
                 .all(|(low, high)| low <= high && (high - low).is_finite())
     }
 
-    /// Indices of the channels that vary, the only ones that a network sees.
+    /// Returns the indices of the channels that vary; a network sees only these.
     pub fn varying(&self) -> Vec<usize> {
         (0..self.channels())
             .filter(|&channel| self.minimum[channel] < self.maximum[channel])
             .collect()
     }
 
-    /// Smallest and largest training value of a channel.
+    /// Returns the smallest and largest training value of a channel.
     pub fn extremes(&self, channel: usize) -> (f64, f64) {
         (self.minimum[channel], self.maximum[channel])
     }
 
-    /// Returns the channels whose value is farther outside the training range than that is wide.
+    /// Returns the channels whose value is outside the training range by more than the width of the range.
     pub fn far_outside<'a>(&'a self, values: &'a [f64]) -> impl Iterator<Item = usize> + 'a {
         (0..self.channels()).filter(move |&channel| {
             let (low, high) = self.extremes(channel);
@@ -133,7 +133,7 @@ impl MinMax {
         })
     }
 
-    /// Middle and half width of a channel's range.
+    /// Returns the middle and half-width of a channel's range.
     fn range(&self, channel: usize) -> (f64, f64) {
         let half_width = 0.5 * (self.maximum[channel] - self.minimum[channel]);
         (self.minimum[channel] + half_width, half_width)
@@ -182,7 +182,7 @@ impl MinMax {
     }
 }
 
-/// Smallest and largest reading of each channel in training, beyond which a network extrapolates.
+/// Smallest and largest reading of each channel in the training set; beyond them a network extrapolates.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ReadingRange {
@@ -190,14 +190,14 @@ pub struct ReadingRange {
     maximum: Vec<f64>,
 }
 
-/// Part of a channel's range by which a reading may leave it: new samples of the same scene go beyond the extremes of
-/// some hundred samples a little, which is no extrapolation worth a warning.
+/// Fraction of a channel's range by which a reading may be outside it: new samples of the same scene slightly exceed
+/// the extremes of a few hundred samples, which does not deserve a warning.
 const MARGIN: f64 = 0.1;
-/// Relative rounding error allowed to a reading that did not vary in training.
+/// Relative rounding error allowed for a channel that is constant in the training set.
 const ROUNDING: f64 = 1e-9;
 
 impl ReadingRange {
-    /// Takes the range of readings (samples × channels). `None` if there are no samples.
+    /// Returns the range of readings (samples × channels); `None` if there are no samples.
     pub fn of(readings: ArrayView2<'_, f64>) -> Option<Self> {
         let extreme = |pick: fn(f64, f64) -> f64| {
             let columns = readings.columns().into_iter();
@@ -216,13 +216,13 @@ impl ReadingRange {
         self.minimum.len()
     }
 
-    /// Smallest and largest reading of a channel in training.
+    /// Returns the smallest and largest reading of a channel in the training set.
     pub fn extremes(&self, channel: usize) -> (f64, f64) {
         (self.minimum[channel], self.maximum[channel])
     }
 
-    /// Returns the limits beyond which a reading of a channel counts as outside: the extremes and a tenth of their
-    /// distance, which for resistances is that of their logarithms, so that 1/R has the same limits.
+    /// Returns the limits beyond which a reading of a channel counts as outside: the extremes, extended by a tenth of
+    /// their distance. For resistances the distance is measured in logarithms, so that 1/R has the same limits.
     pub fn limits(&self, quantity: Quantity, channel: usize) -> (f64, f64) {
         let (low, high) = self.extremes(channel);
         if quantity == Quantity::Raw {
@@ -242,8 +242,8 @@ impl ReadingRange {
         })
     }
 
-    /// Returns `true` if the extremes, which may come from a file, are in order and of readings that `quantity` accepts.
-    pub(super) fn is_sound(&self, quantity: Quantity, channels: usize) -> bool {
+    /// Returns `true` if the extremes, which may come from a file, are in order and accepted by `quantity`.
+    pub(super) fn is_valid(&self, quantity: Quantity, channels: usize) -> bool {
         let mut pairs = self.minimum.iter().zip(&self.maximum);
         (self.minimum.len(), self.maximum.len()) == (channels, channels)
             && pairs.all(|(&low, &high)| low <= high && quantity.accepts(low) && quantity.accepts(high))
@@ -257,7 +257,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn extremes_become_one_and_constants_come_back() {
+    fn extremes_are_scaled_to_one_and_constants_are_restored() {
         let values = array![[1.0, 7.0, -3.0], [3.0, 7.0, 5.0], [2.0, 7.0, 1.0]];
         let scaling = MinMax::fit(values.view()).unwrap();
         assert_eq!(scaling.varying(), [0, 2]);
@@ -286,7 +286,7 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_scaled_is_named() {
+    fn values_that_cannot_be_scaled_are_named() {
         let nan = MinMax::fit(array![[1.0, 2.0], [1.0, f64::NAN]].view()).unwrap_err();
         assert!(matches!(
             nan,
@@ -333,7 +333,7 @@ mod tests {
     }
 
     #[test]
-    fn what_did_not_vary_must_stay_but_for_rounding() {
+    fn a_constant_channel_may_change_only_by_rounding() {
         let range = ReadingRange::of(array![[7.0]].view()).unwrap();
         let outside = |reading| range.outside(Quantity::LogResistance, &[reading]).count();
         assert_eq!((outside(7.0), outside(7.000_000_001), outside(7.001)), (0, 0, 1));

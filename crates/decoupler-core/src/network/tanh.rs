@@ -1,7 +1,7 @@
 /// Replaces each value by its hyperbolic tangent, within 3 units in the last place.
 ///
-/// With y = 2|x|, tanh|x| = (eʸ − 1) / (eʸ − 1 + 2), of the parts of eʸ. There are no branches, so that the loop vectorises,
-/// and no fused operations, so that every machine gives the same bits.
+/// With y = 2|x|, tanh|x| = (eʸ − 1) / (eʸ − 1 + 2), computed from the two parts of eʸ. There are no branches, so that
+/// the loop vectorises, and no fused operations, so that results are bit-identical on every machine.
 pub fn tanh_in_place(values: &mut [f64]) {
     pulp::Arch::new().dispatch(|| {
         for value in &mut *values {
@@ -67,20 +67,21 @@ fn tanh_single(x: f32) -> f32 {
     (exponential_less_one / (exponential_less_one + 2.0)).copysign(x)
 }
 
-/// Returns eˣ within 2 units in the last place for x from −708 to 709; below, what it is at −708.
+/// Returns eˣ within 2 units in the last place for x from −708 to 709; below −708 it returns the value at −708.
 #[inline(always)]
 pub(crate) fn exp(x: f64) -> f64 {
-    /// Below, powers of two are no normal numbers.
+    /// Below this, powers of two are subnormal.
     const LOWEST: f64 = -708.0;
     // Written so that NaN passes through.
     let (power, less_one) = parts(if x < LOWEST { LOWEST } else { x });
     power * (1.0 + less_one)
 }
 
-/// Returns 2ᵏ and eʳ − 1, of which eˣ = 2ᵏ eʳ is made, for x from −708 to 709.
+/// Returns the parts 2ᵏ and eʳ − 1 of eˣ = 2ᵏ eʳ for x from −708 to 709.
 ///
-/// x is split into k·ln 2 + r, |r| ≤ ½ ln 2; eʳ − 1 is its Taylor polynomial of degree 13 (remainder below 1e-17). There
-/// are no branches, so that loops over it vectorise, and no fused operations, so that every machine gives the same bits.
+/// x is split into k·ln 2 + r, |r| ≤ ½ ln 2; eʳ − 1 is its Taylor polynomial of degree 13 (remainder below 1e-17).
+/// There are no branches, so that loops over it vectorise, and no fused operations, so that results are bit-identical
+/// on every machine.
 #[inline(always)]
 pub(super) fn parts(x: f64) -> (f64, f64) {
     /// ln 2 in two parts; products of the first with an integer up to 2¹¹ are exact.
@@ -182,7 +183,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_far_below_is_next_to_nothing_and_nan_stays() {
+    fn large_negative_values_give_almost_zero_and_nan_is_kept() {
         assert!(exp(-1e300) < 1e-307 && exp(f64::NEG_INFINITY) < 1e-307);
         assert!(exp(f64::NAN).is_nan());
     }

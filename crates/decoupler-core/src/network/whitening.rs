@@ -8,8 +8,8 @@ use super::{ChannelNoise, ScalingError};
 /// component's variance and noise² the variance that noise adds to it.
 ///
 /// A weak component above the noise counts as much as the strongest. A component whose variance is no larger than that
-/// of the noise, or of the rounding of the values, is left out: a fit to noise-free values uses whatever it finds there,
-/// and answers noise as large as the signal, or, where it found only last digits, larger by many orders of magnitude.
+/// of the noise, or of the rounding of the values, is left out: a fit to noise-free values would use it, and would then
+/// amplify noise to the size of the signal, or by many more orders of magnitude where the component is only rounding.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "Record", into = "Record")]
 pub struct Whitening {
@@ -24,8 +24,8 @@ pub struct Whitening {
 impl Whitening {
     /// Fits the components of `values` (samples × channels).
     ///
-    /// `rounding` is the standard deviation of the error that rounding leaves in each channel of `values`, and `unseen`
-    /// the noise of later values that `values` lack. At most `most` components are kept, the strongest.
+    /// `rounding` is the standard deviation of the rounding error in each channel of `values`, and `unseen` the noise
+    /// of later values that `values` lack. At most `max_components` components are kept, the strongest.
     ///
     /// # Errors
     /// If there are no samples, or a value is not finite.
@@ -36,7 +36,7 @@ impl Whitening {
         values: ArrayView2<'_, f64>,
         rounding: &[f64],
         unseen: &ChannelNoise,
-        most: usize,
+        max_components: usize,
     ) -> Result<Self, ScalingError> {
         let (samples, channels) = values.dim();
         assert_eq!([rounding.len(), unseen.own.len(), unseen.common.len()], [channels; 3]);
@@ -46,7 +46,7 @@ impl Whitening {
         if let Some(((sample, channel), &value)) = values.indexed_iter().find(|(_, value)| !value.is_finite()) {
             return Err(ScalingError::NotFinite { sample, channel, value });
         }
-        // The mean of many samples is rounded; that of their small differences from it hardly is.
+        // The mean of many samples has a rounding error; adding the mean of the small residuals removes most of it.
         let rest = (&values - &mean).mean_axis(Axis(0)).expect("there are samples");
         let mean = mean + rest;
         // Uses the singular values of the centred samples instead of the eigenvalues of their covariance, because
@@ -61,11 +61,11 @@ impl Whitening {
         let svd = triangle.thin_svd().map_err(|_| ScalingError::NotConverged)?;
         let singular = svd.S().column_vector();
         let root = (samples as f64).sqrt();
-        // Errors of the decomposition itself (Golub and Van Loan, Matrix Computations, section 5.5.8).
+        // Rounding errors of the decomposition (Golub and Van Loan, Matrix Computations, section 5.5.8).
         let decomposition = f64::EPSILON * samples.min(channels) as f64 * singular.iter().copied().fold(0.0, f64::max);
         let mut kept = Vec::new();
         let mut deviations = Vec::new();
-        for (k, &value) in singular.iter().enumerate().take(most) {
+        for (k, &value) in singular.iter().enumerate().take(max_components) {
             let direction = || (0..channels).map(|c| svd.V()[(c, k)]);
             let of_rounding: f64 = direction().zip(rounding).map(|(v, error)| (v * error).powi(2)).sum();
             let (variance, of_noise) = ((value / root).powi(2), unseen.variance(direction()));
@@ -87,7 +87,7 @@ impl Whitening {
         self.mean.len()
     }
 
-    /// Number of components, the inputs of a network.
+    /// Number of components, which are the inputs of a network.
     pub fn components(&self) -> usize {
         self.deviations.len()
     }
@@ -162,10 +162,10 @@ impl TryFrom<Record> for Whitening {
             directions,
         } = record;
         let finite = |values: &[f64]| values.iter().all(|value| value.is_finite());
-        let sound = finite(&mean) && finite(&directions) && finite(&deviations) && deviations.iter().all(|&d| d > 0.0);
+        let is_valid = finite(&mean) && finite(&directions) && finite(&deviations) && deviations.iter().all(|&d| d > 0.0);
         let directions = Array2::from_shape_vec((deviations.len(), mean.len()), directions);
         match directions {
-            Ok(directions) if sound => Ok(Self {
+            Ok(directions) if is_valid => Ok(Self {
                 mean,
                 directions,
                 deviations,
@@ -219,7 +219,7 @@ mod tests {
     }
 
     #[test]
-    fn whitening_can_be_undone() {
+    fn whitening_can_be_inverted() {
         let values = correlated(60);
         let whitening = fit(&values, 1e-8).unwrap();
         assert_eq!(whitening.components(), 3);
@@ -230,7 +230,7 @@ mod tests {
     }
 
     #[test]
-    fn what_noise_hides_is_left_out_and_what_it_veils_is_smaller() {
+    fn components_below_the_noise_are_left_out_and_those_near_it_are_scaled_down() {
         let values = correlated(500);
         let spread = |noise: f64| -> Vec<f64> {
             let white = fit(&values, noise).unwrap().scale(values.view());
@@ -260,14 +260,14 @@ mod tests {
         assert_eq!(
             deviations.len(),
             2,
-            "the first component is this direction: {deviations:?}"
+            "the first component is the direction of the drift: {deviations:?}"
         );
     }
 
-    /// Channels that are steps of a converter have exact dependencies in the training set, which a new sample need not
-    /// keep.
+    /// Channels quantised by a converter have exact linear dependencies in the training set that a new sample need not
+    /// satisfy.
     #[test]
-    fn new_readings_in_steps_stay_of_the_size_of_the_training_set() {
+    fn new_quantised_readings_stay_as_large_as_the_training_set() {
         let mut rng = ChaCha8Rng::seed_from_u64(5);
         let mut draw = |samples: usize| {
             let mut values = Array2::zeros((samples, 12));
@@ -290,7 +290,7 @@ mod tests {
     }
 
     #[test]
-    fn files_come_back_and_damaged_ones_are_refused() {
+    fn whitenings_survive_a_file_and_damaged_ones_are_rejected() {
         let whitening = fit(&correlated(20), 0.0).unwrap();
         let text = serde_json::to_string(&whitening).unwrap();
         assert_eq!(serde_json::from_str::<Whitening>(&text).unwrap(), whitening);

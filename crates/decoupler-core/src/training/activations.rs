@@ -1,8 +1,5 @@
-//! The outputs and errors of the layers, block by block of samples.
-//!
-//! Elementwise products of columns, dispatched to the machine's SIMD instructions.
-//!
-//! The gradient of the mean squared error.
+//! Outputs and errors of the layers, block by block of samples; elementwise products of columns, dispatched to the
+//! machine's SIMD instructions; and the gradient of the mean squared error.
 
 use std::ops::Range;
 
@@ -16,10 +13,10 @@ use super::{
 };
 use crate::network::{Mlp, Shape, tanh_in_place};
 
-/// Most memory for keeping the activations of all blocks; above it they are recomputed for each use.
-const LARGEST_KEPT_BYTES: usize = 32 << 20;
+/// Maximum memory for keeping the activations of all blocks; above it they are recomputed for each use.
+const MAX_KEPT_BYTES: usize = 32 << 20;
 
-/// Hidden outputs and errors of one block, in memory that is used again for every block.
+/// Hidden outputs and errors of one block, in memory that is reused for every block.
 #[derive(Clone, Debug)]
 pub(super) struct Activations {
     /// H̃ = [H, 1]: block × (hidden + 1).
@@ -69,7 +66,7 @@ impl Activations {
         squares
     }
 
-    /// Mean squared error of `mlp` over samples and outputs.
+    /// Returns the mean squared error of `mlp` over samples and outputs.
     pub(super) fn mse(&mut self, mlp: &Mlp, examples: &Examples) -> f64 {
         let squares = examples
             .blocks()
@@ -80,29 +77,29 @@ impl Activations {
     }
 }
 
-/// The activations of every block at the weights last evaluated, so that the network is not run a second time when a step
-/// is accepted. Where they would take too much memory, only buffers of one block for each part of the samples.
+/// Activations of every block at the weights last evaluated, so that the network is not run a second time when a step
+/// is accepted. If they would take too much memory, only one buffer of a block is kept for each part of the samples.
 #[derive(Debug)]
 pub(super) struct KeptActivations {
     /// One for each block, or one for each part.
     buffers: Vec<Activations>,
     recomputed: bool,
     parts: usize,
-    /// The weights evaluated last; empty before the first.
+    /// Weights evaluated last; empty before the first evaluation.
     weights: Vec<f64>,
     squares: f64,
 }
 
 impl KeptActivations {
-    /// About how many bytes are kept for this many samples.
+    /// Approximate number of bytes kept for this many samples.
     pub(super) fn bytes(shape: Shape, samples: usize) -> usize {
         let bytes = all_bytes(shape, samples);
-        if bytes > LARGEST_KEPT_BYTES { 0 } else { bytes }
+        if bytes > MAX_KEPT_BYTES { 0 } else { bytes }
     }
 
-    /// Allocates for samples that are worked on in up to `parts` parts.
+    /// Allocates for samples processed in up to `parts` parts.
     pub(super) fn new(shape: Shape, examples: &Examples, parts: usize) -> Self {
-        let recomputed = all_bytes(shape, examples.samples()) > LARGEST_KEPT_BYTES;
+        let recomputed = all_bytes(shape, examples.samples()) > MAX_KEPT_BYTES;
         let count = if recomputed { parts } else { examples.blocks().len() };
         Self {
             buffers: vec![Activations::new(shape); count],
@@ -140,8 +137,8 @@ impl KeptActivations {
         parts.iter().map(|(.., squares)| squares).sum()
     }
 
-    /// Calls `work` for every block at the weights last evaluated, which are those of `mlp`. The samples are divided into
-    /// as many parts as there are `sums`; `work` gets the blocks of each part in order, with the sums of that part.
+    /// Calls `work` for every block at the weights last evaluated, which are those of `mlp`. The samples are divided
+    /// into as many parts as there are `sums`; `work` gets the blocks of each part in order, together with its sums.
     pub(super) fn for_each_block<S: Send>(
         &mut self,
         mlp: &Mlp,
@@ -386,7 +383,7 @@ mod tests {
     use crate::training::examples::tests::{random_examples, random_mlp};
 
     #[test]
-    fn the_error_is_that_of_the_network_itself() {
+    fn the_error_agrees_with_the_network() {
         let mlp = random_mlp(3, 5, 2, 1);
         let mut rng = ChaCha8Rng::seed_from_u64(2);
         let mut draw = |columns| Array2::from_shape_simple_fn((BLOCK * 2 + 7, columns), || rng.random_range(-1.0..1.0));

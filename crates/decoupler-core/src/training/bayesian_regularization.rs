@@ -19,24 +19,25 @@ use crate::network::{Mlp, Shape};
 /// α = γ / (2 Σw²)                     β = (n − γ) / (2 Σe²)
 /// ```
 ///
-/// With several groups of weights each has its own α, by its own γ and Σw² (MacKay 1992, doi:10.1162/neco.1992.4.3.448):
-/// weights of inputs and of outputs have scales of their own, and one α for both suits neither, which shows with few samples.
-/// Of output biases w² is then that of their distance from the mean of the target, which a network that is told nothing
-/// answers, so that no answer depends on where the zero of a target lies.
+/// With several groups of weights, each group has its own α from its own γ and Σw² (MacKay 1992,
+/// doi:10.1162/neco.1992.4.3.448): weights of inputs and of outputs have different scales, and one α for both suits
+/// neither, which matters with few samples. For output biases, w is then the distance from the mean of the target, so
+/// that a network without information answers the mean, and no answer depends on the zero of a target.
 ///
-/// Errors of neighbouring frames of a recording are correlated, and n of them tell only as much as n/τ independent ones, τ
-/// being their [`correlation_time`]. From [`RegularizationSettings::correlation_epoch`] on, where it is measured once, α/β is
-/// therefore that of n/τ errors of the same size: a posterior that takes every frame for new evidence fits the noise.
+/// Errors of neighbouring frames of a recording are correlated: n of them carry only as much information as n/τ
+/// independent errors, where τ is their [`correlation_time`]. It is measured once, at
+/// [`RegularizationSettings::correlation_epoch`]; from then on α/β is that of n/τ errors of the same size, since a
+/// posterior that treats every frame as new evidence fits the noise.
 ///
-/// The recorded gradient is that of F / (β n), which vanishes at the minimum of F. The field's toolbox switches the
-/// stopping rules on the validation error off for this method; here they hold as for every other method.
+/// The recorded gradient is that of F / (β n), which vanishes at the minimum of F. The field's toolbox disables
+/// validation stops for this method; here they apply as for every other method.
 pub(super) struct BayesianRegularization {
     damping: Damping,
     /// Epoch after which the correlation of errors is measured; 0 for never.
     correlation_epoch: usize,
     /// Group of each class of weights.
     group_of: PerClass<usize>,
-    /// Means of the targets, where output biases are drawn towards them.
+    /// Means of the targets, if output biases are drawn towards them.
     means: Vec<f64>,
     state: BayesianState,
     equations: FactoredEquations,
@@ -64,7 +65,7 @@ pub struct BayesianState {
     /// Number of epochs so far.
     #[serde(default)]
     epochs: usize,
-    /// τ, once it is measured.
+    /// τ, once measured.
     #[serde(default)]
     correlation_time: Option<f64>,
 }
@@ -77,8 +78,8 @@ struct GroupState {
     effective_parameters: f64,
 }
 
-/// Most samples over which errors may be correlated; the sum of the correlations ends at the first that is not positive.
-const LARGEST_LAG: usize = 50;
+/// Maximum lag in samples; the sum of the correlations ends at the first that is not positive.
+const MAX_LAG: usize = 50;
 
 impl Checked for BayesianState {
     fn vectors(&self) -> Vec<&[f64]> {
@@ -109,14 +110,14 @@ impl BayesianState {
 }
 
 impl BayesianRegularization {
-    /// Updates each α, and β, from γ; each is 1 where the formula gives no positive number, and none is so extreme that their
-    /// ratio overflows.
+    /// Updates each α, and β, from γ. Each is 1 if the formula gives no positive number, and is limited so that the
+    /// ratio of any two cannot overflow.
     fn update_weighting(&mut self, mlp: &Mlp) {
         let gamma = self.state.effective_parameters;
         let determined = match self.state.correlation_time {
             None => self.errors - gamma,
             Some(time) => {
-                /// Least part of the errors that is left to tell the noise.
+                /// Minimum share of the errors left to estimate the noise.
                 const MIN_FREE: f64 = 0.1;
                 let independent = self.errors / time;
                 (independent - gamma).max(MIN_FREE * independent)
@@ -151,7 +152,7 @@ impl BayesianRegularization {
         sums
     }
 
-    /// Measures γ at the current weights; it keeps its value if rounding hides the trace.
+    /// Measures γ at the current weights; γ keeps its value if the trace is lost in rounding.
     fn measure_effective_parameters(&mut self, mlp: &Mlp) {
         let BayesianState { alpha, beta, .. } = self.state;
         if self.state.further.is_empty() {
@@ -179,7 +180,7 @@ impl BayesianRegularization {
         self.state.effective_parameters = groups.iter().sum();
     }
 
-    /// The current error with the gradient of F / (β n).
+    /// Returns the current error with the gradient of F / (β n).
     fn regularized(&self, mlp: &Mlp) -> Evaluation {
         let beta = self.state.beta;
         let decays = self.state.decays(self.group_of).map(|alpha| alpha / beta);
@@ -200,7 +201,7 @@ impl Algorithm for BayesianRegularization {
         summary: "Levenberg-Marquardt that keeps weights small, balanced against the error by what the data can \
                   determine: for few or noisy samples.",
         parameter_name: "mu",
-        cure: "take another seed, more samples, or Levenberg-Marquardt (lm)",
+        remedy: "try another seed, more samples, or Levenberg-Marquardt (lm)",
     };
 
     fn check(settings: &RegularizationSettings) -> Result<(), SettingError> {
@@ -295,7 +296,7 @@ impl Algorithm for BayesianRegularization {
         self.measure_effective_parameters(mlp);
         self.state.epochs += 1;
         if self.state.epochs == self.correlation_epoch {
-            self.state.correlation_time = Some(correlation_time(mlp, examples, LARGEST_LAG));
+            self.state.correlation_time = Some(correlation_time(mlp, examples, MAX_LAG));
         }
         self.update_weighting(mlp);
         Ok(self.regularized(mlp))
@@ -335,17 +336,17 @@ settings! {
             "Epoch after which the correlation of neighbouring errors is measured, as in a recording: from then on fewer \
              errors count as independent, and weights are smaller. 0: never.";
         groups [WHOLE]: "groups of weights" = 1.0, in 1.0..=4.0,
-            "Groups of weights, each with its own strength of regularisation. 1: all. 2: hidden layer and output layer. 3: \
-             the hidden layer's biases apart too. 4: all biases apart. From 2 on, output biases are drawn towards the means \
-             of the targets, not towards 0.";
+            "Groups of weights, each with its own strength of regularisation. 1: all together. 2: hidden layer and output \
+             layer. 3: the biases of the hidden layer separate, too. 4: all biases separate. From 2 on, output biases are \
+             drawn towards the means of the targets, not towards 0.";
     }
 }
 
 impl RegularizationSettings {
-    /// Before it, what is not yet learnt makes errors look more correlated than they are.
+    /// Before this epoch, an incomplete fit makes errors look more correlated than they are.
     const EPOCH_OF_RECORDINGS: f64 = 200.0;
 
-    /// Settings for samples in the order in which they were recorded: few for the number of weights, and of any units.
+    /// Settings for samples in the order of recording, which are few for the number of weights and have any units.
     pub fn recorded() -> Self {
         Self {
             correlation_epoch: Self::EPOCH_OF_RECORDINGS,
@@ -399,7 +400,7 @@ mod tests {
         training::{Method, Problem, StoppingRules, Trainer, TrainingSettings},
     };
 
-    /// Weights that the data determine after 60 epochs on a curve with noise that follows an autoregression.
+    /// Returns the effective number of parameters after 60 epochs on a curve with autoregressive noise.
     fn effective_parameters(memory: f64, correlation_epoch: f64) -> f64 {
         let mut rng = ChaCha8Rng::seed_from_u64(3);
         let inputs = Array2::from_shape_fn((300, 1), |(sample, _)| (sample as f64 / 150.0) - 1.0);
@@ -434,16 +435,16 @@ mod tests {
     }
 
     #[test]
-    fn correlated_errors_determine_fewer_weights_once_that_is_measured() {
+    fn correlated_errors_determine_fewer_weights_once_the_correlation_is_measured() {
         let (never, measured) = (effective_parameters(0.9, 0.0), effective_parameters(0.9, 20.0));
         assert!(measured < 0.9 * never, "{measured} {never}");
         let (never, measured) = (effective_parameters(0.0, 0.0), effective_parameters(0.0, 20.0));
         assert!((measured / never - 1.0).abs() < 0.15, "{measured} {never}");
     }
 
-    /// The training error is least where the weights fit the noise; the regularised error falls on.
+    /// The training error has its minimum where the weights fit the noise; the regularised error continues to fall.
     #[test]
-    fn where_nothing_is_held_out_the_latest_weights_are_the_best() {
+    fn without_validation_the_latest_weights_are_the_best() {
         let mut rng = ChaCha8Rng::seed_from_u64(5);
         let inputs = Array2::from_shape_fn((20, 3), |_| rng.random_range(-1.0..1.0));
         let targets = Array2::from_shape_fn((20, 2), |_| rng.random_range(-0.3..0.9));

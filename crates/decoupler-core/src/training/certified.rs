@@ -1,14 +1,13 @@
-//! The damping on problems whose solutions are certified: the nonlinear regressions of NIST's Statistical Reference
+//! Test of the damping on problems with certified solutions: the nonlinear regressions of NIST's Statistical Reference
 //! Datasets, each from both of its starting points.
 //!
-//! Steps are taken as [`LevenbergMarquardt`](super::levenberg_marquardt) takes them, with the default damping and the same
-//! rule, until no step lowers the error. Only the equations differ: the networks' are made of products that other models
-//! have not, so here J is written out and the step is found by QR decomposition. A network's weights are all of the order
-//! of 1; so are these parameters, which are counted in units of their starting values.
+//! Steps follow [`LevenbergMarquardt`](super::levenberg_marquardt), with the default damping and the same rule, until
+//! no step lowers the error. Only the equations differ: those of networks consist of products that other models lack,
+//! so here J is formed explicitly and the step is found by QR decomposition. The weights of a network are of order 1;
+//! so are these parameters, which are in units of their starting values.
 //!
-//! The models of NIST's nonlinear regression problems.
-//!
-//! Numbers that carry their derivatives with respect to up to nine parameters.
+//! The models are differentiated with dual numbers, which carry their derivatives with respect to up to nine
+//! parameters.
 
 use std::{
     f64::consts::PI,
@@ -34,7 +33,7 @@ struct Problem {
     response: Vec<f64>,
 }
 
-/// Residuals at some parameters, and their Jacobian with respect to the parameters in units of the start.
+/// Residuals and their Jacobian with respect to the parameters in units of their starting values.
 struct LinearisedProblem {
     residuals: Mat<f64>,
     jacobian: Mat<f64>,
@@ -65,9 +64,10 @@ impl Fit<'_> {
         }
     }
 
-    /// Steps until none lowers the sum of squares, and returns the parameters, the steps taken, and why there is no other.
+    /// Steps until no step lowers the sum of squares; returns the parameters, the number of steps, and the reason for
+    /// stopping.
     fn run(&self) -> (Vec<f64>, usize, StopReason) {
-        /// No problem needs as many.
+        /// More than any problem needs.
         const MAX_STEPS: usize = 2000;
         let damping = Damping::default();
         let (mut mu, mut scaled) = (damping.mu, vec![1.0; self.units.len()]);
@@ -87,7 +87,7 @@ impl Fit<'_> {
                 Err(reason) => return (self.parameters(&scaled), steps, reason),
             }
         }
-        unreachable!("the steps are counted")
+        unreachable!("no problem needs that many steps")
     }
 
     fn parameters(&self, scaled: &[f64]) -> Vec<f64> {
@@ -99,7 +99,7 @@ impl Fit<'_> {
     }
 }
 
-/// min ‖[J; √mu I] δ + [e; 0]‖
+/// Returns the minimiser δ of ‖[J; √mu I] δ + [e; 0]‖.
 fn step(at: &LinearisedProblem, mu: f64) -> Vec<f64> {
     let (rows, columns) = (at.jacobian.nrows(), at.jacobian.ncols());
     let matrix = Mat::from_fn(rows + columns, columns, |row, column| match row.checked_sub(rows) {
@@ -114,7 +114,8 @@ fn step(at: &LinearisedProblem, mu: f64) -> Vec<f64> {
     (0..columns).map(|k| step[(k, 0)]).collect()
 }
 
-/// Number of correct digits of the worst parameter: its log relative error, at most the 11 digits that are certified.
+/// Returns the number of correct digits of the worst parameter: its negative log relative error, at most the 11
+/// certified digits.
 fn correct_digits(found: &[f64], certified: &[f64]) -> f64 {
     let digits = |(found, certified): (&f64, &f64)| -((found - certified) / certified).abs().log10();
     let digits = found.iter().zip(certified).map(digits);
@@ -149,7 +150,7 @@ fn certified_parameters_are_found_to_more_than_nine_digits() {
     eprintln!("{table}{mean:.2} digits on average");
     assert!(mean >= 9.4, "{mean:.2} digits on average");
     for (name, start, digits) in all {
-        // From its first start, MGH10 needs a larger mu than the default allows.
+        // From its first starting point, MGH10 needs a larger mu than the default allows.
         let is_out_of_reach = (name, start) == ("MGH10", 0);
         assert!(
             digits > 6.0 || is_out_of_reach,
@@ -181,7 +182,7 @@ pub(super) fn model(name: &str) -> Model {
         "DanWood" => |b, x| b[0] * Dual::constant(x[0]).pow(b[1]),
         "Kirby2" => |b, x| polynomial(&b[..3], x[0]) / (1.0 + x[0] * polynomial(&b[3..], x[0])),
         "Hahn1" | "Thurber" => |b, x| polynomial(&b[..4], x[0]) / (1.0 + x[0] * polynomial(&b[4..], x[0])),
-        // Of the logarithm of the response.
+        // Model of the logarithm of the response.
         "Nelson" => |b, x| b[0] - b[1] * x[0] * (-b[2] * x[1]).exp(),
         "MGH09" => |b, x| b[0] * (x[0] * x[0] + x[0] * b[1]) / (x[0] * x[0] + x[0] * b[2] + b[3]),
         "MGH10" => |b, x| b[0] * (b[1] / (x[0] + b[2])).exp(),
@@ -209,7 +210,7 @@ fn polynomial(coefficients: &[Dual], x: f64) -> Dual {
         .expect("at least one coefficient")
 }
 
-/// Most parameters of a problem.
+/// Maximum number of parameters of a problem.
 pub(super) const MAX_PARAMETERS: usize = 9;
 
 #[derive(Clone, Copy, Debug)]
@@ -230,7 +231,7 @@ impl Dual {
         parameter
     }
 
-    /// A function of this number by its value and its derivative there.
+    /// Returns a function of this number, given its value and derivative there.
     fn chain(self, value: f64, derivative: f64) -> Self {
         let slopes = self.slopes.map(|slope| derivative * slope);
         Self { value, slopes }

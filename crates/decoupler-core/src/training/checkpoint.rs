@@ -1,6 +1,4 @@
-//! The state of a training, saved and resumed.
-//!
-//! Continuing a training with another method or other stopping rules.
+//! Saving and resuming the state of a training, and continuing it with another method or other stopping rules.
 
 use std::time::{Duration, Instant};
 
@@ -15,7 +13,7 @@ use super::{
 };
 use crate::network::{Mlp, Shape};
 
-/// Everything that a [`Trainer`] holds except its samples. A training resumed with the same samples gives bit-identical
+/// State of a [`Trainer`] except its samples. A training resumed with the same samples gives bit-identical
 /// results.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -23,7 +21,7 @@ pub struct TrainerState {
     settings: TrainingSettings,
     shape: Shape,
     weights: Vec<f64>,
-    /// Training error of `weights`, which tells whether the samples are the same.
+    /// Training error of `weights`, to check that the samples are the same.
     mse: f64,
     best_weights: Vec<f64>,
     best_epoch: usize,
@@ -48,21 +46,21 @@ pub enum ResumeError {
     /// The network does not fit the samples.
     #[error(
         "the saved network has {} inputs and {} outputs, the samples have {inputs} and {outputs}: resume with the \
-         settings it was begun with",
+         settings it was started with",
         .shape.inputs, .shape.outputs
     )]
     Shape {
-        /// Of the saved network.
+        /// Shape of the saved network.
         shape: Shape,
-        /// Of the samples.
+        /// Number of inputs of the samples.
         inputs: usize,
-        /// Of the samples.
+        /// Number of outputs of the samples.
         outputs: usize,
     },
     /// The saved weights have a different error on these samples.
     #[error(
         "the saved training had an error of {saved:e}, on these samples it is {found:e}: resume with the settings and \
-         the version of the program it was begun with"
+         the version of the program it was started with"
     )]
     OtherSamples {
         /// The training error saved.
@@ -76,12 +74,12 @@ pub enum ResumeError {
 const SAME_ERROR: f64 = 1e-6;
 
 impl TrainerState {
-    /// The method and the stopping rules.
+    /// Returns the method and the stopping rules.
     pub fn settings(&self) -> &TrainingSettings {
         &self.settings
     }
 
-    /// Every epoch so far.
+    /// Returns the records of all epochs so far.
     pub fn history(&self) -> &[EpochRecord] {
         &self.history.0
     }
@@ -148,7 +146,7 @@ impl Trainer {
     /// Resumes a training from `state`, with the same samples. A training that the user had stopped continues.
     ///
     /// # Errors
-    /// A state that is damaged or belongs to other samples.
+    /// If the state is damaged or belongs to other samples.
     pub fn resume(state: TrainerState, problem: Problem) -> Result<Self, ResumeError> {
         state.check()?;
         let (shape, training) = (state.shape, &problem.training);
@@ -169,7 +167,7 @@ impl Trainer {
             return Err(ResumeError::OtherSamples { saved, found });
         }
         let algorithm = state.settings.method.resume(state.method, &mlp, training);
-        let algorithm = algorithm.ok_or(ResumeError::Damaged("the state is that of another method"))?;
+        let algorithm = algorithm.ok_or(ResumeError::Damaged("the state belongs to another method"))?;
         let best = state.history.0[state.best_epoch];
         let best_mse = best.validation_mse.unwrap_or(best.training_mse);
         Ok(Self {
@@ -193,12 +191,12 @@ impl Trainer {
 }
 
 impl Trainer {
-    /// Continues from the current weights with another method (momentum first, Levenberg-Marquardt to finish), even if the
-    /// training has ended, unless because all epochs were run. Epochs keep counting; the count of validation failures
+    /// Continues from the current weights with another method (momentum first, Levenberg-Marquardt to finish), even if
+    /// the training has ended, unless all epochs were run. The epoch count continues; the count of validation failures
     /// restarts from 0, but the best validation error so far remains the one to beat.
     ///
     /// # Errors
-    /// A setting out of range, or a network too wide for the method; then nothing has changed.
+    /// If a setting is out of range, or the network is too wide for the method; nothing is then changed.
     pub fn continue_with(&mut self, method: Method) -> Result<(), TrainingError> {
         self.check_method(&method)?;
         let begun = Instant::now();
@@ -217,17 +215,17 @@ impl Trainer {
     /// Checks that [`Self::continue_with`] would accept this method.
     ///
     /// # Errors
-    /// Those of [`Self::continue_with`].
+    /// As [`Self::continue_with`].
     pub fn check_method(&self, method: &Method) -> Result<(), TrainingError> {
         method.check()?;
         check_width(method, self.mlp.shape(), self.problem.training.samples(), 1)
     }
 
-    /// Replaces the stopping rules. A training that the new rules would not have ended at its present epoch continues, for
-    /// instance with more epochs; one that they would have ended, ends.
+    /// Replaces the stopping rules. The training continues if the new rules do not end it at its current epoch, for
+    /// instance with more epochs; otherwise it ends.
     ///
     /// # Errors
-    /// A setting out of range; then nothing has changed.
+    /// If a setting is out of range; nothing is then changed.
     pub fn set_stopping(&mut self, stopping: StoppingRules) -> Result<(), SettingError> {
         stopping.check()?;
         if stopping == self.settings.stopping {

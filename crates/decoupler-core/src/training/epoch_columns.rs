@@ -1,4 +1,4 @@
-//! The history of a training in files, column by column.
+//! File format of the history of a training, column by column.
 
 use std::fmt;
 
@@ -9,8 +9,8 @@ use serde::{
 
 use super::EpochRecord;
 
-/// The history of a training as columns of equal length: a third of the size of records, and the shape that plotting
-/// programs read.
+/// History of a training, stored as columns of equal length: a third of the size of records, and the layout that
+/// plotting programs read.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "Columns", into = "Columns")]
 pub struct History(pub Vec<EpochRecord>);
@@ -91,7 +91,7 @@ impl TryFrom<Columns> for History {
     }
 }
 
-/// A number that may be infinite or NaN, which are words in the file since JSON has no such numbers.
+/// Number that may be infinite or NaN; these are strings in the file, since JSON has no such numbers.
 #[derive(Clone, Copy)]
 struct Number(f64);
 
@@ -147,7 +147,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_training_that_grew_without_bound_is_kept_as_it_was() {
+    fn infinite_and_nan_values_survive_a_file() {
         let values = [1.5, -0.0, f64::INFINITY, f64::NEG_INFINITY, f64::NAN, 1e-310, 3.0];
         let record = |(epoch, &value): (usize, &f64)| EpochRecord {
             epoch,

@@ -1,6 +1,5 @@
-//! Training samples, cut into blocks.
-//!
-//! Products of two input channels, which the factored equations need of every sample.
+//! Training samples in blocks, and the products of two input channels that the factored equations need for every
+//! sample.
 
 use std::{
     fmt::Debug,
@@ -25,11 +24,11 @@ pub struct Examples {
     outputs: usize,
 }
 
-/// The samples, which all trainings on them have in common.
+/// Samples, shared by all trainings on them.
 #[derive(Debug)]
 struct Data {
     blocks: Vec<Block>,
-    /// Products of two input columns, block by block, once a method has asked for them.
+    /// Products of two input columns, block by block, computed on demand.
     input_pairs: OnceLock<Vec<Mat<f64>>>,
 }
 
@@ -99,7 +98,7 @@ impl Examples {
         (self.samples * self.outputs) as f64
     }
 
-    /// Mean of each target.
+    /// Returns the mean of each target.
     pub(super) fn target_means(&self) -> Vec<f64> {
         let sum = |index| -> f64 {
             let of_block = |block: &Block| column(block.targets.as_ref(), index).iter().sum::<f64>();
@@ -122,7 +121,7 @@ impl Examples {
     }
 }
 
-/// A column of a matrix whose columns are contiguous.
+/// Returns a column of a matrix whose columns are contiguous.
 pub(super) fn column(matrix: MatRef<'_, f64>, index: usize) -> &[f64] {
     let column = matrix
         .col(index)
@@ -131,7 +130,7 @@ pub(super) fn column(matrix: MatRef<'_, f64>, index: usize) -> &[f64] {
     column.as_slice()
 }
 
-/// A column of a matrix whose columns are contiguous.
+/// Returns a mutable column of a matrix whose columns are contiguous.
 pub(super) fn column_mut(matrix: MatMut<'_, f64>, index: usize) -> &mut [f64] {
     let column = matrix.col_mut(index).try_as_col_major_mut();
     column
@@ -167,12 +166,12 @@ pub(super) mod tests {
     }
 }
 
-/// Most memory for keeping the pairs of all blocks; above it the pairs are recomputed block by block, which costs a few
-/// percent of the product they enter.
-const LARGEST_KEPT_BYTES: usize = 32 << 20;
+/// Maximum memory for keeping the pairs of all blocks; above it the pairs are recomputed block by block, which costs a
+/// few percent of the product in which they are used.
+const MAX_KEPT_BYTES: usize = 32 << 20;
 
 /// Products Aₐ∘A_b of two columns of A = [inputs, 1], a ≥ b: n1(n1+1)/2 × block, so that the pairs of a sample are
-/// contiguous and enter the product as they are. They do not change during training.
+/// contiguous and can be used in the product directly. They do not change during training.
 #[derive(Debug)]
 pub(super) enum InputPairs {
     /// One matrix per block, shared by all trainings on these examples.
@@ -198,10 +197,10 @@ impl Default for PairsBuffer {
 }
 
 impl InputPairs {
-    /// Number of bytes that are kept for this many samples; 0 if their pairs are recomputed.
+    /// Number of bytes kept for this many samples; 0 if their pairs are recomputed.
     pub(super) fn kept_bytes(inputs: usize, samples: usize) -> usize {
         let bytes = samples.saturating_mul(pairs(inputs + 1) * size_of::<f64>());
-        if bytes > LARGEST_KEPT_BYTES { 0 } else { bytes }
+        if bytes > MAX_KEPT_BYTES { 0 } else { bytes }
     }
 
     pub(super) fn new(examples: &Examples) -> Self {
@@ -251,7 +250,7 @@ impl InputPairs {
     }
 }
 
-/// Number of pairs.
+/// Number of pairs of `n1` columns.
 pub(super) fn pairs(n1: usize) -> usize {
     n1 * (n1 + 1) / 2
 }

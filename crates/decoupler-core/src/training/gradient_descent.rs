@@ -1,12 +1,9 @@
-//! Conventional back-propagation (`traingd`).
-//!
-//! Gradient descent with momentum of gradients, Eq. (11) of the paper.
-//!
-//! Gradient descent with momentum of steps (`traingdm`).
-//!
-//! Gradient descent with momentum and an adaptive learning rate (`traingdx`).
-//!
-//! Resilient back-propagation (`trainrp`).
+//! Gradient descent:
+//! - conventional back-propagation (`traingd`),
+//! - with momentum of gradients, Eq. (11) of the paper,
+//! - with momentum of steps (`traingdm`),
+//! - with momentum and an adaptive learning rate (`traingdx`),
+//! - resilient back-propagation (`trainrp`).
 
 use serde::{Deserialize, Serialize};
 
@@ -14,7 +11,7 @@ use super::{
     Evaluation, Examples, SettingError, StopReason,
     activations::Backpropagation,
     method::{Algorithm, Checked, Description},
-    setting::{LARGEST_MOMENTUM, check_limit, settings},
+    setting::{MAX_MOMENTUM, check_limit, settings},
 };
 use crate::network::Mlp;
 
@@ -26,9 +23,9 @@ settings! {
     }
 }
 
-/// Conventional back-propagation of the paper, Eq. (5)-(10), in batch form: `v(N+1) = v(N) + α g(N)`, g the negative
-/// gradient of the mean squared error over all samples. The derivative that Eq. (8)-(9) write for a sigmoid is here that
-/// of our layers: 1 − h² for the tanh nodes and 1 for the linear outputs.
+/// Conventional back-propagation of the paper, Eq. (5)-(10), in batch form: `v(N+1) = v(N) + α g(N)`, where g is the
+/// negative gradient of the mean squared error over all samples. Eq. (8)-(9) are written for a sigmoid; the derivative
+/// of our layers is 1 − h² for the tanh nodes and 1 for the linear outputs.
 pub(super) struct GradientDescent {
     settings: GradientDescentSettings,
     backpropagation: Backpropagation,
@@ -43,7 +40,7 @@ impl Algorithm for GradientDescent {
         name: "Gradient descent",
         summary: "Conventional back-propagation, Eq. (5)-(10): a step down the gradient each epoch.",
         parameter_name: "learning rate",
-        cure: "change the learning rate, run more epochs, or take another method",
+        remedy: "change the learning rate, run more epochs, or try another method",
     };
 
     fn new(settings: GradientDescentSettings, mlp: &Mlp, examples: &Examples) -> (Self, Evaluation) {
@@ -83,8 +80,8 @@ settings! {
 }
 
 /// Gradient descent that mixes in the previous **gradient**, Eq. (11) of the paper:
-/// `v(N+1) = v(N) + α[(1−η) g(N) + η g(N−1)]`, g the negative gradient. (The field's `traingdm` mixes in the previous
-/// step instead.) Before the first step g(N−1) is taken as g(N).
+/// `v(N+1) = v(N) + α[(1−η) g(N) + η g(N−1)]`, where g is the negative gradient. (The field's `traingdm` mixes in the
+/// previous step instead.) In the first step g(N−1) = g(N).
 #[derive(Debug)]
 pub(super) struct Momentum {
     settings: MomentumSettings,
@@ -101,7 +98,7 @@ impl Algorithm for Momentum {
         name: "Momentum, Eq. (11)",
         summary: "Gradient descent that mixes the previous gradient into each step, as the paper's Eq. (11) does.",
         parameter_name: "learning rate",
-        cure: "change the learning rate, run more epochs, or take another method",
+        remedy: "change the learning rate, run more epochs, or try another method",
     };
 
     fn new(settings: MomentumSettings, mlp: &Mlp, examples: &Examples) -> (Self, Evaluation) {
@@ -147,14 +144,14 @@ settings! {
     pub struct StepMomentumSettings {
         learning_rate: "learning rate" = 0.01, in f64::MIN_POSITIVE..=1e300,
             "Step length relative to the length of the gradient.";
-        momentum: "momentum" = 0.9, in 0.0..=LARGEST_MOMENTUM,
+        momentum: "momentum" = 0.9, in 0.0..=MAX_MOMENTUM,
             "Share of the previous step in each step, from 0 to below 1: at 1 the gradient would have none.";
     }
 }
 
 /// Gradient descent that mixes in the previous **step** (Rumelhart, Hinton and Williams 1986; `traingdm`):
-/// `dX = mc·dXprev + lr·(1 − mc)·g`, g the negative gradient; dXprev is 0 before the first step. (The paper's Eq. (11)
-/// mixes in the previous gradient instead: `gdm`.)
+/// `dX = mc·dXprev + lr·(1 − mc)·g`, where g is the negative gradient; dXprev is 0 before the first step. (The paper's
+/// Eq. (11) mixes in the previous gradient instead: `gdm`.)
 pub(super) struct StepMomentum {
     settings: StepMomentumSettings,
     backpropagation: Backpropagation,
@@ -170,7 +167,7 @@ impl Algorithm for StepMomentum {
         name: "Momentum of steps",
         summary: "Gradient descent that mixes the previous step into each step, as traingdm does.",
         parameter_name: "learning rate",
-        cure: "change the learning rate, run more epochs, or take another method",
+        remedy: "change the learning rate, run more epochs, or try another method",
     };
 
     fn new(settings: StepMomentumSettings, mlp: &Mlp, examples: &Examples) -> (Self, Evaluation) {
@@ -216,7 +213,7 @@ settings! {
     pub struct AdaptiveDescentSettings {
         learning_rate: "learning rate" = 0.01, in f64::MIN_POSITIVE..=1e300,
             "Initial step length relative to the length of the gradient; it adapts from there.";
-        momentum: "momentum" = 0.9, in 0.0..=LARGEST_MOMENTUM,
+        momentum: "momentum" = 0.9, in 0.0..=MAX_MOMENTUM,
             "Share of the previous step in each step, from 0 to below 1: at 1 the gradient would have none.";
         rate_increase: "rate increase" = 1.05, in 1.0..=1e3,
             "Factor on the learning rate after a step that lowers the error.";
@@ -228,7 +225,7 @@ settings! {
 }
 
 /// Largest learning rate, which keeps a long run of accepted steps from overflowing.
-const LARGEST_RATE: f64 = 1e300;
+const MAX_RATE: f64 = 1e300;
 
 /// Gradient descent with momentum and an adaptive learning rate (Vogl et al. 1988; `traingdx`). With gX the negative
 /// gradient, each epoch tries
@@ -238,16 +235,16 @@ const LARGEST_RATE: f64 = 1e300;
 /// ```
 ///
 /// If the step lowers the error, lr grows by the factor `rate_increase`. If it raises the error by more than the factor
-/// `largest_error_increase`, it is rejected: the weights stay, lr shrinks by the factor `rate_decrease`, and dXprev of the
-/// next epoch is `lr·gX` with the reduced lr (0 if that overflows). Before the first epoch dXprev is 0. (The reference
-/// manual prints `lr·mc·gX` in the step; we use 1 − mc, as in `traingdm`.)
+/// `largest_error_increase`, it is rejected: the weights stay, lr shrinks by the factor `rate_decrease`, and dXprev of
+/// the next epoch is `lr·gX` with the reduced lr (0 if that overflows). Before the first epoch dXprev is 0. (The
+/// reference manual prints `lr·mc·gX` in the step; we use 1 − mc, as in `traingdm`.)
 pub(super) struct AdaptiveDescent {
     settings: AdaptiveDescentSettings,
     state: AdaptiveState,
     now: Evaluation,
-    /// At the current weights.
+    /// Gradient at the current weights.
     gradient: Vec<f64>,
-    /// At the candidate.
+    /// Gradient at the candidate.
     backpropagation: Backpropagation,
     candidate: Mlp,
 }
@@ -275,7 +272,7 @@ impl Algorithm for AdaptiveDescent {
         name: "Adaptive rate with momentum",
         summary: "Gradient descent with momentum whose learning rate grows while the error falls.",
         parameter_name: "learning rate",
-        cure: "lower the learning rate, run more epochs, or take another seed",
+        remedy: "lower the learning rate, run more epochs, or try another seed",
     };
 
     fn new(settings: AdaptiveDescentSettings, mlp: &Mlp, examples: &Examples) -> (Self, Evaluation) {
@@ -310,7 +307,7 @@ impl Algorithm for AdaptiveDescent {
         let bearable = then.mse <= self.settings.largest_error_increase * self.now.mse;
         if bearable && then.if_finite().is_ok() {
             if then.mse < self.now.mse {
-                *learning_rate = (*learning_rate * self.settings.rate_increase).min(LARGEST_RATE);
+                *learning_rate = (*learning_rate * self.settings.rate_increase).min(MAX_RATE);
             }
             std::mem::swap(mlp, &mut self.candidate);
             std::mem::swap(&mut self.gradient, &mut self.backpropagation.gradient);
@@ -348,8 +345,8 @@ settings! {
     }
 }
 
-/// Resilient back-propagation (Riedmiller and Braun 1993; `trainrp`): each weight has a step length of its own, and of
-/// its slope only the sign is used. The length grows while the sign stays and shrinks when it changes; no step is
+/// Resilient back-propagation (Riedmiller and Braun 1993; `trainrp`): each weight has its own step length, and only the
+/// sign of its slope is used. The length grows while the sign stays the same and shrinks when it changes; no step is
 /// rejected.
 pub(super) struct Resilient {
     settings: ResilientSettings,
@@ -360,7 +357,7 @@ pub(super) struct Resilient {
 /// State of resilient back-propagation.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ResilientState {
-    /// The gradient before the current one.
+    /// Gradient of the previous epoch.
     previous_gradient: Vec<f64>,
     /// Step length of each weight.
     lengths: Vec<f64>,
@@ -379,9 +376,9 @@ impl Algorithm for Resilient {
     const DESCRIPTION: Description = Description {
         short_name: "rp",
         name: "Resilient back-propagation",
-        summary: "Each weight keeps a step length of its own and follows only the sign of its slope.",
+        summary: "Each weight has its own step length and uses only the sign of its slope.",
         parameter_name: "mean step length",
-        cure: "lower the first and the largest step length, or take another seed",
+        remedy: "lower the first and the largest step length, or try another seed",
     };
 
     fn check(settings: &ResilientSettings) -> Result<(), SettingError> {
@@ -417,7 +414,7 @@ impl Algorithm for Resilient {
                 self.backpropagation.gradient[index],
                 self.state.previous_gradient[index],
             );
-            // By signs: the product of two tiny slopes would be 0.
+            // Compares signs, since the product of two tiny slopes would be 0.
             let factor = match (now > 0.0, now < 0.0, before > 0.0, before < 0.0) {
                 (true, _, true, _) | (_, true, _, true) => settings.length_increase,
                 (true, _, _, true) | (_, true, true, _) => settings.length_decrease,
@@ -435,7 +432,7 @@ impl Algorithm for Resilient {
         self.backpropagation.evaluate(mlp, examples).if_finite()
     }
 
-    /// The mean step length.
+    /// Returns the mean step length.
     fn parameter(&self) -> f64 {
         self.state.lengths.iter().sum::<f64>() / self.state.lengths.len() as f64
     }
@@ -451,7 +448,7 @@ mod tests {
     use crate::training::examples::tests::{random_examples, random_mlp};
 
     #[test]
-    fn a_step_goes_down_the_gradient_by_the_learning_rate() {
+    fn a_step_is_the_learning_rate_times_the_negative_gradient() {
         let (mut mlp, examples) = (random_mlp(3, 2, 2, 1), random_examples(50, 3, 2, 2));
         let start = mlp.clone();
         let mut backpropagation = Backpropagation::new(&mlp);
@@ -487,7 +484,7 @@ mod tests {
     }
 
     #[test]
-    fn a_rate_far_too_large_shrinks_until_steps_are_bearable_and_then_adapts() {
+    fn a_rate_far_too_large_shrinks_until_steps_are_accepted_and_then_adapts() {
         let (mut mlp, examples) = (random_mlp(3, 4, 2, 1), random_examples(50, 3, 2, 2));
         let settings = AdaptiveDescentSettings {
             learning_rate: 1e12,
@@ -504,9 +501,9 @@ mod tests {
         assert!(last.mse < start.mse, "{last:?}");
     }
 
-    /// `traingdx` keeps `lr·gX` with the reduced rate as the step that momentum mixes in next.
+    /// `traingdx` keeps `lr·gX` with the reduced rate as the previous step for the momentum.
     #[test]
-    fn after_a_rejected_step_momentum_mixes_in_the_gradient_at_the_reduced_rate() {
+    fn after_a_rejected_step_momentum_uses_the_gradient_at_the_reduced_rate() {
         let (mut mlp, examples) = (random_mlp(3, 4, 2, 1), random_examples(50, 3, 2, 2));
         let settings = AdaptiveDescentSettings {
             learning_rate: 1e3,

@@ -1,8 +1,5 @@
-//! Levenberg-Marquardt (`trainlm`).
-//!
-//! The damping mu of the methods that take Levenberg-Marquardt steps.
-//!
-//! Variable projection: the linear output layer is solved for, only the hidden layer is searched.
+//! Levenberg-Marquardt (`trainlm`), the damping mu of all methods that take Levenberg-Marquardt steps, and variable
+//! projection, which solves for the linear output layer and searches only the hidden layer.
 
 use serde::{Deserialize, Serialize};
 
@@ -13,8 +10,8 @@ use super::{
 };
 use crate::network::{Mlp, Shape};
 
-/// Levenberg-Marquardt (Hagan and Menhaj 1994). After a rejected step only the damped equations are solved again, with a
-/// larger mu; the products are gathered once an epoch.
+/// Levenberg-Marquardt (Hagan and Menhaj 1994). After a rejected step only the damped equations are solved again, with
+/// a larger mu; the products are gathered once per epoch.
 pub(super) struct LevenbergMarquardt {
     damping: Damping,
     mu: f64,
@@ -43,9 +40,9 @@ impl Algorithm for LevenbergMarquardt {
     const DESCRIPTION: Description = Description {
         short_name: "lm",
         name: "Levenberg-Marquardt",
-        summary: "Damped Gauss-Newton steps: the fewest epochs, and here also the least time.",
+        summary: "Damped Gauss-Newton steps: the fewest epochs, and here also the shortest training time.",
         parameter_name: "mu",
-        cure: "take another seed, more samples, or fewer hidden nodes",
+        remedy: "try another seed, more samples, or fewer hidden nodes",
     };
 
     fn check(settings: &Damping) -> Result<(), SettingError> {
@@ -103,39 +100,39 @@ impl Algorithm for LevenbergMarquardt {
 settings! {
     /// Settings of the damping mu (Hagan and Menhaj 1994), with the field's usual defaults.
     pub struct Damping {
-        mu: "mu" = 1e-3, in SMALLEST_MU..=1e300,
+        mu: "mu" = 1e-3, in MIN_MU..=1e300,
             "Initial damping. Large: short steps down the gradient; small: full Gauss-Newton steps.";
         mu_decrease: "mu decrease" = 0.1, in 1e-6..=0.999,
             "Factor on mu after a step that lowers the error.";
         mu_increase: "mu increase" = 10.0, in 1.001..=1e6,
             "Factor on mu after a step that does not lower the error.";
-        mu_max: "largest mu" = 1e10, in SMALLEST_MU..=1e300,
+        mu_max: "largest mu" = 1e10, in MIN_MU..=1e300,
             "Training ends when mu exceeds this: no step lowers the error any more.";
     }
 }
 
-/// Below this, mu is lost in the rounding of any sum of squares worth damping.
-const SMALLEST_MU: f64 = 1e-20;
+/// Smaller values of mu are lost in rounding when added to the diagonal.
+const MIN_MU: f64 = 1e-20;
 
 impl Damping {
-    /// Checks that there is a damping to try.
+    /// Checks that mu does not exceed its limit.
     pub(super) fn check(&self) -> Result<(), SettingError> {
         check_limit(("mu", self.mu), ("largest mu", self.mu_max))
     }
 
     /// Tries steps with growing damping until one is accepted; `mu` is then decreased for the next epoch.
     ///
-    /// `attempt` returns `Some` if it accepts the step at the damping it is given, `None` if there is no such step or
-    /// the step does not lower the error.
+    /// `attempt` returns `Some` if it accepts the step at the given damping, and `None` if there is no step or the step
+    /// does not lower the error.
     ///
     /// # Errors
     /// [`StopReason::MuLarge`] if no step up to the largest mu is accepted.
     pub(super) fn search<T>(self, mu: &mut f64, mut attempt: impl FnMut(f64) -> Option<T>) -> Result<T, StopReason> {
         // A saved mu of 0 would never grow.
-        *mu = mu.max(SMALLEST_MU);
+        *mu = mu.max(MIN_MU);
         while *mu <= self.mu_max {
             if let Some(accepted) = attempt(*mu) {
-                *mu = (*mu * self.mu_decrease).max(SMALLEST_MU);
+                *mu = (*mu * self.mu_decrease).max(MIN_MU);
                 return Ok(accepted);
             }
             *mu *= self.mu_increase;
@@ -145,16 +142,16 @@ impl Damping {
 }
 
 /// Variable projection (Golub and Pereyra 1973, with Kaufman's simpler Jacobian of 1975). For any hidden layer the best
-/// output layer is a linear least-squares problem, V = G⁻¹ H̃ᵀT with G = H̃ᵀH̃, so only W is searched. Up to a small term
-/// the Jacobian of what remains is P⊥B diag(V̄ₜ ⊗ 1) for output t, P⊥ = I − H̃ G⁻¹ H̃ᵀ, and Levenberg-Marquardt steps on W
-/// need just the Schur complement with μ on W alone:
+/// output layer is a linear least-squares problem, V = G⁻¹ H̃ᵀT with G = H̃ᵀH̃, so only W is searched. Up to a small
+/// term the Jacobian of the residual is P⊥B diag(V̄ₜ ⊗ 1) for output t, P⊥ = I − H̃ G⁻¹ H̃ᵀ, and Levenberg-Marquardt
+/// steps on W need only the Schur complement with μ on W:
 ///
 /// ```text
 /// [μI + (V̄V̄ᵀ ⊗ 1) ∘ (BᵀB − C G⁻¹ Cᵀ)] δW = −Jwᵀe
 /// ```
 ///
-/// G gets a ridge of 1e-13 of its largest entry, so that it can be factored when nodes are saturated or equal. The first
-/// epoch only solves for V at the initial hidden layer.
+/// G gets a ridge of 1e-13 of its largest entry, so that it can be factored when nodes are saturated or equal. The
+/// first epoch only solves for V at the initial hidden layer.
 pub(super) struct VariableProjection {
     damping: Damping,
     state: ProjectionState,
@@ -169,7 +166,7 @@ pub(super) struct VariableProjection {
 #[serde(deny_unknown_fields)]
 pub struct ProjectionState {
     mu: f64,
-    /// True once the output layer was solved for.
+    /// `true` once the output layer was solved for.
     projected: bool,
 }
 
@@ -204,7 +201,7 @@ impl Algorithm for VariableProjection {
         name: "Variable projection",
         summary: "Solves the linear output layer exactly and takes Levenberg-Marquardt steps on the hidden layer only.",
         parameter_name: "mu",
-        cure: "take another seed, more samples, or Levenberg-Marquardt (lm)",
+        remedy: "try another seed, more samples, or Levenberg-Marquardt (lm)",
     };
 
     fn check(settings: &Damping) -> Result<(), SettingError> {
@@ -283,13 +280,13 @@ mod tests {
     }
 
     #[test]
-    fn the_search_ends_above_the_largest_mu_and_mu_never_vanishes() {
+    fn the_search_ends_above_the_largest_mu_and_mu_never_becomes_zero() {
         let mut mu = 1e9;
         let refused: Result<(), _> = Damping::default().search(&mut mu, |_| None);
         assert_eq!(refused, Err(StopReason::MuLarge));
         assert!(mu > 1e10);
-        let mut mu = SMALLEST_MU;
+        let mut mu = MIN_MU;
         assert_eq!(Damping::default().search(&mut mu, |_| Some(())), Ok(()));
-        assert_eq!(mu, SMALLEST_MU);
+        assert_eq!(mu, MIN_MU);
     }
 }

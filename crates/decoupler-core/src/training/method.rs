@@ -1,7 +1,7 @@
-//! The list of training methods, with their settings and their states, and the interface that each method implements.
+//! List of training methods with their settings and states, and the interface that each method implements.
 //!
-//! To add a method, implement [`Algorithm`] in the file of its family or in a new one, and add one entry to the list below;
-//! `mod.rs` names the file and exports its settings.
+//! To add a method, implement [`Algorithm`] in the file of its family or in a new one, add one entry to the list below,
+//! and export its settings in `mod.rs`.
 
 use std::fmt;
 
@@ -24,8 +24,8 @@ use crate::{
     sensor::short,
 };
 
-/// Defines [`Method`], [`MethodState`] and [`Running`] from the list of methods: the name of each method's [`Algorithm`],
-/// its settings and, unless it has none, its state.
+/// Defines [`Method`], [`MethodState`] and [`Running`] from the list of methods: the name of each method's
+/// [`Algorithm`], its settings and, unless it has none, its state.
 macro_rules! methods {
     ($($(#[doc = $doc:literal])* $name:ident($Settings:ty) $(with $state:ident: $State:ty)?,)*) => {
         /// A training method with its settings.
@@ -35,7 +35,7 @@ macro_rules! methods {
             $($(#[doc = $doc])* $name($Settings),)*
         }
 
-        /// State that a method carries from epoch to epoch next to the weights. A training resumed from it gives
+        /// State that a method carries from epoch to epoch in addition to the weights. A training resumed from it gives
         /// bit-identical results.
         #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
         #[serde(rename_all = "snake_case")]
@@ -43,13 +43,13 @@ macro_rules! methods {
             $(#[doc = concat!("State of [`Method::", stringify!($name), "`].")] $name $(($State))?,)*
         }
 
-        /// A method at work.
+        /// Running method.
         pub(super) enum Running {
             $($name(Box<$name>),)*
         }
 
         impl Method {
-            /// Every method with its defaults, in the order offered.
+            /// Returns every method with its defaults, in the order offered to the user.
             pub fn all() -> [Self; [$(stringify!($name)),*].len()] {
                 [$(Self::$name($name::default_settings())),*]
             }
@@ -60,27 +60,27 @@ macro_rules! methods {
                 }
             }
 
-            fn words(&self) -> Description {
+            fn details(&self) -> Description {
                 match self {
                     $(Self::$name(_) => $name::DESCRIPTION,)*
                 }
             }
 
-            /// The settings of this method, to be shown and changed.
+            /// Returns the settings of this method, for display and editing.
             pub fn settings(&mut self) -> Vec<Setting<'_>> {
                 match self {
                     $(Self::$name(settings) => settings.list($name::default_settings()),)*
                 }
             }
 
-            /// About how many bytes the method's equations take for a network of this shape and this many samples.
+            /// Approximate memory in bytes of the method's equations for a network of this shape and this many samples.
             pub fn equations_bytes(&self, shape: Shape, samples: usize) -> usize {
                 match self {
                     $(Self::$name(_) => $name::equations_bytes(shape, samples),)*
                 }
             }
 
-            /// About how many multiplications an epoch takes for a network of this shape and this many samples.
+            /// Approximate number of multiplications per epoch for a network of this shape and this many samples.
             pub fn epoch_multiplications(&self, shape: Shape, samples: usize) -> f64 {
                 match self {
                     $(Self::$name(_) => $name::epoch_multiplications(shape, samples),)*
@@ -107,7 +107,7 @@ macro_rules! methods {
         }
 
         impl Running {
-            /// Restores the state of an interrupted training; false if it is the state of another method.
+            /// Restores the state of an interrupted training; returns `false` if it is the state of another method.
             fn restore(&mut self, state: MethodState) -> bool {
                 match (self, state) {
                     $((Self::$name(_method), MethodState::$name $(($state))?) => {
@@ -139,7 +139,7 @@ macro_rules! methods {
                 }
             }
 
-            /// The state, to be saved.
+            /// Returns the state for saving.
             pub(super) fn state(&self) -> MethodState {
                 match self {
                     $(Self::$name(_method) => MethodState::$name $(({
@@ -155,15 +155,15 @@ macro_rules! methods {
 }
 
 methods! {
-    /// Damped Gauss-Newton steps (`trainlm`). The normal equations are factored or, where that costs more, which is for
-    /// wide networks and is decided by their shape and the number of samples, solved by conjugate gradients to a
-    /// relative residual of 1e-8, after 500 iterations of at most 1e-3; a step that misses that is rejected.
+    /// Damped Gauss-Newton steps (`trainlm`). The normal equations are factored or, where factoring costs more (for
+    /// wide networks, depending on their shape and the number of samples), solved by conjugate gradients to a relative
+    /// residual of 1e-8. After 500 iterations a residual of 1e-3 is accepted; with a larger one the step is rejected.
     LevenbergMarquardt(Damping) with state: DampedState,
     /// Levenberg-Marquardt that keeps the weights as small as the data permit (`trainbr`). The normal equations are
     /// always factored, since the method needs the trace of their inverse.
     BayesianRegularization(RegularizationSettings) with state: BayesianState,
-    /// The output layer solved exactly, Gauss-Newton steps on the hidden layer. The normal equations are always
-    /// factored: the damping falls so low that conjugate gradients would need thousands of iterations.
+    /// Exact solution for the output layer, Gauss-Newton steps on the hidden layer. The normal equations are always
+    /// factored, since the damping becomes so small that conjugate gradients would need thousands of iterations.
     VariableProjection(Damping) with state: ProjectionState,
     /// Møller's scaled conjugate gradient (`trainscg`).
     ScaledConjugateGradient(ScaledConjugateGradientSettings) with state: ConjugateState,
@@ -186,43 +186,43 @@ impl Default for Method {
 }
 
 impl Method {
-    /// Bayesian regularisation with its defaults.
+    /// Returns Bayesian regularisation with its defaults.
     pub fn bayesian_regularization() -> Self {
         Self::BayesianRegularization(BayesianRegularization::default_settings())
     }
 
-    /// Bayesian regularisation for samples in the order in which they were recorded, whose errors are correlated.
+    /// Returns Bayesian regularisation for samples in the order of recording, whose errors are correlated.
     pub fn recorded_regularization() -> Self {
         Self::BayesianRegularization(RegularizationSettings::recorded())
     }
 
-    /// Returns `false` for Bayesian regularisation, which weighs fit against size of the weights by itself: samples held
-    /// out for validation are better used to train it.
+    /// Returns `false` for Bayesian regularisation, which balances the fit against the size of the weights by itself:
+    /// samples held out for validation are better used for training.
     pub fn needs_validation(&self) -> bool {
         !matches!(self, Self::BayesianRegularization(_))
     }
 
-    /// Short name, for the terminal and tables.
+    /// Short name for the terminal and tables.
     pub fn short_name(&self) -> &'static str {
-        self.words().short_name
+        self.details().short_name
     }
 
     /// Full name.
     pub fn name(&self) -> &'static str {
-        self.words().name
+        self.details().name
     }
 
-    /// One sentence on what the method does.
+    /// Description of the method in one sentence.
     pub fn description(&self) -> &'static str {
-        self.words().summary
+        self.details().summary
     }
 
     /// Name of the value recorded as [`super::EpochRecord::parameter`].
     pub fn parameter_name(&self) -> &'static str {
-        self.words().parameter_name
+        self.details().parameter_name
     }
 
-    /// Checks the ranges of the settings, and settings against each other.
+    /// Checks that the settings are in range and consistent.
     ///
     /// # Errors
     /// The first setting out of range, or two that contradict each other.
@@ -232,9 +232,9 @@ impl Method {
         self.check_together()
     }
 
-    /// Says what to change where a training of this method diverged or did not lower the error: the settings that are not
-    /// the default ones, or where all are, what else may help.
-    pub fn cure(&self) -> String {
+    /// Returns advice for a training of this method that diverged or did not lower the error: resetting the settings
+    /// that differ from their defaults, and what else may help.
+    pub fn remedy(&self) -> String {
         let mut copy = *self;
         let changed = copy
             .settings()
@@ -249,12 +249,12 @@ impl Method {
             })
             .collect();
         if changed.is_empty() {
-            return self.words().cure.to_owned();
+            return self.details().remedy.to_owned();
         }
-        format!("set back {}; or {}", changed.join(", "), self.words().cure)
+        format!("reset {}; or {}", changed.join(", "), self.details().remedy)
     }
 
-    /// Resumes the method where an interrupted training left it; `None` if `state` is that of another method.
+    /// Resumes the method from the state of an interrupted training; `None` if `state` belongs to another method.
     pub(super) fn resume(&self, state: MethodState, mlp: &Mlp, examples: &Examples) -> Option<Running> {
         let (mut running, _) = self.start(mlp, examples);
         running.restore(state).then_some(running)
@@ -275,35 +275,35 @@ impl fmt::Display for Method {
     }
 }
 
-/// A training method at work on one network.
+/// Training method running on one network.
 pub(super) trait Algorithm: Sized + Send + Sync {
     /// Settings, chosen before training.
     type Settings: Settings;
-    /// Everything that is carried from epoch to epoch next to the weights.
+    /// State carried from epoch to epoch in addition to the weights.
     type State;
 
     /// Name and description for menus, tables and the terminal.
     const DESCRIPTION: Description;
 
-    /// The field's usual settings.
+    /// Returns the field's usual settings.
     fn default_settings() -> Self::Settings {
         Self::Settings::default()
     }
 
-    /// Checks settings against each other, each being in its own range.
+    /// Checks that settings, each in its own range, are consistent.
     ///
     /// # Errors
-    /// Two settings that contradict each other.
+    /// If two settings contradict each other.
     fn check(_settings: &Self::Settings) -> Result<(), SettingError> {
         Ok(())
     }
 
-    /// About how many bytes the method's equations take for a network of this shape and this many samples.
+    /// Approximate memory in bytes of the method's equations for a network of this shape and this many samples.
     fn equations_bytes(_shape: Shape, _samples: usize) -> usize {
         0
     }
 
-    /// About how many multiplications an epoch takes: one run of the network over the samples and the gradient.
+    /// Approximate number of multiplications per epoch: one run of the network over the samples and the gradient.
     fn epoch_multiplications(shape: Shape, samples: usize) -> f64 {
         3.0 * samples as f64 * shape.weights() as f64
     }
@@ -328,7 +328,7 @@ pub(super) trait Algorithm: Sized + Send + Sync {
         None
     }
 
-    /// The state, to be saved.
+    /// Returns the state for saving.
     fn state(&self) -> Self::State;
 }
 
@@ -337,12 +337,12 @@ pub(super) struct Description {
     /// Name in the terminal and in tables.
     pub(super) short_name: &'static str,
     pub(super) name: &'static str,
-    /// One sentence.
+    /// Description in one sentence.
     pub(super) summary: &'static str,
     /// Name of [`Algorithm::parameter`].
     pub(super) parameter_name: &'static str,
-    /// Cure for a training that diverged or did not lower the error; completes "to repair it, …".
-    pub(super) cure: &'static str,
+    /// Advice for a training that diverged or did not lower the error, in the imperative.
+    pub(super) remedy: &'static str,
 }
 
 /// State of a method, as read from a file.

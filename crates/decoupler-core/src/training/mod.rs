@@ -1,6 +1,7 @@
-//! Training: methods with their settings, a [`Trainer`] that is stepped one epoch at a time, and why it stopped.
+//! Training: methods with their settings, a [`Trainer`] that is stepped one epoch at a time, and the reasons for
+//! stopping.
 //!
-//! Everything here works on scaled values and knows nothing of sensors.
+//! Everything here works on scaled values and is independent of sensors.
 
 mod activations;
 mod bayesian_regularization;

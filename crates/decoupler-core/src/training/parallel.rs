@@ -1,11 +1,12 @@
 //! Division of work among the threads of the current rayon pool.
 //!
-//! One large product is split by rows and columns of its result; many small products, one for each block of samples, are
-//! split by samples. The splits depend on sizes alone, so every entry is summed in the same order and the bits are the
-//! same on any number of threads.
+//! One large product is split by rows and columns of its result; many small products, one for each block of samples,
+//! are split by samples. The splits depend on sizes alone, so every entry is summed in the same order and the bits are
+//! the same on any number of threads.
 //!
-//! faer's own `Par::rayon(n)` with a fixed n keeps its bits too, on pools of 1, 2 and 4 threads, but on two busy cores it
-//! took 1.1 to 1.4 times as long for Cholesky factors of order 744 to 6208, and as long for large products.
+//! faer's own `Par::rayon(n)` with a fixed n is bit-identical too, on pools of 1, 2 and 4 threads, but on two busy
+//! cores it took 1.1 to 1.4 times as long for Cholesky factors of order 744 to 6208, and equally long for large
+//! products.
 
 use std::ops::Range;
 
@@ -21,17 +22,17 @@ use rayon::prelude::*;
 /// Multiplications (rows × depth × columns) below which a product is not worth splitting: about a millisecond of work,
 /// many times the cost of waking another thread.
 pub(super) const LARGE: usize = 1 << 25;
-/// Most pieces of a result, since each piece reads its factors again.
+/// Maximum number of pieces of a result; each piece reads its factors again.
 const MAX_PIECES: usize = 16;
-/// Fewest rows or columns of a piece; narrower ones waste SIMD lanes.
-const NARROWEST: usize = 16;
+/// Minimum number of rows or columns of a piece; narrower ones waste SIMD lanes.
+const MIN_WIDTH: usize = 16;
 
-/// Most parts of the samples, since each part needs memory for its own sums.
+/// Maximum number of parts of the samples; each part needs memory for its own sums.
 const MAX_PARTS: usize = 8;
-/// Most memory for those sums.
-const LARGEST_PARTS_BYTES: usize = 32 << 20;
+/// Maximum memory for those sums.
+const MAX_PARTS_BYTES: usize = 32 << 20;
 
-/// The amount of work with some blocks of samples.
+/// Amount of work on a number of blocks of samples.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Work {
     /// Number of blocks.
@@ -43,10 +44,10 @@ pub(super) struct Work {
 }
 
 impl Work {
-    /// Number of parts to split the samples into, none with fewer multiplications than `smallest`.
+    /// Number of parts to split the samples into, each with at least `smallest` multiplications.
     pub(super) fn parts(self, smallest: usize) -> usize {
         let worth = self.blocks.saturating_mul(self.multiplications) / smallest;
-        let affordable = LARGEST_PARTS_BYTES / self.bytes.max(1);
+        let affordable = MAX_PARTS_BYTES / self.bytes.max(1);
         worth.min(self.blocks).min(affordable).clamp(1, MAX_PARTS)
     }
 }
@@ -59,7 +60,7 @@ pub(super) fn parts(blocks: usize, parts: usize) -> impl Iterator<Item = Range<u
 /// Calls `work` for each part, on any thread.
 pub(super) fn for_each_part<P: Send>(parts: &mut [P], work: impl Fn(&mut P) + Sync + Send) {
     match parts {
-        // Not through the thread pool.
+        // Bypasses the thread pool.
         [part] => work(part),
         parts => parts.par_iter_mut().for_each(work),
     }
@@ -76,16 +77,16 @@ pub(super) fn pieces(multiplications: usize) -> usize {
     1 << pieces.ilog2()
 }
 
-/// `sum += factor · left · right`.
+/// Computes `sum += factor · left · right`.
 pub(super) fn add_product(sum: MatMut<'_, f64>, left: MatRef<'_, f64>, right: MatRef<'_, f64>, factor: f64) {
     let pieces = pieces(sum.nrows() * left.ncols() * sum.ncols());
     add_in_pieces(sum, left, right, factor, pieces);
 }
 
-/// Halves the longer side until there are `pieces` pieces.
+/// Recursively halves the longer side until there are `pieces` pieces.
 fn add_in_pieces(sum: MatMut<'_, f64>, left: MatRef<'_, f64>, right: MatRef<'_, f64>, factor: f64, pieces: usize) {
     let (rows, columns) = (sum.nrows(), sum.ncols());
-    if pieces == 1 || rows.max(columns) < 2 * NARROWEST {
+    if pieces == 1 || rows.max(columns) < 2 * MIN_WIDTH {
         matmul(sum, Accum::Add, left, right, factor, Par::Seq);
     } else if rows > columns {
         let half = middle(rows);
@@ -106,9 +107,9 @@ fn add_in_pieces(sum: MatMut<'_, f64>, left: MatRef<'_, f64>, right: MatRef<'_, 
     }
 }
 
-/// Half of `length`, rounded up to whole SIMD registers.
+/// Returns half of `length`, rounded up to whole SIMD registers.
 fn middle(length: usize) -> usize {
-    (length / 2).next_multiple_of(NARROWEST)
+    (length / 2).next_multiple_of(MIN_WIDTH)
 }
 
 /// Subtracts F Fᵀ from the lower triangle of `matrix`.

@@ -20,10 +20,10 @@ settings! {
     }
 }
 
-/// The scaled conjugate gradient (Møller 1993, the steps of his section 4 in order; `trainscg`). Along the direction p the
-/// curvature δ = pᵀs is estimated from two gradients, s = (E′(w + σp/|p|) − E′(w)) |p|/σ, and raised by λ|p|² until it is
-/// positive; the step is pᵀr/δ, r the negative gradient. λ is lowered or raised by how well the quadratic model predicts
-/// the error. An epoch is one iteration, even if its step is rejected.
+/// The scaled conjugate gradient (Møller 1993, the steps of his section 4 in order; `trainscg`). Along the direction p
+/// the curvature δ = pᵀs is estimated from two gradients, s = (E′(w + σp/|p|) − E′(w)) |p|/σ, and raised by λ|p|² until
+/// it is positive; the step is pᵀr/δ, where r is the negative gradient. λ is lowered or raised depending on how well
+/// the quadratic model predicts the error. An epoch is one iteration, even if its step is rejected.
 pub(super) struct ScaledConjugateGradient {
     settings: ScaledConjugateGradientSettings,
     state: ConjugateState,
@@ -32,7 +32,7 @@ pub(super) struct ScaledConjugateGradient {
     moved: Mlp,
 }
 
-/// State of the scaled conjugate gradient, in Møller's letters.
+/// State of the scaled conjugate gradient, in Møller's notation.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ConjugateState {
@@ -44,9 +44,9 @@ pub struct ConjugateState {
     delta: f64,
     lambda: f64,
     lambda_bar: f64,
-    /// True if the last step was accepted.
+    /// `true` if the last step was accepted.
     success: bool,
-    /// Accepted steps since p was last the gradient.
+    /// Number of accepted steps since the last restart of p from the gradient.
     since_restart: usize,
 }
 
@@ -57,7 +57,7 @@ impl Checked for ConjugateState {
 }
 
 impl ScaledConjugateGradient {
-    /// Evaluates at `length` along p from `mlp`.
+    /// Evaluates the error and gradient at `length` along p from `mlp`.
     fn evaluate_along(&mut self, mlp: &Mlp, length: f64, examples: &Examples) -> Evaluation {
         let moved = mlp.weights().iter().zip(&self.state.p);
         for (target, (weight, p)) in self.moved.weights_mut().iter_mut().zip(moved) {
@@ -86,7 +86,7 @@ impl ScaledConjugateGradient {
             *r = -slope;
             *p = *r + beta * *p;
         }
-        // Restart if the direction does not descend.
+        // Restart if p is not a descent direction.
         if dot(&state.p, &state.r) <= 0.0 {
             state.p.copy_from_slice(&state.r);
             state.since_restart = 0;
@@ -101,9 +101,9 @@ impl Algorithm for ScaledConjugateGradient {
     const DESCRIPTION: Description = Description {
         short_name: "scg",
         name: "Scaled conjugate gradient",
-        summary: "Conjugate directions with the step length from the curvature: little memory, for very large networks.",
+        summary: "Conjugate directions, step length from the curvature: little memory, for very large networks.",
         parameter_name: "lambda",
-        cure: "take another seed, or Levenberg-Marquardt (lm)",
+        remedy: "try another seed, or Levenberg-Marquardt (lm)",
     };
 
     fn new(settings: ScaledConjugateGradientSettings, mlp: &Mlp, examples: &Examples) -> (Self, Evaluation) {
@@ -159,11 +159,11 @@ impl Algorithm for ScaledConjugateGradient {
         let (delta, length) = (state.delta, mu / state.delta);
         let then = self.evaluate_along(mlp, length, examples);
         let predicted = 2.0 * delta * (self.now.mse - then.mse) / (mu * mu);
-        // An error that is not finite counts as much worse than predicted.
+        // A non-finite error counts as much worse than predicted.
         let comparison = if then.if_finite().is_ok() {
-            predicted.max(WORST)
+            predicted.max(MIN_COMPARISON)
         } else {
-            WORST
+            MIN_COMPARISON
         };
         self.state.success = comparison >= 0.0;
         if self.state.success {
@@ -196,8 +196,8 @@ impl Algorithm for ScaledConjugateGradient {
     }
 }
 
-/// Least value of the comparison between the error found and the error predicted.
-const WORST: f64 = -1e3;
+/// Lower limit on the comparison of actual and predicted error.
+const MIN_COMPARISON: f64 = -1e3;
 
 fn dot(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
@@ -209,7 +209,7 @@ mod tests {
     use crate::training::examples::tests::{random_examples, random_mlp};
 
     #[test]
-    fn a_lambda_that_overflows_is_no_small_gradient() {
+    fn an_overflow_of_lambda_is_not_reported_as_a_small_gradient() {
         let (mut mlp, examples) = (random_mlp(3, 4, 2, 1), random_examples(50, 3, 2, 2));
         let settings = ScaledConjugateGradientSettings {
             lambda: 1e300,

@@ -1,8 +1,4 @@
-//! Numbers that the user can set.
-//!
-//! Defects of a training that has ended.
-//!
-//! Stopping rules, and the reason why a training ended.
+//! Numeric settings, stopping rules, the reasons why a training ends, and defects of a training that has ended.
 
 use std::{fmt, ops::RangeInclusive};
 
@@ -12,10 +8,10 @@ use thiserror::Error;
 use super::{EpochRecord, Method, Trainer};
 use crate::sensor::short;
 
-/// One number that can be set, as the window and the terminal offer it.
+/// Numeric setting, as offered by the window and the terminal.
 #[derive(Debug)]
 pub struct Setting<'a> {
-    /// Name.
+    /// Name of the setting.
     pub name: &'static str,
     /// Explanation, in one or two sentences.
     pub meaning: &'static str,
@@ -23,23 +19,23 @@ pub struct Setting<'a> {
     pub default: f64,
     /// Allowed values.
     pub range: RangeInclusive<f64>,
-    /// True for a number that counts.
+    /// `true` if the value must be an integer.
     pub is_whole: bool,
-    /// The current value.
+    /// Current value.
     pub value: &'a mut f64,
 }
 
-/// The settings of a method, to be shown and changed.
+/// Settings of a method, for display and editing.
 pub(super) trait Settings: Default {
-    /// Lists them, given the method's defaults.
+    /// Returns the settings, given the method's defaults.
     fn list(&mut self, default: Self) -> Vec<Setting<'_>>;
 }
 
-/// Marks a setting that is a whole number.
+/// Marks an integer setting.
 pub(super) const WHOLE: bool = true;
 
-/// Defines the settings of a method: for each number its field, [WHOLE] if it counts, its name, the field's usual default, the allowed values,
-/// and its meaning.
+/// Defines the settings of a method: for each number its field, [WHOLE] if it is an integer, its name, the field's
+/// usual default, the allowed values, and its meaning.
 macro_rules! settings {
     (
         $(#[$doc:meta])*
@@ -76,7 +72,7 @@ macro_rules! settings {
 }
 pub(super) use settings;
 
-/// A setting with which no training can work.
+/// Error for an invalid setting.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
 pub enum SettingError {
@@ -90,7 +86,7 @@ pub enum SettingError {
         /// Allowed values.
         range: RangeInclusive<f64>,
     },
-    /// A number that counts has a fraction.
+    /// An integer setting has a fraction.
     #[error("{name} is {}: it must be a whole number", short(*.value))]
     NotWhole {
         /// Name of the setting.
@@ -98,7 +94,7 @@ pub enum SettingError {
         /// Its value.
         value: f64,
     },
-    /// A first value is above the largest that the method may reach.
+    /// An initial value is above the largest that the method may reach.
     #[error(
         "{name} is {}, above {limit_name}, which is {}: lower {name}, or raise {limit_name}",
         short(*.value), short(*.limit)
@@ -116,10 +112,10 @@ pub enum SettingError {
 }
 
 impl Setting<'_> {
-    /// Checks that the value is in range; NaN is in no range.
+    /// Checks that the value is in range; NaN is always out of range.
     ///
     /// # Errors
-    /// The value is out of range.
+    /// If the value is out of range.
     pub fn check(&self) -> Result<(), SettingError> {
         if self.range.contains(self.value) {
             return if self.is_whole && self.value.fract() != 0.0 {
@@ -139,10 +135,10 @@ impl Setting<'_> {
     }
 }
 
-/// Largest share of the previous step in each step. At 1 the gradient has no share, and no weight ever moves.
-pub(super) const LARGEST_MOMENTUM: f64 = 0.999_999;
+/// Maximum share of the previous step in each step. At 1 the gradient has no share, and no weight ever moves.
+pub(super) const MAX_MOMENTUM: f64 = 0.999_999;
 
-/// Checks that the first value of `name` does not exceed its limit.
+/// Checks that the initial value of `name` does not exceed its limit.
 pub(super) fn check_limit(
     (name, value): (&'static str, f64),
     (limit_name, limit): (&'static str, f64),
@@ -158,12 +154,12 @@ pub(super) fn check_limit(
     })
 }
 
-/// Defect of a training that has ended: what happened, and what to change. Its text says both.
+/// Defect of a training that has ended. Its text describes the problem and the remedy.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TrainingDefect {
-    /// Epoch in which the error grew above that of the start and stayed there, if it did.
+    /// Epoch in which the error rose above its initial value for good, if it did.
     pub diverged_in: Option<usize>,
-    /// True if the best network is hardly better than the random start: [`TrainingDefect::MIN_GAIN`].
+    /// `true` if the best network is hardly better than the random start: [`TrainingDefect::MIN_GAIN`].
     pub is_at_start: bool,
     /// Epoch of the best network.
     pub best_epoch: usize,
@@ -176,11 +172,11 @@ pub struct TrainingDefect {
 }
 
 impl TrainingDefect {
-    /// Share by which the error that decides (validation, or training where nothing is held out) must fall below that of
-    /// the start for the network to count as trained.
+    /// Relative decrease of the selection error (validation error, or training error if nothing is held out) from the
+    /// start at which the network counts as trained.
     pub const MIN_GAIN: f64 = 0.01;
 
-    /// Finds the defect of a training; `None` for a sound one and for one that has not ended.
+    /// Returns the defect of a training; `None` if it has no defect or has not ended.
     pub fn of(trainer: &Trainer) -> Option<Self> {
         let reason = trainer.stop_reason()?;
         let start = trainer.history().first()?;
@@ -188,7 +184,7 @@ impl TrainingDefect {
         let enough = (1.0 - Self::MIN_GAIN) * start_mse;
         let defect = Self {
             diverged_in: diverged_in(trainer.history(), reason),
-            // False for a start without any error, which nothing can improve; true for one that is not a number.
+            // False if the start has no error, which nothing can improve; true if its error is NaN.
             is_at_start: start_mse != 0.0 && (trainer.best_mse() >= enough || enough.is_nan()),
             best_epoch: trainer.best_epoch(),
             epochs: trainer.latest().epoch,
@@ -198,20 +194,20 @@ impl TrainingDefect {
         (defect.diverged_in.is_some() || defect.is_at_start).then_some(defect)
     }
 
-    /// Returns the setting to change, in words.
-    pub fn cure(&self) -> String {
+    /// Returns advice on the setting to change.
+    pub fn remedy(&self) -> String {
         match self.reason {
             StopReason::GoalReached => "set a lower goal".to_owned(),
             StopReason::GradientSmall if self.diverged_in.is_none() => {
-                format!("set a lower smallest gradient; or {}", self.method.cure())
+                format!("set a lower smallest gradient; or {}", self.method.remedy())
             }
             StopReason::Stopped if self.diverged_in.is_none() => "let it run longer".to_owned(),
-            _ => self.method.cure(),
+            _ => self.method.remedy(),
         }
     }
 }
 
-/// First epoch of those at the end whose training error is above that of the start; an epoch that ended in no number is
+/// Returns the first epoch from which on the training error is above its initial value; an epoch whose error was NaN is
 /// not in the history.
 fn diverged_in(history: &[EpochRecord], reason: StopReason) -> Option<usize> {
     let start_mse = history.first()?.training_mse;
@@ -238,7 +234,7 @@ impl fmt::Display for TrainingDefect {
                 self.reason
             )?,
         }
-        write!(f, ": {}", self.cure())
+        write!(f, ": {}", self.remedy())
     }
 }
 
@@ -252,8 +248,8 @@ pub struct StoppingRules {
     pub goal_mse: f64,
     /// Length of the gradient at which training ends.
     pub min_gradient: f64,
-    /// Maximum number of validation failures: epochs, since the last new best validation error, at which it was above
-    /// the best. An error equal to the best counts neither way.
+    /// Maximum number of validation failures: epochs since the last new best validation error at which the error was
+    /// above the best. An error equal to the best is neither a failure nor a new best.
     pub max_fail: usize,
 }
 
@@ -272,17 +268,17 @@ impl StoppingRules {
     /// Largest number of epochs that can be set.
     pub const MAX_EPOCHS: usize = 1_000_000;
 
-    /// Checks the ranges.
+    /// Checks that the rules are in range.
     ///
     /// # Errors
     /// The first setting out of range.
     pub fn check(&self) -> Result<(), SettingError> {
-        let most = Self::MAX_EPOCHS as f64;
+        let max = Self::MAX_EPOCHS as f64;
         let values = [
-            ("epochs", self.epochs as f64, 1.0..=most),
+            ("epochs", self.epochs as f64, 1.0..=max),
             ("goal", self.goal_mse, 0.0..=f64::MAX),
             ("smallest gradient", self.min_gradient, 0.0..=f64::MAX),
-            ("validation failures", self.max_fail as f64, 1.0..=most),
+            ("validation failures", self.max_fail as f64, 1.0..=max),
         ];
         match values.into_iter().find(|(_, value, range)| !range.contains(value)) {
             Some((name, value, range)) => Err(SettingError::Range { name, value, range }),
@@ -291,7 +287,7 @@ impl StoppingRules {
     }
 }
 
-/// Reason why a training ended. Ending is a result, not an error.
+/// Reason why a training ended: a result, not an error.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum StopReason {
@@ -299,7 +295,7 @@ pub enum StopReason {
     EpochsReached,
     /// The training error reached the goal.
     GoalReached,
-    /// The length of the gradient fell to its limit.
+    /// The length of the gradient reached its lower limit.
     GradientSmall,
     /// No step with a damping mu up to its limit lowers the error.
     MuLarge,
@@ -307,36 +303,36 @@ pub enum StopReason {
     LambdaLarge,
     /// The validation error did not reach a new best for [`StoppingRules::max_fail`] epochs.
     ValidationRose,
-    /// The error or its gradient was no longer finite, or the training error was above the initial one when the validation
-    /// failures reached their limit. The best weights before that are kept.
+    /// The error or its gradient was no longer finite, or the training error was above its initial value when the
+    /// validation failures reached their limit. The best weights before that are kept.
     Diverged,
-    /// The user stopped it.
+    /// The user stopped the training.
     Stopped,
 }
 
 impl StopReason {
-    /// Returns `true` if the error fell as it should until the training ended.
+    /// Returns `true` if the training did not diverge.
     pub fn was_successful(self) -> bool {
         self != Self::Diverged
     }
 
-    /// Says what to change after a training of this method that ended so, where its network is not good enough.
+    /// Returns advice for a training of this method that ended for this reason with a network that is not good enough.
     pub fn remedy(self, method: &Method) -> String {
         match self {
-            Self::Diverged => method.cure(),
+            Self::Diverged => method.remedy(),
             Self::EpochsReached | Self::Stopped => "train for more epochs, or with more hidden nodes".to_owned(),
             Self::ValidationRose => {
-                "draw more training samples, or take another seed or another number of hidden nodes".to_owned()
+                "draw more training samples, or try another seed or another number of hidden nodes".to_owned()
             }
             Self::GoalReached => "set a lower goal".to_owned(),
             Self::GradientSmall | Self::MuLarge | Self::LambdaLarge => {
-                "it is stuck: take another seed, or more hidden nodes".to_owned()
+                "the training is stuck: try another seed, or more hidden nodes".to_owned()
             }
         }
     }
 
-    /// Returns `true` if other stopping rules could have let the training continue: not if the user stopped it or the method
-    /// found no further step.
+    /// Returns `true` if other stopping rules could have let the training continue, and `false` if the user stopped it
+    /// or the method found no further step.
     pub(super) fn depends_on_rules(self) -> bool {
         !matches!(self, Self::Stopped | Self::Diverged | Self::MuLarge | Self::LambdaLarge)
     }
@@ -347,7 +343,7 @@ impl fmt::Display for StopReason {
         f.pad(match self {
             Self::EpochsReached => "all epochs done",
             Self::GoalReached => "goal reached",
-            Self::GradientSmall => "gradient below its limit: no further progress to make",
+            Self::GradientSmall => "gradient below its limit: no further progress possible",
             Self::MuLarge => "mu above its limit: no step lowers the error",
             Self::LambdaLarge => "lambda above its limit: no step lowers the error",
             Self::ValidationRose => "validation error no longer falls",
@@ -363,8 +359,8 @@ mod tests {
     use crate::training::{Method, RegularizationSettings};
 
     #[test]
-    fn numbers_that_count_have_no_fraction() {
-        for (groups, correlation_epoch, is_sound) in [
+    fn integer_settings_reject_fractions() {
+        for (groups, correlation_epoch, is_valid) in [
             (2.0, 0.0, true),
             (2.5, 0.0, false),
             (4.0, 100.0, true),
@@ -377,7 +373,7 @@ mod tests {
                 ..RegularizationSettings::default()
             };
             let checked = Method::BayesianRegularization(settings).check();
-            assert_eq!(checked.is_ok(), is_sound, "{groups} {correlation_epoch}: {checked:?}");
+            assert_eq!(checked.is_ok(), is_valid, "{groups} {correlation_epoch}: {checked:?}");
         }
         let settings = RegularizationSettings {
             groups: 2.5,
@@ -391,7 +387,7 @@ mod tests {
     }
 
     #[test]
-    fn the_reasons_in_files_keep_their_names() {
+    fn stop_reasons_have_fixed_names_in_files() {
         let table = [
             ("epochs_reached", StopReason::EpochsReached),
             ("goal_reached", StopReason::GoalReached),

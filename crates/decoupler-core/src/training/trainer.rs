@@ -1,12 +1,5 @@
-//! A training in progress, stepped one epoch at a time.
-//!
-//! The stages of a training, each under one method.
-//!
-//! The record of one epoch.
-//!
-//! Error and gradient at the current weights.
-//!
-//! Correlation of the errors of neighbouring samples.
+//! A training in progress, stepped one epoch at a time: its stages, the records of its epochs, and the correlation of
+//! the errors of neighbouring samples.
 
 use std::time::{Duration, Instant};
 
@@ -22,13 +15,13 @@ use crate::{
     network::{Mlp, Shape},
 };
 
-/// The method and the stopping rules of a training.
+/// Method and stopping rules of a training.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct TrainingSettings {
-    /// The method and its settings.
+    /// Method with its settings.
     pub method: Method,
-    /// The stopping rules.
+    /// Stopping rules.
     pub stopping: StoppingRules,
 }
 
@@ -43,7 +36,7 @@ impl TrainingSettings {
     }
 }
 
-/// The scaled training, validation and test sets.
+/// Scaled training, validation and test sets.
 #[derive(Clone, Debug)]
 pub struct Problem {
     /// Training set.
@@ -54,7 +47,7 @@ pub struct Problem {
     pub test: Option<Examples>,
 }
 
-/// Reason why training cannot begin.
+/// Reason why a training cannot begin.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
 pub enum TrainingError {
@@ -67,23 +60,23 @@ pub enum TrainingError {
     /// The network has no hidden nodes.
     #[error("the network has no hidden nodes: give at least 1")]
     NoHiddenNodes,
-    /// The method's equations would take more memory than there is.
+    /// The method's equations need more memory than is available.
     #[error(
         "the network is too wide for this method: the equations of {} would take {:.1} GB, and {memory}; use the scaled \
          conjugate gradient (scg), fewer hidden nodes, or fewer starts",
         counted(*.trainings), *.bytes as f64 * 1e-9
     )]
     TooWide {
-        /// Number of trainings at once.
+        /// Number of simultaneous trainings.
         trainings: usize,
-        /// Bytes that they would take.
+        /// Memory that they would take, in bytes.
         bytes: u64,
-        /// Memory that there is.
+        /// Memory of the machine.
         memory: MachineMemory,
     },
 }
 
-/// `1 training`, `2 trainings at once`.
+/// Returns `1 training` or `2 trainings at once`.
 fn counted(count: usize) -> String {
     match count {
         1 => "1 training".to_owned(),
@@ -91,7 +84,7 @@ fn counted(count: usize) -> String {
     }
 }
 
-/// Refuses a method whose equations would not fit into memory, with this many trainings of this shape at once.
+/// Checks that the equations of the method fit into memory, with this many simultaneous trainings of this shape.
 pub(crate) fn check_width(
     method: &Method,
     shape: Shape,
@@ -126,8 +119,8 @@ pub struct Trainer {
     pub(super) activations: Activations,
 }
 
-/// The weights with the lowest validation error, or training error where nothing is held out; the latest where the method
-/// then needs no validation.
+/// Weights with the lowest validation error, or with the lowest training error if nothing is held out; in that case the
+/// latest weights if the method needs no validation.
 #[derive(Debug)]
 pub(super) struct Best {
     pub(super) mlp: Mlp,
@@ -139,7 +132,7 @@ impl Trainer {
     /// Prepares a training from the weights of `start` and records them as epoch 0.
     ///
     /// # Errors
-    /// Settings out of range, or nothing to train.
+    /// If a setting is out of range, or there is nothing to train.
     pub fn new(start: Mlp, problem: Problem, settings: TrainingSettings) -> Result<Self, TrainingError> {
         settings.check()?;
         if start.shape().outputs == 0 {
@@ -176,7 +169,7 @@ impl Trainer {
         Ok(trainer)
     }
 
-    /// Runs one epoch, unless the training has ended. Returns the reason why it has ended, if it has.
+    /// Runs one epoch, unless the training has ended. Returns the reason for ending if it has ended.
     pub fn step(&mut self) -> Option<StopReason> {
         if self.stop_reason.is_none() {
             let begun = Instant::now();
@@ -196,13 +189,13 @@ impl Trainer {
         self.stop_reason
     }
 
-    /// Restarts the method after it gave up, when its numbers need not be finite, so that the state can be saved and other
+    /// Restarts the method after it stopped, when its state may not be finite, so that the state can be saved and other
     /// stopping rules can continue the training.
     fn restart_method(&mut self) {
         (self.algorithm, _) = self.settings.method.start(&self.mlp, &self.problem.training);
     }
 
-    /// Ends the training on behalf of the user.
+    /// Ends the training at the user's request.
     pub fn stop(&mut self) {
         self.stop_reason.get_or_insert(StopReason::Stopped);
     }
@@ -216,7 +209,7 @@ impl Trainer {
         let (validation_mse, test_mse) = (watch(&self.problem.validation), watch(&self.problem.test));
         let deciding = validation_mse.unwrap_or(mse);
         let epoch = self.history.len();
-        // Regularised weights are best where the regularised error is least, not the training error.
+        // Regularised weights are best at the minimum of the regularised error, not of the training error.
         let is_regularized = validation_mse.is_none() && !self.settings.method.needs_validation();
         let is_best = if is_regularized {
             deciding.is_finite()
@@ -252,7 +245,7 @@ impl Trainer {
         let start_mse = self.history.first().map_or(f64::INFINITY, |start| start.training_mse);
         let reasons = [
             (!mse.is_finite(), StopReason::Diverged),
-            // A validation error that stays above its best while the training error is above the initial one is no
+            // A validation error that stays above its best while the training error is above its initial value is not
             // overfitting.
             (failed_to_validate && mse > start_mse, StopReason::Diverged),
             (mse <= rules.goal_mse, StopReason::GoalReached),
@@ -263,76 +256,78 @@ impl Trainer {
         reasons.into_iter().find(|(holds, _)| *holds).map(|(_, reason)| reason)
     }
 
-    /// Training samples.
+    /// Number of training samples.
     pub fn samples(&self) -> usize {
         self.problem.training.samples()
     }
 
-    /// The method and the stopping rules.
+    /// Returns the method and the stopping rules.
     pub fn settings(&self) -> &TrainingSettings {
         &self.settings
     }
 
-    /// The current weights, from which another method would continue.
+    /// Returns the current weights, from which another method would continue.
     pub fn present(&self) -> &Mlp {
         &self.mlp
     }
 
-    /// The best weights so far: those with the lowest validation error, or training error where nothing is held out; the
-    /// latest ones of Bayesian regularisation then, which keeps the training error from its minimum.
+    /// Returns the best weights so far: those with the lowest validation error, or with the lowest training error if
+    /// nothing is held out. Bayesian regularisation, which does not minimise the training error, then returns the
+    /// latest.
     pub fn best(&self) -> &Mlp {
         &self.best.mlp
     }
 
-    /// The epoch of [`Self::best`].
+    /// Returns the epoch of [`Self::best`].
     pub fn best_epoch(&self) -> usize {
         self.best.epoch
     }
 
-    /// The error of [`Self::best`]: on the validation set, or on the training set where nothing is held out.
+    /// Returns the error of [`Self::best`]: on the validation set, or on the training set if nothing is held out.
     pub fn best_mse(&self) -> f64 {
         self.best.mse
     }
 
-    /// The methods so far, the first one first.
+    /// Returns the stages so far, in order.
     pub fn stages(&self) -> &[Stage] {
         &self.stages
     }
 
-    /// Every epoch so far, the start first.
+    /// Returns the records of all epochs so far, beginning with the start.
     pub fn history(&self) -> &[EpochRecord] {
         &self.history
     }
 
-    /// The latest epoch.
+    /// Returns the record of the latest epoch.
     pub fn latest(&self) -> &EpochRecord {
         self.history
             .last()
-            .expect("the start is recorded when the trainer is made")
+            .expect("the start is recorded when the trainer is created")
     }
 
-    /// The reason why the training has ended, if it has.
+    /// Returns the reason why the training has ended, if it has.
     pub fn stop_reason(&self) -> Option<StopReason> {
         self.stop_reason
     }
 
-    /// Time spent in training, pauses not counted.
+    /// Returns the time spent in training, without pauses.
     pub fn elapsed(&self) -> Duration {
         self.elapsed
     }
 }
 
-/// The epochs of a training under one method; [`super::Trainer::continue_with`] begins the next stage.
+/// Stage of a training: its epochs with one method. [`super::Trainer::continue_with`] begins the next stage.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Stage {
-    /// The first epoch under this method; 0 for the first stage.
+    /// First epoch with this method; 0 for the first stage.
     pub first_epoch: usize,
-    /// The method and its settings.
+    /// Method with its settings.
     pub method: Method,
 }
 
-/// Errors and state of the training after one epoch; epoch 0 is the start. Errors are mean squared errors in scaled units.
+/// Errors and state of the training after one epoch; epoch 0 is the start. Errors are mean squared errors in scaled
+/// units.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct EpochRecord {
@@ -344,12 +339,12 @@ pub struct EpochRecord {
     pub validation_mse: Option<f64>,
     /// Error on the test set, if there is one. It is only displayed.
     pub test_mse: Option<f64>,
-    /// Euclidean norm of the gradient of the training error, including the penalty on the weights where the method
+    /// Euclidean norm of the gradient of the training error, including the penalty on the weights if the method
     /// regularises.
     pub gradient_norm: f64,
-    /// The damping mu, or the learning rate, after this epoch: [`super::Method::parameter_name`].
+    /// Parameter of the method after this epoch, such as the damping mu: [`super::Method::parameter_name`].
     pub parameter: f64,
-    /// Number of weights that the data determine, where the method estimates it.
+    /// Effective number of weights determined by the data, if the method estimates it.
     #[serde(default)]
     pub effective_parameters: Option<f64>,
     /// Number of epochs at which the validation error was above its best, since the last new best or since the current
@@ -357,18 +352,18 @@ pub struct EpochRecord {
     pub validation_failures: usize,
 }
 
-/// Error and gradient at the weights that a method has just reached.
+/// Error and gradient at the current weights of a method.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Evaluation {
     /// Mean squared error over samples and outputs, in scaled units.
     pub mse: f64,
-    /// Euclidean norm of the gradient of the objective: of [`Self::mse`], plus the penalty on the weights where the method
+    /// Euclidean norm of the gradient of the objective: [`Self::mse`] plus the penalty on the weights if the method
     /// regularises.
     pub gradient_norm: f64,
 }
 
 impl Evaluation {
-    /// Returns the evaluation if it consists of finite numbers.
+    /// Returns the evaluation if it is finite.
     ///
     /// # Errors
     /// [`StopReason::Diverged`] if it does not.
@@ -381,9 +376,10 @@ impl Evaluation {
     }
 }
 
-/// Number of consecutive samples whose errors tell as much as one independent error: the integrated autocorrelation time
-/// 1 + 2 Σ ρ(k) of the errors of `mlp`, over all outputs together, up to the first lag without positive correlation, at most
-/// `lags` (Sokal 1997, doi:10.1007/978-1-4899-0319-8_6). 1 for independent errors.
+/// Returns the integrated autocorrelation time 1 + 2 Σ ρ(k) of the errors of `mlp` over all outputs together: the
+/// number of consecutive samples that carry as much information as one independent sample, 1 for independent errors.
+/// The sum ends at the first lag without positive correlation, or at `lags` (Sokal 1997,
+/// doi:10.1007/978-1-4899-0319-8_6).
 pub(super) fn correlation_time(mlp: &Mlp, examples: &Examples, lags: usize) -> f64 {
     let mut outputs = vec![Vec::new(); examples.outputs()];
     let mut activations = Activations::new(mlp.shape());
@@ -402,7 +398,7 @@ pub(super) fn correlation_time(mlp: &Mlp, examples: &Examples, lags: usize) -> f
     };
     let squares = products(0);
     let correlations = (1..=lags).map(|lag| products(lag) / squares);
-    // False for NaN, as where there are no errors.
+    // False for NaN, as when there are no errors.
     1.0 + 2.0 * correlations.take_while(|correlation| *correlation > 0.0).sum::<f64>()
 }
 
@@ -415,7 +411,7 @@ mod tests {
     use crate::network::Shape;
 
     #[test]
-    fn trainings_at_once_share_the_memory() {
+    fn simultaneous_trainings_share_the_memory() {
         let shape = Shape {
             inputs: 30,
             hidden: 12,
@@ -430,7 +426,7 @@ mod tests {
         );
     }
 
-    /// A network that answers 0, and targets that follow an autoregression of the first order.
+    /// Correlation time of a network that answers 0, with targets from a first-order autoregression.
     fn time(memory: f64, lags: usize) -> f64 {
         let mut rng = ChaCha8Rng::seed_from_u64(7);
         let mut value = [0.0; 2];
@@ -448,9 +444,9 @@ mod tests {
         correlation_time(&mlp, &examples, lags)
     }
 
-    /// The integrated autocorrelation time of an autoregression of memory ρ is (1 + ρ)/(1 − ρ).
+    /// The integrated autocorrelation time of an autoregression with coefficient ρ is (1 + ρ)/(1 − ρ).
     #[test]
-    fn it_is_that_of_the_theory() {
+    fn the_correlation_time_agrees_with_theory() {
         for memory in [0.0, 0.5, 0.8_f64] {
             let expected = (1.0 + memory) / (1.0 - memory);
             let found = time(memory, 100);

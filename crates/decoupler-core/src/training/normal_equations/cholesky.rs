@@ -1,6 +1,4 @@
-//! Cholesky factorisation and triangular solves.
-//!
-//! Elimination of the output layer from the equations.
+//! Cholesky factorisation, triangular solves, and elimination of the output layer from the equations.
 
 use faer::{
     Accum, Mat, MatMut, MatRef, Par,
@@ -17,16 +15,16 @@ use crate::{
     training::parallel::{pieces, subtract_square},
 };
 
-/// Largest order of a matrix that is factored in one piece.
-const LARGEST_WHOLE: usize = 512;
-/// Largest order of a triangular system that is solved in one piece.
-const LARGEST_SOLVED_WHOLE: usize = 128;
+/// Maximum order of a matrix that is factored in one piece.
+const MAX_UNSPLIT_FACTOR: usize = 512;
+/// Maximum order of a triangular system that is solved in one piece.
+const MAX_UNSPLIT_SOLVE: usize = 128;
 
 /// Cholesky factorisation of a symmetric matrix, in place, on all threads if it is large.
 ///
-/// Recursive: the first half is factored, the rows below are solved against it, the rest is reduced by their square and
-/// factored in turn. Nearly all of the work is then in a few large products (Gustavson 1997, IBM Journal of Research and
-/// Development 41).
+/// The algorithm is recursive: it factors the first half, solves the rows below against it, subtracts their square from
+/// the remaining block and factors that in turn. Nearly all of the work is then in a few large products (Gustavson
+/// 1997, IBM Journal of Research and Development 41).
 pub(super) struct Cholesky {
     memory: MemBuffer,
 }
@@ -34,7 +32,7 @@ pub(super) struct Cholesky {
 impl Cholesky {
     /// Allocates for matrices of up to `order` rows.
     pub(super) fn new(order: usize) -> Self {
-        let order = order.min(LARGEST_WHOLE);
+        let order = order.min(MAX_UNSPLIT_FACTOR);
         let memory = llt::factor::cholesky_in_place_scratch::<f64>(order, Par::Seq, Default::default());
         Self {
             memory: MemBuffer::new(memory),
@@ -44,7 +42,7 @@ impl Cholesky {
     /// Replaces the lower triangle of `matrix` by its Cholesky factor; `None` if it is not positive definite.
     pub(super) fn factor(&mut self, matrix: MatMut<'_, f64>) -> Option<()> {
         let order = matrix.nrows();
-        if order <= LARGEST_WHOLE {
+        if order <= MAX_UNSPLIT_FACTOR {
             let memory = MemStack::new(&mut self.memory);
             return llt::factor::cholesky_in_place(matrix, Default::default(), Par::Seq, memory, Default::default())
                 .ok()
@@ -61,7 +59,7 @@ impl Cholesky {
 
 /// Replaces `right` by the solution for a matrix given by its Cholesky factor.
 pub(super) fn substitute(factor: MatRef<'_, f64>, right: MatMut<'_, f64>) {
-    // It needs no scratch memory.
+    // Needs no scratch memory.
     llt::solve::solve_in_place(factor, right, Par::Seq, MemStack::new(&mut []));
 }
 
@@ -86,7 +84,7 @@ fn solve_in_pieces(factor: MatRef<'_, f64>, rows: MatMut<'_, f64>, pieces: usize
 
 fn solve_by_halves(factor: MatRef<'_, f64>, rows: MatMut<'_, f64>) {
     let order = factor.nrows();
-    if order <= LARGEST_SOLVED_WHOLE {
+    if order <= MAX_UNSPLIT_SOLVE {
         solve_lower_triangular_in_place(factor, rows.transpose_mut(), Par::Seq);
         return;
     }
@@ -105,13 +103,13 @@ fn solve_by_halves(factor: MatRef<'_, f64>, rows: MatMut<'_, f64>) {
     solve_by_halves(corner, second);
 }
 
-/// Half of `order`, rounded up to whole SIMD registers.
+/// Returns half of `order`, rounded up to whole SIMD registers.
 fn half(order: usize) -> usize {
     (order / 2).next_multiple_of(16)
 }
 
-/// Eliminates the output layer: reduces the right-hand side of the hidden layer, and finds the step of the output layer
-/// once that of the hidden layer is known. The memory is used again for every damping.
+/// Elimination of the output layer: reduces the right-hand side of the hidden layer, and computes the step of the
+/// output layer once the step of the hidden layer is known. The memory is reused for every damping.
 pub(super) struct Elimination {
     shape: Shape,
     /// Cholesky factor of G.
@@ -138,7 +136,7 @@ impl Elimination {
         }
     }
 
-    /// Factors G = H̃ᵀH̃ + `damping` on the diagonal; `None` if it is not positive definite in the arithmetic.
+    /// Factors G = H̃ᵀH̃ + `damping` on the diagonal; `None` if it is not numerically positive definite.
     pub(super) fn factor(&mut self, sums: &Sums, damping: PerClass) -> Option<()> {
         self.g_factor.copy_from(&sums.g);
         for node in 0..self.g_factor.nrows() {
@@ -204,7 +202,7 @@ impl Elimination {
     }
 }
 
-/// W and V as matrices.
+/// Returns W and V as matrices.
 fn layers(mlp: &Mlp) -> (MatRef<'_, f64>, MatRef<'_, f64>) {
     let (w, v) = mlp.layers();
     let Shape {
@@ -218,7 +216,7 @@ fn layers(mlp: &Mlp) -> (MatRef<'_, f64>, MatRef<'_, f64>) {
     )
 }
 
-/// V̄: h × outputs.
+/// Returns V̄: h × outputs.
 pub(super) fn output_weights(mlp: &Mlp) -> MatRef<'_, f64> {
     layers(mlp).1.subrows(0, mlp.shape().hidden)
 }
@@ -246,8 +244,8 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_matrix_factored_in_pieces_is_the_product_of_its_factor() {
-        let order = 3 * LARGEST_WHOLE / 2 + 7;
+    fn a_matrix_factored_in_pieces_equals_the_product_of_its_factors() {
+        let order = 3 * MAX_UNSPLIT_FACTOR / 2 + 7;
         let entry = |row: usize, column: usize| ((row * 31 + column * 17 + row * column) as f64).sin();
         let root = Mat::from_fn(order, order, entry);
         let matrix = &root * root.transpose() + Mat::<f64>::identity(order, order);
@@ -261,8 +259,8 @@ mod tests {
     }
 
     #[test]
-    fn a_matrix_that_is_not_positive_definite_is_refused() {
-        let order = LARGEST_WHOLE + 50;
+    fn a_matrix_that_is_not_positive_definite_is_rejected() {
+        let order = MAX_UNSPLIT_FACTOR + 50;
         let mut matrix = Mat::<f64>::identity(order, order);
         matrix[(order - 3, order - 3)] = -1.0;
         assert!(Cholesky::new(order).factor(matrix.as_mut()).is_none());

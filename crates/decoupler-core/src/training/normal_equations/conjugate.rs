@@ -1,6 +1,4 @@
-//! Preconditioned conjugate gradients on the hidden layer's equations.
-//!
-//! The interface of a solver for the hidden layer's equations.
+//! Interface of solvers for the hidden layer's equations, and the solver by preconditioned conjugate gradients.
 
 use faer::{
     Accum, Mat, MatMut, MatRef, Par,
@@ -26,19 +24,19 @@ use crate::{
     },
 };
 
-/// Iterations that a step is assumed to need: 30 to 70 were seen in training, more at the end of it.
+/// Assumed number of iterations per step: 30 to 70 were observed in training, more at its end.
 const ITERATIONS: f64 = 100.0;
-/// Residual, relative to the right-hand side and both in the norm of the preconditioner's inverse, at which the iteration
-/// has converged. The relative error of the step, in the norm of S, is at most this times the root of the condition number
-/// of the preconditioned matrix: no bound on the digits of single weights when the damping is small.
+/// Relative residual at convergence, in the norm of the preconditioner's inverse. The relative error of the step, in
+/// the norm of S, is at most this times the square root of the condition number of the preconditioned matrix; this does
+/// not bound the error of single weights when the damping is small.
 const TOLERANCE: f64 = 1e-8;
 /// Ridge on the diagonals of the preconditioner, relative to their largest entry, against rounding.
 const RIDGE: f64 = 1e-13;
-/// Iterations after which the step is taken as it is, if its residual is below [`WORST_RESIDUAL`].
+/// Maximum number of iterations; the step is then accepted if its residual is below [`MAX_RESIDUAL`].
 const MAX_ITERATIONS: usize = 500;
-/// Largest relative residual of an inexact Gauss-Newton step (Dembo, Eisenstat and Steihaug 1982). Above it the solution is
-/// refused and the damping has to grow.
-const WORST_RESIDUAL: f64 = 1e-3;
+/// Maximum relative residual of an inexact Gauss-Newton step (Dembo, Eisenstat and Steihaug 1982). Above it the
+/// solution is rejected and the damping has to grow.
+const MAX_RESIDUAL: f64 = 1e-3;
 
 /// Solves S δ = r on W by preconditioned conjugate gradients (Hestenes and Stiefel 1952), never forming S. With P the
 /// vector as n1 × h,
@@ -47,22 +45,22 @@ const WORST_RESIDUAL: f64 = 1e-3;
 /// S P = μP + Aᵀ(D ∘ ((D ∘ AP) V̄V̄ᵀ)) − F (FᵀP V̄V̄ᵀ)        F node by node
 /// ```
 ///
-/// so a product costs two products with the samples and memory only for vectors. The preconditioner is made of the
-/// blocks of S of each hidden node with itself, factored: nodes share few directions, so that some tens of iterations
-/// are enough.
+/// so a product costs two products with the samples and needs memory only for vectors. The preconditioner consists of
+/// the factored diagonal blocks of S, one for each hidden node: the coupling between nodes has low rank, so a few tens
+/// of iterations are enough.
 pub(in crate::training) struct ConjugateGradient {
     shape: Shape,
     /// V̄V̄ᵀ.
     mixing: Mat<f64>,
-    /// Cholesky factors of the blocks of S on its diagonal: n1 × h·n1.
+    /// Cholesky factors of the diagonal blocks of S: n1 × h·n1.
     blocks: Mat<f64>,
-    /// F with the entries of each node together: n1 × h·(h+1).
+    /// F, with the entries of each node contiguous: n1 × h·(h+1).
     f: Mat<f64>,
     cholesky: Cholesky,
     max_iterations: usize,
-    /// One for each part of the samples; the first gets the sum.
+    /// Buffers for each part of the samples; the first receives the sum.
     parts: Vec<PartBuffers>,
-    /// FᵀP and that times V̄V̄ᵀ: (h+1) × h.
+    /// FᵀP, and FᵀP V̄V̄ᵀ: (h+1) × h.
     eliminated: [Mat<f64>; 2],
     residual: Vec<f64>,
     preconditioned: Vec<f64>,
@@ -73,7 +71,7 @@ pub(in crate::training) struct ConjugateGradient {
 struct PartBuffers {
     /// n1 × h.
     sum: Mat<f64>,
-    /// D ∘ AP, and that times V̄V̄ᵀ: block × h.
+    /// D ∘ AP, and (D ∘ AP) V̄V̄ᵀ: block × h.
     hidden: [Mat<f64>; 2],
 }
 
@@ -100,8 +98,8 @@ impl HiddenSolver for ConjugateGradient {
         }
     }
 
-    /// Gathering BᵀB takes n1²/2 · h multiplications a sample; solving, with order = h·n1, S samples and k iterations,
-    /// k (S (2 n1 h + h²) + order (2 (h+1) + n1)).
+    /// Gathering BᵀB takes n1²/2 · h multiplications per sample; solving, with order = h·n1, S samples and k
+    /// iterations, k (S (2 n1 h + h²) + order (2 (h+1) + n1)).
     fn cost(shape: Shape, samples: usize) -> Cost {
         let (n1, h) = (shape.inputs + 1, shape.hidden);
         let order = shape.hidden_weights();
@@ -122,7 +120,7 @@ impl HiddenSolver for ConjugateGradient {
         self.parts.len()
     }
 
-    /// Adds to the blocks AᵀDᵢ²A.
+    /// Adds AᵀDᵢ²A to the blocks.
     fn add_gram(
         &self,
         gram: &mut Mat<f64>,
@@ -148,7 +146,7 @@ impl HiddenSolver for ConjugateGradient {
     fn solve(&mut self, system: System<'_>, kept: &mut KeptActivations, right: &mut [f64]) -> Option<()> {
         let v = output_weights(system.mlp);
         matmul(self.mixing.as_mut(), Accum::Replace, v, v.transpose(), 1.0, Par::Seq);
-        // A rejected candidate was evaluated since.
+        // A rejected candidate may have been evaluated since.
         kept.evaluate(system.mlp, system.examples);
         self.factor_blocks(system)?;
         let solution = right;
@@ -165,7 +163,7 @@ impl HiddenSolver for ConjugateGradient {
             let product = self.parts[0].sum.as_ref();
             let product = || product.col_iter().flat_map(|column| column.iter());
             let curvature: f64 = product().zip(&self.direction).map(|(a, b)| a * b).sum();
-            // Rounding has taken over. False for NaN.
+            // Otherwise rounding errors dominate. False for NaN.
             let is_convex = curvature > 0.0;
             if !is_convex {
                 return None;
@@ -183,13 +181,13 @@ impl HiddenSolver for ConjugateGradient {
                 *direction = value + length / before * *direction;
             }
         }
-        let worst = WORST_RESIDUAL / TOLERANCE;
+        let worst = MAX_RESIDUAL / TOLERANCE;
         (length <= worst * worst * goal).then_some(())
     }
 }
 
-/// Number of parts that the samples are divided into for each iteration. Iterations follow each other so quickly that
-/// threads stay awake, so less work is worth dividing.
+/// Number of parts into which the samples are divided for each iteration. Iterations follow each other so quickly that
+/// threads stay awake, so it is worth dividing less work than elsewhere.
 fn parts(shape: Shape, blocks: usize) -> usize {
     let work = Work {
         blocks,
@@ -199,7 +197,7 @@ fn parts(shape: Shape, blocks: usize) -> usize {
     work.parts(LARGE / 8)
 }
 
-/// Multiplications of one iteration per sample.
+/// Number of multiplications of one iteration per sample.
 fn iteration_per_sample(shape: Shape) -> usize {
     2 * shape.hidden_weights() + shape.hidden * shape.hidden
 }
@@ -241,8 +239,8 @@ impl ConjugateGradient {
         }
     }
 
-    /// Gathers F by nodes, and factors the blocks of S of each node with itself; `None` if one of them is not positive
-    /// definite in the arithmetic.
+    /// Gathers F by nodes, and factors the diagonal blocks of S; `None` if one of them is not numerically positive
+    /// definite.
     fn factor_blocks(&mut self, system: System<'_>) -> Option<()> {
         let (h1, n1) = (self.shape.hidden + 1, self.shape.inputs + 1);
         self.blocks.copy_from(&system.sums.gram);
@@ -274,7 +272,7 @@ impl ConjugateGradient {
         Some(())
     }
 
-    /// Solves with the preconditioner for the residual; returns the residual's square as the preconditioner measures it.
+    /// Applies the inverse of the preconditioner to the residual; returns the product of the residual with the result.
     fn precondition(&mut self) -> f64 {
         let n1 = self.shape.inputs + 1;
         self.preconditioned.copy_from_slice(&self.residual);
@@ -314,7 +312,7 @@ impl PartBuffers {
     }
 }
 
-/// Solves S δ = r, and gathers what it needs of BᵀB.
+/// Solver of S δ = r, which also gathers the entries of BᵀB that it needs.
 pub(in crate::training) trait HiddenSolver: Send + Sync {
     /// Allocates for a network of this shape and these examples.
     fn new(shape: Shape, examples: &Examples) -> Self
@@ -326,7 +324,7 @@ pub(in crate::training) trait HiddenSolver: Send + Sync {
     where
         Self: Sized;
 
-    /// Number of parts of the samples that are worked on at once while solving.
+    /// Number of parts of the samples that are processed in parallel while solving.
     fn parts(&self) -> usize {
         1
     }
@@ -337,7 +335,8 @@ pub(in crate::training) trait HiddenSolver: Send + Sync {
     }
 
     /// Adds one block of samples to the entries of BᵀB that the solver needs; `gram` has the size [`Cost::gram`].
-    /// `slopes` is D of the block, samples × h; `columns` and `pairs` are buffers with as many rows and no contents.
+    /// `slopes` is D of the block, samples × h; `columns` and `pairs` are buffers with the same number of rows, whose
+    /// contents are unspecified.
     fn add_gram(
         &self,
         gram: &mut Mat<f64>,
@@ -347,12 +346,12 @@ pub(in crate::training) trait HiddenSolver: Send + Sync {
         pairs: &mut PairsBuffer,
     );
 
-    /// Replaces the right-hand side r by the solution δ. `None`, with `right` unspecified, if S is not positive definite
-    /// in the arithmetic or the solution is not accurate enough: a larger damping is needed.
+    /// Replaces the right-hand side r by the solution δ. Returns `None`, with `right` unspecified, if S is not
+    /// numerically positive definite or the solution is not accurate enough: a larger damping is needed.
     fn solve(&mut self, system: System<'_>, kept: &mut KeptActivations, right: &mut [f64]) -> Option<()>;
 }
 
-/// The matrix S = damping on the diagonal + (V̄V̄ᵀ ⊗ 1) ∘ (BᵀB − F Fᵀ), by the parts it is made of.
+/// Terms of the matrix S = damping on the diagonal + (V̄V̄ᵀ ⊗ 1) ∘ (BᵀB − F Fᵀ).
 #[derive(Clone, Copy)]
 pub(in crate::training) struct System<'a> {
     pub(super) mlp: &'a Mlp,
@@ -393,7 +392,7 @@ mod tests {
     }
 
     #[test]
-    fn a_step_that_is_far_from_converged_is_refused() {
+    fn a_step_that_is_far_from_converged_is_rejected() {
         assert_eq!(solve(MAX_ITERATIONS), Some(()));
         assert_eq!(solve(3), None);
     }

@@ -1,11 +1,11 @@
-//! The Jacobian written out entry by entry: the reference for the structured products and steps.
+//! The explicit Jacobian, the reference for the structured products and steps.
 
 use faer::{Mat, prelude::SolveLstsq};
 use ndarray::Array2;
 
 use crate::{network::Mlp, training::Examples};
 
-/// Errors in the order of the Jacobian's rows, as [`Mlp::forward`] gives them.
+/// Returns the errors of [`Mlp::forward`] in the order of the Jacobian's rows.
 pub(super) fn errors(mlp: &Mlp, examples: &Examples) -> Mat<f64> {
     let mut errors = Vec::new();
     for block in examples.blocks() {
@@ -16,7 +16,7 @@ pub(super) fn errors(mlp: &Mlp, examples: &Examples) -> Mat<f64> {
     Mat::from_fn(errors.len(), 1, |row, _| errors[row])
 }
 
-/// J: one row per sample and output, one column per weight in the order of [`Mlp::weights`].
+/// Returns J: one row per sample and output, one column per weight in the order of [`Mlp::weights`].
 pub(super) fn jacobian(mlp: &Mlp, examples: &Examples) -> Mat<f64> {
     let shape = mlp.shape();
     let (inputs, hidden, outputs) = (shape.inputs, shape.hidden, shape.outputs);
@@ -43,8 +43,8 @@ pub(super) fn jacobian(mlp: &Mlp, examples: &Examples) -> Mat<f64> {
     jacobian
 }
 
-/// The damped least-squares problem min ‖[J; √mu I] δ + [e; 0]‖. Its QR decomposition gives the step without squaring
-/// the condition number, as the normal equations do.
+/// Damped least-squares problem min ‖[J; √mu I] δ + [e; 0]‖. QR decomposition gives the step without squaring the
+/// condition number, as the normal equations do.
 pub(super) struct DampedLeastSquares {
     matrix: Mat<f64>,
     right: Mat<f64>,
@@ -77,21 +77,22 @@ impl DampedLeastSquares {
         (0..step.nrows()).map(|k| step[(k, 0)]).collect()
     }
 
-    /// The part of the possible decrease of ‖[J; √mu I] δ + [e; 0]‖² that `step` misses, given the best step.
+    /// Returns the fraction of the possible decrease of ‖[J; √mu I] δ + [e; 0]‖² that `step` misses, given the best
+    /// step.
     pub(super) fn missed(&self, step: &[f64], best: &[f64]) -> f64 {
         let column = |step: &[f64]| Mat::from_fn(step.len(), 1, |row, _| step[row]);
         let apart = &self.matrix * (column(step) - column(best));
         apart.squared_norm_l2() / (&self.matrix * column(best)).squared_norm_l2()
     }
 
-    /// Condition number of the damped normal equations: the square of that of the matrix.
+    /// Condition number of the damped normal equations: the square of the condition number of the matrix.
     pub(super) fn normal_condition(&self) -> f64 {
         let values = self.matrix.singular_values().unwrap();
         (values[0] / values[values.len() - 1]).powi(2)
     }
 }
 
-/// The largest difference between two steps, relative to the largest entry of the second.
+/// Returns the largest difference between two steps, relative to the largest entry of the second.
 pub(super) fn distance(ours: &[f64], reference: &[f64]) -> f64 {
     let largest = reference
         .iter()

@@ -1,6 +1,4 @@
-//! The normal equations of one network and its examples.
-//!
-//! Sums over samples that the equations are made of.
+//! The normal equations of one network and its examples, and the sums over samples of which they consist.
 
 use faer::{Mat, MatRef};
 
@@ -17,13 +15,13 @@ use crate::{
     training::{Evaluation, Examples, activations::KeptActivations},
 };
 
-/// The normal equations of a network and its examples: evaluated, gathered, and solved for any damping.
+/// Normal equations of a network and its examples: evaluated, gathered, and solved for any damping.
 pub(in crate::training) struct NormalEquations<S: HiddenSolver + ?Sized = dyn HiddenSolver> {
     activations: KeptActivations,
     products: Products,
     elimination: Elimination,
     projection: OutputLayer,
-    /// The hidden layer's right-hand side, then its negative step, node by node.
+    /// Right-hand side of the hidden layer, then its negative step, node by node.
     right: Vec<f64>,
     solver: Box<S>,
 }
@@ -32,7 +30,7 @@ pub(in crate::training) struct NormalEquations<S: HiddenSolver + ?Sized = dyn Hi
 pub(in crate::training) type FactoredEquations = NormalEquations<SchurComplement>;
 
 impl NormalEquations {
-    /// Allocates for a network of this shape and these examples, with the solver that costs less.
+    /// Allocates for a network of this shape and these examples, with the cheaper solver.
     pub(in crate::training) fn cheapest(shape: Shape, examples: &Examples) -> Self {
         let samples = examples.samples();
         if factoring_is_cheaper(shape, samples) {
@@ -44,7 +42,7 @@ impl NormalEquations {
         }
     }
 
-    /// About how many bytes [`Self::cheapest`] takes, next to the samples.
+    /// Approximate memory in bytes of [`Self::cheapest`], without the samples.
     pub(in crate::training) fn cheapest_bytes(shape: Shape, samples: usize) -> usize {
         if factoring_is_cheaper(shape, samples) {
             SchurComplement::cost(shape, samples).bytes()
@@ -53,7 +51,7 @@ impl NormalEquations {
         }
     }
 
-    /// About how many multiplications gathering and solving once with [`Self::cheapest`] take.
+    /// Approximate number of multiplications to gather and solve once with [`Self::cheapest`].
     pub(in crate::training) fn cheapest_multiplications(shape: Shape, samples: usize) -> f64 {
         if factoring_is_cheaper(shape, samples) {
             SchurComplement::cost(shape, samples).total()
@@ -70,32 +68,32 @@ impl NormalEquations<SchurComplement> {
         Self::with_solver(solver, &SchurComplement::cost(shape, examples.samples()), examples)
     }
 
-    /// About how many bytes [`Self::factored`] takes, next to the samples.
+    /// Approximate memory in bytes of [`Self::factored`], without the samples.
     pub(in crate::training) fn factored_bytes(shape: Shape, samples: usize) -> usize {
         SchurComplement::cost(shape, samples).bytes()
     }
 
-    /// About how many multiplications gathering and solving once with [`Self::factored`] take.
+    /// Approximate number of multiplications to gather and solve once with [`Self::factored`].
     pub(in crate::training) fn factored_multiplications(shape: Shape, samples: usize) -> f64 {
         SchurComplement::cost(shape, samples).total()
     }
 
-    /// Number of bytes that [`Self::trace_of_inverse`] takes in addition.
+    /// Additional memory in bytes of [`Self::trace_of_inverse`].
     pub(in crate::training) fn inverse_bytes(shape: Shape) -> usize {
         let (order, h1) = (shape.hidden_weights(), shape.hidden + 1);
         let entries = order.saturating_mul(order + h1).saturating_add(h1 * h1);
         entries.saturating_mul(size_of::<f64>())
     }
 
-    /// About how many multiplications [`Self::trace_of_inverse`] takes: factor and inverse of S, and a triangular system
-    /// of h + 1 columns for each output.
+    /// Approximate number of multiplications of [`Self::trace_of_inverse`]: factor and inverse of S, and a triangular
+    /// system of h + 1 columns for each output.
     pub(in crate::training) fn trace_multiplications(shape: Shape) -> f64 {
         let (order, h1) = (shape.hidden_weights() as f64, shape.hidden as f64 + 1.0);
         order * order * (order / 3.0 + h1 / 2.0 + shape.outputs as f64 * h1 / 2.0)
     }
 
-    /// Returns tr (JᵀJ + damping·I)⁻¹ from the products last gathered; `None` if the matrix is not positive definite in
-    /// the arithmetic.
+    /// Returns tr (JᵀJ + damping·I)⁻¹ from the products last gathered; `None` if the matrix is not numerically positive
+    /// definite.
     pub(in crate::training) fn trace_of_inverse(&mut self, mlp: &Mlp, damping: f64) -> Option<f64> {
         let (sums, v) = (self.products.sums(), output_weights(mlp));
         let damping = PerClass::all(damping);
@@ -105,7 +103,7 @@ impl NormalEquations<SchurComplement> {
         trace.is_finite().then_some(trace)
     }
 
-    /// As [`Self::trace_of_inverse`], the part of each class of weights, which each have their damping.
+    /// Returns the contribution of each class of weights to [`Self::trace_of_inverse`], with one damping per class.
     pub(in crate::training) fn traces_of_inverse(&mut self, mlp: &Mlp, damping: PerClass) -> Option<PerClass> {
         let (sums, v) = (self.products.sums(), output_weights(mlp));
         self.elimination.factor(sums, damping)?;
@@ -141,9 +139,9 @@ impl<S: HiddenSolver + ?Sized> NormalEquations<S> {
             .gather(&*self.solver, mlp, examples, &mut self.activations)
     }
 
-    /// Solves for the step at damping `mu` from the products last gathered, at the same `mlp`, and writes it in the order
-    /// of [`Mlp::weights`]. `None`, with `step` unspecified, if the damped equations cannot be solved in the arithmetic:
-    /// a larger `mu` is needed.
+    /// Solves for the step at damping `mu` from the products last gathered, at the same `mlp`, and writes it in the
+    /// order of [`Mlp::weights`]. Returns `None`, with `step` unspecified, if the damped equations are numerically
+    /// singular: a larger `mu` is needed.
     pub(in crate::training) fn solve(
         &mut self,
         mlp: &Mlp,
@@ -173,7 +171,7 @@ impl<S: HiddenSolver + ?Sized> NormalEquations<S> {
         step.iter().all(|value| value.is_finite()).then_some(())
     }
 
-    /// Solves for the step of the hidden layer alone, with the output layer following as its least-squares solution.
+    /// Solves for the step of the hidden layer alone, with the output layer as its least-squares solution.
     pub(in crate::training) fn solve_hidden(
         &mut self,
         mlp: &Mlp,
@@ -211,7 +209,7 @@ impl<S: HiddenSolver + ?Sized> NormalEquations<S> {
     pub(in crate::training) fn gradient_length(&self, mlp: &Mlp, decay: Decay<'_>) -> f64 {
         let (w, v) = mlp.layers();
         let Shape { inputs, hidden, .. } = mlp.shape();
-        // By `hypot`, since the squares overflow where the error weighs next to nothing against the weights.
+        // `hypot` avoids overflow of the squares when the error is negligible compared with the decay.
         let length = |gradient: MatRef<'_, f64>, weights: &[f64], pull: &dyn Fn(usize, usize, f64) -> f64| -> f64 {
             let weights = MatRef::from_row_major_slice(weights, gradient.nrows(), gradient.ncols());
             let columns = gradient.col_iter().zip(weights.col_iter()).enumerate();
@@ -230,8 +228,8 @@ impl<S: HiddenSolver + ?Sized> NormalEquations<S> {
         }))
     }
 
-    /// Gives `mlp` the output layer of least squared error for its hidden layer; `None` if there is none in the
-    /// arithmetic.
+    /// Sets the output layer of `mlp` to the least-squares solution for its hidden layer; `None` if the equations are
+    /// numerically singular.
     pub(in crate::training) fn solve_outputs(&mut self, mlp: &mut Mlp, examples: &Examples) -> Option<()> {
         self.projection.solve(mlp, examples, &mut self.activations)
     }
@@ -240,7 +238,7 @@ impl<S: HiddenSolver + ?Sized> NormalEquations<S> {
 /// Sums over samples.
 pub(super) struct Sums {
     pub(super) shape: Shape,
-    /// The entries of BᵀB that the solver needs.
+    /// Entries of BᵀB that the solver needs.
     pub(super) gram: Mat<f64>,
     /// C: h·n1 × (h+1), column by column without gaps, so that it is also n1 × h(h+1).
     pub(super) c: Vec<f64>,

@@ -8,16 +8,12 @@
 //! S = μI + (V̄V̄ᵀ ⊗ 1) ∘ (BᵀB − C G⁻¹ Cᵀ),   G = H̃ᵀH̃ + μI       (Schur complement on W)
 //! ```
 //!
-//! Two implementations of [`HiddenSolver`](conjugate::HiddenSolver) solve with S. For the usual networks S is formed
-//! and factored. Its order is h·n1, so for wide ones conjugate gradients, which never form S, are cheaper; the choice is
-//! made by the number of multiplications.
+//! Two implementations of [`HiddenSolver`](conjugate::HiddenSolver) solve with S. For most networks S is formed and
+//! factored. Its order is h·n1, so for wide networks conjugate gradients, which never form S, are cheaper. The choice
+//! depends on the number of multiplications, which follows from sizes alone, so that it is the same on every machine
+//! and for a resumed training.
 //!
 //! Hidden weights are numbered node by node here: weight (i, a) is i·n1 + a.
-//!
-//! The choice of the solver for a network.
-//!
-//! The cost of solving the equations, from sizes alone, so that the choice of the solver is the same on every machine and
-//! after every pause.
 
 mod cholesky;
 mod conjugate;
@@ -67,7 +63,7 @@ pub(in crate::training) struct Cost {
     pub(super) pairs: usize,
 }
 
-/// Number of columns that are filled at a time, so that they stay in the cache.
+/// Number of columns filled at a time, so that they stay in the cache.
 pub(super) const CHUNK: usize = 512;
 
 impl Cost {
@@ -82,7 +78,7 @@ impl Cost {
         self.samples as f64 * self.gathering_per_sample() + self.solving
     }
 
-    /// Number of parts of the samples that the products are gathered in.
+    /// Number of parts of the samples in which the products are gathered.
     pub(super) fn gathering_parts(&self, blocks: usize) -> usize {
         let work = Work {
             blocks,
@@ -92,7 +88,7 @@ impl Cost {
         work.parts(LARGE)
     }
 
-    /// About how many bytes the equations take, next to the samples.
+    /// Approximate memory in bytes of the equations, without the samples.
     pub(super) fn bytes(&self) -> usize {
         let matrices = self.entries.saturating_mul(size_of::<f64>());
         let kept = KeptActivations::bytes(self.shape, self.samples)
@@ -103,7 +99,7 @@ impl Cost {
         matrices.saturating_add(self.part_bytes()).saturating_add(kept)
     }
 
-    /// About how many bytes the products take for each part of the samples.
+    /// Approximate memory in bytes of the products for each part of the samples.
     fn part_bytes(&self) -> usize {
         let (h, n1) = (self.shape.hidden, self.shape.inputs + 1);
         let (rows, columns) = self.gram;
@@ -120,7 +116,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_usual_networks_are_factored_and_wide_ones_iterated() {
+    fn typical_networks_are_factored_and_wide_ones_iterated() {
         let is_factored = |inputs, hidden, outputs, samples| {
             let shape = Shape {
                 inputs,

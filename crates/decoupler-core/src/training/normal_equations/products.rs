@@ -1,6 +1,5 @@
-//! The products that the equations are made of, gathered from the samples block by block.
-//!
-//! The least-squares output layer.
+//! The products of which the equations consist, gathered from the samples block by block, and the least-squares output
+//! layer.
 
 use faer::{Accum, Mat, MatMut, MatRef, Par, linalg::matmul::matmul};
 
@@ -20,9 +19,9 @@ use crate::{
     },
 };
 
-/// The products of all samples.
+/// Products summed over all samples.
 pub(super) struct Products {
-    /// One for each part of the samples; once gathered, the first has the sums of all.
+    /// Sums for each part of the samples; once gathered, the first contains the total.
     parts: Vec<(Sums, BlockBuffers)>,
 }
 
@@ -31,7 +30,7 @@ struct BlockBuffers {
     pairs: PairsBuffer,
     /// D: block × h.
     slopes: Mat<f64>,
-    /// Some columns that enter a product: block × up to [`CHUNK`] or a little more.
+    /// Columns of a product: block × up to [`CHUNK`] or slightly more.
     columns: Mat<f64>,
     /// Error at the hidden nodes' net input: block × h.
     delta: Mat<f64>,
@@ -61,7 +60,7 @@ impl Products {
         }
     }
 
-    /// The sums last gathered.
+    /// Returns the sums last gathered.
     pub(super) fn sums(&self) -> &Sums {
         &self.parts[0].0
     }
@@ -112,7 +111,7 @@ impl Sums {
         add_product(self.g.as_mut(), hidden.transpose(), hidden, 1.0);
     }
 
-    /// Adds to C by columns Dᵢ∘H̃_q, column q·h + i.
+    /// Adds to C column by column: Dᵢ∘H̃_q is column q·h + i.
     fn add_c(
         &mut self,
         inputs: MatRef<'_, f64>,
@@ -140,7 +139,7 @@ impl Sums {
         }
     }
 
-    /// Adds a block to Jwᵀe and Jvᵀe; its slopes are still in their buffer.
+    /// Adds a block to Jwᵀe and Jvᵀe; its slopes must still be in their buffer.
     fn add_gradient(&mut self, now: &BlockNow<'_>, mlp: &Mlp, buffers: &mut BlockBuffers) {
         let Shape { hidden: h, outputs, .. } = self.shape;
         let (hidden, errors, samples) = (now.hidden(), now.errors(), now.block.samples());
@@ -162,12 +161,12 @@ impl Sums {
     }
 }
 
-/// The linear least-squares problem of the output layer: G V = H̃ᵀT, G = H̃ᵀH̃.
+/// Linear least-squares problem of the output layer: G V = H̃ᵀT, G = H̃ᵀH̃.
 ///
-/// It is solved as a correction of the current V, G δV = −H̃ᵀE, so that rounding errors in G are corrected at the next
-/// solution instead of repeated.
+/// It is solved for a correction of the current V, G δV = −H̃ᵀE, so that the next solution corrects rounding errors
+/// instead of repeating them.
 pub(super) struct OutputLayer {
-    /// One for each part of the samples; once gathered, the first has the sums of all.
+    /// Sums for each part of the samples; once gathered, the first contains the total.
     parts: Vec<OutputSums>,
     cholesky: Cholesky,
 }
@@ -193,7 +192,7 @@ impl OutputLayer {
         }
     }
 
-    /// Replaces the output layer of `mlp`; `None` if there is no solution in the arithmetic.
+    /// Replaces the output layer of `mlp`; `None` if the equations are numerically singular.
     pub(super) fn solve(&mut self, mlp: &mut Mlp, examples: &Examples, kept: &mut KeptActivations) -> Option<()> {
         kept.evaluate(mlp, examples);
         for sums in &mut self.parts {
@@ -228,8 +227,8 @@ impl OutputLayer {
     }
 }
 
-/// Ridge on the diagonal of G = H̃ᵀH̃ that keeps it positive definite: 1e-13 of its largest entry, which is the last,
-/// that of the ones.
+/// Ridge on the diagonal of G = H̃ᵀH̃ that keeps it positive definite: 1e-13 of its largest entry, which is the last
+/// one (the column of ones).
 pub(super) fn ridge(g: &Mat<f64>) -> f64 {
     let last = g.nrows() - 1;
     1e-13 * g[(last, last)]
@@ -251,7 +250,7 @@ mod tests {
         tests::{random_examples, random_mlp},
     };
 
-    /// The products gathered for one of the solvers.
+    /// Returns the products gathered for one of the solvers.
     fn gathered<S: HiddenSolver>(mlp: &Mlp, examples: &Examples) -> Products {
         let solver = S::new(mlp.shape(), examples);
         let cost = S::cost(mlp.shape(), examples.samples());
@@ -261,9 +260,9 @@ mod tests {
         products
     }
 
-    /// JᵀJ and Jᵀe come back from the products, entry by entry, more than one block of samples in two parts.
+    /// Compares JᵀJ and Jᵀe entry by entry, for more than one block of samples in two parts.
     #[test]
-    fn the_products_are_those_of_the_dense_jacobian() {
+    fn the_products_agree_with_the_dense_jacobian() {
         let (mlp, examples) = (random_mlp(5, 4, 3, 1), random_examples(2 * BLOCK + 44, 5, 3, 2));
         let (h, h1, n1, outputs) = (4, 5, 6, 3);
         let jacobian = jacobian(&mlp, &examples);

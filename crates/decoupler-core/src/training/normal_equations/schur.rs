@@ -1,6 +1,4 @@
-//! The Schur complement S on W, formed and factored.
-//!
-//! Numbers that differ between the classes of weights.
+//! The Schur complement S on W, formed and factored, and values that differ between the classes of weights.
 
 use faer::{
     Accum, Mat, MatMut, MatRef, Par,
@@ -31,14 +29,14 @@ use crate::{
     },
 };
 
-/// Solves with the Cholesky factor of S, in memory that is used again for every damping.
+/// Solver with the Cholesky factor of S, in memory that is reused for every damping.
 ///
 /// All of BᵀB is gathered, packed: pairs of inputs × pairs of hidden nodes, pair (i, j ≤ i) at i(i+1)/2 + j. BᵀB is
 /// symmetric in both, so it is one product of pairs: (pairs of columns of A)ᵀ × (pairs of columns of D).
 pub(in crate::training) struct SchurComplement {
     shape: Shape,
     input_pairs: InputPairs,
-    /// An unpacked n1 × n1 block of BᵀB for each hidden node.
+    /// Unpacked n1 × n1 block of BᵀB for each hidden node.
     squares: Vec<f64>,
     /// S, then its Cholesky factor; the lower triangle.
     s: Mat<f64>,
@@ -59,7 +57,8 @@ impl HiddenSolver for SchurComplement {
         }
     }
 
-    /// Gathering BᵀB takes n1²/2 · h²/2 multiplications a sample, solving order² (h+1)/2 + order³/6, order = h·n1.
+    /// Gathering BᵀB takes n1²/2 · h²/2 multiplications per sample, solving order² (h+1)/2 + order³/6, with order =
+    /// h·n1.
     fn cost(shape: Shape, samples: usize) -> Cost {
         let (n1, h) = (shape.inputs + 1, shape.hidden);
         let order = shape.hidden_weights();
@@ -122,8 +121,7 @@ impl HiddenSolver for SchurComplement {
 }
 
 impl SchurComplement {
-    /// Factors S for a damping of W, with V̄ (h × outputs) and F; `None` if it is not positive definite in the
-    /// arithmetic.
+    /// Factors S for a damping of W, with V̄ (h × outputs) and F; `None` if it is not numerically positive definite.
     pub(super) fn factor(
         &mut self,
         sums: &Sums,
@@ -144,9 +142,9 @@ impl SchurComplement {
         self.cholesky.factor(self.s.as_mut())
     }
 
-    /// Returns the trace of the inverse of the whole matrix that was last factored. By the blocks of the inverse it is
-    /// `tr S⁻¹ + m tr G⁻¹ + Σₜ tr S⁻¹ Rₜ Rₜᵀ` with Rₜ = diag(V̄ₜ ⊗ 1) C G⁻¹; with the factors S = L Lᵀ and G = Lg Lgᵀ that
-    /// is `‖L⁻¹‖² + m ‖Lg⁻¹‖² + Σₜ ‖L⁻¹ Rₜ‖²` (Frobenius).
+    /// Returns the trace of the inverse of the whole matrix last factored. From the blocks of the inverse it is `tr S⁻¹
+    /// + m tr G⁻¹ + Σₜ tr S⁻¹ Rₜ Rₜᵀ` with Rₜ = diag(V̄ₜ ⊗ 1) C G⁻¹; with the factors S = L Lᵀ and G = Lg Lgᵀ this is
+    /// `‖L⁻¹‖² + m ‖Lg⁻¹‖² + Σₜ ‖L⁻¹ Rₜ‖²` (Frobenius norms).
     pub(super) fn trace_of_inverse(&mut self, elimination: &mut Elimination, v: MatRef<'_, f64>) -> f64 {
         let outputs = self.shape.outputs as f64;
         let inverse = self.invert(elimination);
@@ -155,8 +153,8 @@ impl SchurComplement {
         trace
     }
 
-    /// As [`Self::trace_of_inverse`], class by class: entry k of the diagonal is the square of column k of L⁻¹, or of Lg⁻¹
-    /// and all L⁻¹ Rₜ.
+    /// As [`Self::trace_of_inverse`], class by class: diagonal entry k is the squared norm of column k of L⁻¹, or of
+    /// Lg⁻¹ and all L⁻¹ Rₜ.
     pub(super) fn traces_of_inverse(&mut self, elimination: &mut Elimination, v: MatRef<'_, f64>) -> PerClass {
         let Shape {
             inputs,
@@ -196,7 +194,7 @@ impl SchurComplement {
         inverse
     }
 
-    /// Calls `add` with L⁻¹ Rₜ of every output, after [`Self::invert`].
+    /// Calls `add` with L⁻¹ Rₜ for every output, after [`Self::invert`].
     fn for_each_output(
         &mut self,
         elimination: &mut Elimination,
@@ -218,7 +216,7 @@ impl SchurComplement {
     }
 }
 
-/// Memory for the trace of the inverse, allocated when it is first needed.
+/// Memory for the trace of the inverse, allocated on first use.
 struct Inverse {
     s: Mat<f64>,
     g: Mat<f64>,
@@ -235,14 +233,14 @@ impl Inverse {
     }
 }
 
-/// Returns the sum of squares of the lower triangle.
+/// Returns the sum of squares in the lower triangle.
 fn squared_lower(matrix: &Mat<f64>) -> f64 {
     let columns = (0..matrix.ncols()).map(|index| &column(matrix.as_ref(), index)[index..]);
     columns.flatten().map(|value| value * value).sum()
 }
 
-/// Fills the lower triangle of S, except for its damping: (V̄V̄ᵀ ⊗ 1) ∘ (BᵀB − F Fᵀ). `s` holds the columns of the nodes from
-/// `first` on, from their diagonal down; `squares` has n1² entries for each of those nodes.
+/// Fills the lower triangle of S, except for its damping: (V̄V̄ᵀ ⊗ 1) ∘ (BᵀB − F Fᵀ). `s` holds the columns of the
+/// nodes from `first` on, from their diagonal down; `squares` has n1² entries for each of those nodes.
 fn fill_schur(terms: &Terms<'_>, first: usize, s: MatMut<'_, f64>, squares: &mut [f64]) {
     let nodes = s.ncols() / terms.n1;
     if nodes > 1 && is_large(s.nrows() * s.ncols() * terms.n1) {
@@ -282,7 +280,7 @@ fn fill_schur(terms: &Terms<'_>, first: usize, s: MatMut<'_, f64>, squares: &mut
     });
 }
 
-/// The parts that S is made of.
+/// Terms of S.
 struct Terms<'a> {
     gram: MatRef<'a, f64>,
     v: MatRef<'a, f64>,
@@ -325,21 +323,21 @@ impl WithSimd for Completion<'_, '_> {
     }
 }
 
-/// A number for each class of weights.
+/// Value for each class of weights.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(in crate::training) struct PerClass<T = f64> {
-    /// From inputs to hidden nodes.
+    /// Weights from inputs to hidden nodes.
     pub(in crate::training) hidden_weights: T,
-    /// Of hidden nodes.
+    /// Biases of hidden nodes.
     pub(in crate::training) hidden_biases: T,
-    /// From hidden nodes to outputs.
+    /// Weights from hidden nodes to outputs.
     pub(in crate::training) output_weights: T,
-    /// Of outputs.
+    /// Biases of outputs.
     pub(in crate::training) output_biases: T,
 }
 
 impl<T: Copy> PerClass<T> {
-    /// The same for every weight.
+    /// Creates the same value for every class.
     pub(in crate::training) fn all(value: T) -> Self {
         Self {
             hidden_weights: value,
@@ -349,7 +347,7 @@ impl<T: Copy> PerClass<T> {
         }
     }
 
-    /// As `of` makes them of these.
+    /// Applies `of` to the value of each class.
     pub(in crate::training) fn map<U>(self, of: impl Fn(T) -> U) -> PerClass<U> {
         PerClass {
             hidden_weights: of(self.hidden_weights),
@@ -359,7 +357,7 @@ impl<T: Copy> PerClass<T> {
         }
     }
 
-    /// Of a weight of the hidden layer: that of this input, or after the last one the bias.
+    /// Returns the value for a weight of the hidden layer: `input` equal to `inputs` is the bias.
     pub(super) fn of_input(&self, input: usize, inputs: usize) -> T {
         if input == inputs {
             self.hidden_biases
@@ -368,7 +366,7 @@ impl<T: Copy> PerClass<T> {
         }
     }
 
-    /// Of a weight of the output layer: that of this hidden node, or after the last one the bias.
+    /// Returns the value for a weight of the output layer: `node` equal to `hidden` is the bias.
     pub(super) fn of_node(&self, node: usize, hidden: usize) -> T {
         if node == hidden {
             self.output_biases
@@ -377,7 +375,7 @@ impl<T: Copy> PerClass<T> {
         }
     }
 
-    /// Class by class.
+    /// Returns the values class by class.
     pub(in crate::training) fn values(self) -> [T; 4] {
         [
             self.hidden_weights,
@@ -389,7 +387,7 @@ impl<T: Copy> PerClass<T> {
 }
 
 impl PerClass {
-    /// Class by class the product.
+    /// Returns the product class by class.
     pub(in crate::training) fn times(self, other: Self) -> Self {
         Self {
             hidden_weights: self.hidden_weights * other.hidden_weights,
@@ -400,11 +398,11 @@ impl PerClass {
     }
 }
 
-/// Decay of the weights towards zero, of output biases towards values of their own.
+/// Decay of the weights towards zero, and of output biases towards given values.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::training) struct Decay<'a> {
     rates: PerClass,
-    /// Output by output; empty for zeros.
+    /// Value for each output bias; empty for zeros.
     biases: &'a [f64],
 }
 
@@ -419,24 +417,24 @@ impl<'a> Decay<'a> {
         biases: &[],
     };
 
-    /// At these rates, of output biases towards `biases`, or zero if that is empty.
+    /// Creates a decay with these rates, of output biases towards `biases`, or towards zero if that is empty.
     pub(in crate::training) fn new(rates: PerClass, biases: &'a [f64]) -> Self {
         Self { rates, biases }
     }
 
-    /// Half the gradient of the decay by a weight of the hidden layer.
+    /// Returns half the derivative of the decay with respect to a weight of the hidden layer.
     pub(super) fn pull_in_hidden(&self, (input, inputs): (usize, usize), weight: f64) -> f64 {
         self.rates.of_input(input, inputs) * weight
     }
 
-    /// Half the gradient of the decay by a weight of the output layer.
+    /// Returns half the derivative of the decay with respect to a weight of the output layer.
     pub(super) fn pull_in_output(&self, (node, hidden): (usize, usize), output: usize, weight: f64) -> f64 {
         let bias = self.biases.get(output).filter(|_| node == hidden);
         self.rates.of_node(node, hidden) * bias.map_or(weight, |bias| weight - bias)
     }
 }
 
-/// Number of weights of each class.
+/// Returns the number of weights in each class.
 pub(in crate::training) fn class_sizes(shape: Shape) -> PerClass<usize> {
     let Shape {
         inputs,
@@ -451,7 +449,7 @@ pub(in crate::training) fn class_sizes(shape: Shape) -> PerClass<usize> {
     }
 }
 
-/// Σw² of each class; of output biases their squared distances from `biases`, or zero if that is empty.
+/// Returns Σw² of each class; for output biases, the squared distances from `biases`, or from zero if that is empty.
 pub(in crate::training) fn class_squares(mlp: &Mlp, biases: &[f64]) -> PerClass {
     let mut rest = mlp.weights();
     let sizes = class_sizes(mlp.shape());

@@ -9,7 +9,7 @@ use crate::training::{
     examples::tests::{random_examples, random_mlp},
 };
 
-/// Every solver, with its name.
+/// Returns every solver with its name.
 fn solvers(shape: Shape, examples: &Examples) -> [(&'static str, NormalEquations); 2] {
     let samples = examples.samples();
     let factored = NormalEquations::<dyn HiddenSolver>::with_solver(
@@ -25,7 +25,7 @@ fn solvers(shape: Shape, examples: &Examples) -> [(&'static str, NormalEquations
     [("factored", factored), ("conjugate gradients", iterated)]
 }
 
-/// The step at damping `mu`, solved as after a rejected step: another network was evaluated since.
+/// Returns the step at damping `mu`, solved as after a rejected step: another network was evaluated in between.
 fn step(equations: &mut NormalEquations, mlp: &Mlp, examples: &Examples, mu: f64) -> Option<Vec<f64>> {
     equations.gather(mlp, examples);
     equations.mse(&Mlp::zeros(mlp.shape()), examples);
@@ -34,11 +34,11 @@ fn step(equations: &mut NormalEquations, mlp: &Mlp, examples: &Examples, mu: f64
     Some(step)
 }
 
-/// Rounding is amplified by the condition number κ of the normal equations, and so is the residual that conjugate
-/// gradients leave. The directions in which the step is then uncertain hardly change the linearised error: at least
-/// its decrease is found to six digits.
+/// Rounding errors and the residual of conjugate gradients are amplified by the condition number κ of the normal
+/// equations. The directions in which the step is then inaccurate hardly change the linearised error, so its decrease
+/// is still accurate to six digits.
 #[test]
-fn the_step_is_that_of_the_dense_jacobian() {
+fn the_step_agrees_with_the_dense_jacobian() {
     for (inputs, hidden, outputs, samples) in [
         (5, 4, 3, 300),
         (1, 1, 1, 3),
@@ -53,32 +53,32 @@ fn the_step_is_that_of_the_dense_jacobian() {
             let dense = DampedLeastSquares::new(&mlp, &examples, mu);
             let (expected, condition) = (dense.step(), dense.normal_condition());
             let [(_, mut factored), (_, mut iterated)] = solvers(mlp.shape(), &examples);
-            let what = format!("{inputs}-{hidden}-{outputs}, mu {mu:e}, condition {condition:.1e}");
+            let case = format!("{inputs}-{hidden}-{outputs}, mu {mu:e}, condition {condition:.1e}");
             let rounding = 30.0 * f64::EPSILON * condition;
             match step(&mut factored, &mlp, &examples, mu) {
                 Some(step) => {
                     let distance = distance(&step, &expected);
-                    assert!(distance < rounding.max(1e-12), "{what}, factored: {distance:e}");
+                    assert!(distance < rounding.max(1e-12), "{case}, factored: {distance:e}");
                 }
                 // Lost in rounding.
-                None => assert!(rounding > 1.0, "{what}, factored"),
+                None => assert!(rounding > 1.0, "{case}, factored"),
             }
             match step(&mut iterated, &mlp, &examples, mu) {
                 Some(step) => {
                     let distance = distance(&step, &expected);
                     let missed = dense.missed(&step, &expected);
-                    assert!(missed < 1e-6, "{what}, iterated: {missed:e}");
+                    assert!(missed < 1e-6, "{case}, iterated: {missed:e}");
                     let close = rounding + 1e-8 * condition;
-                    assert!(distance < close || condition > 1e6, "{what}, iterated: {distance:e}");
+                    assert!(distance < close || condition > 1e6, "{case}, iterated: {distance:e}");
                 }
-                None => assert!(rounding > 1.0, "{what}, iterated"),
+                None => assert!(rounding > 1.0, "{case}, iterated"),
             }
         }
     }
 }
 
-/// Decay that differs between the classes of weights, of output biases towards values of their own, next to the matrix
-/// written out.
+/// Decay that differs between the classes of weights, with output biases drawn towards given values, compared with the
+/// explicit matrix.
 #[test]
 fn every_class_of_weights_decays_at_its_own_rate() {
     let (inputs, hidden, outputs) = (5, 4, 3);
@@ -136,7 +136,7 @@ fn every_class_of_weights_decays_at_its_own_rate() {
     assert!((whole / parts - 1.0).abs() < 1e-13);
 }
 
-/// Enough samples that they are divided into parts.
+/// With enough samples to be divided into parts.
 #[test]
 fn parts_of_the_samples_add_up() {
     let (mlp, examples) = (random_mlp(20, 12, 5, 3), random_examples(40_000, 20, 5, 4));
@@ -155,7 +155,7 @@ fn parts_of_the_samples_add_up() {
 }
 
 #[test]
-fn it_evaluates_as_back_propagation_does() {
+fn the_evaluation_agrees_with_back_propagation() {
     let mlp = random_mlp(6, 5, 4, 3);
     let examples = random_examples(400, 6, 4, 4);
     let ours = NormalEquations::cheapest(mlp.shape(), &examples).gather(&mlp, &examples);
@@ -165,7 +165,7 @@ fn it_evaluates_as_back_propagation_does() {
 }
 
 #[test]
-fn a_singular_system_is_refused_or_solved_but_never_nan() {
+fn a_singular_system_is_rejected_or_solved_but_never_nan() {
     let mlp = Mlp::zeros(Shape {
         inputs: 3,
         hidden: 2,
