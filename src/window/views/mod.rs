@@ -1,8 +1,8 @@
-//! The views, one room each; none knows another.
+//! The views, one module each; they do not depend on each other.
 //!
-//! A new view is a room of its own whose main type is a [`View`], and a field and a line in [`Views`] below. What it asks
-//! of the window is an [`Effect`](crate::window::shared::Effect); only if it needs what no view has asked for yet,
-//! `shared/effect.rs` gets a variant, and `window/applying.rs` says what it does.
+//! A new view is a module whose main type implements [`View`], with a field and a line in [`Views`] below. It requests
+//! changes to the window as an [`Effect`](crate::window::shared::Effect); a new kind of request needs a variant in
+//! `shared/effect.rs` and its implementation in `window/applying.rs`.
 
 mod compare;
 mod experiments;
@@ -29,22 +29,22 @@ use self::{
 /// All views.
 #[derive(Debug)]
 pub struct Views {
-    /// One training and what it makes of the sensor.
+    /// One training and the sensor that it decodes.
     pub train: TrainView,
     /// The paper's tables and sweeps.
     pub experiments: ExperimentsView,
     /// Two finished trainings side by side.
     pub compare: CompareView,
-    /// View of what the readings determine.
+    /// What the readings determine.
     pub identifiability: IdentifiabilityView,
-    /// View of the speed and the accuracy of each decoder.
+    /// Speed and accuracy of each decoder.
     pub trade_off: TradeOffView,
-    /// View of frames decoded as they come.
+    /// Frames decoded as they arrive.
     pub live: LiveView,
 }
 
 impl Views {
-    /// As the window opens. `wake` is called whenever a view has events.
+    /// Creates the views in their initial state; `wake` is called whenever a view has events.
     pub fn new(wake: &Wake) -> Self {
         Self {
             train: TrainView::new(Arc::clone(wake)),
@@ -71,7 +71,7 @@ impl Views {
         !self.train.recording.is_empty()
     }
 
-    /// In the order of the top bar. The first is the one that trains.
+    /// Returns the views in the order of the top bar; the first is the Train view.
     pub fn all(&mut self) -> [&mut dyn View; 6] {
         [
             &mut self.train,

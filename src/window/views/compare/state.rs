@@ -20,29 +20,29 @@ use crate::window::{
 
 /// The Compare view.
 pub struct CompareView {
-    /// Contents of the two places.
+    /// The two sides, A and B.
     pub places: [Place; 2],
     /// Snapshot of both test sets.
     pub snapshot: usize,
-    /// Surface shown of both networks.
+    /// Surface shown for both networks.
     pub card: RightCard,
-    /// The run that the user is asked about before it is removed.
+    /// Run whose removal awaits confirmation.
     pub removing: Option<u64>,
-    /// Number of runs with which its places were last filled, until both are.
+    /// Number of runs when empty sides were last filled; `None` once both are filled.
     pub(super) opened_with: Option<usize>,
-    /// The node under the pointer, lit on both surfaces.
+    /// Node under the pointer, highlighted on both surfaces.
     pub node: Option<usize>,
     wake: Wake,
 }
 
-/// One of the two places.
+/// One side of the comparison.
 #[derive(Debug, Default)]
 pub struct Place {
-    /// The run in it.
+    /// The run on this side.
     id: Option<u64>,
-    /// Test set of the run and the answers of its network, once they are there.
+    /// Test set of the run and the answers of its network, once they are ready.
     pub compared: Option<Compared>,
-    /// Reason for which they cannot be had.
+    /// Reason why they are not available.
     pub problem: Option<String>,
     /// Target of a recording whose regression is shown.
     pub target: usize,
@@ -50,18 +50,18 @@ pub struct Place {
     job: Option<Job<Result<Box<Compared>, String>>>,
 }
 
-/// A run as it is drawn.
+/// A run prepared for drawing.
 #[derive(Clone, Debug)]
 pub struct Compared {
     /// Its test set.
     pub test: TestSet,
     /// Answers of its network: samples × targets.
     pub answers: Arc<Array2<f64>>,
-    /// What is drawn of them.
+    /// Displayed part of them.
     pub drawn: Drawn,
 }
 
-/// What is drawn of a test set.
+/// Displayed part of a test set.
 #[derive(Clone, Debug)]
 pub enum Drawn {
     /// Nodes of an array at the displayed snapshot: actual, decoupled, difference.
@@ -81,7 +81,7 @@ impl Place {
 }
 
 impl Compared {
-    /// Draws the test set of a run again, or reads it from the files of its recording; `None` once cancelled.
+    /// Simulates the test set of a run again, or reads it from the files of its recording; `None` once cancelled.
     fn new(file: &NetworkFile, is_cancelled: &dyn Fn() -> bool) -> Result<Option<Self>, String> {
         let test = match (file.settings.simulated(), &file.recorded) {
             (Some(settings), _) => TestSet::Array(TestView::draw(&settings).map_err(|error| error.to_string())?),
@@ -104,7 +104,7 @@ impl Compared {
     }
 }
 
-/// Reads the test samples with which the network was tested again.
+/// Reads the test samples of a network again.
 fn recorded_test(
     file: &NetworkFile,
     recorded: &Recorded,
@@ -112,7 +112,7 @@ fn recorded_test(
 ) -> Result<Option<RecordedTest>, String> {
     if let [missing, ..] = recorded.missing()[..] {
         return Err(format!(
-            "The recording '{}' is not there any more, so its test samples cannot be shown. Put the file back to see them; \
+            "The recording '{}' no longer exists, so its test samples cannot be shown. Put the file back to see them; \
              errors, loss and settings are kept with the run.",
             missing.display()
         ));
@@ -127,8 +127,8 @@ fn recorded_test(
     if !is_same {
         let data = recorded.plan.import.data.display();
         return Err(format!(
-            "'{data}' has other samples than when this network was trained, so they are not shown. Use the file of that \
-             time, or train again."
+            "'{data}' has changed since this network was trained, so its samples are not shown. Restore the original \
+             file, or train again."
         ));
     }
     let test = RecordedTest::new(Arc::clone(&sets.sets.test), Arc::new(file.problem.clone()));
@@ -159,7 +159,7 @@ fn drawn(test: &TestSet, answers: &Array2<f64>, snapshot: usize) -> Drawn {
 }
 
 impl CompareView {
-    /// Nothing compared yet. `wake` is called when there is something to be drawn.
+    /// Creates the view with both sides empty; `wake` is called when there is something new to draw.
     pub fn new(wake: Wake) -> Self {
         Self {
             places: Default::default(),
@@ -190,7 +190,7 @@ impl CompareView {
             .unwrap_or(0)
     }
 
-    /// Fills empty places with the newest runs as the view opens, the older one first, and as runs arrive until both are
+    /// Fills empty sides with the newest runs as the view opens, the older one first, and as runs arrive until both are
     /// filled.
     pub(super) fn fill_places(&mut self, runs: &RunList, effects: &mut Vec<Effect>) {
         let count = runs.workspace.runs.len();
@@ -208,7 +208,7 @@ impl CompareView {
         effects.extend(filled.map(|(place, id)| Effect::PinRun(place, Some(id))));
     }
 
-    /// Prepares what is to be drawn in the two places on threads, and takes what they have prepared.
+    /// Starts background jobs that prepare the two sides, and takes their results.
     pub(super) fn follow(&mut self, runs: &RunList) {
         for (number, place) in self.places.iter_mut().enumerate() {
             let run = runs.pinned(number);
@@ -243,7 +243,7 @@ fn prepare(file: &Arc<NetworkFile>, wake: &Wake) -> Job<Result<Box<Compared>, St
         move |report| Compared::new(&file, &|| report.is_cancelled()),
         |prepared| match prepared {
             Ok(Ok(Some(compared))) => Ok(Box::new(compared)),
-            Ok(Ok(None)) => Err("The test samples were not read to the end.".to_owned()),
+            Ok(Ok(None)) => Err("Reading the test samples was cancelled.".to_owned()),
             Ok(Err(reason)) => Err(reason),
             Err(error) => Err(format!("The test samples of this run could not be prepared: {error}")),
         },
@@ -257,8 +257,7 @@ impl fmt::Debug for CompareView {
     }
 }
 
-/// The finished trainings, the newest first.
-/// `removing` is the run that the user is asked about before it is removed.
+/// Shows the finished trainings, newest first; `removing` is the run whose removal awaits confirmation.
 pub fn run_list_ui(ui: &mut Ui, shared: &Shared, removing: &mut Option<u64>, effects: &mut Vec<Effect>) {
     let runs = &shared.runs;
     scrolled_ui(ui, "runs", |ui| {
@@ -345,7 +344,7 @@ fn run_ui(
     });
 }
 
-/// The name, to be changed in place; what is typed counts when the field is left.
+/// Shows the name in an editable field; a change takes effect when the field loses the focus.
 fn name_ui(ui: &mut Ui, position: usize, run: &KeptRun, effects: &mut Vec<Effect>) {
     let id = Id::unique(("run name", run.id));
     let typed: Option<String> = ui.data(|data| data.get_temp(id));
@@ -356,7 +355,7 @@ fn name_ui(ui: &mut Ui, position: usize, run: &KeptRun, effects: &mut Vec<Effect
     if edit.changed() {
         ui.data_mut(|data| data.insert_temp(id, name.clone()));
     }
-    // Also a field that lost the focus while another view was displayed.
+    // This includes a field that lost the focus while another view was displayed.
     if !edit.has_focus() && typed.is_some() {
         ui.data_mut(|data| data.remove::<String>(id));
         if name != run.name {
@@ -365,7 +364,7 @@ fn name_ui(ui: &mut Ui, position: usize, run: &KeptRun, effects: &mut Vec<Effect
     }
 }
 
-/// Returns the conditions of the run in a line.
+/// Returns the settings of the run in one line.
 fn conditions(file: &NetworkFile) -> String {
     let settings = &file.settings;
     let starts = match settings.starts {

@@ -1,6 +1,4 @@
-//! Exports of two runs side by side, and of each of them alone.
-//!
-//! A run's scene and inputs in words.
+//! The body, the figures and the exports of the Compare view.
 
 use std::{sync::Arc, time::Duration};
 
@@ -68,7 +66,7 @@ impl View for CompareView {
         run_list_ui(ui, shared, &mut self.removing, effects);
     }
 
-    /// The surfaces of both runs above, their curves and figures below.
+    /// Shows the surfaces of both runs above, their curves and figures below.
     fn body_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) {
         let whole = ui.available_rect_before_wrap();
         let gap = space(2);
@@ -107,7 +105,7 @@ impl View for CompareView {
 }
 
 impl CompareView {
-    /// Decoded against actual values of the displayed target in this place, if it has no surface.
+    /// Returns the plot of decoded against actual values of the displayed target on this side, if it has no surface.
     pub(super) fn regression(&self, place: usize) -> Option<PlotFigure> {
         let place = &self.places[place];
         let Compared { test, answers, drawn } = place.compared.as_ref()?;
@@ -125,7 +123,7 @@ impl CompareView {
         ))
     }
 
-    /// The surfaces of the runs that are prepared, with one scale.
+    /// Returns the surfaces of the runs that are ready, on a common scale.
     pub(super) fn figure(&self, shared: &Shared) -> SurfaceFigure {
         let look = shared.look;
         let surface = |place: usize| {
@@ -184,7 +182,7 @@ impl CompareView {
                     .color(colour),
             );
             ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
-                // What holds for both is asked for once.
+                // Choices common to both sides are shown once.
                 match place {
                     0 => view_mode_ui(ui, look, effects),
                     _ => {
@@ -254,11 +252,11 @@ fn surface_ui(
         theme: Theme::of(ui),
     };
     let shown = view.show(ui, look.camera);
-    // The node of the same number is lit on the other surface.
+    // The node with the same number is highlighted on the other surface.
     follow_surface(&shown, look, node, effects);
 }
 
-/// The errors of each epoch of the runs that are chosen.
+/// Returns the loss curves of the chosen runs.
 pub(super) fn losses(runs: &RunList) -> Option<PlotFigure> {
     let [a, b] = [0, 1].map(|place| {
         let run = runs.pinned(place)?;
@@ -268,7 +266,7 @@ pub(super) fn losses(runs: &RunList) -> Option<PlotFigure> {
     (a.is_some() || b.is_some()).then(|| compared_losses_figure(runs))
 }
 
-/// The networks of both runs, the pictures, and the table.
+/// Returns the exports: networks of both runs, pictures and table.
 pub(super) fn compare_exports<'a>(view: &'a CompareView, shared: &'a Shared) -> Vec<Export<'a>> {
     let runs = &shared.runs;
     let mut exports = Vec::new();
@@ -278,7 +276,7 @@ pub(super) fn compare_exports<'a>(view: &'a CompareView, shared: &'a Shared) -> 
         let source = source.ok_or_else(|| format!("No run is chosen as {letter}: choose one in the list."));
         exports.extend(network_exports(&format!("{letter}: "), &source, Vec::new));
     }
-    // One part of the menu for the networks of both.
+    // Both networks share a section of the menu.
     exports.sort_by_key(|export| export.group);
     let nothing = || "No run is chosen: choose one in the list.".to_owned();
     let figure = view.figure(shared);
@@ -308,7 +306,7 @@ pub(super) fn compare_exports<'a>(view: &'a CompareView, shared: &'a Shared) -> 
     exports
 }
 
-/// Returns the differences between a run and the paper's scene and inputs, in words; empty if there are none.
+/// Describes the differences between a run and the paper's scene and inputs; empty if there are none.
 pub fn unlike_paper(settings: &SimulatedSettings) -> Vec<String> {
     let paper = SimulatedSettings::default();
     let (scene, of_paper) = (&settings.source.scene, &paper.source.scene);
@@ -385,9 +383,9 @@ const COLUMNS: [Column<'_>; 3] = [
 ];
 
 const OTHER_SAMPLES: &str =
-    "These networks were tested on different samples, so their errors are not comparable directly.";
+    "These networks were tested on different samples, so their errors are not directly comparable.";
 
-/// A figure of a run, in words; `None` if runs of its source have none.
+/// Formats a figure of a run; returns `None` if it does not apply to the source of the run.
 type FigureOf = fn(&KeptRun) -> Option<String>;
 
 fn of_nodes(run: &KeptRun, figure: fn(&Errors) -> Option<f64>) -> Option<String> {
@@ -444,7 +442,7 @@ const FIGURES: [(&str, FigureOf); 20] = [
     }),
 ];
 
-/// Figures that at least one of the runs compared has, with the words for each.
+/// Returns the figures that apply to at least one of the compared runs, formatted for each run.
 fn figures(runs: &RunList) -> impl Iterator<Item = (&'static str, [Option<String>; 2])> {
     let figure = |(name, figure): &(&'static str, FigureOf)| {
         let of = |place| runs.pinned(place).and_then(figure);
@@ -457,7 +455,7 @@ fn figures(runs: &RunList) -> impl Iterator<Item = (&'static str, [Option<String
         .filter(move |(_, words)| is_empty || words.iter().any(Option::is_some))
 }
 
-/// RMSE and R² of each target of the recordings compared, with the words for each run.
+/// Returns RMSE and R² of each target of the compared recordings, formatted for each run.
 fn target_figures(runs: &RunList) -> Vec<(String, [Option<String>; 2])> {
     let pinned = [0, 1].map(|place| runs.pinned(place));
     let mut targets: Vec<&Channel> = Vec::new();
@@ -484,7 +482,7 @@ fn target_figures(runs: &RunList) -> Vec<(String, [Option<String>; 2])> {
     targets.into_iter().flat_map(figures).collect()
 }
 
-/// Returns true if the errors of two recordings are not of the same samples.
+/// Returns true if the two runs were tested on different samples.
 fn are_other_samples(runs: &RunList) -> bool {
     // The channels of the readings may differ.
     let samples = |run: &KeptRun| {
@@ -506,7 +504,7 @@ fn split_words(plan: &Plan) -> String {
     }
 }
 
-/// The figures of both runs, under their names.
+/// Returns the figures of both runs, with their names as headings.
 pub fn compared_table(runs: &RunList) -> Table {
     let name = |place: usize| {
         let run = runs.pinned(place).map_or("", |run| &run.name);
@@ -521,7 +519,7 @@ pub fn compared_table(runs: &RunList) -> Table {
     }
 }
 
-/// Errors, configuration and cost of both runs.
+/// Shows errors, configuration and cost of both runs.
 pub fn figures_ui(ui: &mut Ui, runs: &RunList) {
     if are_other_samples(runs) {
         note_ui(ui, OTHER_SAMPLES);
@@ -536,7 +534,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_differs_from_the_paper_is_said_and_nothing_else() {
+    fn only_differences_from_the_paper_are_listed() {
         assert!(unlike_paper(&SimulatedSettings::default()).is_empty());
         let mut best = Preset::Best.settings_in(Noise {
             relative: 1e-3,

@@ -12,10 +12,10 @@ use thiserror::Error;
 
 use super::Topic;
 
-/// An experiment as the user sets it up.
+/// Form of an experiment.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Form {
-    /// Everything but the axes, which are typed.
+    /// The experiment without its axes, which are typed.
     pub template: Experiment,
     /// Plan by which a recording is read; `None` for a simulated array.
     pub plan: Option<Plan>,
@@ -23,22 +23,22 @@ pub struct Form {
     pub axes: Vec<AxisForm>,
 }
 
-/// Reasons for which a form is not yet an experiment.
+/// Error in a form.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
 pub enum FormError {
-    /// A value that cannot be understood.
+    /// A value that cannot be parsed.
     #[error(transparent)]
     List(#[from] ListError),
-    /// Values that cannot be run.
+    /// Values that do not make a valid experiment.
     #[error(transparent)]
     Experiment(#[from] ExperimentError),
-    /// More than can be looked at.
-    #[error("{0} cells are more than can be looked at: give fewer values, at most {MAX_CELLS} cells")]
+    /// Too many cells to display.
+    #[error("{0} cells are too many to display: give fewer values, at most {MAX_CELLS} cells")]
     TooManyCells(usize),
 }
 
-/// The most cells of one experiment in the window.
+/// Maximum number of cells of an experiment in the window.
 const MAX_CELLS: usize = 400;
 
 impl Form {
@@ -67,12 +67,12 @@ impl Form {
         }
     }
 
-    /// Setup of the base.
+    /// Returns the setup of the base.
     pub fn setup(&self) -> Option<Setup> {
         Setup::of(self.template.base, self.plan.clone())
     }
 
-    /// Takes `setup` as the base. An axis that its source does not have gives way to another.
+    /// Uses `setup` as the base. An axis that its source does not have is replaced by another.
     pub fn take(&mut self, setup: &Setup) {
         self.template.base = *setup.settings();
         self.template.recording = setup.experiment_recording();
@@ -88,12 +88,12 @@ impl Form {
         }
     }
 
-    /// Settings that an axis can vary.
+    /// Returns the settings that an axis can vary.
     pub fn offered(&self) -> impl Iterator<Item = AxisKind> + use<> {
         AxisKind::of_source(&self.template.base.source)
     }
 
-    /// Gives methods on a recording the settings that suit recordings.
+    /// Adapts the settings of training methods to a recording, if the base is one.
     fn suited(&self, axis: Axis) -> Axis {
         let Axis::Method(mut methods) = axis else { return axis };
         if self.plan.is_some() {
@@ -104,10 +104,10 @@ impl Form {
         Axis::Method(methods)
     }
 
-    /// The experiment, sound as far as can be known before it is run.
+    /// Returns the experiment, validated as far as possible without running it.
     ///
     /// # Errors
-    /// If it is not a possible experiment.
+    /// If the form is not a valid experiment.
     pub fn experiment(&self) -> Result<Experiment, FormError> {
         let mut axes = Vec::new();
         for axis in &self.axes {
@@ -130,7 +130,7 @@ impl Form {
     }
 }
 
-/// An axis as the user types it.
+/// An axis as typed by the user.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct AxisForm {
     /// Setting that is varied.
@@ -139,7 +139,7 @@ pub struct AxisForm {
     pub values: String,
 }
 
-/// A value that cannot be understood.
+/// Error in a typed list of values.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
 pub enum ListError {
@@ -150,20 +150,20 @@ pub enum ListError {
         name: &'static str,
         /// Text that was typed.
         text: String,
-        /// Numbers that the axis has.
+        /// Kind of numbers that the axis takes.
         of: &'static str,
-        /// A list that is understood.
+        /// Example of a valid list.
         example: &'static str,
     },
     /// Not an array scale.
     #[error(transparent)]
     Array(#[from] ArrayScaleError),
-    /// Not one of the words of the axis.
+    /// Not a valid value of the axis.
     #[error("{name}: {message}")]
     Word {
         /// The axis.
         name: &'static str,
-        /// What is wrong, and the words there are.
+        /// Error message, with the valid values.
         message: String,
     },
     /// Not a method.
@@ -171,12 +171,12 @@ pub enum ListError {
     Method {
         /// Text that was typed.
         text: String,
-        /// The names there are.
+        /// The valid names.
         known: String,
     },
 }
 
-/// Name of a setting as a label.
+/// Returns the label of a setting.
 pub fn axis_label(kind: AxisKind) -> &'static str {
     match kind {
         AxisKind::Hidden => "Hidden nodes",
@@ -193,7 +193,7 @@ pub fn axis_label(kind: AxisKind) -> &'static str {
     }
 }
 
-/// Values of a setting to begin with.
+/// Returns the initial values of a setting, as typed.
 pub fn axis_example(kind: AxisKind) -> &'static str {
     match kind {
         AxisKind::Hidden => "6, 8, 10, 12",
@@ -211,7 +211,7 @@ pub fn axis_example(kind: AxisKind) -> &'static str {
 }
 
 impl AxisForm {
-    /// An axis with the values to begin with.
+    /// Creates an axis with its initial values.
     pub fn new(kind: AxisKind) -> Self {
         Self {
             kind,
@@ -219,7 +219,7 @@ impl AxisForm {
         }
     }
 
-    /// The values of `axis` as one would type them.
+    /// Creates the typed form of `axis`.
     pub fn of(axis: &Axis) -> Self {
         let values: Vec<String> = (0..axis.len()).map(|index| axis.label(index)).collect();
         Self {
@@ -228,10 +228,10 @@ impl AxisForm {
         }
     }
 
-    /// The axis.
+    /// Parses the axis.
     ///
     /// # Errors
-    /// The first value that cannot be understood.
+    /// The first value that cannot be parsed.
     pub fn parse(&self) -> Result<Axis, ListError> {
         Ok(match self.kind {
             AxisKind::Hidden => Axis::Hidden(self.numbers()?),
@@ -299,7 +299,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_topic_begins_with_what_can_be_run() {
+    fn the_default_form_of_every_topic_can_be_run() {
         for topic in Topic::ALL {
             let experiment = Form::new(topic).experiment().unwrap();
             match topic {
@@ -310,7 +310,7 @@ mod tests {
     }
 
     #[test]
-    fn a_recording_changes_the_axes_that_it_does_not_have() {
+    fn axes_that_a_recording_lacks_are_replaced() {
         let plan = Plan::default();
         let settings = RunSettings::from(Measured { rows: RowModel::Shared });
         let setup = Setup::recording(settings, plan);
@@ -345,7 +345,7 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_run_says_why() {
+    fn invalid_forms_give_a_reason() {
         let with = |values: &str| {
             let mut form = Form::new(Topic::Sweep);
             form.axes[0].values = values.to_owned();
@@ -366,7 +366,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_offered_is_understood_and_written_back_alike() {
+    fn initial_values_are_parsed_and_printed_unchanged() {
         for kind in AxisKind::ALL {
             let form = AxisForm::new(kind);
             let axis = form.parse().unwrap();
@@ -376,7 +376,7 @@ mod tests {
     }
 
     #[test]
-    fn separators_do_not_matter_and_mistakes_are_named() {
+    fn separators_do_not_matter_and_errors_name_the_value() {
         let parse = |kind, values: &str| {
             AxisForm {
                 kind,

@@ -1,5 +1,4 @@
-//! The Experiments view: the paper's tables redone and sweeps of one's own, run on threads of their own while the
-//! window stays free.
+//! The Experiments view: reproduces the paper's tables and runs sweeps in the background.
 
 mod form;
 mod panel;

@@ -1,4 +1,4 @@
-//! Exports of an experiment.
+//! The form, the status line and the exports of an experiment.
 
 use std::sync::Arc;
 
@@ -39,7 +39,7 @@ use crate::window::{
     },
 };
 
-/// The most seeds or repeats.
+/// Maximum number of seeds or repeats.
 const MAX_TRIALS: usize = 1000;
 
 /// Shows the form: the choice of an experiment, its lists and numbers, Run and Cancel.
@@ -168,7 +168,7 @@ fn cross_validation_ui(ui: &mut Ui, form: &mut Form) {
     );
 }
 
-/// A list of values, written freely.
+/// Shows a list of values as a text field.
 fn list_ui(ui: &mut Ui, name: &str, axis: &mut AxisForm) {
     let label = ui.label(name);
     let hint = "Values separated by commas";
@@ -206,7 +206,7 @@ fn base_ui(ui: &mut Ui, form: &mut Form, shared: &Shared) {
     let samples = base.source.simulation().map(|source| counted(source.samples, "sample"));
     parts.extend(samples);
     parts.push(base.training.method.name().to_owned());
-    dim_ui(ui, &format!("{}, where no axis says otherwise", parts.join(", ")));
+    dim_ui(ui, &format!("{}, unless an axis varies it", parts.join(", ")));
     let setup = shared.setup();
     let is_other = setup.as_ref().is_ok_and(|setup| form.setup().as_ref() != Some(setup));
     let button = ui.add_enabled(is_other, Button::new("Use the settings of the Train view"));
@@ -306,8 +306,8 @@ pub fn status_ui(ui: &mut Ui, experiments: &ExperimentsView) {
     ui.horizontal_centered(|ui| state_ui(ui, colour, &text));
 }
 
-/// Takes a cell to the Train view: its settings with the seed of its median trial, and the network of that trial. One
-/// that was not kept, as none is of a cross-validation, is trained there.
+/// Opens a cell in the Train view: its settings with the seed of its median trial, and the network of that trial. A
+/// network that was not kept, as in a cross-validation, is trained there.
 pub fn open_cell(shared: &Shared, outcome: &Outcome, cell: usize, effects: &mut Vec<Effect>) {
     let cell = outcome.results.cells.get(cell).filter(|_| !shared.phase.is_busy());
     let Some(cell) = cell else { return };
@@ -347,7 +347,7 @@ const MARKDOWN: FileWords = FileWords {
     extensions: &["md"],
 };
 
-/// The figure, the tables, and the verdicts of the current experiment.
+/// Returns the exports of the current experiment: figure, tables and verdicts.
 pub(super) fn experiment_exports(view: &ExperimentsView, colours: SequentialMap) -> Vec<Export<'_>> {
     let topic = view.topic;
     let stem = topic.name().to_lowercase().replace(' ', "_");

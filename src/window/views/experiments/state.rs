@@ -1,4 +1,4 @@
-//! Runs an experiment in the background: one thread hands over what is finished, and as many train as there are cores.
+//! Runs an experiment in the background: one thread reports finished trials, and one thread per core trains.
 
 use std::{
     collections::HashMap,
@@ -39,12 +39,12 @@ use crate::window::{
 pub enum Topic {
     /// A table of the paper.
     Table(PaperTable),
-    /// Two axes of one's own.
+    /// A sweep over two axes.
     Sweep,
 }
 
 impl Topic {
-    /// In the order offered.
+    /// All topics, in display order.
     pub const ALL: [Self; 4] = [
         Self::Table(PaperTable::HiddenNodes),
         Self::Table(PaperTable::CrossValidation),
@@ -52,7 +52,7 @@ impl Topic {
         Self::Sweep,
     ];
 
-    /// In a word or two.
+    /// Returns the short name.
     pub fn name(self) -> &'static str {
         match self {
             Self::Table(PaperTable::HiddenNodes) => "Table 1",
@@ -62,7 +62,7 @@ impl Topic {
         }
     }
 
-    /// The title of its results.
+    /// Returns the title of its results.
     pub fn heading(self) -> String {
         match self {
             Self::Table(table) => table.heading(),
@@ -89,7 +89,7 @@ pub struct ExperimentsView {
 /// State of the display of an experiment.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct ExperimentLook {
-    /// The cell marked in table and picture.
+    /// The cell marked in the table and the figure.
     pub marked: Option<usize>,
     /// The order of the table.
     pub sort: SortBy,
@@ -98,26 +98,26 @@ pub struct ExperimentLook {
 #[derive(Debug)]
 struct CheckedForm {
     form: Form,
-    /// Number of trials, or the reason for which the form is no experiment.
+    /// Number of trials, or the reason why the form is not valid.
     checked: Result<usize, String>,
-    /// Results to be filled in, with the published figures.
+    /// Results without trials, with the published figures.
     preview: Option<Outcome>,
-    /// The file with which the terminal sweeps it, or the reason for which it cannot.
+    /// Specification for `decoupler sweep`, or the reason why there is none.
     specification: Result<Value, String>,
 }
 
-/// The most memory that the finished trainings of one experiment may take. Those of later trials are not kept: they
-/// are trained again when they are to be seen.
+/// Memory limit for the finished trainings of one experiment. Trainings beyond it are not kept, but repeated when they
+/// are opened.
 const MAX_KEPT_BYTES: usize = 400_000_000;
 
 /// An experiment under way.
 #[derive(Clone, Copy, Debug)]
 pub struct Running {
-    /// Which.
+    /// The experiment.
     pub topic: Topic,
-    /// Trials finished.
+    /// Number of finished trials.
     pub done: usize,
-    /// Trials there are.
+    /// Number of trials.
     pub trials: usize,
     /// Estimated time of the remaining trials, once there is one.
     pub time_left: Option<Duration>,
@@ -128,24 +128,24 @@ pub struct Running {
 /// Ending of an experiment.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Ending {
-    /// Every trial has come to something.
+    /// Every trial has finished or failed.
     Complete,
-    /// By the user, or by an accident that was told.
+    /// Ended early by the user, or by an error that was reported.
     Cut,
 }
 
 /// Results of an experiment so far.
 #[derive(Debug)]
 pub struct Outcome {
-    /// Everything; shared with a file being written.
+    /// Results of all trials; shared with a file being written.
     pub results: Arc<ExperimentResults>,
     /// Plan by which its recording is read, if it is on one.
     pub plan: Option<Plan>,
-    /// For reading.
+    /// Results as a table.
     pub table: ExperimentTable,
-    /// For looking at.
+    /// Results as a figure.
     pub figure: Figure,
-    /// The figures behind it.
+    /// Results of each cell.
     pub summaries: Vec<CellSummary>,
     /// Verdicts on the paper's claims.
     pub verdicts: Vec<Verdict>,
@@ -172,7 +172,7 @@ impl Outcome {
         }
     }
 
-    /// Trials finished and trials asked for.
+    /// Returns the numbers of finished and planned trials.
     pub fn trials(&self) -> (usize, usize) {
         let cells = self.results.cells.iter();
         cells.fold((0, 0), |(done, all), cell| {
@@ -205,7 +205,7 @@ impl Outcome {
 }
 
 impl ExperimentsView {
-    /// Every form as the paper has it, nothing run. `wake` is called when there are events.
+    /// Creates the view with the default forms; `wake` is called when there are events.
     pub fn new(wake: Wake) -> Self {
         let mut state = Self {
             topic: Topic::ALL[0],
@@ -224,28 +224,28 @@ impl ExperimentsView {
         state
     }
 
-    /// Looks at another experiment.
+    /// Shows another experiment.
     pub fn choose(&mut self, topic: Topic) {
         self.topic = topic;
         self.look = ExperimentLook::default();
     }
 
-    /// The form of what is looked at.
+    /// Returns the form of the current experiment.
     pub fn form(&self) -> &Form {
         &self.forms[&self.topic].form
     }
 
-    /// Returns the number of trials of the form, or the reason for which it cannot be run.
+    /// Returns the number of trials of the form, or the reason why it cannot be run.
     pub fn checked(&self) -> &Result<usize, String> {
         &self.forms[&self.topic].checked
     }
 
-    /// Returns the file with which the terminal sweeps the form, or the reason for which it cannot.
+    /// Returns the specification of the form for `decoupler sweep`, or the reason why there is none.
     pub(super) fn specification(&self) -> &Result<Value, String> {
         &self.forms[&self.topic].specification
     }
 
-    /// Takes a changed form of what is looked at.
+    /// Replaces the form of the current experiment.
     pub fn edit(&mut self, form: Form) {
         let (checked, preview, specification) = match form.experiment() {
             Ok(experiment) => {
@@ -272,27 +272,27 @@ impl ExperimentsView {
         self.running.is_none() && self.checked().is_ok()
     }
 
-    /// Runs what is looked at.
+    /// Runs the current experiment.
     pub(super) fn run(&mut self, effects: &mut Vec<Effect>) {
         let (Ok(experiment), Some(setup)) = (self.form().experiment(), self.form().setup()) else {
             return;
         };
         effects.push(Effect::Settle(Matter::Experiments));
         if self.topic == Topic::Sweep {
-            // It would are in the place of the results.
+            // The folder would be shown in place of the results.
             self.folder.close();
         }
         self.begin(experiment.clone(), setup.plan().cloned());
         run(&mut self.job, experiment, setup);
     }
 
-    /// Ends the one that runs; what is finished stays.
+    /// Cancels the running experiment; finished trials are kept.
     pub(super) fn cancel(&mut self) {
         self.job.abandon();
         self.end(Instant::now());
     }
 
-    /// Makes room for the results of `experiment`.
+    /// Prepares empty results for `experiment`.
     fn begin(&mut self, experiment: Experiment, plan: Option<Plan>) {
         let outcome = Outcome::new(experiment, plan);
         self.running = Some(Running {
@@ -314,7 +314,7 @@ impl ExperimentsView {
         }
     }
 
-    /// Adds trials that have come to something.
+    /// Adds trials that have finished or failed.
     pub fn record(&mut self, finished: Vec<Finished>) {
         let Some(running) = &mut self.running else { return };
         let Some(outcome) = self.outcomes.get_mut(&running.topic) else {
@@ -328,7 +328,7 @@ impl ExperimentsView {
         outcome.refresh();
     }
 
-    /// The one that ran has ended.
+    /// Records the end of the running experiment.
     pub fn end(&mut self, at: Instant) {
         let Some(running) = self.running.take() else { return };
         let Some(outcome) = self.outcomes.get_mut(&running.topic) else {
@@ -343,7 +343,7 @@ impl ExperimentsView {
         });
     }
 
-    /// Returns the current sweep folder, in whose place no experiment is.
+    /// Returns the open sweep folder, if it is shown instead of an experiment.
     pub(super) fn shown_folder(&self) -> Option<&OpenFolder> {
         self.folder.shown().filter(|_| self.topic == Topic::Sweep)
     }
@@ -359,28 +359,29 @@ impl ExperimentsView {
     }
 }
 
-/// About how much memory the finished training of a trial takes.
+/// Returns the approximate size of the finished training of a trial in memory.
 fn bytes_of(trial: &Trial, hidden: usize, problem: Option<&Problem>) -> usize {
     let weights = problem.map_or(0, |problem| {
         hidden * (problem.inputs.len() + 1) + (hidden + 1) * problem.targets.len()
     });
-    // The current and the best weights, and up to as many numbers of the method's own.
+    // Current weights, best weights, and about as many numbers again for the state of the method.
     let of_start = 4 * weights * size_of::<f64>();
     trial.states.len() * of_start + trial.epochs * size_of::<EpochRecord>()
 }
 
-/// Events of the experiment begun last.
+/// Event of the most recent experiment.
 #[derive(Debug)]
 pub enum ExperimentEvent {
     /// A recording has been read, with these channels.
     Read(Arc<Problem>),
-    /// A trial has come to something.
+    /// A trial has finished or failed.
     Finished(Box<Finished>),
-    /// The experiment has ended, or why it could not go on.
+    /// The experiment has ended, with the reason if it could not continue.
     Ended(Result<(), String>),
 }
 
-/// Runs `experiment` on the samples of `setup`; one that still runs is cancelled, and ends after the epochs in progress.
+/// Runs `experiment` on the samples of `setup`; a running experiment is cancelled, and ends after the epochs in
+/// progress.
 pub fn run(job: &mut Job<ExperimentEvent>, experiment: Experiment, setup: Setup) {
     job.start(
         move |report| {

@@ -1,4 +1,4 @@
-//! A folder that `decoupler sweep` fills, on this machine or on others: its trials in a table that grows with it.
+//! A folder that `decoupler sweep` fills, on this machine or on others, and the growing table of its trials.
 
 use std::{
     collections::BTreeMap,
@@ -25,7 +25,7 @@ use crate::window::{
 /// The folder of a sweep.
 const FOLDER: FileWords = FileWords {
     kind: "sweep folder",
-    description: "A folder that decoupler sweep fills. Its finished trials are shown, and new ones as they come.",
+    description: "A folder that decoupler sweep fills. Its finished trials are shown, and new ones as they arrive.",
     extensions: &[],
 };
 
@@ -42,15 +42,15 @@ pub(in crate::window::views::experiments) struct SweepFolder {
 #[derive(Debug)]
 pub(in crate::window::views::experiments) struct OpenFolder {
     pub(super) path: PathBuf,
-    /// Its table, or why there is none; `None` until it is read.
+    /// Its table, or the error; `None` until it is read.
     pub(super) table: Option<Result<Box<SweepTable>, String>>,
     pub(super) sort: SortBy,
-    /// Dropped, it ends the watch.
+    /// Ends the watch when dropped.
     _watched: Sender<()>,
 }
 
 impl SweepFolder {
-    /// No folder. `wake` is called when there are events of one.
+    /// Creates the card without a folder; `wake` is called when a folder has events.
     pub(in crate::window::views::experiments) fn new(wake: Wake) -> Self {
         let (choices, chosen) = channel();
         Self {
@@ -113,30 +113,30 @@ impl SweepFolder {
 }
 
 impl OpenFolder {
-    /// Name of the folder.
+    /// Returns the name of the folder.
     pub(in crate::window::views::experiments) fn name(&self) -> String {
         let name = self.path.file_name().unwrap_or(Path::new("").as_os_str());
         name.to_string_lossy().into_owned()
     }
 
-    /// Trials finished and planned, once they are read.
+    /// Returns the numbers of finished and planned trials, once they are read.
     pub(in crate::window::views::experiments) fn trials(&self) -> Option<(usize, usize)> {
         let table = self.table.as_ref()?.as_ref().ok()?;
         Some((table.finished(), table.trials))
     }
 }
 
-/// Shortest time between two looks at the folder.
+/// Minimum time between two reads of the folder.
 const BETWEEN_LOOKS: Duration = Duration::from_secs(1);
-/// Share of the time that reading may take: a look at a large folder is followed by this much longer a rest.
+/// Ratio of the pause between reads to the time of a read, so that a large folder does not keep the disk busy.
 const REST: u32 = 10;
 
-/// Events of a folder.
+/// Event of a folder.
 #[derive(Debug)]
 pub(in crate::window::views::experiments) enum FolderEvent {
-    /// It has changed, or why it cannot be read.
+    /// The table of a changed folder, or the reason why it cannot be read.
     Read(Result<Box<SweepTable>, String>),
-    /// No one looks at it any more, or why that ended.
+    /// Watching has ended, with the reason if it failed.
     Ended(Result<(), String>),
 }
 
@@ -151,7 +151,7 @@ pub(super) fn watch(path: &Path, open: &Receiver<()>, report: &Report<FolderEven
                 Ok(_) => read(path),
                 Err(error) => Err(error.clone()),
             };
-            // Of tables that no one has looked at, the newest is enough.
+            // Only the newest of the tables not yet received is needed.
             report.progress(FolderEvent::Read(table), |_, _| ());
             before = Some(files);
         }
@@ -167,16 +167,16 @@ fn read(path: &Path) -> Result<Box<SweepTable>, String> {
     Ok(Box::new(SweepTable::of(&merged)))
 }
 
-/// The trials of a folder as they are shown.
+/// Table of the trials of a folder.
 #[derive(Debug)]
 pub(in crate::window::views::experiments) struct SweepTable {
     pub(super) headings: Vec<String>,
     /// Number of headings that name options.
     pub(super) options: usize,
     pub(super) rows: Vec<Vec<SweepCell>>,
-    /// Trials that are planned or there.
+    /// Number of trials, planned or present.
     pub(super) trials: usize,
-    /// Everything that is wrong with files of the folder.
+    /// Problems with files of the folder.
     pub(super) problems: Vec<String>,
 }
 
@@ -186,7 +186,8 @@ pub(super) struct SweepCell {
     pub(super) value: Option<f64>,
 }
 
-/// Results of a trial: heading, place in its report and, for a list of targets, the field whose mean over the targets counts.
+/// Results of a trial: heading, place in its report and, for a list of targets, the field whose mean over the targets
+/// is shown.
 type ResultColumn = (&'static str, &'static str, Option<&'static str>);
 
 /// Results on an array.
@@ -234,13 +235,13 @@ impl SweepTable {
         }
     }
 
-    /// Number of trials that are finished.
+    /// Returns the number of finished trials.
     pub(super) fn finished(&self) -> usize {
         self.rows.len()
     }
 }
 
-/// Options that a plan varies, or that differ between trials where there is no plan, in the order of the plan.
+/// Returns the options that a plan varies, in its order, or those that differ between trials if there is no plan.
 fn varying(merged: &MergedSweep) -> Vec<String> {
     let mut options = merged.axes.clone();
     let mut first: BTreeMap<&String, &Value> = BTreeMap::new();
@@ -264,7 +265,7 @@ fn cells(row: &SweepRow, options: &[String], results: &[ResultColumn]) -> Vec<Sw
     of_options.chain(of_results).chain([seconds]).collect()
 }
 
-/// Mean of a field over the targets that have it.
+/// Returns the mean of a field over the targets that have it.
 fn mean(targets: &[Value], field: &str) -> Option<Value> {
     let values = Vec::from_iter(targets.iter().filter_map(|target| target[field].as_f64()));
     (!values.is_empty()).then(|| Value::from(values.iter().sum::<f64>() / values.len() as f64))
@@ -289,10 +290,10 @@ impl SweepCell {
     }
 }
 
-/// Most problems that are spelled out.
+/// Maximum number of problems listed.
 const MAX_PROBLEMS: usize = 3;
 
-/// Shows the folder: how far it is filled, and the table of its trials.
+/// Shows the folder: its progress and the table of its trials.
 pub(in crate::window::views::experiments) fn folder_card_ui(ui: &mut Ui, folder: &mut SweepFolder) {
     let Some(open) = &mut folder.open else { return };
     let mut is_closed = false;
@@ -308,7 +309,7 @@ pub(in crate::window::views::experiments) fn folder_card_ui(ui: &mut Ui, folder:
     });
     let OpenFolder { table, sort, .. } = open;
     match table {
-        None => placeholder_ui(ui, "Reading the folder …"),
+        None => placeholder_ui(ui, "Reading the folder…"),
         Some(Err(reason)) => {
             note_ui(ui, reason);
         }
@@ -321,10 +322,10 @@ pub(in crate::window::views::experiments) fn folder_card_ui(ui: &mut Ui, folder:
 
 fn trials_ui(ui: &mut Ui, table: &SweepTable, sort: &mut SortBy) {
     let (finished, trials) = (table.finished(), table.trials);
-    let how_far = format!("{finished} of {} finished", counted(trials, "trial"));
-    progress_bar_ui(ui, "Sweep folder", finished as f32 / trials.max(1) as f32, &how_far);
+    let progress = format!("{finished} of {} finished", counted(trials, "trial"));
+    progress_bar_ui(ui, "Sweep folder", finished as f32 / trials.max(1) as f32, &progress);
     if finished < trials {
-        dim_ui(ui, "New trials appear here by themselves.");
+        dim_ui(ui, "New trials appear here automatically.");
     }
     ui.add_space(space(1));
     for problem in table.problems.iter().take(MAX_PROBLEMS) {
@@ -393,7 +394,6 @@ const SPECIFICATION: FileWords = FileWords {
     extensions: &["json"],
 };
 
-/// The file of a specification.
 fn specification_task(specification: Value) -> FileTask {
     let contents = Contents::new(move |path| {
         atomic_write(path, |writer| {

@@ -1,4 +1,4 @@
-//! The table of an experiment: every column orders it, every row can be marked.
+//! The results of an experiment: table, figure and verdicts.
 
 use std::time::Instant;
 
@@ -94,7 +94,7 @@ impl View for ExperimentsView {
         panel::form_ui(ui, self, shared, effects);
     }
 
-    /// The table above, picture and verdicts below.
+    /// Shows the table above, figure and verdicts below.
     fn body_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) {
         let whole = ui.available_rect_before_wrap();
         if self.shown_folder().is_some() {
@@ -144,7 +144,7 @@ impl View for ExperimentsView {
     }
 }
 
-/// The promise of an experiment that was not run yet.
+/// Text shown before an experiment is run.
 const INVITATION: &str = "Our figures appear next to the published ones as the trials finish.";
 
 /// Returns the hint shown while there is no figure yet, unless that is an invitation to run.
@@ -172,12 +172,12 @@ fn picture_ui(
             legend_ui(ui, &plots.keys);
             plots_ui(ui, topic.name(), plots, Pointer::Moves);
         }
-        // No experiment has any.
+        // Experiments have no surfaces.
         Figure::Surfaces(_) => {}
     }
 }
 
-/// The map of a sweep. A click marks the cell, two open it in the Train view.
+/// The map of a sweep. A click marks a cell, a double click opens it in the Train view.
 pub fn sweep_ui(
     ui: &mut Ui,
     (outcome, map): (&Outcome, &HeatMap),
@@ -196,7 +196,7 @@ pub fn sweep_ui(
     }
 }
 
-/// The claims that hold in this run, with the numbers; below, those that could not be tried.
+/// Shows the verdicts on the paper's claims with their numbers, then failed trials and other remarks.
 pub fn verdicts_ui(ui: &mut Ui, outcome: &Outcome) {
     for verdict in &outcome.verdicts {
         verdict_ui(ui, verdict);
@@ -247,7 +247,7 @@ fn colour_of(standing: VerdictStatus, palette: &Palette) -> Color32 {
 /// Margins of a card, both sides together.
 const MARGINS: f32 = 24.0;
 
-/// Title, how it was made, and the table.
+/// Shows the title, the conditions and the table.
 pub fn results_card_ui(
     ui: &mut Ui,
     (topic, outcome): (Topic, &Outcome),
@@ -296,7 +296,7 @@ fn text_size(ui: &Ui, text: String, size: f32, width: f32) -> Vec2 {
         .size()
 }
 
-/// Takes the marked cell to the Train view.
+/// Shows the button that opens the marked cell in the Train view.
 fn open_ui(ui: &mut Ui, outcome: &Outcome, marked: Option<usize>, shared: &Shared, effects: &mut Vec<Effect>) {
     let can_open = marked.is_some() && !shared.phase.is_busy();
     let button = ui.add_enabled(can_open, ghost_button("Open in Train view"));
