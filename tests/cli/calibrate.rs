@@ -163,13 +163,13 @@ fn readings_and_depths_that_cannot_be_are_refused_with_their_line() {
     for (column, value, cause) in [
         (3, "-5", "column 2: the reading -5 is not a resistance"),
         (2, "0", "column 1: the reading 0 is not a resistance"),
-        (13, "1e300", "column 12: the reading 1e300 ohm is out of all proportion"),
+        (13, "1e300", "column 12: the reading 1e300 ohm is implausible"),
         (14, "-3", "node 1: it is pressed down by -3 mm"),
         (17, "50", "node 4"),
         (
             15,
             "1.7",
-            "node 2: it is pressed down by 1.7 mm, where 0 to 1 mm is possible",
+            "node 2: it is pressed down by 1.7 mm, but only 0 to 1 mm is possible",
         ),
     ] {
         let spoilt = sound.lines().enumerate().map(|(line, text)| {

@@ -8,17 +8,18 @@ use thiserror::Error;
 
 use crate::sensor::{Axes, RelativeNoise, RowConductance, SensorError, SensorModel};
 
-/// Deformation patterns that the readings of one row-wire see, from the singular values of the Jacobian of ln R.
+/// Deformation patterns that the readings of one row-wire determine, from the singular values of the Jacobian of ln
+/// R.
 ///
-/// With readings that are off by ε (relative, one standard deviation), a deformation pattern whose singular value is s
-/// is known to ε/s millimetres: the smallest value decides what noise the sensor can bear.
+/// With readings that are off by ε (relative, one standard deviation), a deformation pattern with singular value s is
+/// known to ε/s millimetres: the smallest value limits the noise that the sensor can tolerate.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Identifiability {
     /// The row-wire, from 0.
     pub row: usize,
-    /// Along which axes the nodes move.
+    /// Axes along which the nodes move.
     pub axes: Axes,
-    /// Readings of the row: M4.
+    /// Number of readings of the row, M4.
     pub equations: usize,
     /// Singular values of ∂ ln R/∂u in 1/mm, largest first, one for each unknown (0 where readings are too few).
     pub singular_values_per_mm: Vec<f64>,
@@ -32,7 +33,7 @@ impl Identifiability {
     /// Analyses row-wire `row` whose nodes are displaced by `displacements_mm` (M2 of them) and move along `axes`.
     ///
     /// # Errors
-    /// No such row, no resistance for the deformation, or a decomposition that does not converge.
+    /// If there is no such row, no resistance for the deformation, or the decomposition does not converge.
     pub fn of_row(
         model: &SensorModel,
         row: usize,
@@ -42,9 +43,9 @@ impl Identifiability {
         Self::of_row_with_gain(model, row, displacements_mm, axes, RelativeNoise::default())
     }
 
-    /// As [`Self::of_row`], for readings with this noise: where they have a common error, such as the gain of a snapshot,
-    /// what all of them have in common counts only as far as that error leaves it. Readings with an error of their own
-    /// alone (`noise.own`) and these singular values then determine as much as the readings with both.
+    /// As [`Self::of_row`], for readings with this noise: if they have a common error, such as the gain of a
+    /// snapshot, a change common to all readings counts only as far as that error allows. Readings with independent
+    /// errors alone (`noise.own`) and these singular values then determine as much as the readings with both.
     ///
     /// # Errors
     /// As [`Self::of_row`].
@@ -63,7 +64,7 @@ impl Identifiability {
         let mut conductance = RowConductance::new(model, axes);
         conductance.evaluate(model, row, displacements_mm);
         let unknowns = displacements_mm.len() * axes.count();
-        // ln R = ln g − ln s, so the signs turn; rows of zeros complete the basis where readings are too few.
+        // ln R = ln g − ln s, hence the minus sign; rows of zeros complete the basis if there are too few readings.
         let mut jacobian = Mat::from_fn(equations.max(unknowns), unknowns, |k, unknown| {
             if k < equations {
                 -conductance.derivatives(unknown)[k] / conductance.sums()[k]
@@ -81,7 +82,7 @@ impl Identifiability {
         let svd = jacobian
             .thin_svd()
             .map_err(|_| IdentifiabilityError::NotConverged(row))?;
-        // Rounding would leave the zeros of the added rows at about 1e-17.
+        // Rounding would turn the zeros of the added rows into about 1e-17.
         let singular_values_per_mm = svd.S().column_vector().iter().enumerate();
         let singular_values_per_mm =
             singular_values_per_mm.map(|(pattern, &value)| if pattern < equations { value } else { 0.0 });
@@ -107,12 +108,13 @@ impl Identifiability {
         })
     }
 
-    /// Unknowns of the row.
+    /// Number of unknowns of the row.
     pub fn unknowns(&self) -> usize {
         self.singular_values_per_mm.len()
     }
 
-    /// Largest singular value over the smallest; infinite where some pattern is not seen at all.
+    /// Condition number: largest over smallest singular value; infinite if some pattern is not visible in the
+    /// readings.
     pub fn condition(&self) -> f64 {
         match self.singular_values_per_mm[..] {
             [largest, .., smallest] if smallest > 0.0 => largest / smallest,
@@ -121,8 +123,8 @@ impl Identifiability {
         }
     }
 
-    /// Standard deviation in millimetres to which readings with an own error of `noise` (relative) know the worst-seen pattern; infinite
-    /// where they do not see it at all.
+    /// Standard deviation in millimetres of the worst-determined pattern, for readings with an independent relative
+    /// error of `noise`; infinite if the readings do not depend on it.
     pub fn worst_spread_mm(&self, noise: f64) -> f64 {
         match self.singular_values_per_mm.last() {
             Some(&smallest) if smallest > 0.0 => noise / smallest,
@@ -131,8 +133,9 @@ impl Identifiability {
     }
 
     /// Share of a prior spread of `prior_mm` (standard deviation of each unknown) that remains after a reading with
-    /// `noise` (relative): the root mean over patterns of 1 / (1 + (s·prior/noise)²). 0 means that everything is known, 1
-    /// that the reading carries no information. Of a pattern that no reading sees (s = 0) everything remains, also without noise.
+    /// `noise` (relative): the root mean over patterns of 1 / (1 + (s·prior/noise)²). 0 means that everything is
+    /// known, 1 that the reading carries no information. A pattern that no reading depends on (s = 0) keeps its whole
+    /// spread, also without noise.
     pub fn remaining_share(&self, noise: f64, prior_mm: f64) -> f64 {
         let remaining = |&s: &f64| {
             let seen = s * prior_mm / noise;
@@ -155,22 +158,22 @@ pub struct RowPair {
     pub first: usize,
     /// The other.
     pub second: usize,
-    /// rms over readings of the difference of ln R, as far as an error common to all readings leaves it.
+    /// rms over readings of the difference of ln R, apart from an error common to all readings.
     pub difference: f64,
 }
 
 impl Identifiability {
-    /// Rows whose undeformed readings differ less than this count as the same even without noise.
+    /// Rows whose undeformed readings differ by less count as identical even without noise.
     pub const SAME_ROWS: f64 = 1e-9;
 
     /// The two row-wires whose undeformed readings are most alike; `None` for a single row-wire.
     ///
     /// A layout that is symmetric about a line between row-wires gives mirror rows the same readings: no decoder can
-    /// tell which one it reads unless the electronics say so. Of readings with a common error in their `noise`, such as the
-    /// gain of a snapshot, a difference that is common to all of them counts only as far as that error leaves it.
+    /// distinguish them unless the electronics report the row. If `noise` has a common error, such as the gain of a
+    /// snapshot, a difference that is common to all readings counts only as far as that error allows.
     ///
     /// # Errors
-    /// The undeformed sensor has no resistance.
+    /// If the undeformed sensor has no resistance.
     pub fn most_alike_rows(model: &SensorModel, noise: RelativeNoise) -> Result<Option<RowPair>, SensorError> {
         let rest = vec![DVec3::ZERO; model.scale.nodes_per_row()];
         let readings: Vec<Vec<f64>> = (0..model.scale.rows())
@@ -207,9 +210,9 @@ pub enum IdentifiabilityError {
     /// The array has no such row-wire.
     #[error("row {} does not exist: the array has rows 1 to {rows}", row + 1)]
     Row {
-        /// Row-wire asked for, from 0.
+        /// Row-wire requested, from 0.
         row: usize,
-        /// Row-wires of the array.
+        /// Number of row-wires of the array.
         rows: usize,
     },
     /// The decomposition did not converge.
@@ -222,12 +225,12 @@ pub enum IdentifiabilityError {
 pub enum IdentifiabilityWarning {
     /// Fewer readings than unknowns.
     TooFewReadings {
-        /// Readings of a row.
+        /// Number of readings of a row.
         equations: usize,
-        /// Unknowns of a row.
+        /// Number of unknowns of a row.
         unknowns: usize,
     },
-    /// Two rows read the same.
+    /// Two rows have the same readings.
     RowsAlike {
         /// The two rows.
         pair: RowPair,
@@ -253,7 +256,7 @@ impl fmt::Display for IdentifiabilityWarning {
         match *self {
             Self::TooFewReadings { equations, unknowns } => write!(
                 f,
-                "a row has {unknowns} unknowns but only {equations} readings: some deformations cannot be seen; use at \
+                "a row has {unknowns} unknowns but only {equations} readings: some deformations cannot be determined; use at \
                  least {unknowns} column-wires, or let nodes move along z only"
             ),
             Self::RowsAlike { pair, noise } => {
@@ -267,17 +270,17 @@ impl fmt::Display for IdentifiabilityWarning {
             }
             Self::Hopeless { noise, share } => write!(
                 f,
-                "with noise of {noise:.1e} the readings hardly narrow the deformation ({:.0} % of its spread remains); \
+                "with noise of {noise:.1e} the readings hardly constrain the deformation ({:.0} % of its spread remains); \
                  lower the noise, reduce the height, widen the node pitch, or add column-wires",
                 100.0 * share
             ),
             Self::IllConditioned { condition } if condition.is_infinite() => f.write_str(
-                "some deformation changes no reading at all; reduce the height, widen the node pitch, add column-wires, or \
+                "some deformation pattern changes no reading at all; reduce the height, widen the node pitch, add column-wires, or \
                  let nodes move along z only",
             ),
             Self::IllConditioned { condition } => write!(
                 f,
-                "some deformation is seen {condition:.0e} times worse than another: even rounding blurs it; reduce the \
+                "some deformation pattern is determined {condition:.0e} times worse than another: even rounding hides it; reduce the \
                  height, widen the node pitch, add column-wires, or let nodes move along z only"
             ),
         }
@@ -285,14 +288,14 @@ impl fmt::Display for IdentifiabilityWarning {
 }
 
 impl Identifiability {
-    /// The condition number from which [`IdentifiabilityWarning::IllConditioned`] is given: readings exact to 16
-    /// digits then leave fewer than 6 in the worst-seen pattern.
+    /// Condition number from which [`IdentifiabilityWarning::IllConditioned`] is given: readings exact to 16 digits
+    /// then leave fewer than 6 in the worst-determined pattern.
     pub const LARGEST_CONDITION: f64 = 1e10;
-    /// The share of the prior spread that remains from which noise is called hopeless: readings then tell less than
-    /// a tenth of the variance.
+    /// Remaining share of the prior spread from which noise is reported: the readings then explain less than a tenth
+    /// of the variance.
     pub const HOPELESS_SHARE: f64 = 0.95;
-    /// Warnings to the user, most severe first. `noise` is the relative error of a reading of its own (for a common error see
-    /// [`Self::of_row_with_gain`] and [`Self::most_alike_rows`]), `prior_mm` the standard
+    /// Returns warnings for the user, most severe first. `noise` is the independent relative error of a reading (for
+    /// a common error see [`Self::of_row_with_gain`] and [`Self::most_alike_rows`]), `prior_mm` the standard
     /// deviation of each unknown before reading; `alike` the most similar rows if the row is not known beforehand.
     pub fn warnings(&self, noise: f64, prior_mm: f64, alike: Option<RowPair>) -> Vec<IdentifiabilityWarning> {
         let condition = self.condition();
@@ -326,7 +329,7 @@ mod tests {
 
     /// One node over one column node: R = g·d, so ∂ ln R/∂uz = −z/d².
     #[test]
-    fn a_single_pair_is_known_in_closed_form() {
+    fn a_single_pair_has_a_closed_form() {
         let mut model = SensorModel::new("1x1_1x1".parse().unwrap());
         model.geometry.column_node_x0_mm = model.geometry.row_x0_mm + 12.0;
         let seen = at_rest(&model, 0, Axes::Z);
@@ -339,7 +342,7 @@ mod tests {
 
     /// The dense formula: (Jᵀ Σ⁻¹ J)⁻¹ with Σ = own² I + common² 1 1ᵀ, J by differences of the resistances.
     #[test]
-    fn a_common_gain_leaves_what_the_covariance_of_the_readings_says() {
+    fn a_common_gain_agrees_with_the_dense_covariance_formula() {
         let model = SensorModel::new("3x2_2x8".parse().unwrap());
         let noise = RelativeNoise { own: 1e-3, common: 0.1 };
         let rest = [DVec3::ZERO; 2];
@@ -368,7 +371,7 @@ mod tests {
         let found = [large, small].map(|value| (value / noise.own).powi(2));
         assert!(((found[0] + found[1]) / trace - 1.0).abs() < 1e-6);
         assert!((found[0] * found[1] / determinant - 1.0).abs() < 1e-6);
-        // One reading of one unknown: nothing is left but the gain's own spread.
+        // One reading of one unknown: the spread of the gain alone remains.
         let single = SensorModel::new("1x1_1x1".parse().unwrap());
         let seen = |noise| Identifiability::of_row_with_gain(&single, 0, &[DVec3::ZERO], Axes::Z, noise).unwrap();
         let exact = RelativeNoise { own: 0.0, ..noise };
@@ -379,7 +382,7 @@ mod tests {
     }
 
     #[test]
-    fn moving_along_the_worst_pattern_changes_readings_least() {
+    fn the_worst_pattern_changes_readings_least() {
         let model = SensorModel::new(ArrayScale::default());
         let seen = at_rest(&model, 4, Axes::Z);
         let rest = model.row_resistances(4, &[DVec3::ZERO; 10]).unwrap();
@@ -399,13 +402,13 @@ mod tests {
         }
     }
 
-    /// Four readings determine four of six patterns exactly; of the other two the whole prior remains.
+    /// Four readings determine four of six patterns exactly; the other two keep their whole prior spread.
     #[test]
-    fn unseen_patterns_remain_whole_without_noise() {
+    fn unseen_patterns_keep_their_whole_spread_without_noise() {
         let seen = at_rest(&SensorModel::new("2x6_3x4".parse().unwrap()), 1, Axes::Z);
         let share = seen.remaining_share(0.0, 0.3);
         assert!((share - (2.0_f64 / 6.0).sqrt()).abs() < 1e-12, "{share}");
-        // With a little noise the same, except for what that hides.
+        // Nearly the same with a little noise, which hides a little more.
         assert!((seen.remaining_share(1e-9, 0.3) - share).abs() < 1e-3);
         assert_eq!(seen.worst_spread_mm(0.0), f64::INFINITY);
     }
@@ -420,7 +423,7 @@ mod tests {
     }
 
     #[test]
-    fn mirror_rows_are_found_and_named() {
+    fn mirror_rows_are_reported() {
         let mut model = SensorModel::new("10x6_3x18".parse().unwrap());
         let default = Identifiability::most_alike_rows(&model, RelativeNoise::default())
             .unwrap()
@@ -448,7 +451,7 @@ mod tests {
     }
 
     #[test]
-    fn rows_that_do_not_exist_are_counted_from_one() {
+    fn errors_count_rows_from_one() {
         let model = SensorModel::new(ArrayScale::default());
         let error = Identifiability::of_row(&model, 10, &[DVec3::ZERO; 10], Axes::Z).unwrap_err();
         assert_eq!(error.to_string(), "row 11 does not exist: the array has rows 1 to 10");
@@ -474,7 +477,7 @@ mod tests {
     }
 
     #[test]
-    fn noise_is_hopeless_only_when_it_hides_nearly_everything() {
+    fn noise_is_reported_only_when_it_hides_nearly_everything() {
         let seen = at_rest(&SensorModel::new(ArrayScale::default()), 0, Axes::Z);
         assert_eq!(seen.remaining_share(0.0, 0.3), 0.0);
         assert!(seen.warnings(1e-4, 0.3, None).is_empty());

@@ -2,7 +2,7 @@
 //!
 //! A tactile skin of conductive rubber is read through crossed row-wires and column-wires. Every reading is the
 //! parallel connection of many electrode nodes; *decoupling* recovers the deformation of each node from the
-//! row-column resistances. The modules report that story in order, and each uses only the ones before it:
+//! row-column resistances. The modules are listed in order of dependency, each using only the ones before it:
 //!
 //! | module | contents |
 //! |---|---|
@@ -25,7 +25,7 @@
 //!
 //! # Glossary
 //!
-//! One word for one thing, in the code, on screen and in print; the window explains further terms under the pointer.
+//! One term per concept, in the code, on screen and in print; the window explains further terms in tooltips.
 //!
 //! | word | meaning |
 //! |---|---|
@@ -116,8 +116,8 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! The programs in `examples/` go on from here: training with an error table, decoding frames, and measured pairs of
-//! readings and targets without any geometry.
+//! The programs in `examples/` continue from here: training with an error table, decoding frames, and measured pairs
+//! of readings and targets without any geometry.
 
 pub mod calibration;
 pub mod dataset;

@@ -1,5 +1,5 @@
-//! The machine that the program runs on: its memory and its speed, from which memory and time of a run are stated before it
-//! begins.
+//! The machine that the program runs on: its memory and speed, from which the memory and time of a run are estimated
+//! before it starts.
 
 use std::{env, fmt, fs, hint::black_box, sync::OnceLock, time::Instant};
 
@@ -8,11 +8,11 @@ use glam::DVec3;
 
 use crate::sensor::{ArrayScale, SensorModel};
 
-/// Memory that trainings may take: all that the machine has, or what a container leaves of it, or what
-/// [`Self::VARIABLE`] says. Where nothing says it, [`Self::ASSUMED_BYTES`].
+/// Memory available to trainings: that of the machine, or the limit of its container, or the value of
+/// [`Self::VARIABLE`]. [`Self::ASSUMED_BYTES`] if none is known.
 ///
-/// Only Linux reports its memory in a file. Elsewhere it takes `unsafe` calls, or a crate of thousands of lines for one
-/// number; the variable serves there, and also where a machine has more memory than a program ought to take.
+/// Only Linux reports its memory in a file. Other systems would need `unsafe` calls, or a crate of thousands of lines
+/// for one number; use the variable there, or to use less than the memory of the machine.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct MachineMemory {
     /// Size in bytes.
@@ -28,17 +28,17 @@ pub enum MemorySource {
     System,
     /// The user, by [`MachineMemory::VARIABLE`].
     User,
-    /// Neither: it is assumed.
+    /// Assumed, since neither is known.
     Assumed,
 }
 
 impl MachineMemory {
-    /// Memory that is assumed where the system does not report it, as that of an ordinary machine.
+    /// Memory that is assumed if the system does not report it: that of an ordinary machine.
     pub const ASSUMED_BYTES: u64 = 8_000_000_000;
-    /// Environment variable with the memory that trainings may take, in GB (10⁹ bytes).
+    /// Environment variable with the memory available to trainings, in GB (10⁹ bytes).
     pub const VARIABLE: &str = "DECOUPLER_MEMORY_GB";
 
-    /// Returns the memory of this machine, which is read the first time.
+    /// Returns the memory of this machine, which is read on the first call.
     pub fn of_this_machine() -> Self {
         static MEMORY: OnceLock<MachineMemory> = OnceLock::new();
         *MEMORY.get_or_init(|| {
@@ -49,8 +49,8 @@ impl MachineMemory {
         })
     }
 
-    /// From the texts of the variable, of `/proc/meminfo` and of the container's limit. A variable that is not a number above
-    /// 0 is left alone: the message of a refusal names it again.
+    /// Evaluates the texts of the variable, of `/proc/meminfo` and of the container's limit. A variable that is not a
+    /// number above 0 is ignored; the error message of a run that needs too much memory names the variable again.
     fn from_texts(given: Option<&str>, meminfo: Option<&str>, limit: Option<&str>) -> Self {
         let gigabytes = given.and_then(|text| text.trim().parse().ok());
         if let Some(gigabytes) = gigabytes.filter(|gigabytes: &f64| *gigabytes > 0.0) {
@@ -97,14 +97,14 @@ fn total_bytes(meminfo: &str) -> Option<u64> {
 /// Work per second on one thread.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Speed {
-    /// Multiplications of large products.
+    /// Multiplications in large matrix products.
     pub(crate) multiplications: f64,
-    /// Pairs of a node on a row-wire and one on a column-wire, in resistances.
+    /// Pairs of a row-wire node and a column-wire node, in resistances.
     pub(crate) node_pairs: f64,
 }
 
 impl Speed {
-    /// Returns the speed, which is measured the first time; that takes some 20 ms.
+    /// Returns the speed, which is measured on the first call in about 20 ms.
     pub(crate) fn measured() -> Self {
         static SPEED: OnceLock<Speed> = OnceLock::new();
         *SPEED.get_or_init(|| Self {
@@ -114,7 +114,7 @@ impl Speed {
     }
 }
 
-/// Returns the best rate of a few repetitions, the first of which fills the caches.
+/// Returns the best rate of a few repetitions, the first of which warms the caches.
 fn rate(work: f64, mut run: impl FnMut()) -> f64 {
     const REPETITIONS: usize = 4;
     let seconds = (0..REPETITIONS).map(|_| {
@@ -150,7 +150,7 @@ fn node_pairs_per_second() -> f64 {
     })
 }
 
-/// Pairs of nodes in the resistances of a row-wire.
+/// Number of node pairs in the resistances of a row-wire.
 pub(crate) fn node_pairs_per_row(sensor: &SensorModel) -> f64 {
     let scale = sensor.scale;
     scale.nodes_per_row() as f64 * scale.nodes_per_column() as f64 * scale.columns() as f64
@@ -163,7 +163,7 @@ mod tests {
     const MEMINFO: &str = "MemTotal:       24683956 kB\nMemFree:        24097000 kB\n";
 
     #[test]
-    fn the_memory_is_what_the_machine_and_its_container_leave() {
+    fn the_memory_is_the_smaller_of_machine_and_container() {
         let memory = |meminfo, limit| MachineMemory::from_texts(None, meminfo, limit);
         let known = |bytes| MachineMemory {
             bytes,
@@ -176,7 +176,7 @@ mod tests {
     }
 
     #[test]
-    fn where_the_system_does_not_report_it_the_message_says_what_is_assumed_and_how_to_change_it() {
+    fn without_a_reported_size_the_message_names_the_assumption_and_the_variable() {
         let memory = MachineMemory::from_texts(None, Some("MemFree: 5 kB\n"), None);
         let assumed = (MachineMemory::ASSUMED_BYTES, MemorySource::Assumed);
         assert_eq!((memory.bytes, memory.source), assumed);
@@ -188,7 +188,7 @@ mod tests {
     }
 
     #[test]
-    fn the_user_has_the_last_word_on_the_memory() {
+    fn the_variable_overrides_the_memory() {
         let memory = |given| MachineMemory::from_texts(Some(given), Some(MEMINFO), Some("1000000"));
         assert_eq!(memory("64").bytes, 64_000_000_000);
         assert_eq!(memory(" 0.5\n").to_string(), "DECOUPLER_MEMORY_GB allows 0.5 GB");

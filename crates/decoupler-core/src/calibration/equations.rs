@@ -4,10 +4,10 @@ use crate::sensor::{DVec3, SensorError, SensorModel};
 /// Number of parameters.
 pub(super) const COUNT: usize = SensorParameter::COUNT;
 
-/// Derivatives of one reading by every parameter, in the order of [`SensorParameter::ALL`].
+/// Derivatives of one reading with respect to each parameter, in the order of [`SensorParameter::ALL`].
 pub(super) type Slopes = [f64; COUNT];
 
-/// Writes ln R of Eq. (2) for every column-wire (M4) and its derivatives by the parameters.
+/// Writes ln R of Eq. (2) for every column-wire (M4) and its derivatives with respect to the parameters.
 ///
 /// With s = Σ 1/d and R = g/s, ∂ ln R/∂θ = −(1/s) ∂s/∂θ for a length θ, where ∂(1/d)/∂θ = −(d · ∂d/∂θ)/d³ for the vector
 /// d between a node and an electrode; and ∂ ln R/∂g = 1/g.
@@ -56,19 +56,19 @@ pub(super) fn log_resistances(model: &SensorModel, pressed: &PressedRow, mut wri
 /// Displacements that nodes may have in samples of known presses.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PressLimits {
-    /// Largest displacement downwards.
+    /// Largest downward displacement.
     pub largest_depth_mm: f64,
-    /// Largest displacement sideways, along x and along y.
+    /// Largest sideways displacement, along x and along y.
     pub largest_shift_mm: f64,
 }
 
 impl PressLimits {
-    /// Displacements beyond the limits, in proportion to the height, that are errors of their measurement.
+    /// Tolerance beyond the limits for measurement errors of a displacement, relative to the height.
     const TOLERANCE: f64 = 0.02;
-    /// Factor by which a reading may differ from what the sensor model and the other readings suggest.
+    /// Factor by which a reading may differ from the value that the sensor model and the other readings suggest.
     pub const LARGEST_FACTOR: f64 = 1e3;
 
-    /// Limits of a sensor of which no scene is known: nodes move down as far as the column-wires, and sideways by any
+    /// Limits for a sensor without a known scene: nodes move down as far as the column-wires, and sideways by any
     /// distance.
     pub fn of_sensor(model: &SensorModel) -> Self {
         Self {
@@ -77,12 +77,12 @@ impl PressLimits {
         }
     }
 
-    /// Checks samples of known presses on a sensor like `nominal`, before it is calibrated by them or a network trained on
-    /// them. A sensor whose readings all differ from those of `nominal` by the same factor passes.
+    /// Checks samples of known presses on a sensor like `nominal`, before they are used to calibrate it or to train a
+    /// network. A sensor whose readings all differ from those of `nominal` by the same factor passes.
     ///
     /// # Errors
     /// If the nominal sensor is impossible, or a sample does not belong to the array, has a reading that is not a
-    /// resistance or is out of all proportion, or a displacement outside these limits.
+    /// resistance or is implausible, or a displacement outside these limits.
     pub fn check(self, nominal: &SensorModel, samples: &[PressedRow]) -> Result<(), CalibrationError> {
         nominal
             .check()
@@ -140,7 +140,7 @@ fn check_shape(nominal: &SensorModel, sample: usize, pressed: &PressedRow) -> Re
         ("readings", pressed.resistances_ohm.len(), scale.columns()),
     ];
     let wrong = counts.into_iter().find(|(_, found, expected)| found != expected);
-    let row = ("as the number of its row-wire", pressed.row + 1, scale.rows());
+    let row = ("as row-wire number", pressed.row + 1, scale.rows());
     match wrong.or_else(|| (pressed.row >= scale.rows()).then_some(row)) {
         Some((what, found, expected)) => Err(CalibrationError::Shape {
             sample,
@@ -198,9 +198,9 @@ mod tests {
         }
     }
 
-    /// Derivatives by central differences of the resistance model itself.
+    /// Compares with central differences of the resistance model.
     #[test]
-    fn derivatives_are_those_of_the_resistance_model() {
+    fn derivatives_match_the_resistance_model() {
         for (text, row) in [("10x6_3x18", 7), ("10x10_5x30", 0), ("3x2_1x7", 2)] {
             let mut model = SensorModel::new(text.parse().unwrap());
             (model.geometry.column_node_x0_mm, model.geometry.row_pitch_mm) = (12.3, 1.4);

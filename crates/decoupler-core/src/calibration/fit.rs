@@ -8,7 +8,7 @@ use super::{
 };
 use crate::sensor::SensorModel;
 
-/// Sums of the linearised equations at one sensor model, with every parameter in proportion to its reference.
+/// Sums of the linearised equations at one sensor model, with every parameter relative to its reference.
 pub(super) struct LinearisedFit {
     /// JᵀJ.
     pub(super) gram: [[f64; COUNT]; COUNT],
@@ -70,9 +70,10 @@ pub(super) struct CalibratedFit {
 /// (Marquardt 1963) on the logarithms of the resistances, so that relative errors count alike:
 /// minimises `Σ r² + prior_weight · Σ θ²`, with θ the change of a parameter from `nominal` in proportion to its reference.
 ///
-/// The fit has converged when the Gauss-Newton step would lower this by less than a share of it that is nothing next to the
-/// uncertainty of the parameters (the relative offset of Bates and Watts 1981), whatever the length of the step: patterns
-/// that the readings hardly see do not delay it. Exact readings converge when their rounding is reached.
+/// The fit has converged when the Gauss-Newton step would lower this objective by an amount that is negligible
+/// compared with the uncertainty of the parameters (the relative offset of Bates and Watts 1981), whatever the length
+/// of the step: poorly determined patterns do not delay convergence. Exact readings converge when rounding is
+/// reached.
 pub(super) fn fit(
     (nominal, start): (&SensorModel, &SensorModel),
     free: &[usize],
@@ -80,15 +81,15 @@ pub(super) fn fit(
     samples: &[PressedRow],
     prior_weight: f64,
 ) -> Result<CalibratedFit, CalibrationError> {
-    /// Iterations after which a fit that has not ended will not.
+    /// Iteration limit.
     const MAX: usize = 200;
-    /// Length of the step that is left, in standard deviations of the parameters.
+    /// Convergence tolerance: length of the remaining step, in standard deviations of the parameters.
     const OFFSET: f64 = 1e-4;
-    /// Share of Σ r² below which its change is its rounding.
+    /// Relative change of Σ r² that is attributed to rounding.
     const ROUNDING_OF_SUM: f64 = 1e-14;
-    /// Rounding of a residual: that of a reading, a resistance and their logarithms.
+    /// Rounding error of a residual: that of a reading, a resistance and their logarithms.
     const ROUNDING: f64 = 16.0 * f64::EPSILON;
-    /// Damping, in proportion to the largest eigenvalue of JᵀJ, beyond which no step is left.
+    /// Damping, relative to the largest eigenvalue of JᵀJ, beyond which the fit stops.
     const LARGEST_DAMPING: f64 = 1e6;
     let readings: usize = samples.iter().map(|sample| sample.resistances_ohm.len()).sum();
     let redundancy = readings.saturating_sub(free.len()).max(1) as f64;
@@ -146,9 +147,9 @@ pub(super) fn fit(
     Err(CalibrationError::NotConverged)
 }
 
-/// Fits the parameters `free` with the prior that they are nominal to `tolerance` (one standard deviation, in proportion to
-/// their references), weighed against the noise that the residuals themselves show. Any readings, however few, have such a
-/// fit.
+/// Fits the parameters `free` with a normal prior around their nominal values, whose standard deviation is
+/// `tolerance` relative to their references, and with the noise estimated from the residuals. This fit exists for any
+/// number of readings.
 pub(super) fn fit_with_prior(
     nominal: &SensorModel,
     free: &[usize],
@@ -156,7 +157,7 @@ pub(super) fn fit_with_prior(
     samples: &[PressedRow],
     tolerance: f64,
 ) -> Result<CalibratedFit, CalibrationError> {
-    /// Rounds in which the noise settles, and the relative change at which it has.
+    /// Max iterations of the noise estimate, and the relative change at which it has converged.
     const ROUNDS: usize = 20;
     const SETTLED: f64 = 1e-2;
     let readings: usize = samples.iter().map(|sample| sample.resistances_ohm.len()).sum();
@@ -205,7 +206,7 @@ impl Decomposition {
         self.values.first().copied().unwrap_or(0.0)
     }
 
-    /// (JᵀJ + damping · I)⁻¹ `right`, without patterns that rounding hides.
+    /// (JᵀJ + damping · I)⁻¹ `right`, leaving out patterns below rounding.
     pub(super) fn solve(&self, right: &[f64], damping: f64) -> Vec<f64> {
         let mut solution = vec![0.0; right.len()];
         for (pattern, &value) in self.values.iter().enumerate() {
@@ -219,7 +220,7 @@ impl Decomposition {
         solution
     }
 
-    /// Diagonal entry of (JᵀJ)⁻¹; infinite where rounding hides a pattern of which the parameter is part.
+    /// Diagonal entry of (JᵀJ)⁻¹; infinite if the parameter is part of a pattern below rounding.
     pub(super) fn inverse_diagonal(&self, parameter: usize) -> f64 {
         let part = |(pattern, &value): (usize, &f64)| {
             let share = self.vectors[(parameter, pattern)].powi(2);
@@ -237,10 +238,10 @@ impl Decomposition {
     }
 }
 
-/// Variances of the fitted parameters `free`, allowing for errors of readings that belong together: the larger of that of
-/// independent errors and those of errors clustered by crossing (a wire's own misfit, in every frame) and by frame (a
-/// drift of all readings), by the sandwich formula `A⁻¹ (Σ_c g_c g_cᵀ) A⁻¹`, A = JᵀJ, g_c = Σ_{i ∈ c} J_i r_i, times
-/// G/(G−1) for G clusters (Liang and Zeger 1986).
+/// Variances of the fitted parameters `free`, allowing for correlated errors of readings: the largest of the variance
+/// for independent errors and the cluster-robust variances with clusters by crossing (a misfit of one wire in every
+/// frame) and by frame (a drift of all readings), from the sandwich formula `A⁻¹ (Σ_c g_c g_cᵀ) A⁻¹`, A = JᵀJ, g_c =
+/// Σ_{i ∈ c} J_i r_i, times G/(G−1) for G clusters (Liang and Zeger 1986).
 pub(super) fn variances(
     model: &SensorModel,
     free: &[usize],
@@ -261,7 +262,7 @@ pub(super) fn variances(
     let mut variances: Vec<f64> = (0..free.len())
         .map(|parameter| noise_variance * decomposition.inverse_diagonal(parameter))
         .collect();
-    // In a fixed order, so that the sums have the same bits each time.
+    // In a fixed order, for bit-identical sums.
     let clusterings = [sorted(by_crossing), sorted(by_frame)];
     for scores in clusterings.iter().filter(|scores| scores.len() >= 3 * free.len()) {
         let mut of_clusters = vec![0.0; free.len()];

@@ -1,8 +1,9 @@
 //! Calibration: geometry and resistivity of Eq. (2), fitted to the readings of known deformations.
 //!
 //! [`Calibration::fit`] minimises the squared relative errors of the readings by the Levenberg-Marquardt method with
-//! analytic derivatives. What the readings cannot determine stays at its nominal value, and is said to.
-//! [`PressLimits::check`] refuses samples that no press can give, before a calibration or a training on them.
+//! analytic derivatives. Parameters that the readings cannot determine keep their nominal values and are reported as
+//! such. [`PressLimits::check`] refuses samples that no press can produce, before a calibration or a training uses
+//! them.
 
 mod equations;
 mod fit;
@@ -35,8 +36,8 @@ pub enum CalibrationError {
     /// The nominal sensor is impossible.
     #[error(transparent)]
     Sensor(#[from] SensorError),
-    /// The array has no such row-wire, or a row has another number of nodes or readings.
-    #[error("sample {}: {found} {what}, where the array {scale} has {expected}; give samples of this array", .sample + 1)]
+    /// The array has no such row-wire, or a row has the wrong number of nodes or readings.
+    #[error("sample {}: {found} {what}, but the array {scale} has {expected}; give samples of this array", .sample + 1)]
     Shape {
         /// Index of the sample, from 0.
         sample: usize,
@@ -44,7 +45,7 @@ pub enum CalibrationError {
         what: &'static str,
         /// Number found.
         found: usize,
-        /// Number of the array.
+        /// Number expected.
         expected: usize,
         /// Name of the array scale.
         scale: String,
@@ -76,7 +77,7 @@ pub enum CalibrationError {
     },
     /// A displacement is upwards, or further down than nodes may be pressed.
     #[error(
-        "sample {}, node {}: it is pressed down by {} mm, where 0 to {} mm is possible; correct it, or leave this sample out",
+        "sample {}, node {}: it is pressed down by {} mm, but only 0 to {} mm is possible; correct it, or leave this sample out",
         .sample + 1, .node + 1, rounded(*.depth_mm), short(*.largest_mm)
     )]
     Depth {
@@ -86,12 +87,12 @@ pub enum CalibrationError {
         node: usize,
         /// Displacement downwards.
         depth_mm: f64,
-        /// Largest possible one.
+        /// Largest possible displacement.
         largest_mm: f64,
     },
-    /// A displacement sideways is larger than those of nodes may be.
+    /// A sideways displacement exceeds the limit.
     #[error(
-        "sample {}, node {}: it is shifted sideways by {} mm, where up to {} mm is possible; correct it, or leave this sample \
+        "sample {}, node {}: it is shifted sideways by {} mm, but at most {} mm is possible; correct it, or leave this sample \
          out",
         .sample + 1, .node + 1, rounded(*.shift_mm), short(*.largest_mm)
     )]
@@ -100,14 +101,14 @@ pub enum CalibrationError {
         sample: usize,
         /// Node on the row-wire, from 0.
         node: usize,
-        /// Displacement sideways.
+        /// Sideways displacement.
         shift_mm: f64,
-        /// Largest possible one.
+        /// Largest possible displacement.
         largest_mm: f64,
     },
-    /// A reading is out of all proportion to the others.
+    /// A reading is implausible compared with the others.
     #[error(
-        "sample {}, column {}: the reading {} ohm is out of all proportion: the sensor model and the other readings suggest \
+        "sample {}, column {}: the reading {} ohm is implausible: the sensor model and the other readings suggest \
          {} ohm; correct it, or leave this sample out",
         .sample + 1, .column + 1, short(*.ohm), rounded(*.expected_ohm)
     )]
@@ -121,10 +122,10 @@ pub enum CalibrationError {
         /// Reading that the sensor model and the other readings suggest.
         expected_ohm: f64,
     },
-    /// All samples are of one row-wire, from which the pitch of the row-wires and the place of the columns cannot be told
-    /// apart.
+    /// All samples are of one row-wire, which does not separate the pitch of the row-wires from the position of the
+    /// columns.
     #[error(
-        "all samples are of row-wire {}: its place and that of the column-wires shift the readings alike; give presses on at \
+        "all samples are of row-wire {}: its position cannot be separated from that of the column-wires; give presses on at \
          least two row-wires, or on the first",
         .row + 1
     )]
@@ -140,7 +141,7 @@ pub enum CalibrationError {
         /// Number of parameters.
         parameters: usize,
     },
-    /// The fit did not come to an end.
+    /// The fit did not converge.
     #[error(
         "the fit did not converge: the readings do not follow Eq. (2) from this nominal geometry; check the array scale, the \
          order of the wires, and that displacements are in millimetres"
@@ -148,14 +149,14 @@ pub enum CalibrationError {
     NotConverged,
 }
 
-/// [`short`] of four significant digits.
+/// Formats as [`short`] does, with four significant digits.
 fn rounded(value: f64) -> String {
     let digits = format!("{value:.3e}");
     digits.parse().map_or(digits, short)
 }
 
 impl CalibrationError {
-    /// Index of the sample at fault, from 0; `None` if it is no single one.
+    /// Index of the sample at fault, from 0; `None` if the error is not about a single sample.
     pub fn sample(&self) -> Option<usize> {
         match *self {
             Self::Shape { sample, .. }

@@ -12,7 +12,7 @@ use crate::sensor::{SensorModel, short};
 pub struct Calibration {
     /// The fitted model; parameters that the readings do not determine have their nominal values.
     pub model: SensorModel,
-    /// Every parameter with what the readings determine about it.
+    /// All parameters, with the status of each.
     pub parameters: Vec<CalibratedParameter>,
     /// Number of readings fitted.
     pub readings: usize,
@@ -22,10 +22,11 @@ pub struct Calibration {
     pub nominal_residual: f64,
     /// Root mean square of the relative errors of the fitted model's resistances.
     pub residual: f64,
-    /// Singular values of the Jacobian of ln R by relative changes of the parameters, largest first, divided by the
-    /// residual: a pattern is known to one part in this many. 0 for a pattern that the readings do not see.
+    /// Singular values of the Jacobian of ln R with respect to relative changes of the parameters, largest first,
+    /// divided by the residual: a pattern with value s is known to one part in s. 0 for a pattern that the readings
+    /// do not determine.
     pub patterns: Vec<f64>,
-    /// Signs that the readings are not those of such a sensor, with cause and cure.
+    /// Warnings that the readings do not fit the sensor model, with likely causes and remedies.
     pub warnings: Vec<CalibrationWarning>,
 }
 
@@ -53,25 +54,25 @@ pub enum ParameterStatus {
 }
 
 impl Calibration {
-    /// Nominal values are taken to be right to ± this, in proportion to [`SensorParameter::reference`]: readings must tell
-    /// a parameter better than that to change it.
+    /// Tolerance of nominal values, relative to [`SensorParameter::reference`]: a parameter is changed only if the
+    /// readings determine it better than this.
     pub(super) const NOMINAL_TOLERANCE: f64 = 0.1;
 
     /// Fits geometry and resistivity of Eq. (2) to `samples`, starting from `nominal`.
     ///
-    /// What the readings determine is decided at a fit with the prior that nominal values are right to ±10 % (two standard
-    /// deviations), which any readings have; the parameters that they determine are then fitted without a prior.
+    /// A fit with the prior that nominal values are correct to ±10 % (two standard deviations), which exists for any
+    /// number of readings, decides which parameters the readings determine; these are then fitted without a prior.
     ///
-    /// Parameters that the readings do not determine to ±10 % are held at their nominal values, one after another, the least
-    /// known first. The intervals of the others allow for nominal values wrong by ±10 %, for a misfit of single crossings
-    /// and for a drift from frame to frame.
+    /// Parameters that the readings do not determine to ±10 % are held at their nominal values, one after another,
+    /// the least certain first. The intervals of the others allow for errors of ±10 % in the nominal values, for a
+    /// misfit of single crossings and for a drift from frame to frame.
     ///
     /// # Errors
     /// If the nominal sensor is impossible, a sample does not belong to the array or has a reading that is not a
     /// resistance, or the fit does not converge.
     pub fn fit(nominal: &SensorModel, samples: &[PressedRow]) -> Result<Self, CalibrationError> {
         PressLimits::of_sensor(nominal).check(nominal, samples)?;
-        // The place of the first row-wire is not fitted: with it alone nothing is mistaken for anything else.
+        // The position of the first row-wire is not fitted, so it alone leaves no ambiguity.
         if let Some(row) = samples.first().map(|sample| sample.row).filter(|&row| row > 0)
             && samples.iter().all(|sample| sample.row == row)
         {
@@ -105,14 +106,14 @@ impl Calibration {
             let noise_variance = here.squares / (readings - free.len()) as f64;
             let fit_variances = variances(&model, &free, &references, samples, (&decomposition, noise_variance));
             let factor = two_sided_quantile(0.05 / free.len().max(1) as f64);
-            let min_known = fit_variances
+            let least_certain = fit_variances
                 .iter()
                 .enumerate()
                 .max_by(|(_, one), (_, other)| one.total_cmp(other));
             // False for NaN.
-            let is_told = |variance: f64| factor * variance.sqrt() <= Self::NOMINAL_TOLERANCE;
-            if let Some((index, &variance)) = min_known
-                && !is_told(variance)
+            let is_determined = |variance: f64| factor * variance.sqrt() <= Self::NOMINAL_TOLERANCE;
+            if let Some((index, &variance)) = least_certain
+                && !is_determined(variance)
             {
                 free.remove(index);
                 with_prior = true;
@@ -160,8 +161,8 @@ impl Calibration {
     }
 }
 
-/// Variances that nominal values of the held parameters, wrong by their tolerance (two standard deviations), give to the
-/// fitted ones: those of −(J_fᵀJ_f)⁻¹ J_fᵀJ_h.
+/// Variances of the fitted parameters due to errors of the held ones, whose tolerance is two standard deviations:
+/// those of −(J_fᵀJ_f)⁻¹ J_fᵀJ_h.
 fn held_variances(here: &LinearisedFit, free: &[usize], decomposition: &Decomposition) -> Vec<f64> {
     let mut sums = vec![0.0; free.len()];
     for held in (0..COUNT).filter(|index| !free.contains(index)) {
@@ -173,7 +174,7 @@ fn held_variances(here: &LinearisedFit, free: &[usize], decomposition: &Decompos
     sums
 }
 
-/// The z beyond which, on either side, a standard normal value lies with this probability.
+/// Two-sided quantile of the standard normal distribution: the z with P(|Z| > z) = `probability`.
 fn two_sided_quantile(probability: f64) -> f64 {
     let (mut low, mut high) = (0.0, 40.0);
     for _ in 0..80 {
@@ -198,7 +199,7 @@ impl fmt::Display for CalibratedParameter {
         let unit = parameter.unit();
         match standing {
             ParameterStatus::Determined(half_width) => {
-                // Two digits of the interval, and the value to the same place.
+                // Two digits of the interval, and the value to the same decimal place.
                 let digits = (1.0 - half_width.log10().floor()).clamp(0.0, 12.0) as usize;
                 write!(
                     f,
@@ -266,7 +267,7 @@ impl SensorParameter {
         *self.field(&mut model.clone())
     }
 
-    /// Returns what a relative change of the parameter is in proportion to: the nominal value, or, for the x of the column
+    /// Returns the reference for relative changes of the parameter: the nominal value, or, for the x of the column
     /// nodes, which may be 0 or far from any origin, the nominal distance between them.
     pub fn reference(self, nominal: &SensorModel) -> f64 {
         match self {
@@ -303,11 +304,11 @@ impl fmt::Display for SensorParameter {
     }
 }
 
-/// Sign that the readings are not those of the sensor that was fitted, and what to check.
+/// Warning that the readings do not fit the sensor model, with what to check.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum CalibrationWarning {
-    /// CalibratedFit values are far from their nominal ones.
+    /// Fitted values are far from their nominal values.
     FarFromNominal {
         /// The parameters.
         parameters: Vec<CalibratedParameter>,
@@ -332,7 +333,7 @@ impl CalibrationWarning {
         parameters: &[CalibratedParameter],
         fitted: usize,
     ) -> Vec<Self> {
-        /// Standard deviations of the prior from which a value is far from its nominal one.
+        /// Standard deviations of the prior from which a value counts as far from its nominal value.
         const FAR: f64 = 3.0;
         let deviation = 0.5 * Calibration::NOMINAL_TOLERANCE;
         let mut largest = 0.0_f64;
@@ -342,7 +343,7 @@ impl CalibrationWarning {
                 continue;
             };
             let apart = (fitted.value - fitted.nominal).abs();
-            // By what is certain of it.
+            // The part of the difference beyond the interval.
             if apart - half_width > FAR * deviation * reference {
                 largest = largest.max(apart / (deviation * reference));
                 far.push(*fitted);
@@ -357,14 +358,14 @@ impl CalibrationWarning {
             .collect()
     }
 
-    /// The errors that all frames share, if they are large next to the noise: an analysis of variance of the residuals by
-    /// crossing.
+    /// Returns a warning if the errors that all frames share are large compared with the noise, by an analysis of
+    /// variance of the residuals by crossing.
     fn misfit(model: &SensorModel, references: &Slopes, samples: &[PressedRow], fitted: usize) -> Option<Self> {
-        /// Systematic errors in proportion to the noise from which they count.
+        /// Ratio of systematic error to noise from which it is reported.
         const LARGE: f64 = 3.0;
-        /// Readings beyond one for each crossing from which their noise is known.
-        const FEWEST: usize = 10;
-        /// Relative errors that rounding explains.
+        /// Min degrees of freedom of the noise estimate: readings minus crossings.
+        const MIN_DEGREES: usize = 10;
+        /// Relative errors explained by rounding.
         const SMALLEST: f64 = 1e-12;
         // Number, sum and sum of squares of the residuals of each crossing.
         let mut crossings: BTreeMap<(usize, usize), (f64, f64, f64)> = BTreeMap::new();
@@ -376,7 +377,7 @@ impl CalibrationWarning {
         });
         let readings: f64 = crossings.values().map(|(count, ..)| count).sum();
         let (groups, fitted) = (crossings.len() as f64, fitted as f64);
-        if readings - groups < FEWEST as f64 || groups <= fitted {
+        if readings - groups < MIN_DEGREES as f64 || groups <= fitted {
             return None;
         }
         let shared: f64 = crossings.values().map(|(count, sum, _)| sum * sum / count).sum();
@@ -398,14 +399,14 @@ impl fmt::Display for CalibrationWarning {
                 }
                 write!(
                     f,
-                    ": up to {deviations:.0} standard deviations from nominal values that are assumed to be right to ±10 % (two \
+                    ": up to {deviations:.0} standard deviations from nominal values that are assumed to be correct to ±10 % (two \
                      standard deviations); check the array scale, the order of the wires and the unit of the displacements, or \
-                     give a nominal sensor that is nearer"
+                     use a nominal sensor that is closer"
                 )
             }
             Self::Misfit { systematic, noise } => write!(
                 f,
-                "the readings of a crossing are off by {systematic:.1e} in every frame, and vary by {noise:.1e} only: Eq. (2) \
+                "the readings of a crossing are off by {systematic:.1e} in every frame, and vary by only {noise:.1e}: Eq. (2) \
                  with these parameters does not describe the sensor; check the array scale, the order of the wires, and \
                  wires with a resistance of their own"
             ),

@@ -55,21 +55,21 @@ fn frames(real: &SensorModel, rows: &[usize], frames: usize, noise: f64, rng: &m
     samples
 }
 
-/// Returns `true` if every interval holds the truth.
-fn holds(calibration: &Calibration, real: &SensorModel) -> bool {
-    let mut told = calibration.parameters.iter();
-    told.all(|fitted| match fitted.standing {
+/// Returns `true` if every interval contains the true value.
+fn intervals_hold(calibration: &Calibration, real: &SensorModel) -> bool {
+    let mut parameters = calibration.parameters.iter();
+    parameters.all(|fitted| match fitted.standing {
         ParameterStatus::Determined(half_width) => (fitted.value - fitted.parameter.of(real)).abs() <= half_width,
         ParameterStatus::Nominal => fitted.value == fitted.nominal,
     })
 }
 
-fn told(calibration: &Calibration) -> Vec<SensorParameter> {
-    let told = calibration
+fn determined(calibration: &Calibration) -> Vec<SensorParameter> {
+    let determined = calibration
         .parameters
         .iter()
         .filter(|fitted| fitted.standing != ParameterStatus::Nominal);
-    told.map(|fitted| fitted.parameter).collect()
+    determined.map(|fitted| fitted.parameter).collect()
 }
 
 /// All intervals of a calibration together hold with 95 %; 45 of 50 leaves room for chance.
@@ -96,7 +96,7 @@ fn a_sensor_off_by_5_percent_is_recovered_within_the_stated_intervals() {
             calibration.residual
         );
         assert!(calibration.nominal_residual > 10.0 * calibration.residual);
-        within += usize::from(holds(&calibration, &real));
+        within += usize::from(intervals_hold(&calibration, &real));
     }
     assert!(within >= 45, "{within} of 50");
 }
@@ -107,25 +107,25 @@ fn readings_without_noise_give_the_sensor_exactly() {
     let real = real(&mut rng);
     let samples = frames(&real, &Vec::from_iter(0..10), 6, 0.0, &mut rng);
     let calibration = Calibration::fit(&nominal(), &samples).unwrap();
-    assert_eq!(told(&calibration), SensorParameter::ALL);
+    assert_eq!(determined(&calibration), SensorParameter::ALL);
     for fitted in &calibration.parameters {
         let truth = fitted.parameter.of(&real);
         assert!((fitted.value - truth).abs() < 1e-6, "{fitted}: {truth}");
     }
 }
 
-/// The place of the first row-wire does not depend on the pitch.
+/// The position of the first row-wire does not depend on the pitch.
 #[test]
-fn what_one_row_cannot_tell_keeps_its_nominal_value() {
+fn parameters_undetermined_by_one_row_keep_their_nominal_values() {
     let mut within = 0;
     for seed in 0..20 {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let real = real(&mut rng);
         let samples = frames(&real, &[0], 60, 1e-4, &mut rng);
         let calibration = Calibration::fit(&nominal(), &samples).unwrap();
-        let told = told(&calibration);
-        assert!(!told.contains(&SensorParameter::RowPitch), "{told:?}");
-        within += usize::from(holds(&calibration, &real));
+        let determined = determined(&calibration);
+        assert!(!determined.contains(&SensorParameter::RowPitch), "{determined:?}");
+        within += usize::from(intervals_hold(&calibration, &real));
     }
     assert!(within >= 17, "{within} of 20");
     let mut rng = ChaCha8Rng::seed_from_u64(0);
@@ -139,9 +139,9 @@ fn what_one_row_cannot_tell_keeps_its_nominal_value() {
     );
 }
 
-/// There the pitch and the place of the columns are one number: either interval would be that of the other's truth.
+/// There the pitch and the position of the columns are one unknown: neither has an interval of its own.
 #[test]
-fn one_row_that_is_not_the_first_is_refused() {
+fn a_single_row_other_than_the_first_is_refused() {
     let mut rng = ChaCha8Rng::seed_from_u64(0);
     let samples = frames(&real(&mut rng), &[6], 60, 1e-4, &mut rng);
     let error = Calibration::fit(&nominal(), &samples).unwrap_err();
@@ -149,9 +149,9 @@ fn one_row_that_is_not_the_first_is_refused() {
     assert!(error.to_string().starts_with("all samples are of row-wire 7:"));
 }
 
-/// A wire with a resistance of its own is in all frames: its readings are not as many as there are frames.
+/// A wire with its own resistance affects all frames: its readings are not independent from frame to frame.
 #[test]
-fn intervals_allow_for_wires_that_are_off() {
+fn intervals_allow_for_deviating_wires() {
     let half_width = |wire_error: f64| {
         let mut rng = ChaCha8Rng::seed_from_u64(4);
         let real = real(&mut rng);
@@ -177,8 +177,8 @@ fn intervals_allow_for_wires_that_are_off() {
     assert!(wide > 2.0 * narrow, "{wide} and {narrow} of the residual");
 }
 
-/// Sets that leave patterns of the parameters open: few readings, one row-wire, and no press, where all lengths and the
-/// resistivity are known up to one factor. The first residual is that of the true sensor.
+/// Sets that leave patterns of the parameters undetermined: few readings, one row-wire, and no press, where all
+/// lengths and the resistivity are known up to a common factor. The first residual is that of the true sensor.
 #[test]
 fn few_frames_and_frames_at_rest_converge_within_the_intervals() {
     let mut within = 0;
@@ -209,17 +209,17 @@ fn few_frames_and_frames_at_rest_converge_within_the_intervals() {
                 Calibration::fit(&nominal, &samples).unwrap_or_else(|error| panic!("{scale}, seed {seed}: {error}"));
             assert!(calibration.residual < 1.6 * noise, "{scale}: {}", calibration.residual);
             assert_eq!(calibration.warnings, [], "{scale}, seed {seed}");
-            within += usize::from(at_rest || holds(&calibration, &real));
+            within += usize::from(at_rest || intervals_hold(&calibration, &real));
             all += 1;
         }
     }
     assert!(10 * within >= 9 * all, "{within} of {all}");
 }
 
-/// With one electrode more on each column-wire than there are, the fit is as good as with the true scale: only the values
-/// show it. With column-wires in the wrong order, the residual does.
+/// With one electrode too many on each column-wire, the fit is as good as with the true scale: only the values show
+/// it. With column-wires in the wrong order, the residual does.
 #[test]
-fn another_sensor_is_warned_of() {
+fn a_wrong_sensor_gives_a_warning() {
     let mut rng = ChaCha8Rng::seed_from_u64(3);
     let samples = frames(&of_scale("4x3_2x8"), &[0, 1, 2, 3], 30, 1e-3, &mut rng);
     let calibration = Calibration::fit(&of_scale("4x3_3x8"), &samples).unwrap();
@@ -255,12 +255,12 @@ fn presses_outside_the_limits_are_named() {
         error.to_string()
     };
     assert!(message(&|sample| sample.resistances_ohm[1] = 0.0).contains("column 2"));
-    assert!(message(&|sample| sample.resistances_ohm[0] = 1e300).contains("1e300 ohm is out of all proportion"));
-    assert!(message(&|sample| sample.resistances_ohm[0] = 1e-12).contains("1e-12 ohm is out of all proportion"));
+    assert!(message(&|sample| sample.resistances_ohm[0] = 1e300).contains("1e300 ohm is implausible"));
+    assert!(message(&|sample| sample.resistances_ohm[0] = 1e-12).contains("1e-12 ohm is implausible"));
     assert!(message(&|sample| sample.displacements_mm[2].z = -3.0).contains("node 3: it is pressed down by -3 mm"));
     assert!(message(&|sample| sample.displacements_mm[2].z = 1.5).contains("0 to 1 mm is possible"));
     assert!(message(&|sample| sample.displacements_mm[0].y = -0.5).contains("sideways by 0.5 mm"));
-    // Another rubber is no error.
+    // Another rubber is not an error.
     let mut samples = good.clone();
     for sample in &mut samples {
         sample.resistances_ohm.iter_mut().for_each(|ohm| *ohm *= 1e9);
@@ -269,7 +269,7 @@ fn presses_outside_the_limits_are_named() {
 }
 
 #[test]
-fn samples_that_do_not_fit_are_named() {
+fn invalid_samples_are_named() {
     let mut rng = ChaCha8Rng::seed_from_u64(0);
     let good = frames(&nominal(), &[0, 1, 2], 4, 1e-3, &mut rng);
     let message = |spoil: &dyn Fn(&mut PressedRow)| {

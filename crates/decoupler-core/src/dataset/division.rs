@@ -8,15 +8,15 @@ use super::{Dataset, DatasetError, Seed, Stream};
 
 /// Division of a measured set into training, validation and test samples.
 ///
-/// The samples are taken to be in the order in which they were recorded.
+/// The samples are assumed to be in the order in which they were recorded.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Division {
     /// Rule by which samples are assigned to the parts.
     pub by: SplitBy,
-    /// Share of the samples for the test, above 0 and below 1.
+    /// Share of the samples held out for the test, above 0 and below 1.
     pub test_fraction: f64,
-    /// Share of the other samples that is held out for validation, from 0 to below 1. With 0, nothing is held out; see
+    /// Share of the other samples held out for validation, from 0 to below 1. With 0, nothing is held out; see
     /// [`RunSettings::validation_fraction`](crate::evaluation::RunSettings::validation_fraction).
     pub validation_fraction: f64,
 }
@@ -28,7 +28,7 @@ pub struct DividedSamples {
     pub training: Vec<usize>,
     /// Samples that select the best weights; empty if nothing is held out.
     pub validation: Vec<usize>,
-    /// Samples that no fit has seen; empty if the test set is given apart.
+    /// Samples that no fit has seen; empty if the test set is a separate file.
     pub test: Vec<usize>,
 }
 
@@ -43,10 +43,10 @@ pub enum DivisionError {
         part: &'static str,
         /// Share given.
         value: f64,
-        /// Smallest share possible.
+        /// Smallest valid share.
         least: &'static str,
     },
-    /// There are not two units, so that one could be the test.
+    /// There is only one unit, so none is left for the test.
     #[error("all {samples} samples are one {unit}: a test set needs another; give a test file, or split another way")]
     TooFew {
         /// Number of samples.
@@ -54,14 +54,14 @@ pub enum DivisionError {
         /// Name of the unit of division: sample or group.
         unit: &'static str,
     },
-    /// The test samples are of other row-wires.
+    /// The test samples belong to other row-wires.
     #[error(transparent)]
     Rows(#[from] DatasetError),
 }
 
 impl Default for Division {
-    /// Returns the division in time: the last fifth for the test, and nothing held out for validation, since the default
-    /// method of measured runs needs none.
+    /// Returns the division in time: the last fifth is the test set, and nothing is held out for validation, since
+    /// the default method of measured runs needs none.
     fn default() -> Self {
         Self {
             by: SplitBy::Time,
@@ -72,9 +72,9 @@ impl Default for Division {
 }
 
 impl Division {
-    /// Divides `set` into training, validation and test samples. At least one unit (a sample or a group) trains and one
-    /// tests; a part that cannot be filled exactly with whole groups gets the number of samples nearest to its share.
-    /// Nothing is held out for validation if only one unit remains.
+    /// Divides `set` into training, validation and test samples. The training and the test set get at least one unit
+    /// (a sample or a group) each; a part that cannot be filled exactly with whole groups gets the number of samples
+    /// nearest to its share. Nothing is held out for validation if only one unit remains.
     ///
     /// # Errors
     /// If a share is out of range, or the set is a single unit.
@@ -91,7 +91,7 @@ impl Division {
         Ok(self.parts(units, test))
     }
 
-    /// Divides `set` into training and validation samples, where the test set is given apart; see [`Self::divide`].
+    /// Divides `set` into training and validation samples, for a separate test set; see [`Self::divide`].
     ///
     /// # Errors
     /// If a share is out of range.
@@ -172,7 +172,7 @@ impl DividedSamples {
     }
 }
 
-/// Moves the last units to a part with about this share of all samples, at least one unit and not all.
+/// Moves the last units to a part with about this share of all samples: at least one unit, and never all.
 fn take_last(units: &mut Vec<Vec<usize>>, share: f64) -> Vec<usize> {
     let samples: usize = units.iter().map(Vec::len).sum();
     let wanted = share * samples as f64;
@@ -233,21 +233,21 @@ pub fn hold_out(set: Dataset, held_out: usize, rng: &mut impl Rng) -> Split {
 
 /// Rule by which the samples of a recording are divided into training, validation and test samples, or into folds.
 ///
-/// Neighbouring frames of a recording are nearly the same, so a network that has trained on the neighbours of a test
-/// sample is judged too well (Roberts et al. 2017, doi:10.1111/ecog.02881: blocks in time or by group).
+/// Neighbouring frames of a recording are nearly the same, so a test sample whose neighbours are in the training set
+/// gives an optimistic error (Roberts et al. 2017, doi:10.1111/ecog.02881: blocks in time or by group).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum SplitBy {
-    /// Blocks in the order of the samples, the last for the test. Consecutive samples of one group stay together.
+    /// Blocks in the order of the samples, the last one for the test. Consecutive samples of one group stay together.
     #[default]
     Time,
     /// Whole groups, drawn at random: no group is in two parts.
     Group,
-    /// Single samples, drawn at random. It is optimistic wherever neighbouring samples are alike.
+    /// Single samples, drawn at random. Optimistic if neighbouring samples are alike.
     Random,
 }
 
-/// Error for a word that names no rule of division.
+/// Error for an unknown name of a division rule.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 #[error("'{0}' is not a split: give time, group or random")]
 pub struct SplitByError(String);
@@ -272,10 +272,11 @@ impl FromStr for SplitBy {
 }
 
 impl SplitBy {
-    /// Every rule, in the order offered.
+    /// All rules, in the order offered.
     pub const ALL: [Self; 3] = [Self::Time, Self::Group, Self::Random];
 
-    /// Returns the rule whose test samples are new to the fit: by group if samples of `set` are in groups, else by time.
+    /// Returns the rule that keeps related samples together: by group if samples of `set` are in groups, else by
+    /// time.
     pub fn honest(set: &Dataset) -> Self {
         let groups = Self::Group.units(set).len();
         if (2..set.samples()).contains(&groups) {
@@ -285,7 +286,7 @@ impl SplitBy {
         }
     }
 
-    /// Number of folds of `set`: as many as wanted, or as it has units.
+    /// Number of folds of `set`: `wanted`, or the number of units if there are fewer.
     pub fn folds_of(self, set: &Dataset, wanted: usize) -> usize {
         wanted.min(self.units(set).len())
     }
@@ -303,7 +304,7 @@ impl SplitBy {
         }
     }
 
-    /// Returns [`Self::units`] in the order in which parts are taken from them.
+    /// Returns [`Self::units`] in the order in which they are assigned to the parts.
     pub(super) fn ordered_units(self, set: &Dataset, rng: &mut impl Rng) -> Vec<Vec<usize>> {
         let mut units = self.units(set);
         if self != Self::Time {
@@ -347,13 +348,17 @@ mod tests {
     }
 
     #[test]
-    fn in_time_the_last_part_tests_and_the_one_before_it_validates() {
+    fn in_time_the_last_part_is_for_testing_and_the_one_before_for_validation() {
         let set = set((0..100).collect());
         let parts = divide(&set, SplitBy::Time, 0).unwrap();
         assert_eq!(parts.training, Vec::from_iter(0..64));
         assert_eq!(parts.validation, Vec::from_iter(64..80));
         assert_eq!(parts.test, Vec::from_iter(80..100));
-        assert_eq!(parts, divide(&set, SplitBy::Time, 1).unwrap(), "nothing is drawn");
+        assert_eq!(
+            parts,
+            divide(&set, SplitBy::Time, 1).unwrap(),
+            "no random numbers are used"
+        );
         assert_eq!(parts.test_set(&set).targets()[[0, 0]], 80.0);
         assert_eq!(parts.split(&set).validation.unwrap().samples(), 16);
     }
@@ -375,7 +380,7 @@ mod tests {
     }
 
     #[test]
-    fn a_cut_in_time_goes_between_groups() {
+    fn splits_in_time_fall_between_groups() {
         // Runs of 30, 30, 30 and 10: 20 samples of 100 would cut the third.
         let groups = (0..100).map(|sample| sample / 30).collect();
         let parts = divide(&set(groups), SplitBy::Time, 0).unwrap();
@@ -384,7 +389,7 @@ mod tests {
     }
 
     #[test]
-    fn every_sample_is_in_one_part_whatever_the_rule() {
+    fn every_sample_is_in_exactly_one_part() {
         for samples in [2, 3, 5, 97] {
             let set = set((0..samples).map(|sample| sample / 2).collect());
             for by in SplitBy::ALL {
@@ -401,7 +406,7 @@ mod tests {
     }
 
     #[test]
-    fn a_random_split_is_seeded_and_spread() {
+    fn a_random_split_is_seeded_and_uniform() {
         let set = set((0..1000).collect());
         let parts = divide(&set, SplitBy::Random, 4).unwrap();
         assert_eq!(parts, divide(&set, SplitBy::Random, 4).unwrap());
@@ -411,7 +416,7 @@ mod tests {
     }
 
     #[test]
-    fn a_given_test_set_leaves_the_rest_for_training_and_validation() {
+    fn a_separate_test_set_leaves_all_samples_for_training_and_validation() {
         let set = set((0..50).collect());
         let rng = &mut Seed(0).rng(Stream::Split);
         let a_fifth_held_out = Division {
@@ -428,7 +433,7 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_divided_is_named() {
+    fn invalid_divisions_are_refused() {
         let one_group = divide(&set(vec![7; 10]), SplitBy::Group, 0).unwrap_err().to_string();
         assert!(one_group.contains("all 10 samples are one group"), "{one_group}");
         for (test_fraction, validation_fraction) in [(0.0, 0.2), (1.0, 0.2), (f64::NAN, 0.2), (0.2, 1.0), (0.2, -0.1)] {
@@ -455,7 +460,7 @@ mod tests {
         let (set, split) = split(200, 3);
         let validation = split.validation.unwrap();
         assert_eq!((split.training.samples(), validation.samples()), (170, 30));
-        // Every z is drawn afresh, so the first node's z names the sample.
+        // Every z is drawn independently, so the first node's z identifies the sample.
         let z = |set: &Dataset| set.targets().column(2).to_vec();
         let mut apart = [z(&split.training), z(&validation)].concat();
         let mut whole = z(&set);
@@ -472,7 +477,7 @@ mod tests {
     }
 
     #[test]
-    fn one_snapshot_always_stays_for_training() {
+    fn at_least_one_snapshot_remains_for_training() {
         assert_eq!(split(10, 1).1.validation, None);
         assert_eq!(split(20, 5).1.training.samples(), 10);
         assert_eq!(split(100, 0).1.validation, None);

@@ -100,7 +100,7 @@ impl Folds {
         let samples: usize = units.iter().map(Vec::len).sum();
         let (mut blocks, mut first, mut before) = (Vec::with_capacity(folds), 0, 0);
         for fold in 0..folds {
-            // Each later fold needs a unit of its own.
+            // Each later fold needs at least one unit.
             let most = units.len() - (folds - fold - 1);
             let end_of_fold = samples as f64 * (fold + 1) as f64 / folds as f64;
             let (mut end, mut within) = (first + 1, before + units[first].len());
@@ -215,7 +215,7 @@ mod tests {
     }
 
     #[test]
-    fn folds_that_cannot_be_filled_are_refused() {
+    fn too_many_folds_are_refused() {
         let set = set(100);
         for (folds, unit) in [
             (0, FoldUnit::Sample),
@@ -230,7 +230,7 @@ mod tests {
     }
 
     #[test]
-    fn folds_in_time_are_blocks_one_after_another() {
+    fn folds_in_time_are_consecutive_blocks() {
         let set = set(130);
         let assigned = Folds::by(&set, 4, SplitBy::Time, &mut Seed(0).rng(Stream::Split)).unwrap();
         let mut next = 0;
@@ -245,7 +245,7 @@ mod tests {
             next += block.len();
         }
         assert_eq!(next, 130);
-        // Runs of very different lengths still give every fold one.
+        // Blocks of very different lengths still leave one for every fold.
         let readings = ndarray::Array2::zeros((103, 1));
         let groups = (0..103usize).map(|sample| sample.saturating_sub(99)).collect();
         let uneven = Dataset::new(readings.clone(), readings, None, groups).unwrap();
@@ -259,7 +259,7 @@ mod tests {
     }
 
     #[test]
-    fn folds_by_group_or_at_random_are_those_by_snapshot_or_sample() {
+    fn folds_by_group_or_at_random_match_those_by_snapshot_or_sample() {
         let set = set(130);
         for (by, unit) in [
             (SplitBy::Group, FoldUnit::Snapshot),

@@ -4,7 +4,7 @@ use thiserror::Error;
 use super::Dataset;
 use crate::scene::RowModel;
 
-/// Whole frames, each with the readings of all row-wires at one moment: the input of a decoder in use.
+/// Whole frames, each with the readings of all row-wires at one moment: the input of a decoder.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Frames {
     /// Snapshots × rows × channels.
@@ -13,7 +13,7 @@ pub struct Frames {
     samples: Vec<usize>,
 }
 
-/// Error for a set that does not consist of whole frames.
+/// Error for a set with incomplete frames.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 #[error("the snapshot of sample {} is not whole: {found} samples of row-wire {}, where each row-wire read needs one", .sample + 1, .row_wire + 1)]
 pub struct FramesError {
@@ -127,7 +127,7 @@ impl<T> PerRow<T> {
         }
     }
 
-    /// Returns the value for the row-wire with this index among those read; a shared value serves every index.
+    /// Returns the value for the row-wire with this index among those read; a shared value applies to every index.
     ///
     /// # Panics
     /// If there is one value per row-wire and no row-wire with this index.
@@ -179,7 +179,7 @@ mod tests {
     }
 
     #[test]
-    fn frames_follow_groups_and_row_wires_whatever_the_order() {
+    fn frames_follow_groups_and_row_wires_in_any_order() {
         let frames = set(Some(&[5, 3, 3, 5]), &[8, 8, 2, 2]).frames().unwrap();
         assert_eq!((frames.count(), frames.rows()), (2, 2));
         assert_eq!(frames.samples(0), [1, 0]);
@@ -195,7 +195,7 @@ mod tests {
     }
 
     #[test]
-    fn snapshots_that_are_not_whole_are_named() {
+    fn incomplete_snapshots_are_refused() {
         let lacking = set(Some(&[0, 1, 1]), &[0, 0, 1]).frames().unwrap_err();
         assert_eq!(
             lacking.to_string().split(':').next(),
@@ -208,7 +208,7 @@ mod tests {
     }
 
     #[test]
-    fn one_serves_every_row_and_each_row_has_its_own() {
+    fn a_value_is_shared_or_one_per_row() {
         let shared = PerRow::shared('a');
         assert_eq!((shared.at(0), shared.at(7), shared.only()), (&'a', &'a', Some(&'a')));
         let each = PerRow::each(vec!['a', 'b', 'c']);

@@ -9,21 +9,21 @@ use crate::{
     sensor::SensorModel,
 };
 
-/// Largest number of samples in a set, chosen to fit in memory with room to work.
+/// Largest number of samples in a set, limited by memory.
 pub const LARGEST_SAMPLES: usize = 1_000_000;
 
 /// Samples for training or testing, simulated or measured. A sample is one row-wire at one moment (or, for a sensor
 /// without row-wires, everything read at one moment) and knows its row-wire and its snapshot.
 ///
 /// For a simulated array, the readings are the M4 resistances in ohm and the targets the 3·M2 absolute coordinates of
-/// the row's nodes in millimetres (x, y, z node by node). Measured samples have whatever was measured.
+/// the row's nodes in millimetres (x, y, z node by node). Measured samples contain any quantities.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Dataset {
     /// Samples × channels, in standard (row-major) layout.
     readings: Array2<f64>,
     /// Samples × outputs, in standard layout.
     targets: Array2<f64>,
-    /// `None` if there are no row-wires, or those of the samples are unknown.
+    /// `None` if there are no row-wires, or the row-wires of the samples are unknown.
     rows: Option<SampleRows>,
     /// Group of each sample, which divisions keep together: its snapshot where row-wires are read together.
     groups: Vec<usize>,
@@ -269,8 +269,8 @@ fn contiguous(values: &Array2<f64>, sample: usize) -> &[f64] {
 }
 
 impl Dataset {
-    /// Replaces the readings of simulated snapshots by what the wires and amplifiers of a faulty sensor make of them, before
-    /// noise is added. `model` is the sensor without its fault.
+    /// Replaces the readings of simulated snapshots by those of a faulty sensor (wires and amplifiers), before noise
+    /// is added. `model` is the sensor without its fault.
     pub fn break_before_noise(&mut self, model: &SensorModel, faulty: &FaultySensor) {
         let deformations: Vec<Deformation> = (0..self.samples())
             .step_by(self.row_count())
@@ -284,8 +284,8 @@ impl Dataset {
         }
     }
 
-    /// Replaces the readings of simulated snapshots by what the converter of a faulty sensor makes of them, after noise was
-    /// added.
+    /// Replaces the readings of simulated snapshots by the output of the converter of a faulty sensor, after noise
+    /// was added.
     pub fn break_after_noise(&mut self, faulty: &FaultySensor) {
         let read = self.row_wires_read().map_or_else(Vec::new, <[usize]>::to_vec);
         let length = read.len() * self.channels();
@@ -320,7 +320,7 @@ mod tests {
     }
 
     #[test]
-    fn samples_keep_their_row_wire_and_group_wherever_they_go() {
+    fn selected_samples_keep_their_row_wire_and_group() {
         let set = set(Some(&[7, 2, 7, 2, 4]), vec![5, 5, 9, 9, 9]).unwrap();
         assert_eq!(set.row_wires_read(), Some(&[2, 4, 7][..]));
         assert_eq!(set.snapshots(), [vec![0, 1], vec![2, 3, 4]]);
@@ -342,7 +342,7 @@ mod tests {
     }
 
     #[test]
-    fn channels_are_chosen_for_every_sample() {
+    fn channels_are_selected_for_every_sample() {
         let set = set(Some(&[0, 1]), vec![0, 0]).unwrap();
         let second = set.of_channels(&[1]);
         assert_eq!(
@@ -354,7 +354,7 @@ mod tests {
     }
 
     #[test]
-    fn samples_may_know_no_row_wire() {
+    fn row_wires_are_optional() {
         let set = set(None, vec![0, 0, 1]).unwrap();
         assert_eq!(
             (set.row_wires_read(), set.row_count(), set.row_wire(2)),
@@ -365,7 +365,7 @@ mod tests {
     }
 
     #[test]
-    fn a_set_without_samples_of_some_rows_can_say_which_rows_there_are() {
+    fn a_set_can_declare_rows_without_samples() {
         let set = set(Some(&[4, 4]), vec![0, 1]).unwrap().among_rows(&[2, 4]).unwrap();
         assert_eq!((set.row_count(), set.row_index(1), set.row_wire(1)), (2, 1, Some(4)));
         for rows in [&[2][..], &[4, 2], &[]] {
@@ -375,7 +375,7 @@ mod tests {
     }
 
     #[test]
-    fn parts_that_do_not_fit_are_named() {
+    fn mismatched_parts_are_named() {
         let zeros = |shape: (usize, usize)| Array2::<f64>::zeros(shape);
         let cases = [
             (
@@ -416,7 +416,7 @@ mod tests {
     }
 
     #[test]
-    fn any_memory_layout_will_do() {
+    fn any_memory_layout_is_accepted() {
         let readings = Array2::from_shape_fn((2, 3), |(c, s)| (10 * s + c) as f64).reversed_axes();
         let set = Dataset::new(readings, Array2::zeros((3, 1)), None, vec![0, 1, 2]).unwrap();
         assert_eq!(set.sample_readings(1), [10.0, 11.0]);

@@ -3,13 +3,13 @@ use std::fmt;
 use rand::{SeedableRng, rngs::ChaCha8Rng};
 use serde::{Deserialize, Serialize};
 
-/// Seed of everything random in a run.
+/// Seed of all random numbers of a run.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(transparent)]
 pub struct Seed(pub u64);
 
-/// Purpose of random numbers. Each purpose has a stream of its own, so that, say, more training samples change neither
-/// the test set nor the initial weights of the network.
+/// Purpose of random numbers. Each purpose has its own stream: more training samples, for example, change neither the
+/// test set nor the initial weights of the network.
 ///
 /// The number of a stream is part of every data set drawn from it: never change one, and give new purposes new numbers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -38,18 +38,19 @@ pub enum Stream {
     Resampling = 20,
 }
 
-/// Stream of the random initialisations after the first: this number plus the number of the initialisation.
+/// Offset of the streams of all random initialisations after the first: initialisation k uses this number plus k.
 const FURTHER_STARTS: u64 = 1 << 32;
 
 impl Seed {
-    /// Random number generator of one purpose.
+    /// Random number generator for one purpose.
     pub fn rng(self, stream: Stream) -> ChaCha8Rng {
         let mut rng = ChaCha8Rng::seed_from_u64(self.0);
         rng.set_stream(stream as u64);
         rng
     }
 
-    /// Random number generator of the initial weights of start `start`, counted from 0. Start 0 uses [`Stream::Start`].
+    /// Random number generator for the initial weights of restart `start`, counted from 0. Restart 0 uses
+    /// [`Stream::Start`].
     pub fn start_rng(self, start: usize) -> ChaCha8Rng {
         let mut rng = self.rng(Stream::Start);
         if start > 0 {
@@ -71,7 +72,7 @@ mod tests {
 
     use super::*;
 
-    /// Literal values, so that no data set changes unnoticed: a stream that is renumbered draws other numbers.
+    /// Literal values, to detect a renumbered stream, which would draw other data sets.
     #[test]
     fn every_stream_keeps_its_numbers() {
         let streams = [

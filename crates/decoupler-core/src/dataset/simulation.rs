@@ -144,7 +144,7 @@ mod tests {
     }
 
     #[test]
-    fn a_scene_of_one_row_names_it() {
+    fn a_scene_of_one_row_declares_it() {
         let model = SensorModel::new("10x6_3x18".parse().unwrap());
         let scene = Scene {
             rows: Rows::One(3),
@@ -184,7 +184,7 @@ mod tests {
     }
 
     #[test]
-    fn a_row_is_every_sample_of_it() {
+    fn selecting_a_row_gives_all_its_samples() {
         let set = draw("10x6_3x18", 30, 3);
         assert_eq!(set.of_row(4), set.select(&[4, 14, 24]));
     }
@@ -205,7 +205,7 @@ mod tests {
     }
 
     #[test]
-    fn drift_is_common_to_the_samples_of_a_group() {
+    fn drift_is_shared_within_a_group() {
         let model = SensorModel::new("10x6_3x18".parse().unwrap());
         let clean = draw("10x6_3x18", 30, 3);
         let mut drifting = clean.clone();

@@ -13,7 +13,7 @@ use crate::{
     sensor::{Axes, RowConductance, SensorModel},
 };
 
-/// An affine map from readings to targets, with the scalings on both sides folded into its matrix.
+/// An affine map from readings to targets, with the input and output scalings folded into its matrix.
 #[derive(Clone, Debug, PartialEq)]
 pub struct AffineMap {
     quantity: Quantity,
@@ -21,13 +21,13 @@ pub struct AffineMap {
     centre: Vec<f64>,
     /// Matrix from centred channels to targets (channels × varying targets), in standard layout.
     matrix: Array2<f64>,
-    /// Targets for all channels at their centres.
+    /// Targets for readings at the channel centres.
     base: Vec<f64>,
     /// Indices of the varying targets.
     varying: Vec<usize>,
     /// Buffer for the centred channels of one row.
     values: Vec<f64>,
-    /// Buffer for the changes of the varying targets in one row.
+    /// Buffer for the offsets of the varying targets in one row.
     changes: Vec<f64>,
 }
 
@@ -44,7 +44,7 @@ impl AffineMap {
         Ok(Self::folded(&inputs, &coefficients, &outputs))
     }
 
-    /// Fits the map to `training` by ridge regression, each target with the penalty of its least leave-one-out error;
+    /// Fits the map to `training` by ridge regression, with the penalty of each target chosen by leave-one-out error;
     /// `unseen` is as in [`Inputs::fit`].
     ///
     /// # Errors
@@ -85,8 +85,8 @@ impl AffineMap {
 }
 
 impl AffineMap {
-    /// Writes the centred channels. Returns `true` if all readings are valid: found out in the same pass, which a separate
-    /// one would lengthen by 6 % of decoding.
+    /// Writes the centred channels. Returns `true` if all readings are valid; a separate pass for this check would
+    /// take 6 % more time.
     #[inline(always)]
     fn read(&mut self, readings: &[f64], of: impl Fn(f64) -> f64) -> bool {
         let mut is_sound = true;
@@ -141,43 +141,43 @@ impl Decoder for AffineMap {
     }
 }
 
-/// Affine estimate of the compressions of a row-wire's nodes from its readings, of the least expected squared error if
-/// every node is pressed independently and uniformly over the stroke: where to start to solve Eq. (2).
+/// Affine estimate of the compressions of a row-wire's nodes from its readings, with the min expected squared error
+/// if every node is pressed independently and uniformly over the stroke: a starting point for solving Eq. (2).
 ///
-/// s_k is a sum over nodes. In x from −1 to 1 over the stroke, the part of a node is its mean plus
-/// `a P₁(x) + b P₂(x) + c P₃(x)` with Legendre's polynomials, whose variances are 1/3, 1/5 and 1/7 and which are
-/// uncorrelated. With A, B and C the coefficients of all nodes (readings × nodes), the estimate is
-/// `Aᵀ/3 (A Aᵀ/3 + B Bᵀ/5 + C Cᵀ/7)⁻¹ (s − s̄)`.
+/// s_k is a sum over nodes. In x from −1 to 1 over the stroke, the contribution of a node is its mean plus `a P₁(x) +
+/// b P₂(x) + c P₃(x)` with Legendre polynomials, whose variances are 1/3, 1/5 and 1/7 and which are uncorrelated.
+/// With A, B and C the coefficients of all nodes (readings × nodes), the estimate is `Aᵀ/3 (A Aᵀ/3 + B Bᵀ/5 + C
+/// Cᵀ/7)⁻¹ (s − s̄)`.
 #[derive(Clone, Debug)]
 pub(super) struct AffineStart {
     middle_mm: f64,
     /// g/s̄ in ohm.
     means_ohm: Vec<f64>,
-    /// Nodes × readings, in mm for a relative change of the conductance.
+    /// Nodes × readings, in mm per relative change of the conductance.
     gains_mm: Vec<f64>,
 }
 
-/// Variance that is added, in proportion to the sum of all, so that what no node moves has an inverse.
+/// Variance added to each direction, relative to the sum of all variances, to make the matrix invertible.
 const SMALLEST_VARIANCE: f64 = 1e-13;
 
 impl AffineStart {
-    /// Memory of the estimate for one row-wire.
+    /// Size in bytes of the estimate for one row-wire.
     pub(super) fn bytes(model: &SensorModel) -> usize {
         (model.scale.nodes_per_row() + 1) * model.scale.columns() * size_of::<f64>()
     }
 
-    /// Computes the estimate for row-wire `row`; the middle of `stroke` if there is no inverse.
+    /// Computes the estimate for row-wire `row`; the middle of `stroke` if the matrix is singular.
     pub(super) fn new(model: &SensorModel, row: usize, stroke: Range) -> Self {
         let (readings, nodes) = (model.scale.columns(), model.scale.nodes_per_row());
         let half_mm = 0.5 * stroke.width();
-        // Gauss's rule of three points, exact to the fifth degree.
+        // Three-point Gauss quadrature, exact to the fifth degree.
         let points = [
             (-(0.6_f64.sqrt()), 5.0 / 9.0),
             (0.0, 8.0 / 9.0),
             (0.6_f64.sqrt(), 5.0 / 9.0),
         ];
         let mut mean = vec![0.0; readings];
-        // Legendre coefficients of the derivatives: those of the parts follow by integrating.
+        // Legendre coefficients of the derivatives; those of the contributions follow by integration.
         let mut slopes = [0; 3].map(|_| Mat::<f64>::zeros(readings, nodes));
         let mut conductance = RowConductance::new(model, Axes::Z);
         for (x, weight) in points {
@@ -219,12 +219,13 @@ impl AffineStart {
         }
     }
 
-    /// Describes the coordinates (3·M2) of the nodes of row-wire `row` at the estimate, before they are cut to the stroke.
+    /// Describes the coordinates (3·M2) of the nodes of row-wire `row` at the estimate, before they are clamped to
+    /// the stroke.
     pub(super) fn description(&self, model: &SensorModel, row: usize) -> LayeredMap {
         let (readings, nodes) = (self.means_ohm.len(), model.scale.nodes_per_row());
         let middles = (0..nodes).flat_map(|node| model.displaced_mm(row, node, DVec3::Z * self.middle_mm).to_array());
         let weight = |(reading, coordinate): (usize, usize)| match coordinate % 3 {
-            // z counts upwards, and (mean − R)/R is the mean times the change of the conductance.
+            // z is upwards, and (mean − R)/R is the mean times the change of the conductance.
             2 => -self.gains_mm[coordinate / 3 * readings + reading] * self.means_ohm[reading],
             _ => 0.0,
         };
@@ -238,7 +239,7 @@ impl AffineStart {
         }
     }
 
-    /// Writes the estimate for readings in ohm, before it is cut to the stroke.
+    /// Writes the estimate for readings in ohm, before it is clamped to the stroke.
     pub(super) fn estimate(&self, readings_ohm: &[f64], compressions_mm: &mut [f64]) {
         compressions_mm.fill(self.middle_mm);
         let readings = self.means_ohm.len();
@@ -249,21 +250,21 @@ impl AffineStart {
     }
 }
 
-/// The ridge regression on scaled inputs with the penalty of the least leave-one-out error for each output.
+/// Ridge regression on scaled inputs, with the penalty of each output chosen by leave-one-out error.
 ///
-/// The penalty is on inputs in proportion to their deviations, whether they are whitened or not: it leaves out weak
-/// components first, in which noise is largest.
+/// The penalty acts on inputs in proportion to their standard deviations, whether they are whitened or not: it
+/// suppresses weak components first, in which noise is largest.
 pub(super) struct LinearFit {
     ridge: Ridge,
-    /// Deviation of each input before whitening, relative to the largest.
+    /// Standard deviation of each input before whitening, relative to the largest.
     sizes: Array1<f64>,
     /// Number of samples.
     samples: f64,
 }
 
 impl LinearFit {
-    /// Fits to `units` of the scaled inputs and outputs. `unseen` (sources × inputs) are the changes of the inputs by one
-    /// standard deviation of each source of noise that they lack.
+    /// Fits to `units` of the scaled inputs and outputs. `unseen` (sources × inputs) are the changes of the inputs by
+    /// one standard deviation of each noise source that the training samples lack.
     pub fn new(inputs: &Inputs, units: &Units, unseen: ArrayView2<'_, f64>) -> Result<Self, ScalingError> {
         let sizes = Array1::from(inputs.deviations());
         let largest = sizes.iter().copied().fold(0.0, f64::max);
@@ -288,7 +289,7 @@ impl LinearFit {
 
     /// Variances of the noise of the scaled inputs that has the same effect as the best penalty for all outputs together.
     pub fn variances(&self) -> Vec<f64> {
-        /// Next to this noise nothing is left of the inputs.
+        /// Noise variance beyond which the inputs carry no information.
         const LARGEST: f64 = 1e12;
         let penalty = self.ridge.common_penalty();
         let variance = |size: &f64| (penalty / self.samples / (size * size)).min(LARGEST);
@@ -296,7 +297,7 @@ impl LinearFit {
     }
 }
 
-/// Decoder that always answers the mean targets of the training set, the score of knowing nothing.
+/// Decoder that always answers the mean targets of the training set: the baseline.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TrainingMean {
     channels: usize,
@@ -438,7 +439,7 @@ mod tests {
         }
     }
 
-    /// The mean distance of the middle from a uniform compression is a quarter of the stroke.
+    /// The mean distance of a uniform compression from the middle is a quarter of the stroke.
     #[test]
     fn the_estimate_is_within_a_few_thousandths_of_the_stroke() {
         for array in ["10x6_3x18", "10x10_5x30", "2x1_1x3"] {

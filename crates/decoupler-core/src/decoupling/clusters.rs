@@ -1,9 +1,9 @@
 use ndarray::{Array2, ArrayView1, ArrayView2, Axis};
 use rand::{Rng, seq::index};
 
-/// Rounds of Lloyd's algorithm.
+/// Iterations of Lloyd's algorithm.
 const ROUNDS: usize = 20;
-/// Samples among which clusters are sought: a few for each are enough.
+/// Max number of samples that are clustered: a few per cluster are enough.
 const MAX_CLUSTERED: usize = 1000;
 
 /// Squared Euclidean distance.
@@ -12,7 +12,8 @@ pub(super) fn distance2(a: ArrayView1<'_, f64>, b: ArrayView1<'_, f64>) -> f64 {
     a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum()
 }
 
-/// Means of `count` clusters of the rows of `x`, or of [`MAX_CLUSTERED`] of them, begun at rows drawn by `rng`.
+/// Means of `count` clusters of the rows of `x`, or of [`MAX_CLUSTERED`] of them, with initial centres drawn from the
+/// rows by `rng`.
 pub(super) fn k_means(x: ArrayView2<'_, f64>, count: usize, rng: &mut impl Rng) -> Array2<f64> {
     let most = MAX_CLUSTERED.max(count);
     let drawn = (x.nrows() > most).then(|| x.select(Axis(0), &index::sample(rng, x.nrows(), most).into_vec()));

@@ -50,12 +50,12 @@ pub trait Decoder: Send {
         Ok(())
     }
 
-    /// Decodes rows that need not be those of a frame: `readings` are rows × channels and `targets` rows × outputs, each of
+    /// Decodes rows that need not form a frame: `readings` are rows × channels and `targets` rows × outputs, each for
     /// the row-wire with its index among those read.
     ///
     /// # Errors
-    /// If a reading cannot be decoded; `row_index` is then the place among these rows, and the contents of `targets` are
-    /// unspecified.
+    /// If a reading cannot be decoded; `row_index` is then the index among these rows, and the contents of `targets`
+    /// are unspecified.
     ///
     /// # Panics
     /// If the slices have other lengths, or there is no such row-wire.
@@ -71,8 +71,8 @@ pub trait Decoder: Send {
         Ok(())
     }
 
-    /// Returns the standing of the rows decoded since it was last asked, of decoders that solve equations; others count
-    /// no rows.
+    /// Returns the number of rows decoded since the last call, by status, for decoders that solve equations; zeros
+    /// for others.
     fn take_solved_rows(&mut self) -> SolvedRows {
         SolvedRows::default()
     }
@@ -80,7 +80,7 @@ pub trait Decoder: Send {
     /// Describes what the decoder computes, for programs that decode without this one.
     ///
     /// # Errors
-    /// If the decoder has no such description.
+    /// If the decoder cannot be described.
     fn description(&self) -> Result<Description, NotDescribed> {
         Err(NotDescribed::Unknown)
     }
@@ -114,8 +114,8 @@ impl DecodeError {
         }
     }
 
-    /// Checks that `is_sound` holds for all readings of a row, in a single vectorised pass, since bad readings are
-    /// rare.
+    /// Checks that `is_valid` holds for all readings of a row, in a single vectorised pass, since invalid readings
+    /// are rare.
     #[inline(always)]
     fn check_that(readings: &[f64], is_sound: impl Fn(f64) -> bool) -> Result<(), Self> {
         if readings.iter().fold(true, |all, &value| all & is_sound(value)) {
@@ -136,7 +136,7 @@ impl DecodeError {
 /// If a reading cannot be decoded; `row_index` is then the index of the sample.
 ///
 /// # Panics
-/// If the set has another number of channels, or row-wires unknown to the decoder.
+/// If the set has a different number of channels, or row-wires unknown to the decoder.
 pub fn decode_set(decoder: &mut dyn Decoder, set: &Dataset) -> Result<Array2<f64>, DecodeError> {
     /// Samples that are decoded at once.
     const BLOCK: usize = 1024;
@@ -183,15 +183,15 @@ impl<D: Decoder> Decoder for PerRow<D> {
 
 /// Root mean square of m/R − 1 over the readings m of a row, with R the model's resistances at the decoded coordinates.
 ///
-/// It needs no ground truth, so it tells how far to trust any decoder; 1 and above explains nothing. Infinite if the
-/// model has no resistance at these coordinates.
+/// It needs no ground truth and so measures the reliability of any decoder; a value of 1 or more means that the
+/// answer does not explain the readings. Infinite if the model has no resistance at these coordinates.
 ///
 /// # Panics
 /// If there are not M4 readings and 3·M2 coordinates.
 pub fn resistance_residual(model: &SensorModel, readings_ohm: &[f64], coordinates_mm: &[f64]) -> f64 {
     assert_eq!(coordinates_mm.len(), model.scale.coordinates_per_row());
     let mut problem = RowProblem::new(model, Axes::Xyz);
-    // Displacements are measured from the first row, wherever the nodes are.
+    // Displacements are relative to the first row, wherever the nodes are.
     problem.read(0, readings_ohm);
     let mut unknowns = vec![0.0; problem.unknowns()];
     problem.unknowns_of(coordinates_mm, &mut unknowns);
@@ -199,14 +199,14 @@ pub fn resistance_residual(model: &SensorModel, readings_ohm: &[f64], coordinate
     if residual.is_finite() { residual } else { f64::INFINITY }
 }
 
-/// Number of rows decoded by solving the equations of the sensor, and of those whose answers cannot be relied on.
+/// Number of rows decoded by solving the equations of the sensor, and of those with unreliable answers.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct SolvedRows {
     /// Rows decoded.
     pub rows: usize,
-    /// Rows whose readings the answer does not explain.
+    /// Rows whose answer does not explain the readings.
     pub unsolved: usize,
-    /// Rows whose readings other answers may explain as well.
+    /// Rows whose readings other answers explain as well.
     pub undetermined: usize,
 }
 
@@ -220,14 +220,14 @@ impl SolvedRows {
         }
     }
 
-    /// Returns `true` if every answer can be relied on.
+    /// Returns `true` if all answers are reliable.
     pub fn are_reliable(self) -> bool {
         self.unsolved == 0 && self.undetermined == 0
     }
 }
 
 impl fmt::Display for SolvedRows {
-    /// Writes how many answers cannot be relied on, why, and what helps; nothing if all can.
+    /// Writes how many answers are unreliable, why, and what helps; nothing if all are reliable.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self {
             rows,

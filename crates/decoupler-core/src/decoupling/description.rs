@@ -4,12 +4,12 @@ use thiserror::Error;
 use super::RowProblemDescription;
 use crate::network::Quantity;
 
-/// What a decoder computes, in plain numbers and few kinds of steps, for programs that decode without this one.
+/// What a decoder computes, as plain numbers and a few kinds of steps, for programs that decode without this one.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Description {
-    /// From readings to targets: one map for all row-wires, or one for each.
+    /// Maps from readings to targets: one for all row-wires, or one for each.
     pub maps: Vec<LayeredMap>,
-    /// Iteration on the equations of the sensor that begins at the answers of the maps.
+    /// Iteration on the equations of the sensor that starts from the answers of the maps.
     pub equations: Option<RowProblemDescription>,
 }
 
@@ -18,16 +18,16 @@ pub struct Description {
 pub struct LayeredMap {
     /// Quantity computed from each reading.
     pub quantity: Quantity,
-    /// Value of the quantity that is subtracted in each channel.
+    /// Value subtracted from the quantity in each channel.
     pub centre: Vec<f64>,
-    /// Layers, the first of which takes the centred values and the last of which gives the targets.
+    /// Layers; the first takes the centred values and the last returns the targets.
     pub layers: Vec<Layer<f64>>,
 }
 
-/// A step from values to values.
+/// A layer.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Layer<T> {
-    /// Sums of weighted values.
+    /// Weighted sums.
     Affine(AffineLayer<T>),
     /// Hyperbolic tangent of each value.
     Tanh,
@@ -36,7 +36,7 @@ pub enum Layer<T> {
         /// Inputs × Gaussians.
         centres: Array2<T>,
     },
-    /// Fuzzy rules: affine consequents, blended by normalised memberships.
+    /// Fuzzy rules: affine consequents, blended by normalised firing strengths.
     Rules {
         /// Logarithms of the memberships (up to a common term), one for each rule.
         memberships: AffineLayer<T>,
@@ -45,7 +45,7 @@ pub enum Layer<T> {
     },
 }
 
-/// Sums of weighted values with a constant: values · weights + biases.
+/// Weighted sums with a constant: values · weights + biases.
 #[derive(Clone, Debug, PartialEq)]
 pub struct AffineLayer<T> {
     /// Inputs × outputs.
@@ -54,7 +54,7 @@ pub struct AffineLayer<T> {
     pub biases: Vec<T>,
 }
 
-/// Reason for which a decoder cannot be described.
+/// Reason why a decoder cannot be described.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
 #[non_exhaustive]
 pub enum NotDescribed {
@@ -63,17 +63,17 @@ pub enum NotDescribed {
         "the readings of the scene have noise, for which this decoder computes a posterior by expectation propagation, too long a program for a bundle: take another decoder, or settings without noise"
     )]
     Posterior,
-    /// There are not more equations than unknowns.
+    /// There are no more equations than unknowns.
     #[error(
         "a row has {readings} readings for {unknowns} unknown displacements, too few for the equations to have one solution: take another decoder"
     )]
     Undetermined {
-        /// Readings of a row.
+        /// Number of readings of a row.
         readings: usize,
-        /// Unknowns of a row.
+        /// Number of unknowns of a row.
         unknowns: usize,
     },
-    /// The decoder has no description.
+    /// The decoder cannot be described.
     #[error("this decoder has no form for other programs: take another decoder")]
     Unknown,
 }
@@ -93,7 +93,7 @@ impl<T> AffineLayer<T> {
 }
 
 impl AffineLayer<f64> {
-    /// A layer without constants.
+    /// Returns a layer without constants.
     pub(super) fn linear(weights: Array2<f64>) -> Self {
         Self {
             biases: vec![0.0; weights.ncols()],
@@ -115,7 +115,7 @@ impl AffineLayer<f64> {
 }
 
 impl<T> Layer<T> {
-    /// Values of all tables: weights row by row before biases, memberships before consequents.
+    /// Values of all tables: weights (row by row) before biases, memberships before consequents.
     pub fn values(&self) -> Box<dyn Iterator<Item = &T> + '_> {
         match self {
             Self::Affine(affine) => Box::new(affine.values()),
@@ -172,7 +172,7 @@ impl<T> AffineLayer<T> {
     }
 }
 
-/// An array of the next values, row by row.
+/// Returns an array of the next values, row by row.
 fn array<U>((rows, columns): (usize, usize), values: &mut impl Iterator<Item = U>) -> Option<Array2<U>> {
     Array2::from_shape_vec((rows, columns), values.take(rows * columns).collect()).ok()
 }

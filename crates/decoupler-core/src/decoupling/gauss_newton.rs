@@ -8,8 +8,8 @@ use crate::{
     sensor::{Axes, SensorModel},
 };
 
-/// LinearisedRow equations for one step, in proportion to the ranges of the unknowns. Kept between steps so that none
-/// allocates.
+/// Equations linearised for one step, in units of the ranges of the unknowns. Reused between steps to avoid
+/// allocation.
 #[derive(Clone, Debug)]
 pub(super) struct LinearisedRow {
     /// Unknowns that may move: all, or those not held at a bound.
@@ -36,8 +36,8 @@ impl LinearisedRow {
         }
     }
 
-    /// Linearises the equations at `unknowns_mm`. Unknowns at a bound that would leave it are held there if `hold` says
-    /// so.
+    /// Linearises the equations at `unknowns_mm`. With `hold`, unknowns at a bound that would leave their range are
+    /// held there.
     pub(super) fn linearise(&mut self, problem: &mut RowProblem, ranges: &[Range], unknowns_mm: &[f64], hold: bool) {
         problem.evaluate(unknowns_mm);
         let problem = &*problem;
@@ -87,16 +87,16 @@ impl LinearisedRow {
         }
     }
 
-    /// Returns the largest error of an unknown, in proportion to its range, that errors of the readings with the norm
-    /// `error` make to first order: error times the largest norm of a row of J⁺.
+    /// Returns the largest error of an unknown, relative to its range, caused to first order by errors of the
+    /// readings with the norm `error`: `error` times the largest norm of a row of J⁺.
     pub(super) fn largest_error(&mut self, error: f64) -> f64 {
         let width = self.free.len() + 1;
         self.triangle.factor(&self.system, width, 0.0);
         error * self.triangle.largest_inverse_row()
     }
 
-    /// Returns Σ_i |J_ki| of reading `k`, in proportion to the ranges: the most by which its residual changes if every
-    /// unknown moves by as much as 1.
+    /// Returns Σ_i |J_ki| of reading `k`, relative to the ranges: the max change of its residual if every unknown
+    /// moves by at most 1.
     pub(super) fn reach(&self, k: usize) -> f64 {
         let width = self.free.len() + 1;
         self.system[k * width..(k + 1) * width - 1]
@@ -106,10 +106,10 @@ impl LinearisedRow {
     }
 }
 
-/// Returns where in `range` each of `count` functions of one variable is least, and its value there: the least of a grid of
-/// steps of about 1, which finds the deepest of several valleys, then golden-section search within a step of it.
+/// Returns the position and value of the minimum in `range` of each of `count` functions of one variable: the min
+/// over a grid with steps of about 1, which finds the deepest of several valleys, refined by golden-section search.
 ///
-/// `of` returns the values of all functions, each at its own place, so that work they share is done once.
+/// `of` returns the values of all functions, each at its own position, so that shared work is done once.
 pub(super) fn least(range: (f64, f64), count: usize, of: impl Fn(&[f64]) -> Vec<f64>) -> Vec<(f64, f64)> {
     let (low, high) = range;
     let steps = (high - low).ceil().max(1.0);
@@ -118,7 +118,7 @@ pub(super) fn least(range: (f64, f64), count: usize, of: impl Fn(&[f64]) -> Vec<
     for k in 0..=steps as usize {
         let at = low + step * k as f64;
         for (best, value) in best.iter_mut().zip(of(&vec![at; count])) {
-            // The lowest place is kept where no value is a number.
+            // The lowest position is kept if all values are NaN.
             if value < best.1 {
                 *best = (at, value);
             }
@@ -142,13 +142,13 @@ pub(super) fn least(range: (f64, f64), count: usize, of: impl Fn(&[f64]) -> Vec<
 
 /// Golden-section search of one function.
 struct Valley {
-    /// Place and value of the least so far.
+    /// Position and value of the min so far.
     best: (f64, f64),
     left: f64,
     right: f64,
-    /// Places and values between the ends, in order.
+    /// Positions and values between the ends, in ascending order.
     inner: [(f64, f64); 2],
-    /// Index of the one of [`Self::inner`] that is to be evaluated; `None` once the valley is narrow.
+    /// Index of the [`Self::inner`] point to be evaluated; `None` once the valley is narrow.
     open: Option<usize>,
 }
 
@@ -198,7 +198,7 @@ impl Valley {
         at
     }
 
-    /// Takes the value at the place that was asked for.
+    /// Sets the value at the requested position.
     fn take(&mut self, value: f64) {
         if let Some(open) = self.open {
             self.inner[open].1 = value;
@@ -206,16 +206,16 @@ impl Valley {
     }
 }
 
-/// The golden ratio's inverse.
+/// Inverse of the golden ratio.
 fn golden() -> f64 {
     0.5 * (5.0_f64.sqrt() - 1.0)
 }
 
-/// Deformations of a row-wire that give the same readings as another one, by symmetry: the readings do not determine which of
-/// them is the true one, however exact they are.
+/// Deformations of a row-wire that give the same readings as another one, by symmetry: even exact readings do not
+/// determine which is the true one.
 ///
-/// The electrodes of a column-wire are evenly spaced, so a node may be mirrored at their middle; and two nodes may change
-/// places. Either needs nodes that move so far sideways.
+/// The electrodes of a column-wire are evenly spaced, so a node may be mirrored about their middle, and two nodes may
+/// be swapped. Both need nodes that can move that far sideways.
 #[derive(Clone, Debug)]
 pub(super) struct Twins {
     model: SensorModel,
@@ -263,7 +263,7 @@ impl Twins {
         self.is_within(mirrored_mm) && self.is_apart(mirrored_mm, x_mm)
     }
 
-    /// Returns `true` if node `a` may take the place of node `b`, `apart` places on, and the other way round.
+    /// Returns `true` if node `a` may take the position of node `b`, `apart` positions away, and vice versa.
     fn is_exchanged(&self, apart: usize, a: [f64; 3], b: [f64; 3]) -> bool {
         let distance_mm = self.model.geometry.node_pitch_mm * apart as f64;
         let differs = self.is_apart(a[0], b[0]) || self.is_apart(a[1], b[1] + distance_mm) || self.is_apart(a[2], b[2]);

@@ -17,7 +17,7 @@ use crate::{
 /// Method of decoding the readings of a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum DecoderKind {
-    /// Mean of the training set, whatever the readings.
+    /// Mean of the training set, independent of the readings.
     Mean,
     /// Affine map fitted by ridge regression.
     Ridge,
@@ -27,7 +27,8 @@ pub enum DecoderKind {
     RadialBasis,
     /// Fuzzy rules with affine consequents: a Takagi-Sugeno system.
     Fuzzy,
-    /// Gauss-Newton method on Eq. (2), with noise and prior if the scene has noise or the equations leave the answer open.
+    /// Gauss-Newton method on Eq. (2), with noise and prior if the scene has noise or the equations do not determine
+    /// the answer.
     Newton,
     /// Network followed by at most [`DecoderKind::POLISH_STEPS`] Gauss-Newton steps.
     Polish,
@@ -43,15 +44,15 @@ pub enum Precision {
     Single,
 }
 
-/// Error for a word that names no decoder.
+/// Error for an unknown name of a decoder.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 #[error("'{text}' is not a decoder: give {words}", words = words())]
 pub struct DecoderKindError {
-    /// Word given.
+    /// Name given.
     pub text: String,
 }
 
-/// Properties of a decoder, all in one place.
+/// Properties of a decoder.
 struct Entry {
     word: &'static str,
     name: &'static str,
@@ -146,7 +147,7 @@ impl DecoderKind {
         }
     }
 
-    /// Returns a sentence on the method of decoding.
+    /// Returns a sentence that describes the method of decoding.
     pub fn meaning(self) -> &'static str {
         self.entry().meaning
     }
@@ -170,7 +171,7 @@ impl DecoderKind {
     }
 }
 
-/// Lists the words of all decoders: `mean, ridge … or polish`.
+/// Lists the names of all decoders: `mean, ridge … or polish`.
 fn words() -> String {
     let words = DecoderKind::ALL.map(|kind| kind.entry().word);
     let [others @ .., last] = &words;
@@ -178,7 +179,7 @@ fn words() -> String {
 }
 
 impl fmt::Display for DecoderKind {
-    /// Writes the word used in the terminal and in files.
+    /// Writes the name used in the terminal and in files.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.pad(self.entry().word)
     }
@@ -193,16 +194,16 @@ impl FromStr for DecoderKind {
     }
 }
 
-/// What a decoder is fitted to.
+/// Training samples and settings from which a decoder is fitted.
 #[derive(Clone, Copy)]
 pub struct FitProblem<'a> {
     /// Training samples.
     pub training: &'a Dataset,
-    /// Whether all row-wires share a decoder, or each has its own.
+    /// Whether all row-wires share a decoder or each has its own.
     pub row_model: RowModel,
     /// Quantity and scaling of the inputs.
     pub inputs: InputChoice,
-    /// Noise that readings have and the training samples lack.
+    /// Noise of the readings that the training samples lack.
     pub unseen: NoiseSource,
     /// The sensor and its scene, if they are known.
     pub sensor: Option<(&'a SensorModel, &'a Scene)>,
@@ -214,11 +215,11 @@ pub struct FitProblem<'a> {
     pub seed: Seed,
 }
 
-/// Error of fitting a decoder.
+/// Error in fitting a decoder.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
 pub enum FitError {
-    /// Samples cannot be scaled.
+    /// The samples cannot be scaled.
     #[error(transparent)]
     Scaling(#[from] ScalingError),
     /// The sensor has no resistances at rest.

@@ -38,9 +38,9 @@ pub(super) fn fit_least_squares(
     Ok(Array2::from_shape_fn((n1, m), |(i, t)| fitted[(i, t)]))
 }
 
-/// Returns the triangular factor of [inputs, 1, outputs], all scaled, which has the same least-squares solutions as the
-/// whole set. Each chunk of samples is joined to the factor of those before it, so that memory does not grow with their
-/// number (Golub and Van Loan, Matrix Computations, section 6.5.2).
+/// Returns the triangular factor of [inputs, 1, outputs], all scaled, which has the same least-squares solutions as
+/// the whole set. Chunks of samples are added to the factor one by one, so memory does not grow with their number
+/// (Golub and Van Loan, Matrix Computations, section 6.5.2).
 fn triangle(training: &Dataset, inputs: &Inputs, outputs: &MinMax) -> Mat<f64> {
     /// Number of samples per chunk.
     const CHUNK: usize = 512;
@@ -71,17 +71,17 @@ fn triangle(training: &Dataset, inputs: &Inputs, outputs: &MinMax) -> Mat<f64> {
 /// Computations, section 5.2). Row by row, so that all columns are reflected at once in vector registers.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Triangle {
-    /// [R, Qᵀb] above the diagonal; what is below it is used up. Rows × width.
+    /// [R, Qᵀb] above the diagonal; the entries below it are scratch. Rows × width.
     matrix: Vec<f64>,
-    /// Number of unknowns and 1.
+    /// Number of unknowns plus 1.
     width: usize,
     sums: Vec<f64>,
     column: Vec<f64>,
 }
 
 impl Triangle {
-    /// Decomposes `system` = [A, b] (rows × `width`, row by row), stacked on [`root` · I, 0] unless `root` is 0 and A
-    /// has as many rows as unknowns.
+    /// Decomposes `system` = [A, b] (rows × `width`, row by row), with [`root` · I, 0] appended below unless `root`
+    /// is 0 and A has at least as many rows as unknowns.
     pub(super) fn factor(&mut self, system: &[f64], width: usize, root: f64) {
         let unknowns = width - 1;
         let equations = system.len() / width;
@@ -102,7 +102,7 @@ impl Triangle {
         }
     }
 
-    /// Makes the entries of column `pivot` below the diagonal 0.
+    /// Zeroes the entries of column `pivot` below the diagonal.
     fn reflect(&mut self, pivot: usize) {
         let Self {
             matrix,
@@ -141,8 +141,8 @@ impl Triangle {
         &self.matrix[row * self.width..(row + 1) * self.width]
     }
 
-    /// Solves R x = Qᵀb, which minimises `‖A x − b‖² + root² ‖x‖²`. Entries are not finite where the columns of A depend
-    /// on each other.
+    /// Solves R x = Qᵀb, which minimises `‖A x − b‖² + root² ‖x‖²`. Entries are not finite if the columns of A are
+    /// linearly dependent.
     pub(super) fn solve(&self, solution: &mut Vec<f64>) {
         let unknowns = self.width - 1;
         solution.clear();
@@ -155,8 +155,8 @@ impl Triangle {
         }
     }
 
-    /// Returns the largest norm of a row of R⁻¹, which is that of a row of A⁺; infinite if the columns of A depend on
-    /// each other.
+    /// Returns the largest norm of a row of R⁻¹, which equals that of A⁺; infinite if the columns of A are linearly
+    /// dependent.
     pub(super) fn largest_inverse_row(&mut self) -> f64 {
         let unknowns = self.width - 1;
         let mut squares = vec![0.0; unknowns];
@@ -208,7 +208,7 @@ mod tests {
         );
     }
 
-    /// A = [[3, 1], [4, 2], [0, 2]], b = A (2, −1) + 5 (8, −6, 2)/…: the last is orthogonal to both columns.
+    /// A = [[3, 1], [4, 2], [0, 2]], b = A (2, −1) + 5 (8, −6, 2)/…: the last term is orthogonal to both columns.
     #[test]
     fn least_squares_and_the_pseudo_inverse_are_those_of_the_normal_equations() {
         // (8, −6, 2): 3·8 − 4·6 + 0 = 0 and 8 − 12 + 4 = 0.

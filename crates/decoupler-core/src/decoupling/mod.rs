@@ -13,9 +13,9 @@
 //! | [`PosteriorDecoder`] | the Gauss-Newton method with noise and prior |
 //!
 //! [`DecoderKind`] lists them with their names and meanings, and fits each. Decoders of readings alone come as
-//! [`PerRow`](crate::dataset::PerRow): one shared by all row-wires, or one per row-wire. [`resistance_residual`] tells
-//! how well an answer explains the readings, without ground truth. [`Description`] is what a decoder computes, in plain
-//! numbers, for programs that decode without this one.
+//! [`PerRow`](crate::dataset::PerRow): one shared by all row-wires, or one per row-wire. [`resistance_residual`]
+//! measures how well an answer explains the readings, without ground truth. [`Description`] contains what a decoder
+//! computes, as plain numbers, for programs that decode without this one.
 
 mod affine_map;
 mod clusters;

@@ -11,16 +11,16 @@ use super::{
 };
 use crate::{scene::Scene, sensor::SensorModel};
 
-/// Gauss-Newton method with Levenberg's damping and bounds for Eq. (2) of one known row-wire. The unknowns are only
-/// what the scene moves.
+/// Gauss-Newton method with Levenberg's damping and bounds for Eq. (2) of one known row-wire. Its unknowns are the
+/// displacements that the scene allows.
 ///
-/// Plain steps are tried first, which solve nearly all rows. If they fail, each step solves `min ‖J δ + ρ‖² + μ ‖δ‖²` by QR over the unknowns that
-/// are not held at a bound, and is cut off at the bounds. μ is 0 until a step fails to lower the misfit; then it grows
-/// tenfold, and shrinks again after steps that succeed.
+/// Plain steps are tried first and solve nearly all rows. If they fail, each step solves `min ‖J δ + ρ‖² + μ ‖δ‖²` by
+/// QR over the unknowns that are not held at a bound, and is clamped to the bounds. μ is 0 until a step fails to
+/// lower the misfit; it is then multiplied by ten, and divided by ten after successful steps.
 ///
-/// The misfit has minima that are no solutions. An answer counts as the [solution](Solution) only if what is left of
-/// the misfit, or the rounding of readings and model where that is more, cannot hide a distance of
-/// [`LARGEST_ERROR`](super::LARGEST_ERROR); else other starts are tried.
+/// The misfit has local minima that are not solutions. An answer counts as the [solution](Solution) only if the
+/// remaining misfit, or the rounding of readings and model if that is larger, implies an error below
+/// [`LARGEST_ERROR`](super::LARGEST_ERROR); otherwise the method restarts elsewhere.
 #[derive(Clone, Debug)]
 pub struct Newton {
     plain: PlainNewton,
@@ -39,9 +39,9 @@ pub struct Newton {
 const FIRST_DAMPING: f64 = 1e-12;
 /// Relative damping beyond which steps only get shorter.
 const LARGEST_DAMPING: f64 = 1e6;
-/// Distance, in proportion to the range, within which minima found from different starts count as the same.
+/// Distance, relative to the range, within which minima found from different starts count as the same.
 const SAME: f64 = 1e-3;
-/// Number of starts that must lead to the same minimum for the readings to be given up.
+/// Number of starts that must lead to the same minimum before the search ends without a solution.
 const AGREEING_STARTS: usize = 6;
 
 impl Newton {
@@ -73,8 +73,8 @@ impl Newton {
         self.problem.unknowns()
     }
 
-    /// Solves row-wire `row` for its readings in ohm (M4), and writes absolute coordinates (3·M2). Starts from an affine
-    /// estimate, and elsewhere if that leads to no solution.
+    /// Solves row-wire `row` for its readings in ohm (M4), and writes absolute coordinates (3·M2). Starts from an
+    /// affine estimate, and restarts elsewhere if that leads to no solution.
     ///
     /// # Errors
     /// If readings are not resistances.
@@ -91,8 +91,8 @@ impl Newton {
         }
     }
 
-    /// Solves up to [`LANES`] row-wires at once by plain steps alone, for their sound readings in ohm (rows × M4), and
-    /// writes absolute coordinates (rows × 3·M2) of those for which that leads to the only solution; returns their reports.
+    /// Solves up to [`LANES`] row-wires at once by plain steps alone, for their valid readings in ohm (rows × M4),
+    /// and writes the absolute coordinates (rows × 3·M2) of those with a unique solution; returns their reports.
     pub(super) fn solve_plainly(
         &mut self,
         rows: &[usize],
@@ -110,8 +110,8 @@ impl Newton {
         self.write_plain_answers(rows, coordinates_mm)
     }
 
-    /// Polishes as [`Self::polish`] up to [`LANES`] row-wires at once by plain steps alone; returns the reports of those for
-    /// which that is enough.
+    /// Polishes up to [`LANES`] row-wires at once, as [`Self::polish`], by plain steps alone; returns the reports of
+    /// those for which they suffice.
     pub(super) fn polish_plainly(
         &mut self,
         rows: &[usize],
@@ -146,7 +146,7 @@ impl Newton {
         reports
     }
 
-    /// Solves with damping and bounds, from the middle of the ranges, and from elsewhere if that leads to no solution.
+    /// Solves with damping and bounds, from the middle of the ranges, with restarts if that leads to no solution.
     fn solve_carefully(&mut self, row: usize, readings_ohm: &[f64], coordinates_mm: &mut [f64]) -> NewtonReport {
         self.problem.read(row, readings_ohm);
         let mut starts = Starts::default();
@@ -154,7 +154,7 @@ impl Newton {
         let mut agreeing = 1;
         let max_starts = if self.is_redundant() { self.rules.starts } else { 1 };
         for _ in 1..max_starts {
-            // Readings that leave several answers do so from any start.
+            // Underdetermined readings have several answers from any start.
             if best.solution != Solution::None || agreeing == AGREEING_STARTS {
                 break;
             }
@@ -203,9 +203,10 @@ impl Newton {
         Ok(report)
     }
 
-    /// Runs plain Gauss-Newton steps first, which converge from anywhere nearby, though the misfit may rise on the way.
-    /// If they end out of bounds or do not converge, as with noise, damped steps within the bounds follow. Damped steps
-    /// alone take up to three times as long, and solve half as many rows whose nodes move sideways.
+    /// Runs plain Gauss-Newton steps first, which converge from anywhere nearby, though the misfit may rise on the
+    /// way. If they end out of bounds or do not converge, as with noise, damped steps within the bounds follow.
+    /// Damped steps alone would take up to three times as long, and solve only half as many rows whose nodes move
+    /// sideways.
     fn run(&mut self, row: usize, start: Vec<f64>) -> (NewtonReport, Vec<f64>) {
         let mut unknowns = start;
         self.clamp(&mut unknowns);
@@ -241,15 +242,15 @@ impl Newton {
         (report, unknowns)
     }
 
-    /// Judges an answer: to first order, errors of the readings with the norm e hide a distance of e times the largest
-    /// norm of a row of J⁺.
+    /// Judges an answer: to first order, errors of the readings with the norm e cause errors of the unknowns up to e
+    /// times the largest norm of a row of J⁺.
     fn judge(&mut self, row: usize, unknowns: &[f64]) -> (Solution, f64) {
         self.linearised
             .linearise(&mut self.problem, &self.ranges, unknowns, false);
         let mut is_explained = true;
         let (mut squares, mut excess) = (0.0, 0.0);
         for (k, residual) in self.problem.residuals().iter().enumerate() {
-            // Unknowns are rounded too, which weighs where a node nearly touches.
+            // Unknowns are rounded too, which matters where a node nearly touches an electrode.
             let rounding = ROUNDING + f64::EPSILON * self.linearised.reach(k);
             squares += rounding * rounding;
             excess += residual * residual;
@@ -261,8 +262,9 @@ impl Newton {
         (solution, largest_error)
     }
 
-    /// Returns `true` if there are more readings than unknowns. As many equations as unknowns often have several
-    /// solutions, and nothing is left by which to tell them apart; one alone is monotonic in the compression.
+    /// Returns `true` if there are more readings than unknowns. With as many equations as unknowns there are often
+    /// several solutions that nothing distinguishes; with one unknown, the resistance is monotonic in the
+    /// compression.
     fn is_redundant(&self) -> bool {
         let (equations, unknowns) = (self.problem.equations(), self.problem.unknowns());
         equations > unknowns || unknowns == 1
@@ -274,7 +276,7 @@ impl Newton {
         }
     }
 
-    /// Takes plain steps, each shortened to stay where the model is valid.
+    /// Takes plain steps, each shortened to stay within the domain of the model.
     fn take_plain_steps(&mut self, unknowns: &mut [f64]) -> (NewtonStop, usize) {
         let most = self.rules.steps.min(Self::MAX_PLAIN_STEPS);
         for steps in 1..=most {
@@ -343,7 +345,7 @@ impl Newton {
                 }
                 let sound = linearised.step_mm.iter().all(|step| step.is_finite());
                 let next_residual = if sound { problem.evaluate(&next) } else { f64::INFINITY };
-                // A step this short is within rounding, where the misfit falls no further.
+                // A step this short is within rounding: the misfit cannot decrease further.
                 let short = sound && length <= self.rules.tolerance;
                 if next_residual < residual || short || damping > LARGEST_DAMPING {
                     break (next, length, next_residual);
@@ -371,19 +373,19 @@ impl Newton {
 /// Stopping rules of the Gauss-Newton method.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct NewtonRules {
-    /// Largest number of steps from one start. A step that is rejected and shortened counts as one.
+    /// Max number of steps from one start. A step that is rejected and shortened counts as one.
     pub steps: usize,
-    /// Step length, in proportion to the range of the unknown, below which the method has converged. Plain steps also end
-    /// where another could only lower residuals within their rounding.
+    /// Step length, relative to the range of the unknown, below which the method has converged. Plain steps also end
+    /// if another one could only lower residuals within their rounding.
     pub tolerance: f64,
-    /// Largest number of starts; another is tried where one does not lead to a solution.
+    /// Max number of starts; the method restarts if one does not lead to a solution.
     pub starts: usize,
 }
 
 impl Default for NewtonRules {
-    /// Returns limits of 50 steps and 16 starts, and a tolerance of a tenth of a picometre for a stroke of a millimetre,
-    /// where rounding of the readings begins to show in the least visible pattern of the paper's largest array (singular
-    /// value 1e-5 per mm).
+    /// Returns limits of 50 steps and 16 starts, and a tolerance of a tenth of a picometre for a stroke of a
+    /// millimetre, where rounding of the readings begins to show in the worst-determined pattern of the paper's
+    /// largest array (singular value 1e-5 per mm).
     fn default() -> Self {
         Self {
             steps: 50,
@@ -400,7 +402,7 @@ pub enum NewtonStop {
     Converged,
     /// All allowed steps were taken.
     StepsTaken,
-    /// No damping gives a step that lowers the misfit.
+    /// No damping yields a step that lowers the misfit.
     NoStepHelps,
 }
 
@@ -416,20 +418,20 @@ impl fmt::Display for NewtonStop {
     }
 }
 
-/// Standing of an answer to the equations of a row.
+/// Status of an answer to the equations of a row.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Solution {
-    /// The readings are explained, and leave no other answer within [`LARGEST_ERROR`] of the range.
+    /// The answer explains the readings and no other one does: its error is at most [`LARGEST_ERROR`] of the range.
     Unique,
-    /// The readings are not explained: the answer is a minimum of the misfit, but no solution.
+    /// The answer does not explain the readings: it is a local minimum of the misfit, not a solution.
     None,
-    /// The readings are explained to rounding, and so would others be: they do not determine the answer.
+    /// The answer explains the readings to rounding, but others do as well: the readings do not determine it.
     Undetermined,
 }
 
 impl Solution {
-    /// Judges an answer by the largest error that what is left of its misfit can hide; `is_explained` reports that rounding
-    /// explains the misfit, and `is_only` that no other answer would be as good.
+    /// Judges an answer by the largest error that its remaining misfit implies; `is_explained` states that rounding
+    /// explains the misfit, and `is_only` that no other answer is as good.
     pub(super) fn of(largest_error: f64, is_explained: bool, is_only: impl FnOnce() -> bool) -> Self {
         if largest_error <= LARGEST_ERROR {
             if is_only() { Self::Unique } else { Self::Undetermined }
@@ -441,10 +443,10 @@ impl Solution {
     }
 }
 
-/// Largest rounding of a residual: of the resistance that was read and of the one that the model computes (4 units in the
-/// last place each), of the reading and of the residual itself.
+/// Max rounding error of a residual: of the true resistance and the modelled one (4 units in the last place each), of
+/// the reading and of the residual itself.
 pub(super) const ROUNDING: f64 = 10.0 * f64::EPSILON;
-/// Largest error of an unknown, in proportion to its range, of an answer that counts as the solution.
+/// Largest error of an unknown, relative to its range, of an answer that counts as the solution.
 pub const LARGEST_ERROR: f64 = 1e-6;
 
 /// Outcome of solving a row.
@@ -452,22 +454,22 @@ pub const LARGEST_ERROR: f64 = 1e-6;
 pub struct NewtonReport {
     /// Reason for stopping.
     pub stop: NewtonStop,
-    /// Number of steps taken, from all starts.
+    /// Number of steps, over all starts.
     pub steps: usize,
     /// Root mean square over readings of the relative misfit m/R − 1.
     pub residual: f64,
-    /// Standing of the answer.
+    /// Status of the answer.
     pub solution: Solution,
-    /// Largest error of an unknown, in proportion to its range, that the misfit and rounding make to first order.
+    /// Largest error of an unknown, relative to its range, caused by misfit and rounding to first order.
     pub largest_error: f64,
 }
 
-/// Starts of the Gauss-Newton method, one after the other: the middle of the ranges, which is the least far from any
-/// answer, the undeformed state, the whole stroke, then random ones, the same for every row.
+/// Starts of the Gauss-Newton method in order: the middle of the ranges, which is closest to any answer, the
+/// undeformed state, the full stroke, then random ones, the same for every row.
 #[derive(Default)]
 pub(super) struct Starts {
     given: usize,
-    /// Not seeded before it is needed, which is rare.
+    /// Seeded only when needed, which is rare.
     rng: Option<ChaCha8Rng>,
 }
 

@@ -12,22 +12,22 @@ use crate::{
     sensor::{Axes, RowConductance, SensorModel},
 };
 
-/// Plain Gauss-Newton steps for several row-wires at once, as nearly all rows need no other: no damping, no bounds, one
-/// evaluation of Eq. (2) and one Cholesky factor a step, and no allocation. A row that wants more care is given up, and is
-/// for [`Newton`](super::Newton) to solve.
+/// Plain Gauss-Newton steps for several row-wires at once, which suffice for nearly all rows: no damping, no bounds,
+/// one evaluation of Eq. (2) and one Cholesky factorisation per step, and no allocation. Other rows are given up and
+/// left to [`Newton`](super::Newton).
 ///
-/// A step is the last one if what linearising leaves out is within the rounding of the residuals: a step of length δ changes
-/// 1/d by at most δ²/d³ more than its derivatives tell, since no second derivative of 1/d exceeds 2/d³. Residuals at the
-/// answer are then those of the linear equations, and nothing need be evaluated there.
+/// A step is the last one if its linearisation error is within the rounding of the residuals: a step of length δ
+/// changes 1/d by at most δ²/d³ more than predicted by its derivatives, since no second derivative of 1/d exceeds
+/// 2/d³. Residuals at the answer are then those of the linear equations, and need no further evaluation.
 #[derive(Clone, Debug)]
 pub(super) struct PlainNewton {
     model: SensorModel,
     axes: Axes,
     ranges: Vec<Range>,
     wide: Vec<Range>,
-    /// Length of a last step.
+    /// Max length of a last step.
     last_length_mm: f64,
-    /// False if a row is never solved by plain steps alone.
+    /// False if plain steps alone never solve a row.
     is_fit: bool,
     twins: Twins,
     /// Start for each row-wire that was read.
@@ -45,7 +45,7 @@ struct Lane {
     row: usize,
     readings_ohm: Vec<f64>,
     unknowns_mm: Vec<f64>,
-    /// Jacobian in proportion to the ranges, unknown by unknown, then −ρ: each padded to whole registers.
+    /// Jacobian in units of the ranges, unknown by unknown, then −ρ: each padded to whole registers.
     system: Vec<f64>,
     first_residual: f64,
     residual: f64,
@@ -56,19 +56,19 @@ struct Lane {
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum State {
     Moving,
-    /// The last step was taken, and the equations are still those before it.
+    /// The last step was taken; the equations are still those before it.
     Arrived,
     GivenUp,
     Judged(NewtonReport),
 }
 
-/// Smallest fraction of a step; one that must be shortened further leads out of the sensor.
+/// Smallest fraction of a step; a shorter one would lead out of the sensor.
 pub(super) const SHORTEST_SHARE: f64 = 1e-3;
-/// Most memory for the estimates of all row-wires; above it they start from the middle, which takes a step more.
+/// Max memory for the estimates of all row-wires; above it, rows start from the middle, which takes one more step.
 const LARGEST_STARTS_BYTES: usize = 256 << 20;
-/// Largest number of steps; more are not needed where they converge quadratically.
+/// Max number of steps; quadratic convergence needs no more.
 const MAX_STEPS: usize = 12;
-/// Steps that may fail to become shorter.
+/// Initial steps exempt from the contraction test.
 const STEPS_ON_THE_WAY: usize = 2;
 
 impl PlainNewton {
@@ -115,7 +115,7 @@ impl PlainNewton {
         self.is_fit
     }
 
-    /// Puts row-wire `row` with its sound readings into `lane`, to start from the affine estimate.
+    /// Loads row-wire `row` with its valid readings into `lane`, starting from the affine estimate.
     pub(super) fn load(&mut self, lane: usize, row: usize, readings_ohm: &[f64]) {
         let lane = &mut self.lanes[lane];
         lane.read(row, readings_ohm);
@@ -131,7 +131,7 @@ impl PlainNewton {
         lane.clamp(&self.ranges);
     }
 
-    /// Puts row-wire `row` with its sound readings into `lane`, to start from `unknowns_mm`.
+    /// Loads row-wire `row` with its valid readings into `lane`, starting from `unknowns_mm`.
     pub(super) fn load_from(&mut self, lane: usize, row: usize, readings_ohm: &[f64], unknowns_mm: &[f64]) {
         let lane = &mut self.lanes[lane];
         lane.read(row, readings_ohm);
@@ -139,12 +139,11 @@ impl PlainNewton {
         lane.clamp(&self.ranges);
     }
 
-    /// Leaves all lanes empty.
     pub(super) fn clear(&mut self) {
         self.lanes.iter_mut().for_each(|lane| lane.state = State::GivenUp);
     }
 
-    /// Report on the row in `lane` and its unknowns, unless it was given up.
+    /// Returns the report on the row in `lane` and its unknowns, unless it was given up.
     pub(super) fn answer(&self, lane: usize) -> Option<(NewtonReport, &[f64])> {
         match self.lanes[lane].state {
             State::Judged(report) => Some((report, &self.lanes[lane].unknowns_mm)),
@@ -152,7 +151,7 @@ impl PlainNewton {
         }
     }
 
-    /// Solves the rows that were loaded: those for which this leads to the only solution are judged, others given up.
+    /// Solves the loaded rows: those that reach a unique solution are judged, others are given up.
     pub(super) fn solve(&mut self, rules: NewtonRules) {
         self.take_steps(rules);
         for lane in &mut self.lanes {
@@ -162,8 +161,8 @@ impl PlainNewton {
         }
     }
 
-    /// Takes at most the steps of `rules` from where the rows that were loaded start, and judges what they lead to, unless
-    /// the misfit grew.
+    /// Takes at most the steps of `rules` from the starts of the loaded rows, and judges the results, unless the
+    /// misfit grew.
     pub(super) fn polish(&mut self, rules: NewtonRules) {
         self.take_steps(rules);
         if !self.lanes.iter().any(|lane| lane.state == State::Moving) {
@@ -179,8 +178,8 @@ impl PlainNewton {
                 }
             }
         }
-        // The derivatives before the last step judge the answer: where it comes within the errors that count, the step was so
-        // short that they hardly changed.
+        // The derivatives before the last step are used: if the error is small enough to count, the step was so short
+        // that they hardly changed.
         if rules.steps == 0 {
             self.equations.solve();
         }
@@ -255,7 +254,7 @@ impl PlainNewton {
         self.equations.set(index, &self.entries);
     }
 
-    /// Evaluates the misfits of Eq. (2) for the row in `lane`, whose equations stay as they are.
+    /// Evaluates the misfits of Eq. (2) for the row in `lane`, without updating its normal equations.
     fn evaluate_misfits(&mut self, index: usize) {
         self.place_nodes(index);
         let row = self.lanes[index].row;
@@ -287,7 +286,7 @@ impl PlainNewton {
         lane.residual = rms(squares, readings);
     }
 
-    /// Takes the step of the row in `lane`.
+    /// Takes one step of the row in `lane`.
     fn move_on(&mut self, index: usize, step: usize, tolerance: f64) -> State {
         let lane = &mut self.lanes[index];
         if !self.equations.is_sound(index) {
@@ -316,7 +315,7 @@ impl PlainNewton {
         if part < 1.0 || length_mm > self.last_length_mm {
             return State::Moving;
         }
-        // The residuals at the answer, within its ranges.
+        // The residuals at the answer, clamped to its ranges.
         let readings = padded(lane.readings_ohm.len());
         let (jacobian, misfits) = lane.system.split_at_mut(lane.unknowns_mm.len() * readings);
         for (place, (unknown, range)) in lane.unknowns_mm.iter_mut().zip(&self.ranges).enumerate() {
@@ -336,8 +335,8 @@ impl PlainNewton {
         State::Arrived
     }
 
-    /// Judges the answer in `lane` by its residuals: to first order, errors of the readings with the norm e hide a distance
-    /// of e times the largest norm of a row of J⁺.
+    /// Judges the answer in `lane` by its residuals: to first order, errors of the readings with the norm e cause
+    /// errors of the unknowns up to e times the largest norm of a row of J⁺.
     fn judge(&self, index: usize, inverse_row: f64, (stop, steps): (NewtonStop, usize)) -> NewtonReport {
         let lane = &self.lanes[index];
         let readings = lane.readings_ohm.len();
@@ -346,7 +345,7 @@ impl PlainNewton {
         let (mut squares, mut excess) = (0.0, 0.0);
         for (k, misfit) in misfits[..readings].iter().enumerate() {
             let slopes = jacobian.iter().skip(k).step_by(padded(readings));
-            // Unknowns are rounded too, which weighs where a node nearly touches.
+            // Unknowns are rounded too, which matters where a node nearly touches an electrode.
             let rounding = ROUNDING + f64::EPSILON * slopes.map(|slope| slope.abs()).sum::<f64>();
             squares += rounding * rounding;
             excess += misfit * misfit;
@@ -383,7 +382,7 @@ fn rms(squares: f64, count: usize) -> f64 {
     (squares / count as f64).sqrt()
 }
 
-/// Length of this many readings in whole vector registers.
+/// Number of readings rounded up to whole vector registers.
 fn padded(readings: usize) -> usize {
     readings.next_multiple_of(LANES)
 }

@@ -1,4 +1,4 @@
-//! Radial-basis networks, fitted and prepared to decode fast.
+//! Radial-basis networks, fitted and compiled for fast decoding.
 
 use ndarray::{Array2, ArrayView1, Axis};
 use pulp::{Simd, WithSimd};
@@ -18,22 +18,23 @@ use crate::{
     scene::NoiseSource,
 };
 
-/// A radial-basis network (Broomhead and Lowe 1988): Gaussians around centres in the scaled inputs, and a linear output
-/// layer with a constant, fitted by ridge regression, each target with the penalty of its least leave-one-out error.
+/// A radial-basis network (Broomhead and Lowe 1988): Gaussians around centres in the scaled inputs, and a linear
+/// output layer with a constant, fitted by ridge regression, with the penalty of each target chosen by leave-one-out
+/// error.
 ///
-/// The scalings are folded into the layers, and decoding allocates nothing.
+/// The scalings are folded into the layers, and decoding does not allocate.
 #[derive(Clone, Debug)]
 pub struct RadialBasisNetwork {
     quantity: Quantity,
     /// Centre of each channel, subtracted from its values.
     channel_centres: Vec<f64>,
-    /// From centred channels to scaled inputs.
+    /// Maps centred channels to scaled inputs.
     input_layer: PaddedLayer,
     centres: usize,
     gaussians: Gaussians,
-    /// From Gaussians to the changes of the varying targets.
+    /// Maps Gaussians to the offsets of the varying targets.
     output_layer: PaddedLayer,
-    /// Targets from which the output layer counts.
+    /// Targets to which the output layer adds its offsets.
     middles: Vec<f64>,
     /// Indices of the varying targets.
     varying: Vec<usize>,
@@ -54,16 +55,16 @@ struct Buffers {
 pub struct RadialBasisSettings {
     /// Positions of the Gaussians.
     pub centres: Centres,
-    /// Width of the Gaussians in proportion to the root mean square distance between inputs.
+    /// Width of the Gaussians, relative to the root mean square distance between inputs.
     pub relative_width: f64,
 }
 
 /// Positions of the Gaussians.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Centres {
-    /// On every training sample.
+    /// At every training sample.
     Samples,
-    /// On this many means of clusters (Lloyd 1982), at most one for each sample.
+    /// At this many cluster means (Lloyd 1982), at most one per sample.
     KMeans(usize),
 }
 
@@ -77,10 +78,11 @@ impl Default for RadialBasisSettings {
 }
 
 impl RadialBasisNetwork {
-    /// Fits to a training set; `unseen` as in [`Inputs::fit`]; `rng` draws it, and where clusters begin.
+    /// Fits to a training set; `unseen` is as in [`Inputs::fit`]; `rng` draws the noise and the initial cluster
+    /// centres.
     ///
     /// # Errors
-    /// Values that cannot be scaled.
+    /// If values cannot be scaled.
     pub fn fit(
         training: &Dataset,
         choice: InputChoice,
@@ -233,7 +235,7 @@ impl WithSimd for Decoding<'_> {
     }
 }
 
-/// Gaussians of one width around centres, laid out so that centres lie side by side in vector registers.
+/// Gaussians of equal width around centres, laid out with centres side by side in vector registers.
 #[derive(Clone, Debug)]
 pub(super) struct Gaussians {
     /// Number of centres, padded to a multiple of [`LANES`].
@@ -244,7 +246,7 @@ pub(super) struct Gaussians {
     sharpness: f64,
 }
 
-/// Centres are padded to a multiple of this number.
+/// The number of centres is padded to a multiple of this.
 const LANES: usize = 8;
 
 impl Gaussians {
@@ -268,7 +270,7 @@ impl Gaussians {
         self.width
     }
 
-    /// Roots of the sharpness, and centres (inputs × `count`) in proportion to it.
+    /// Root of the sharpness, and centres (inputs × `count`) multiplied by it.
     pub(super) fn in_units_of_width(&self, count: usize) -> (f64, Array2<f64>) {
         let root = self.sharpness.sqrt();
         let inputs = self.centres.len() / self.width.max(1);
@@ -289,8 +291,8 @@ impl Gaussians {
         }
     }
 
-    /// Writes the Gaussians `first..first + B` and returns B. Several registers are filled at once, so that additions
-    /// need not wait for each other.
+    /// Writes the Gaussians `first..first + B` and returns B. Several registers are filled at once to hide the
+    /// latency of additions.
     #[inline(always)]
     fn block<const B: usize>(&self, x: &[f64], first: usize, values: &mut [f64]) -> usize {
         let mut squares = [0.0; B];
@@ -308,7 +310,7 @@ impl Gaussians {
     }
 }
 
-/// Returns the Gaussian around `centre` at `x`.
+/// Returns the value at `x` of the Gaussian around `centre`.
 pub(super) fn gaussian(x: ArrayView1<'_, f64>, centre: ArrayView1<'_, f64>, sharpness: f64) -> f64 {
     (-sharpness * distance2(x, centre)).exp()
 }
@@ -348,9 +350,9 @@ mod tests {
         }
     }
 
-    /// Whitening divides by deviations that are hardly above the rounding of the readings, which comes back enlarged: no
-    /// evaluation in double precision is nearer to the network evaluated in 150 bits than what one unit in the last place of
-    /// the readings changes.
+    /// Whitening divides by deviations that are hardly above the rounding of the readings, which is amplified: no
+    /// evaluation in double precision can be closer to the network evaluated in 150 bits than the effect of one unit
+    /// in the last place of the readings.
     #[test]
     fn rounding_is_that_of_the_readings() {
         type Exact = FBig<HalfEven>;

@@ -4,17 +4,17 @@ use ndarray::{Array2, ArrayView2, Axis};
 use super::gauss_newton::least;
 use crate::network::ScalingError;
 
-/// Ridge regressions of outputs on inputs with every penalty, from one singular value decomposition, and their
+/// Ridge regressions of outputs on inputs for any penalty, from one singular value decomposition, with their
 /// leave-one-out errors.
 ///
-/// With A = U S Vᵀ the centred inputs and t = penalty / (s² + penalty) the part of a singular direction that the penalty
-/// takes away, the answers to the training samples are ȳ + U (1 − t) Uᵀ(y − ȳ). Without sample i, its answer would be
-/// wrong by residual_i / (1 − leverage_i) (Golub, Heath and Wahba 1979). Residual and 1 − leverage are here what they are
-/// without penalty, plus U t Uᵀ(y − ȳ) and Σ t u²: where the map goes through every sample and both vanish, they do so
-/// with all their digits.
+/// With A = U S Vᵀ the centred inputs and t = penalty / (s² + penalty) the fraction of a singular direction that the
+/// penalty removes, the answers to the training samples are ȳ + U (1 − t) Uᵀ(y − ȳ). Without sample i, its answer
+/// would be wrong by residual_i / (1 − leverage_i) (Golub, Heath and Wahba 1979). Residual and 1 − leverage are
+/// computed as their values without penalty plus U t Uᵀ(y − ȳ) and Σ t u²: if the map goes through every sample and
+/// both vanish, they keep full relative accuracy.
 ///
-/// A sample may stand for several copies. Its row of A and of y is then multiplied by the root of their number, and the error is
-/// that of leaving out all of them at once.
+/// A sample may represent several copies. Its row of A and of y is then multiplied by the square root of their
+/// number, and the error is that of leaving out all copies at once.
 pub(super) struct Ridge {
     x_mean: Vec<f64>,
     y_mean: Vec<f64>,
@@ -27,11 +27,11 @@ pub(super) struct Ridge {
     left_out: LeftOut,
 }
 
-/// Samples that are left out, and the noise that is added.
+/// Samples that are left out, and additional noise.
 struct LeftOut {
     /// Left singular vectors U of the samples: samples × singular values.
     samples: Mat<f64>,
-    /// Their squares.
+    /// Squares of [`Self::u`].
     squares: Mat<f64>,
     /// The same vectors of the noise: its sources × singular values.
     noise: Mat<f64>,
@@ -43,15 +43,15 @@ struct LeftOut {
     of_mean: Vec<f64>,
 }
 
-/// Samples that are left out in turn: of more, evenly spaced ones, which are as good an estimate.
+/// Max number of samples that are left out in turn: evenly spaced ones of a larger set give as good an estimate.
 const MAX_LEFT_OUT: usize = 4000;
 
 impl Ridge {
-    /// Decomposes the inputs `x` (samples × inputs) for the outputs `y` (samples × outputs); `weights` are the numbers of
-    /// samples that each stands for.
+    /// Decomposes the inputs `x` (samples × inputs) for the outputs `y` (samples × outputs); `weights` are the
+    /// numbers of samples that each row represents.
     ///
-    /// `unseen` (sources × inputs) are the changes of the inputs by one standard deviation of each source of noise that
-    /// `x` lacks. The coefficients then minimise the error expected with this noise.
+    /// `unseen` (sources × inputs) are the changes of the inputs by one standard deviation of each noise source that
+    /// `x` lacks. The coefficients then minimise the expected error with this noise.
     ///
     /// # Panics
     /// If the lengths differ.
@@ -71,7 +71,7 @@ impl Ridge {
         let mean = |values: &ArrayView2<'_, f64>| (values * &column).sum_axis(Axis(0)) / total;
         let (x_mean, y_mean) = (mean(&x), mean(&y));
         let roots: Vec<f64> = weights.iter().map(|weight| weight.sqrt()).collect();
-        // The sum over all samples of the squared error that noise adds is that of these additional rows.
+        // The squared error that noise adds, summed over all samples, is that of these additional rows.
         let root = total.sqrt();
         let a = Mat::from_fn(samples + unseen.nrows(), inputs, |row, i| {
             match row.checked_sub(samples) {
@@ -95,7 +95,7 @@ impl Ridge {
         let share = |sample: usize| 1.0 - weights[sample] / total;
         let free = |&sample: &usize| {
             let free = share(sample) - of_samples.row(sample).squared_norm_l2();
-            // A sample that alone spans a direction; the rest is rounding.
+            // A sample that alone spans a direction; the remainder is rounding.
             let is_rounding = free < f64::EPSILON * samples as f64;
             if is_all_spanned || is_rounding { 0.0 } else { free }
         };
@@ -128,7 +128,8 @@ impl Ridge {
         })
     }
 
-    /// Returns the penalty of the least leave-one-out error for each output; infinite where none is better than the mean.
+    /// Returns the penalty with the min leave-one-out error for each output; infinite if none is better than the
+    /// mean.
     pub fn best_penalties(&self) -> Vec<f64> {
         let Some(decades) = self.decades() else {
             return vec![f64::INFINITY; self.y_mean.len()];
@@ -148,8 +149,8 @@ impl Ridge {
         found.into_iter().zip(&self.left_out.of_mean).map(penalty).collect()
     }
 
-    /// Returns the penalty with the least leave-one-out error of all outputs together; infinite if none is better than the
-    /// mean.
+    /// Returns the penalty with the min leave-one-out error of all outputs together; infinite if none is better than
+    /// the mean.
     pub fn common_penalty(&self) -> f64 {
         let Some(decades) = self.decades() else {
             return f64::INFINITY;
@@ -166,15 +167,14 @@ impl Ridge {
         }
     }
 
-    /// Range of the logarithms of penalties. Further out, a penalty takes away nothing in double precision, or nearly
-    /// everything.
+    /// Range of the logarithms of penalties. Beyond it, a penalty has no effect in double precision, or removes
+    /// nearly everything.
     fn decades(&self) -> Option<(f64, f64)> {
         let (largest, smallest) = (self.singular.first()?, self.singular.last()?);
         Some((2.0 * smallest.log10() - 16.0, 2.0 * largest.log10() + 4.0))
     }
 
-    /// Sum of the squared errors of the samples for each output with its penalty, each sample left out in turn, with what
-    /// noise adds.
+    /// Sum of the squared leave-one-out errors for each output with its penalty, including the contribution of noise.
     fn leave_one_out(&self, penalties: &[f64]) -> Vec<f64> {
         let LeftOut {
             samples,
@@ -205,8 +205,8 @@ impl Ridge {
         (0..outputs).map(of_output).collect()
     }
 
-    /// Coefficients with a penalty for each output: inputs + 1 × outputs, the constant last. With an infinite one they are 0,
-    /// and the constant the mean.
+    /// Coefficients with a penalty for each output: inputs + 1 × outputs, the constant last. For an infinite penalty
+    /// they are 0, and the constant is the mean.
     pub fn coefficients(&self, penalties: &[f64]) -> Array2<f64> {
         let (kept, outputs) = self.projected.shape();
         let shrunk = Mat::from_fn(kept, outputs, |k, t| {
@@ -269,7 +269,7 @@ mod tests {
         assert!(fitted.iter().take(20).map(|c| c * c).sum::<f64>() < 0.2);
     }
 
-    /// The truth are fits without each sample in turn.
+    /// Compares with fits that leave out each sample in turn.
     #[test]
     fn leave_one_out_errors_are_those_of_fits_without_each_sample() {
         for (samples, inputs) in [(25, 6), (9, 8), (9, 20)] {
@@ -287,7 +287,7 @@ mod tests {
                     for left_out in 0..samples {
                         let others: Vec<usize> = (0..samples).filter(|&sample| sample != left_out).collect();
                         let (x_others, y_others) = (x.select(Axis(0), &others), y.select(Axis(0), &others));
-                        // The noise weighs as it does for all samples.
+                        // The noise has the same weight as for all samples.
                         let weight = (samples as f64 / others.len() as f64).sqrt();
                         let fit = Ridge::new(
                             x_others.view(),
@@ -310,7 +310,7 @@ mod tests {
         }
     }
 
-    /// Where the map goes through all samples, residuals and 1 − leverage are nothing but rounding unless computed apart.
+    /// If the map goes through all samples, residuals and 1 − leverage are pure rounding unless computed separately.
     #[test]
     fn fits_through_every_sample_are_still_told_apart() {
         let x = normal(12, 30, 6);
@@ -331,7 +331,7 @@ mod tests {
         assert!((gain - 0.8).abs() < 0.01, "{gain}");
     }
 
-    /// The truth are fits to all copies, without all those of each sample in turn.
+    /// Compares with fits to all copies, leaving out all copies of each sample in turn.
     #[test]
     fn weighted_samples_are_as_many_copies_that_are_left_out_together() {
         let (x, y) = (normal(9, 4, 9), normal(9, 2, 10));
@@ -342,7 +342,7 @@ mod tests {
             Ridge::new(x.view(), y.view(), &ones(&x), none(4).view()).unwrap()
         };
         let ridge = Ridge::new(x.view(), y.view(), &weights, none(4).view()).unwrap();
-        // An own penalty for each output.
+        // A separate penalty for each output.
         for penalties in [[1e-6, 0.3], [10.0, 1e-2]] {
             let (ours, truth) = (ridge.coefficients(&penalties), fit_to(&copies).coefficients(&penalties));
             assert!(

@@ -8,8 +8,8 @@ use crate::{
     sensor::{Axes, RowConductance, SensorModel},
 };
 
-/// Eq. (2) of one row-wire as equations for what the scene moves: `ρ_k(u) = m_k · s_k(u)/g − 1 = 0` with m the
-/// readings and g/s the model's resistances.
+/// Eq. (2) of one row-wire as equations for the displacements that the scene allows: `ρ_k(u) = m_k · s_k(u)/g − 1 =
+/// 0` with m the readings and g/s the model's resistances.
 ///
 /// For a reading `m = R · (1 + ε)` of a true resistance R, ρ at the true deformation is ε: the residual is
 /// the relative error of the reading, with no approximation. And s is a plain sum over nodes, nearly linear in u.
@@ -50,7 +50,7 @@ impl Range {
     }
 }
 
-/// The ranges of the unknowns of a row-wire in a scene: node by node, each node's axes together.
+/// The ranges of the unknowns of a row-wire in a scene: node by node, the axes of each node together.
 pub(crate) fn ranges(model: &SensorModel, scene: &Scene) -> Vec<Range> {
     let stroke_mm = scene.stroke_mm(&model.geometry);
     let shift_mm = scene.movement.largest_shift_mm();
@@ -69,7 +69,7 @@ pub(crate) fn ranges(model: &SensorModel, scene: &Scene) -> Vec<Range> {
     nodes.flat_map(|_| axes.iter().map(|&axis| of_axis(axis))).collect()
 }
 
-/// [`ranges`] widened by their width either way, but never as far as the column-wires.
+/// [`ranges`] widened by their width on both sides, but not as far as the column-wires.
 pub(crate) fn wide_ranges(model: &SensorModel, scene: &Scene) -> Vec<Range> {
     let height_mm = model.geometry.height_mm;
     let lowest_gap_mm = 0.5 * (height_mm - scene.stroke_mm(&model.geometry));
@@ -115,7 +115,7 @@ impl RowProblem {
         self.row = row;
     }
 
-    /// Sets the readings of row-wire `row`, for which the equations are to be solved.
+    /// Sets the readings of row-wire `row`, for which the equations are solved.
     pub(crate) fn read(&mut self, row: usize, readings_ohm: &[f64]) {
         self.row = row;
         self.readings_ohm.copy_from_slice(readings_ohm);
@@ -128,7 +128,7 @@ impl RowProblem {
         self.write_residuals()
     }
 
-    /// Evaluates residuals alone at `unknowns_mm`, as [`Self::evaluate`]; derivatives stay those of the last evaluation.
+    /// Evaluates only the residuals at `unknowns_mm`; derivatives remain those of the last [`Self::evaluate`].
     pub(crate) fn evaluate_residuals(&mut self, unknowns_mm: &[f64]) -> f64 {
         self.displace(unknowns_mm);
         self.conductance
@@ -183,7 +183,7 @@ impl RowProblem {
         self.readings_ohm[reading]
     }
 
-    /// The unknowns behind absolute coordinates (3·M2) of nodes on the current row-wire.
+    /// The unknowns that correspond to absolute coordinates (3·M2) of nodes on the current row-wire.
     pub(crate) fn unknowns_of(&self, coordinates_mm: &[f64], unknowns_mm: &mut [f64]) {
         let axes = self.axes.indices();
         for (node, values) in unknowns_mm.chunks_exact_mut(axes.len()).enumerate() {
@@ -209,11 +209,11 @@ impl RowProblem {
     }
 }
 
-/// Gauss-Newton iteration on Eq. (2) of a row-wire, in plain numbers.
+/// Gauss-Newton iteration on Eq. (2) of a row-wire, as plain numbers.
 ///
-/// The unknowns are the displacements of the nodes along the axes that move, node by node. A step minimises ‖J δ + ρ‖ with
-/// ρ the residuals m·s/g − 1 of the readings m, is shortened to stay within the wide ranges, and the answer is cut to the
-/// ranges.
+/// The unknowns are the displacements of the nodes along the axes that move, node by node. A step minimises ‖J δ + ρ‖
+/// with ρ the residuals m·s/g − 1 of the readings m and is shortened to stay within the wide ranges; the answer is
+/// clamped to the ranges.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RowProblemDescription {
     /// Positions of the nodes and resistance per millimetre.
@@ -222,28 +222,28 @@ pub struct RowProblemDescription {
     pub axes: Axes,
     /// Row-wires read, from 0.
     pub rows: Vec<usize>,
-    /// How the row-wire of a reading is known.
+    /// How the row-wire of a reading is determined.
     pub row_choice: RowChoice,
     /// Smallest and largest value of each unknown in millimetres.
     pub ranges: Vec<(f64, f64)>,
-    /// Values of each unknown that a step may not leave.
+    /// Range of each unknown that a step may not leave.
     pub wide_ranges: Vec<(f64, f64)>,
-    /// Largest number of steps from one start.
+    /// Max number of steps from one start.
     pub steps: usize,
-    /// Step length, in proportion to the range of the unknown, below which the iteration ends.
+    /// Step length, relative to the range of the unknown, below which the iteration ends.
     pub tolerance: f64,
-    /// True if other starts are tried where the first leads to no solution, which are then an error.
+    /// True if the method restarts when the first start leads to no solution, which a bundle reports as an error.
     pub seeks_solution: bool,
 }
 
-/// How the row-wire of a reading is known.
+/// How the row-wire of a reading is determined.
 #[derive(Clone, Debug, PartialEq)]
 pub enum RowChoice {
     /// Given with the readings, or the only one.
     Given,
     /// The row-wire whose x is nearest to that of the first answer.
     Nearest,
-    /// By trial, in the order of similarity with the readings at rest.
+    /// By trial, in order of similarity with the readings at rest.
     Tried {
         /// Logarithms of the resistances in ohm of each row-wire at rest.
         rest: Vec<Vec<f64>>,
@@ -251,7 +251,7 @@ pub enum RowChoice {
 }
 
 impl RowProblemDescription {
-    /// Describes the iteration for `rows` of `model` in `scene` by these rules.
+    /// Describes the iteration for `rows` of `model` in `scene` with these rules.
     pub(super) fn new(
         (model, scene): (&SensorModel, &Scene),
         (rows, row_choice): (&[usize], RowChoice),
@@ -273,8 +273,8 @@ impl RowProblemDescription {
     }
 }
 
-/// Gaussian prior of the unknowns of a row-wire, measured in widths of their ranges, so that ranges of any length, and of
-/// unlike lengths, give a covariance that can be inverted.
+/// Gaussian prior of the unknowns of a row-wire, in units of the widths of their ranges: the covariance is invertible
+/// for ranges of any length, and of different lengths.
 #[derive(Clone, Debug)]
 pub(crate) struct GaussianPrior {
     pub(crate) mean: Vec<f64>,
@@ -282,11 +282,11 @@ pub(crate) struct GaussianPrior {
     pub(crate) inverse_root: Mat<f64>,
 }
 
-/// Draws that estimate a scene's mean and covariance.
+/// Number of draws that estimate a scene's mean and covariance.
 const DRAWS: usize = 4000;
 
 impl GaussianPrior {
-    /// Independent unknowns about the middle of their ranges, with this standard deviation.
+    /// Independent unknowns centred in their ranges, with this standard deviation.
     pub(crate) fn independent(ranges: &[Range], deviation: f64) -> Self {
         let (n, inverse) = (ranges.len(), 1.0 / deviation);
         Self {
@@ -295,8 +295,9 @@ impl GaussianPrior {
         }
     }
 
-    /// The mean and covariance of each of `rows` in `scene`: those of the uniform distribution for nodes that move on their
-    /// own, estimated by draws for other loadings. No pattern is taken as known to better than `smallest_spread`.
+    /// Mean and covariance of each of `rows` in `scene`: those of the uniform distribution for nodes that move
+    /// independently, estimated from draws for other loadings. No pattern gets a prior spread below
+    /// `smallest_spread`.
     pub(crate) fn of_rows(
         model: &SensorModel,
         scene: &Scene,
@@ -323,9 +324,9 @@ impl GaussianPrior {
         draws.iter().map(of_row).collect()
     }
 
-    /// About how many bytes [`Self::of_rows`] takes.
+    /// Approximate number of bytes that [`Self::of_rows`] needs.
     pub(crate) fn bytes(loading: Loading, rows: usize, unknowns: usize) -> u64 {
-        // Nodes that move on their own have priors in closed form.
+        // Nodes that move independently have priors in closed form.
         if loading == Loading::RandomNodes {
             return 0;
         }
@@ -333,7 +334,7 @@ impl GaussianPrior {
         entries.saturating_mul(size_of::<f64>() as u64)
     }
 
-    /// From draws × unknowns in millimetres, row by row.
+    /// Estimates a prior from draws × unknowns in millimetres, row by row.
     fn of_draws(values_mm: &[f64], ranges: &[Range], smallest_spread: f64) -> Self {
         let n = ranges.len();
         let draws = values_mm.chunks_exact(n);

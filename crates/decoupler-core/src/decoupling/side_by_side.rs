@@ -1,10 +1,10 @@
 use pulp::{Simd, WithSimd};
 
-/// Cholesky factors of several small least-squares problems side by side, one in each lane of vector registers, in memory
-/// that is used again. A lane gives the same bits whatever is in the others.
+/// Cholesky factors of several small least-squares problems side by side, one in each lane of vector registers, with
+/// reused memory. The result of a lane has the same bits whatever the other lanes contain.
 ///
-/// The equations are those of [A, b]: the lower triangle of [A, b]ᵀ[A, b] row by row. Their factor has Aᵀb, already solved
-/// forward, as its last row.
+/// The equations are those of [A, b]: the lower triangle of [A, b]ᵀ[A, b], row by row. The last row of their factor
+/// is Aᵀb after forward substitution.
 #[derive(Clone, Debug)]
 pub(super) struct SideBySide {
     unknowns: usize,
@@ -12,13 +12,13 @@ pub(super) struct SideBySide {
     /// Reciprocals of the diagonal entries.
     reciprocals: Vec<[f64; LANES]>,
     solution: Vec<[f64; LANES]>,
-    /// Smallest share of a diagonal entry of AᵀA that the columns before leave.
+    /// Smallest fraction of a diagonal entry of AᵀA that remains after eliminating the columns before it.
     min_left: [f64; LANES],
 }
 
-/// Problems side by side.
+/// Number of problems side by side.
 pub(super) const LANES: usize = 8;
-/// Share of a diagonal entry below which rounding shows in the solution.
+/// Fraction of a diagonal entry below which rounding affects the solution.
 const MIN_LEFT: f64 = 1e-11;
 
 impl SideBySide {
@@ -45,7 +45,7 @@ impl SideBySide {
         pulp::Arch::new().dispatch(Solving(self));
     }
 
-    /// Returns `true` if the problem in `lane` is so well conditioned that its normal equations determine the solution.
+    /// Returns `true` if the problem in `lane` is well conditioned enough for its normal equations.
     pub(super) fn is_sound(&self, lane: usize) -> bool {
         self.min_left[lane] > MIN_LEFT
     }
@@ -61,7 +61,7 @@ impl SideBySide {
     }
 }
 
-/// Begin of a row of the packed triangle.
+/// Start of a row of the packed triangle.
 #[inline(always)]
 fn begin(row: usize) -> usize {
     row * (row + 1) / 2
@@ -83,7 +83,7 @@ impl WithSimd for Solving<'_> {
             min_left,
         } = self.0;
         let n = *unknowns;
-        // What columns before leave of the diagonal is found next to what it was.
+        // The remainder of the diagonal entry is compared with its original value.
         for (i, diagonal) in solution.iter_mut().enumerate() {
             *diagonal = lower[begin(i) + i];
         }
@@ -93,7 +93,7 @@ impl WithSimd for Solving<'_> {
             let mut reciprocal = [0.0; LANES];
             for lane in 0..LANES {
                 let left = pivot[lane] / solution[p][lane];
-                // Written so that NaN counts as least.
+                // Written so that NaN counts as the min.
                 min_left[lane] = if left >= min_left[lane] { min_left[lane] } else { left };
                 reciprocal[lane] = 1.0 / pivot[lane].sqrt();
             }
@@ -219,7 +219,7 @@ impl WithSimd for Products<'_> {
         for i in 0..columns {
             let row = &mut entries[begin..=begin + i];
             let mut j = 0;
-            // Four at a time read column i once.
+            // Four at a time, to read column i once.
             while j + 4 <= i + 1 {
                 let sums = products([column(j), column(j + 1), column(j + 2), column(j + 3)], column(i));
                 row[j..j + 4].copy_from_slice(&sums);
@@ -234,7 +234,7 @@ impl WithSimd for Products<'_> {
     }
 }
 
-/// Returns the products of several columns with another, each in eight partial sums of fixed order.
+/// Returns the products of several columns with another one, each as eight partial sums in fixed order.
 #[inline(always)]
 fn products<const N: usize>(columns: [&[f64]; N], other: &[f64]) -> [f64; N] {
     let mut sums = [[0.0; LANES]; N];
@@ -268,8 +268,8 @@ mod tests {
             .collect()
     }
 
-    /// A = [[3, 1], [4, 2], [0, 2]] with b = A (2, −1) + (8, −6, 2), of which the last is orthogonal to both columns; the
-    /// same with the columns of A twice and half as long; dependent columns; an empty lane.
+    /// A = [[3, 1], [4, 2], [0, 2]] with b = A (2, −1) + (8, −6, 2), whose last term is orthogonal to both columns;
+    /// the same with the columns of A doubled and halved; dependent columns; an empty lane.
     #[test]
     fn each_lane_has_the_solution_of_its_own_problem() {
         let b = [5.0 + 8.0, 6.0 - 6.0, -2.0 + 2.0];
@@ -295,7 +295,7 @@ mod tests {
         assert!((norms[3] - (100.0_f64 / 104.0).sqrt()).abs() < 1e-13, "{norms:?}");
     }
 
-    /// Whole numbers, of which every product and sum is exact in any order.
+    /// Integers, whose products and sums are exact in any order.
     #[test]
     fn products_of_all_columns_are_written() {
         for (columns, rows) in [(1, 3), (6, 9), (11, 30)] {

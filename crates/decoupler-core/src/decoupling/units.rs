@@ -8,16 +8,17 @@ use rand::Rng;
 
 use crate::{dataset::Dataset, scene::NoiseSource};
 
-/// Training samples gathered into units, each of which is left out as a whole when a fit is validated.
+/// Training samples grouped into units, each of which is left out as a whole when a fit is validated.
 ///
-/// A unit is a sample with its copies, which all have the same readings and targets: it counts as often as it occurs, but a copy
-/// that is trained on while another is held out would make the validation optimistic. Equal samples are copies
+/// A unit is a sample with its copies, which all have the same readings and targets. It counts as often as it occurs,
+/// but a copy that is trained on while another is held out would make the validation optimistic. Equal samples are
+/// copies
 ///
 /// - if they follow each other, as in a recording that holds its values between two conversions;
-/// - wherever they are, if a channel identifies the samples as a measurement with many digits does.
+/// - anywhere, if a channel identifies the samples, as a measurement with many digits does.
 ///
-/// Other equal samples of coarse channels are not copies: that two of a thousand readings of a switch agree is no coincidence,
-/// and each is evidence of its own.
+/// Other equal samples of coarse channels are not copies: that two of a thousand readings of a switch agree is
+/// expected by chance, and each is independent evidence.
 pub(super) struct Units {
     /// Inputs: units × inputs.
     pub x: Array2<f64>,
@@ -28,10 +29,10 @@ pub(super) struct Units {
 }
 
 impl Units {
-    /// Fewest units that can be left out in turn: with less, what is left says too little of the whole, and samples are left
-    /// out one by one.
+    /// Min number of units that are left out in turn: with fewer, the rest represents the set badly, and samples are
+    /// left out one by one.
     const FEWEST: usize = 10;
-    /// Distinct values of an identifying channel in proportion to the distinct samples.
+    /// Min ratio of distinct values of an identifying channel to distinct samples.
     const IDENTIFYING: f64 = 0.9;
 
     /// Gathers the samples of `training`, whose inputs are `x` (samples × inputs) and outputs `y` (samples × outputs).
@@ -52,11 +53,11 @@ impl Units {
         }
     }
 
-    /// Samples of each unit, in the order of their first ones.
+    /// Samples of each unit, in order of first occurrence.
     fn members(readings: ArrayView2<'_, f64>, targets: ArrayView2<'_, f64>) -> Vec<Vec<usize>> {
         let samples = readings.nrows();
         let singles = || (0..samples).map(|sample| vec![sample]).collect();
-        // The number of the first sample that is equal, for each.
+        // For each sample, the index of the first equal one.
         let mut seen = HashMap::new();
         let pairs = readings.rows().into_iter().zip(targets.rows()).enumerate();
         let first: Vec<usize> = pairs
@@ -100,7 +101,7 @@ fn bits(values: ArrayView1<'_, f64>) -> Vec<u64> {
     values.iter().map(|value| (value + 0.0).to_bits()).collect()
 }
 
-/// Returns `training` with the noise that its readings lack: what a curved map makes of noise is learned from samples.
+/// Returns `training` with the noise that its readings lack: a nonlinear map learns the effect of noise from samples.
 pub(super) fn with_noise<'a>(training: &'a Dataset, unseen: NoiseSource, rng: &mut impl Rng) -> Cow<'a, Dataset> {
     let mut training = Cow::Borrowed(training);
     if !unseen.is_none() {
@@ -179,7 +180,7 @@ mod tests {
         }
     }
 
-    /// Copies of all samples add nothing, wherever they are: the map is that of the samples themselves.
+    /// Copies of all samples add no information, wherever they are: the map is that of the samples themselves.
     #[test]
     fn copies_of_exact_samples_do_not_leak_into_the_choice_of_the_penalty() {
         let mut rng = ChaCha8Rng::seed_from_u64(5);
@@ -205,7 +206,7 @@ mod tests {
         }
     }
 
-    /// The second target is noise alone: what suits the first would fit it by heart.
+    /// The second target is pure noise: the penalty that suits the first would overfit it.
     #[test]
     fn each_target_is_decoded_as_well_as_alone() {
         let mut rng = ChaCha8Rng::seed_from_u64(6);
@@ -237,15 +238,15 @@ mod tests {
 
     #[test]
     fn held_readings_and_copies_of_exact_ones_are_units_and_equal_coarse_ones_are_not() {
-        // Held for five frames, also where few values occur.
+        // Held for five frames, also with few distinct values.
         assert_eq!(
             sizes(100, |s| [irrational(s / 5), 1.0], |s| irrational(s / 5)),
             vec![5.0; 20]
         );
         assert_eq!(sizes(100, |s| [(s / 5 % 2) as f64, 1.0], |_| 3.0), vec![5.0; 20]);
-        // A target that continues changing is evidence of its own.
+        // A target that keeps changing is independent evidence.
         assert_eq!(sizes(100, |s| [irrational(s / 5), 1.0], |s| s as f64), vec![1.0; 100]);
-        // The same 20 samples, 5 times over.
+        // The same 20 samples, repeated 5 times.
         assert_eq!(
             sizes(100, |s| [irrational(s % 20), 1.0], |s| (s % 20) as f64),
             vec![5.0; 20]
@@ -253,9 +254,9 @@ mod tests {
         // Two switches that alternate.
         let coarse = |s: usize| [(s % 2) as f64, (s / 3 % 2) as f64];
         assert!(sizes(100, coarse, |s| (s % 2) as f64).len() > 80);
-        // Samples of a table in order, of few kinds.
+        // Samples of a table in order, with few distinct values.
         assert_eq!(sizes(60, |s| [(s / 30) as f64, 0.0], |s| (s % 7) as f64), vec![1.0; 60]);
-        // Nothing is equal.
+        // No equal samples.
         assert_eq!(sizes(30, |s| [irrational(s), 1.0], |_| 2.0), vec![1.0; 30]);
     }
 

@@ -7,13 +7,13 @@ use std::{
 use serde::{Deserialize, Deserializer};
 
 /// Text in place of a missing number.
-const NO_NUMBER: &str = "–";
+const MISSING: &str = "–";
 
-/// Formats a number with three significant digits: `0.217`, `12.3`, `1234`; `6.13e-5` below 0.001 and from
-/// 100000; a dash for none, NaN and infinity.
+/// Formats a number with three significant digits: `0.217`, `12.3`, `1234`; `6.13e-5` below 0.001 and from 100000; a
+/// dash for a missing number, NaN and infinity.
 pub fn format_number(value: impl Into<Option<f64>>) -> String {
     let Some(value) = value.into().filter(|value| value.is_finite()) else {
-        return NO_NUMBER.to_owned();
+        return MISSING.to_owned();
     };
     if value == 0.0 {
         return "0".to_owned();
@@ -30,8 +30,8 @@ pub fn format_number(value: impl Into<Option<f64>>) -> String {
     format!("{value:.*}", usize::try_from(decimals).unwrap_or(0))
 }
 
-/// Formats a number with `decimals` decimals, for figures whose distance from a round value matters, as of R² from 1:
-/// `0.9987`. As [`format_number`] does where it is 10000 or more in magnitude, or none.
+/// Formats a number with `decimals` decimals, where the distance from a round value matters, as for R² near 1:
+/// `0.9987`. A number of 10000 or more in magnitude, or a missing one, is formatted as by [`format_number`].
 pub fn format_decimals(value: impl Into<Option<f64>>, decimals: usize) -> String {
     match value.into() {
         Some(value) if value.abs() < 1e4 => {
@@ -54,7 +54,7 @@ pub fn format_r2(value: impl Into<Option<f64>>) -> String {
 /// Formats a number as [`format_number`] does, with a percent sign.
 pub fn format_percent(value: impl Into<Option<f64>>) -> String {
     match format_number(value) {
-        text if text == NO_NUMBER => text,
+        text if text == MISSING => text,
         text => format!("{text} %"),
     }
 }
@@ -71,22 +71,22 @@ pub fn format_duration(duration: Duration) -> String {
     }
 }
 
-/// Returns the text with its first letter as a capital.
+/// Returns the text with its first letter capitalised.
 pub fn capitalised(text: &str) -> String {
     let mut letters = text.chars();
     let first = letters.next().into_iter().flat_map(char::to_uppercase);
     first.chain(letters).collect()
 }
 
-/// `1 sample`, `2 samples`.
+/// Returns a count with its noun: `1 sample`, `2 samples`.
 pub fn counted<N: fmt::Display + PartialEq + From<u8>>(count: N, noun: &str) -> String {
     let is_one = count == N::from(1);
     format!("{count} {noun}{}", if is_one { "" } else { "s" })
 }
 
-/// Returns a name from a file without what is no letter of it: control characters, with which a name could drive a terminal
-/// or break XML, characters that turn the direction of the text around it, and the apostrophe with which
-/// [`inert`] protects spreadsheets.
+/// Returns a name from a file without special characters: control characters, which could drive a terminal or break
+/// XML, characters that change the direction of the text around them, and the apostrophe with which [`inert`]
+/// protects spreadsheets.
 pub fn clean_name(name: &str) -> String {
     let name = match name.strip_prefix('\'') {
         Some(rest) if begins_formula(rest) => rest,
@@ -99,8 +99,8 @@ pub fn clean_name(name: &str) -> String {
     words.filter(|word| !word.is_empty()).collect::<Vec<_>>().join(" ")
 }
 
-/// Returns a text for a spreadsheet, which takes a cell that begins with one of `= + - @` for a formula: such a text gets
-/// an apostrophe in front, unless it is a number.
+/// Returns a text that is safe in a spreadsheet, which treats a cell that begins with one of `= + - @` as a formula:
+/// such a text gets a leading apostrophe, unless it is a number.
 pub fn inert(text: &str) -> String {
     if begins_formula(text) {
         format!("'{text}")
@@ -109,12 +109,12 @@ pub fn inert(text: &str) -> String {
     }
 }
 
-/// Returns `true` for a text that a spreadsheet would take for a formula.
+/// Returns `true` for a text that a spreadsheet would treat as a formula.
 pub fn begins_formula(text: &str) -> bool {
     text.starts_with(['=', '+', '-', '@']) && text.len() > 1 && text.parse::<f64>().is_err()
 }
 
-/// Returns `true` for characters that are not printed but do something.
+/// Returns `true` for characters that are not printed but have an effect.
 pub fn is_unprintable(c: char) -> bool {
     c.is_control()
         || matches!(c, '\u{200e}' | '\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2066}'..='\u{2069}' | '\u{feff}' | '\u{fffe}' | '\u{ffff}')
@@ -130,7 +130,7 @@ pub(crate) fn cleaned_if_any<'de, D: Deserializer<'de>>(deserializer: D) -> Resu
     Ok(Option::<String>::deserialize(deserializer)?.map(|name| clean_name(&name)))
 }
 
-/// Says in plain words why the operating system refused a file, and what to do about it.
+/// Returns in plain words why the operating system refused a file, and what to do about it.
 pub fn system_cause(error: &io::Error) -> String {
     let words = match error.kind() {
         ErrorKind::NotFound => "there is no such file or folder; check the name",
@@ -141,8 +141,8 @@ pub fn system_cause(error: &io::Error) -> String {
         ErrorKind::NotADirectory => "a part of the path is a file, not a folder; correct the path",
         ErrorKind::AlreadyExists => "there is a file of this name already; remove it, or give another name",
         ErrorKind::StorageFull => "the disk is full; free some space, or give a place on another disk",
-        ErrorKind::QuotaExceeded => "your share of the disk is used up; free some space, or give another place",
-        // Beyond a limit of our own.
+        ErrorKind::QuotaExceeded => "your disk quota is exhausted; free some space, or give another place",
+        // Beyond one of our own limits.
         ErrorKind::FileTooLarge if error.get_ref().is_some() => return error.to_string(),
         ErrorKind::FileTooLarge => "the file is too large for this disk; give a place on another disk",
         ErrorKind::ReadOnlyFilesystem => "the disk is read-only; give a place on another disk",
@@ -155,13 +155,13 @@ pub fn system_cause(error: &io::Error) -> String {
         ErrorKind::BrokenPipe => "the program that reads it has ended; start both again",
         ErrorKind::OutOfMemory => "memory is full; close other programs, or use less data",
         ErrorKind::InvalidData => "it is not text that can be read; check that it is the right file",
-        _ => return with_cure(error),
+        _ => return with_remedy(error),
     };
     words.to_owned()
 }
 
-/// The system's own words, without its number, for what happens rarely.
-fn with_cure(error: &io::Error) -> String {
+/// Returns the system's own message without its number, for rare errors.
+fn with_remedy(error: &io::Error) -> String {
     let text = error.to_string();
     let words = text.split(" (os error").next().unwrap_or(&text);
     if error.raw_os_error().is_some() {
@@ -176,7 +176,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn numbers_read_the_same_everywhere() {
+    fn numbers_have_three_significant_digits() {
         let cases = [
             (0.0, "0"),
             (-0.0, "0"),
@@ -205,7 +205,7 @@ mod tests {
     }
 
     #[test]
-    fn decimals_are_kept_where_they_are_asked_for() {
+    fn requested_decimals_are_kept() {
         let cases = [
             (Some(0.998_76), "0.9988"),
             (Some(1.0), "1.0000"),
@@ -222,7 +222,7 @@ mod tests {
     }
 
     #[test]
-    fn times_take_the_unit_one_would_say() {
+    fn durations_have_the_usual_units() {
         let cases = [
             (0.0, "0 ms"),
             (0.000_23, "0.230 ms"),
@@ -239,7 +239,7 @@ mod tests {
     }
 
     #[test]
-    fn names_keep_their_letters_and_lose_what_is_none() {
+    fn names_keep_letters_and_lose_special_characters() {
         for (name, expected) in [
             ("force (µN)", "force (µN)"),
             ("a\u{1b}[31mb\u{7}", "a [31mb"),
@@ -276,7 +276,7 @@ mod tests {
     }
 
     #[test]
-    fn every_refusal_is_said_in_words_with_a_cure() {
+    fn every_system_error_has_a_message_with_a_remedy() {
         // Linux numbers: no entry, permission, exists, not a folder, is a folder, too large, full, read-only, input/output,
         // too many open files, name too long, loop of links.
         for number in [2, 13, 17, 20, 21, 27, 28, 30, 5, 24, 36, 40] {

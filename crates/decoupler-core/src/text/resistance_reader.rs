@@ -15,7 +15,7 @@ pub struct ResistanceReader<R> {
     columns: ResistanceColumns,
     /// Number of row-wires of the array, if row-wires are to be read.
     row_wires: Option<usize>,
-    /// `true` if the current row was already read while looking for names.
+    /// `true` if the current row was already read while looking for column names.
     waiting: bool,
 }
 
@@ -84,10 +84,10 @@ pub enum ReadError {
         /// Number of row-wires of the array.
         rows: usize,
     },
-    /// A line break does not end a row: it is within quotes, or a carriage return alone.
+    /// A line break does not end a row: it is within quotes, or is a single carriage return.
     #[error("line {0}: there is a line break within the row; end rows, and only rows, with LF or CR LF")]
     LineBreak(u64),
-    /// A row is endless, or nothing but blank lines follow.
+    /// A row has no end, or only blank lines follow.
     #[error("line {0}: no row ends within 1 MiB; give one line for each row-wire")]
     Endless(u64),
     /// The file could not be read.
@@ -95,7 +95,8 @@ pub enum ReadError {
     Io(#[from] io::Error),
 }
 
-/// Most bytes up to the end of the next row, blank lines included: 1 MiB. A row of the largest array takes some 100 kB.
+/// Max bytes up to the end of the next row, blank lines included: 1 MiB. A row of the largest array takes about 100
+/// kB.
 pub const LONGEST_ROW: u64 = 1 << 20;
 
 impl<R: BufRead> Rows<R> {
@@ -249,12 +250,12 @@ impl ResistanceColumns {
         }
     }
 
-    /// Returns `true` for a line that has a name of a resistance.
+    /// Returns `true` for a line with the name of a resistance column.
     pub fn has_name(fields: &CsvFields, channels: usize) -> bool {
         fields.iter().any(|name| channel_of(name, channels).is_some())
     }
 
-    /// Returns `true` if lines say their row-wire.
+    /// Returns `true` if lines contain their row-wire.
     pub fn has_row(&self) -> bool {
         self.row.is_some()
     }
@@ -262,7 +263,7 @@ impl ResistanceColumns {
     /// Appends the resistances of a line.
     ///
     /// # Errors
-    /// If the line has another number of columns, or a field is not a resistance.
+    /// If the line has the wrong number of columns, or a field is not a resistance.
     pub fn read(&self, line: u64, fields: &CsvFields, resistances_ohm: &mut Vec<f64>) -> Result<(), ReadError> {
         let (found, expected) = (fields.count(), self.width);
         if found != expected {
@@ -280,7 +281,7 @@ impl ResistanceColumns {
         Ok(())
     }
 
-    /// Returns the row-wire of a line, from 0, if lines say it; `rows` is the number of row-wires of the array.
+    /// Returns the row-wire of a line, from 0, if lines contain it; `rows` is the number of row-wires of the array.
     ///
     /// # Errors
     /// If the field is not the number of a row-wire.
@@ -312,7 +313,7 @@ fn excerpt(field: &[u8]) -> String {
     }
 }
 
-/// Parses a number; `None` if the field is none.
+/// Parses a number; `None` if the field is not a number.
 pub fn number(field: &[u8]) -> Option<f64> {
     std::str::from_utf8(field).ok()?.trim().parse().ok()
 }
@@ -323,7 +324,7 @@ fn channel_of(name: &[u8], channels: usize) -> Option<usize> {
     number.parse().ok().filter(|channel| (1..=channels).contains(channel))
 }
 
-/// Fields of one line of CSV, kept between lines so that none allocates.
+/// Fields of one line of CSV, reused between lines to avoid allocation.
 #[derive(Debug)]
 pub struct CsvFields {
     parser: Reader,
@@ -349,7 +350,7 @@ impl CsvFields {
     /// Splits a line without its line break.
     pub fn split(&mut self, line: &[u8]) {
         self.parser.reset();
-        // Lines of like lengths need no further room.
+        // Lines of similar length need no reallocation.
         self.text.resize(self.text.len().max(line.len().next_power_of_two()), 0);
         let (mut rest, mut written) = (line, 0);
         self.count = 0;
@@ -361,7 +362,7 @@ impl CsvFields {
             written += text;
             self.count += ends;
             match result {
-                // The parser takes the empty rest for the end of the record.
+                // The parser treats the empty rest as the end of the record.
                 ReadRecordResult::InputEmpty => {}
                 ReadRecordResult::OutputFull => self.text.resize(2 * self.text.len() + 1, 0),
                 ReadRecordResult::OutputEndsFull => self.ends.resize(2 * self.ends.len() + 8, 0),
@@ -377,7 +378,7 @@ impl CsvFields {
 
     /// Field with this index, without surrounding spaces.
     ///
-    /// # Panics
+    /// If there are fewer fields.
     /// If there are not this many fields.
     pub fn get(&self, index: usize) -> &[u8] {
         let ends = &self.ends[..self.count];
@@ -404,7 +405,7 @@ mod tests {
     }
 
     #[test]
-    fn columns_are_found_by_name_or_by_order() {
+    fn columns_are_found_by_name_or_order() {
         for text in [
             "1.5,2\n3,4e0\n",
             " 1.5 , 2\r\n3,4",
@@ -421,7 +422,7 @@ mod tests {
     }
 
     #[test]
-    fn what_has_no_end_is_refused() {
+    fn endless_rows_are_refused() {
         let endless = |byte| {
             ResistanceReader::new(io::BufReader::new(io::repeat(byte)), 2)
                 .err()
@@ -448,7 +449,7 @@ mod tests {
     }
 
     #[test]
-    fn row_wires_are_read_where_they_are_wanted_and_said() {
+    fn row_wires_are_read_if_requested_and_present() {
         let rows = |text: &str, wanted: Option<usize>| {
             let reader = ResistanceReader::new(text.as_bytes(), 2)?;
             let mut reader = match wanted {
@@ -464,14 +465,14 @@ mod tests {
         assert_eq!(
             rows("row,r_1,r_2\nx,1,2\n", None).unwrap(),
             None,
-            "what is not wanted is not read"
+            "the column is ignored if not requested"
         );
         let message = rows(text, Some(2)).unwrap_err().to_string();
         assert!(message.contains("line 2, column 1: '3'"), "{message}");
     }
 
     #[test]
-    fn what_is_wrong_is_found_at_its_place() {
+    fn errors_name_line_and_column() {
         let cases = [
             ("nothing", "", "no rows"),
             ("names only", "r_1,r_2\n", "no rows"),

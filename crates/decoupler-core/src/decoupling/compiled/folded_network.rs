@@ -110,7 +110,7 @@ impl<T: Real> FoldedNetwork<T> {
     }
 }
 
-/// Layers are padded to a multiple of this number.
+/// The number of nodes of a layer is padded to a multiple of this.
 pub(super) const LANES: usize = 4;
 
 /// An affine layer in double precision.
@@ -123,7 +123,7 @@ pub(in crate::decoupling) struct PaddedLayer {
 }
 
 impl PaddedLayer {
-    /// Lays out the weight of each input, and the constant of no input, for each output.
+    /// Lays out the weight of each input and the constant (no input) for each output.
     pub(in crate::decoupling) fn new(
         (inputs, outputs): (usize, usize),
         weight: impl Fn(Option<usize>, usize) -> f64,
@@ -172,7 +172,7 @@ impl PaddedLayer {
 }
 
 /// Computes `output = [input, 1] · layer`. The layer is stored row by row with its biases last; its number of columns
-/// is that of the outputs, a multiple of [`LANES`]. Blocks of columns stay in registers.
+/// is the number of outputs, a multiple of [`LANES`]. Blocks of columns stay in registers.
 #[inline(always)]
 pub(super) fn affine<T: Real>(input: &[T], layer: &[T], output: &mut [T]) {
     let width = output.len();
@@ -187,8 +187,8 @@ pub(super) fn affine<T: Real>(input: &[T], layer: &[T], output: &mut [T]) {
     }
 }
 
-/// Computes the outputs `first..first + B` and returns B. Even and odd inputs are summed separately, so that additions
-/// need not wait for each other.
+/// Computes the outputs `first..first + B` and returns B. Even and odd inputs are summed separately to hide the
+/// latency of additions.
 #[inline(always)]
 fn block<T: Real, const B: usize>(input: &[T], layer: &[T], width: usize, first: usize, output: &mut [T]) -> usize {
     let weights = |row: usize| -> &[T; B] {

@@ -1,4 +1,4 @@
-//! Trained networks prepared to decode fast: scalings folded into the weights, layers padded to vector registers.
+//! Trained networks compiled for fast decoding: scalings folded into the weights, layers padded to vector registers.
 
 mod folded_network;
 
@@ -16,21 +16,22 @@ use folded_network::affine;
 pub(super) use folded_network::PaddedLayer;
 pub use folded_network::Real;
 
-/// Networks prepared to decode frames fast and without allocation, in double or single precision: the scalings are
+/// Networks compiled to decode frames fast and without allocation, in double or single precision: the scalings are
 /// folded into the weights, and layers are padded to whole vector registers.
 ///
-/// Inputs are taken relative to a resistance R₀ in the middle of each channel, subtracted in double precision:
-/// `1/R − 1/R₀ = −(R − R₀)/R/R₀`. Single precision therefore loses nothing where readings differ little.
+/// Inputs are relative to a resistance R₀ in the middle of each channel, subtracted in double precision: `1/R − 1/R₀
+/// = −(R − R₀)/R/R₀`. Single precision therefore loses no accuracy where readings differ little.
 ///
-/// Whitening without noise amplifies weak patterns a million times, so large products nearly cancel. Where this would
-/// show in single precision, the sums of the hidden layer are computed in double precision, and the rest in single.
+/// Whitening without noise amplifies weak patterns a million times, and large products nearly cancel. Where this
+/// would affect single precision, the sums of the hidden layer are computed in double precision, and the rest in
+/// single.
 #[derive(Clone, Debug)]
 pub struct CompiledNetworks<T> {
     rows: usize,
     channels: usize,
     outputs_per_row: usize,
     networks: PerRow<FoldedNetwork<T>>,
-    /// The networks as they were trained, for their description.
+    /// The networks as trained, for their description.
     trained: Networks,
     /// Inputs of one row.
     inputs: Vec<T>,
@@ -102,7 +103,7 @@ impl<T: Real> Decoder for CompiledNetworks<T> {
     }
 }
 
-/// Scaling, both layers and the restoring of a network, none of them folded into another.
+/// Scaling, both layers and output scaling of a network, not folded.
 fn layers_of(network: &DecouplingNetwork) -> LayeredMap {
     let (centre, to_inputs) = network.inputs().affine();
     let layer = |layer: ndarray::ArrayView2<'_, f64>| {

@@ -13,21 +13,21 @@ use crate::{
     sensor::{Axes, SensorError, SensorModel},
 };
 
-/// Decodes every row of a frame by the Gauss-Newton method. If rows are not known, the one that fits the readings best
-/// is taken.
+/// Decodes every row of a frame by the Gauss-Newton method. If rows are not known, the row-wire that fits the
+/// readings best is used.
 ///
-/// It takes readings to be exact: all of them have gain 1. Readings with drift or other noise are for
-/// [`PosteriorDecoder`], whose unknowns include the gain of the snapshot; here they count as not solved.
+/// It assumes exact readings, with gain 1. Readings with drift or other noise need a [`PosteriorDecoder`], whose
+/// unknowns include the gain of the snapshot; here they count as not solved.
 #[derive(Clone, Debug)]
 pub struct NewtonDecoder {
     model: SensorModel,
     scene: Scene,
     newton: Newton,
     search: RowSearch,
-    /// Rules that give each row-wire one start.
+    /// Rules with one start for each row-wire.
     brief: NewtonRules,
     rules: NewtonRules,
-    /// Answers the rows that the equations leave open.
+    /// Decoder for the rows that the equations do not determine.
     of_open_rows: Option<PosteriorDecoder>,
     solved: SolvedRows,
 }
@@ -50,9 +50,9 @@ impl NewtonDecoder {
         })
     }
 
-    /// As [`Self::new`], but `posterior` answers where the equations have no solution to within [`LARGEST_ERROR`]: of all
-    /// deformations that explain the readings to their rounding, its median has the least expected error. `rows` must be
-    /// among its rows.
+    /// As [`Self::new`], but `posterior` decodes the rows whose equations have no solution to within
+    /// [`LARGEST_ERROR`]: among all deformations that explain the readings to their rounding, its median has the min
+    /// expected error. `rows` must be among its rows.
     ///
     /// # Errors
     /// If the sensor has no resistances at rest.
@@ -69,7 +69,7 @@ impl NewtonDecoder {
         })
     }
 
-    /// Solves one row by `rules`; returns the report on the row-wire taken.
+    /// Solves one row by `rules`; returns the report on the row-wire that was chosen.
     fn solve(
         &mut self,
         rules: NewtonRules,
@@ -91,7 +91,7 @@ impl NewtonDecoder {
     }
 }
 
-/// The coordinates of the nodes of a row-wire from which the iteration starts: the affine estimate where nodes move along z
+/// Coordinates of the nodes of a row-wire at the start of the iteration: the affine estimate if nodes move along z
 /// only, and mid-range otherwise.
 fn start_of((model, scene): (&SensorModel, &Scene), row: usize) -> LayeredMap {
     let ranges = ranges(model, scene);
@@ -130,7 +130,7 @@ impl PlainFirst for NewtonDecoder {
     fn answer(&mut self, row_index: usize, readings: &[f64], targets: &mut [f64]) -> Result<Solution, DecodeError> {
         let mut report = None;
         if self.search.is_needed() {
-            // Most row-wires tried are not the right one, and no start helps them.
+            // Most row-wires tried are not the right one, and no restart helps them.
             report = self.solve(self.brief, row_index, readings, targets)?;
         }
         if report.is_none_or(|report| report.solution == Solution::None) {
@@ -191,29 +191,29 @@ impl Decoder for NewtonDecoder {
     }
 }
 
-/// Decoders that answer the rows of a frame side by side by plain steps, and with more care the rows for which those do not
-/// suffice.
+/// Decoders that solve the rows of a frame side by side by plain steps, and the remaining rows one by one with
+/// damping.
 pub(super) trait PlainFirst: Decoder {
-    /// Answers the rows from index `first` on, at most [`LANES`], as far as plain steps do; returns their standing. Leaves the
-    /// targets of all others as they are.
+    /// Solves at most [`LANES`] rows from index `first` on, by plain steps; returns the status of the solved ones.
+    /// Leaves the targets of all others unchanged.
     fn answer_plainly(&mut self, first: usize, readings: &[f64], targets: &mut [f64]) -> [Option<Solution>; LANES];
 
-    /// Answers one row with care; returns its standing.
+    /// Solves one row with damping and restarts; returns its status.
     ///
     /// # Errors
-    /// Readings that are no resistances.
+    /// If a reading is not a resistance.
     fn answer(&mut self, row_index: usize, readings: &[f64], targets: &mut [f64]) -> Result<Solution, DecodeError>;
 
-    /// The rows counted so far.
+    /// Returns the rows counted so far.
     fn solved(&mut self) -> &mut SolvedRows;
 
-    /// Answers all rows of a frame.
+    /// Solves all rows of a frame.
     ///
     /// # Errors
-    /// Readings that are no resistances; the error names their row.
+    /// If a reading is not a resistance; the error names the row.
     ///
     /// # Panics
-    /// If there are not as many rows of targets as of readings.
+    /// If the numbers of rows of targets and readings differ.
     fn answer_all(&mut self, readings: &[f64], targets: &mut [f64]) -> Result<(), DecodeError> {
         let (channels, outputs) = (self.channels(), self.outputs());
         assert_eq!(readings.len() / channels, targets.len() / outputs);
@@ -242,13 +242,13 @@ pub(super) trait PlainFirst: Decoder {
     }
 }
 
-/// Decodes every row of a frame by the Gauss-Newton method with noise and prior. If rows are not known, the most probable
-/// one is taken: the row of the largest evidence under the noise of the scene.
+/// Decodes every row of a frame by the Gauss-Newton method with noise and prior. If rows are not known, the most
+/// probable row-wire is used: the one with the largest evidence under the noise of the scene.
 #[derive(Clone, Debug)]
 pub struct PosteriorDecoder {
     posterior: Posterior,
     search: RowSearch,
-    /// Noise leaves every answer undetermined, as the reference shows.
+    /// With noise, no answer is fully determined, which is not reported.
     is_noisy: bool,
     solved: SolvedRows,
 }
@@ -267,7 +267,7 @@ impl PosteriorDecoder {
         })
     }
 
-    /// Solves rows side by side, each with the index of its own row-wire; returns the standing of the answers.
+    /// Solves rows side by side, each with the index of its own row-wire; returns the status of the answers.
     fn answers(
         &mut self,
         row_indices: &[usize],
@@ -300,7 +300,7 @@ impl PosteriorDecoder {
                 if self.is_noisy || report.determined && report.residual < EXPLAINED {
                     Solution::Unique
                 } else if report.determined {
-                    // Readings that leave nothing open, and that the answer does not explain.
+                    // The readings determine the answer, but it does not explain them.
                     Solution::None
                 } else {
                     Solution::Undetermined
@@ -310,7 +310,7 @@ impl PosteriorDecoder {
         }
     }
 
-    /// Solves one row; returns the standing of the answer.
+    /// Solves one row; returns the status of the answer.
     pub(super) fn answer(
         &mut self,
         row_index: usize,

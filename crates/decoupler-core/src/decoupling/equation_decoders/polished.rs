@@ -13,7 +13,7 @@ use crate::{
     sensor::{SensorError, SensorModel},
 };
 
-/// Ratio of the misfit to the noise above which noise does not explain it.
+/// Max ratio of misfit to noise that noise explains.
 const NOISES: f64 = 6.0;
 
 /// Improves the answer of another decoder by a few Gauss-Newton steps, with noise and prior if the scene has noise.
@@ -33,14 +33,14 @@ pub struct PolishedDecoder {
 enum Improvement {
     /// Without noise.
     Newton(Box<Newton>),
-    /// With noise: the posterior, and the noise by which the misfit is judged.
+    /// With noise: the posterior, and the noise with which the misfit is compared.
     Posterior(Box<Posterior>, NoiseSource),
 }
 
 impl PolishedDecoder {
-    /// Creates a decoder that takes `steps` steps after `first`, for `rows` of `model` in `scene`. If rows are not known,
-    /// the row-wire nearest to the first answer is taken. `rng` draws the samples that estimate a prior without closed
-    /// form.
+    /// Creates a decoder that takes `steps` steps after `first`, for `rows` of `model` in `scene`. If rows are not
+    /// known, the row-wire nearest to the first answer is used. `rng` draws the samples that estimate a prior without
+    /// closed form.
     ///
     /// # Errors
     /// If the sensor has no resistances at rest.
@@ -75,7 +75,7 @@ impl PolishedDecoder {
         })
     }
 
-    /// Returns the row-wire of a row with this first answer.
+    /// Returns the row-wire that belongs to this first answer.
     fn row_wire(&self, row_index: usize, coordinates_mm: &[f64]) -> usize {
         match self.row_model {
             RowModel::Each => self.rows[row_index],
@@ -96,8 +96,8 @@ impl PolishedDecoder {
     }
 }
 
-/// The standing of an answer to readings with this noise: those that noise explains are all that a posterior can ask for.
-/// The residual is free of the gain, and so is the noise next to it.
+/// Status of an answer to readings with this noise: with a posterior, an answer is reliable if noise explains its
+/// misfit. The residual is independent of the gain, and so is the noise that it is compared with.
 fn standing_beside(noise: &NoiseSource, readings: &[f64], report: PosteriorReport) -> Solution {
     let variance = |&ohm: &f64| noise.relative_to(ohm).own.powi(2);
     let variance = readings.iter().map(variance).sum::<f64>() / readings.len() as f64;
@@ -109,7 +109,6 @@ fn standing_beside(noise: &NoiseSource, readings: &[f64], report: PosteriorRepor
 }
 
 impl PlainFirst for PolishedDecoder {
-    /// Improves the first answers.
     fn answer_plainly(&mut self, first: usize, readings: &[f64], targets: &mut [f64]) -> [Option<Solution>; LANES] {
         let mut row_wires = [0; LANES];
         let first_answers = targets.chunks_exact(self.first.outputs()).enumerate();

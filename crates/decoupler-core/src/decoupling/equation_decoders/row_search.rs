@@ -4,7 +4,7 @@ use crate::{
     sensor::{ArrayScale, SensorError, SensorModel},
 };
 
-/// Finds the row-wire of each row of a frame by trial, where the scene's decoders are not told.
+/// Finds the row-wire of each row of a frame by trial, if rows are not known in the scene.
 #[derive(Clone, Debug)]
 pub(super) struct RowSearch {
     scale: ArrayScale,
@@ -18,7 +18,7 @@ pub(super) struct RowSearch {
 
 /// Outcome of solving a row for a given row-wire.
 pub(super) struct Trial<R> {
-    /// Measure by which row-wires are compared: the lowest is taken.
+    /// Measure for comparing row-wires: the lowest is chosen.
     pub(super) score: f64,
     /// True if the row-wire is accepted without trying the others.
     pub(super) is_explained: bool,
@@ -29,8 +29,8 @@ pub(super) struct Trial<R> {
 pub(super) const EXPLAINED: f64 = 1e-10;
 
 impl<R> Trial<R> {
-    /// Returns `true` if this row-wire is to be taken instead of another: an explained one before one that is not, then the
-    /// one with the lower score. A score of NaN is above all others.
+    /// Returns `true` if this row-wire is preferred to another: an explained one to one that is not, then the lower
+    /// score. NaN is above all other scores.
     fn is_taken_over(&self, other: Option<&Self>) -> bool {
         other.is_none_or(|other| {
             (!self.is_explained, self.score) < (!other.is_explained, other.score)
@@ -66,7 +66,7 @@ impl RowSearch {
         self.rest.is_empty().then_some(&self.rows)
     }
 
-    /// Row-wires read, and how that of a reading is known.
+    /// Row-wires read, and how the row-wire of a reading is determined.
     pub(super) fn description(&self) -> (&[usize], RowChoice) {
         let tried = || RowChoice::Tried {
             rest: self.rest.clone(),
@@ -89,10 +89,10 @@ impl RowSearch {
         &self.twins
     }
 
-    /// Solves one row with `solve`, which solves for a given row-wire. Returns the report on the row-wire taken.
+    /// Solves one row with `solve`, which solves for a given row-wire. Returns the report on the chosen row-wire.
     ///
-    /// If rows are not known, row-wires are tried in the order of similarity of their readings at rest, and the one
-    /// with the lowest score is taken; rows that mirror each other may then be confused.
+    /// If rows are not known, row-wires are tried in order of similarity with their readings at rest, and the one
+    /// with the lowest score is chosen; rows that mirror each other may then be confused.
     pub(super) fn solve<R>(
         &mut self,
         row_index: usize,
@@ -119,8 +119,8 @@ impl RowSearch {
         Ok(taken.map(|trial| trial.report))
     }
 
-    /// As [`Self::solve`], several rows side by side, those of a frame or others: `solve` solves for a given row-wire each.
-    /// Returns the report on the row-wire taken for each row.
+    /// As [`Self::solve`], for several rows side by side, of one frame or several: `solve` solves each for a given
+    /// row-wire. Returns the report on the chosen row-wire for each row.
     pub(super) fn solve_rows<R>(
         &self,
         row_indices: &[usize],
@@ -159,7 +159,7 @@ impl RowSearch {
         Ok(taken.into_iter().map(|trial| Some(trial?.report)).collect())
     }
 
-    /// The row-wires in the order of similarity of these readings with theirs at rest.
+    /// Row-wires in order of similarity of their readings at rest with these readings.
     fn order(&self, readings_ohm: &[f64]) -> Vec<usize> {
         let unlike = |rest: &Vec<f64>| -> f64 {
             let differences = rest.iter().zip(readings_ohm).map(|(rest, ohm)| ohm.ln() - rest);
@@ -171,15 +171,15 @@ impl RowSearch {
     }
 }
 
-/// Row-wires that give the same readings as another one, by symmetry, where the row-wire of a row is not known.
+/// Row-wires that give the same readings as another one, by symmetry, if rows are not known.
 ///
-/// The electrodes of a column-wire are evenly spaced, so readings stay the same if any nodes are mirrored at their middle.
-/// Without sideways movement, row-wires mirror each other only as a whole, at rest as well. With it, a row has a twin if
-/// each of its nodes, or its mirror image, is within reach of the nodes of one row-wire. The same positions as nodes of
-/// another row-wire are no twin: they are the same answer.
+/// The electrodes of a column-wire are evenly spaced, so readings stay the same if any nodes are mirrored about their
+/// middle. Without sideways movement, row-wires mirror each other only as a whole, also at rest. With it, a row has a
+/// twin if each of its nodes, or its mirror image, is within reach of the nodes of one row-wire. The same positions
+/// as nodes of another row-wire are not a twin: they are the same answer.
 #[derive(Clone, Debug, Default)]
 pub(super) struct RowTwins {
-    /// x of the row-wires that another one equals in all readings at rest.
+    /// x of the row-wires whose readings at rest all equal those of another one.
     at_rest_x_mm: Vec<f64>,
     sideways: Option<Sideways>,
     /// True if every row has a twin.
@@ -199,7 +199,8 @@ struct Sideways {
 const SAME_AT_REST: f64 = 1e-13;
 
 impl RowTwins {
-    /// Twins among `rows` of `model` with these logarithms of the resistances at rest; none where the scene tells the row.
+    /// Returns the twins among `rows` of `model` with these logarithms of the resistances at rest; none if rows are
+    /// known.
     pub(super) fn of(model: &SensorModel, scene: &Scene, rows: &[usize], rest: &[Vec<f64>]) -> Self {
         let is_same = |a: &Vec<f64>, b: &Vec<f64>| a.iter().zip(b).all(|(a, b)| (a - b).abs() <= SAME_AT_REST);
         let has_twin = |index: &usize| rest.iter().filter(|other| is_same(&rest[*index], other)).count() > 1;
@@ -217,12 +218,13 @@ impl RowTwins {
                 .map(|index| geometry.row_x_mm(rows[index]))
                 .collect(),
             sideways: (largest_shift_mm > 0.0 && rest.len() > 1).then_some(sideways),
-            // Electrodes of one x see the distance from it alone, which height and x share.
+            // Readings of electrodes with the same x depend only on the distance from it, which combines height and
+            // x.
             is_everywhere: rest.len() > 1 && electrodes == 0,
         }
     }
 
-    /// Returns the standing of an answer with these coordinates, which is not the only one if it has a twin.
+    /// Returns the status of an answer with these coordinates, which is not unique if it has a twin.
     pub(super) fn unless_twin(&self, solution: Solution, coordinates_mm: &[f64]) -> Solution {
         match solution {
             Solution::Unique if self.has(coordinates_mm) => Solution::Undetermined,
@@ -230,7 +232,7 @@ impl RowTwins {
         }
     }
 
-    /// Returns `true` if another row-wire than the one of these coordinates may have the same readings.
+    /// Returns `true` if another row-wire may have the same readings.
     fn has(&self, coordinates_mm: &[f64]) -> bool {
         let sideways = self.sideways.as_ref();
         self.is_everywhere
@@ -260,7 +262,7 @@ impl Sideways {
     }
 }
 
-/// Logarithms of the resistances at rest of each of `rows`; none where the scene tells the row.
+/// Returns the logarithms of the resistances at rest of each of `rows`; empty if rows are known.
 ///
 /// # Errors
 /// If the sensor has no resistances at rest.

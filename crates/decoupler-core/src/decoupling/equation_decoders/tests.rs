@@ -70,15 +70,15 @@ fn rows_that_mirror_each_other_are_flagged_unless_they_are_known() {
     }
 }
 
-/// As above with nodes that move sideways: at rest only the rows at the ends mirror each other, row 2 mirrors itself, and
-/// rows of pitch 0.3 are within reach of each other's mirror images.
+/// As above with nodes that move sideways: at rest only the rows at the ends mirror each other, row 2 mirrors itself,
+/// and rows of pitch 0.3 are within reach of each other's mirror images.
 #[test]
 fn rows_that_mirror_each_other_are_flagged_when_they_move_sideways_too() {
     for (row_pitch_mm, middle_mm, rows, expected) in [
         (2.0, 10.0, Rows::All, 30),
         (2.0, 10.0, Rows::Known, 10),
         (2.0, 12.5, Rows::All, 0),
-        // By count, below.
+        // Counted below.
         (0.3, 9.0, Rows::All, 0),
     ] {
         let mut model = SensorModel::new("3x1_3x9".parse().unwrap());
@@ -112,7 +112,7 @@ fn polishing_flags_rows_that_mirror_each_other() {
     model.geometry.column_node_x0_mm = 7.5;
     let scene = Scene::default();
     let set = Dataset::simulate(&model, &scene, 30, &mut Seed(0).rng(Stream::Test)).unwrap();
-    // The first answer names the right row-wire.
+    // The first answer identifies the right row-wire.
     let nearly = PolishedDecoder::new(
         Box::new(
             NewtonDecoder::new(
@@ -136,8 +136,8 @@ fn polishing_flags_rows_that_mirror_each_other() {
     assert_eq!((solved.rows, solved.unsolved, solved.undetermined), (30, 0, 20));
 }
 
-/// The gain of the snapshot is unknown. With it, exact evidence (importance sampling of the uniform prior, 60 rows) finds
-/// 8 of 10 rows; the residual alone is lowest for whichever row suits the gain.
+/// The gain of the snapshot is unknown. With it, exact evidence (importance sampling of the uniform prior, 60 rows)
+/// finds 8 of 10 rows; the residual alone is lowest for the row that suits the gain.
 #[test]
 fn rows_are_found_under_drift_as_without_it() {
     let model = SensorModel::new("10x6_3x18".parse().unwrap());
@@ -174,7 +174,7 @@ fn rows_are_found_under_drift_as_without_it() {
     assert!(alone == 100 && digitised >= 70, "{alone} exact, {digitised} of 16 bits");
 }
 
-/// In a sensor so high that all rows look alike, which of them explain the readings depends on the last digits.
+/// In a sensor so high that all rows look alike, rounding decides which of them explain the readings.
 #[test]
 fn the_standing_is_that_of_the_row_taken_and_of_no_other_that_was_tried() {
     let mut model = SensorModel::new("10x2_3x30".parse().unwrap());
@@ -203,7 +203,7 @@ fn the_standing_is_that_of_the_row_taken_and_of_no_other_that_was_tried() {
     assert!(counts.iter().all(|&count| count > 20), "{counts:?}");
 }
 
-/// Four electrodes for six nodes leave every row open, and 18 none.
+/// Four electrodes for six nodes leave every row undetermined; 18 leave none.
 #[test]
 fn rows_that_the_equations_leave_open_are_answered_by_the_posterior_and_no_others() {
     for (array, is_open) in [("2x6_3x4", true), ("2x6_3x18", false)] {
@@ -238,8 +238,8 @@ fn bits(values: &[f64]) -> Vec<u64> {
     values.iter().map(|value| value.to_bits()).collect()
 }
 
-/// Rows side by side do not touch each other: neither those of which noise leaves none solved, nor those that are given up
-/// among others that are solved.
+/// Rows side by side do not influence each other: neither rows that noise leaves unsolved, nor rows that are given up
+/// among solved ones.
 #[test]
 fn a_frame_gives_the_bits_and_the_standing_of_its_rows() {
     for (array, noisy_rows) in [

@@ -69,7 +69,7 @@ fn impossible_readings_are_refused_and_foreign_ones_end_within_the_bounds() {
     }
 }
 
-/// Numbers of rows that are right, wrong and flagged, and wrong without a flag; wrong is an unknown that is off by
+/// Numbers of rows that are right, wrong but flagged, and wrong without a flag; wrong means an unknown that is off by
 /// more than [`LARGEST_ERROR`] of its range.
 fn standings(scene: &Scene, model: &SensorModel, rows: usize) -> [usize; 3] {
     let set = Dataset::simulate(model, scene, rows, &mut Seed(7).rng(Stream::Test)).unwrap();
@@ -132,7 +132,7 @@ fn rows_that_readings_do_not_determine_are_flagged() {
     // Fewer readings than nodes.
     let few = SensorModel::new("10x6_3x4".parse().unwrap());
     assert_eq!(standings(&Scene::default(), &few, 50), [0, 50, 0]);
-    // So flat that no reading sees the height; so high that all nodes look alike.
+    // So flat that the readings do not depend on the height; so high that all nodes look alike.
     for height_mm in [1e-6, 1e6] {
         let mut model = SensorModel::new("2x4_3x12".parse().unwrap());
         model.geometry.height_mm = height_mm;
@@ -193,7 +193,7 @@ fn an_answer_is_polished_to_rounding_in_a_few_steps() {
     }
 }
 
-/// Readings that no deformation explains leave the misfit of the answer, which is the least in its neighbourhood.
+/// For readings that no deformation explains, the misfit reported is that of the answer, a local minimum.
 #[test]
 fn the_residual_reported_is_that_of_the_answer() {
     let model = SensorModel::new("3x4_2x12".parse().unwrap());

@@ -6,38 +6,39 @@ use super::{
     truncated::{Marginal, Site},
 };
 
-/// The marginals of all unknowns.
+/// Marginals of all unknowns.
 #[derive(Clone, Debug)]
 pub(super) struct Marginals {
     pub(super) of_unknowns: Vec<Marginal>,
-    /// Number of rounds.
+    /// Number of EP sweeps.
     pub(super) rounds: usize,
-    /// False if the factors still moved after the last round.
+    /// False if the factors still changed in the last sweep.
     pub(super) converged: bool,
 }
 
-/// Largest number of rounds over all ranges.
+/// Max number of EP sweeps.
 const ROUNDS: usize = 400;
-/// Rounds after which the change of a factor is halved, and halved again: factors that swing then settle.
+/// Number of sweeps after which the update of a factor is halved, and halved again, to damp oscillations.
 const ROUNDS_UNDAMPED: usize = 20;
-/// Smallest share of a change of a factor.
+/// Smallest damping factor of an update.
 const SMALLEST_SHARE: f64 = 0.1;
 /// Change of a mean, relative to the range, below which the factors have converged.
 pub(super) const TOLERANCE: f64 = 1e-7;
 
-/// Expectation propagation for several models side by side, in memory that is used again. A model has the same bits
-/// whatever is in the other lanes.
+/// Expectation propagation for several models side by side, with reused memory. The result of a model has the same
+/// bits whatever the other lanes contain.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Propagation {
     gaussians: RowPosteriors,
     of_unknowns: Vec<Site>,
     of_rounded: Vec<Site>,
-    /// Forms of the rounded readings: rounded readings × unknowns.
+    /// Linear forms of the rounded readings: rounded readings × unknowns.
     forms: Vec<Pack>,
 }
 
 impl Propagation {
-    /// The marginals of at most [`LANES`] models, all of the same shape; `None` where there is no model or numbers overflow.
+    /// Returns the marginals of at most [`LANES`] models, all of the same shape; `None` without a model or if numbers
+    /// overflow.
     pub(super) fn marginals(&mut self, models: &[Option<LinearModel>]) -> [Option<Marginals>; LANES] {
         let mut found = [const { None }; LANES];
         let has_first =
@@ -55,7 +56,7 @@ impl Propagation {
         found
     }
 
-    /// Finds the marginals of the models in `open` lanes, which begin with their first factors or without them.
+    /// Finds the marginals of the models in `open` lanes, which start from their initial factors or without them.
     fn propagate(
         &mut self,
         models: &[Option<LinearModel>],
@@ -143,7 +144,7 @@ impl WithSimd for Rounds<'_> {
 }
 
 impl Propagation {
-    /// One EP sweep over all sites. Returns the largest change of a mean, or NaN where numbers overflow.
+    /// One EP sweep over all sites. Returns the largest change of a mean, or NaN if numbers overflow.
     #[inline(always)]
     fn meet_ranges(&mut self, share: Pack, defects: Pack) -> Pack {
         let Self {
@@ -169,7 +170,7 @@ impl Propagation {
 }
 
 impl Rounds<'_> {
-    /// Closes the lanes in which means moved by less than the tolerance, became NaN, or no round.
+    /// Closes the lanes whose means changed by less than the tolerance, became NaN, or reached the iteration limit.
     fn close_lanes(&mut self, moved: Pack, share: f64, rounds: usize) {
         for (lane, (open, model)) in self.open.iter_mut().zip(self.models).enumerate() {
             let Some(model) = model.as_ref().filter(|_| *open) else {

@@ -19,7 +19,7 @@ pub(super) struct Ranges {
 }
 
 impl Factor {
-    /// The factor of t + `shift`, in terms of t.
+    /// Returns the factor of t + `shift` as a function of t.
     pub(super) fn shifted(self, shift: f64) -> Self {
         Self {
             precision: self.precision,
@@ -46,7 +46,7 @@ impl Factor<Pack> {
         }
     }
 
-    /// The factors of t if these are the factors of t + ε, with normal ε of variance `noise`.
+    /// Returns the factors of t if these are the factors of t + ε, with normal ε of variance `noise`.
     #[inline(always)]
     pub(super) fn blurred(self, noise: f64) -> Self {
         if noise == 0.0 {
@@ -61,7 +61,7 @@ impl Factor<Pack> {
 }
 
 impl Ranges {
-    /// Ranges of no width at 0.
+    /// Zero-width ranges at 0.
     pub(super) const NONE: Self = Self {
         lowest: Pack::ZERO,
         highest: Pack::ZERO,
@@ -74,7 +74,7 @@ impl Ranges {
         self.middle.set(lane, range.middle());
     }
 
-    /// The nearest values within the ranges; their middles for NaN.
+    /// Clamps to the ranges; their middles for NaN.
     #[inline(always)]
     pub(super) fn clamp(&self, values: Pack) -> Pack {
         let raised = self.lowest.max(values);
@@ -86,13 +86,13 @@ impl Ranges {
 #[derive(Clone, Debug)]
 pub(super) struct Component {
     centre: Vec<f64>,
-    /// L without what is above the diagonal, row by row.
+    /// L without the entries above the diagonal, row by row.
     root: Vec<f64>,
     /// ln det L.
     log_determinant: f64,
 }
 
-/// An even mixture of Gaussians.
+/// An equally weighted mixture of Gaussians.
 #[derive(Clone, Debug)]
 pub(super) struct Mixture {
     components: Vec<Component>,
@@ -104,7 +104,7 @@ fn place(i: usize, j: usize) -> usize {
 }
 
 impl Component {
-    /// From J (row by row, as wide as `centre` is long); `None` where numbers overflow.
+    /// Computes the component from J (row by row, as wide as `centre` is long); `None` if numbers overflow.
     pub(super) fn new(centre: &[f64], jacobian: &[f64], least: f64) -> Option<Self> {
         let d = centre.len();
         let mut root = vec![0.0; place(d, 0)];
@@ -114,7 +114,7 @@ impl Component {
                 (entries.iter_mut().zip(row)).for_each(|(entry, value)| *entry += row[i] * value);
             }
         }
-        // Cholesky's factorisation in place.
+        // Cholesky factorisation in place.
         let mut log_determinant = 0.0;
         for i in 0..d {
             root[place(i, i)] += least;
@@ -123,7 +123,7 @@ impl Component {
                 let sum: f64 = (0..j).map(|k| root[of_i + k] * root[of_j + k]).sum();
                 let rest = root[of_i + j] - sum;
                 if i == j {
-                    // Rounding of a large sum may take what `least` added.
+                    // Rounding of a large sum may cancel the contribution of `least`.
                     let pivot = rest.max(least).sqrt();
                     log_determinant += pivot.ln();
                     root[of_i + i] = pivot;
@@ -167,7 +167,7 @@ impl Component {
         x
     }
 
-    /// Logarithm of the density, except for the factor √(2π) of each variable, in room for a vector.
+    /// Logarithm of the density, without the factor √(2π) of each variable; uses a vector as scratch.
     fn log_density(&self, x: &[f64], product: &mut [f64]) -> f64 {
         product.fill(0.0);
         let mut begin = 0;
@@ -197,7 +197,7 @@ impl Mixture {
         self.components[component].draw(rng)
     }
 
-    /// Logarithm of the density, except for the factor √(2π) of each variable.
+    /// Logarithm of the density, without the factor √(2π) of each variable.
     pub(super) fn log_density(&self, x: &[f64]) -> f64 {
         let mut apart = vec![0.0; x.len()];
         let logs: Vec<f64> = self

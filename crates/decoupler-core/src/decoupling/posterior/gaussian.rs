@@ -10,9 +10,9 @@ use crate::decoupling::row_problem::Range;
 
 /// Gaussians in square-root form, one in each lane: mean and a factor L of the covariance `Σ = L Lᵀ`.
 ///
-/// Precision matrices square the condition number of the equations; at a noise near rounding nothing would be left of
-/// what the other factors add. L comes from a QR decomposition of the equations themselves, and factors that are added
-/// later update L, not Σ (Potter's square-root filter; Bierman, Factorization Methods for Discrete Sequential
+/// Precision matrices square the condition number of the equations; at a noise near rounding, the contributions of
+/// the other factors would be lost. L comes from a QR decomposition of the equations themselves, and factors that are
+/// added later update L, not Σ (Potter's square-root filter; Bierman, Factorization Methods for Discrete Sequential
 /// Estimation, 1977, section V.2). Variances are sums of squares.
 #[derive(Clone, Debug, Default)]
 pub(super) struct RowPosteriors {
@@ -20,19 +20,19 @@ pub(super) struct RowPosteriors {
     mean: Vec<Pack>,
     /// L, row by row: unknowns × unknowns.
     root: Vec<Pack>,
-    /// Lᵀa of the direction that was asked for last.
+    /// Lᵀa of the last requested direction.
     along: Vec<Pack>,
     /// Number of equations, without those of single unknowns.
     equations: usize,
-    /// `[A, b]`, column by column; below the equations there is room for one of each unknown.
+    /// `[A, b]`, column by column; with room below the equations for one equation of each unknown.
     columns: Vec<Pack>,
     /// c of the linear term.
     linear: Vec<Pack>,
-    /// Equations of single unknowns: coefficient and right side.
+    /// Equations of single unknowns: coefficient and right-hand side.
     singles: Vec<(Pack, Pack)>,
-    /// Unknown of each column.
+    /// Unknown that belongs to each column.
     order: Vec<[usize; LANES]>,
-    /// Squared norms of what is left of the columns.
+    /// Squared norms of the remaining columns.
     squares: Vec<Pack>,
     /// A row of L, and Qᵀb + Lᵀc.
     row: Vec<Pack>,
@@ -49,7 +49,7 @@ pub(super) enum Direction<'a> {
 }
 
 impl RowPosteriors {
-    /// Makes room for this many equations of all unknowns.
+    /// Allocates space for this many equations of all unknowns.
     pub(super) fn make_room(&mut self, unknowns: usize, equations: usize) {
         if (self.unknowns, self.equations) == (unknowns, equations) {
             return;
@@ -71,13 +71,13 @@ impl RowPosteriors {
         }
     }
 
-    /// Sets coefficient `column` of an equation in `lane`, or its right side, which comes after all unknowns.
+    /// Sets coefficient `column` of an equation in `lane`, or its right-hand side, which follows all unknowns.
     pub(super) fn set_entry(&mut self, lane: usize, equation: usize, column: usize, value: f64) {
         let height = self.equations + self.unknowns;
         self.columns[column * height + equation].set(lane, value);
     }
 
-    /// Sets the equation of a single unknown in `lane`: coefficient and right side.
+    /// Sets the equation of a single unknown in `lane`: coefficient and right-hand side.
     pub(super) fn set_single(&mut self, lane: usize, unknown: usize, (coefficient, right): (f64, f64)) {
         let single = &mut self.singles[unknown];
         single.0.set(lane, coefficient);
@@ -89,10 +89,10 @@ impl RowPosteriors {
         self.linear[unknown].set(lane, value);
     }
 
-    /// Finds `p(x) ∝ exp(−½ ‖A x − b‖² + cᵀ x)`. Returns 0 where the equations determine all of x, NaN elsewhere.
-    ///
-    /// Householder's method with column pivoting, which is stable row by row when the rows differ in size by many
-    /// decades (Cox and Higham 1998). The equation of a single unknown has no part in a reflection before its column's.
+    /// Finds `p(x) ∝ exp(−½ ‖A x − b‖² + cᵀ x)`. Returns 0 where the equations determine all of x, and NaN elsewhere.
+    /// Householder's method with column pivoting, which is row-wise stable when the rows differ in size by many
+    /// decades (Cox and Higham 1998). The equation of a single unknown takes part only from the reflection of its own
+    /// column on.
     #[inline(always)]
     pub(super) fn factor(&mut self) -> Pack {
         let (n, m) = (self.unknowns, self.equations);
@@ -107,7 +107,7 @@ impl RowPosteriors {
         let mut defects = Pack::ZERO;
         for k in 0..n {
             self.pivot(k);
-            // The column's own equation comes last; those of others have a 0 in it.
+            // The column's own equation is last; those of other columns have a 0 there.
             let (single, right) = self.singles[k];
             let rows = k..m + k + 1;
             let (done, rest) = self.columns.split_at_mut((k + 1) * height);
@@ -131,14 +131,14 @@ impl RowPosteriors {
             let column = &mut rest[(n - k - 1) * height..][rows];
             let product = -(scale * dot(reflector, column));
             add(column, product, reflector);
-            // The reciprocal, which is what R is divided by.
+            // The reciprocal, since R is divided by it.
             reflector[0] = Pack::ONE / diagonal;
         }
         self.invert();
         defects
     }
 
-    /// Moves the largest of the columns from `k` on to place `k` in each lane.
+    /// Moves the largest of the columns from `k` on to position `k` in each lane.
     #[inline(always)]
     fn pivot(&mut self, k: usize) {
         let (n, height, rows) = (self.unknowns, self.equations + self.unknowns, self.equations + k);
@@ -204,7 +204,7 @@ impl RowPosteriors {
         }
     }
 
-    /// Means and variances along `direction`.
+    /// Returns means and variances along `direction`.
     #[inline(always)]
     pub(super) fn marginals(&mut self, direction: Direction<'_>) -> (Pack, Pack) {
         let n = self.unknowns;
@@ -224,8 +224,8 @@ impl RowPosteriors {
         (mean, dot(&self.along, &self.along))
     }
 
-    /// Multiplies by the `factors` of t, which is along the direction of the last [`Self::marginals`], which gave `means` and
-    /// `variances`. Returns what is above 0 and finite where that leaves a Gaussian.
+    /// Multiplies by the `factors` of t along the direction of the last [`Self::marginals`], which returned `means`
+    /// and `variances`. Returns a value that is above 0 and finite where the result is a Gaussian.
     #[inline(always)]
     pub(super) fn multiply(&mut self, means: Pack, variances: Pack, factors: Factor<Pack>) -> Pack {
         let Factor { precision, linear } = factors;
@@ -260,35 +260,34 @@ fn swap(lane: usize, a: &mut Pack, b: &mut Pack) {
     b.set(lane, value);
 }
 
-/// A linear model whose unknowns, and some of whose readings, are known to lie in ranges:
-/// `p(x) ∝ exp(−½ ‖A x − b‖² + cᵀ x)` for x within its ranges, times `P(fₖ·x + εₖ in range k)` for each rounded reading, with
-/// standard normal ε.
+/// A linear model whose unknowns, and some of whose readings, are known to be in ranges: `p(x) ∝ exp(−½ ‖A x − b‖² +
+/// cᵀ x)` for x within its ranges, times `P(fₖ·x + εₖ in range k)` for each rounded reading, with standard normal ε.
 ///
-/// Its moments have no closed form in several dimensions. They are found by expectation propagation (Minka 2001;
-/// Cunningham, Hennig and Lacoste-Julien 2011 for ranges): each range is replaced by a Gaussian factor such that its
-/// marginal keeps mean and variance. Tests compare with sampling.
+/// Its moments have no closed form in several dimensions. They are approximated by expectation propagation (Minka
+/// 2001; Cunningham, Hennig and Lacoste-Julien 2011 for ranges): each range is replaced by a Gaussian factor that
+/// preserves the mean and variance of its marginal. Tests compare with sampling.
 #[derive(Clone, Debug, Default)]
 pub(super) struct LinearModel {
     /// `[A, b]`, row by row.
     pub(super) equations: Vec<f64>,
     /// c, one for each unknown.
     pub(super) linear: Vec<f64>,
-    /// Ranges of the unknowns, possibly open to one side or both.
+    /// Ranges of the unknowns, possibly open on one side or both.
     pub(super) ranges: Vec<Range>,
     /// The rounded readings.
     pub(super) rounded: Vec<RoundedReading>,
-    /// Factors with which those of the unknowns begin; empty if they begin with the moments of their ranges.
+    /// Initial factors of the unknowns; if empty, those with the moments of their ranges.
     pub(super) first_factors: Vec<Factor>,
     /// Change of a mean, relative to the range, below which the factors have converged.
     pub(super) tolerance: f64,
 }
 
-/// A reading of which only the interval is known.
+/// A reading that is only known to be in an interval.
 #[derive(Clone, Debug)]
 pub(super) struct RoundedReading {
     /// f, one coefficient for each unknown.
     pub(super) form: Vec<f64>,
-    /// Middle of the interval less the reading expected at x = 0, in standard deviations of ε.
+    /// Middle of the interval minus the reading expected at x = 0, in standard deviations of ε.
     pub(super) misfit: f64,
     /// The interval, in standard deviations of ε.
     pub(super) range: Range,
@@ -307,12 +306,12 @@ pub(super) struct LinearisedPosterior {
     at: Point,
     pub(super) marginals: Marginals,
     pub(super) means: Point,
-    /// w that the linearisation expects at the means.
+    /// w predicted by the linearisation at the means.
     pub(super) misfits: Vec<f64>,
 }
 
 impl LinearisedPosterior {
-    /// Appends the factors of the ranges, for displacements measured from another point.
+    /// Appends the factors of the ranges, for displacements relative to another point.
     fn append_factors(&self, factors: &mut Vec<Factor>, at: &Point, widths: &[f64]) {
         let points = at.displacements_mm.iter().zip(&self.at.displacements_mm);
         let shifts = points.zip(widths).map(|((to, from), width)| (to - from) / width);
@@ -322,8 +321,9 @@ impl LinearisedPosterior {
 }
 
 impl Posterior {
-    /// Makes `model` the equations of row-wire `row` linearised at a point, where they were evaluated, with a factor of the
-    /// noise. Expectation propagation begins with the factors of an earlier linearisation, if there was one.
+    /// Sets `model` to the equations of row-wire `row` linearised at a point, where they were evaluated, with a
+    /// factor of the noise. Expectation propagation starts from the factors of an earlier linearisation, if there is
+    /// one.
     pub(super) fn linearise(
         &self,
         model: &mut LinearModel,
@@ -356,7 +356,7 @@ impl Posterior {
         }
     }
 
-    /// The posterior with these `marginals` of the `model` linearised at `at` with `blur` times the noise.
+    /// Returns the posterior with these `marginals` of the `model` linearised at `at` with `blur` times the noise.
     pub(super) fn linearised(
         &self,
         model: &LinearModel,
@@ -388,7 +388,7 @@ impl Posterior {
         self.displacements_mm(&found.at, medians(&found.marginals.of_unknowns).into_iter())
     }
 
-    /// Displacements within their ranges from x = (displacement − present) / width.
+    /// Displacements, clamped to their ranges, from x = (displacement − current) / width.
     fn displacements_mm(&self, at: &Point, x: impl Iterator<Item = f64>) -> Vec<f64> {
         let places = x.zip(&at.displacements_mm).zip(&self.widths).zip(&self.ranges);
         places

@@ -10,12 +10,12 @@ use super::{
 };
 use crate::{decoupling::LARGEST_ERROR, scene::normal_cdf};
 
-/// A row on its way to its answer: the equations are linearised again at each mean.
+/// Iteration of a row towards its answer: the equations are relinearised at each mean.
 ///
-/// Where the error of a linearisation is large next to the noise, as far from the answer with little noise, the noise
-/// is blurred to about that error: the answer is approached from a posterior that can hold it.
+/// If the linearisation error is large compared with the noise, as happens far from the answer with little noise, the
+/// noise is inflated to about that error, so that the posterior can contain the answer.
 struct Approach {
-    /// Index among the rows that are solved.
+    /// Index among the rows to be solved.
     index: usize,
     /// Row-wire.
     row: usize,
@@ -23,9 +23,9 @@ struct Approach {
     max_steps: usize,
     steps: usize,
     rounds: usize,
-    /// Factor of the noise in the linearisation at `at`.
+    /// Factor by which the noise is inflated in the linearisation at `at`.
     blur: f64,
-    /// Misfits there, and as the linearisation before expected them.
+    /// Misfits at `at`, and those predicted by the previous linearisation.
     misfits: Vec<f64>,
     expected: Option<Vec<f64>>,
     last: Option<LinearisedPosterior>,
@@ -36,15 +36,15 @@ struct Approach {
 
 /// Change of a mean, relative to the range, below which the linearisation has converged.
 const LINEARISED_TOLERANCE: f64 = 1e-5;
-/// Change of a mean up to which the first linearisation is followed, which is far from the answer.
+/// Tolerance of the first linearisation, which is far from the answer.
 const FIRST_TOLERANCE: f64 = 1e-3;
-/// Error of a linearisation, in standard deviations of the readings, up to which it needs no blur.
+/// Linearisation error, in standard deviations of the readings, up to which the noise is not inflated.
 const TOLERATED_MISFIT: f64 = 1e4;
-/// Error of a linearisation in proportion to the change of the readings, before it is known.
+/// Assumed linearisation error, relative to the change of the readings, before it is known.
 const CURVATURE: f64 = 0.1;
 
 impl Approach {
-    /// From `first` on, by at most this many steps.
+    /// Starts from `first`, with at most this many steps.
     fn new((index, row): (usize, usize), first: Vec<f64>, max_steps: usize) -> Self {
         Self {
             index,
@@ -71,7 +71,7 @@ impl Approach {
         self.steps == 0 && self.max_steps > 1
     }
 
-    /// Makes `model` the linearisation at the place where the equations of the row were evaluated.
+    /// Sets `model` to the linearisation at the point where the equations of the row were evaluated.
     fn linearise(&mut self, posterior: &Posterior, model: &mut LinearModel) {
         let Posterior {
             likelihood, problem, ..
@@ -94,7 +94,8 @@ impl Approach {
         model.tolerance = if self.is_rough() { FIRST_TOLERANCE } else { TOLERANCE };
     }
 
-    /// Moves to the mean of the linearised `model`. Returns `true` where the row has arrived, or can go no further.
+    /// Moves to the mean of the linearised `model`. Returns `true` if the row has converged or cannot improve
+    /// further.
     fn follow(&mut self, posterior: &Posterior, model: &LinearModel, marginals: Option<Marginals>) -> bool {
         let is_rough = self.is_rough();
         self.steps += 1;
@@ -142,9 +143,9 @@ impl Approach {
 }
 
 impl Posterior {
-    /// Solves `rows` side by side, each from where it is to `begin` by its coordinates in `coordinates_mm` (rows × 3·M2) and
-    /// in at most this many steps; where one has arrived, the next begins. Replaces the coordinates by the medians and returns
-    /// the report on each row.
+    /// Solves `rows` side by side, each from its start, which `begin` computes from its coordinates in
+    /// `coordinates_mm` (rows × 3·M2), in at most this many steps; when one has finished, the next starts. Replaces
+    /// the coordinates by the medians and returns the report on each row.
     pub(super) fn iterate(
         &mut self,
         (rows, max_steps): (&[usize], usize),
@@ -193,7 +194,7 @@ impl Posterior {
         }
     }
 
-    /// Writes the medians of a row that has arrived, and reports on it.
+    /// Writes the medians of a finished row and returns its report.
     fn answer(&mut self, approach: Approach, readings_ohm: &[f64], coordinates_mm: &mut [f64]) -> PosteriorReport {
         let answer = match &approach.last {
             Some(last) => self.medians_mm(last),
@@ -221,8 +222,8 @@ impl Posterior {
     }
 }
 
-/// Share of step number `steps` that is taken: all of the first ones, which nearly always arrive, then less, lest means go
-/// in a cycle.
+/// Fraction of step number `steps` that is taken: full first steps, which nearly always converge, then shorter ones
+/// to prevent cycles.
 fn share_of_step(steps: usize) -> f64 {
     match steps {
         ..=5 => 1.0,
@@ -240,15 +241,15 @@ fn rms(values: impl Iterator<Item = f64>) -> f64 {
     (squares / f64::from(count)).sqrt()
 }
 
-/// Precision of a uniform distribution over a range, in widths of the range.
+/// Precision of the uniform distribution over a range, in units of the range's width.
 const UNIFORM_PRECISION: f64 = 12.0;
 
 impl Posterior {
-    /// Returns −2 ln p(m | row) of the readings m (rows × M4) for each of `rows`, up to a constant that all row-wires share,
-    /// by Laplace's approximation at the answers of [`Self::solve_rows`] (rows × 3·M2) and at their gains.
+    /// Returns −2 ln p(m | row) of the readings m (rows × M4) for each of `rows`, up to a constant common to all
+    /// row-wires, by Laplace's approximation at the answers of [`Self::solve_rows`] (rows × 3·M2) and at their gains.
     ///
-    /// The evidence integrates over the deformation and the gain of the snapshot, so a row-wire is neither preferred for
-    /// a gain that is unlikely, nor for deformations that few of its own would resemble (MacKay 2003, section 28.1).
+    /// The evidence integrates over the deformation and the gain of the snapshot, so a row-wire is preferred neither
+    /// for an unlikely gain nor for deformations that are atypical of it (MacKay 2003, section 28.1).
     pub(in crate::decoupling) fn surprises(
         &mut self,
         rows: &[usize],
@@ -280,7 +281,7 @@ impl Posterior {
         let rounded = model.rounded.iter().map(|reading| -2.0 * reading.log_probability());
         let equations = model.equations.chunks_exact(unknowns + 1);
         let squares = equations.clone().map(|row| row[unknowns] * row[unknowns]);
-        // Rows of a Gaussian prior come last, and have the root of its precision on their diagonal.
+        // Rows of a Gaussian prior are last, with the root of its precision on their diagonal.
         let own = self.problem.equations() - model.rounded.len() + usize::from(self.likelihood.has_drift());
         let of_prior = equations.clone().skip(own).enumerate();
         let log_prior_root: f64 = of_prior.map(|(place, row)| row[place].abs().ln()).sum();
@@ -307,8 +308,8 @@ impl Posterior {
     }
 }
 
-/// ln det of a symmetric positive definite matrix, whose eigenvalues are no smaller than their rounding; NaN if they are not
-/// found.
+/// ln det of a symmetric positive definite matrix, with eigenvalues bounded below by their rounding; NaN if they are
+/// not found.
 fn log_determinant(matrix: Mat<f64>) -> f64 {
     let Ok(values) = matrix.self_adjoint_eigenvalues(faer::Side::Lower) else {
         return f64::NAN;
@@ -318,13 +319,14 @@ fn log_determinant(matrix: Mat<f64>) -> f64 {
 }
 
 impl RoundedReading {
-    /// ln of the probability that a standard normal value, added to what is expected at x = 0, is within the interval.
+    /// ln of the probability that a standard normal value, added to the reading expected at x = 0, is within the
+    /// interval.
     fn log_probability(&self) -> f64 {
         let (low, high) = (self.range.lowest, self.range.highest);
         log_probability(low, high)
     }
 
-    /// Reciprocal of the variance of the reading: of ε and of its place within the interval, which counts as uniform.
+    /// Reciprocal of the variance of the reading: of ε and of its position within the interval, assumed uniform.
     fn weight(&self) -> f64 {
         let half_width = 0.5 * (self.range.highest - self.range.lowest);
         1.0 / (1.0 + half_width * half_width / 3.0)
@@ -333,10 +335,10 @@ impl RoundedReading {
 
 /// ln P(low < ε < high) of a standard normal ε.
 pub(super) fn log_probability(low: f64, high: f64) -> f64 {
-    /// Beyond this the tail is known by its asymptote, to a part in 1000.
+    /// Beyond this value the asymptote of the tail is accurate to 1 in 1000.
     const FAR: f64 = 30.0;
     let log_density = |x: f64| -0.5 * x * x - 0.5 * std::f64::consts::TAU.ln();
-    // The mirror image of an interval most of which is below 0: its tail does not cancel.
+    // Mirrors an interval that is mostly below 0, to avoid cancellation in its tail.
     let (low, high) = (low.max(-high), high.max(-low));
     let width = high - low;
     if width * low.abs().max(1.0) < 1e-4 {
@@ -352,7 +354,7 @@ pub(super) fn log_probability(low: f64, high: f64) -> f64 {
 mod tests {
     use super::*;
 
-    /// Values of scipy.stats.norm.logcdf and logsf.
+    /// Values from scipy.stats.norm.logcdf and logsf.
     #[test]
     fn probabilities_of_intervals_are_those_of_the_normal_distribution() {
         for (low, high, expected) in [

@@ -8,24 +8,24 @@ use crate::{
     scene::{NoiseSource, normal_cdf},
 };
 
-/// The likelihood of the readings of one row-wire, linearised.
+/// Linearised likelihood of the readings of one row-wire.
 ///
 /// With R(u) the resistances and γ = 1 + drift · η the gain of the snapshot, a reading m before rounding is normal about
 /// P = γ R(u) with standard deviation σ = √((relative · P)² + additive²), truncated to m > 0:
 ///
 /// `ln p(m|u,η) = −½ w² − ln σ(P) − ln Φ(P/σ(P)),   w = (m − P)/σ(P)`.
 ///
-/// w is nearly linear in u: with relative noise it is conductance, up to constants. The two normalising terms, which are
-/// there because σ depends on u, are linearised as well. η is one more unknown, with a standard normal prior.
+/// w is nearly linear in u: with relative noise it is the conductance, up to constants. The two normalising terms,
+/// which depend on u through σ, are linearised as well. η is one more unknown, with a standard normal prior.
 ///
-/// No noise is less than the rounding of the readings. Of a reading that a converter rounded, the interval is known in
-/// which it was before: w counts as the distance from the middle of the step, and the normalising term fades as the step
-/// grows beyond σ.
+/// The noise is at least the rounding of the readings. A reading that a converter rounded is known to lie in an
+/// interval: w is then the distance from the middle of the step, and the normalising term vanishes as the step grows
+/// beyond σ.
 #[derive(Clone, Debug)]
 pub(super) struct Likelihood {
     noise: NoiseSource,
     rounding: f64,
-    /// Noise in proportion to the resistance, with the rounding.
+    /// Relative noise, including the rounding.
     relative: f64,
 }
 
@@ -45,7 +45,7 @@ impl Likelihood {
         }
     }
 
-    /// The same with readings rounded to a part of `parts` of what they are taken to be rounded to.
+    /// Returns the same likelihood for readings rounded to 1/`parts` of the assumed rounding.
     pub(super) fn rounded_finer(&self, parts: f64) -> Self {
         Self::rounded(self.noise, self.rounding / parts)
     }
@@ -63,19 +63,19 @@ impl Likelihood {
         }
     }
 
-    /// The most likely η of readings whose resistances the evaluated `problem` has.
+    /// Returns the most likely η for readings, given the resistances of the evaluated `problem`.
     pub(super) fn likeliest_drift(&self, problem: &RowProblem) -> f64 {
         let pairs =
             (0..problem.equations()).map(|reading| (problem.reading_ohm(reading), problem.resistance_ohm(reading)));
         self.likeliest_drift_of(pairs)
     }
 
-    /// As [`Self::likeliest_drift`], of pairs of readings and resistances.
+    /// As [`Self::likeliest_drift`], for pairs of readings and resistances.
     pub(super) fn likeliest_drift_of(&self, pairs: impl Iterator<Item = (f64, f64)>) -> f64 {
         let drift = self.noise.drift();
         let (mut precision, mut linear) = (1.0, 0.0);
         for (reading_ohm, ohm) in pairs {
-            // Noise as at gain 1; all readings see the same gain.
+            // Noise as at gain 1; all readings share the same gain.
             let deviation_ohm = self.deviation_ohm(ohm);
             let slope = drift * ohm / deviation_ohm;
             precision += slope * slope;
@@ -84,8 +84,8 @@ impl Likelihood {
         (linear / precision).max(-(1.0 - SMALLEST_GAIN) / drift)
     }
 
-    /// ln p(readings | resistances, η), of pairs of readings and resistances, without approximation; −∞ at gains of 0 and
-    /// less.
+    /// ln p(readings | resistances, η), for pairs of readings and resistances, without approximation; −∞ for gains of
+    /// 0 and below.
     pub(super) fn log_density(&self, drift: f64, pairs: impl Iterator<Item = (f64, f64)>) -> f64 {
         let gain = 1.0 + self.noise.drift() * drift;
         if gain <= 0.0 {
@@ -115,7 +115,7 @@ impl Likelihood {
         if sum.is_nan() { f64::NEG_INFINITY } else { sum }
     }
 
-    /// w of every reading, and −∂w/∂ ln P, to shape proposals: the width of a step of a converter counts as noise.
+    /// w of every reading, and −∂w/∂ ln P, for proposals: the width of a converter step counts as noise.
     pub(super) fn misfits_and_scales(&self, problem: &RowProblem, drift: f64) -> (Vec<f64>, Vec<f64>) {
         let gain = self.gain(drift);
         let of_reading = |reading| {
@@ -147,7 +147,7 @@ impl Likelihood {
         }
     }
 
-    /// w of every reading, with the residuals of the evaluated `problem`.
+    /// w of every reading, from the residuals of the evaluated `problem`.
     pub(super) fn misfits(&self, problem: &RowProblem, drift: f64) -> impl Iterator<Item = f64> {
         let gain = self.gain(drift);
         let misfit = move |reading| {
@@ -157,15 +157,16 @@ impl Likelihood {
         (0..problem.equations()).map(misfit)
     }
 
-    /// m/(γR) − 1 of every reading m, with the resistances R of the evaluated `problem`.
+    /// m/(γR) − 1 of every reading m, from the resistances R of the evaluated `problem`.
     pub(super) fn relative_misfits(&self, problem: &RowProblem, drift: f64) -> impl Iterator<Item = f64> {
         let gain = self.gain(drift);
         (0..problem.equations())
             .map(move |reading| problem.reading_ohm(reading) / (gain * problem.resistance_ohm(reading)) - 1.0)
     }
 
-    /// 2 Σ ln(σ(P) Φ(P/σ(P))) over readings, with the resistances of the evaluated `problem`: what a likelihood has next to its
-    /// exponent, except for constants. σ(P) is left out for readings that a converter rounded, whose likelihood is a probability.
+    /// 2 Σ ln(σ(P) Φ(P/σ(P))) over readings, from the resistances of the evaluated `problem`: the log-likelihood
+    /// apart from its exponent and constants. σ(P) is omitted for readings that a converter rounded, whose likelihood
+    /// is a probability.
     pub(super) fn log_normalisers(&self, problem: &RowProblem, drift: f64) -> f64 {
         let gain = self.gain(drift);
         let of_reading = |reading| {
@@ -182,8 +183,9 @@ impl Likelihood {
         (1.0 + self.noise.drift() * drift).max(SMALLEST_GAIN)
     }
 
-    /// Makes `model` the likelihood linearised where `problem` was evaluated, without priors and ranges, for unknowns
-    /// x = (displacement − present) / width, and η − `drift` if there is drift. Every σ is `blur` times what it is.
+    /// Sets `model` to the likelihood linearised where `problem` was evaluated, without priors and ranges, for
+    /// unknowns x = (displacement − current) / width, and η − `drift` if there is drift. Every σ is multiplied by
+    /// `blur`.
     pub(super) fn linearise(
         &self,
         model: &mut LinearModel,
@@ -205,7 +207,7 @@ impl Likelihood {
             let deviation_ohm = blur * own_ohm;
             let interval_ohm = self.noise.rounded_from_ohm(read_ohm);
             let weight = interval_ohm.map_or(1.0, |(lowest, highest)| narrowness(0.5 * (highest - lowest) / own_ohm));
-            // Shares of σ² that grow with the reading, and that do not.
+            // Parts of σ² that grow with the reading, and that do not.
             let additive = (self.noise.additive_ohm() / own_ohm).powi(2);
             let relative = weight * (1.0 - additive).max(0.0);
             let scale = predicted_ohm / deviation_ohm;
@@ -218,7 +220,7 @@ impl Likelihood {
                 0.0
             };
             let normalising = -relative - truncation;
-            // ∂ ln P/∂x: −∂ ln s/∂x for what moves.
+            // ∂ ln P/∂x: −∂ ln s/∂x for moving axes.
             let slopes = problem.log_conductance_slopes(reading);
             for ((value, of_unknown), &width) in form.iter_mut().zip(slopes).zip(widths) {
                 *value = -of_unknown * width;
@@ -253,7 +255,7 @@ impl Likelihood {
     }
 }
 
-/// Misfits expected at `x`, as [`Likelihood::misfits`] gives them, by a `model` linearised with `blur`.
+/// Misfits expected at `x`, as [`Likelihood::misfits`] returns them, for a `model` linearised with `blur`.
 pub(super) fn expected_misfits(model: &LinearModel, readings: usize, x: &[Marginal], blur: f64) -> Vec<f64> {
     let product = |form: &[f64]| -> f64 { form.iter().zip(x).map(|(value, x)| value * x.mean).sum() };
     if model.rounded.is_empty() {
@@ -266,11 +268,11 @@ pub(super) fn expected_misfits(model: &LinearModel, readings: usize, x: &[Margin
     }
 }
 
-/// Gain below which none is sought.
+/// Min gain considered.
 const SMALLEST_GAIN: f64 = 1e-6;
 
-/// `−∂ ln P/∂ ln σ` of the probability of an interval of `half_width` standard deviations either side of the mean: 1 for a
-/// narrow one, which is a density, and 0 for a wide one.
+/// `−∂ ln P/∂ ln σ` of the probability of an interval of `half_width` standard deviations on either side of the mean:
+/// 1 for a narrow one, which is a density, and 0 for a wide one.
 fn narrowness(half_width: f64) -> f64 {
     let probability = libm::erf(half_width * std::f64::consts::FRAC_1_SQRT_2);
     let edges = 2.0 * half_width * density(half_width);
@@ -281,7 +283,7 @@ fn narrowness(half_width: f64) -> f64 {
     }
 }
 
-/// φ(x)/Φ(x) for x of 0 or more.
+/// φ(x)/Φ(x) for x ≥ 0.
 fn inverse_mills(x: f64) -> f64 {
     density(x) / normal_cdf(x)
 }

@@ -26,29 +26,30 @@ use crate::{
     sensor::{SensorError, SensorModel},
 };
 
-/// Newton's method with noise and prior: iterates the posterior of the linearised equations, cut to the range of every
-/// unknown, and answers with its median, the answer of the least expected distance.
+/// Newton's method with noise and prior: iterates the posterior of the linearised equations, truncated to the range
+/// of every unknown, and answers with its median, which has the min expected absolute error.
 ///
-/// With noise, the single best deformation is a poor answer: it lies in a corner of the possible ones. The posterior
-/// weighs all deformations that explain the readings. Without noise the rounding of the readings takes its place: most
-/// sensors then leave next to nothing unknown, but some deformations are seen so badly that rounding hides them.
+/// With noise, the single best deformation is a poor answer: it is in a corner of the possible ones. The posterior
+/// includes all deformations that explain the readings. Without noise, the rounding of the readings takes its place:
+/// most sensors then leave next to nothing undetermined, but some deformations are so ill-conditioned that rounding
+/// hides them.
 #[derive(Clone, Debug)]
 pub struct Posterior {
     problem: RowProblem,
     ranges: Vec<Range>,
     widths: Vec<f64>,
     rows: Vec<usize>,
-    /// One for each row, cut to the ranges; none where nodes move on their own, uniformly within their ranges.
+    /// One per row, truncated to the ranges; empty if nodes move independently and uniformly within their ranges.
     priors: Vec<GaussianPrior>,
     likelihood: Likelihood,
     propagation: Propagation,
-    /// Rounds that each of the rows took when it was last solved: those that take the most begin.
+    /// EP sweeps of each row when it was last solved: the slowest rows start first.
     rounds: Vec<usize>,
 }
 
-/// A standard deviation, in proportion to the range, below which no pattern is taken as known beforehand.
+/// Min prior standard deviation of a pattern, relative to the range.
 const SMALLEST_SPREAD: f64 = 1e-3;
-/// Largest number of linearisations. Six do as a rule, for conductance is nearly linear.
+/// Max number of linearisations. Usually six are enough, since conductance is nearly linear.
 const STEPS: usize = 60;
 
 impl Posterior {
@@ -56,7 +57,7 @@ impl Posterior {
     /// without closed form.
     ///
     /// # Errors
-    /// A sensor without resistances at rest.
+    /// If the sensor has no resistances at rest.
     pub fn new(model: &SensorModel, scene: &Scene, rows: &[usize], rng: &mut impl Rng) -> Result<Self, SensorError> {
         let ranges = ranges(model, scene);
         Ok(Self {
@@ -74,13 +75,13 @@ impl Posterior {
         })
     }
 
-    /// About how many bytes the priors of this many rows take while they are estimated.
+    /// Approximate number of bytes for estimating the priors of this many rows.
     pub(crate) fn prior_bytes(scene: &Scene, rows: usize, unknowns_per_row: usize) -> u64 {
         GaussianPrior::bytes(scene.loading, rows, unknowns_per_row)
     }
 
-    /// The same posterior of readings rounded to a part of `parts` of what they are taken to be rounded to: how finely they
-    /// are is known to its order of magnitude only.
+    /// Returns the posterior for readings rounded to 1/`parts` of the assumed rounding, which is known only to its
+    /// order of magnitude.
     pub(crate) fn rounded_finer(&self, parts: f64) -> Self {
         Self {
             likelihood: self.likelihood.rounded_finer(parts),
@@ -88,13 +89,13 @@ impl Posterior {
         }
     }
 
-    /// Decodes one row-wire of those given, from its readings in ohm (M4); writes absolute coordinates (3·M2).
+    /// Decodes one of the given row-wires from its readings in ohm (M4); writes absolute coordinates (3·M2).
     ///
     /// # Errors
-    /// Readings that are no resistances.
+    /// If a reading is not a resistance.
     ///
     /// # Panics
-    /// If `row` is none of the rows given.
+    /// If `row` is not one of the given rows.
     pub fn solve(
         &mut self,
         row: usize,
@@ -104,14 +105,14 @@ impl Posterior {
         Ok(self.solve_rows(&[row], readings_ohm, coordinates_mm)?[0])
     }
 
-    /// As [`Self::solve`], several rows side by side (rows × M4 readings, rows × 3·M2 coordinates): each has the same bits as
-    /// by itself.
+    /// As [`Self::solve`], for several rows side by side (rows × M4 readings, rows × 3·M2 coordinates), with
+    /// bit-identical results.
     ///
     /// # Errors
-    /// Readings that are no resistances; the error names their place among the rows.
+    /// If a reading is not a resistance; the error contains its index among the rows.
     ///
     /// # Panics
-    /// If one of `rows` is none of the rows given.
+    /// If one of `rows` is not one of the given rows.
     pub(super) fn solve_rows(
         &mut self,
         rows: &[usize],
@@ -124,14 +125,14 @@ impl Posterior {
         Ok(self.iterate((rows, STEPS), readings_ohm, coordinates_mm, from_middle))
     }
 
-    /// As [`Self::solve`], by at most `steps` steps from the answer of another decoder in `coordinates_mm`, which is
+    /// As [`Self::solve`], in at most `steps` steps from the answer of another decoder in `coordinates_mm`, which is
     /// replaced.
     ///
     /// # Errors
-    /// Readings that are no resistances.
+    /// If a reading is not a resistance.
     ///
     /// # Panics
-    /// If `row` is none of the rows given.
+    /// If `row` is not one of the given rows.
     pub fn polish(
         &mut self,
         row: usize,
@@ -142,13 +143,13 @@ impl Posterior {
         Ok(self.polish_rows(&[row], readings_ohm, coordinates_mm, steps)?[0])
     }
 
-    /// As [`Self::polish`], several rows side by side, as in [`Self::solve_rows`].
+    /// As [`Self::polish`], for several rows side by side, as in [`Self::solve_rows`].
     ///
     /// # Errors
-    /// Readings that are no resistances; the error names their place among the rows.
+    /// If a reading is not a resistance; the error contains its index among the rows.
     ///
     /// # Panics
-    /// If one of `rows` is none of the rows given.
+    /// If one of `rows` is not one of the given rows.
     pub(super) fn polish_rows(
         &mut self,
         rows: &[usize],
@@ -160,7 +161,7 @@ impl Posterior {
         Ok(self.iterate((rows, steps), readings_ohm, coordinates_mm, Self::unknowns_of))
     }
 
-    /// The unknowns of row-wire `row` nearest to these coordinates.
+    /// Unknowns of row-wire `row` nearest to these coordinates.
     fn unknowns_of(&mut self, row: usize, coordinates_mm: &[f64]) -> Vec<f64> {
         let mut unknowns_mm = vec![0.0; self.ranges.len()];
         self.problem.turn_to(row);
@@ -171,7 +172,7 @@ impl Posterior {
         unknowns_mm
     }
 
-    /// Index of row-wire `row` among the rows given.
+    /// Index of row-wire `row` among the given rows.
     fn place(&self, row: usize) -> usize {
         let place = self.rows.iter().position(|&known| known == row);
         place.expect("the row is one of those given")
@@ -188,9 +189,9 @@ impl Posterior {
 /// Result of a row's posterior.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PosteriorReport {
-    /// Linearisations.
+    /// Number of linearisations.
     pub steps: usize,
-    /// Rounds of expectation propagation over all unknowns, in all linearisations.
+    /// Number of EP sweeps, over all linearisations.
     pub rounds: usize,
     /// rms over readings of the relative misfit m/(γR) − 1 at the answer, with the gain γ of [`Self::drift`].
     pub residual: f64,
@@ -201,27 +202,28 @@ pub struct PosteriorReport {
     /// True if no unknown has a posterior standard deviation above
     /// [`LARGEST_ERROR`](crate::decoupling::LARGEST_ERROR) of its range.
     pub determined: bool,
-    /// True if the answer can be relied on: expectation propagation converged in a last linearisation that was as good as
-    /// the readings.
+    /// True if the answer is reliable: expectation propagation converged, and the last linearisation was accurate
+    /// compared with the noise.
     pub converged: bool,
 }
 
 impl Posterior {
-    /// Computes the medians of the posterior linearised at the true deformation of the row whose nodes are at `truth_mm`
-    /// (3·M2), given noisy readings of it: the answer of a decoder that knows where to linearise. Writes absolute
-    /// coordinates (3·M2) and returns true; or writes the truth and returns false if the posterior did not converge.
+    /// Computes the medians of the posterior linearised at the true deformation of the row whose nodes are at
+    /// `truth_mm` (3·M2), given noisy readings of it: the answer of a decoder with the ideal linearisation point.
+    /// Writes absolute coordinates (3·M2) and returns true; or writes the truth and returns false if the posterior
+    /// did not converge.
     ///
     /// # Panics
-    /// If `row` is none of the rows given.
+    /// If `row` is not one of the given rows.
     pub fn limit(&mut self, row: usize, readings_ohm: &[f64], truth_mm: &[f64], coordinates_mm: &mut [f64]) -> bool {
         self.limits(&[row], readings_ohm, truth_mm, coordinates_mm)
     }
 
-    /// As [`Self::limit`], several rows side by side (rows × M4 readings, rows × 3·M2 coordinates). Returns `true` if all
-    /// posteriors converged.
+    /// As [`Self::limit`], for several rows side by side (rows × M4 readings, rows × 3·M2 coordinates). Returns
+    /// `true` if all posteriors converged.
     ///
     /// # Panics
-    /// If one of `rows` is none of the rows given.
+    /// If one of `rows` is not one of the given rows.
     pub(crate) fn limits(
         &mut self,
         rows: &[usize],

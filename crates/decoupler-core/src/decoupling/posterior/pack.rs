@@ -1,16 +1,16 @@
-//! Sums and products of vectors of packs, in blocks whose additions need not wait for each other.
+//! Sums and products of vectors of packs, in blocks that hide the latency of additions.
 
 use std::ops::{Add, AddAssign, Div, DivAssign, Mul, MulAssign, Neg, Sub, SubAssign};
 
 use crate::network::exp;
 
-/// Rows side by side.
+/// Number of rows side by side.
 pub(super) const LANES: usize = 4;
 
 /// One value of each of several rows, side by side in a vector register.
 ///
-/// Lanes never mix and no operation is fused: a row has the same bits whatever the other lanes hold, on every machine.
-/// Loops rather than maps, which are not compiled for vector registers.
+/// Lanes never mix and no operation is fused: the result of a row has the same bits whatever the other lanes contain,
+/// on every machine. Uses loops rather than maps, which are not compiled to vector registers.
 #[derive(Clone, Copy, Debug)]
 #[repr(align(32))]
 pub(super) struct Pack([f64; LANES]);
@@ -59,7 +59,7 @@ impl Pack {
         self
     }
 
-    /// The larger of the two; `other` where one is NaN.
+    /// Max of the two; `other` where one is NaN.
     #[inline(always)]
     pub(super) fn max(mut self, other: Self) -> Self {
         for lane in 0..LANES {
@@ -72,7 +72,7 @@ impl Pack {
         self
     }
 
-    /// The smaller of the two; `other` where one is NaN.
+    /// Min of the two; `other` where one is NaN.
     #[inline(always)]
     pub(super) fn min(mut self, other: Self) -> Self {
         for lane in 0..LANES {
@@ -85,7 +85,7 @@ impl Pack {
         self
     }
 
-    /// `other` where this is NaN.
+    /// Replaces NaN by `other`.
     #[inline(always)]
     pub(super) fn unless_nan(mut self, other: Self) -> Self {
         for lane in 0..LANES {
@@ -98,7 +98,7 @@ impl Pack {
         self
     }
 
-    /// This, negated where `other` is above 0.
+    /// Negates where `other` is above 0.
     #[inline(always)]
     pub(super) fn negated_where_positive(mut self, other: Self) -> Self {
         for lane in 0..LANES {
@@ -111,7 +111,7 @@ impl Pack {
         self
     }
 
-    /// 0 where this is above 0 and finite, NaN elsewhere.
+    /// 0 where the value is above 0 and finite, NaN elsewhere.
     #[inline(always)]
     pub(super) fn defects(mut self) -> Self {
         for lane in 0..LANES {
@@ -121,7 +121,7 @@ impl Pack {
         self
     }
 
-    /// The larger of the two; NaN where either is.
+    /// Max of the two; NaN where either is.
     #[inline(always)]
     pub(super) fn max_or_nan(mut self, other: Self) -> Self {
         for lane in 0..LANES {
@@ -174,7 +174,7 @@ impl Neg for Pack {
     }
 }
 
-/// Entries of a block.
+/// Number of entries of a block.
 const STRANDS: usize = 4;
 
 /// Sum of the products.

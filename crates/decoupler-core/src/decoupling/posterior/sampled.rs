@@ -11,15 +11,15 @@ use crate::{
     sensor::{SensorError, SensorModel},
 };
 
-/// The posterior of a row-wire's deformation under the prior that the scene draws from, by importance sampling.
+/// Posterior of a row-wire's deformation under the prior of the scene, by importance sampling.
 ///
-/// The prior is that of standard normal variables, from which the deformation follows ([`LatentRow`]); the likelihood is
-/// exact. The first proposal is the prior itself: samples that are drawn once for all readings of the row. Where too few of
-/// them explain the readings, the best are moved towards deformations that do, each by damped Gauss-Newton steps that
-/// depart from its place as little as they can, and a mixture of Gaussians around them, with the local curvature of the
-/// posterior, proposes samples. Further rounds put the mixture around samples drawn by their weights (population Monte
-/// Carlo, Cappé et al. 2004). Weights correct whatever the proposals get wrong, so that the answer depends on them only by
-/// its effective sample size.
+/// The prior is that of standard normal variables, which determine the deformation ([`LatentRow`]); the likelihood is
+/// exact. The first proposal is the prior itself, with samples that are drawn once for all readings of the row. If
+/// too few of them explain the readings, the best are moved towards deformations that do, each by damped Gauss-Newton
+/// steps that stay as close to the sample as possible, and samples are proposed from a mixture of Gaussians around
+/// them, with the local curvature of the posterior. Further rounds centre the mixture on samples drawn by their
+/// weights (population Monte Carlo, Cappé et al. 2004). Weights correct any errors of the proposals, which affect the
+/// answer only through its effective sample size.
 #[derive(Clone, Debug)]
 pub(crate) struct SampledPosterior {
     latent: LatentRow,
@@ -27,7 +27,7 @@ pub(crate) struct SampledPosterior {
     likelihood: Likelihood,
     row: usize,
     axes: &'static [usize],
-    /// Standard normal variables, of which the last is the drift if there is any.
+    /// Standard normal variables; the last is the drift, if there is any.
     variables: usize,
     nodes_mm: Vec<DVec3>,
     moved_mm: Vec<DVec3>,
@@ -42,15 +42,15 @@ pub(crate) struct PriorSamples {
     resistances_ohm: Vec<f64>,
 }
 
-/// Medians of a posterior that was sampled, and how far they can be trusted.
+/// Medians of a sampled posterior, and their reliability.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct SampledMedians {
     /// Absolute coordinates of the nodes (3·M2).
     pub(crate) coordinates_mm: Vec<f64>,
-    /// Number of independent samples that would estimate a mean as well (Kish).
+    /// Effective sample size (Kish).
     pub(crate) effective_samples: f64,
-    /// Posterior probability of a deformation that explains the readings less well than the true one does. As the truth is
-    /// itself a sample of its posterior, it is uniform from 0 to 1.
+    /// Posterior probability of a deformation that explains the readings less well than the true one. As the truth is
+    /// itself a sample of its posterior, this is uniform between 0 and 1.
     pub(crate) rank_of_truth: f64,
 }
 
@@ -65,27 +65,27 @@ struct Sample {
     component: usize,
 }
 
-/// Samples of the prior.
+/// Number of samples of the prior.
 const PRIOR_SAMPLES: usize = 2000;
-/// Samples of the first mixture; each further one has half as many again.
+/// Number of samples of the first mixture; each further one has half as many again.
 const FIRST_ROUND: usize = 300;
-/// Mixtures tried.
+/// Max number of mixtures.
 const ROUNDS: usize = 7;
-/// Effective samples that suffice: they increase the expected error of a median by some 0.5 %.
+/// Sufficient effective sample size: it increases the expected error of a median by about 0.5 %.
 const SUFFICIENT: f64 = 150.0;
-/// Samples moved towards the readings.
+/// Number of samples moved towards the readings.
 const STARTS: usize = 40;
-/// Gauss-Newton steps of each.
+/// Number of Gauss-Newton steps of each.
 const STEPS: usize = 12;
-/// Curvatures given to directions in which the readings determine nothing, where the prior has 1. Gaussians shorter than
-/// the prior follow a curved valley.
+/// Candidate curvatures of directions that the readings do not determine, where the prior has 1. Gaussians narrower
+/// than the prior follow a curved valley.
 const CURVATURES: [f64; 3] = [1.0, 9.0, 81.0];
 
 impl SampledPosterior {
     /// Prepares the row-wire `row` of `model`.
     ///
     /// # Errors
-    /// A sensor without resistances at rest.
+    /// If the sensor has no resistances at rest.
     pub(crate) fn new(model: &SensorModel, scene: &Scene, row: usize) -> Result<Self, SensorError> {
         let latent = LatentRow::new(model, scene, row);
         let likelihood = Likelihood::new(scene.noise.in_test().source(model)?);
@@ -106,11 +106,11 @@ impl SampledPosterior {
         })
     }
 
-    /// Returns about how many pairs of nodes are evaluated to sample one posterior.
+    /// Returns the approximate number of node pairs evaluated to sample one posterior.
     pub(crate) fn node_pairs(model: &SensorModel, scene: &Scene) -> f64 {
         let scale = model.scale;
         let pairs = (scale.nodes_per_row() * scale.nodes_per_column() * scale.columns()) as f64;
-        // Derivatives cost as much again for each axis, and as much for the products of as many variables.
+        // Derivatives cost the same again for each axis, and for the products with the variables.
         let evaluations = (PRIOR_SAMPLES + 3 * FIRST_ROUND + 6 * STARTS * STEPS) as f64;
         let products = LatentRow::new(model, scene, 0).variables() as f64 / scale.nodes_per_column() as f64;
         pairs * evaluations * (1.0 + products)
@@ -137,8 +137,8 @@ impl SampledPosterior {
         samples
     }
 
-    /// Computes the medians of the posterior of these readings in ohm (M4), and where the deformation whose nodes are at
-    /// `truth_mm` (3·M2) lies in it.
+    /// Computes the medians of the posterior of these readings in ohm (M4), and the quantile of the deformation whose
+    /// nodes are at `truth_mm` (3·M2).
     pub(crate) fn medians(
         &mut self,
         readings_ohm: &[f64],
@@ -188,7 +188,7 @@ impl SampledPosterior {
         });
         let log_weights: Vec<f64> = log_weights.collect();
         let largest = log_weights.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-        // Those that have no weight, even tempered, are of no use.
+        // Samples with zero weight, even when tempered, are useless.
         let kept = samples
             .zip(log_weights)
             .map(|(((variables, unknowns), ohms), log_weight)| {
@@ -210,7 +210,7 @@ impl SampledPosterior {
             .collect()
     }
 
-    /// How well resistances explain the readings at the gain that does it best.
+    /// Log-likelihood of resistances at the gain that explains the readings best.
     fn explains(&self, pairs: impl Iterator<Item = (f64, f64)> + Clone, log_density: f64) -> f64 {
         if !self.likelihood.has_drift() {
             return log_density;
@@ -227,7 +227,7 @@ impl SampledPosterior {
         }
     }
 
-    /// Sets the unknowns to those of `variables`.
+    /// Sets the unknowns to those given by `variables`.
     fn deform(&mut self, variables: &[f64]) {
         self.latent.displacements(variables, &mut self.nodes_mm);
         let unknowns = self
@@ -237,7 +237,8 @@ impl SampledPosterior {
         (self.unknowns_mm.iter_mut().zip(unknowns)).for_each(|(unknown, value)| *unknown = value);
     }
 
-    /// Evaluates the readings of `variables`; returns their log-likelihood, and how well the deformation explains them.
+    /// Evaluates the readings of `variables`; returns their log-likelihood, and that of the deformation at the best
+    /// gain.
     fn evaluate(&mut self, variables: &[f64]) -> (f64, f64) {
         self.deform(variables);
         self.problem.evaluate_residuals(&self.unknowns_mm);
@@ -249,7 +250,7 @@ impl SampledPosterior {
 
     /// Evaluates the misfits w of the readings at `variables`, and their derivatives −∂w (readings × variables).
     fn linearise(&mut self, variables: &[f64]) -> (Vec<f64>, Vec<f64>) {
-        /// Change of a variable for difference quotients, which only shape proposals.
+        /// Change of a variable for difference quotients, which only affect proposals.
         const CHANGE: f64 = 1e-6;
         let (m, n, d) = (self.problem.equations(), self.unknowns_mm.len(), self.variables);
         self.deform(variables);
@@ -282,7 +283,7 @@ impl SampledPosterior {
         (misfits, jacobian)
     }
 
-    /// Moves samples, drawn by weights tempered so that several have some, towards the readings.
+    /// Moves samples towards the readings; they are drawn by weights tempered to keep several of them.
     fn moved_to_readings(&mut self, samples: &[Sample], rng: &mut impl Rng) -> Vec<Component> {
         let power = tempered(samples, STARTS as f64);
         let starts = resampled(samples, power, STARTS, rng);
@@ -295,8 +296,8 @@ impl SampledPosterior {
         components
     }
 
-    /// Levenberg-Marquardt steps from `start` that minimise `‖w‖² + ‖v − start‖²`, so that what the readings do not determine
-    /// stays distributed as it was.
+    /// Takes Levenberg-Marquardt steps from `start` that minimise `‖w‖² + ‖v − start‖²`: directions that the readings
+    /// do not determine keep their distribution.
     fn approach(&mut self, start: &[f64]) -> (Vec<f64>, Vec<f64>) {
         let d = self.variables;
         let squares = |misfits: &[f64], at: &[f64]| {
@@ -337,8 +338,8 @@ impl SampledPosterior {
         (at, jacobian)
     }
 
-    /// Components around samples drawn by their weights, with the least curvature of the prior and with that which proposed
-    /// best.
+    /// Components around samples drawn by their weights, with the min curvature of the prior and with the curvature
+    /// that proposed best.
     fn around_samples(&mut self, samples: &[Sample], least: f64, rng: &mut impl Rng) -> Vec<Component> {
         let power = tempered(samples, STARTS as f64);
         let mut starts = resampled(samples, power, 2 * STARTS, rng);
@@ -378,7 +379,7 @@ impl SampledPosterior {
         samples
     }
 
-    /// Medians of the samples of all rounds, each round counted by its effective samples.
+    /// Medians of the samples of all rounds, each round weighted by its effective sample size.
     fn summary(&mut self, rounds: &[(Vec<Sample>, f64)], truth_mm: &[f64]) -> SampledMedians {
         let mut weighted: Vec<(&Sample, f64)> = Vec::new();
         for (samples, effective) in rounds {
@@ -420,7 +421,7 @@ impl SampledPosterior {
     }
 }
 
-/// Weights that sum to 1, to this power before.
+/// Weights raised to this power and normalised.
 fn weights(samples: &[Sample], power: f64) -> Vec<f64> {
     let largest = samples
         .iter()
@@ -435,7 +436,7 @@ fn weights(samples: &[Sample], power: f64) -> Vec<f64> {
     weights
 }
 
-/// The curvature whose components, in the order of [`CURVATURES`], proposed the most of the posterior.
+/// The curvature whose components, in the order of [`CURVATURES`], proposed most of the posterior mass.
 fn best_curvature(samples: &[Sample]) -> f64 {
     let mut found = [0.0; CURVATURES.len()];
     for (sample, weight) in samples.iter().zip(weights(samples, 1.0)) {
@@ -456,9 +457,9 @@ fn effective_samples(samples: &[Sample], power: f64) -> f64 {
         .sum::<f64>()
 }
 
-/// The power, up to 1, at which weights have at least `wanted` effective samples.
+/// The max power, up to 1, at which weights have at least `wanted` effective samples.
 fn tempered(samples: &[Sample], wanted: f64) -> f64 {
-    /// Halvings.
+    /// Number of bisections.
     const STEPS: usize = 60;
     if effective_samples(samples, 1.0) >= wanted {
         return 1.0;

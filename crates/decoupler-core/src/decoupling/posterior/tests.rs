@@ -53,7 +53,7 @@ fn medians_are_those_of_the_exact_posterior() {
     }
 }
 
-/// Mean errors of z of the limit and of the decoder, in proportion to those of the middle.
+/// Mean errors of z of the limit and of the decoder, relative to those of the mid-range answer.
 fn shares(array: &str, movement: Movement, noise: Noise, samples: usize) -> (f64, f64) {
     let model = SensorModel::new(array.parse().unwrap());
     let scene = Scene {
@@ -83,7 +83,7 @@ fn shares(array: &str, movement: Movement, noise: Noise, samples: usize) -> (f64
 }
 
 /// 30 sideways unknowns with a condition number near 1e14, and 6 unknowns with 4 readings: the smallest noise leaves
-/// something unknown, and more noise never leaves less.
+/// some patterns undetermined, and more noise never leaves fewer.
 #[test]
 fn no_noise_is_too_small_for_a_posterior() {
     for (array, movement) in [("10x10_5x30", Movement::SIDEWAYS), ("2x6_3x4", Movement::Z)] {
@@ -94,7 +94,8 @@ fn no_noise_is_too_small_for_a_posterior() {
                 limit > 1e-3 && limit < 1.0 && limit > 0.98 * last,
                 "{array} {noise}: {limit} {last:?}"
             );
-            // Where 14 decades lie between the patterns, anyone who does not know where to linearise stays behind.
+            // With 14 decades between the patterns, a decoder that does not know the linearisation point is worse
+            // than the limit.
             let most = (1.05 * limit).max(if movement == Movement::Z { 0.0 } else { 0.6 });
             assert!(answer < most, "{array} {noise}: {answer} {limit}");
             last = limit;
@@ -135,7 +136,7 @@ fn no_converter_leaves_more_than_the_middle() {
     }
 }
 
-/// From 1e-3 down to none at all, past the rounding of the readings, below which noise adds nothing.
+/// From 1e-3 down to zero, past the rounding of the readings, below which noise has no effect.
 #[test]
 fn noise_passes_into_rounding_without_a_step() {
     let model = SensorModel::new("2x4_2x12".parse().unwrap());

@@ -5,30 +5,31 @@ use super::{
 };
 use crate::decoupling::row_problem::Range;
 
-/// Mean and variance of factors cut to ranges.
+/// Mean and variance of factors truncated to ranges.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Moments {
     pub(super) mean: Pack,
     pub(super) variance: Pack,
 }
 
-/// Intervals of the quadrature on either side of its middle, an even number.
+/// Number of quadrature intervals on either side of the middle; even.
 const HALF: usize = 48;
 
-/// The densities exp(slope t − ½ precision t²) between `middle` − HALF `step` and `middle` + HALF `step`, with t measured
-/// from the mode within the range, where what carries weight may be narrower than the rounding of positions.
+/// The densities exp(slope t − ½ precision t²) between `middle` − HALF `step` and `middle` + HALF `step`, with t
+/// relative to the mode within the range: the relevant part may be narrower than the rounding of positions.
 #[derive(Clone, Copy)]
 pub(super) struct Cut {
     mode: Pack,
-    /// 0, or points out of the range.
+    /// 0, or directed out of the range.
     slope: Pack,
     precision: Pack,
     middle: Pack,
     step: Pack,
 }
 
-/// Densities at equal distances on both sides of the middle of a [`Cut`]. Each follows from the one before by a factor,
-/// and the factor from the one before by another, which is the same for all: the density is the exponential of a parabola.
+/// Densities at equal distances on both sides of the middle of a [`Cut`]. Each follows from the one before by a
+/// factor, and the factor from the one before by another, which is constant: the density is the exponential of a
+/// parabola.
 struct Pairs {
     above: Pack,
     below: Pack,
@@ -38,10 +39,10 @@ struct Pairs {
 }
 
 impl Cut {
-    /// The part of factors cut to ranges that carries weight.
+    /// The relevant part of factors truncated to ranges.
     #[inline(always)]
     pub(super) fn new(factor: Factor<Pack>, ranges: &Ranges) -> Self {
-        /// exp(−36) ends what carries weight.
+        /// Densities below exp(−36) are neglected.
         const DECAY: f64 = 36.0;
         let precision = factor.precision.max(Pack::ZERO);
         let mode = ranges.clamp(factor.linear / precision);
@@ -61,7 +62,7 @@ impl Cut {
         }
     }
 
-    /// Densities from the middle outwards, in proportion to that in the middle.
+    /// Densities from the middle outwards, relative to the density in the middle.
     #[inline(always)]
     fn densities(&self) -> Pairs {
         let bend = self.precision * self.step * self.step;
@@ -78,7 +79,8 @@ impl Cut {
         }
     }
 
-    /// Mean and variance by Simpson's rule. Places are counted from the middle in steps, and so are the same for all lanes.
+    /// Mean and variance by Simpson's rule. Positions are counted from the middle in steps, and so are the same for
+    /// all lanes.
     #[inline(always)]
     pub(super) fn moments(self) -> Moments {
         let mut pairs = self.densities();
@@ -92,7 +94,7 @@ impl Cut {
             place += 1.0;
             even.add(&pairs, place);
         }
-        // Simpson's weights, halved: 2 at odd places, 1 at even ones, ½ at both ends.
+        // Simpson's weights, halved: 2 at odd positions, 1 at even ones, ½ at both ends.
         let mut ends = Sums::ZERO;
         ends.add(&pairs, place);
         let (two, half) = (Pack::splat(2.0), Pack::splat(0.5));
@@ -108,7 +110,7 @@ impl Cut {
         }
     }
 
-    /// The points below which half of the area under the densities lies, by trapezoids; the means where they are not found.
+    /// Medians, by the trapezoidal rule; the means if they are not found.
     #[inline(always)]
     pub(super) fn medians(self, ranges: &Ranges, means: Pack) -> Pack {
         let mut densities = [Pack::ONE; 2 * HALF + 1];
@@ -139,7 +141,7 @@ impl Cut {
 }
 
 impl Pairs {
-    /// Continues to the densities one step further out.
+    /// Advances to the densities one step further out.
     #[inline(always)]
     fn step(&mut self) {
         self.above *= self.growth_above;
@@ -149,7 +151,7 @@ impl Pairs {
     }
 }
 
-/// Sums of densities, and of their products with their places and with the squares of these.
+/// Sums of densities, and of their products with the positions and the squares of these.
 struct Sums {
     total: Pack,
     first: Pack,
@@ -172,18 +174,18 @@ impl Sums {
     }
 }
 
-/// A range and the Gaussian factor that stands for it, in every lane.
+/// A range and the Gaussian factor that approximates it, in every lane.
 #[derive(Clone, Debug)]
 pub(super) struct Site {
     ranges: Ranges,
-    /// Reciprocals of the widths, by which changes of means are measured; 1 for open ranges.
+    /// Reciprocals of the widths, for relative changes of means; 1 for open ranges.
     per_width: Pack,
-    /// Variance of what is added to the unknown before it meets the range.
+    /// Variance of the noise added to the unknown before the range applies.
     noise: f64,
     pub(super) factor: Factor<Pack>,
-    /// Cavity distribution of the unknown: that of the equations and all other factors.
+    /// Cavity distribution of the unknown: the product of the equations and all other factors.
     seen: Factor<Pack>,
-    /// Moments of that within the range.
+    /// Moments of the cavity distribution truncated to the range.
     moments: Moments,
 }
 
@@ -202,7 +204,7 @@ impl Site {
         }
     }
 
-    /// Begins in `lane` with `first`, or with the moments of the range by itself; with none if it is open.
+    /// Starts in `lane` from `first`, or from the moments of the range alone; flat if it is open.
     pub(super) fn begin(&mut self, lane: usize, range: Range, first: Option<Factor>) {
         let width = range.width();
         let precision = 12.0 / (width * width);
@@ -225,9 +227,9 @@ impl Site {
         self.moments.mean.set(lane, f64::INFINITY);
     }
 
-    /// Changes the factor by `share` of what makes the marginal keep its moments within the range. `mean` and `variance` are
-    /// those that `gaussians` have along the direction of the last question. Returns by how much the mean within the range
-    /// moved, in proportion to the range, and 0, or NaN where numbers overflow.
+    /// Updates the factor by `share` of the change that matches the moments of the truncated cavity distribution.
+    /// `mean` and `variance` are those that `gaussians` returned for the last direction. Returns the change of the
+    /// mean within the range, relative to the range, and 0, or NaN if numbers overflow.
     #[inline(always)]
     pub(super) fn meet_range(
         &mut self,
@@ -263,7 +265,7 @@ impl Site {
         (moved, moments.variance.defects() + left.defects())
     }
 
-    /// The square root of the factor's precision in `lane`, and what it equals times the unknown: the factor as an equation.
+    /// The factor as an equation: the square root of its precision in `lane`, and the right-hand side.
     pub(super) fn equation(&self, lane: usize) -> (f64, f64) {
         let Factor { precision, linear } = self.factor.get(lane);
         let root = precision.sqrt();
@@ -282,19 +284,19 @@ impl Site {
     }
 }
 
-/// The distribution of one unknown.
+/// Marginal distribution of one unknown.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Marginal {
     pub(super) mean: f64,
     pub(super) variance: f64,
     pub(super) range: Range,
-    /// Everything said of the unknown but its range, to which it is cut.
+    /// Cavity distribution of the unknown, which is truncated to the range.
     pub(super) seen: Factor,
-    /// Factor that stands for the range.
+    /// Factor that approximates the range.
     pub(super) factor: Factor,
 }
 
-/// The points below which half of each distribution lies: the answers of the least expected distance.
+/// Medians of the distributions: the answers with the min expected absolute error.
 pub(super) fn medians(marginals: &[Marginal]) -> Vec<f64> {
     let mut medians = Vec::with_capacity(marginals.len());
     for some in marginals.chunks(LANES) {
@@ -320,7 +322,7 @@ mod tests {
         highest: 1.0,
     };
 
-    /// Mean, variance and median of a factor cut to a range, in the last lane next to other factors.
+    /// Mean, variance and median of a factor truncated to a range, in the last lane next to other factors.
     fn cut(factor: Factor, range: Range) -> (f64, f64, f64) {
         let (mut factors, mut ranges) = (Factor::FLAT, Ranges::NONE);
         (0..LANES).for_each(|lane| ranges.set(lane, range));

@@ -20,11 +20,11 @@ pub(super) struct NormalEquations {
     right: Mat<f64>,
 }
 
-/// Samples whose regressors are held at once.
+/// Number of samples whose regressors are held in memory at once.
 const BLOCK: usize = 2048;
 
 impl NormalEquations {
-    /// Those of `samples` of the regressors and the targets.
+    /// Sums over `samples` of the regressors and the targets.
     pub fn of(regressors: &Mat<f64>, targets: &Mat<f64>, samples: Range<usize>) -> Self {
         let a = regressors.subrows(samples.start, samples.len());
         let t = targets.subrows(samples.start, samples.len());
@@ -47,7 +47,7 @@ impl NormalEquations {
         }
     }
 
-    /// Those of all units, whose targets are `y`, without holding all regressors at once.
+    /// Sums over all units, whose targets are `y`, without holding all regressors at once.
     pub fn in_blocks(antecedents: &Antecedents, units: &Units, y: ArrayView2<'_, f64>) -> Self {
         let (count, inputs) = units.x.dim();
         let blocks = (0..count).step_by(BLOCK).map(|start| {
@@ -82,8 +82,8 @@ impl NormalEquations {
         self
     }
 
-    /// Consequents (regressors × outputs) that minimise the squared errors expected when the inputs have additional
-    /// noise of these variances, with a penalty of `ridge`, in proportion to the mean of the diagonal of AᵀA, on their squares. A penalty
+    /// Consequents (regressors × outputs) that minimise the expected squared error when the inputs have additional
+    /// noise of these variances, with a penalty of `ridge`, relative to the mean of the diagonal of AᵀA. A penalty
     /// too small for the rounding of AᵀA is raised; `None` if none is large enough, because sums overflow.
     pub fn consequents(&self, ridge: f64, noise: Option<&[f64]>) -> Option<Mat<f64>> {
         let order = self.gram.nrows();
@@ -109,8 +109,8 @@ impl NormalEquations {
         None
     }
 
-    /// Adds to the lower triangle of AᵀA what noise of the inputs with these variances does, the firing strengths taken as
-    /// they are: variance · Σ φᵣφₛ for each input and pair of rules.
+    /// Adds the effect of input noise with these variances to the lower triangle of AᵀA, with the firing strengths
+    /// unchanged: variance · Σ φᵣφₛ for each input and pair of rules.
     fn add_noise(&self, gram: &mut Mat<f64>, variances: &[f64]) {
         let of_rule = variances.len() + 1;
         let rules = gram.nrows() / of_rule;
@@ -124,8 +124,8 @@ impl NormalEquations {
     }
 }
 
-/// Regressors (samples × rules·(inputs + 1)) of the inputs `x`: the firing strength of each rule times [x, 1], times the root
-/// of the weight of the sample.
+/// Regressors (samples × rules·(inputs + 1)) of the inputs `x`: the firing strength of each rule times [x, 1], times
+/// the square root of the sample's weight.
 pub(super) fn regressors(antecedents: &Antecedents, x: ArrayView2<'_, f64>, weights: &[f64]) -> Mat<f64> {
     let mut strengths = antecedents.firing_strengths(x);
     for (mut row, weight) in strengths.rows_mut().into_iter().zip(weights) {
@@ -139,12 +139,12 @@ pub(super) fn regressors(antecedents: &Antecedents, x: ArrayView2<'_, f64>, weig
     })
 }
 
-/// The targets `y` (samples × outputs) times the roots of the weights of the samples.
+/// The targets `y` (samples × outputs) times the square roots of the sample weights.
 pub(super) fn weighted(y: ArrayView2<'_, f64>, weights: &[f64]) -> Mat<f64> {
     Mat::from_fn(y.nrows(), y.ncols(), |i, j| weights[i].sqrt() * y[[i, j]])
 }
 
-/// Mean of the targets of all samples, each as often as it occurs; `None` without samples.
+/// Weighted mean of the targets of all units; `None` without samples.
 pub(super) fn mean_target(units: &Units) -> Option<Array1<f64>> {
     let column = ArrayView2::from_shape((units.weights.len(), 1), &units.weights).ok()?;
     let total: f64 = units.weights.iter().sum();
@@ -154,16 +154,16 @@ pub(super) fn mean_target(units: &Units) -> Option<Array1<f64>> {
 /// Penalty on the consequents of one output.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Penalty {
-    /// In proportion to the mean of the diagonal of AᵀA.
+    /// Relative to the mean of the diagonal of AᵀA.
     pub ridge: f64,
-    /// True if the consequents are those expected with noise of the inputs.
+    /// True if the expected effect of input noise is included.
     pub is_noisy: bool,
 }
 
-/// Consequents (regressors × outputs) of `units`, each output with its penalty, which draws them to the mean of the targets,
-/// not to 0; `noise` are the variances of the noise of the inputs.
+/// Consequents (regressors × outputs) of `units`, each output with its penalty, which shrinks them towards the mean
+/// of the targets, not to 0; `noise` are the variances of the input noise.
 ///
-/// # Errors
+/// If the equations have no finite solution.
 /// If the equations have no finite solution.
 pub(super) fn fit_consequents(
     antecedents: &Antecedents,
@@ -188,7 +188,7 @@ pub(super) fn fit_consequents(
             }
         };
         for row in 0..order {
-            // Firing strengths add up to 1, and so the constants of all rules together are one.
+            // Firing strengths add up to 1, so the constants of all rules together are one constant.
             let constant = if row % (inputs + 1) == inputs {
                 mean[output]
             } else {
@@ -244,8 +244,8 @@ mod tests {
         a.iter().zip(b).fold(0.0, |most, (a, b)| most.max((a - b).abs()))
     }
 
-    /// The truth are consequents of many copies of the samples with drawn noise and the firing strengths of the samples
-    /// without.
+    /// Compares with consequents of many copies of the samples with drawn noise, and the firing strengths of the
+    /// samples without noise.
     #[test]
     fn noise_of_the_inputs_is_answered_as_if_many_noisy_copies_were_given() {
         let mut rng = ChaCha8Rng::seed_from_u64(3);
@@ -319,7 +319,7 @@ mod tests {
         assert!(error < 1e-9, "{error}");
     }
 
-    /// The truth are fits to as many copies, and to each output alone.
+    /// Compares with fits to that many copies, and to each output alone.
     #[test]
     fn weights_are_copies_and_each_output_has_its_penalty() {
         let mut rng = ChaCha8Rng::seed_from_u64(4);

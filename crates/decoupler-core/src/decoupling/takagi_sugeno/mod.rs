@@ -22,13 +22,14 @@ use selection::{Antecedents, normalise};
 /// Cᵢ·x + dᵢ", blended by their normalised firing strengths.
 ///
 /// The antecedents are Gaussian memberships on whitened readings, centred on clusters of the training samples; the
-/// consequents of all rules are found together by least squares with a small ridge penalty. A cross-validation chooses the
-/// number of rules, how many inputs their memberships look at, and the penalty of each target.
+/// consequents of all rules are fitted together by least squares with a small ridge penalty. Cross-validation chooses
+/// the number of rules, the number of inputs of their memberships, and the penalty of each target.
 ///
-/// In 30 dimensions distances hardly differ, so memberships look at the leading 3 or 10 principal components only, and are
-/// four times as wide as their centres are apart. Measured on the simulated 10×10_5×30 array with 12 rules, the held-out
-/// error of a known row-wire is 0.011 % with 10 components, 0.026 % with 15, and 0.040 % with 30 or 3, and that of one map
-/// for all row-wires 0.45 % with 3 components and 0.71 % with 11; narrower memberships were never clearly better.
+/// In 30 dimensions distances hardly differ, so memberships use only the leading 3 or 10 principal components, with a
+/// width four times the distance between centres. Measured on the simulated 10×10_5×30 array with 12 rules, the
+/// held-out error of a known row-wire is 0.011 % with 10 components, 0.026 % with 15, and 0.040 % with 30 or 3, and
+/// that of one map for all row-wires 0.45 % with 3 components and 0.71 % with 11; narrower memberships were never
+/// clearly better.
 #[derive(Clone, Debug)]
 pub struct TakagiSugeno {
     quantity: Quantity,
@@ -39,9 +40,9 @@ pub struct TakagiSugeno {
     /// Coordinates in millimetres from centred channels, the scalings folded in: for each rule (M4 + 1) × varying
     /// coordinates, the constant last.
     consequents: Array2<f64>,
-    /// The middle of every target, which constant ones keep.
+    /// Middle of the range of every target; constant targets keep it.
     middles: Vec<f64>,
-    /// The targets that vary.
+    /// Indices of the varying targets.
     varying: Vec<usize>,
     /// Centred channels and a 1.
     values: Vec<f64>,
@@ -50,11 +51,11 @@ pub struct TakagiSugeno {
 }
 
 impl TakagiSugeno {
-    /// Fits to a training set, on this quantity of the readings, whitened; `unseen` as in [`Inputs::fit`]; `rng` draws it,
-    /// the folds of the cross-validation and where clusters begin.
+    /// Fits to a training set, on this quantity of the readings, whitened; `unseen` is as in [`Inputs::fit`]; `rng`
+    /// draws the noise, the folds of the cross-validation and the initial cluster centres.
     ///
     /// # Errors
-    /// Values that cannot be scaled.
+    /// If values cannot be scaled.
     pub fn fit(
         training: &Dataset,
         quantity: Quantity,
@@ -146,7 +147,7 @@ impl Decoder for TakagiSugeno {
         }
         targets.copy_from_slice(&self.middles);
         for (&target, &change) in self.varying.iter().zip(&self.changes) {
-            // Readings of 1e300 times those of the training set overflow.
+            // Readings 1e300 times those of the training set overflow.
             if change.is_finite() {
                 targets[target] += change;
             }
@@ -182,7 +183,7 @@ impl Decoder for TakagiSugeno {
     }
 }
 
-/// Adds `factor` · values · matrix to `sums`, the matrix values × sums, row by row.
+/// Adds `factor` · values · matrix to `sums`; the matrix is values × sums, row by row.
 fn add_products(sums: &mut [f64], values: &[f64], factor: f64, matrix: &[f64]) {
     if sums.is_empty() {
         return;

@@ -8,37 +8,37 @@ use crate::decoupling::{
     units::Units,
 };
 
-/// Numbers of rules that are tried.
+/// Candidate numbers of rules.
 const RULES: [usize; 8] = [1, 2, 4, 8, 12, 16, 24, 32];
-/// Number of rules, or the next smaller one possible, with which the inputs of the memberships are chosen.
+/// Number of rules (or the next smaller possible one) with which the inputs of the memberships are chosen.
 const PILOT_RULES: usize = 8;
-/// Leading inputs that memberships look at.
+/// Candidate numbers of leading inputs for the memberships.
 const COMPONENTS: [usize; 2] = [3, 10];
-/// Width of the memberships in proportion to the root mean square distance between centres.
+/// Width of the memberships, relative to the root mean square distance between centres.
 const RELATIVE_WIDTH: f64 = 4.0;
-/// Penalties in ascending order, in proportion to the mean of the diagonal of the normal equations.
+/// Penalties in ascending order, relative to the mean of the diagonal of the normal equations.
 const RIDGES: [f64; 5] = [1e-10, 1e-8, 1e-6, 1e-4, 1e-2];
-/// Regressors of the largest system tried.
+/// Max number of regressors of a candidate.
 const MAX_REGRESSORS: usize = 512;
-/// Regressors of the largest system in proportion to the samples: a fold must leave enough for its fit.
+/// Max ratio of regressors to samples: a fold must leave enough samples for its fit.
 const REGRESSORS_PER_SAMPLE: f64 = 0.75;
 const FOLDS: usize = 5;
-/// Samples that the cross-validation uses.
+/// Max number of samples in the cross-validation.
 const MAX_VALIDATED: usize = 1000;
-/// A system with more rules must reduce the mean squared error to this, so that it is not chosen by chance.
+/// A system with more rules must reduce the mean squared error to this fraction, to avoid choosing it by chance.
 const WORTHWHILE: f64 = 0.99;
 
-/// Choice of a cross-validation.
+/// Result of the cross-validation.
 pub(super) struct Choice {
     pub antecedents: Antecedents,
     /// Penalty of each output.
     pub penalties: Vec<Penalty>,
 }
 
-/// The antecedents of the least held-out error of all outputs in a k-fold cross-validation over `units`, and the penalty, with
-/// `noise` of the inputs (variances) or without, of the least error of each.
+/// Returns the antecedents with the min held-out error of all outputs in a k-fold cross-validation over `units`, and
+/// for each output the best penalty, with or without `noise` of the inputs (variances).
 ///
-/// The centres are those of all units; the consequents of each fold know nothing of its targets.
+/// The centres are those of all units; the consequents of each fold do not depend on its targets.
 pub(super) fn choose(units: &Units, noise: &[f64], rng: &mut impl Rng) -> Choice {
     let mut order: Vec<usize> = (0..units.weights.len()).collect();
     order.shuffle(rng);
@@ -89,7 +89,7 @@ pub(super) fn choose(units: &Units, noise: &[f64], rng: &mut impl Rng) -> Choice
     let (penalties, components) = pilot.map_or((vec![first], COMPONENTS[0]), |((_, choice), components)| {
         (choice.penalties, components)
     });
-    // What the pilot took for no output is not tried again.
+    // Noise settings that the pilot chose for no output are not tried again.
     let mut noises = [None, Some(noise)].to_vec();
     noises.retain(|noise| penalties.iter().any(|penalty| penalty.is_noisy == noise.is_some()));
     let mut least = f64::INFINITY;
@@ -105,8 +105,9 @@ pub(super) fn choose(units: &Units, noise: &[f64], rng: &mut impl Rng) -> Choice
     best
 }
 
-/// Sum of squared held-out errors of all outputs in a cross-validation over folds of adjacent samples, each output with the best
-/// penalty and the best of `noises`, and these penalties. Larger ones are tried until no error falls.
+/// Sum of squared held-out errors of all outputs in a cross-validation over folds of adjacent samples, each output
+/// with the best penalty and the best of `noises`, and these penalties. Larger penalties are tried until no error
+/// decreases.
 fn held_out(regressors: &Mat<f64>, targets: &Mat<f64>, noises: &[Option<&[f64]>]) -> (f64, Vec<Penalty>) {
     let samples = regressors.nrows();
     let folds = FOLDS.min(samples);
@@ -117,7 +118,7 @@ fn held_out(regressors: &Mat<f64>, targets: &Mat<f64>, noises: &[Option<&[f64]>]
     let empty = NormalEquations::zeros(regressors.ncols(), targets.ncols());
     let all = parts.iter().fold(empty, NormalEquations::plus);
     let others: Vec<_> = parts.iter().map(|part| all.clone().minus(part)).collect();
-    // Errors of each output; infinite where a fold has no solution.
+    // Errors of each output; infinite if a fold has no solution.
     let errors = |ridge: f64, noise: Option<&[f64]>| {
         let mut errors = vec![0.0; targets.ncols()];
         for (fold, others) in others.iter().enumerate() {
@@ -161,11 +162,11 @@ fn held_out(regressors: &Mat<f64>, targets: &Mat<f64>, noises: &[Option<&[f64]>]
     (total, best.into_iter().map(|(_, penalty)| penalty).collect())
 }
 
-/// Antecedents of fuzzy rules: each has a Gaussian membership exp(−‖x − c‖² / 2σ²) around its centre c, a product of one
-/// membership for each input, with one width σ for all of them.
+/// Antecedents of fuzzy rules: each has a Gaussian membership exp(−‖x − c‖² / 2σ²) around its centre c, a product of
+/// one membership for each input, with one width σ for all inputs.
 #[derive(Clone, Debug)]
 pub(super) struct Antecedents {
-    /// Rules × the leading inputs that memberships look at.
+    /// Rules × the leading inputs that memberships use.
     centres: Array2<f64>,
     /// 1 / 2σ².
     sharpness: f64,
@@ -180,7 +181,7 @@ impl Antecedents {
         }
     }
 
-    /// Memberships of this width around `centres`; where the width is 0, every rule fires alike.
+    /// Memberships of this width around `centres`; if the width is 0, all rules fire equally.
     pub fn new(centres: Array2<f64>, width: f64) -> Self {
         let sharpness = 0.5 / (width * width);
         Self {
@@ -189,8 +190,8 @@ impl Antecedents {
         }
     }
 
-    /// Centres of `rules` clusters of the leading `components` of the inputs `x` (samples × inputs), at most one for
-    /// each sample, with their root mean square distance.
+    /// Centres of `rules` clusters of the leading `components` of the inputs `x` (samples × inputs), at most one per
+    /// sample, with their root mean square distance.
     pub fn clusters(x: ArrayView2<'_, f64>, components: usize, rules: usize, rng: &mut impl Rng) -> (Array2<f64>, f64) {
         let leading = x.slice_axis(Axis(1), Slice::from(..components.min(x.ncols())));
         let centres = k_means(leading, rules.clamp(1, x.nrows()), rng);
@@ -208,8 +209,8 @@ impl Antecedents {
         self.centres.nrows()
     }
 
-    /// Logarithms of the memberships as an affine map of `inputs` inputs: slopes (rules × inputs) and offsets. They lack
-    /// −‖x‖² / 2σ², which all rules share and which normalising removes.
+    /// Logarithms of the memberships as an affine map of `inputs` inputs: slopes (rules × inputs) and offsets. They
+    /// omit −‖x‖² / 2σ², which all rules share and normalisation cancels.
     pub fn logarithms(&self, inputs: usize) -> (Array2<f64>, Array1<f64>) {
         let slopes = Array2::from_shape_fn((self.rules(), inputs), |(rule, input)| {
             let coordinate = self.centres.get((rule, input)).copied().unwrap_or(0.0);
@@ -223,7 +224,7 @@ impl Antecedents {
     /// Normalised firing strengths (samples × rules) of the inputs `x` (samples × inputs).
     pub fn firing_strengths(&self, x: ArrayView2<'_, f64>) -> Array2<f64> {
         let (slopes, offsets) = self.logarithms(x.ncols());
-        // A product of one input is made column by column.
+        // A product with a single input is computed column by column.
         let mut strengths = (x.dot(&slopes.t()) + &offsets).as_standard_layout().into_owned();
         for mut row in strengths.rows_mut() {
             normalise(row.as_slice_mut().expect("rows of a standard array are contiguous"));
@@ -232,8 +233,8 @@ impl Antecedents {
     }
 }
 
-/// Logarithms of memberships, up to a common term, to firing strengths, whose sum is 1. The largest is subtracted first, so
-/// that far from all centres the nearest rule fires and nothing is 0/0.
+/// Converts logarithms of memberships, up to a common term, to firing strengths, whose sum is 1. The largest is
+/// subtracted first to avoid 0/0: far from all centres, the nearest rule fires.
 pub(super) fn normalise(strengths: &mut [f64]) {
     let largest = strengths.iter().copied().fold(f64::NEG_INFINITY, f64::max);
     let mut total = 0.0;

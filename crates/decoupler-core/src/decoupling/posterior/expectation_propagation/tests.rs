@@ -56,11 +56,12 @@ fn one_unknown_is_the_truncated_normal_in_closed_form() {
     }
 }
 
-/// A reading of noise 1/50, of which only the interval is known: the density of the unknown is a difference of two
-/// distribution functions, integrated here by the midpoint rule.
+/// A reading with noise 1/50 that is only known to be in an interval: the density of the unknown is a difference of
+/// two distribution functions, integrated here by the midpoint rule.
 #[test]
 fn an_interval_blurred_by_noise_is_the_difference_of_two_distribution_functions() {
-    // Where both the range and the interval cut the unknown, their factors describe it to a fifth of its spread.
+    // Where both the range and the interval truncate the unknown, their factors are accurate to a fifth of its
+    // spread.
     for (lowest, highest, tolerance) in [
         (0.2, 0.3, 0.02),
         (0.45, 0.452, 0.02),
@@ -121,14 +122,14 @@ fn a_wide_box_leaves_the_gaussian() {
     }
 }
 
-/// Two unknowns whose difference is known: what is left is one unknown in the range that both share, which the factors
-/// describe to a fifth of its spread, and alike down to rounding.
+/// Two unknowns whose difference is known: one unknown remains, in the range that both share; the factors are
+/// accurate to a fifth of its spread, and do not change down to rounding.
 #[test]
 fn a_combination_known_to_rounding_leaves_the_rest_unknown() {
     for deviation in [1e-4, 1e-8, 1e-12, 1e-15] {
         let equations = vec![1.0 / deviation, -1.0 / deviation, 0.5 / deviation];
         let ours = marginals(equations, vec![UNIT; 2]);
-        // x − y = ½, so that x is uniform from ½ to 1.
+        // x − y = ½, so x is uniform from ½ to 1.
         for (ours, middle) in ours.iter().zip([0.75, 0.25]) {
             assert!((ours.mean - middle).abs() < 1e-3, "{deviation}: {ours:?}");
             assert!(
@@ -139,7 +140,7 @@ fn a_combination_known_to_rounding_leaves_the_rest_unknown() {
     }
 }
 
-/// Draws uniformly from the box and weighs: exact, whatever the shape.
+/// Draws uniformly from the box with weights: exact for any shape.
 #[test]
 fn several_correlated_unknowns_agree_with_sampling() {
     let mut rng = ChaCha8Rng::seed_from_u64(4);
@@ -185,14 +186,14 @@ fn several_correlated_unknowns_agree_with_sampling() {
     }
 }
 
-/// Models that converge soon and late, one whose numbers overflow, and one that begins with factors: alone, and in every
+/// Models that converge early and late, one whose numbers overflow, and one with initial factors: alone, and in every
 /// lane next to the others.
 #[test]
 fn models_side_by_side_have_the_bits_of_each_alone() {
     let mut rng = ChaCha8Rng::seed_from_u64(9);
     let n = 3;
     let mut model = |noise: f64, offset: f64| {
-        // Columns in another order of size for each.
+        // The columns have a different order of size in each.
         let sizes: Vec<f64> = (0..n).map(|_| 10.0_f64.powf(rng.random_range(-2.0..2.0))).collect();
         let mut row = || -> Vec<f64> { (0..=n).map(|_| standard_normal(&mut rng)).collect() };
         let mut equations = Vec::new();
@@ -211,7 +212,7 @@ fn models_side_by_side_have_the_bits_of_each_alone() {
         }
     };
     let soon = model(5.0, 0.0);
-    // Differences that are known leave all unknowns to find their place together.
+    // If differences are known, all unknowns must move together.
     let of_differences = [
         [1.0, -1.0, 0.0, 0.5],
         [0.0, 1.0, -1.0, -0.2],
