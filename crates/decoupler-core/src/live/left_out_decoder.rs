@@ -11,10 +11,10 @@ use crate::{
 /// Decodes with the wires of a named fault left out, if there is one: the most probable deformation given the other
 /// readings, the noise and the prior of the scene, by the Gauss-Newton method.
 ///
-/// A broken row-wire is decoded from the nodes before its break, and two that touch from the mean of both. A row-wire of
-/// which nothing is known takes the mean of its neighbours' answers in the same frame. Where nodes are independent, or the
-/// row is decoded alone, it takes the mean of the prior. An answer depends on the readings given and on nothing before
-/// them. Decoding allocates nothing.
+/// A broken row-wire is decoded from the nodes before its break, and two touching row-wires from the mean of their
+/// readings. A row-wire without usable readings is interpolated from its neighbours in the same frame, or set to the mean
+/// of the prior if nodes are independent or the row is decoded alone. Each answer depends only on the readings given, not
+/// on earlier frames. Decoding does not allocate.
 #[derive(Clone, Debug)]
 pub struct LeftOutDecoder {
     model: SensorModel,
@@ -25,17 +25,17 @@ pub struct LeftOutDecoder {
     two: RowFit,
     /// True if the deformations of neighbouring rows are correlated.
     has_neighbours: bool,
-    /// Geometric means of the readings of two rows that touch: M4.
+    /// Geometric means of the readings of two touching rows: M4.
     shared_ohm: Vec<f64>,
-    /// Answers of a whole frame: rows × 3·M2, in millimetres.
+    /// Decoded coordinates of a whole frame: rows × 3·M2, in millimetres.
     frame_mm: Vec<f64>,
 }
 
 impl LeftOutDecoder {
-    /// Prepares to decode `rows` of `model` in `scene`, first with all wires.
+    /// Prepares to decode `rows` of `model` in `scene`, initially with all wires.
     ///
     /// # Errors
-    /// A sensor without resistances.
+    /// If the model has no resistance.
     pub fn new(model: &SensorModel, scene: &Scene, rows: &[usize]) -> Result<Self, SensorError> {
         Ok(Self {
             model: *model,
@@ -50,7 +50,7 @@ impl LeftOutDecoder {
         })
     }
 
-    /// Sets the fault whose wires are left out from now on; `None` for none.
+    /// Sets the fault whose wires are left out from now on; `None` uses all wires.
     pub fn leave_out(&mut self, fault: Option<Diagnosis>) {
         self.fault = fault;
     }
@@ -60,15 +60,15 @@ impl LeftOutDecoder {
         self.fault
     }
 
-    /// Returns `true` if nothing is known of a row-wire but what its neighbours say.
+    /// Returns `true` if a row-wire can only be interpolated from its neighbours.
     fn is_dead(&self, row: usize) -> bool {
         self.fault.is_some_and(|fault| {
             fault.wire == FaultyWire::Row(row) && !matches!(fault.cause, FaultCause::Broken { .. })
         })
     }
 
-    /// Sets the answer of a row to the mean depth of its neighbours in the same frame, whose answers are in
-    /// `coordinates_mm` (rows × 3·M2). Returns `false` if it has none.
+    /// Sets a row of `coordinates_mm` (rows × 3·M2) to the mean depth of its neighbours in the same frame. Returns `false`
+    /// if it has no neighbours.
     fn interpolate(&self, row_index: usize, coordinates_mm: &mut [f64]) -> bool {
         let (nodes, row) = (self.model.scale.nodes_per_row(), self.rows[row_index]);
         let is_neighbour = |&index: &usize| self.rows[index].abs_diff(row) == 1;
@@ -92,10 +92,10 @@ impl LeftOutDecoder {
     /// Decodes one row of a frame with all rows read (rows × M4, in ohm) into 3·M2 `targets`.
     ///
     /// # Errors
-    /// A reading that is no resistance.
+    /// If a reading is not a valid resistance.
     ///
     /// # Panics
-    /// If the frame has another length.
+    /// If the frame has the wrong length.
     pub fn decode_row_of(&mut self, frame: &[f64], row_index: usize, targets: &mut [f64]) -> Result<(), DecodeError> {
         let (channels, outputs) = (self.channels(), self.outputs());
         assert_eq!(frame.len(), self.rows.len() * channels);
@@ -159,8 +159,8 @@ impl Decoder for LeftOutDecoder {
         Ok(())
     }
 
-    /// Decodes a frame. Unlike other decoders, it does more for rows at fault than [`Self::decode_row`], which does not know
-    /// the rows next to them.
+    /// Decodes a frame. Unlike with other decoders, this is more accurate for faulty rows than [`Self::decode_row`], which
+    /// has no access to the neighbouring rows.
     fn decode(&mut self, frame: &[f64], targets: &mut [f64]) -> Result<(), DecodeError> {
         let (channels, outputs) = (self.channels(), self.outputs());
         assert_eq!(
@@ -175,7 +175,7 @@ impl Decoder for LeftOutDecoder {
         let mut decoded = Ok(());
         let rows = frame.chunks_exact(channels).zip(targets.chunks_exact_mut(outputs));
         for (row_index, (readings, targets)) in rows.enumerate() {
-            // Both of two rows that touch have the same resistances; their mean has less noise.
+            // Two touching rows have the same resistances; their mean has less noise.
             let readings = match shorted {
                 Some(first) if (first..=first + 1).contains(&row_index) => {
                     let (one, other) = (&frame[first * channels..][..channels], &frame[(first + 1) * channels..]);
@@ -194,17 +194,17 @@ impl Decoder for LeftOutDecoder {
         if let Some(dead) = (0..self.rows.len()).find(|&index| self.is_dead(self.rows[index]))
             && self.has_neighbours
         {
-            // Without neighbours the mean of the prior stays.
+            // Without neighbours, the mean of the prior is kept.
             let _ = self.interpolate(dead, targets);
         }
         Ok(())
     }
 }
 
-/// Rounds of median polish: two or three are enough.
+/// Iterations of median polish: two or three are enough.
 const ROUNDS: usize = 6;
 
-/// Values divided into a common part, one of each row and one of each column.
+/// Values decomposed into a common part, row parts and column parts.
 pub(super) struct Polished {
     pub(super) common: f64,
     pub(super) of_rows: Vec<f64>,
@@ -214,7 +214,7 @@ pub(super) struct Polished {
 }
 
 impl Polished {
-    /// Divides values, rows × columns, by median polish.
+    /// Decomposes values (rows × columns) by median polish.
     pub(super) fn new(values: &[f64], columns: usize) -> Self {
         let rows = values.len() / columns;
         let mut found = Self {
@@ -260,9 +260,9 @@ pub(super) fn median(mut values: Vec<f64>) -> f64 {
 mod tests {
     use super::*;
 
-    /// Parts of rows and columns whose medians are 0 come back, whatever happens to less than half of the rows.
+    /// Row and column parts with median 0 are recovered even if fewer than half of the rows are corrupted.
     #[test]
-    fn additive_parts_are_found_beside_outliers() {
+    fn additive_parts_are_found_despite_outliers() {
         let (rows, columns) = ([-2.0, 0.0, 1.0, 0.0, 3.0], [0.5, 0.0, -0.25]);
         let value = |index: usize| 10.0 + rows[index / 3] + columns[index % 3] - if index == 4 { 7.0 } else { 0.0 };
         let values: Vec<f64> = (0..15).map(value).collect();

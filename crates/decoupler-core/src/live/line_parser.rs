@@ -9,22 +9,23 @@ use crate::{
     text::{CsvFields, ReadError, ResistanceColumns, number as parsed_number},
 };
 
-/// Reads frames from lines of CSV, one after the other, without allocation in steady state.
+/// Parses frames from successive CSV lines, without allocation in steady state.
 ///
-/// A line has the resistances of one row-wire: in columns named as for `decode`, also among others, M4 of them without
-/// names, or one more that begins with the number of the row-wire. Or it has those of a whole snapshot, rows × M4 without
-/// names, row by row. The first line of readings decides; names may come again, as from a device that starts again.
+/// A line has the resistances of one row-wire: in columns named as for `decode`, possibly among others; as M4 unnamed
+/// columns; or as M4 + 1 unnamed columns, the first being the number of the row-wire. Or it has those of a whole snapshot:
+/// rows × M4 unnamed columns, row by row. The first line of readings determines the layout; a header may be repeated, for
+/// example when a device restarts.
 #[derive(Debug)]
 pub struct LineParser {
     scale: ArrayScale,
     rows: Rows,
     /// Row-wires read.
     read: Vec<usize>,
-    /// True if lines come from their beginning, so that their turn tells the row-wire.
+    /// True if the input is read from its beginning, so that the row-wire follows from the line count.
     is_complete: bool,
     fields: CsvFields,
     layout: Option<Layout>,
-    /// Lines of single rows without a number so far, good or bad.
+    /// Number of single-row lines without a row number so far, valid or not.
     turns: usize,
     readings_ohm: Vec<f64>,
 }
@@ -39,13 +40,13 @@ struct Layout {
 /// Contents of a line.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum ParsedLine<'a> {
-    /// Nothing, or names of columns.
+    /// An empty line or a header.
     NoReadings,
     /// Resistances of one row-wire in ohm: M4.
     Row {
-        /// Index among the row-wires read; `None` if it is not known.
+        /// Index among the row-wires read; `None` if unknown.
         row_index: Option<usize>,
-        /// Its readings.
+        /// Readings: M4.
         readings_ohm: &'a [f64],
     },
     /// Resistances of all row-wires read, in ohm: rows × M4.
@@ -59,16 +60,16 @@ pub enum LineError {
     /// A field is missing or wrong.
     #[error(transparent)]
     Fields(#[from] ReadError),
-    /// The names of columns lack a resistance, or have one twice.
+    /// A resistance is missing from the header, or is named twice.
     #[error("line {line}: {source}")]
     Names {
         /// Line number.
         line: u64,
-        /// What is wrong with the names.
+        /// Error in the header.
         source: ReadError,
     },
     /// The network does not read this row-wire.
-    #[error("line {line}: it is of row {row}, but the network reads row {rows} only")]
+    #[error("line {line}: it belongs to row {row}, but the network reads only row {rows}")]
     OtherRow {
         /// Line number.
         line: u64,
@@ -77,27 +78,27 @@ pub enum LineError {
         /// Rows that are read.
         rows: Rows,
     },
-    /// The line does not say its row-wire, which the network must know.
+    /// The line has no row number, which the network needs.
     #[error(
-        "line {0}: it does not say its row-wire, and where a device begins is not known; send the number of the row \
-         before the resistances, or whole snapshots in one line"
+        "line {0}: it has no row number, and it is not known with which row a device begins; send the row number before \
+         the resistances, or whole snapshots in one line"
     )]
     NoRow(u64),
 }
 
 impl LineError {
-    /// Returns `true` if the lines to come are not known to be readings of which wires, so that none should be decoded.
+    /// Returns `true` if later lines cannot be assigned to wires either, so that decoding must stop.
     pub fn is_final(&self) -> bool {
         matches!(self, Self::Names { .. } | Self::NoRow(_))
     }
 }
 
 impl LineParser {
-    /// Prepares to read lines for a network of `rows` of an array. `is_complete` reports that the input is read from its
-    /// beginning and no line of it is lost, so that lines without a number are counted.
+    /// Prepares to read lines for a network of `rows` of an array. `is_complete` means that the input is read from its
+    /// beginning and no line is lost, so that the row of a line without a row number follows from counting lines.
     ///
     /// # Errors
-    /// A row that the array does not have.
+    /// If the array does not have the row.
     pub fn new(scale: ArrayScale, rows: Rows, is_complete: bool) -> Result<Self, SceneError> {
         Ok(Self {
             read: rows.read(scale.rows())?,
@@ -111,12 +112,12 @@ impl LineParser {
         })
     }
 
-    /// Returns `true` if the lines read so far are whole snapshots; `None` before the first.
+    /// Returns whether each line is a whole snapshot; `None` before the first line of readings.
     pub fn is_snapshot(&self) -> Option<bool> {
         self.layout.as_ref().map(|layout| layout.is_snapshot)
     }
 
-    /// Reads a line without its line break, with its number for messages.
+    /// Parses a line without its line break; `number` is used in messages.
     ///
     /// # Errors
     /// If the line is not a frame.
@@ -165,7 +166,8 @@ impl LineParser {
         }
     }
 
-    /// Returns `true` for a line with a name of a resistance, or with as many other texts as there are resistances.
+    /// Returns `true` for a line with the name of a resistance, or with at least as many text cells as there are
+    /// resistances.
     fn has_names(&self) -> bool {
         let channels = self.scale.columns();
         let is_text = |field: &[u8]| !field.is_empty() && parsed_number(field).is_none();
@@ -173,12 +175,12 @@ impl LineParser {
             || (self.fields.count() >= channels.max(2) && self.fields.iter().all(is_text))
     }
 
-    /// A line that is no frame takes the turn of one, for there is nothing better to assume.
+    /// Counts a malformed line, which still advances the row counter.
     pub fn count_bad(&mut self) {
         self.turns += usize::from(self.layout.as_ref().is_some_and(|layout| !layout.columns.has_row()));
     }
 
-    /// Index among the row-wires read of a line that says `row_wire`, or of the line whose turn it is.
+    /// Index of the line's row-wire among those read: from its row number `row_wire`, or else from the line count.
     fn row_index(&mut self, line: u64, row_wire: Option<usize>) -> Result<Option<usize>, LineError> {
         if let Some(row_wire) = row_wire {
             let index = self.read.iter().position(|&other| other == row_wire);
@@ -214,7 +216,7 @@ impl Layout {
     }
 }
 
-/// Lines one after the other in one buffer.
+/// Lines stored consecutively in one buffer.
 #[derive(Debug, Default)]
 pub(super) struct Batch {
     pub(super) bytes: Vec<u8>,
@@ -224,16 +226,16 @@ pub(super) struct Batch {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Entry {
     pub(super) number: u64,
-    /// Place in the bytes; `None` for a line that is too long.
+    /// Start and end in the bytes; `None` for a line that is too long.
     pub(super) place: Option<(usize, usize)>,
-    /// True if it looks like names of columns.
+    /// True if it looks like a header.
     pub(super) has_names: bool,
     pub(super) read_at: Instant,
 }
 
 impl Batch {
-    /// Drops all but the newest `kept` lines if the oldest has waited too long; returns how many. The latest names of
-    /// columns stay: without them the lines that follow would be taken for others.
+    /// Drops all but the newest `kept` lines if the oldest has waited too long; returns the number of dropped lines. The
+    /// latest header is kept: without it the lines that follow would be misinterpreted.
     pub(super) fn drop_old(&mut self, now: Instant, kept: usize) -> u64 {
         let is_old = |entry: &Entry| now.saturating_duration_since(entry.read_at) > Lines::PATIENCE;
         if !self.lines.front().is_some_and(is_old) || self.lines.len() <= kept {
@@ -245,7 +247,7 @@ impl Batch {
             self.lines.push_front(drained.swap_remove(names));
             dropped -= 1;
         }
-        // The bytes of the others go at once, so that the buffer never grows beyond what waits.
+        // The bytes of dropped lines are freed at once, so that the buffer never exceeds the waiting lines.
         let mut bytes = Vec::with_capacity(self.bytes.len());
         for (from, to) in self.lines.iter_mut().filter_map(|entry| entry.place.as_mut()) {
             let start = bytes.len();
@@ -260,7 +262,7 @@ impl Batch {
 /// Splits chunks of bytes into lines.
 #[derive(Debug, Default)]
 pub(super) struct Splitter {
-    /// Beginning of a line whose end has not come.
+    /// Beginning of an incomplete line.
     partial: Vec<u8>,
     is_too_long: bool,
     number: u64,
@@ -268,7 +270,7 @@ pub(super) struct Splitter {
 }
 
 impl Splitter {
-    /// With `skips_first` the first line is left out, unless it is empty or begins as names do.
+    /// With `skips_first` the first line is skipped, unless it is empty or begins like a header.
     pub(super) fn new(skips_first: bool) -> Self {
         Self {
             skips_first,
@@ -285,7 +287,7 @@ impl Splitter {
         self.extend(bytes);
     }
 
-    /// Gives the last line, if it has no line break.
+    /// Adds the last line, if it has no line break.
     pub(super) fn finish(&mut self, read_at: Instant, batch: &mut Batch) {
         if self.is_too_long || !self.partial.is_empty() {
             self.end_line(read_at, batch);
@@ -305,13 +307,13 @@ impl Splitter {
 
     fn end_line(&mut self, read_at: Instant, batch: &mut Batch) {
         self.number += 1;
-        let begins_as_names = |text: &[u8]| {
+        let begins_like_header = |text: &[u8]| {
             text.first()
                 .is_none_or(|first| first.is_ascii_alphabetic() || *first == b'"')
         };
-        let is_skipped = self.number == 1 && self.skips_first && !begins_as_names(self.partial.trim_ascii());
+        let is_skipped = self.number == 1 && self.skips_first && !begins_like_header(self.partial.trim_ascii());
         if !is_skipped {
-            let has_names = begins_as_names(self.partial.trim_ascii()) && self.partial.contains(&b',');
+            let has_names = begins_like_header(self.partial.trim_ascii()) && self.partial.contains(&b',');
             let start = batch.bytes.len();
             batch.bytes.extend_from_slice(&self.partial);
             batch.lines.push_back(Entry {
@@ -344,7 +346,7 @@ mod tests {
     }
 
     #[test]
-    fn rows_come_by_name_by_number_or_in_turn() {
+    fn rows_are_identified_by_name_by_number_or_by_count() {
         let mut named = parser(Rows::Known, false);
         assert_eq!(named.parse(1, b"time,row,r_2,r_1,r_3").unwrap(), ParsedLine::NoReadings);
         assert_eq!(
@@ -365,7 +367,7 @@ mod tests {
     }
 
     #[test]
-    fn a_snapshot_comes_in_one_line() {
+    fn a_line_may_hold_a_whole_snapshot() {
         let mut parser = parser(Rows::Known, false);
         assert_eq!(
             parser.parse(1, b"1,2,3,4,5,6").unwrap(),
@@ -377,7 +379,7 @@ mod tests {
     }
 
     #[test]
-    fn a_bad_line_is_told_and_the_next_one_read() {
+    fn a_bad_line_is_reported_and_the_next_one_read() {
         let mut parser = parser(Rows::Known, true);
         assert_eq!(parser.parse(1, b"4,5,6").unwrap(), row(Some(0), &[4.0, 5.0, 6.0]));
         for (line, bad) in [
@@ -390,13 +392,13 @@ mod tests {
             let message = parser.parse(line, bad.as_bytes()).unwrap_err().to_string();
             assert!(message.starts_with(&format!("line {line}")), "{message}");
         }
-        // Five bad lines took five turns.
+        // Five bad lines advanced the row counter by five.
         assert_eq!(parser.parse(7, b"4,5,6").unwrap(), row(Some(0), &[4.0, 5.0, 6.0]));
         assert_eq!(parser.parse(8, b"  ").unwrap(), ParsedLine::NoReadings);
     }
 
     #[test]
-    fn names_that_lack_a_resistance_are_refused() {
+    fn a_header_that_lacks_a_resistance_is_refused() {
         for (names, words) in [
             ("time,r_1,r_2", "line 1: there is no column r_3"),
             ("R1,R2,R3", "line 1: there is no column r_1"),
@@ -408,7 +410,7 @@ mod tests {
     }
 
     #[test]
-    fn garbage_before_the_first_frame_decides_nothing() {
+    fn garbage_before_the_first_frame_does_not_determine_the_layout() {
         let mut parser = parser(Rows::Known, false);
         assert!(parser.parse(1, b"5,6").is_err());
         assert!(parser.parse(2, b"boot ok").is_err());
@@ -416,14 +418,14 @@ mod tests {
     }
 
     #[test]
-    fn rows_that_are_not_known_are_refused() {
+    fn lines_of_unknown_rows_are_refused() {
         let message = parser(Rows::Known, false).parse(3, b"4,5,6").unwrap_err().to_string();
-        assert!(message.starts_with("line 3: it does not say its row-wire"), "{message}");
+        assert!(message.starts_with("line 3: it has no row number"), "{message}");
         let message = parser(Rows::One(0), false)
             .parse(3, b"2,4,5,6")
             .unwrap_err()
             .to_string();
-        assert_eq!(message, "line 3: it is of row 2, but the network reads row 1 only");
+        assert_eq!(message, "line 3: it belongs to row 2, but the network reads only row 1");
         assert_eq!(
             parser(Rows::One(1), false).parse(3, b"4,5,6").unwrap(),
             row(Some(0), &[4.0, 5.0, 6.0])
@@ -431,7 +433,7 @@ mod tests {
     }
 
     #[test]
-    fn names_of_columns_are_not_dropped() {
+    fn headers_are_not_dropped() {
         let start = Instant::now();
         let mut batch = Batch::default();
         let mut splitter = Splitter::default();
@@ -445,7 +447,7 @@ mod tests {
     }
 
     #[test]
-    fn the_latest_lines_win_once_the_oldest_is_too_old() {
+    fn old_lines_are_dropped_once_the_oldest_is_too_old() {
         let start = Instant::now();
         let after = |millis| start + Duration::from_millis(millis);
         let mut batch = Batch::default();

@@ -8,25 +8,24 @@ use std::{
 use super::line_parser::{Batch, Entry, Splitter};
 use crate::text::LONGEST_ROW;
 
-/// Lines of a source, read by a thread of their own as they come.
+/// Lines of a source, read on a separate thread as they arrive.
 ///
-/// From a file or pipe every line is given, and the source waits if no one takes them. From a device or socket that does
-/// not wait the latest win: once a line has waited for [`Lines::PATIENCE`], all but the newest are dropped, and counted.
-/// Lines that are dropped are the oldest, and as many remain as [`Lines::set_kept`] says. Buffers are used again, so that
-/// nothing is allocated in steady state.
+/// Every line of a file or pipe is returned, and reading pauses while lines are waiting. A device or socket cannot be
+/// paused: once a line has waited for [`Lines::PATIENCE`], the oldest lines are dropped and counted, and the number of
+/// newest lines set by [`Lines::set_kept`] is kept. Buffers are reused, so that nothing is allocated in steady state.
 #[derive(Debug)]
 pub struct Lines {
     shared: Arc<Shared>,
-    /// Lines taken from the reader, not yet given.
+    /// Lines taken from the reader, not yet returned.
     batch: Batch,
 }
 
-/// A line with its number from 1 and the time when its last byte was read.
+/// A line, its number and its time of arrival.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Line<'a> {
-    /// Number in the source, from 1; dropped lines count.
+    /// Number in the source, from 1; dropped lines are counted.
     pub number: u64,
-    /// Its bytes without LF; `None` if it is longer than [`Lines::LONGEST`], which is not kept.
+    /// Bytes without LF; `None` if the line is longer than [`Lines::LONGEST`].
     pub text: Option<&'a [u8]>,
     /// Time when its last byte was read.
     pub read_at: Instant,
@@ -37,27 +36,27 @@ pub struct Line<'a> {
 pub enum NextLine<'a> {
     /// A line.
     Line(Line<'a>),
-    /// None has come in time.
+    /// No line arrived before the timeout.
     None,
-    /// The source has ended, with an error unless it is a regular end.
+    /// The source has ended, with an error unless it ended normally.
     End(Option<io::Error>),
 }
 
-/// Keeping of lines that no one takes.
+/// Overflow policy for lines that arrive faster than they are consumed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Keeping {
-    /// All, and the source waits.
+    /// Keep all lines and pause reading.
     All,
-    /// The latest.
+    /// Keep only the latest lines.
     Latest,
 }
 
 #[derive(Debug)]
 struct Shared {
     state: Mutex<State>,
-    /// Told when lines come or the source ends.
+    /// Notified when lines arrive or the source ends.
     filled: Condvar,
-    /// Told when lines are taken.
+    /// Notified when lines are taken.
     emptied: Condvar,
 }
 
@@ -68,25 +67,26 @@ struct State {
     waiting: Batch,
     dropped: u64,
     end: Option<Option<io::Error>>,
-    /// No one takes lines any more.
+    /// True once the [`Lines`] are dropped.
     is_abandoned: bool,
 }
 
-/// Most bytes read at once. Of lines that all count, no more are read before these are taken: what waits grows old.
+/// Maximum number of bytes read at once. With [`Keeping::All`] no more are read before these are taken, because waiting
+/// lines become stale.
 const CHUNK: usize = 1 << 14;
 
 impl Lines {
-    /// Time after which a waiting line is too old if only the latest count: longer than a busy machine lets a program wait
-    /// for its turn.
+    /// Waiting time after which a line is too old with [`Keeping::Latest`]: longer than the scheduling delays of a busy
+    /// machine.
     pub const PATIENCE: Duration = Duration::from_millis(100);
-    /// Most bytes of a line, its line break included: 1 MiB, as of any file of readings.
+    /// Maximum length of a line in bytes, including its line break: 1 MiB, as for any file of readings.
     pub const LONGEST: usize = LONGEST_ROW as usize;
 
-    /// Starts to read `source`. With `skips_first` its first line is not given unless it is empty or begins with a letter
-    /// or a quote, as names do: a device may have been met in the middle of a line.
+    /// Starts reading `source`. With `skips_first` its first line is skipped unless it is empty or begins with a letter or
+    /// a quote, like a header: reading from a device may begin in the middle of a line.
     ///
     /// # Errors
-    /// If the operating system has no further thread.
+    /// If the operating system cannot create a thread.
     pub fn spawn(source: impl Read + Send + 'static, keeping: Keeping, skips_first: bool) -> io::Result<Self> {
         let shared = Arc::new(Shared {
             state: Mutex::new(State {
@@ -113,7 +113,7 @@ impl Lines {
         })
     }
 
-    /// Sets how many of the newest lines remain when older ones are dropped: those of a whole snapshot.
+    /// Sets the number of newest lines kept when older ones are dropped: those of a whole snapshot.
     pub fn set_kept(&mut self, lines: usize) {
         self.shared.lock().kept = lines.max(1);
     }
@@ -123,12 +123,12 @@ impl Lines {
         self.shared.lock().dropped
     }
 
-    /// Returns `true` if no line waits at present.
+    /// Returns `true` if no line is waiting.
     pub fn is_empty(&self) -> bool {
         self.batch.lines.is_empty() && self.shared.lock().waiting.lines.is_empty()
     }
 
-    /// Waits for the next line, at most so long.
+    /// Waits for the next line, up to `timeout`.
     pub fn next(&mut self, timeout: Duration) -> NextLine<'_> {
         if self.batch.lines.is_empty() {
             self.batch.bytes.clear();
@@ -162,7 +162,7 @@ impl Lines {
         }
     }
 
-    /// Drops lines that have waited too long, if newer ones are there.
+    /// Drops lines that have waited too long, if there are newer ones.
     fn drop_old(&mut self, now: Instant) {
         let mut state = self.shared.lock();
         if state.keeping == Keeping::Latest {
@@ -181,11 +181,11 @@ impl Drop for Lines {
 
 impl Shared {
     fn lock(&self) -> MutexGuard<'_, State> {
-        // Nothing panics while the lock is held, and counts stay counts if it did.
+        // Nothing panics while the lock is held, and the state would still be valid if it did.
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Reads lines until the source ends or no one takes them.
+    /// Reads lines until the source ends or the receiver is dropped.
     fn read(&self, mut source: impl Read, skips_first: bool) -> io::Result<()> {
         let mut chunk = vec![0; CHUNK];
         let mut splitter = Splitter::new(skips_first);
@@ -251,7 +251,7 @@ mod tests {
         }
     }
 
-    /// Gives a few bytes at a time, interrupted now and then.
+    /// Returns a few bytes at a time, with occasional interruptions.
     struct Dribble(Vec<u8>, usize);
 
     impl Read for Dribble {
@@ -268,7 +268,7 @@ mod tests {
     }
 
     #[test]
-    fn every_line_comes_with_its_number() {
+    fn every_line_has_its_number() {
         let text: String = (1..=2000).map(|k| format!("{k},{}\n", "x".repeat(k % 50))).collect();
         let expected: Vec<_> = (1..).zip(text.lines().map(|line| Some(line.to_owned()))).collect();
         assert_eq!(all(io::Cursor::new(text.clone()), false), expected);
@@ -281,7 +281,7 @@ mod tests {
     }
 
     #[test]
-    fn the_source_waits_for_who_takes_its_lines() {
+    fn the_source_waits_for_a_slow_receiver() {
         let text = format!("{}\n", "y".repeat(999)).repeat(2000);
         assert_eq!(all(io::Cursor::new(text), false).len(), 2000);
     }
@@ -293,7 +293,7 @@ mod tests {
     }
 
     #[test]
-    fn what_a_device_sends_first_may_be_the_rest_of_a_line() {
+    fn an_incomplete_first_line_of_a_device_is_skipped() {
         assert_eq!(all(&b"3,4\n1,2\n"[..], true), [(2, Some("1,2".to_owned()))]);
         assert_eq!(all(&b"r_1,r_2\n1,2\n"[..], true).len(), 2);
         assert_eq!(all(&b"\n1,2\n"[..], true).len(), 2);

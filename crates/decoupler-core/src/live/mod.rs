@@ -1,8 +1,9 @@
-//! Frames as they come: sources, decoding line by line, re-zero, recording, and faults named from the residual.
+//! Live frames: sources, line-by-line decoding, re-zeroing, recording, and fault diagnosis from the residual.
 //!
-//! A [`Source`] gives bytes, [`Lines`] their lines, and [`LineParser`] the readings in them. [`FaultMonitor`] watches
-//! whether Eq. (2) explains them and names the wire at fault; [`LeftOutDecoder`] decodes without it. [`Simulated`] needs
-//! no hardware. [`ReZero`] takes the unloaded state from recent frames, and [`Recorder`] keeps frames for a replay.
+//! A [`Source`] provides bytes, [`Lines`] splits them into lines, and [`LineParser`] parses the readings. [`FaultMonitor`]
+//! checks whether Eq. (2) explains them and identifies the faulty wire; [`LeftOutDecoder`] decodes without it.
+//! [`Simulated`] needs no hardware. [`ReZero`] estimates the unloaded state from recent frames, and [`Recorder`] saves
+//! frames for replay.
 
 mod faults;
 mod left_out_decoder;

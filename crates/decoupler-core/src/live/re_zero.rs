@@ -4,69 +4,70 @@ use thiserror::Error;
 use super::left_out_decoder::{Polished, median};
 use crate::scene::NoiseSource;
 
-/// Takes the unloaded state from recent frames, without erasing a contact that is held.
+/// Estimates the unloaded state from recent frames, without erasing a sustained contact.
 ///
-/// From each channel's median over the frames follows its ratio to the resistance at rest. Amplifiers and temperature change
-/// whole columns and the whole array; a contact lowers readings of few rows. So the logarithms of the ratios are divided
-/// into a common part, one of each column and one of each row by median polish (Tukey, "Exploratory Data Analysis", 1977),
-/// which a contact on less than half of the rows does not move. A row is in contact if the mean of what remains, with its
-/// own part, is below zero by more than [`ReZero::DEVIATIONS`] of its standard deviations, as the other rows or the noise
-/// tell them, or if its readings changed while the frames came by more than their noise and its steps explain, less the
-/// gain error that a snapshot has in common. Channels of such rows take the common part and their column's only; all others
-/// take their whole ratio. Where the noise is not known, it is estimated from the differences of successive frames, to which
-/// slow movement contributes little.
+/// Each channel's gain is the ratio of its median reading over the frames to its resistance at rest. Amplifiers and
+/// temperature affect whole columns and the whole array; a contact lowers the readings of a few rows. The logarithms of the
+/// ratios are therefore decomposed by median polish (Tukey, "Exploratory Data Analysis", 1977) into a common part, column
+/// parts, row parts and residuals. A contact on fewer than half of the rows does not affect the common and column parts.
 ///
-/// A contact that spares less than half of the rows cannot be distinguished from a drift, and is refused where readings move.
+/// A row is in contact if its part plus its mean residual is below zero by more than [`ReZero::DEVIATIONS`] standard
+/// deviations, estimated from the other rows or from the noise. It is also in contact if its readings, corrected for the
+/// gain error that a snapshot has in common, changed during the frames by more than noise and converter steps explain.
+/// Channels of rows in contact use the common and column parts only; all others use their full ratio. If the noise is
+/// unknown, it is estimated from the differences of successive frames, to which slow movement contributes little.
+///
+/// A contact on more than half of the rows cannot be distinguished from drift; it is refused if the readings move.
 #[derive(Clone, Debug)]
 pub struct ReZero {
     rows: usize,
     columns: usize,
     /// Resistances at rest: rows × columns.
     rest_ohm: Vec<f64>,
-    /// Noise of the readings; none if it is not known.
+    /// Noise of the readings; none if unknown.
     noise: NoiseSource,
-    /// Latest frames, oldest overwritten first: frames × rows × columns.
+    /// Ring buffer of the latest frames: frames × rows × columns.
     frames_ohm: Vec<f64>,
     next: usize,
     count: usize,
 }
 
-/// Gain of every channel in the unloaded state: its reading over the resistance at rest.
+/// Gain of every channel in the unloaded state: the reading divided by the resistance at rest.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ZeroGains {
     /// Number of column-wires.
     pub columns: usize,
-    /// Reading over resistance at rest: rows read × columns, row by row.
+    /// Reading divided by resistance at rest: rows read × columns, row by row.
     pub gains: Vec<f64>,
-    /// Rows that were in contact, and took the gains of their columns only.
+    /// True for rows in contact, whose gains are those of their columns.
     pub in_contact: Vec<bool>,
 }
 
-/// Reason for which there is no unloaded state in the frames.
+/// Reason why the unloaded state cannot be estimated.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
 pub enum ReZeroError {
     /// Too few frames.
-    #[error("{found} frames have come, and {needed} are needed: wait a moment and try again")]
+    #[error("only {found} of {needed} frames have been received: wait a moment and try again")]
     Frames {
-        /// Frames that came.
+        /// Number of frames received.
         found: usize,
-        /// Frames needed.
+        /// Number of frames needed.
         needed: usize,
     },
     /// Half of the rows or more are in contact.
-    #[error("{touched} of {rows} rows are in contact: lift what presses from at least half of the rows and try again")]
+    #[error("{touched} of {rows} rows are in contact: remove the load from at least half of the rows and try again")]
     Contact {
-        /// Rows in contact.
+        /// Number of rows in contact.
         touched: usize,
-        /// Rows read.
+        /// Number of rows read.
         rows: usize,
     },
     /// A gain is far from 1.
     #[error(
-        "row {}, column {}: the reading is {gain:.2} times that at rest, which no drift makes; check the wire, or lift what \
-         presses",
+        "row {}, column {}: the reading is {gain:.2} times that at rest, which is too much for drift; check the wire, or \
+         remove the load",
         row + 1,
         column + 1
     )]
@@ -80,22 +81,22 @@ pub enum ReZeroError {
     },
 }
 
-/// Median absolute deviation of a normal distribution, in standard deviations.
+/// Median absolute deviation of a normal distribution in units of its standard deviation.
 const NORMAL_MAD: f64 = 0.674_489_750_196_081_7;
-/// Largest gain or loss that counts as a drift.
+/// Largest gain that is attributed to drift; the smallest is its reciprocal.
 const LARGEST_GAIN: f64 = 2.0;
 
 impl ReZero {
-    /// Standard deviations beyond which a row is in contact.
+    /// Number of standard deviations beyond which a row is in contact.
     pub const DEVIATIONS: f64 = 4.0;
-    /// Frames that are needed.
+    /// Number of frames needed.
     pub const FRAMES: usize = 25;
 
-    /// Prepares for frames of `rest_ohm.len() / columns` rows, with their resistances at rest and the noise of the readings;
-    /// without noise, it is estimated from the frames.
+    /// Prepares for frames of `rest_ohm.len() / columns` rows with these resistances at rest. If `noise` is none, it is
+    /// estimated from the frames.
     ///
     /// # Panics
-    /// If the resistances are not whole rows, or not above 0.
+    /// If the resistances do not form whole rows, or are not above 0.
     pub fn new(rest_ohm: Vec<f64>, columns: usize, noise: NoiseSource) -> Self {
         assert!(columns > 0 && rest_ohm.len().is_multiple_of(columns) && !rest_ohm.is_empty());
         assert!(rest_ohm.iter().all(|&ohm| ohm > 0.0));
@@ -110,10 +111,10 @@ impl ReZero {
         }
     }
 
-    /// Takes a frame, rows × columns, all readings finite and above 0. Allocates nothing.
+    /// Adds a frame (rows × columns), whose readings must be finite and above 0. Does not allocate.
     ///
     /// # Panics
-    /// If the frame has another length.
+    /// If the frame has the wrong length.
     pub fn observe(&mut self, frame_ohm: &[f64]) {
         let length = self.rest_ohm.len();
         self.frames_ohm[self.next * length..][..length].copy_from_slice(frame_ohm);
@@ -121,7 +122,7 @@ impl ReZero {
         self.count = (self.count + 1).min(Self::FRAMES);
     }
 
-    /// Returns the gains of the unloaded state in the latest frames.
+    /// Returns the gains of the unloaded state estimated from the latest frames.
     ///
     /// # Errors
     /// If there are too few frames, too many rows are in contact, or a gain is far from 1.
@@ -141,7 +142,7 @@ impl ReZero {
             of_columns,
             rest,
         } = Polished::new(&ratios, self.columns);
-        // Mean and spread of what is left in each row, its own part included.
+        // Mean and spread of the residuals of each row, including the row part.
         let mean = |row: usize| {
             let of_row = &rest[row * self.columns..(row + 1) * self.columns];
             of_rows[row] + of_row.iter().sum::<f64>() / self.columns as f64
@@ -211,7 +212,7 @@ impl ReZero {
         }
     }
 
-    /// Logarithm of the gain error that each frame has in common; 0 where it is no noise but all rows have moved.
+    /// Logarithm of the common gain error of each frame; 0 if all rows have moved, which is not noise.
     fn common(&self, channels: &[Vec<f64>]) -> Vec<f64> {
         let middles: Vec<f64> = channels.iter().map(|logs| median(logs.clone())).collect();
         let of_frame = |frame: usize| median(channels.iter().zip(&middles).map(|(logs, m)| logs[frame] - m).collect());
@@ -228,7 +229,7 @@ impl ReZero {
         }
     }
 
-    /// Noise of each channel relative to its reading, without the gain error in common (standard deviation).
+    /// Noise of each channel relative to its reading, without the common gain error (standard deviation).
     fn deviations(&self, channels: &[Vec<f64>]) -> Vec<f64> {
         if !self.noise.is_none() {
             let own = self.rest_ohm.iter().map(|&ohm| self.noise.relative_to(ohm).own);
@@ -236,7 +237,7 @@ impl ReZero {
         }
         let found: Vec<f64> = channels.iter().map(|logs| jitter(logs)).collect();
         let middle = median(found.clone());
-        // Few frames estimate it roughly, and a contact that trembles is not to hide in it.
+        // The estimate from a few frames is rough, and a trembling contact must not be mistaken for noise.
         let limited = |deviation: f64| deviation.clamp(middle, 3.0 * middle);
         found.into_iter().map(limited).collect()
     }
@@ -246,27 +247,27 @@ impl ReZero {
 struct Ratios {
     /// Logarithm of the ratio of each channel's median to its resistance at rest.
     logs: Vec<f64>,
-    /// True for rows whose readings changed beyond their noise while the frames came.
+    /// True for rows whose readings changed by more than noise during the frames.
     moves: Vec<bool>,
-    /// Relative noise of a reading (standard deviation), of all channels.
+    /// Relative noise of a reading (standard deviation) over all channels.
     noise: f64,
 }
 
-/// Frames at the beginning, and at the end, whose medians are compared.
+/// Number of frames at the beginning and at the end whose medians are compared.
 const HALF: usize = ReZero::FRAMES / 2;
 
-/// Difference of the medians of the first and the last values.
+/// Difference between the medians of the last and the first values.
 fn change(values: &[f64]) -> f64 {
     (median(values[..HALF].to_vec()) - median(values[values.len() - HALF..].to_vec())).abs()
 }
 
-/// Largest [`change`] of values with this standard deviation. That of a median of n normal values is 1.2533/√n of theirs,
-/// and a channel of a whole array may be so far apart by chance more easily than one alone.
+/// Largest [`change`] expected by chance for values with this standard deviation. The standard deviation of a median of n
+/// normal values is 1.2533/√n times theirs; the limit allows for the many channels of an array.
 fn largest_change(deviation: f64) -> f64 {
     1.5 * ReZero::DEVIATIONS * 1.2533 * (2.0 / HALF as f64).sqrt() * deviation
 }
 
-/// Standard deviation of values about a slow movement, from the differences of successive ones.
+/// Standard deviation of values around a slow movement, estimated from successive differences.
 fn jitter(values: &[f64]) -> f64 {
     let differences = values.windows(2).map(|pair| (pair[1] - pair[0]).abs());
     median(differences.collect()) / (NORMAL_MAD * 2.0_f64.sqrt())
@@ -276,7 +277,7 @@ impl ZeroGains {
     /// Divides the readings of a frame, rows × columns in ohm, by the gains.
     ///
     /// # Panics
-    /// If the frame has another length.
+    /// If the frame has the wrong length.
     pub fn apply(&self, frame_ohm: &mut [f64]) {
         assert_eq!(frame_ohm.len(), self.gains.len());
         frame_ohm
@@ -285,7 +286,7 @@ impl ZeroGains {
             .for_each(|(ohm, gain)| *ohm /= gain);
     }
 
-    /// Returns `true` for gains of this many rows and columns that divide any reading soundly: they may come from a file.
+    /// Returns `true` if there are gains for this many rows and columns, all finite and above 0: they may come from a file.
     pub fn is_sound(&self, rows: usize, columns: usize) -> bool {
         let is_gain = |gain: &f64| *gain > 0.0 && gain.is_finite();
         self.columns == columns
@@ -322,7 +323,7 @@ mod tests {
         readings(model, &Deformation::from_fn(model.scale, |_, _| DVec3::ZERO))
     }
 
-    /// Gains of columns by 1 %, on top of 2 % for all.
+    /// Column gains with a spread of 1 %, on top of 2 % for all.
     fn drift(rng: &mut impl Rng) -> Vec<f64> {
         (0..30).map(|_| 1.02 * (1.0 + 0.01 * standard_normal(rng))).collect()
     }
@@ -332,7 +333,7 @@ mod tests {
         re_zero_in(noise, noise, deformation, gains, rng)
     }
 
-    /// Frames with `noise`, of which `assumed` is known.
+    /// Frames with `noise`, decoded under the assumption of `assumed`.
     fn re_zero_in(
         noise: Noise,
         assumed: Noise,
@@ -384,7 +385,7 @@ mod tests {
         assert!(found.is_sound(10, 30) && !found.is_sound(9, 30));
     }
 
-    /// A punch of 1.5 mm radius held half a millimetre deep: what it changes in the readings is still there afterwards.
+    /// A punch of 1.5 mm radius held half a millimetre deep: its effect on the readings is preserved.
     #[test]
     fn a_held_contact_is_not_erased() {
         let model = model();
@@ -404,7 +405,7 @@ mod tests {
                 .for_each(|(index, ohm)| *ohm *= gains[index % 30]);
             found.apply(&mut ohm);
             let rest = at_rest(&model);
-            // The contact, in ohm below rest, of the row that it presses most.
+            // Effect of the contact on the row that it presses most.
             let contact = |ohm: &[f64]| (90..120).map(|index| (rest[index] / ohm[index]).ln()).sum::<f64>();
             let kept = contact(&ohm) / contact(&before);
             assert!(
@@ -416,7 +417,7 @@ mod tests {
     }
 
     #[test]
-    fn what_moves_or_covers_half_the_rows_is_refused() {
+    fn movement_or_contact_on_half_the_rows_is_refused() {
         let model = model();
         let mut rng = Seed(3).rng(Stream::Live);
         let ball = Indenter::default();
@@ -427,7 +428,7 @@ mod tests {
         assert_eq!(new.gains().unwrap_err(), ReZeroError::Frames { found: 0, needed: 25 });
     }
 
-    /// Noise of every kind, known and not known.
+    /// Noise of every kind, known and unknown.
     fn noises() -> Vec<(Noise, Noise)> {
         let additive = Noise {
             additive_ohm: 0.2,
@@ -451,7 +452,7 @@ mod tests {
     }
 
     #[test]
-    fn jitter_at_rest_is_no_contact_whatever_the_noise() {
+    fn jitter_at_rest_is_not_a_contact_for_any_noise() {
         let model = model();
         for (noise, assumed) in noises() {
             for seed in 0..10 {
@@ -465,11 +466,11 @@ mod tests {
     }
 
     #[test]
-    fn what_moves_is_refused_whatever_the_noise() {
+    fn movement_is_refused_for_any_noise() {
         let model = model();
         let ball = Indenter::default();
         let moving = |frame: usize| ball.press(&model, DVec2::new(12.0, 12.0), 0.04 * frame as f64);
-        // Readings move by a percent.
+        // Readings change by one percent.
         for (noise, assumed) in noises() {
             let noise = Noise {
                 additive_ohm: 0.1 * noise.additive_ohm,
@@ -489,7 +490,7 @@ mod tests {
     }
 
     #[test]
-    fn a_broken_wire_is_no_drift() {
+    fn a_broken_wire_is_not_drift() {
         let model = model();
         let mut gains = [1.0; 30];
         gains[4] = 3.0;

@@ -9,12 +9,12 @@ use thiserror::Error;
 
 use crate::text::{CsvFields, ReadError, ResistanceColumns};
 
-/// Writes frames with their times as CSV: a line for each row-wire, with columns `time_s`, `row` (from 1) and `r_1` to
-/// `r_M4` in ohm, which `decode` reads too. Every frame is flushed, so that a file ends with a whole line whenever the
-/// program does.
+/// Writes frames with their times as CSV: one line per row-wire, with columns `time_s`, `row` (from 1) and `r_1` to `r_M4`
+/// in ohm. `decode` reads these files too. Every frame is flushed, so that the file ends with a complete line even if the
+/// program is terminated.
 #[derive(Debug)]
 pub struct Recorder<W: Write> {
-    /// Lines of one frame, which are written together.
+    /// Lines of one frame, written together.
     text: Vec<u8>,
     rows: Vec<usize>,
     channels: usize,
@@ -22,10 +22,10 @@ pub struct Recorder<W: Write> {
 }
 
 impl<W: Write> Recorder<W> {
-    /// Writes the names of the columns, for frames of these row-wires (from 0) with this many channels.
+    /// Writes the header for frames of these row-wires (from 0) with this many channels.
     ///
     /// # Errors
-    /// Any error of `writer`.
+    /// If `writer` fails.
     pub fn new(mut writer: W, rows: &[usize], channels: usize) -> io::Result<Self> {
         let mut text = b"time_s,row".to_vec();
         for channel in 1..=channels {
@@ -45,10 +45,10 @@ impl<W: Write> Recorder<W> {
     /// Writes a frame, rows × channels in ohm, with its time in seconds.
     ///
     /// # Errors
-    /// Any error of the writer.
+    /// If the writer fails.
     ///
     /// # Panics
-    /// If the frame has another length.
+    /// If the frame has the wrong length.
     pub fn record(&mut self, time_s: f64, frame_ohm: &[f64]) -> io::Result<()> {
         assert_eq!(frame_ohm.len(), self.rows.len() * self.channels);
         self.text.clear();
@@ -64,7 +64,7 @@ impl<W: Write> Recorder<W> {
     }
 }
 
-/// Recorded frames, to be replayed.
+/// Recorded frames for replay.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Recording {
     /// Time of each frame in seconds, in ascending order.
@@ -77,11 +77,11 @@ pub struct Recording {
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum RecordingError {
-    /// A field is missing or wrong.
+    /// A field is missing or invalid.
     #[error(transparent)]
     Fields(#[from] ReadError),
     /// The time is missing or not in order.
-    #[error("line {0}: the time is not a number of seconds from that of the line before on; record again")]
+    #[error("line {0}: the time is missing, invalid or earlier than on the previous line; record again")]
     Time(u64),
     /// The row-wire is not the one expected.
     #[error("line {line}: row {expected} is expected here: each frame needs its rows in ascending order")]
@@ -91,17 +91,17 @@ pub enum RecordingError {
         /// Row expected, from 1.
         expected: usize,
     },
-    /// There is no whole frame.
-    #[error("there is no whole frame in it: record again, or choose another file")]
+    /// There is no complete frame.
+    #[error("it contains no complete frame: record again, or choose another file")]
     Empty,
 }
 
 impl Recording {
-    /// Reads what [`Recorder`] wrote, for these row-wires of an array with `array_rows` of them. A last frame that is not
-    /// whole is left out.
+    /// Reads a file written by [`Recorder`] for these row-wires of an array with `array_rows` row-wires. An incomplete last
+    /// frame is ignored.
     ///
     /// # Errors
-    /// If the file cannot be read, is malformed, or has no whole frame.
+    /// If the file cannot be read, is malformed, or has no complete frame.
     pub fn read(
         source: impl BufRead,
         rows: &[usize],
@@ -157,7 +157,7 @@ impl Recording {
         })
     }
 
-    /// Frames that come without times, frames × rows × channels in ohm, at an even rate.
+    /// Creates a recording of frames (frames × rows × channels in ohm) without times, at a constant rate.
     ///
     /// # Errors
     /// If there is no frame.
@@ -172,17 +172,17 @@ impl Recording {
         })
     }
 
-    /// Times of the frames in seconds, in ascending order.
+    /// Returns the times of the frames in seconds, in ascending order.
     pub fn times_s(&self) -> &[f64] {
         &self.times_s
     }
 
-    /// Index of the last frame at or before a time; the first before that.
+    /// Returns the index of the last frame at or before a time; 0 before the first frame.
     pub fn frame_at(&self, time_s: f64) -> usize {
         self.times_s.partition_point(|other| *other <= time_s).saturating_sub(1)
     }
 
-    /// Readings of a frame in ohm: rows × channels.
+    /// Returns the readings of a frame in ohm: rows × channels.
     ///
     /// # Panics
     /// If there is no such frame.
@@ -191,8 +191,8 @@ impl Recording {
     }
 }
 
-/// Latencies of any number of frames in fixed memory: counted in bins of 1/32 of an octave, 2.2 % wide, from a
-/// microsecond up; the largest exactly.
+/// Histogram of latencies in fixed memory: bins of 1/32 of an octave, 2.2 % wide, from one microsecond upwards. The
+/// maximum is stored exactly.
 #[derive(Clone, Debug)]
 pub struct Latencies {
     bins: Vec<u64>,
@@ -225,18 +225,18 @@ impl Latencies {
         self.largest = self.largest.max(latency);
     }
 
-    /// Number of frames counted.
+    /// Returns the number of frames counted.
     pub fn count(&self) -> u64 {
         self.count
     }
 
-    /// The largest latency.
+    /// Returns the largest latency.
     pub fn largest(&self) -> Duration {
         self.largest
     }
 
-    /// Latency that a share of the frames, from 0 to 1, does not exceed, rounded up by at most 2.2 % and to at least a
-    /// microsecond; `None` without frames.
+    /// Returns the quantile of the latencies for a `share` of the frames from 0 to 1, rounded up by at most 2.2 % and to at
+    /// least one microsecond; `None` without frames.
     pub fn quantile(&self, share: f64) -> Option<Duration> {
         let rank = ((self.count as f64 * share).ceil() as u64).clamp(1, self.count.max(1));
         let mut below = 0;
@@ -250,7 +250,7 @@ impl Latencies {
 }
 
 impl fmt::Display for Latencies {
-    /// Writes median, 99th percentile and maximum in milliseconds.
+    /// Formats median, 99th percentile and maximum in milliseconds.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let millis = |duration: Duration| duration.as_secs_f64() * 1e3;
         match self.quantile(0.5).zip(self.quantile(0.99)) {
@@ -285,7 +285,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_recorded_is_replayed_with_the_same_bits() {
+    fn recorded_frames_are_replayed_bit_for_bit() {
         let recording = read(&recorded()).unwrap();
         assert_eq!(recording.times_s(), [0.0, 0.1, 0.2, 0.1 * 3.0]);
         assert_eq!(
@@ -298,7 +298,7 @@ mod tests {
     }
 
     #[test]
-    fn frames_without_times_come_at_an_even_rate() {
+    fn frames_without_times_have_a_constant_rate() {
         let frames = Array3::from_shape_fn((3, 2, 3), |(frame, row, k)| (100 * frame + 10 * row + k) as f64);
         let recording = Recording::at_rate(frames, 20.0).unwrap();
         assert_eq!(recording.times_s(), [0.0, 0.05, 0.1]);
@@ -311,7 +311,7 @@ mod tests {
     }
 
     #[test]
-    fn a_recording_that_was_cut_off_keeps_its_whole_frames() {
+    fn a_truncated_recording_keeps_its_complete_frames() {
         let bytes = recorded();
         let lines: Vec<&[u8]> = bytes.split_inclusive(|&byte| byte == b'\n').collect();
         assert_eq!(read(&lines[..6].concat()).unwrap().times_s().len(), 2);
@@ -319,7 +319,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_wrong_is_found_at_its_line() {
+    fn errors_name_their_line() {
         let text = String::from_utf8(recorded()).unwrap();
         for (from, to, expected) in [
             ("0.1,3", "0.1,1", "line 5: row 3 is expected"),
@@ -333,7 +333,7 @@ mod tests {
     }
 
     #[test]
-    fn quantiles_are_those_of_sorted_latencies() {
+    fn quantiles_match_sorted_latencies() {
         let micros = |k: u64| 3 + (k * k * 7919) % 1_000_003;
         let mut latencies = Latencies::default();
         let mut sorted: Vec<u64> = (0..10_000).map(micros).collect();
@@ -351,7 +351,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_and_extremes_are_told_as_such() {
+    fn empty_and_extreme_latencies_are_formatted() {
         let mut latencies = Latencies::default();
         assert_eq!(
             (latencies.quantile(0.5), latencies.to_string()),

@@ -21,7 +21,7 @@ use crate::{
     text::system_cause,
 };
 
-/// Origin of frames.
+/// Source of frames.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Source {
     /// Standard input.
@@ -32,7 +32,7 @@ pub enum Source {
     Serial {
         /// Device.
         path: String,
-        /// Bits a second.
+        /// Baud rate.
         baud: u32,
     },
     /// A TCP socket to connect to, as `HOST:PORT`.
@@ -43,13 +43,13 @@ pub enum Source {
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum SourceError {
-    /// No baud rate is given.
-    #[error("'{0}' is a serial device and needs its baud rate: give {0}:115200, or the rate it sends with")]
+    /// The baud rate is missing.
+    #[error("'{0}' is a serial device and needs its baud rate: give {0}:115200, or the rate at which it sends")]
     NoBaud(String),
     /// Not a socket.
     #[error("'tcp:{0}' is not a socket: give tcp:HOST:PORT, for example tcp:localhost:5000")]
     NoPort(String),
-    /// There is no such device.
+    /// The device does not exist.
     #[error("there is no device '{0}': check its cable and its name, for example with ls /dev/tty*")]
     NoDevice(String),
     /// Opening the device is not permitted.
@@ -58,33 +58,33 @@ pub enum SourceError {
          and log in again"
     )]
     Permission(String),
-    /// Another program has the device.
+    /// Another program is using the device.
     #[error("'{0}' is in use: close the other program that reads it")]
     InUse(String),
-    /// The device does not take the baud rate.
-    #[error("'{path}' does not take {baud} baud: {cause}; give a rate that it supports, for example 9600 or 115200")]
+    /// The device does not support the baud rate.
+    #[error("'{path}' does not support {baud} baud: {cause}; give a rate that it supports, for example 9600 or 115200")]
     Device {
         /// Device.
         path: String,
-        /// Rate given.
+        /// Given rate.
         baud: u32,
-        /// Words of the system.
+        /// Message of the operating system.
         cause: String,
     },
-    /// No connection.
+    /// The connection failed.
     #[error("cannot connect to 'tcp:{address}': {}; check that the sender listens there", system_cause(.source))]
     Connect {
-        /// Address given.
+        /// Given address.
         address: String,
-        /// Error of the system.
+        /// Error of the operating system.
         source: io::Error,
     },
     /// The file cannot be opened.
     #[error("cannot open '{}': {}", .path.display(), system_cause(.source))]
     File {
-        /// File given.
+        /// Given file.
         path: PathBuf,
-        /// Error of the system.
+        /// Error of the operating system.
         source: io::Error,
     },
 }
@@ -92,7 +92,7 @@ pub enum SourceError {
 impl FromStr for Source {
     type Err = SourceError;
 
-    /// Reads `-`, `tcp:HOST:PORT`, `DEVICE:BAUD` or the path of a file.
+    /// Parses `-`, `tcp:HOST:PORT`, `DEVICE:BAUD` or the path of a file.
     fn from_str(text: &str) -> Result<Self, SourceError> {
         if text == "-" {
             return Ok(Self::StandardInput);
@@ -131,7 +131,7 @@ impl fmt::Display for Source {
 }
 
 impl Source {
-    /// Returns which lines count when they come faster than they are taken.
+    /// Returns the overflow policy for lines that arrive faster than they are consumed.
     pub fn keeping(&self) -> Keeping {
         match self {
             Self::StandardInput | Self::File(_) => Keeping::All,
@@ -144,7 +144,7 @@ impl Source {
         matches!(self, Self::Serial { .. })
     }
 
-    /// Opens the source. Reading a device or socket times out now and then, so that who reads can be stopped.
+    /// Opens the source. Reading from a device or socket times out regularly, so that the reader can be stopped.
     ///
     /// # Errors
     /// If it cannot be opened.
@@ -174,7 +174,7 @@ impl Source {
     }
 }
 
-/// Returns `true` for a name that systems give to serial ports: `COM` and digits on Windows, a path in `/dev` elsewhere.
+/// Returns `true` for a system name of a serial port: `COM` and digits on Windows, a path in `/dev` elsewhere.
 fn is_port(name: &str) -> bool {
     let bare = name.strip_prefix(r"\\.\").unwrap_or(name);
     let is_numbered = bare
@@ -186,7 +186,7 @@ fn is_port(name: &str) -> bool {
             .any(|start| name.starts_with(start))
 }
 
-/// Longest wait for a byte.
+/// Timeout for reading a byte.
 const TIMEOUT: Duration = Duration::from_millis(200);
 
 fn open_serial(path: &str, baud: u32) -> Result<Box<dyn Read + Send>, SourceError> {
@@ -208,11 +208,11 @@ fn open_serial(path: &str, baud: u32) -> Result<Box<dyn Read + Send>, SourceErro
     Ok(Box::new(port))
 }
 
-/// Source of frames without hardware: an indenter that wanders over the array, pressing and lifting.
+/// Source of frames without hardware: an indenter that moves over the array, pressing and lifting.
 ///
-/// Its place and depth are sums of sines whose phases the seed draws, so that any moment can be computed. Frames of all
-/// row-wires read come at a given rate; time is simulated, and the caller paces them. A fault can be switched on and off
-/// while it runs, and the indenter held or lifted.
+/// Its position and depth are sums of sines whose phases are drawn from the seed, so that the state at any time can be
+/// computed. Frames of all row-wires read have a given rate; time is simulated, and the caller paces them. At any time a
+/// fault can be switched on or off, and the indenter held or lifted.
 #[derive(Debug)]
 pub struct Simulated {
     model: SensorModel,
@@ -227,7 +227,7 @@ pub struct Simulated {
     frames_per_second: f64,
     frames: u64,
     motion: Motion,
-    /// Frames during which the indenter did not wander.
+    /// Number of frames during which the indenter did not move along its path.
     frames_at_rest: u64,
     deformation: Deformation,
 }
@@ -235,12 +235,12 @@ pub struct Simulated {
 /// Motion of the indenter of a [`Simulated`] source.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Motion {
-    /// Along its path, pressing and lifting.
+    /// Moves along its path, pressing and lifting.
     #[default]
     Wandering,
-    /// Held where it is, as deep as it is.
+    /// Held at its current position and depth.
     Held,
-    /// Lifted from the array; it continues from where it was.
+    /// Lifted from the array; it resumes from its last position.
     Lifted,
 }
 
@@ -248,26 +248,26 @@ pub enum Motion {
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
 pub enum SimulatedError {
-    /// The scene is impossible.
+    /// The scene is invalid.
     #[error(transparent)]
     Scene(#[from] SceneError),
     /// The array has no resistance at rest.
     #[error(transparent)]
     Sensor(#[from] SensorError),
-    /// The fault is none of this array.
+    /// The array does not have the wires of the fault.
     #[error(transparent)]
     Fault(#[from] FaultError),
     /// The rate is out of range.
-    #[error("{} frames a second: give a number above 0 and at most 1000000", crate::sensor::short(*.0))]
+    #[error("{} frames per second: give a number above 0 and at most 1000000", crate::sensor::short(*.0))]
     Rate(f64),
 }
 
 impl Simulated {
-    /// Prepares frames of `model` in `scene`: its rows, stroke and noise, and its indenter or, if the loading is another,
-    /// a ball.
+    /// Prepares frames of `model` with the rows, stroke and noise of `scene`, and its indenter, or a ball if it has another
+    /// loading.
     ///
     /// # Errors
-    /// If the scene or the rate is impossible, or the array has no resistance at rest.
+    /// If the scene or the rate is invalid, or the array has no resistance at rest.
     pub fn new(model: &SensorModel, scene: &Scene, seed: Seed, frames_per_second: f64) -> Result<Self, SimulatedError> {
         scene.check()?;
         if !(frames_per_second > 0.0 && frames_per_second <= 1e6) {
@@ -296,12 +296,12 @@ impl Simulated {
         })
     }
 
-    /// Row-wires read, from 0.
+    /// Returns the row-wires read, from 0.
     pub fn rows(&self) -> &[usize] {
         &self.rows
     }
 
-    /// Number of readings in a frame: rows × M4.
+    /// Returns the number of readings in a frame: rows × M4.
     pub fn readings(&self) -> usize {
         self.rows.len() * self.model.scale.columns()
     }
@@ -311,7 +311,7 @@ impl Simulated {
         self.motion = motion;
     }
 
-    /// Passes over this many frames, as if no one had taken them. Their noise is not drawn.
+    /// Skips `frames` frames, without drawing their noise.
     pub fn skip(&mut self, frames: u64) {
         self.frames += frames;
         if self.motion != Motion::Wandering {
@@ -319,7 +319,7 @@ impl Simulated {
         }
     }
 
-    /// Sets the fault of the frames to come; `None` for none.
+    /// Sets the fault of the following frames; `None` for none.
     ///
     /// # Errors
     /// If the array does not have its wires.
@@ -339,7 +339,7 @@ impl Simulated {
     /// If the model has no resistance for the deformation.
     ///
     /// # Panics
-    /// If the slice has another length.
+    /// If the slice has the wrong length.
     pub fn next_frame(&mut self, readings_ohm: &mut [f64]) -> Result<f64, SensorError> {
         assert_eq!(readings_ohm.len(), self.readings());
         let time_s = self.frames as f64 / self.frames_per_second;
@@ -363,7 +363,7 @@ impl Simulated {
         Ok(time_s)
     }
 
-    /// The true deformation of the last frame; that at rest before the first.
+    /// Returns the true deformation of the last frame; the undeformed state before the first frame.
     pub fn deformation(&self) -> &Deformation {
         &self.deformation
     }
@@ -378,7 +378,7 @@ struct PressPath {
     phases: [[f64; 2]; 3],
 }
 
-/// Frequencies of the sines of x, y and depth in Hz: ratios that do not repeat soon.
+/// Frequencies of the sines of x, y and depth in Hz, with ratios chosen for a long period.
 const FREQUENCIES_HZ: [[f64; 2]; 3] = [[0.11, 0.29], [0.13, 0.31], [0.37, 0.89]];
 
 impl PressPath {
@@ -395,7 +395,7 @@ impl PressPath {
         }
     }
 
-    /// Place at a time, and depth in proportion to the stroke: 0 while the indenter is lifted.
+    /// Position at a time, and depth as a fraction of the stroke: 0 while the indenter is lifted.
     fn at(&self, time_s: f64) -> (DVec2, f64) {
         let wave = |axis: usize| {
             let pairs = FREQUENCIES_HZ[axis].iter().zip(self.phases[axis]).zip([0.6, 0.4]);
@@ -414,7 +414,7 @@ mod tests {
     use crate::scene::Noise;
 
     #[test]
-    fn sources_are_told_apart() {
+    fn sources_are_distinguished_by_their_names() {
         let serial = |path: &str, baud| Source::Serial {
             path: path.to_owned(),
             baud,
@@ -422,7 +422,7 @@ mod tests {
         for (text, expected) in [
             ("-", Source::StandardInput),
             ("frames.csv", Source::File("frames.csv".into())),
-            // Files that are not there, whatever their names begin with.
+            // Missing files, even if their names begin like those of ports.
             ("COMPARISON.csv", Source::File("COMPARISON.csv".into())),
             ("COM", Source::File("COM".into())),
             ("COM1.csv", Source::File("COM1.csv".into())),
@@ -446,7 +446,7 @@ mod tests {
     }
 
     #[test]
-    fn a_device_that_does_not_open_is_explained() {
+    fn a_device_that_cannot_be_opened_is_explained() {
         let message = |text: &str| match text.parse::<Source>().unwrap().open() {
             Ok(_) => panic!("{text} is open"),
             Err(error) => error.to_string(),
@@ -454,7 +454,7 @@ mod tests {
         let found = message("/dev/no-such-tty:9600");
         assert!(found.starts_with("there is no device '/dev/no-such-tty'"), "{found}");
         let found = message("/dev/null:9600");
-        assert!(found.contains("'/dev/null' does not take 9600 baud"), "{found}");
+        assert!(found.contains("'/dev/null' does not support 9600 baud"), "{found}");
     }
 
     fn source() -> Simulated {
@@ -471,7 +471,7 @@ mod tests {
     }
 
     #[test]
-    fn a_held_indenter_stays_a_lifted_one_leaves_no_trace_and_both_go_on_from_there() {
+    fn a_held_indenter_stays_a_lifted_one_leaves_no_trace_and_both_resume() {
         let (mut source, mut wandering) = (source(), source());
         let path: Vec<Vec<f64>> = (0..40).map(|_| next(&mut wandering).1).collect();
         for frame in &path[..20] {
@@ -492,7 +492,7 @@ mod tests {
     }
 
     #[test]
-    fn frames_that_nobody_takes_are_passed_over() {
+    fn skipped_frames_leave_the_others_unchanged() {
         let (mut source, mut whole) = (source(), source());
         source.skip(7);
         (0..7).for_each(|_| drop(next(&mut whole)));

@@ -7,20 +7,20 @@ use crate::sensor::{ArrayScale, Axes, RowConductance, SensorError, SensorModel, 
 
 /// A fault of the wires or of the electronics.
 ///
-/// The readout drives one row-wire, holds the others at ground, and measures the current of each column-wire at virtual
-/// ground, so that a reading has the nodes between its own two wires only. Wires are connected at their first node.
-/// Beyond a break a wire floats, and its nodes carry no current into an amplifier. Two wires that touch share what drives
-/// or measures them, in equal parts: both read 2/(1/R + 1/R′).
+/// The readout drives one row-wire, grounds the others, and measures the current of each column-wire at virtual ground, so
+/// that a reading depends only on the nodes between its two wires. Wires are connected at their first node. Beyond a break
+/// a wire floats, and its nodes carry no current into an amplifier. Two touching wires share the drive or the measured
+/// current equally: both read 2/(1/R + 1/R′).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Fault {
-    /// A row-wire is broken before its node `before_node`, counted from 0; at its connector if that is 0.
+    /// A row-wire is broken before node `before_node`, counted from 0; at its connector if this is 0.
     OpenRow {
         /// Row-wire, from 0.
         row: usize,
         /// First node that is cut off.
         before_node: usize,
     },
-    /// A column-wire is broken before its node `before_node`, counted from 0; at its connector if that is 0.
+    /// A column-wire is broken before node `before_node`, counted from 0; at its connector if this is 0.
     OpenColumn {
         /// Column-wire, from 0.
         column: usize,
@@ -37,7 +37,7 @@ pub enum Fault {
         /// First of the two, from 0.
         column: usize,
     },
-    /// The gain of a column-wire's amplifier is off: its readings are 1 + `relative` times the resistances.
+    /// The amplifier of a column-wire has a gain error: its readings are 1 + `relative` times the resistances.
     Gain {
         /// Column-wire, from 0.
         column: usize,
@@ -53,16 +53,16 @@ pub enum Fault {
     },
 }
 
-/// An end of a converter's range.
+/// End of a converter's range.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ConverterEnd {
-    /// Its first step.
+    /// Lowest step.
     Low,
-    /// Its full scale, as without any current.
+    /// Full scale, as without current.
     High,
 }
 
-/// Error in the description of a fault.
+/// Invalid description of a fault.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
 pub enum FaultError {
@@ -77,13 +77,13 @@ pub enum FaultError {
     Number {
         /// Kind of wire or node.
         what: &'static str,
-        /// Its number, from 1.
+        /// Number, from 1.
         number: usize,
-        /// The largest number.
+        /// Largest number.
         last: usize,
     },
-    /// A gain out of range.
-    #[error("the error of the gain is {}: give a number above -1, other than 0 and at most 10", short(*.0))]
+    /// The gain error is out of range.
+    #[error("the gain error is {}: give a number above -1, other than 0 and at most 10", short(*.0))]
     GainRange(f64),
     /// The scene does not read a row-wire of the fault.
     #[error("row {0} is not read in this scene; give a row that is, or read all rows")]
@@ -163,7 +163,7 @@ impl Fault {
     /// Checks that an array has the wires and nodes of this fault, and that the row-wires are among those `read`.
     ///
     /// # Errors
-    /// The first wire or node that is missing.
+    /// If a wire or node does not exist.
     pub fn check(self, scale: ArrayScale, read: &[usize]) -> Result<(), FaultError> {
         let within = |what, index: usize, count: usize| {
             if index < count {
@@ -199,21 +199,21 @@ impl Fault {
     }
 }
 
-/// A fault in the readings of one array: what it does to resistances before their noise, and to readings after it.
+/// Effect of a fault on the resistances of an array before noise and on the readings after noise.
 #[derive(Clone, Debug)]
 pub struct FaultySensor {
     model: SensorModel,
     fault: Fault,
-    /// Ends of the converter's range. A scene without a converter has one of 16 bits for this purpose.
+    /// Ends of the converter's range; without a converter in the scene, of a converter of 16 bits.
     range_ohm: (f64, f64),
 }
 
 impl FaultySensor {
-    /// Prepares `fault` in an array with this noise. The converter reads up to twice the largest resistance at rest, as
-    /// that of the noise does.
+    /// Prepares `fault` in an array with this noise. The converter reads up to twice the largest resistance at rest, like
+    /// the converter of the noise.
     ///
     /// # Errors
-    /// The undeformed sensor has no resistance.
+    /// If the undeformed sensor has no resistance.
     pub fn new(model: &SensorModel, noise: Noise, fault: Fault) -> Result<Self, SensorError> {
         Ok(Self {
             model: *model,
@@ -222,8 +222,8 @@ impl FaultySensor {
         })
     }
 
-    /// Replaces the resistances of one snapshot, row by row of those `read`, by what the wires and amplifiers make of
-    /// them. `deformation` is the one they belong to.
+    /// Applies faults of wires and amplifiers to the resistances of one snapshot (rows `read`, row by row), which belong to
+    /// `deformation`.
     pub fn before_noise(&self, read: &[usize], deformation: &Deformation, resistances_ohm: &mut [f64]) {
         let scale = self.model.scale;
         let (columns, full_scale_ohm) = (scale.columns(), self.range_ohm.1);
@@ -233,7 +233,7 @@ impl FaultySensor {
             let displacements_mm = &deformation.row_mm(row)[..nodes];
             conductance.evaluate_broken(&self.model, row, displacements_mm, electrodes);
             let of_sum = |&sum: &f64| {
-                // Without any node there is no current; what noise makes of that is the converter's full scale.
+                // Without any node there is no current, and the converter reads its full scale.
                 if sum > 0.0 {
                     self.model.resistivity_ohm_per_mm / sum
                 } else {
@@ -279,8 +279,8 @@ impl FaultySensor {
         }
     }
 
-    /// Replaces the readings of one snapshot by what the converter makes of them: where it has no current or is stuck, it
-    /// shows an end of its range without noise.
+    /// Applies faults of the converter to the readings of one snapshot: without current, or when it is stuck, it reads an
+    /// end of its range without noise.
     pub fn after_noise(&self, read: &[usize], readings_ohm: &mut [f64]) {
         let columns = self.model.scale.columns();
         let (lowest_ohm, full_scale_ohm) = self.range_ohm;

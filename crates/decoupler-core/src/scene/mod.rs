@@ -1,4 +1,4 @@
-//! The scene: rows read, movement, loading and noise. Nothing that does not vary in the scene is modelled further on.
+//! The scene: rows read, movement, loading and noise. Decoders model only what varies in the scene.
 
 mod fault;
 mod loading;
@@ -23,35 +23,35 @@ use thiserror::Error;
 
 use crate::sensor::{ArrayScale, Axes, Geometry, SensorError, SensorModel, short};
 
-/// Rows read, movement, loading and noise of the readings. The default is the paper's.
+/// Rows read, movement, loading and noise of the readings. The default is that of the paper.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Scene {
-    /// Row-wires read, and whether a decoder knows which one it reads.
+    /// Row-wires read, and the sharing of decoders among them.
     pub rows: Rows,
     /// Movement of the nodes.
     pub movement: Movement,
     /// Loading of the surface.
     pub loading: Loading,
-    /// The largest compression as a fraction of the height, in (0, 1).
+    /// Largest compression as a fraction of the height, in (0, 1).
     pub largest_compression: f64,
     /// Noise of the readings.
     pub noise: Noise,
 }
 
-/// A scene that cannot be drawn.
+/// Invalid scene.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
 pub enum SceneError {
     /// The largest compression is out of range.
     #[error("the largest compression is {} %: it must be above 0 and below 100 % of the height", short(100.0 * .0))]
     Compression(f64),
-    /// The array has no such row-wire.
+    /// The row-wire does not exist.
     #[error("row {row} does not exist: the array has rows 1 to {rows}; give one of them")]
     Row {
-        /// Row asked for, from 1.
+        /// Requested row, from 1.
         row: usize,
-        /// Row-wires of the array.
+        /// Number of row-wires of the array.
         rows: usize,
     },
     /// Not a choice of rows.
@@ -66,35 +66,35 @@ pub enum SceneError {
     /// Not a choice of axes.
     #[error("'{0}' is not a choice of axes: give z or xyz")]
     AxesText(String),
-    /// The shift sideways is impossible.
+    /// The shift sideways is out of range.
     #[error(
-        "the largest shift sideways is {} mm: it must be above 0 and finite; for none, let nodes move along z only",
+        "the largest shift sideways is {} mm: it must be above 0 and finite; for none, choose movement along z only",
         short(*.0)
     )]
     Shift(f64),
-    /// The correlation length is impossible.
+    /// The correlation length is out of range.
     #[error("the correlation length is {} mm: it must be above 0 and finite", short(*.0))]
     CorrelationLength(f64),
-    /// The indenter's spread is impossible.
+    /// The decay length around the indenter is out of range.
     #[error("the decay length of the surface around the indenter is {} mm: it must be above 0 and finite", short(*.0))]
     Spread(f64),
-    /// The indenter's radius is impossible.
+    /// The indenter's radius is out of range.
     #[error("the indenter's radius is from {} to {} mm: give two lengths above 0 in order", short(.0.smallest), short(.0.largest))]
     Radius(Span),
-    /// The indenter's tilt is impossible.
+    /// The indenter's tilt is out of range.
     #[error("the indenter's largest tilt is {} degrees: give from 0 to 45", short(*.0))]
     Tilt(f64),
-    /// Noise out of range.
+    /// The noise is out of range.
     #[error("the {what} is {}: give from 0 to {}", short(*.value), short(*.largest))]
     Noise {
         /// Kind of noise.
         what: &'static str,
-        /// Its value.
+        /// Value.
         value: f64,
-        /// The largest possible.
+        /// Largest allowed value.
         largest: f64,
     },
-    /// Bits out of range.
+    /// The number of bits is out of range.
     #[error("the converter has {0} bits: give from 1 to {most}", most = Noise::MAX_BITS)]
     Bits(u8),
 }
@@ -112,10 +112,10 @@ impl Default for Scene {
 }
 
 impl Scene {
-    /// Checks every number, but not whether an array has the row of [`Rows::One`]: [`Rows::read`] reports that.
+    /// Checks every number, except that the row of [`Rows::One`] exists, which [`Rows::read`] checks.
     ///
     /// # Errors
-    /// The first that is impossible.
+    /// If a number is out of range.
     pub fn check(&self) -> Result<(), SceneError> {
         if !(self.largest_compression > 0.0 && self.largest_compression < 1.0) {
             return Err(SceneError::Compression(self.largest_compression));
@@ -125,7 +125,7 @@ impl Scene {
         self.noise.check()
     }
 
-    /// The full scale of the deformation: the distance a node can travel.
+    /// Returns the full scale of the deformation: the distance that a node can travel.
     pub fn stroke_mm(&self, geometry: &Geometry) -> f64 {
         self.largest_compression * geometry.height_mm
     }
@@ -135,13 +135,13 @@ impl Scene {
         DeformationSampler::new(self, model)
     }
 
-    /// Unknowns of each row-wire of an array: what moves, and nothing else.
+    /// Returns the number of unknowns of each row-wire: the coordinates that vary in the scene.
     pub fn unknowns_per_row(&self, scale: ArrayScale) -> usize {
         scale.nodes_per_row() * self.movement.axes().count()
     }
 }
 
-/// Converter that digitises readings: it reads from 0 to twice the largest resistance at rest, and clips beyond.
+/// Analogue-to-digital converter with a range from 0 to twice the largest resistance at rest, beyond which it clips.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Converter {
     pub(super) step_ohm: f64,
@@ -149,10 +149,10 @@ pub(super) struct Converter {
 }
 
 impl Converter {
-    /// A converter of this many bits for the readings of `model`.
+    /// Creates a converter with this many bits for the readings of `model`.
     ///
     /// # Errors
-    /// The undeformed sensor has no resistance.
+    /// If the undeformed sensor has no resistance.
     pub(super) fn new(bits: u8, model: &SensorModel) -> Result<Self, SensorError> {
         let rest = vec![DVec3::ZERO; model.scale.nodes_per_row()];
         let mut largest_ohm = 0.0_f64;
@@ -169,7 +169,7 @@ impl Converter {
         })
     }
 
-    /// The lowest and the highest reading.
+    /// Lowest and highest reading.
     pub(super) fn range_ohm(self) -> (f64, f64) {
         (self.step_ohm, self.step_ohm * self.steps)
     }
@@ -179,7 +179,7 @@ impl Converter {
         self.step(reading_ohm) * self.step_ohm
     }
 
-    /// The lowest and the highest value that it gives as `reading_ohm`. The last step is open, for it clips.
+    /// Lowest and highest value that are converted to `reading_ohm`. The last step is open because the converter clips.
     pub(super) fn rounded_from_ohm(self, reading_ohm: f64) -> (f64, f64) {
         let Self { step_ohm, steps } = self;
         let step = self.step(reading_ohm);
@@ -197,7 +197,7 @@ impl Converter {
     }
 }
 
-/// Displacement of each upper node at one moment, in millimetres; z counts downwards.
+/// Displacement of each upper node at one moment, in millimetres; z is positive downwards.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Deformation {
     /// Row-wires × nodes on a row-wire, in standard (row-major) layout.
@@ -205,7 +205,7 @@ pub struct Deformation {
 }
 
 impl Deformation {
-    /// The deformation with `displacement_mm(row, node)` at every node.
+    /// Creates a deformation with `displacement_mm(row, node)` at every node.
     pub fn from_fn(scale: ArrayScale, mut displacement_mm: impl FnMut(usize, usize) -> DVec3) -> Self {
         let shape = (scale.rows(), scale.nodes_per_row());
         Self {
@@ -213,30 +213,30 @@ impl Deformation {
         }
     }
 
-    /// Displacements of the nodes of row-wire `row`, in millimetres.
+    /// Returns the displacements of the nodes of row-wire `row`, in millimetres.
     pub fn row_mm(&self, row: usize) -> &[DVec3] {
         let nodes = self.displacement_mm.ncols();
         let all = self.displacement_mm.as_slice().expect("built in standard layout");
         &all[row * nodes..(row + 1) * nodes]
     }
 
-    /// Positions of the displaced nodes of row-wire `row`, in millimetres.
+    /// Returns the positions of the displaced nodes of row-wire `row`, in millimetres.
     pub fn row_positions_mm<'a>(&'a self, model: &'a SensorModel, row: usize) -> impl Iterator<Item = DVec3> + 'a {
         let displacements = self.row_mm(row).iter().enumerate();
         displacements.map(move |(node, &displacement)| model.displaced_mm(row, node, displacement))
     }
 }
 
-/// Movement of the nodes, which sets the unknowns of each of them.
+/// Movement of the nodes, which determines the unknowns of each node.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum Movement {
-    /// Down only, as in the paper.
+    /// Downwards only, as in the paper.
     #[default]
     Z,
-    /// Down, and sideways by up to `largest_shift_mm` along x and along y.
+    /// Downwards, and sideways by up to `largest_shift_mm` along x and along y.
     Xyz {
-        /// The largest shift along x, and along y, either way.
+        /// Largest shift along x and along y, in either direction.
         largest_shift_mm: f64,
     },
 }
@@ -253,7 +253,7 @@ impl fmt::Display for Movement {
 impl FromStr for Movement {
     type Err = SceneError;
 
-    /// Reads `z` or `xyz`.
+    /// Parses `z` or `xyz`.
     fn from_str(text: &str) -> Result<Self, SceneError> {
         match text.trim() {
             "z" => Ok(Self::Z),
@@ -264,10 +264,10 @@ impl FromStr for Movement {
 }
 
 impl Movement {
-    /// Sideways too, by up to a fifth of a millimetre: a tenth of the assumed node pitch.
+    /// Also sideways, by up to a fifth of a millimetre: a tenth of the assumed node pitch.
     pub const SIDEWAYS: Self = Self::Xyz { largest_shift_mm: 0.2 };
 
-    /// The unknown coordinates.
+    /// Returns the axes of the unknown coordinates.
     pub fn axes(self) -> Axes {
         match self {
             Self::Z => Axes::Z,
@@ -275,7 +275,7 @@ impl Movement {
         }
     }
 
-    /// The largest shift sideways.
+    /// Returns the largest shift sideways.
     pub fn largest_shift_mm(self) -> f64 {
         match self {
             Self::Z => 0.0,
@@ -343,7 +343,7 @@ mod tests {
     }
 
     #[test]
-    fn scenes_survive_their_file_and_older_files_are_the_papers() {
+    fn scenes_survive_serialisation_and_older_files_have_the_papers_defaults() {
         for scene in scenes() {
             let scene = Scene {
                 rows: Rows::One(3),
@@ -358,7 +358,7 @@ mod tests {
     }
 
     #[test]
-    fn impossible_scenes_are_named() {
+    fn invalid_scenes_are_reported() {
         let impossible = [
             (
                 Scene {

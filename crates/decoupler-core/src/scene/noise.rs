@@ -8,19 +8,19 @@ use super::{Converter, SceneError};
 pub use crate::sensor::RelativeNoise;
 use crate::sensor::{SensorError, SensorModel};
 
-/// Noise of the readings. Everything is Gaussian but the converter, which rounds.
+/// Noise of the readings: Gaussian noise and the rounding of the converter.
 ///
-/// reading = round(R · (1 + drift · η) · (1 + relative · ε₁) + additive · ε₂), with ε drawn for each resistance and η once
-/// for each snapshot. The Gaussians are truncated to what a reading can be: η is drawn again until the gain is above 0, ε₁
-/// and ε₂ until the sum is above 0 and finite. Up to noise of a tenth of the reading that never happens.
+/// reading = round(R · (1 + drift · η) · (1 + relative · ε₁) + additive · ε₂), with ε₁ and ε₂ drawn for each resistance and
+/// η once per snapshot. The Gaussians are truncated to possible readings: η is redrawn until the gain is above 0, and ε₁ and
+/// ε₂ until the sum is above 0 and finite. With noise up to a tenth of the reading this practically never happens.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Noise {
-    /// Standard deviation in proportion to the resistance.
+    /// Standard deviation relative to the resistance.
     pub relative: f64,
-    /// Standard deviation in ohm, whatever the resistance.
+    /// Standard deviation in ohm, independent of the resistance.
     pub additive_ohm: f64,
-    /// Bits of the converter that digitises readings; `None` for one without steps.
+    /// Number of bits of the analogue-to-digital converter; `None` for readings without quantisation.
     pub converter_bits: Option<u8>,
     /// Gain error shared by all readings of a snapshot, e.g. from temperature (standard deviation, relative).
     pub drift: f64,
@@ -32,23 +32,23 @@ pub struct Noise {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum NoisySets {
-    /// Training and test samples: the network learns to handle the noise.
+    /// Training and test samples: the network is trained for the noise.
     #[default]
     Both,
     /// Training only.
     Training,
-    /// Test only: a network trained on clean readings meets noise.
+    /// Test only: a network trained on noise-free readings is tested with noise.
     Test,
 }
 
-/// Largest additive noise: the squares of readings with it are still finite numbers.
+/// Largest additive noise for which the squares of readings remain finite.
 const LARGEST_ADDITIVE_OHM: f64 = 1e150;
 
 impl Noise {
-    /// The most bits of a converter.
+    /// Maximum number of bits of a converter.
     pub const MAX_BITS: u8 = 32;
 
-    /// Noise of standard deviation `relative` in proportion to the resistance, in both sets.
+    /// Creates noise with standard deviation `relative` relative to the resistance, in both sets.
     pub fn relative(relative: f64) -> Self {
         Self {
             relative,
@@ -56,12 +56,12 @@ impl Noise {
         }
     }
 
-    /// True if no reading is changed.
+    /// Returns `true` if no reading is changed.
     pub fn is_none(&self) -> bool {
         self.relative == 0.0 && self.additive_ohm == 0.0 && self.drift == 0.0 && self.converter_bits.is_none()
     }
 
-    /// Noise of the training set.
+    /// Returns the noise of the training set.
     pub fn in_training(self) -> Self {
         if self.sets == NoisySets::Test {
             Self::default()
@@ -70,7 +70,7 @@ impl Noise {
         }
     }
 
-    /// Noise of the test set.
+    /// Returns the noise of the test set.
     pub fn in_test(self) -> Self {
         if self.sets == NoisySets::Training {
             Self::default()
@@ -96,21 +96,21 @@ impl Noise {
         }
     }
 
-    /// The lowest and the highest reading of the converter, or of one of 16 bits if there is none.
+    /// Returns the lowest and highest reading of the converter, or of a 16-bit converter if there is none.
     ///
     /// # Errors
-    /// The undeformed sensor has no resistance.
+    /// If the undeformed sensor has no resistance.
     pub(crate) fn range_ohm(&self, model: &SensorModel) -> Result<(f64, f64), SensorError> {
         Ok(Converter::new(self.converter_bits.unwrap_or(16), model)?.range_ohm())
     }
 }
 
 impl RelativeNoise {
-    /// The relative noise of the median reading of `rows` (counted from 0), all of whose nodes are pressed down by
-    /// `depth_mm`: one number for the whole array, where resistances in ohm need a reading to be compared with.
+    /// Returns the relative noise of the median reading of `rows` (counted from 0) with all nodes pressed down by
+    /// `depth_mm`: a single figure for the whole array, which relates noise in ohm to a typical reading.
     ///
     /// # Errors
-    /// No resistance at that depth, or at rest, which sets the range of a converter.
+    /// If there is no resistance at that depth, or at rest, which sets the range of a converter.
     pub fn of(noise: Noise, model: &SensorModel, rows: &[usize], depth_mm: f64) -> Result<Self, SensorError> {
         let displacements_mm = vec![DVec3::Z * depth_mm; model.scale.nodes_per_row()];
         let mut readings_ohm = Vec::new();
@@ -124,14 +124,14 @@ impl RelativeNoise {
     }
 }
 
-/// A standard normal value, by Box and Muller (1958).
+/// Draws a standard normal value by the method of Box and Muller (1958).
 pub(crate) fn standard_normal(rng: &mut impl Rng) -> f64 {
     // 1 − u lies in (0, 1], where the logarithm is finite.
     let length = (-2.0 * (1.0 - rng.random::<f64>()).ln()).sqrt();
     length * (TAU * rng.random::<f64>()).cos()
 }
 
-/// The distribution function of the standard normal.
+/// Cumulative distribution function of the standard normal distribution.
 pub(crate) fn normal_cdf(x: f64) -> f64 {
     0.5 * libm::erfc(-x * std::f64::consts::FRAC_1_SQRT_2)
 }
@@ -147,14 +147,14 @@ mod tests {
     }
 
     #[test]
-    fn relative_noise_alone_keeps_its_bits() {
+    fn relative_noise_alone_is_returned_exactly() {
         for relative in [0.0, 1e-300, 1e-8, 0.1, 1.0 / 3.0, 1.0] {
             let found = of(Noise::relative(relative));
             assert_eq!((found.own, found.common, found.total()), (relative, 0.0, relative));
         }
     }
 
-    /// The median resistance is found here by counting.
+    /// The median resistance is determined here by counting.
     #[test]
     fn sources_in_ohm_are_compared_with_the_median_reading() {
         let model = SensorModel::new(ArrayScale::default());

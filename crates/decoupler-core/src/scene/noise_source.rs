@@ -6,7 +6,7 @@ use rand::Rng;
 use super::{Converter, Deformation, Indenter, Noise, RelativeNoise, standard_normal};
 use crate::sensor::{SensorError, SensorModel};
 
-/// Noise of one sensor, ready to be drawn; none by default.
+/// Noise of one sensor, prepared for drawing; none by default.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct NoiseSource {
     noise: Noise,
@@ -17,7 +17,7 @@ impl Noise {
     /// Prepares to disturb readings of `model`.
     ///
     /// # Errors
-    /// The undeformed sensor has no resistance, hence the converter no range.
+    /// If the undeformed sensor has no resistance, so that the converter has no range.
     pub fn source(&self, model: &SensorModel) -> Result<NoiseSource, SensorError> {
         let converter = self.converter_bits.map(|bits| Converter::new(bits, model));
         Ok(NoiseSource {
@@ -28,13 +28,13 @@ impl Noise {
 }
 
 impl NoiseSource {
-    /// True if no reading is changed.
+    /// Returns `true` if no reading is changed.
     pub fn is_none(&self) -> bool {
         self.noise.is_none()
     }
 
-    /// Disturbs the readings of one snapshot in place. Readings stay above 0 and finite: what noise would turn around is
-    /// drawn again.
+    /// Adds noise to the readings of one snapshot in place. Readings remain above 0 and finite: other values are drawn
+    /// again.
     pub fn disturb(&self, resistances_ohm: &mut [f64], rng: &mut impl Rng) {
         let Noise {
             relative,
@@ -68,12 +68,12 @@ impl NoiseSource {
         }
     }
 
-    /// Standard deviation in proportion to the resistance.
+    /// Standard deviation relative to the resistance.
     pub(crate) fn relative(&self) -> f64 {
         self.noise.relative
     }
 
-    /// Standard deviation in ohm, whatever the resistance.
+    /// Standard deviation in ohm, independent of the resistance.
     pub(crate) fn additive_ohm(&self) -> f64 {
         self.noise.additive_ohm
     }
@@ -83,14 +83,14 @@ impl NoiseSource {
         self.noise.drift
     }
 
-    /// The lowest and the highest value that the converter gives as `reading_ohm`; `None` without a converter. The last
-    /// step is open, for the converter clips.
+    /// Lowest and highest value that are converted to `reading_ohm`; `None` without a converter. The last step is open
+    /// because the converter clips.
     pub(crate) fn rounded_from_ohm(&self, reading_ohm: f64) -> Option<(f64, f64)> {
         Some(self.converter?.rounded_from_ohm(reading_ohm))
     }
 
-    /// The noise of a reading of `resistance_ohm` relative to it, with own part
-    /// √(relative² + (additive² + step²/12)/R²); step/√12 is the standard deviation of rounding to steps.
+    /// Returns the relative noise of a reading of `resistance_ohm`. Its own part is
+    /// √(relative² + (additive² + step²/12)/R²), where step/√12 is the standard deviation of rounding to steps.
     pub fn relative_to(&self, resistance_ohm: f64) -> RelativeNoise {
         let step_ohm = self.converter.map_or(0.0, |converter| converter.step_ohm);
         let additive_ohm = libm::hypot(self.noise.additive_ohm, step_ohm / 12.0_f64.sqrt());
@@ -101,10 +101,10 @@ impl NoiseSource {
     }
 }
 
-/// The first of the values drawn that is above 0 and finite.
+/// Draws until a value is above 0 and finite.
 fn positive(mut draw: impl FnMut() -> f64) -> f64 {
-    /// Half of the draws are positive, and at the largest noise, where sums overflow, a third is kept: all fail less than
-    /// once in 10⁴⁵ readings.
+    /// At least half of the draws are positive; at the largest noise, where sums overflow, a third is accepted. All fail for
+    /// fewer than one in 10⁴⁵ readings.
     const MAX_DRAWS: usize = 256;
     let mut value = draw();
     for _ in 1..MAX_DRAWS {
@@ -113,33 +113,32 @@ fn positive(mut draw: impl FnMut() -> f64) -> f64 {
         }
         value = draw();
     }
-    // Only a resistance that is none itself gets here with another value.
+    // Reached with an invalid value only if the resistance itself is invalid.
     value
 }
 
-/// A deformation made by hand: the print of an indenter, and single nodes moved up and down.
+/// A manually defined deformation: the imprint of an indenter, and individual nodes moved up or down.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Touch {
     /// The indenter pressed onto the surface, if there is one.
     pub print: Option<Print>,
-    /// Depths in millimetres of nodes moved one by one, by row-wire and node on it, from 0; they count instead of the
-    /// print's.
+    /// Depths in millimetres of individually moved nodes, by row-wire and node on it, from 0; they override the imprint.
     pub nodes_mm: BTreeMap<(usize, usize), f64>,
 }
 
-/// An upright indenter pressed onto one place.
+/// An upright indenter pressed at one position.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Print {
-    /// The indenter; of its sizes the middle one counts.
+    /// The indenter; the middle of its range of sizes is used.
     pub indenter: Indenter,
-    /// Place of its middle.
+    /// Position of its centre.
     pub place_mm: DVec2,
-    /// Depth of its middle.
+    /// Depth at its centre.
     pub depth_mm: f64,
 }
 
 impl Touch {
-    /// Deformation of an array whose nodes can travel `stroke_mm`: no node goes above its rest or below that.
+    /// Returns the deformation of an array, with depths limited to between 0 and `stroke_mm`.
     pub fn deformation(&self, model: &SensorModel, stroke_mm: f64) -> Deformation {
         let within = |depth_mm: f64| depth_mm.clamp(0.0, stroke_mm);
         let print = self.print.as_ref().map(|print| {
@@ -229,9 +228,9 @@ mod tests {
         }
     }
 
-    /// Kolmogorov and Smirnov: with 20 000 readings the distance from their distribution exceeds 0.0138 once in 1000 times.
+    /// Kolmogorov-Smirnov test: with 20 000 readings the distance exceeds 0.0138 with a probability of 0.001.
     #[test]
-    fn readings_follow_the_normal_distribution_above_zero_and_do_not_tell_the_truth() {
+    fn readings_follow_the_truncated_normal_distribution_and_do_not_reveal_the_truth() {
         let cases = [
             (Noise::relative(1.0), 10.0, 10.0),
             (Noise::relative(0.5), 10.0, 5.0),
@@ -263,7 +262,7 @@ mod tests {
     }
 
     #[test]
-    fn drift_turns_no_snapshot_around() {
+    fn drift_makes_no_snapshot_negative() {
         let noise = Noise {
             drift: 1.0,
             ..Noise::default()
@@ -277,7 +276,7 @@ mod tests {
             assert!((readings[1] / readings[0] - 2.0).abs() < 1e-12);
             gains.push(readings[0] / 10.0);
         }
-        // The mean of a normal value of mean and deviation 1 that is above 0 is 1 + φ(1)/Φ(1).
+        // The mean of a normal distribution with mean and standard deviation 1, truncated to values above 0, is 1 + φ(1)/Φ(1).
         let (mean, _) = spread(&gains);
         assert!((mean - 1.2876).abs() < 0.06, "{mean}");
         assert!(
@@ -286,9 +285,9 @@ mod tests {
         );
     }
 
-    /// The first draw is kept wherever it is positive, so ordinary noise has one draw for each reading.
+    /// The first draw is kept if it is positive, so ordinary noise needs one draw per reading.
     #[test]
-    fn ordinary_noise_takes_one_draw_a_reading() {
+    fn ordinary_noise_takes_one_draw_per_reading() {
         let noise = Noise {
             relative: 0.05,
             additive_ohm: 0.1,
@@ -305,7 +304,7 @@ mod tests {
     }
 
     #[test]
-    fn no_noise_changes_nothing_and_sets_choose() {
+    fn zero_noise_changes_nothing_and_sets_are_respected() {
         assert!(disturbed(Noise::default(), 12.5, 5).iter().all(|&r| r == 12.5));
         let test_only = Noise {
             sets: NoisySets::Test,
@@ -342,7 +341,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_leaves_the_limits_of_the_scene() {
+    fn depths_stay_within_the_limits_of_the_scene() {
         let model = model();
         let deep = |depth_mm| Touch {
             print: Some(Print {

@@ -4,14 +4,14 @@ use serde::{Deserialize, Serialize};
 
 use super::SceneError;
 
-/// Row-wires read, and whether a decoder knows which one it reads.
+/// Row-wires read, and the sharing of decoders among them.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Rows {
-    /// One decoder for all row-wires, which does not know the row it reads: the paper's experiments.
+    /// One decoder for all row-wires, which does not know the row it reads, as in the paper's experiments.
     #[default]
     All,
-    /// One decoder for each row-wire: the electronics know which row they address.
+    /// One decoder per row-wire: the electronics know which row they address.
     Known,
     /// One row-wire, counted from 0.
     One(usize),
@@ -21,17 +21,17 @@ pub enum Rows {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum RowModel {
-    /// One for all row-wires, which does not know the row it reads.
+    /// One decoder for all row-wires, which does not know the row it reads.
     Shared,
-    /// One for each row-wire read: the electronics know which one they address.
+    /// One decoder per row-wire read: the electronics know which one they address.
     Each,
 }
 
 impl Rows {
-    /// The row-wires read, of an array with `rows` of them.
+    /// Returns the row-wires read in an array with `rows` row-wires.
     ///
     /// # Errors
-    /// A row that the array does not have.
+    /// If the array does not have the row.
     pub fn read(self, rows: usize) -> Result<Vec<usize>, SceneError> {
         match self {
             Self::All | Self::Known => Ok((0..rows).collect()),
@@ -40,7 +40,7 @@ impl Rows {
         }
     }
 
-    /// One decoder for every row-wire, or one for each.
+    /// Returns the sharing of decoders among row-wires.
     pub fn model(self) -> RowModel {
         match self {
             Self::All => RowModel::Shared,
@@ -52,7 +52,7 @@ impl Rows {
 impl FromStr for Rows {
     type Err = SceneError;
 
-    /// Reads `all`, `known`, or the number of a row-wire from 1.
+    /// Parses `all`, `known`, or the number of a row-wire from 1.
     fn from_str(text: &str) -> Result<Self, SceneError> {
         match text.trim() {
             "all" => Ok(Self::All),
@@ -80,7 +80,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn rows_are_counted_from_one_in_words_and_from_zero_in_the_model() {
+    fn rows_are_counted_from_one_in_text_and_from_zero_in_the_model() {
         assert_eq!("3".parse(), Ok(Rows::One(2)));
         assert_eq!(Rows::One(2).to_string(), "3");
         assert_eq!(Rows::One(2).read(3), Ok(vec![2]));
@@ -91,7 +91,7 @@ mod tests {
     }
 
     #[test]
-    fn rows_that_do_not_exist_are_named() {
+    fn rows_that_do_not_exist_are_reported() {
         assert_eq!(Rows::One(10).read(10), Err(SceneError::Row { row: 11, rows: 10 }));
         for text in ["0", "-1", "some", ""] {
             let message = text.parse::<Rows>().unwrap_err().to_string();

@@ -3,12 +3,12 @@ use std::{fmt, str::FromStr};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-/// The most wires, or nodes on a wire, that an array may have.
+/// Maximum number of wires of one kind, or of nodes on a wire.
 pub const LARGEST_COUNT: usize = 512;
 
 /// The scale `M1×M2_M3×M4` of a sensor array, in the notation of the paper (section 2.2).
 ///
-/// Parses `10x6_3x18` and `10×6_3×18`, prints the latter.
+/// Parses `10x6_3x18` and `10×6_3×18`; formats as `10×6_3×18`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(try_from = "String", into = "String")]
 pub struct ArrayScale {
@@ -18,7 +18,7 @@ pub struct ArrayScale {
     columns: usize,
 }
 
-/// Error of a text or four numbers that are not an array scale.
+/// Invalid array scale.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 #[non_exhaustive]
 pub enum ArrayScaleError {
@@ -30,7 +30,7 @@ pub enum ArrayScaleError {
     Count {
         /// Name of the count.
         what: &'static str,
-        /// Its value.
+        /// Value of the count.
         count: usize,
     },
 }
@@ -53,11 +53,11 @@ impl ArrayScale {
         }
     }
 
-    /// An array of `rows` (M1) row-wires with `nodes_per_row` (M2) nodes over `columns` (M4) column-wires with
+    /// Creates an array of `rows` (M1) row-wires with `nodes_per_row` (M2) nodes over `columns` (M4) column-wires with
     /// `nodes_per_column` (M3) nodes.
     ///
     /// # Errors
-    /// A count outside `1..=LARGEST_COUNT`.
+    /// If a count is outside `1..=LARGEST_COUNT`.
     pub fn new(
         rows: usize,
         nodes_per_row: usize,
@@ -82,32 +82,32 @@ impl ArrayScale {
         })
     }
 
-    /// M1, row-wires on top.
+    /// Returns M1, the number of row-wires on top.
     pub fn rows(self) -> usize {
         self.rows
     }
 
-    /// M2, nodes on each row-wire.
+    /// Returns M2, the number of nodes on each row-wire.
     pub fn nodes_per_row(self) -> usize {
         self.nodes_per_row
     }
 
-    /// M3, nodes on each column-wire.
+    /// Returns M3, the number of nodes on each column-wire.
     pub fn nodes_per_column(self) -> usize {
         self.nodes_per_column
     }
 
-    /// M4, column-wires at the bottom: the resistances read for each row-wire.
+    /// Returns M4, the number of column-wires at the bottom: of resistances read for each row-wire.
     pub fn columns(self) -> usize {
         self.columns
     }
 
-    /// 3·M2, the coordinates of one row-wire's nodes.
+    /// Returns 3·M2, the number of coordinates of the nodes of one row-wire.
     pub fn coordinates_per_row(self) -> usize {
         3 * self.nodes_per_row
     }
 
-    /// Note to the user of an array that departs from the paper's rule M4 = 3·M2.
+    /// Returns a note for the user if the array departs from the paper's rule M4 = 3·M2.
     pub fn note(self) -> Option<String> {
         let equations = self.columns;
         let coordinates = self.coordinates_per_row();
@@ -172,14 +172,14 @@ mod tests {
     use super::*;
 
     #[test]
-    fn both_crosses_parse_and_the_proper_one_prints() {
+    fn both_crosses_are_parsed_and_the_multiplication_sign_is_printed() {
         for text in ["10x6_3x18", "10×6_3×18", " 10X6_3x18 "] {
             assert_eq!(text.parse::<ArrayScale>().unwrap().to_string(), "10×6_3×18");
         }
     }
 
     #[test]
-    fn what_is_not_a_scale_is_named() {
+    fn invalid_scales_are_reported() {
         for text in [
             "10x6",
             "",

@@ -8,10 +8,10 @@ use super::{
     geometry::{Differences, SplitLength, two_sum},
 };
 
-/// The sums `s_k = Σ_i Σ_j 1/d` of Eq. (2) for one row-wire, so that `R_k = g / s_k`, and their derivatives by what
-/// moves. Kept between evaluations so that none allocates.
+/// The sums `s_k = Σ_i Σ_j 1/d` of Eq. (2) for one row-wire, with `R_k = g / s_k`, and their derivatives by the unknowns.
+/// Storage is reused between evaluations, which do not allocate.
 ///
-/// Conductance is what a solver wants: it is a plain sum over nodes, hence much closer to linear than resistance.
+/// Conductance is suited to solvers: it is a plain sum over nodes, hence much closer to linear than resistance.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RowConductance {
     axes: Axes,
@@ -23,7 +23,7 @@ pub struct RowConductance {
 }
 
 impl RowConductance {
-    /// Room for the row-wires of `model` whose nodes move along `axes`.
+    /// Allocates storage for the row-wires of `model` whose nodes move along `axes`.
     pub fn new(model: &SensorModel, axes: Axes) -> Self {
         let columns = model.scale.columns();
         Self {
@@ -34,17 +34,17 @@ impl RowConductance {
         }
     }
 
-    /// Along which axes the nodes move.
+    /// Returns the axes along which the nodes move.
     pub fn axes(&self) -> Axes {
         self.axes
     }
 
-    /// s_k, M4 of them, in 1/mm.
+    /// Returns the sums s_k in 1/mm: M4.
     pub fn sums(&self) -> &[f64] {
         &self.sums
     }
 
-    /// Derivatives of every s_k by one unknown, M4 of them, in 1/mm².
+    /// Returns the derivatives of every s_k by one unknown in 1/mm²: M4.
     pub fn derivatives(&self, unknown: usize) -> &[f64] {
         &self.derivatives[unknown * self.columns..(unknown + 1) * self.columns]
     }
@@ -58,9 +58,9 @@ impl RowConductance {
         self.evaluate_by::<Divided>(model, row, displacements_mm, model.scale.nodes_per_column());
     }
 
-    /// Evaluates sums and derivatives of a row-wire, or of column-wires, broken after the first nodes: those displaced by
-    /// `displacements_mm` (up to M2) and the first `electrodes` (up to M3) of every column-wire. Derivatives by other nodes
-    /// stay as they are.
+    /// Evaluates sums and derivatives with a broken row-wire or broken column-wires. Only the first nodes contribute: those
+    /// displaced by `displacements_mm` (up to M2), and the first `electrodes` (up to M3) of every column-wire. Derivatives
+    /// by other nodes are left unchanged.
     ///
     /// # Panics
     /// If there are more displacements or electrodes than nodes.
@@ -69,26 +69,25 @@ impl RowConductance {
         self.evaluate_by::<Divided>(model, row, displacements_mm, electrodes);
     }
 
-    /// Evaluates as [`Self::evaluate`], by [refined](Refined) reciprocal roots, in half the time and to within a few more
+    /// Evaluates like [`Self::evaluate`] with [refined](Refined) reciprocal roots: in half the time, with errors of a few more
     /// units in the last place. Distances must be [within reach](Self::is_within_reach).
     pub(crate) fn evaluate_refined(&mut self, model: &SensorModel, row: usize, displacements_mm: &[DVec3]) {
         assert_eq!(displacements_mm.len(), model.scale.nodes_per_row());
         self.evaluate_by::<Refined>(model, row, displacements_mm, model.scale.nodes_per_column());
     }
 
-    /// Evaluates the sums alone, with the same bits as [`Self::evaluate`]; derivatives stay those of the last evaluation.
+    /// Evaluates only the sums, bit-identical to [`Self::evaluate`]; derivatives remain those of the last evaluation.
     pub(crate) fn evaluate_sums(&mut self, model: &SensorModel, row: usize, displacements_mm: &[DVec3]) {
         self.evaluate_sums_by::<Divided>(model, row, displacements_mm);
     }
 
-    /// Evaluates the sums alone, with the same bits as [`Self::evaluate_refined`]; derivatives stay those of the last
-    /// evaluation.
+    /// Evaluates only the sums, bit-identical to [`Self::evaluate_refined`]; derivatives remain those of the last evaluation.
     pub(crate) fn evaluate_sums_refined(&mut self, model: &SensorModel, row: usize, displacements_mm: &[DVec3]) {
         self.evaluate_sums_by::<Refined>(model, row, displacements_mm);
     }
 
-    /// Returns `true` if refined reciprocal roots can be computed of distances up to that of nodes displaced by
-    /// `largest_mm`, no nearer to the column-wires than `nearest_mm`.
+    /// Returns `true` if refined reciprocal roots are valid for nodes displaced by up to `largest_mm` and at least
+    /// `nearest_mm` away from the column-wires.
     pub(crate) fn is_within_reach(model: &SensorModel, nearest_mm: f64, largest_mm: f64) -> bool {
         let (geometry, scale) = (&model.geometry, model.scale);
         let farthest_mm = geometry.height_mm
@@ -126,7 +125,7 @@ impl RowConductance {
     }
 }
 
-/// A way to compute 1/√x for the distances of Eq. (2).
+/// Method of computing 1/√x for the distances of Eq. (2).
 pub(super) trait ReciprocalRoot {
     fn of(square: f64) -> f64;
 }
@@ -134,12 +133,12 @@ pub(super) trait ReciprocalRoot {
 /// A square root and a division.
 pub(super) struct Divided;
 
-/// Begins in single precision, whose square roots and divisions take a quarter of the time, and takes one step of third
-/// order (Householder 1970): with e = 1 − x y², `y (1 + e/2 + 3e²/8)` leaves an error of 5e³/16, below 1e-19. Within 2
+/// Single-precision estimate, whose square root and division take a quarter of the time, refined by one third-order step
+/// (Householder 1970): with e = 1 − x y², `y (1 + e/2 + 3e²/8)` leaves an error of 5e³/16, below 1e-19. Accurate to 2
 /// units in the last place for squares in [`SQUARES`].
 pub(super) struct Refined;
 
-/// Squares of which the reciprocal root is [refined](Refined) without leaving single precision.
+/// Squares whose [refined](Refined) reciprocal root stays within the range of single precision.
 pub(super) const SQUARES: std::ops::RangeInclusive<f64> = 1e-30..=1e30;
 
 impl ReciprocalRoot for Divided {
@@ -158,25 +157,25 @@ impl ReciprocalRoot for Refined {
     }
 }
 
-/// Columns per block, whose sums stay in registers. The padding of the last block is discarded.
+/// Number of columns per block, whose sums stay in registers. The padding of the last block is discarded.
 const LANES: usize = 8;
-/// Electrodes per chunk, whose sum is rounded as it comes.
+/// Number of electrodes per chunk, which is summed without compensation.
 const ELECTRODES: usize = 8;
 
 /// Computes `s_k = Σ_i Σ_j 1/d` of Eq. (2), in 1/mm, for row-wire `row` whose nodes are displaced by `displacements_mm`
 /// (M2), into `sums` (M4); and its derivatives by the displacements along no axis (`AXES` = 0), z (1) or x, y and z (3)
 /// into `derivatives` (M2 × `AXES` × M4, in 1/mm²).
 ///
-/// Where a wire is broken, the sum is over the nodes before the break: the first ones of the row-wire, if fewer
-/// displacements are given, and the first `electrodes` of every column-wire.
+/// If a wire is broken, the sum is over the nodes before the break: the first nodes of the row-wire, if fewer displacements
+/// are given, and the first `electrodes` of every column-wire.
 ///
-/// With d² = dx² + dy² + z²: ∂(1/d)/∂ux = −dx/d³, ∂(1/d)/∂uy = −dy/d³ and, uz counting downwards, ∂(1/d)/∂uz = z/d³.
+/// With d² = dx² + dy² + z²: ∂(1/d)/∂ux = −dx/d³, ∂(1/d)/∂uy = −dy/d³ and, with uz positive downwards, ∂(1/d)/∂uz = z/d³.
 ///
-/// Differences of coordinates are right to the last place wherever the origin is, and the sum over nodes is compensated
-/// (Ogita, Rump and Oishi, "Accurate sum and dot product", SIAM J. Sci. Comput. 26, 2005), so that s is right to a few
+/// Differences of coordinates are accurate to the last place for any origin, and the sum over nodes is compensated
+/// (Ogita, Rump and Oishi, "Accurate sum and dot product", SIAM J. Sci. Comput. 26, 2005), so that s is accurate to a few
 /// units in the last place for any number of nodes.
 ///
-/// No fused operations, so every machine gives the same bits.
+/// There are no fused operations, so results are bit-identical on all machines.
 pub(super) fn sum_reciprocal_distances<const AXES: usize, R: ReciprocalRoot>(
     (scale, geometry): (ArrayScale, &Geometry),
     row: usize,
@@ -219,7 +218,7 @@ impl<const AXES: usize, R: ReciprocalRoot> WithSimd for Summation<'_, AXES, R> {
         });
         let differences = self.geometry.differences(self.scale, self.row, shift_mm);
         self.sums.fill(0.0);
-        // The first chunk, nearly always the only one, has code of its own, which does not read derivatives.
+        // The first chunk, usually the only one, has separate code, which does not read derivatives.
         self.add_electrodes(&differences, 0, true);
         for first in (ELECTRODES..self.electrodes).step_by(ELECTRODES) {
             self.add_electrodes(&differences, first, false);
@@ -228,7 +227,7 @@ impl<const AXES: usize, R: ReciprocalRoot> WithSimd for Summation<'_, AXES, R> {
 }
 
 impl<const AXES: usize, R: ReciprocalRoot> Summation<'_, AXES, R> {
-    /// Adds the terms of electrodes `first_electrode` and on of every column-wire.
+    /// Adds the terms of one chunk of electrodes, from `first_electrode` on, of every column-wire.
     #[inline(always)]
     fn add_electrodes(&mut self, differences: &Differences, first_electrode: usize, are_first: bool) {
         let Self {
@@ -274,7 +273,7 @@ impl<const AXES: usize, R: ReciprocalRoot> Summation<'_, AXES, R> {
                 }
             }
             for (sum, (total, rest)) in sums.iter_mut().zip(totals.iter().zip(&rests)) {
-                // The rest of an infinite sum, that of a node which touches a column-wire, is not a number.
+                // The compensation of an infinite sum (a node touches a column-wire) is NaN.
                 *sum = if rest.is_nan() { *total } else { total + rest };
             }
         }
@@ -310,7 +309,7 @@ mod tests {
     use super::*;
     use crate::sensor::{Axes, RowConductance};
 
-    /// Against the evaluation by square roots and divisions, whose rounding is measured in high precision elsewhere.
+    /// Compared with the evaluation by square roots and divisions, whose rounding is tested in high precision elsewhere.
     #[test]
     fn refined_sums_and_derivatives_are_within_four_units_in_the_last_place() {
         for scale in ["10x10_5x30", "3x2_1x7", "2x9_17x5"] {
@@ -354,7 +353,7 @@ mod tests {
     }
 
     #[test]
-    fn lengths_beyond_single_precision_are_out_of_reach() {
+    fn lengths_beyond_single_precision_are_excluded() {
         let mut model = SensorModel::new("2x4_3x12".parse().unwrap());
         assert!(RowConductance::is_within_reach(&model, 0.5, 2.0));
         assert!(!RowConductance::is_within_reach(&model, 0.0, 2.0));
@@ -363,9 +362,9 @@ mod tests {
         assert!(!RowConductance::is_within_reach(&model, 0.5, 2.0));
     }
 
-    /// The Jacobian of [`SensorModel`] is checked against central differences; R = g/s relates the two.
+    /// The Jacobian of [`SensorModel`] is tested against central differences; R = g/s relates the two.
     #[test]
-    fn sums_and_derivatives_are_those_of_the_resistances() {
+    fn sums_and_derivatives_match_the_resistances() {
         for scale in ["10x6_3x18", "3x2_1x7"] {
             let model = SensorModel::new(scale.parse().unwrap());
             let nodes = model.scale.nodes_per_row();
@@ -396,7 +395,7 @@ mod tests {
         }
     }
 
-    /// Against the whole sums of an array that has no more nodes, moved so that those left are where they were.
+    /// Compared with the full sums of a smaller array whose nodes are at the same positions.
     #[test]
     fn a_broken_wire_has_the_sums_of_a_shorter_one() {
         let model = SensorModel::new("3x4_3x12".parse().unwrap());
@@ -432,13 +431,13 @@ mod tests {
         assert!(none.sums().iter().all(|sum| *sum == 0.0));
     }
 
-    /// y is right to 2 units in the last place if x y² is right to twice as many: y (1 + δ) gives 1 + 2δ.
+    /// y is accurate to 2 units in the last place if x y² is accurate to twice as many: y (1 + δ) gives 1 + 2δ.
     #[test]
-    fn refined_roots_are_right_to_two_units_in_the_last_place() {
+    fn refined_roots_are_accurate_to_two_units_in_the_last_place() {
         let (mut square, mut worst) = (*SQUARES.start(), 0.0_f64);
         while square < *SQUARES.end() {
             let root = Refined::of(square);
-            // x y² with the rounding of y² kept: fused operations round once.
+            // x y² with the rounding error of y²: fused operations round once.
             let upper = root * root;
             let lower = root.mul_add(root, -upper);
             let error = square.mul_add(upper, -1.0) + square * lower;

@@ -6,8 +6,8 @@ use super::{ArrayScale, short};
 
 /// Positions of the electrode nodes of the undeformed sensor, in millimetres.
 ///
-/// The paper gives the height (5), the gap between wires (1) and row-wires at x = 8..17. The other values are an
-/// assumption: the layout, of 330 scanned, under which the model comes closest to the paper's Tables 1 and 3.
+/// The paper gives the height (5), the gap between wires (1) and row-wires at x = 8..17. The other values are assumed: of
+/// 330 layouts tested, they are those for which the model is closest to the paper's Tables 1 and 3.
 /// Row-wires run along y, column-wires along x, z points up from the column-wires.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
@@ -30,7 +30,7 @@ pub struct Geometry {
     pub column_node_pitch_mm: f64,
 }
 
-/// A geometry that no sensor can have.
+/// Invalid geometry.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
 pub enum GeometryError {
@@ -39,15 +39,15 @@ pub enum GeometryError {
     NotFinite {
         /// Name of the length.
         what: &'static str,
-        /// Its value.
+        /// Value.
         value: f64,
     },
-    /// A length that must be positive is not.
+    /// A length is not positive.
     #[error("{what} is {} mm: it must be above 0", short(*.value))]
     NotPositive {
         /// Name of the length.
         what: &'static str,
-        /// Its value.
+        /// Value.
         value: f64,
     },
 }
@@ -68,14 +68,14 @@ impl Default for Geometry {
 }
 
 impl Geometry {
-    /// Note to the user about the default values.
+    /// Note for the user on the default values.
     pub const ASSUMPTION: &'static str = "The paper gives height, wire gap and row positions (x = 8 to 17 mm). Node \
          pitch and column-node positions are assumed: the layout, of 330 scanned, that comes closest to its tables.";
 
     /// Checks that every length is finite and that height and pitches are positive.
     ///
     /// # Errors
-    /// The first length that is not.
+    /// If a length is not.
     pub fn check(&self) -> Result<(), GeometryError> {
         let Self {
             height_mm,
@@ -112,24 +112,24 @@ impl Geometry {
         Ok(())
     }
 
-    /// x of row-wire `row`.
+    /// Returns x of row-wire `row`.
     pub fn row_x_mm(&self, row: usize) -> f64 {
         self.row_x0_mm + self.row_pitch_mm * row as f64
     }
 
-    /// y of node `node` on every row-wire.
+    /// Returns y of node `node` on every row-wire.
     pub fn node_y_mm(&self, scale: ArrayScale, node: usize) -> f64 {
         let columns_centre = self.column_y0_mm + self.column_pitch_mm * (scale.columns() - 1) as f64 / 2.0;
         columns_centre + self.node_pitch_mm * (node as f64 - (scale.nodes_per_row() - 1) as f64 / 2.0)
     }
 
-    /// Undeformed position of node `node` on row-wire `row`.
+    /// Returns the undeformed position of node `node` on row-wire `row`.
     pub fn row_node_mm(&self, scale: ArrayScale, row: usize, node: usize) -> DVec3 {
         DVec3::new(self.row_x_mm(row), self.node_y_mm(scale, node), self.height_mm)
     }
 
-    /// Position of node `node` on row-wire `row` displaced by `displacement_mm`, whose z counts downwards (compression is
-    /// positive).
+    /// Returns the position of node `node` on row-wire `row` displaced by `displacement_mm`, whose z is positive downwards
+    /// (compression).
     pub fn displaced_mm(&self, scale: ArrayScale, row: usize, node: usize, displacement_mm: DVec3) -> DVec3 {
         let rest = self.row_node_mm(scale, row, node);
         DVec3::new(
@@ -139,7 +139,7 @@ impl Geometry {
         )
     }
 
-    /// Position of node `node` on column-wire `column`; the bottom layer never moves.
+    /// Returns the position of node `node` on column-wire `column`; the bottom layer does not move.
     pub fn column_node_mm(&self, column: usize, node: usize) -> DVec3 {
         DVec3::new(
             self.column_node_x0_mm + self.column_node_pitch_mm * node as f64,
@@ -148,7 +148,7 @@ impl Geometry {
         )
     }
 
-    /// Returns what differences of coordinates are made of, for nodes shifted sideways by at most `shift_mm`.
+    /// Prepares differences of coordinates for nodes shifted sideways by at most `shift_mm`.
     pub(super) fn differences(&self, scale: ArrayScale, row: usize, shift_mm: f64) -> Differences {
         let x_mm = (self.row_x0_mm - self.column_node_x0_mm).abs()
             + self.row_pitch_mm * scale.rows() as f64
@@ -212,24 +212,24 @@ impl Differences {
     }
 }
 
-/// Axes along which the nodes of the row-wires move, which set the number of unknowns of a node.
+/// Axes along which the nodes of the row-wires move, which determine the number of unknowns per node.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Axes {
-    /// Up and down only: one unknown each node.
+    /// Vertical only: one unknown per node.
     #[default]
     Z,
-    /// Sideways too: three unknowns each node, in the order x, y, z.
+    /// Also sideways: three unknowns per node, in the order x, y, z.
     Xyz,
 }
 
 impl Axes {
-    /// Unknowns of each node.
+    /// Returns the number of unknowns per node.
     pub fn count(self) -> usize {
         self.indices().len()
     }
 
-    /// Indices of the unknown coordinates among x, y, z (0, 1, 2).
+    /// Returns the indices of the unknown coordinates among x, y, z (0, 1, 2).
     pub fn indices(self) -> &'static [usize] {
         match self {
             Self::Z => &[2],
@@ -240,17 +240,16 @@ impl Axes {
 
 /// Fixed-point grid fine enough for every coordinate of a row-wire, on which sums are exact.
 ///
-/// A length is split into a multiple of the grid and what is left, each exactly (Rump, Ogita and Oishi, "Accurate
-/// floating-point summation", SIAM J. Sci. Comput. 31, 2008). Multiples add without rounding, and what is left is so
-/// small that its rounding does not count: differences of coordinates are right to the last place, even where they nearly
-/// cancel.
+/// A length is split exactly into a multiple of the grid and a remainder (Rump, Ogita and Oishi, "Accurate floating-point
+/// summation", SIAM J. Sci. Comput. 31, 2008). Multiples are added without rounding, and the rounding of the small
+/// remainders is negligible: differences of coordinates are accurate to the last place, even if they nearly cancel.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct FixedPoint {
-    /// Three halves of a power of two above any length: adding it rounds to the grid.
+    /// 1.5 times a power of two above any length: adding it rounds to the grid.
     shift: f64,
 }
 
-/// Length as a multiple of a grid and what is left.
+/// Length as a multiple of a grid and a remainder.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct SplitLength {
     pub(super) upper: f64,
@@ -261,7 +260,7 @@ impl FixedPoint {
     /// Returns the grid for lengths whose sums never exceed `bound`.
     pub(super) fn new(bound: f64) -> Self {
         let exponent = bound.to_bits() & f64::INFINITY.to_bits();
-        // The power of two below `bound`, and four times as much.
+        // The power of two below `bound`, times four.
         Self {
             shift: 6.0 * f64::from_bits(exponent),
         }
@@ -297,7 +296,7 @@ impl SplitLength {
         }
     }
 
-    /// Returns the length times a whole number.
+    /// Returns the length times an integer.
     #[inline(always)]
     pub(super) fn times(self, count: f64) -> Self {
         Self {
@@ -313,7 +312,7 @@ impl SplitLength {
     }
 }
 
-/// Returns a + b, rounded, and the error of rounding, which is itself a number (Knuth, The Art of Computer Programming,
+/// Returns a + b, rounded, and the rounding error, which is exactly representable (Knuth, The Art of Computer Programming,
 /// vol. 2, section 4.2.2).
 #[inline(always)]
 pub(super) fn two_sum(a: f64, b: f64) -> (f64, f64) {
@@ -327,7 +326,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_default_layout_is_the_documented_one() {
+    fn the_default_layout_is_as_documented() {
         let scale = ArrayScale::default();
         let geometry = Geometry::default();
         assert_eq!(geometry.row_node_mm(scale, 9, 0), DVec3::new(17.0, 6.5, 5.0));
@@ -335,7 +334,7 @@ mod tests {
     }
 
     #[test]
-    fn impossible_lengths_are_named() {
+    fn invalid_lengths_are_reported() {
         let flat = Geometry {
             height_mm: 0.0,
             ..Geometry::default()
@@ -367,7 +366,7 @@ mod tests {
     }
 
     #[test]
-    fn the_rest_of_a_sum_is_kept() {
+    fn the_remainder_of_a_sum_is_kept() {
         let grid = FixedPoint::new(10.0);
         assert_eq!(grid.sum(1.0, 1e-20).plus(grid.split(-1.0)).rounded(), 1e-20);
         assert_eq!(two_sum(1e17, 3.0), (1e17, 3.0));

@@ -1,4 +1,4 @@
-//! The sensor: numbers and positions of wires and nodes, and the resistances of a deformation. Displacements and positions
+//! The sensor: number and positions of wires and nodes, and the resistances for a deformation. Displacements and positions
 //! are [`DVec3`], the double-precision vector of the crate `glam`.
 
 mod array_scale;

@@ -8,19 +8,19 @@ use super::{
     conductance::{Divided, sum_reciprocal_distances},
 };
 
-/// Default resistance per millimetre of rubber. The paper gives none: g scales every
-/// resistance alike, so no relative error depends on it.
+/// Default resistance per millimetre of rubber. The paper gives none: g scales all resistances alike, so relative errors
+/// do not depend on it.
 pub const DEFAULT_RESISTIVITY_OHM_PER_MM: f64 = 100.0;
 
 /// The resistance model of one array: Eq. (1)-(2) of the paper and its derivatives.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct SensorModel {
-    /// Number of wires and nodes.
+    /// Numbers of wires and nodes.
     pub scale: ArrayScale,
     /// Positions of the nodes.
     pub geometry: Geometry,
-    /// g, resistance per millimetre of rubber.
+    /// Resistance g per millimetre of rubber.
     pub resistivity_ohm_per_mm: f64,
 }
 
@@ -35,16 +35,16 @@ impl Default for SensorModel {
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
 pub enum SensorError {
-    /// The geometry is impossible.
+    /// The geometry is invalid.
     #[error(transparent)]
     Geometry(#[from] GeometryError),
     /// g is not a positive number.
     #[error("the resistance per millimetre is {}: it must be above 0 and finite", short(*.0))]
     Resistivity(f64),
-    /// A resistance came out as zero, infinite or NaN.
+    /// A resistance is zero, infinite or NaN.
     #[error(
         "row {}, column {}: the resistance is {} ohm; a node touches a column-wire, or a length is \
-         out of range; press less deep, or give lengths nearer to a millimetre",
+         out of range; press less deep, or give lengths closer to a millimetre",
         row + 1,
         column + 1,
         short(*.resistance_ohm)
@@ -60,7 +60,7 @@ pub enum SensorError {
 }
 
 impl SensorModel {
-    /// An array with the assumed geometry and resistivity.
+    /// Creates an array with the assumed geometry and resistivity.
     pub fn new(scale: ArrayScale) -> Self {
         Self {
             scale,
@@ -72,7 +72,7 @@ impl SensorModel {
     /// Checks geometry and resistivity.
     ///
     /// # Errors
-    /// The first impossible value.
+    /// If a value is invalid.
     pub fn check(&self) -> Result<(), SensorError> {
         self.geometry.check()?;
         let g = self.resistivity_ohm_per_mm;
@@ -83,24 +83,24 @@ impl SensorModel {
         }
     }
 
-    /// Position of a node displaced by `displacement_mm`, whose z counts downwards (compression is positive).
+    /// Returns the position of a node displaced by `displacement_mm`, whose z is positive downwards (compression).
     pub fn displaced_mm(&self, row: usize, node: usize, displacement_mm: DVec3) -> DVec3 {
         self.geometry.displaced_mm(self.scale, row, node, displacement_mm)
     }
 
-    /// The displacement that puts a node at `position_mm`, z counting downwards: the inverse of [`Self::displaced_mm`].
+    /// Returns the displacement of a node at `position_mm`, z positive downwards: the inverse of [`Self::displaced_mm`].
     pub fn displacement_mm(&self, row: usize, node: usize, position_mm: DVec3) -> DVec3 {
         let apart = position_mm - self.geometry.row_node_mm(self.scale, row, node);
         DVec3::new(apart.x, apart.y, -apart.z)
     }
 
-    /// Row-column resistances of row-wire `row` whose nodes are displaced by `displacements_mm` (M2 of them),
-    /// written to `resistances_ohm` (M4), Eq. (2):
+    /// Computes the resistances of row-wire `row` whose nodes are displaced by `displacements_mm` (M2), and writes them to
+    /// `resistances_ohm` (M4), by Eq. (2):
     ///
     /// `1/R_lk = Σ_i Σ_j 1 / (g · |p_li + u_li − q_kj|)`
     ///
     /// # Errors
-    /// A resistance that is not a positive finite number.
+    /// If a resistance is not positive and finite.
     ///
     /// # Panics
     /// If the slices do not have M2 and M4 elements.
@@ -112,7 +112,7 @@ impl SensorModel {
     ) -> Result<(), SensorError> {
         assert_eq!(displacements_mm.len(), self.scale.nodes_per_row());
         assert_eq!(resistances_ohm.len(), self.scale.columns());
-        // The sum of reciprocal distances, per millimetre, is gathered in place of the resistance.
+        // The sum of reciprocal distances, per millimetre, is accumulated in place of the resistance.
         sum_reciprocal_distances::<0, Divided>(
             (self.scale, &self.geometry),
             row,
@@ -134,23 +134,23 @@ impl SensorModel {
         Ok(())
     }
 
-    /// Row-column resistances in ohm as by [`Self::row_resistances_into`], in a new vector (M4).
+    /// Returns the resistances of [`Self::row_resistances_into`] in ohm as a new vector (M4).
     ///
     /// # Errors
-    /// A resistance that is not a positive finite number.
+    /// If a resistance is not positive and finite.
     pub fn row_resistances(&self, row: usize, displacements_mm: &[DVec3]) -> Result<Vec<f64>, SensorError> {
         let mut resistances_ohm = vec![0.0; self.scale.columns()];
         self.row_resistances_into(row, displacements_mm, &mut resistances_ohm)?;
         Ok(resistances_ohm)
     }
 
-    /// Analytic derivatives ∂R_lk/∂u_li of row-wire `row`, in ohm per millimetre: shape M4 × M2 × 3, the last axis
-    /// being ux, uy, uz (uz downwards).
+    /// Returns the analytic derivatives ∂R_lk/∂u_li of row-wire `row` in ohm per millimetre: M4 × M2 × 3, the last axis being
+    /// ux, uy, uz (uz downwards).
     ///
     /// With s = Σ 1/d and R = g/s, ∂R/∂u = −(R/s) ∂s/∂u.
     ///
     /// # Errors
-    /// A resistance that is not a positive finite number.
+    /// If a resistance is not positive and finite.
     pub fn row_jacobian(&self, row: usize, displacements_mm: &[DVec3]) -> Result<Array3<f64>, SensorError> {
         let resistances_ohm = self.row_resistances(row, displacements_mm)?;
         let (columns, nodes) = (self.scale.columns(), self.scale.nodes_per_row());
@@ -167,21 +167,21 @@ impl SensorModel {
 /// Noise of a reading relative to the reading, from all sources of a scene.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct RelativeNoise {
-    /// Standard deviation of each reading's own error.
+    /// Standard deviation of the independent error of each reading.
     pub own: f64,
-    /// Standard deviation of the error common to all readings of a snapshot.
+    /// Standard deviation of the error that all readings of a snapshot have in common.
     pub common: f64,
 }
 
 impl RelativeNoise {
-    /// Standard deviation of a reading's whole error.
+    /// Returns the standard deviation of the total error of a reading.
     pub fn total(self) -> f64 {
         libm::hypot(self.own, self.common)
     }
 
-    /// Factor on the part that `readings` have in common, by which readings with a common error count as if each had its own
-    /// alone: own / √(own² + readings · common²), from the eigenvalues of the covariance own² I + common² 1 1ᵀ. Exact
-    /// readings have the rounding of double precision as their own error.
+    /// Returns the factor for the mean of `readings` by which readings with a common error can be weighted like independent
+    /// ones: own / √(own² + readings · common²), from the eigenvalues of the covariance own² I + common² 1 1ᵀ. The independent
+    /// error of exact readings is the rounding of double precision.
     pub(crate) fn weight_of_mean(self, readings: usize) -> f64 {
         if self.common == 0.0 {
             return 1.0;
@@ -191,7 +191,7 @@ impl RelativeNoise {
     }
 }
 
-/// A number of any size in a few characters, for messages: `0.5`, `-5`, `1e300`.
+/// Formats a number of any size in a few characters for messages: `0.5`, `-5`, `1e300`.
 pub fn short(value: f64) -> String {
     if value == 0.0 || (1e-4..1e6).contains(&value.abs()) {
         format!("{value}")
@@ -206,7 +206,7 @@ mod tests {
 
     /// One node over one column node: R is g times their distance.
     #[test]
-    fn a_single_pair_is_the_rubber_between_two_points() {
+    fn a_single_pair_has_the_resistance_of_its_distance() {
         let mut model = SensorModel::new("1x1_1x1".parse().unwrap());
         model.geometry.column_node_x0_mm = model.geometry.row_x0_mm;
         model.resistivity_ohm_per_mm = 470.0;
@@ -215,7 +215,7 @@ mod tests {
     }
 
     #[test]
-    fn resistivity_only_scales() {
+    fn resistivity_scales_resistances() {
         for g in [1e-12, 1.0, 1e12] {
             let mut model = SensorModel::new(ArrayScale::default());
             let rest = vec![DVec3::ZERO; 10];
@@ -241,7 +241,7 @@ mod tests {
     }
 
     #[test]
-    fn no_number_takes_three_hundred_digits() {
+    fn extreme_numbers_are_short() {
         let cases = [
             (0.0, "0"),
             (-5.0, "-5"),

@@ -2,7 +2,7 @@
 //!
 //! Linear interpolation by a matrix of weights.
 //!
-//! A lattice found among places in the plane.
+//! Detection of a lattice among points in the plane.
 
 use std::ops::RangeInclusive;
 
@@ -10,8 +10,8 @@ use ndarray::{Array2, ArrayView1, ArrayViewMut1, linalg::general_mat_vec_mul};
 
 use super::map::{Axis, SurfaceError};
 
-/// A rectangular grid that passes through the nodes of a lattice and extends half a pitch beyond them; over scattered nodes,
-/// one that passes through the outermost of them.
+/// A rectangular grid through the nodes of a lattice that extends half a pitch beyond them; for scattered nodes, a grid
+/// through the outermost of them.
 ///
 /// Values on it are `x points × y points`, x-major: point `(ix, iy)` has the index `ix · y_mm().len() + iy`.
 #[derive(Clone, Debug, PartialEq)]
@@ -25,17 +25,17 @@ impl Grid {
         Self { x, y }
     }
 
-    /// Coordinates along x in millimetres, ascending.
+    /// Returns the coordinates along x in millimetres, ascending.
     pub fn x_mm(&self) -> &[f64] {
         &self.x.points_mm
     }
 
-    /// Coordinates along y in millimetres, ascending.
+    /// Returns the coordinates along y in millimetres, ascending.
     pub fn y_mm(&self) -> &[f64] {
         &self.y.points_mm
     }
 
-    /// Number of points.
+    /// Returns the number of points.
     pub fn len(&self) -> usize {
         self.x.points_mm.len() * self.y.points_mm.len()
     }
@@ -50,12 +50,12 @@ impl Grid {
         ix * self.y.points_mm.len() + iy
     }
 
-    /// Indices along x within the bounding rectangle of the nodes.
+    /// Returns the indices along x within the bounding rectangle of the nodes.
     pub fn inside_x(&self) -> RangeInclusive<usize> {
         self.x.first_inside..=self.x.last_inside
     }
 
-    /// Indices along y within the bounding rectangle of the nodes.
+    /// Returns the indices along y within the bounding rectangle of the nodes.
     pub fn inside_y(&self) -> RangeInclusive<usize> {
         self.y.first_inside..=self.y.last_inside
     }
@@ -65,8 +65,8 @@ impl Grid {
         self.x.beyond(ix).max(self.y.beyond(iy))
     }
 
-    /// Returns `true` if a point is within the bounding rectangle of the nodes; outside, the surface is extrapolated. A
-    /// single row or column has no extent; the strip that stands for it counts as inside.
+    /// Returns `true` if a point is within the bounding rectangle of the nodes; outside, the surface is extrapolated. For a
+    /// single row or column, which has no extent, the strip that represents it counts as inside.
     pub fn is_inside(&self, ix: usize, iy: usize) -> bool {
         self.inside_x().contains(&ix) && self.inside_y().contains(&iy)
     }
@@ -92,10 +92,10 @@ impl GridAxis {
 
     /// Divides every interval of the ascending `nodes_mm` into equal steps, for about `target` points in all.
     ///
-    /// `lone_margin_mm` is the margin around a single coordinate, which has no pitch of its own; larger where that would be
-    /// lost in the rounding of the coordinate.
+    /// `lone_margin_mm` is the margin around a single coordinate, which has no pitch; it is increased if it would be lost in
+    /// the rounding of the coordinate.
     pub(super) fn through(nodes_mm: &[f64], target: usize, lone_margin_mm: f64) -> Self {
-        // Very long axes are thinned: more lines than pixels would not be visible.
+        // Very long axes are thinned: more lines than pixels are not visible.
         let stride = nodes_mm.len().div_ceil(target.max(2));
         let last = nodes_mm.len() - 1;
         let mut kept_mm: Vec<f64> = nodes_mm.iter().copied().step_by(stride).collect();
@@ -141,8 +141,8 @@ impl GridAxis {
         }
     }
 
-    /// Divides the stretch between the outermost nodes into equal steps, and continues by `margin_mm` at both ends, with about
-    /// `target` steps in all.
+    /// Divides the interval between the outermost nodes into equal steps, and extends it by `margin_mm` at both ends, with
+    /// about `target` steps in all.
     pub(super) fn spanning(first_mm: f64, last_mm: f64, target: usize, margin_mm: f64) -> Self {
         let extent_mm = last_mm - first_mm;
         let share = extent_mm / (extent_mm + 2.0 * margin_mm);
@@ -159,16 +159,16 @@ impl GridAxis {
     }
 }
 
-/// Place after this many of equal steps.
+/// Coordinate after `step` of `steps` equal steps.
 fn along(from: f64, to: f64, step: usize, steps: usize) -> f64 {
     from + (to - from) * step as f64 / steps as f64
 }
 
-/// Largest coordinate of which differences and products with the number of points do not overflow.
+/// Largest coordinate for which differences and products with the number of points do not overflow.
 const LARGEST_MM: f64 = 1e300;
 
-/// Smallest distance between nodes, relative to their largest coordinate: some thousand roundings, so that the points
-/// between them can be told apart in double precision.
+/// Minimum distance between nodes relative to their largest coordinate: about a thousand roundings, so that points between
+/// them are distinct in double precision.
 pub(super) const CLOSEST_RELATIVE: f64 = 1e-12;
 
 /// Checks that there are coordinates, all of them finite.
@@ -213,14 +213,14 @@ impl SortedAxis {
         Ok(Self { nodes_mm, order })
     }
 
-    /// Smallest distance between neighbours; `None` for a single coordinate.
+    /// Minimum distance between neighbours; `None` for a single coordinate.
     pub(super) fn pitch_mm(&self) -> Option<f64> {
         self.nodes_mm.windows(2).map(|pair| pair[1] - pair[0]).reduce(f64::min)
     }
 }
 
-/// Largest accepted sum of absolute weights at a point within the nodes. On even lattices it stays below 3; a smooth
-/// surface through nodes much closer to each other than to the rest overshoots by as much.
+/// Largest accepted sum of absolute weights at a point within the nodes. On regular lattices the sum is below 3; a smooth
+/// surface through nodes that nearly coincide overshoots by the size of this sum.
 const LARGEST_AMPLIFICATION: f64 = 1e3;
 
 /// Largest accepted deviation of the computed weights at a node from 1 there and 0 elsewhere.
@@ -230,17 +230,17 @@ const LARGEST_ROUNDING: f64 = 1e-9;
 #[derive(Clone, Debug)]
 pub(super) struct Weights(Array2<f64>);
 
-/// Properties of a point that are known beforehand.
+/// Known properties of a point.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Point {
-    /// Within the nodes, and not extrapolated.
+    /// True within the nodes, where the surface is not extrapolated.
     pub(super) is_inside: bool,
-    /// The node at this place.
+    /// Node at this point.
     pub(super) node: Option<usize>,
 }
 
 impl Weights {
-    /// Takes `weights` as computed for `points`, or returns `None` if they are rounding errors or amplify too much.
+    /// Returns `weights` computed for `points`, or `None` if they are dominated by rounding errors or amplify too much.
     pub(super) fn checked(mut weights: Array2<f64>, points: impl Iterator<Item = Point>) -> Option<Self> {
         for (mut row, point) in weights.outer_iter_mut().zip(points) {
             let amplification: f64 = row.iter().map(|weight| weight.abs()).sum();
@@ -269,7 +269,7 @@ impl Weights {
 
     /// Evaluates one frame: `out = weights · node_values`.
     pub(super) fn evaluate_into(&self, node_values: &[f64], out: &mut [f64]) {
-        // Relative to one of the values, so that level nodes give an exactly level surface.
+        // Relative to one of the values, so that the surface through level nodes is exactly level.
         let level = node_values[0];
         let relative: Vec<f64> = node_values.iter().map(|value| value - level).collect();
         out.fill(level);
@@ -283,7 +283,7 @@ impl Weights {
     }
 }
 
-/// Places that are the nodes of a lattice: every x with every y, in any order.
+/// Points that are the nodes of a lattice: every x with every y, in any order.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Lattice {
     x_mm: Vec<f64>,
@@ -291,13 +291,13 @@ pub struct Lattice {
     places: Vec<usize>,
 }
 
-/// Largest difference of the coordinates along one line of the lattice, relative to the distance of the nearest neighbours.
+/// Largest difference of the coordinates along a line of the lattice, relative to the distance of the nearest neighbours.
 const SPREAD: f64 = 0.1;
 
 impl Lattice {
-    /// Finds the lattice whose nodes are these places (x, y), in millimetres. Coordinates along a line may differ by up to
-    /// a tenth of the distance of the nearest neighbours, and their mean is taken. `None` if the places are no lattice:
-    /// scattered, turned, or with gaps.
+    /// Finds the lattice whose nodes are these points (x, y), in millimetres. Coordinates along a line may differ by up to
+    /// a tenth of the distance of the nearest neighbours; their mean is used. `None` if the points do not form a lattice:
+    /// scattered, rotated, or with gaps.
     pub fn of(places_mm: &[[f64; 2]]) -> Option<Self> {
         if places_mm
             .iter()
@@ -315,7 +315,7 @@ impl Lattice {
         }
         let mut places = vec![None; places_mm.len()];
         for (place, (ix, iy)) in x.line_of.iter().zip(&y.line_of).enumerate() {
-            // As many places as nodes: a node without one leaves another with two.
+            // There are as many points as nodes: if a node has none, another has two.
             let node = &mut places[ix * y.means_mm.len() + iy];
             if node.replace(place).is_some() {
                 return None;
@@ -328,24 +328,24 @@ impl Lattice {
         })
     }
 
-    /// Coordinates of the lines along x in millimetres, ascending.
+    /// Returns the coordinates of the lines along x in millimetres, ascending.
     pub fn x_mm(&self) -> &[f64] {
         &self.x_mm
     }
 
-    /// Coordinates of the lines along y in millimetres, ascending.
+    /// Returns the coordinates of the lines along y in millimetres, ascending.
     pub fn y_mm(&self) -> &[f64] {
         &self.y_mm
     }
 
-    /// Index of the place at each node, in the order of the values of a [`SurfaceMap`](super::SurfaceMap): all y of the
-    /// first x, then those of the next.
+    /// Returns the index of the point at each node, in the order of the values of a [`SurfaceMap`](super::SurfaceMap): all y
+    /// of the first x, then those of the next.
     pub fn places(&self) -> &[usize] {
         &self.places
     }
 }
 
-/// Coordinates along one axis, gathered to lines.
+/// Coordinates along one axis, grouped into lines.
 struct Lines {
     /// Mean of each line, ascending.
     means_mm: Vec<f64>,
@@ -372,7 +372,7 @@ impl Lines {
     }
 }
 
-/// Distance of the nearest two places; 0 for fewer.
+/// Distance of the nearest two points; 0 for fewer.
 fn nearest_distance_mm(places_mm: &[[f64; 2]]) -> f64 {
     let pairs = places_mm
         .iter()
@@ -386,7 +386,7 @@ fn nearest_distance_mm(places_mm: &[[f64; 2]]) -> f64 {
 mod tests {
     use super::*;
 
-    /// 3 × 4 places in an order of their own, each moved by up to `jitter`.
+    /// 3 × 4 points in shuffled order, each moved by up to `jitter`.
     fn places(jitter: f64) -> Vec<[f64; 2]> {
         let nodes = (0..12).map(|index| (7 * index + 3) % 12);
         let moved = nodes.enumerate().map(|(number, node)| {
@@ -400,7 +400,7 @@ mod tests {
     }
 
     #[test]
-    fn a_lattice_is_found_whatever_the_order_and_within_the_tolerance() {
+    fn a_lattice_is_found_in_any_order_and_within_the_tolerance() {
         for jitter in [0.0, 0.05] {
             let places = places(jitter);
             let lattice = Lattice::of(&places).unwrap();
@@ -423,7 +423,7 @@ mod tests {
     }
 
     #[test]
-    fn other_places_are_no_lattice() {
+    fn other_points_are_not_a_lattice() {
         let whole = places(0.0);
         assert_eq!(Lattice::of(&[]), None);
         assert_eq!(Lattice::of(&whole[1..]), None, "a gap");
@@ -436,12 +436,16 @@ mod tests {
                 f64::from(node % 4) * 2.0 + f64::from(node / 4 % 2),
             ]
         });
-        assert_eq!(Lattice::of(&Vec::from_iter(offset)), None, "every other line is offset");
+        assert_eq!(
+            Lattice::of(&Vec::from_iter(offset)),
+            None,
+            "every second line is offset"
+        );
         let mut twice = whole.clone();
         twice[3] = twice[4];
-        assert_eq!(Lattice::of(&twice), None, "a node with two places");
+        assert_eq!(Lattice::of(&twice), None, "a node with two points");
         let mut none = whole;
         none[5][0] = f64::NAN;
-        assert_eq!(Lattice::of(&none), None, "a place that is not a number");
+        assert_eq!(Lattice::of(&none), None, "a NaN coordinate");
     }
 }

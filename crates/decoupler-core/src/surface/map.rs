@@ -6,8 +6,8 @@
 //!
 //! The natural cubic spline through nodes on a line, the curve of least bending energy.
 //!
-//! Between neighbours at a distance h it is `s = a z_i + b z_{i+1} + h²/6 ((a³ − a) m_i + (b³ − b) m_{i+1})` with b the
-//! part of the way from i to i + 1 and a = 1 − b. Its second derivatives m vanish at both ends and, for the slope to be
+//! Between neighbours at a distance h it is `s = a z_i + b z_{i+1} + h²/6 ((a³ − a) m_i + (b³ − b) m_{i+1})`, where b is
+//! the fraction of the way from i to i + 1 and a = 1 − b. Its second derivatives m vanish at both ends and, for the slope to be
 //! continuous, satisfy
 //!
 //! ```text
@@ -25,10 +25,10 @@ use super::{
     scattered::{self, Scattered},
 };
 
-/// Largest number of nodes for a spline; beyond it, factorisation and matrix cost more than they show.
+/// Maximum number of nodes for a spline; for more nodes, the cost of factorisation and matrix outweighs the benefit.
 const MAX_SPLINE_NODES: usize = 1000;
 
-/// Largest number of weights (grid points × nodes): about a millisecond per frame, limited by memory bandwidth.
+/// Maximum number of weights (grid points × nodes): about a millisecond per frame, limited by memory bandwidth.
 const MAX_WEIGHTS: usize = 1_100_000;
 
 /// Number of grid points per side, as far as [`MAX_WEIGHTS`] allows.
@@ -37,13 +37,13 @@ const GRID_POINTS: usize = 110;
 /// Interpolation between the nodes. Each kind reproduces constants and planes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Interpolation {
-    /// The biharmonic spline with a plane (Duchon 1977). MATLAB's `griddata(…, 'v4')`, which draws the paper's figures, has
-    /// none, so that its surfaces sag between nodes of equal height and depend on the unit of length.
+    /// The biharmonic spline with a plane (Duchon 1977). MATLAB's `griddata(…, 'v4')`, used for the paper's figures, has no
+    /// plane, so that its surfaces sag between nodes of equal height and depend on the unit of length.
     ThinPlateSpline,
     /// A natural cubic spline along a single row or column of nodes, constant across it; level for a single node.
     CubicSpline,
-    /// Bilinear between neighbours, and with the same slope beyond the outermost nodes. Used for more than a thousand
-    /// nodes, and for nodes so unevenly spaced that a spline would overshoot a thousandfold or drown in rounding.
+    /// Bilinear between neighbours, continued with the same slope beyond the outermost nodes. Used for more than a thousand
+    /// nodes, and for nodes so unevenly spaced that a spline would overshoot a thousandfold or be lost in rounding errors.
     Bilinear,
 }
 
@@ -57,7 +57,7 @@ impl fmt::Display for Interpolation {
     }
 }
 
-/// Interpolation through nodes, factored once, so that each frame is one matrix-vector product.
+/// Interpolation through nodes, factored once, so that each frame takes one matrix-vector product.
 #[derive(Clone, Debug)]
 pub struct SurfaceMap {
     grid: Grid,
@@ -71,9 +71,9 @@ pub struct SurfaceMap {
 enum Spline {
     /// Weights of every grid point.
     Surface(Weights),
-    /// Weights of the grid points along x, of nodes with one y.
+    /// Weights of the grid points along x, for nodes with one y.
     AlongX(Weights),
-    /// Weights of the grid points along y, of nodes with one x.
+    /// Weights of the grid points along y, for nodes with one x.
     AlongY(Weights),
     /// Weights of the grid points between scattered nodes.
     Scattered(Scattered),
@@ -116,9 +116,9 @@ impl SurfaceMap {
         })
     }
 
-    /// Prepares the thin-plate spline through nodes at these places (x, y), in millimetres, which need be no lattice. It has
-    /// gaps (NaN) beyond their convex hull, except for a margin of half the mean distance between neighbours, and at places that
-    /// are far from every node.
+    /// Prepares the thin-plate spline through nodes at these points (x, y), in millimetres, which need not form a lattice. It
+    /// has gaps (NaN) outside their convex hull, except for a margin of half the mean distance between neighbours, and at
+    /// points far from every node.
     ///
     /// # Errors
     /// [`SurfaceError`] if there are no nodes, or more than a thousand, a coordinate is not finite, two nodes coincide or
@@ -140,13 +140,13 @@ impl SurfaceMap {
         })
     }
 
-    /// Grid on which the surface is evaluated.
+    /// Returns the grid on which the surface is evaluated.
     pub fn grid(&self) -> &Grid {
         &self.grid
     }
 
-    /// Distance of a grid point from the nodes as a part of the margin: 0 between them, in their bounding rectangle or, of
-    /// scattered nodes, their hull; 1 where the surface ends, and where scattered nodes have none.
+    /// Returns the distance of a grid point from the nodes as a fraction of the margin: 0 within their bounding rectangle or,
+    /// for scattered nodes, their convex hull; 1 where the surface ends, and where scattered nodes have none.
     pub fn beyond(&self, ix: usize, iy: usize) -> f64 {
         match &self.spline {
             Some(Spline::Scattered(scattered)) => scattered.beyond(self.grid.index(ix, iy)),
@@ -154,7 +154,7 @@ impl SurfaceMap {
         }
     }
 
-    /// Number of nodes; of a lattice, rows × nodes per row.
+    /// Returns the number of nodes; for a lattice, rows × nodes per row.
     pub fn node_count(&self) -> usize {
         self.nodes
     }
@@ -168,18 +168,18 @@ impl SurfaceMap {
         }
     }
 
-    /// Writes the surface through `node_values` (of a lattice `rows × nodes_per_row`, row by row; in any unit) to `out`
+    /// Writes the surface through `node_values` (for a lattice `rows × nodes_per_row`, row by row; in any unit) to `out`
     /// (`x points × y points`, see [`Grid`]).
     ///
-    /// A missing value (NaN) leaves a gap around its node of a lattice, and the rest of that frame is bilinear; of scattered
-    /// nodes it leaves no surface.
+    /// On a lattice, a missing value (NaN) leaves a gap around its node, and the rest of that frame is bilinear; with
+    /// scattered nodes there is no surface.
     ///
     /// # Panics
     /// If `node_values` does not have [`Self::node_count`] entries, or `out` not [`Grid::len`].
     pub fn evaluate_into(&self, node_values: &[f64], out: &mut [f64]) {
         assert_eq!(node_values.len(), self.nodes, "one value per node");
         assert_eq!(out.len(), self.grid.len(), "one value per grid point");
-        // A missing value would spread over the whole spline.
+        // A missing value would affect the whole spline.
         let spline = self
             .spline
             .as_ref()
@@ -216,7 +216,7 @@ impl SurfaceMap {
     }
 }
 
-/// Number of grid points a side for a spline through this many nodes.
+/// Number of grid points per side for a spline through this many nodes.
 fn affordable(nodes: usize) -> usize {
     ((MAX_WEIGHTS as f64 / nodes.max(1) as f64).sqrt() as usize).min(GRID_POINTS)
 }
@@ -266,7 +266,7 @@ fn node_at(nodes_mm: &[f64], point_mm: f64) -> Option<usize> {
     nodes_mm.iter().position(|&node_mm| node_mm == point_mm)
 }
 
-/// Axis of the coordinates at fault.
+/// Axis of the invalid coordinates.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Axis {
     /// The x axis, in a lattice with one coordinate per row-wire.
@@ -295,31 +295,31 @@ pub enum SurfaceError {
         axis: Axis,
     },
     /// A coordinate is NaN, infinite, or so large that distances would overflow.
-    #[error("{axis} coordinate {index} is {value_mm:?} mm; nodes need finite places within ±1e300 mm")]
+    #[error("{axis} coordinate {index} is {value_mm:?} mm; nodes need finite coordinates within ±1e300 mm")]
     NotFinite {
-        /// Axis at fault.
+        /// Axis of the invalid coordinates.
         axis: Axis,
-        /// Index in the coordinates given.
+        /// Index in the given coordinates.
         index: usize,
         /// Value found, in millimetres.
         value_mm: f64,
     },
-    /// Two coordinates coincide, where the surface would have two heights, or are too close to draw points between.
-    #[error("{axis} coordinates {first} and {second} coincide at {value_mm:?} mm; nodes need places of their own")]
+    /// Two coordinates coincide, so that the surface would have two heights, or are too close to place points between them.
+    #[error("{axis} coordinates {first} and {second} coincide at {value_mm:?} mm; nodes need distinct positions")]
     Duplicate {
-        /// Axis at fault.
+        /// Axis of the invalid coordinates.
         axis: Axis,
-        /// Index of the first in the coordinates given.
+        /// Index of the first in the given coordinates.
         first: usize,
         /// Index of the second.
         second: usize,
-        /// Coordinate that they share, in millimetres.
+        /// Common coordinate in millimetres.
         value_mm: f64,
     },
-    /// Two scattered nodes coincide, where the surface would have two heights.
-    #[error("nodes {first} and {second} coincide; nodes need places of their own")]
+    /// Two scattered nodes coincide, so that the surface would have two heights.
+    #[error("nodes {first} and {second} coincide; nodes need distinct positions")]
     SamePlace {
-        /// Index of the first in the places given.
+        /// Index of the first in the given points.
         first: usize,
         /// Index of the second.
         second: usize,
@@ -327,22 +327,22 @@ pub enum SurfaceError {
     /// Scattered nodes are on one line.
     #[error("all nodes are on one line, oblique to x and y; a surface needs nodes on both sides of it")]
     OnOneLine,
-    /// Scattered nodes are too many for a spline.
-    #[error(
-        "{count} scattered nodes are too many; a surface is laid through at most {most}, or through a lattice of any size"
-    )]
+    /// There are too many scattered nodes for a spline.
+    #[error("{count} scattered nodes are too many; a surface can have at most {most}, or a lattice of any size")]
     TooMany {
         /// Number of nodes.
         count: usize,
-        /// Largest number.
+        /// Maximum number.
         most: usize,
     },
-    /// Scattered nodes of which some are much nearer to each other than to the rest.
-    #[error("a surface through the nodes would overshoot a thousandfold; leave out one of those that nearly coincide")]
+    /// Some scattered nodes are much closer to each other than to the rest.
+    #[error(
+        "a surface through the nodes would overshoot a thousandfold; leave out one of the nodes that nearly coincide"
+    )]
     Uneven,
 }
 
-/// Position of a grid line among two lattice lines: `(1 − weight) · lower + weight · upper`. Beyond the outermost line the
+/// Position of a grid line relative to two lattice lines: `(1 − weight) · lower + weight · upper`. Beyond the outermost line the
 /// weight is below 0 or above 1.
 #[derive(Clone, Copy, Debug)]
 struct Between {
@@ -360,7 +360,7 @@ pub(super) struct Bilinear {
 }
 
 impl Bilinear {
-    /// Takes for each axis the ascending node coordinates, their indices in the caller's order, and the grid
+    /// Creates the weights. Each axis has the ascending node coordinates, their indices in the caller's order, and the grid
     /// coordinates.
     pub(super) fn new(x: (&[f64], &[usize], &[f64]), y: (&[f64], &[usize], &[f64])) -> Self {
         Self {
@@ -422,7 +422,7 @@ pub(super) fn weights(nodes_mm: &[f64], points_mm: &[f64]) -> Array2<f64> {
     if last == 0 {
         return Array2::ones((points_mm.len(), 1));
     }
-    // In units of the extent, so that no length overflows when squared or divided by.
+    // In units of the extent, so that squares and quotients of lengths do not overflow.
     let extent_mm = nodes_mm[last] - nodes_mm[0];
     let widths: Vec<f64> = nodes_mm
         .windows(2)
@@ -438,7 +438,7 @@ pub(super) fn weights(nodes_mm: &[f64], points_mm: &[f64]) -> Array2<f64> {
         let a = 1.0 - b;
         row[lower] = a;
         row[upper] = b;
-        // Beyond an end the cubic is continued by its slope there, of which m is 0.
+        // Beyond an end the cubic is continued with its slope there, where m is 0.
         let (lower_part, upper_part) = if b < 0.0 {
             (0.0, -b)
         } else if b > 1.0 {
@@ -458,8 +458,8 @@ pub(super) fn weights(nodes_mm: &[f64], points_mm: &[f64]) -> Array2<f64> {
     weights
 }
 
-/// Returns the matrix (`nodes × nodes`) from values to second derivatives, by elimination of the tridiagonal equations:
-/// diagonally dominant, hence without pivots.
+/// Returns the matrix (`nodes × nodes`) from values to second derivatives, by elimination of the tridiagonal equations,
+/// which are diagonally dominant and need no pivoting.
 fn second_derivatives(widths: &[f64]) -> Array2<f64> {
     let last = widths.len();
     let mut right = Array2::zeros((last + 1, last + 1));

@@ -1,27 +1,27 @@
-//! The thin-plate spline through places that are no lattice: hexagonal skins, lattices with gaps, taxels put where they fit.
+//! The thin-plate spline through scattered points: hexagonal skins, lattices with gaps, irregular taxels.
 //!
-//! The surface ends where the places end, at their convex hull and a little beyond, and leaves out what is far from every
-//! place: the middle of a ring, the notch of an L.
+//! The surface ends slightly beyond the convex hull of the points and excludes regions far from every point, such as the
+//! middle of a ring or the notch of an L.
 //!
 //! The thin-plate spline (J. Duchon, "Splines minimizing rotation-invariant semi-norms in Sobolev spaces", 1977): of all
-//! surfaces through the nodes the one of least bending energy.
+//! surfaces through the nodes, the one of minimum bending energy.
 //!
-//! It is a plane and a sum of Green's functions of the biharmonic operator, one at each node,
+//! It is the sum of a plane and Green's functions of the biharmonic operator, one at each node,
 //!
 //! ```text
 //! z(p) = a + b·p + Σ_n w_n φ(|p − p_n|)        φ(r) = r² ln r,  φ(0) = 0,  Σ w_n = 0,  Σ w_n p_n = 0
 //! ```
 //!
-//! MATLAB's `griddata(…, 'v4')`, with which the paper draws its figures, is the biharmonic spline without the plane (D. T.
+//! MATLAB's `griddata(…, 'v4')`, used for the paper's figures, is the biharmonic spline without the plane (D. T.
 //! Sandwell, "Biharmonic spline interpolation of GEOS-3 and SEASAT altimeter data", Geophysical Research Letters 14(2),
-//! 1987, 139-142; φ(r) = r² (ln r − 1)). That sags between nodes of equal height, bends towards 0 beyond them, and changes
-//! with the unit of length. With the plane, constants and planes are reproduced; and since a multiple of r² in φ adds only
+//! 1987, 139-142; φ(r) = r² (ln r − 1)). It sags between nodes of equal height, bends towards 0 beyond them, and depends on the
+//! unit of length. With the plane, constants and planes are reproduced; and since a multiple of r² in φ adds only
 //! a constant under the two conditions on w, neither Sandwell's −1 nor the unit makes a difference.
 //!
 //! Only z varies from frame to frame, and it enters linearly: z(points) = W z. With P an orthonormal basis of the affine
 //! functions on the nodes and Π = I − PPᵀ, the columns of Wᵀ are `P q + Π (ΠAΠ + τPPᵀ)⁻¹ Π (φ − AP q)`, where q are the
 //! basis functions and φ the Green's functions at a point, and A_mn = φ(|p_m − p_n|). ΠAΠ is positive definite on the
-//! complement of P, hence the Cholesky factor; any τ > 0 gives the same W.
+//! complement of P, so the matrix has a Cholesky factor; any τ > 0 gives the same W.
 
 use faer::{Mat, MatRef, Scale, Side, linalg::solvers::Solve};
 use glam::DVec2;
@@ -32,25 +32,25 @@ use super::{
     map::{Axis, SurfaceError},
 };
 
-/// Places this near to one line, as a part of their extent along it, are on it.
+/// Maximum distance of collinear points from their line, relative to their extent along it.
 const THINNEST: f64 = 1e-6;
 
-/// Farthest from the nearest place that the surface goes, in units of the largest distance of a place from its neighbour.
+/// Maximum distance of the surface from the nearest point, relative to the largest nearest-neighbour distance.
 const REACH: f64 = 1.5;
 
-/// A spline at the points of a grid that are between the places.
+/// A spline evaluated at the grid points between scattered nodes.
 #[derive(Clone, Debug)]
 pub(super) struct Scattered {
     /// Indices of the grid points that have a surface.
     points: Vec<usize>,
-    /// Distance of each grid point from the hull, as a part of the margin; 1 where there is no surface.
+    /// Distance of each grid point from the hull as a fraction of the margin; 1 where there is no surface.
     beyond: Vec<f64>,
-    /// Weights at these points, and after them at the places themselves.
+    /// Weights at these points, followed by those at the nodes.
     weights: Weights,
 }
 
 impl Scattered {
-    /// Prepares the spline, with its grid of about `target` points a side.
+    /// Prepares the spline, with a grid of about `target` points per side.
     pub(super) fn new(places_mm: &[[f64; 2]], target: usize) -> Result<(Grid, Self), SurfaceError> {
         for (axis, place) in [(Axis::X, 0), (Axis::Y, 1)] {
             check_coordinates(axis, &Vec::from_iter(places_mm.iter().map(|at| at[place])))?;
@@ -85,7 +85,7 @@ impl Scattered {
             is_inside: beyond_mm == 0.0,
             node: None,
         });
-        // At the places the spline must give their values, or it is rounding.
+        // The spline must reproduce the values at the nodes; otherwise it is dominated by rounding errors.
         let at_places = (0..places.len()).map(|node| Point {
             is_inside: true,
             node: Some(node),
@@ -103,7 +103,7 @@ impl Scattered {
         Ok((grid, scattered))
     }
 
-    /// Distance of a grid point from the nodes as a part of the margin: see [`super::SurfaceMap::beyond`].
+    /// Distance of a grid point from the nodes as a fraction of the margin: see [`super::SurfaceMap::beyond`].
     pub(super) fn beyond(&self, point: usize) -> f64 {
         self.beyond[point]
     }
@@ -118,7 +118,7 @@ impl Scattered {
     }
 }
 
-/// Distance of each place from its nearest neighbour.
+/// Distance of each point from its nearest neighbour.
 fn distances_of_neighbours(places: &[DVec2]) -> Result<Vec<f64>, SurfaceError> {
     let largest_mm = places
         .iter()
@@ -138,12 +138,12 @@ fn distances_of_neighbours(places: &[DVec2]) -> Result<Vec<f64>, SurfaceError> {
     Ok(nearest_mm)
 }
 
-/// Convex hull of places, its corners anticlockwise.
+/// Convex hull of points, with its corners anticlockwise.
 struct Hull(Vec<DVec2>);
 
 impl Hull {
-    /// The hull by monotone chains (A. M. Andrew, "Another efficient algorithm for convex hulls in two dimensions", 1979);
-    /// `None` if the places are on one line.
+    /// Computes the hull by monotone chains (A. M. Andrew, "Another efficient algorithm for convex hulls in two dimensions", 1979);
+    /// `None` if the points are on one line.
     fn of(places: &[DVec2]) -> Option<Self> {
         let mut sorted = places.to_vec();
         sorted.sort_by(|one, other| one.x.total_cmp(&other.x).then(one.y.total_cmp(&other.y)));
@@ -157,7 +157,7 @@ impl Hull {
                 }
                 chain.push(place);
             }
-            // It ends where the other begins.
+            // It ends where the other chain begins.
             chain.pop();
             chain
         };
@@ -175,7 +175,7 @@ impl Hull {
         (doubled_area > THINNEST * extent_mm * extent_mm).then_some(Self(corners))
     }
 
-    /// Distance of a place from the hull; 0 within.
+    /// Distance of a point from the hull; 0 inside.
     fn distance_mm(&self, at: DVec2) -> f64 {
         let ends = self.0.iter().cycle().skip(1);
         let edges = || self.0.iter().zip(ends.clone());
@@ -191,10 +191,10 @@ impl Hull {
     }
 }
 
-/// A place in the plane.
+/// A point in the plane.
 pub(super) type Place = (f64, f64);
 
-/// Returns W (`points × nodes`) for nodes that are not on one line; `None` if the equations are singular in the arithmetic.
+/// Returns W (`points × nodes`) for nodes that are not on one line; `None` if the equations are numerically singular.
 pub(super) fn weights(nodes_mm: &[Place], points_mm: &[Place]) -> Option<Array2<f64>> {
     let local = LocalCoordinates::of(nodes_mm);
     let nodes = local.places(nodes_mm);
@@ -213,7 +213,7 @@ pub(super) fn weights(nodes_mm: &[Place], points_mm: &[Place]) -> Option<Array2<
     solution -= (&system * basis) * at_points.transpose();
     remove_affine(basis, &mut solution);
 
-    // Before the projection, which leaves only rounding of three nodes.
+    // Before the projection, which for three nodes leaves only rounding errors.
     let tau = system.norm_max();
     // Twice, once from each side: A is symmetric.
     remove_affine(basis, &mut system);
@@ -242,14 +242,14 @@ fn distance_squared(a: Place, b: Place) -> f64 {
     (a.0 - b.0).powi(2) + (a.1 - b.1).powi(2)
 }
 
-/// Subtracts from each column its part in the span of `basis`: `matrix = (I − PPᵀ) matrix`.
+/// Removes from each column its component in the span of `basis`: `matrix = (I − PPᵀ) matrix`.
 fn remove_affine(basis: MatRef<'_, f64>, matrix: &mut Mat<f64>) {
     let parts = basis.transpose() * &*matrix;
     *matrix -= basis * parts;
 }
 
-/// Coordinates from the middle of the nodes, as fractions of half their extent: neither the origin nor the unit of the
-/// places given costs digits.
+/// Coordinates relative to the centre of the nodes, as fractions of half their extent, so that no digits are lost to the
+/// origin or the unit of the given coordinates.
 struct LocalCoordinates {
     middle_mm: Place,
     half_extent_mm: f64,
@@ -278,12 +278,12 @@ impl LocalCoordinates {
     }
 }
 
-/// Affine functions that are orthonormal on the nodes: a constant, the distance from the mean of x, and that of y as far as
-/// it does not follow from the distance of x, which on a lattice is all of it.
+/// Affine functions that are orthonormal on the nodes: a constant, the deviation from the mean of x, and the deviation from
+/// the mean of y after regression on x.
 struct AffineBasis {
     constant: f64,
     mean: Place,
-    /// Change of y with x along the nodes.
+    /// Slope of the regression of y on x over the nodes.
     tilt: f64,
     scales: Place,
 }
@@ -305,7 +305,7 @@ impl AffineBasis {
         }
     }
 
-    /// Values of the three functions, `places × 3`.
+    /// Values of the three functions: `points × 3`.
     fn at(&self, places: &[Place]) -> Mat<f64> {
         Mat::from_fn(places.len(), 3, |p, function| {
             let (x, y) = (places[p].0 - self.mean.0, places[p].1 - self.mean.1);

@@ -305,6 +305,6 @@ fn impossible_places_are_refused() {
     ));
     assert_eq!(
         refused(&[0.0], &[f64::INFINITY]).to_string(),
-        "y coordinate 0 is inf mm; nodes need finite places within ±1e300 mm"
+        "y coordinate 0 is inf mm; nodes need finite coordinates within ±1e300 mm"
     );
 }

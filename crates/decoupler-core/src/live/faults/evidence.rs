@@ -5,7 +5,7 @@ use super::{
     row_fit::{FitPrior, RowFit, RowFitReport, RowReadings},
 };
 
-/// A hypothesis on the fault behind some frames, and how well it explains them.
+/// A hypothesis about the fault in some frames, with its evidence.
 #[derive(Clone, Copy, Debug)]
 struct Hypothesis {
     wire: FaultyWire,
@@ -14,30 +14,30 @@ struct Hypothesis {
     score: f64,
     /// χ² of all readings.
     chi_squared: f64,
-    /// Number of readings in it.
+    /// Number of readings in χ².
     readings: usize,
-    /// Number of fits of rows in it, each with its prior.
+    /// Number of row fits in χ², each with its prior.
     rows: usize,
 }
 
 /// The most probable fault.
 pub(super) struct Explained {
     pub(super) diagnosis: Diagnosis,
-    /// χ² of the readings that it does not leave open.
+    /// χ² of the readings that the fault predicts.
     pub(super) chi_squared: f64,
     /// Number of these readings.
     pub(super) readings: usize,
-    /// Number of fits of rows, each with its prior.
+    /// Number of row fits, each with its prior.
     pub(super) rows: usize,
 }
 
-/// Compares the faults that a single wire can have by their evidence in the same frames.
+/// Compares all single-wire faults by their evidence in the same frames.
 ///
-/// A fault of a row-wire leaves the other rows as they are. A fault of a column-wire is judged by what the other columns
-/// predict: R̂ of the fit without it, with the variance τ² of that prediction. A reading under an unknown cause has any
-/// value within [`WIDTH`] with equal density.
+/// A fault of a row-wire does not affect the other rows. A fault of a column-wire is judged by the prediction from the
+/// other columns: R̂ of the fit without it, with its variance τ². For an unknown cause, readings are distributed uniformly
+/// within [`WIDTH`].
 pub(super) struct Evidence<'a> {
-    /// Fit of one row-wire, and of two that touch.
+    /// Fit of one row-wire, and of two touching row-wires.
     pub(super) one: &'a mut RowFit,
     pub(super) two: &'a mut RowFit,
     pub(super) prior: &'a FitPrior,
@@ -46,18 +46,18 @@ pub(super) struct Evidence<'a> {
     pub(super) columns: usize,
     pub(super) nodes_per_row: usize,
     pub(super) nodes_per_column: usize,
-    /// Frames in ohm, each rows × M4, one after the other.
+    /// Frames in ohm: frames × rows × M4.
     pub(super) frames_ohm: &'a [f64],
 }
 
-/// Range of the logarithm of a reading, or of a gain, that is not known: from a seventh to sevenfold.
+/// Range of the logarithm of an unknown reading or gain: from a seventh to sevenfold.
 const WIDTH: f64 = 4.0;
-/// Column-wires that are examined on all lines.
+/// Maximum number of column-wires examined on all lines.
 const MAX_COLUMNS: usize = 8;
-/// Lines by which they are chosen.
+/// Number of lines used to choose them.
 const WORST_LINES: usize = 4;
 
-/// Prediction of one reading without its column.
+/// Prediction of a reading from a fit without its column.
 #[derive(Clone, Copy)]
 struct Predicted {
     /// ln m − ln R̂.
@@ -135,7 +135,7 @@ impl Evidence<'_> {
         })
     }
 
-    /// Faults of row-wires.
+    /// Adds the faults of row-wires.
     fn add_rows(&mut self, normal: &[RowFitReport], hypotheses: &mut Vec<Hypothesis>) {
         let total = sum(normal);
         for index in 0..self.rows.len() {
@@ -201,7 +201,7 @@ impl Evidence<'_> {
         }
     }
 
-    /// Two rows that touch: their readings differ by noise only, and their geometric means are those of both rows.
+    /// Fit of two touching rows: their readings differ only by noise, and their geometric means are those of both rows.
     fn fit_shorted_rows(&mut self, line: usize, next: usize) -> RowFitReport {
         let (row, next_row) = (self.row(line), self.row(next));
         let (mut score, mut chi_squared) = (0.0, 0.0);
@@ -227,7 +227,7 @@ impl Evidence<'_> {
         }
     }
 
-    /// The column-wires without which Eq. (2) explains the worst lines of the last frame best, in ascending order.
+    /// Column-wires whose removal most improves the fit of the worst lines of the last frame, in ascending order.
     fn suspects(&mut self, normal: &[RowFitReport]) -> Vec<usize> {
         let mut lines: Vec<usize> = (self.lines() - self.rows.len()..self.lines()).collect();
         lines.sort_by(|&a, &b| normal[b].chi_squared.total_cmp(&normal[a].chi_squared));
@@ -241,7 +241,7 @@ impl Evidence<'_> {
         }
         order.sort_by(|a, b| a.0.total_cmp(&b.0));
         let mut suspects: Vec<usize> = order.iter().take(MAX_COLUMNS).map(|(_, column)| *column).collect();
-        // Two columns that touch hide behind each other: leaving one out does not help.
+        // Two touching columns mask each other: leaving out one does not improve the fit.
         if let Some(&(_, best)) = order.first() {
             suspects.extend([best.saturating_sub(1), (best + 1).min(self.columns - 1)]);
         }
@@ -251,13 +251,13 @@ impl Evidence<'_> {
     }
 }
 
-/// Fits of all lines without one or two columns, and what they predict of those.
+/// Predictions of one or two columns from fits of all lines without them.
 struct ColumnLeftOut {
     rest: RowFitReport,
-    /// The first column left out, unbroken and then broken before each node from 1 on; each for every line. `None` where the
-    /// reading is certain, beyond the range of the converter.
+    /// Predictions for the first column left out, intact and then broken before each node from 1 on, for every line. `None`
+    /// if the reading is beyond the range of the converter, hence certain.
     predicted: Vec<Vec<Option<Predicted>>>,
-    /// Mean conductance of both columns as ln R̂, with its variance without noise, for every line.
+    /// Mean conductance of both columns as ln R̂, with its variance excluding noise, for every line.
     shared: Vec<(f64, f64)>,
     /// Variance of the noise of the first column, for every line.
     noise: Vec<f64>,
@@ -315,8 +315,8 @@ impl Evidence<'_> {
         found
     }
 
-    /// Score, χ² and number of the logarithms of readings that do not depend on the deformation: all at the end of the converter's
-    /// range, which is certain without any current, or at another level.
+    /// Score, χ² and number of the logarithms of readings that do not depend on the deformation: all at the end of the
+    /// converter's range, which is certain without any current, or at another level.
     fn no_signal(&self, readings: impl Iterator<Item = Predicted> + Clone) -> (f64, f64, usize) {
         let full_scale = self.one.log_full_scale();
         if readings.clone().all(|reading| reading.misfit < full_scale) {
@@ -331,7 +331,7 @@ impl Evidence<'_> {
         (chi_squared + noise, chi_squared, below.count())
     }
 
-    /// Faults of one column-wire.
+    /// Adds the faults of one column-wire.
     fn add_column(&self, column: usize, left_out: &ColumnLeftOut, hypotheses: &mut Vec<Hypothesis>) {
         let mut add = |cause, score: f64, chi_squared: f64, count: usize| {
             hypotheses.push(Hypothesis {
@@ -368,7 +368,7 @@ impl Evidence<'_> {
 }
 
 impl ColumnLeftOut {
-    /// Two columns that touch: their readings differ by noise only, and have the mean conductance of both.
+    /// Hypothesis that two columns touch: their readings differ only by noise, and have the mean conductance of both.
     fn shorted(&self, column: usize, one: Vec<f64>, other: Vec<f64>) -> Hypothesis {
         let mut chi_squared = self.rest.chi_squared;
         let mut score = self.rest.score;
@@ -392,7 +392,7 @@ impl ColumnLeftOut {
     }
 }
 
-/// Values that have an unknown mean in common, somewhere within [`WIDTH`].
+/// Values with a common unknown mean, uniform within [`WIDTH`].
 struct Level {
     mean: f64,
     score: f64,

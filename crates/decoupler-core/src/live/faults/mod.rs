@@ -1,4 +1,4 @@
-//! Faults of wires and electronics, named from what Eq. (2) leaves unexplained.
+//! Diagnosis of faults of wires and electronics from the residual of Eq. (2).
 
 mod evidence;
 mod monitor;

@@ -11,20 +11,19 @@ use crate::{
     sensor::{ArrayScale, SensorError, SensorModel},
 };
 
-/// Watches whether Eq. (2) explains the frames, and names the wire at fault if it does not.
+/// Checks whether Eq. (2) explains the frames, and identifies the faulty wire if it does not.
 ///
-/// A frame is suspicious if no deformation explains its readings: if the smallest χ² of all rows, by weak priors, exceeds
-/// the value that a normal frame exceeds with a probability of at most 10⁻³. At the true deformation χ² of the readings is
-/// that of their noise, with as many degrees of freedom as readings, and the smallest is never more. When
-/// [`FaultMonitor::PERSISTENCE`] frames in a row are suspicious, the faults that a single wire can have are compared by
-/// their evidence. One is named if its probability is at least [`FaultMonitor::SURE`] and it explains these frames by the
-/// same measure.
+/// A frame is suspicious if no deformation explains its readings: if the minimum χ² of all rows under weak priors exceeds
+/// a limit that a normal frame exceeds with a probability of at most 10⁻³. At the true deformation, χ² is that of the noise,
+/// with as many degrees of freedom as readings, and the minimum is never larger. When [`FaultMonitor::PERSISTENCE`]
+/// consecutive frames are suspicious, all single-wire faults are compared by their evidence. The most probable fault is
+/// reported if its probability is at least [`FaultMonitor::SURE`] and it explains these frames by the same measure.
 ///
-/// Two wires that touch may have readings that some deformation explains. They are also named where their readings stay
-/// equal while the array is pressed in different ways, which is improbable in the scene of wires that do not touch. They
-/// stay named until their readings differ in [`FaultMonitor::PERSISTENCE`] frames in a row.
+/// The readings of two touching wires may also be explained by some deformation. A short is therefore also reported if the
+/// readings of two wires remain equal while the array is pressed in different ways, which is improbable for wires that do
+/// not touch. It is reported until the readings differ in [`FaultMonitor::PERSISTENCE`] consecutive frames.
 ///
-/// Checking a normal frame allocates nothing.
+/// Checking a normal frame does not allocate.
 #[derive(Clone, Debug)]
 pub struct FaultMonitor {
     one: RowFit,
@@ -38,13 +37,13 @@ pub struct FaultMonitor {
     /// χ² of the prior of a row-wire at the worst deformation within the ranges.
     of_priors: f64,
     state: State,
-    /// Suspicious frames in a row, each rows × M4.
+    /// Consecutive suspicious frames, each rows × M4.
     suspicious_ohm: Vec<f64>,
-    /// Number of suspicious frames in a row, stored or not.
+    /// Number of consecutive suspicious frames, stored or not.
     suspicious: usize,
     /// Number of suspicious frames at which faults are compared again.
     next_comparison: usize,
-    /// Number of frames in a row without any fault.
+    /// Number of consecutive frames without a fault.
     normal: usize,
 }
 
@@ -55,12 +54,12 @@ enum State {
     Unexplained,
 }
 
-/// Events of a frame.
+/// Event of a frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum FaultEvent {
-    /// A fault is named: its wires should be left out.
+    /// A fault was identified: its wires should be left out.
     Named(Diagnosis),
-    /// The readings contradict Eq. (2), and no fault of a single wire explains them.
+    /// The readings contradict Eq. (2), and no single-wire fault explains them.
     Unexplained,
     /// The readings agree with Eq. (2) again.
     Recovered,
@@ -68,27 +67,27 @@ pub enum FaultEvent {
 
 /// Normal deviate that is exceeded with a probability of 10⁻³.
 const DEVIATE: f64 = 3.090_232_306_167_814;
-/// Largest arrays that are checked: unknowns of a row, and column-wires.
+/// Largest array that is checked: unknowns of a row, and column-wires.
 const MAX_UNKNOWNS: usize = 64;
 const MAX_COLUMNS: usize = 128;
-/// Largest factor of [`FaultMonitor::PERSISTENCE`] between comparisons of frames that nothing explains.
+/// Largest interval between comparisons of unexplained frames, in units of [`FaultMonitor::PERSISTENCE`].
 const LONGEST_WAIT: usize = 1024;
 
 impl FaultMonitor {
-    /// Frames in a row that must be suspicious for a fault to be named, or normal for it to be forgotten.
+    /// Number of consecutive frames that must be suspicious for a fault to be reported, or normal for it to be cleared.
     pub const PERSISTENCE: usize = 4;
-    /// Smallest probability at which a fault is named.
+    /// Minimum probability at which a fault is reported.
     pub const SURE: f64 = 0.99;
 
-    /// Returns `true` unless the array is so large that checking would take too long for every frame.
+    /// Returns `true` unless the array is too large to check every frame.
     pub fn is_affordable(scale: ArrayScale, scene: &Scene) -> bool {
         scene.unknowns_per_row(scale) <= MAX_UNKNOWNS && scale.columns() <= MAX_COLUMNS
     }
 
-    /// Prepares to check frames of `rows`, with the noise of `scene`, which must have some.
+    /// Prepares to check frames of `rows` with the noise of `scene`, which must not be zero.
     ///
     /// # Errors
-    /// A sensor without resistances.
+    /// If the model has no resistance.
     pub fn new(model: &SensorModel, scene: &Scene, rows: &[usize]) -> Result<Self, SensorError> {
         let (one, scale) = (RowFit::new(model, scene, 1)?, model.scale);
         Ok(Self {
@@ -116,7 +115,7 @@ impl FaultMonitor {
         })
     }
 
-    /// Returns the fault that is named at present.
+    /// Returns the fault currently reported.
     pub fn named(&self) -> Option<Diagnosis> {
         match self.state {
             State::Named(diagnosis) => Some(diagnosis),
@@ -124,19 +123,19 @@ impl FaultMonitor {
         }
     }
 
-    /// Checks a frame of the row-wires read: rows × M4 readings in ohm, all finite and above 0.
+    /// Checks a frame of the row-wires read: rows × M4 readings in ohm, which must be finite and above 0.
     ///
     /// # Panics
-    /// If the frame has another length.
+    /// If the frame has the wrong length.
     pub fn check(&mut self, frame_ohm: &[f64]) -> Option<FaultEvent> {
         self.check_zeroed(frame_ohm, frame_ohm)
     }
 
-    /// Checks a frame that was divided by the gains of the unloaded state, which came as `raw_ohm`. These gains may hide
-    /// that two row-wires touch, if they did when the unloaded state was taken.
+    /// Checks a frame divided by the gains of the unloaded state; `raw_ohm` is the frame before the division. The gains may
+    /// hide a short of two row-wires that was present when they were estimated.
     ///
     /// # Panics
-    /// If a frame has another length.
+    /// If a frame has the wrong length.
     pub fn check_zeroed(&mut self, raw_ohm: &[f64], frame_ohm: &[f64]) -> Option<FaultEvent> {
         assert_eq!(frame_ohm.len(), self.rows.len() * self.columns);
         assert_eq!(raw_ohm.len(), frame_ohm.len());
@@ -156,7 +155,7 @@ impl FaultMonitor {
         }
         if is_explained {
             self.suspicious = 0;
-            // Eq. (2) may explain rows that touch, but seldom columns.
+            // Eq. (2) may explain touching rows, but seldom touching columns.
             let is_shorted = |named: Diagnosis| {
                 matches!(named.wire, FaultyWire::Rows(_))
                     && named.cause == FaultCause::Shorted
@@ -205,7 +204,7 @@ impl FaultMonitor {
         (!is_known).then_some(event)
     }
 
-    /// Returns `true` if some deformation explains the readings without those of `left_out`.
+    /// Returns `true` if some deformation explains the readings, excluding those of `left_out`.
     fn is_explained(&mut self, frame_ohm: &[f64], left_out: Option<FaultyWire>) -> bool {
         let (mut chi_squared, mut readings, mut rows) = (0.0, 0, 0);
         for (&row, readings_ohm) in self.rows.iter().zip(frame_ohm.chunks_exact(self.columns)) {
@@ -225,12 +224,12 @@ impl FaultMonitor {
         chi_squared <= self.limit(readings, rows)
     }
 
-    /// Largest χ² of a normal fit of this many readings and rows.
+    /// Limit of χ² for a normal fit of this many readings and rows.
     fn limit(&self, readings: usize, rows: usize) -> f64 {
         quantile(readings, DEVIATE) + self.of_priors * rows as f64
     }
 
-    /// The fault behind the last suspicious frames, if a single one explains them.
+    /// The fault that explains the last suspicious frames, if there is one.
     fn compare(&mut self) -> Option<Diagnosis> {
         let evidence = Evidence {
             one: &mut self.one,
@@ -263,7 +262,7 @@ pub(super) fn quantile(degrees_of_freedom: usize, deviate: f64) -> f64 {
     d * (1.0 - spread + deviate * spread.sqrt()).powi(3)
 }
 
-/// Wires at fault, counted from 0.
+/// Faulty wires, counted from 0.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum FaultyWire {
     /// A row-wire.
@@ -276,7 +275,7 @@ pub enum FaultyWire {
     Columns(usize),
 }
 
-/// Cause of a fault, as far as the readings determine.
+/// Cause of a fault, as far as the readings determine it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum FaultCause {
     /// The readings do not depend on the deformation: the wire is broken at its connector or grounded, or a converter is
@@ -298,19 +297,19 @@ pub enum FaultCause {
     Unknown,
 }
 
-/// Fault named from the readings.
+/// Fault identified from the readings.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Diagnosis {
-    /// Wires at fault.
+    /// Faulty wires.
     pub wire: FaultyWire,
     /// Most probable cause.
     pub cause: FaultCause,
-    /// Probability of these wires, all causes taken together, if exactly one fault explains the readings.
+    /// Probability of these wires, summed over all causes, given that exactly one fault explains the readings.
     pub probability: f64,
 }
 
 impl FaultyWire {
-    /// Returns `true` if the readings of this row-wire are affected and no others.
+    /// Returns `true` if only the readings of this row-wire are affected.
     pub fn is_row(self, row: usize) -> bool {
         match self {
             Self::Row(faulty) => faulty == row,
@@ -319,7 +318,7 @@ impl FaultyWire {
         }
     }
 
-    /// Column-wires at fault.
+    /// Returns the faulty column-wires.
     pub fn columns(self) -> [Option<usize>; 2] {
         match self {
             Self::Row(_) | Self::Rows(_) => [None; 2],
@@ -351,9 +350,13 @@ impl fmt::Display for Diagnosis {
                 write!(f, "no signal, as if broken at its connector or its converter stuck")
             }
             (FaultCause::Broken { before_node }, _) => write!(f, "broken before node {}", before_node + 1),
-            (FaultCause::Shorted, _) => write!(f, "they touch each other"),
+            (FaultCause::Shorted, _) => write!(f, "the wires touch"),
             (FaultCause::Gain { relative }, _) => {
-                write!(f, "its amplifier's gain is off, readings by {:+.2} %", 100.0 * relative)
+                write!(
+                    f,
+                    "gain error of its amplifier, readings off by {:+.2} %",
+                    100.0 * relative
+                )
             }
             (FaultCause::Unknown, _) => write!(f, "its readings contradict all others"),
         }?;
@@ -368,9 +371,9 @@ mod tests {
     use super::*;
     use crate::scene::Noise;
 
-    /// Without one of two row-wires, three readings are left, and one row's prior.
+    /// Without one of two row-wires, three readings and the prior of one row remain.
     #[test]
-    fn wires_left_out_have_no_degrees_of_freedom() {
+    fn left_out_wires_do_not_count_as_degrees_of_freedom() {
         let model = SensorModel::new("2x1_1x3".parse().unwrap());
         let scene = Scene {
             noise: Noise::relative(1e-3),
@@ -398,7 +401,7 @@ mod tests {
 
     /// Critical values of the NIST/SEMATECH e-Handbook of Statistical Methods, 1.3.6.7.4.
     #[test]
-    fn quantiles_are_those_of_tables() {
+    fn quantiles_match_published_tables() {
         for (degrees_of_freedom, expected) in [(30, 59.703), (100, 149.449)] {
             let found = quantile(degrees_of_freedom, DEVIATE);
             assert!((found / expected - 1.0).abs() < 3e-3, "{degrees_of_freedom}: {found}");

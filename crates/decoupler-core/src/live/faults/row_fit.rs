@@ -9,41 +9,41 @@ use crate::{
     sensor::{RowConductance, SensorError, SensorModel},
 };
 
-/// The most probable deformation of a row-wire, or of two that touch, given its readings, and the evidence for them.
+/// Most probable deformation of a row-wire, or of two touching row-wires, given their readings, and its evidence.
 ///
-/// With y_k = ln m_k − ln R_k(u) the misfit of reading m_k, noise of standard deviation σ relative to the reading, and a
-/// Gaussian prior with mean μ and precision P, it minimises
+/// With the misfit y_k = ln m_k − ln R_k(u) of reading m_k, relative noise of standard deviation σ_k, and a Gaussian prior
+/// with mean μ and precision P, it minimises
 ///
 /// `χ²(u) = Σ_k y_k²/σ_k² + (u − μ)ᵀ P (u − μ)`
 ///
-/// by the Gauss-Newton method. The evidence, the probability of the readings whatever the deformation, follows from
+/// by the Gauss-Newton method. The evidence, the marginal probability of the readings, follows from
 /// Laplace's approximation (MacKay, "Bayesian interpolation", Neural Computation 4, 1992):
 ///
 /// `−2 ln p(m) = χ²(û) + ln det H − ln det P + Σ_k ln 2πσ_k²,   H = P + Σ_k ∇y_k ∇y_kᵀ/σ_k²`.
 ///
-/// A gain error that the readings of a snapshot share is one more unknown. Nothing allocates after [`Self::new`].
+/// The common gain error of a snapshot is an additional unknown. Nothing allocates after [`Self::new`].
 #[derive(Clone, Debug)]
 pub(in crate::live) struct RowFit {
     pub(super) model: SensorModel,
     pub(super) axes: &'static [usize],
     conductance: RowConductance,
     ranges: Vec<Range>,
-    /// Standard deviation of each reading relative to it: rows of the array × M4.
+    /// Relative standard deviation of each reading: rows of the array × M4.
     deviations: Vec<f64>,
     /// Standard deviation of the gain error of a row; 0 for none.
     pub(super) common: f64,
-    /// Reading from which on the converter clips.
+    /// Reading above which the converter clips.
     pub(super) full_scale_ohm: f64,
-    /// Unknowns: of each row, then the common gain error.
+    /// Unknowns of each row, then the common gain error.
     pub(super) unknowns: Vec<f64>,
     pub(super) displacements_mm: Vec<DVec3>,
     /// ln R of every column.
     pub(super) log_ohm: Vec<f64>,
     /// −∂ ln R/∂u: unknowns × M4.
     pub(super) slopes: Vec<f64>,
-    /// y/σ, 0 for readings that are left out.
+    /// y/σ; 0 for readings that are left out.
     misfits: Vec<f64>,
-    /// 1/σ², 0 for readings that are left out.
+    /// 1/σ²; 0 for readings that are left out.
     weights: Vec<f64>,
     /// One row of slopes times weights.
     weighted: Vec<f64>,
@@ -53,16 +53,17 @@ pub(in crate::live) struct RowFit {
     trial: Vec<f64>,
 }
 
-/// Readings of one row-wire, or the geometric means of those of two that touch, and how they are understood.
+/// Readings of one row-wire, or the geometric means of the readings of two touching row-wires, with what is known of
+/// them.
 #[derive(Clone, Copy)]
 pub(in crate::live) struct RowReadings<'a> {
-    /// Row-wires with their priors: one, or two that touch.
+    /// Row-wires with their priors: one, or two touching row-wires.
     pub(in crate::live) rows: &'a [(usize, &'a FitPrior)],
     /// Readings in ohm: M4.
     pub(in crate::live) readings_ohm: &'a [f64],
     /// Column-wires that are left out.
     pub(in crate::live) left_out: [Option<usize>; 2],
-    /// Nodes of the row-wire before its break; M2 if it has none.
+    /// Number of nodes of the row-wire before its break; M2 if it is intact.
     pub(in crate::live) nodes: usize,
 }
 
@@ -77,15 +78,15 @@ pub(in crate::live) struct RowFitReport {
     pub(super) readings: usize,
 }
 
-/// Noise below which none is assumed: the model is no better.
+/// Minimum noise assumed: the accuracy of the model.
 const SMALLEST_NOISE: f64 = 1e-6;
-/// Decrease of χ² that is not worth a step.
+/// Decrease of χ² below which iteration stops.
 const TOLERANCE: f64 = 1e-2;
 const MAX_STEPS: usize = 12;
 const MAX_HALVINGS: usize = 6;
 
 impl RowFit {
-    /// Room for fits of `rows` row-wires together, 1 or 2.
+    /// Prepares for joint fits of `rows` row-wires, 1 or 2.
     pub(in crate::live) fn new(model: &SensorModel, scene: &Scene, rows: usize) -> Result<Self, SensorError> {
         let scale = model.scale;
         let noise = scene.noise.in_test();
@@ -108,8 +109,8 @@ impl RowFit {
             conductance: RowConductance::new(model, scene.movement.axes()),
             ranges,
             deviations,
-            // The rows of a snapshot, which are fitted one by one, share it: together they must not be charged for it more
-            // than once.
+            // The rows of a snapshot are fitted one by one but share this error: it must not be penalised more than once
+            // in total.
             common: noise.drift * (scale.rows() as f64).sqrt(),
             full_scale_ohm: noise.range_ohm(model)?.1 * (1.0 - 1e-9),
             unknowns: vec![0.0; unknowns],
@@ -126,7 +127,7 @@ impl RowFit {
         })
     }
 
-    /// Standard deviation of a reading relative to it.
+    /// Relative standard deviation of a reading.
     pub(super) fn deviation(&self, row: usize, column: usize) -> f64 {
         self.deviations[row * self.model.scale.columns() + column]
     }
@@ -146,7 +147,7 @@ impl RowFit {
         for _ in 0..MAX_STEPS {
             self.find_step(view);
             let decrease: f64 = self.step.iter().map(|entry| entry * entry).sum();
-            // ½ gᵀH⁻¹g is the decrease of χ²/2 that the linearised equations promise.
+            // ½ gᵀH⁻¹g is the decrease of χ²/2 predicted by the linearised equations.
             if decrease < TOLERANCE {
                 break;
             }
@@ -173,17 +174,17 @@ impl RowFit {
         }
     }
 
-    /// Takes the mean of a prior for the answer, where no reading determines anything.
+    /// Sets the solution to the mean of a prior, for rows without usable readings.
     pub(in crate::live) fn set_to(&mut self, prior: &FitPrior) {
         self.unknowns[..prior.mean_mm.len()].copy_from_slice(&prior.mean_mm);
     }
 
-    /// Evaluates misfits and slopes at the unknowns; returns χ².
+    /// Evaluates misfits and slopes at the current unknowns; returns χ².
     fn evaluate(&mut self, view: RowReadings<'_>) -> f64 {
         let (n, columns) = (self.ranges.len(), self.model.scale.columns());
         self.slopes.fill(0.0);
         self.log_ohm.fill(0.0);
-        // First sums s and their slopes, of all rows, then logarithms of the resistances g/s̄ with s̄ the mean.
+        // First the sums s of all rows and their slopes, then the logarithms of the resistances g/s̄, where s̄ is the mean.
         for (place, &(row, _)) in view.rows.iter().enumerate() {
             let unknowns = &self.unknowns[place * n..(place + 1) * n];
             for (displacement, values) in self
@@ -258,7 +259,7 @@ impl RowFit {
         }
     }
 
-    /// Linearises where the misfits were evaluated: factors H, and sets the step to L⁻¹ of the gradient of −χ²/2.
+    /// Linearises at the current unknowns: factors H, and sets the step to L⁻¹ times the gradient of −χ²/2.
     fn find_step(&mut self, view: RowReadings<'_>) {
         let (n, columns, order) = (self.ranges.len(), self.model.scale.columns(), self.unknowns.len());
         for i in 0..order {
@@ -270,7 +271,7 @@ impl RowFit {
                 let others = &self.slopes[j * columns..(j + 1) * columns];
                 self.hessian[i * order + j] = self.weighted.iter().zip(others).map(|(a, b)| a * b).sum();
             }
-            // y = ln m − ln R has the slope of −ln R, which is what `slopes` has.
+            // y = ln m − ln R has the slope of −ln R, as stored in `slopes`.
             let pairs = slopes.iter().zip(self.misfits.iter().zip(&self.weights));
             self.step[i] = -pairs
                 .map(|(slope, (misfit, weight))| slope * misfit * weight.sqrt())
@@ -300,8 +301,8 @@ impl RowFit {
         }
     }
 
-    /// Takes the step, halved until χ² falls below `chi_squared`, which is returned; `None` leaves the unknowns where they
-    /// were. No node leaves the ranges by more than their width, nor comes near a column-wire.
+    /// Takes the step, halved until χ² is below `chi_squared`, and returns the new χ²; `None` leaves the unknowns unchanged.
+    /// No node leaves its range by more than the width of the range, or comes close to a column-wire.
     fn take_step(&mut self, view: RowReadings<'_>, chi_squared: f64) -> Option<f64> {
         let (n, moving) = (self.ranges.len(), view.rows.len() * self.ranges.len());
         self.trial.copy_from_slice(&self.unknowns);
@@ -333,7 +334,8 @@ impl RowFit {
         None
     }
 
-    /// Coordinates in mm (3·M2) of the nodes of a row-wire, the `place`-th of the view, within the ranges of the scene.
+    /// Writes the coordinates in mm (3·M2) of the nodes of a row-wire, the `place`-th of the fit, clamped to the ranges of
+    /// the scene.
     pub(in crate::live) fn coordinates(&self, row: usize, place: usize, coordinates_mm: &mut [f64]) {
         let n = self.ranges.len();
         let unknowns = self.unknowns[place * n..(place + 1) * n].chunks_exact(self.axes.len());
@@ -349,8 +351,8 @@ impl RowFit {
     }
 }
 
-/// Cholesky factor L Lᵀ of a small symmetric positive definite matrix, kept between uses so that none allocates. Up
-/// to order 16, that of usual row-wires, it is faster than the factorisation of faer, which is made for large ones.
+/// Cholesky factor L Lᵀ of a small symmetric positive definite matrix, with storage that is reused. Up to order 16, typical
+/// of row-wires, it is faster than the factorisation of faer, which is optimised for large matrices.
 #[derive(Clone, Debug)]
 pub(super) struct Cholesky {
     order: usize,
@@ -366,8 +368,7 @@ impl Cholesky {
         }
     }
 
-    /// Factors `matrix` (order × order), of which the lower triangle is read. Returns `false` if it is not positive
-    /// definite.
+    /// Factors `matrix` (order × order), reading only its lower triangle. Returns `false` if it is not positive definite.
     pub(super) fn factor(&mut self, matrix: &[f64]) -> bool {
         let n = self.order;
         for i in 0..n {
@@ -388,7 +389,7 @@ impl Cholesky {
         true
     }
 
-    /// ln det of the matrix.
+    /// Logarithm of the determinant of the matrix.
     pub(super) fn log_determinant(&self) -> f64 {
         let diagonal = (0..self.order).map(|i| self.lower[i * self.order + i].ln());
         2.0 * diagonal.sum::<f64>()
@@ -413,32 +414,32 @@ impl Cholesky {
     }
 }
 
-/// Predictions of readings that were left out of a fit.
+/// Predictions of readings left out of a fit.
 impl RowFit {
-    /// Logarithm of the reading from which on the converter clips.
+    /// Logarithm of the reading above which the converter clips.
     pub(super) fn log_full_scale(&self) -> f64 {
         self.full_scale_ohm.ln()
     }
 
-    /// Returns `true` for a reading at the end of the converter's range of a resistance that is beyond it.
+    /// Returns `true` if the reading is at the end of the converter's range and the resistance beyond it.
     pub(super) fn is_clipped(&self, log_reading: f64, log_ohm: f64) -> bool {
         log_reading >= self.log_full_scale() && log_ohm >= self.log_full_scale()
     }
 
-    /// Variance of ln R in a direction of the unknowns, given by its slopes; they are overwritten.
+    /// Variance of ln R with these slopes by the unknowns; `slopes` is overwritten.
     pub(super) fn variance(&self, slopes: &mut [f64]) -> f64 {
         self.cholesky.solve_lower(slopes);
         slopes.iter().map(|entry| entry * entry).sum()
     }
 
-    /// Slopes of −ln R of a column by all unknowns, into `slopes`.
+    /// Writes the slopes of −ln R of a column by all unknowns to `slopes`.
     pub(super) fn slopes_of(&self, column: usize, slopes: &mut [f64]) {
         let of_column = self.slopes.iter().skip(column).step_by(self.model.scale.columns());
         slopes.iter_mut().zip(of_column).for_each(|(to, slope)| *to = *slope);
     }
 
-    /// ln R of a column that is broken before node `electrodes`, with its slopes as in [`Self::slopes_of`], after a fit of
-    /// one row-wire.
+    /// Returns ln R of a column that is broken before node `electrodes`, and writes its slopes as [`Self::slopes_of`] does,
+    /// after a fit of one row-wire.
     pub(super) fn broken_column(
         &mut self,
         (row, column, electrodes): (usize, usize, usize),
@@ -461,23 +462,23 @@ impl RowFit {
     }
 }
 
-/// Gaussian prior of the unknowns of one row-wire (node by node, each node's axes together) with what a fit and its
-/// evidence need of it.
+/// Gaussian prior of the unknowns of one row-wire (node by node, each node's axes together), prepared for fits and their
+/// evidence.
 #[derive(Clone, Debug)]
 pub(in crate::live) struct FitPrior {
     pub(super) mean_mm: Vec<f64>,
     /// Inverse of the covariance in 1/mm²: unknowns × unknowns.
     pub(super) precision: Vec<f64>,
-    /// ln det of the precision.
+    /// Logarithm of the determinant of the precision.
     pub(super) log_determinant: f64,
 }
 
-/// A standard deviation, in proportion to the range, below which no pattern is taken as known beforehand.
+/// Minimum prior standard deviation of a pattern, relative to the range.
 const SMALLEST_SPREAD: f64 = 1e-2;
 
 impl FitPrior {
-    /// About the middle of every range with the range's width as standard deviation, for one row-wire of any scene with
-    /// the ranges of `scene`: it only keeps what the readings do not determine from growing without bound.
+    /// Weak prior of a row-wire, centred in every range of `scene`, with the width of the range as standard deviation: it
+    /// only bounds unknowns that the readings do not determine.
     pub(super) fn weak(model: &SensorModel, scene: &Scene) -> Self {
         let ranges = ranges(model, scene);
         Self::of(&GaussianPrior::independent(&ranges, 1.0), &ranges)
@@ -527,11 +528,11 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_factored_matrix_gives_back_its_solution_and_determinant() {
+    fn a_factored_matrix_returns_its_solution_and_determinant() {
         let matrix = [4.0, 0.0, 0.0, 2.0, 5.0, 0.0, -1.0, 1.5, 3.0];
         let mut cholesky = Cholesky::new(3);
         assert!(cholesky.factor(&matrix));
-        // A x for x = (1, −2, 3), with the upper triangle that mirrors the lower one.
+        // A x for x = (1, −2, 3), where A is symmetric with this lower triangle.
         let mut b = [-3.0, -3.5, 5.0];
         cholesky.solve_lower(&mut b);
         cholesky.solve_upper(&mut b);

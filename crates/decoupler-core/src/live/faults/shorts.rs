@@ -7,29 +7,29 @@ use crate::{
     sensor::{SensorError, SensorModel},
 };
 
-/// Looks for neighbouring wires that touch, by readings that stay equal while the array is pressed in different ways.
+/// Detects neighbouring wires that touch: their readings remain equal while the array is pressed in different ways.
 ///
-/// Eq. (2) explains equal readings of two row-wires by some deformation, so that χ² of a frame says little. But it is
-/// improbable that each of several presses happens to be such a deformation. Readings of two wires are *equal* if
-/// Q = Σ_k (ln m_k − ln m′_k)²/2σ_k² is below the value that wires which touch exceed with a probability of
-/// [`EXCEEDED`], σ the relative noise of a reading without the gain error that a snapshot has in common, which cancels.
-/// Wires that do not touch have equal readings with probability q in a frame that presses them, as estimated by draws from
-/// the scene, with their noise or without it, whichever is more often equal: readings may have less noise than is assumed.
+/// Eq. (2) explains equal readings of two row-wires by some deformation, so that χ² of a single frame says little. But it
+/// is improbable that each of several presses happens to be such a deformation. Readings of two wires are *equal* if
+/// Q = Σ_k (ln m_k − ln m′_k)²/2σ_k² is below the value that touching wires exceed with a probability of [`EXCEEDED`],
+/// where σ is the relative noise of a reading without the common gain error of a snapshot, which cancels.
+/// Wires that do not touch have equal readings with probability q in a frame that presses them. This is estimated by draws
+/// from the scene, with and without noise, and the larger value is used: readings may have less noise than assumed.
 /// Every frame in which they are unequal adds ln(EXCEEDED/(1 − q)) to the evidence for a short, and every *new
-/// press* with equal readings adds ln(1/q). A new press is one whose mean readings differ from those at rest and from all
-/// presses counted before by at least half of the typical difference in the scene, so that a contact that is held, an array at
-/// rest whose rows are symmetric, or a slow movement count once. The sum is kept at or above 0, as in a cumulative sum test
-/// (Page, "Continuous inspection schemes", Biometrika 41, 1954): of presses that are independent given the scene, false
-/// alarms come on average once in more than e^[`LIMIT`] presses.
+/// press* with equal readings adds ln(1/q). A press is new if its mean readings differ from those at rest and from all
+/// presses counted before by at least half of the typical difference in the scene. Thus a sustained contact, an array with
+/// symmetric rows at rest, or a slow movement counts only once. The sum is kept at or above 0, as in a cumulative sum test
+/// (Page, "Continuous inspection schemes", Biometrika 41, 1954): for presses that are independent given the scene, the mean
+/// number of presses between false alarms exceeds e^[`LIMIT`].
 ///
-/// Wires that are mirror images of each other in the array have equal readings wherever they are pressed alike, as under a
-/// bar across both or on the line between them. Where an indenter presses, they are not judged.
+/// Wires that are mirror images of each other in the array have equal readings whenever they are pressed alike, for example
+/// by a bar across both or on the line between them. In scenes with an indenter, they are not judged.
 #[derive(Clone, Debug)]
 pub(super) struct Shorts {
     pairs: Vec<Pair>,
     source: NoiseSource,
     log_full_scale: f64,
-    /// True if readings of a snapshot have a gain error in common.
+    /// True if the readings of a snapshot have a common gain error.
     has_drift: bool,
     /// Mean logarithms of the readings of a pair.
     signature: Vec<f64>,
@@ -39,29 +39,29 @@ pub(super) struct Shorts {
 #[derive(Clone, Debug)]
 struct Pair {
     wire: FaultyWire,
-    /// Indices in a frame of the readings of both wires that belong together.
+    /// Corresponding readings of both wires, as indices in a frame.
     readings: Vec<(usize, usize)>,
     /// ln q.
     log_equal: f64,
-    /// Smallest root mean square distance of a new press from others.
+    /// Minimum root mean square distance of a new press from earlier ones.
     distance: f64,
     evidence: f64,
-    /// Presses counted: mean logarithms of the readings, that at rest first.
+    /// Mean logarithms of the readings of each counted press, preceded by the state at rest.
     presses: Vec<f64>,
-    /// Unequal frames in a row.
+    /// Number of consecutive unequal frames.
     apart: usize,
     is_held: bool,
 }
 
-/// Probability at which the readings of wires that touch count as unequal.
+/// Probability that the readings of touching wires count as unequal.
 const EXCEEDED: f64 = 1e-4;
 /// Normal deviate that is exceeded with that probability.
 const DEVIATE: f64 = 3.719_016_485_455_68;
-/// Evidence from which on wires are taken to touch: one false alarm in 10¹⁰ presses.
+/// Evidence above which a short is reported: one false alarm in 10¹⁰ presses.
 const LIMIT: f64 = 23.025_850_929_940_457;
-/// Presses that are kept for comparison. Wires whose readings are equal so often that these do not decide are not judged.
+/// Maximum number of presses kept for comparison. Wires with equal readings too often for this number are not judged.
 const MAX_PRESSES: usize = 64;
-/// Draws from the scene, and pairs of nodes for which resistances are computed in all of them.
+/// Number of draws from the scene, and limit on the pairs of nodes evaluated in all of them.
 const DRAWS: usize = 1000;
 const MIN_DRAWS: usize = 100;
 const MAX_NODE_PAIRS: usize = 30_000_000;
@@ -69,15 +69,15 @@ const MAX_NODE_PAIRS: usize = 30_000_000;
 /// Readings of a pair in one frame.
 struct Comparison {
     is_equal: bool,
-    /// Distance of two signatures that noise alone hardly makes.
+    /// Distance of two signatures that noise alone seldom exceeds.
     noise: f64,
 }
 
 impl Shorts {
-    /// Prepares to compare neighbouring wires of those `rows` read.
+    /// Prepares to compare neighbouring wires; `rows` are the row-wires read.
     ///
     /// # Errors
-    /// A sensor without resistances.
+    /// If the model has no resistance.
     pub(super) fn new(
         model: &SensorModel,
         scene: &Scene,
@@ -124,7 +124,7 @@ impl Shorts {
         Ok(shorts)
     }
 
-    /// Measures how often wires that do not touch have equal readings; `None` if no number of presses decides.
+    /// Estimates how often wires that do not touch have equal readings; `None` if a short could never be established.
     fn judge(
         &mut self,
         wire: FaultyWire,
@@ -172,8 +172,9 @@ impl Shorts {
         })
     }
 
-    /// Takes a frame: `raw_ohm` as it came, and `frame_ohm` divided by the gains of the unloaded state. Two rows share the
-    /// amplifiers of the columns, so that they are compared as they came; amplifiers of columns have gains of their own.
+    /// Adds a frame: `raw_ohm` as received, and `frame_ohm` divided by the gains of the unloaded state. Rows share the
+    /// amplifiers of the columns, so their raw readings are compared; columns have separate amplifiers, so their corrected
+    /// readings are compared.
     pub(super) fn observe(&mut self, raw_ohm: &[f64], frame_ohm: &[f64]) {
         let mut pairs = std::mem::take(&mut self.pairs);
         for pair in &mut pairs {
@@ -187,7 +188,7 @@ impl Shorts {
         self.pairs = pairs;
     }
 
-    /// The wires that touch, if there are any: those with the most evidence.
+    /// The touching wires with the most evidence, if there are any.
     pub(super) fn held(&self) -> Option<Diagnosis> {
         let held = self.pairs.iter().filter(|pair| pair.is_held);
         let best = held.max_by(|a, b| a.evidence.total_cmp(&b.evidence))?;
@@ -204,7 +205,7 @@ impl Shorts {
         self.pairs.iter().any(|pair| pair.wire == wire && pair.apart == 0)
     }
 
-    /// Compares the readings of two wires, whose mean logarithms go to the signature.
+    /// Compares the readings of two wires, and writes their mean logarithms to the signature.
     fn compare(&mut self, readings: &[(usize, usize)], frame_ohm: &[f64]) -> Comparison {
         let (mut q, mut count, mut variance) = (0.0, 0, 0.0);
         let signature = &mut self.signature[..readings.len()];
@@ -250,7 +251,7 @@ fn draw(model: &SensorModel, scene: &Scene, rows: &[usize], rng: &mut impl Rng) 
     Ok(frames_ohm)
 }
 
-/// Noise below which none is assumed.
+/// Minimum noise assumed.
 const SMALLEST_NOISE: f64 = 1e-6;
 
 impl Pair {

@@ -8,40 +8,40 @@ use crate::{
     sensor::SensorModel,
 };
 
-/// A body pressed somewhere onto the surface: place, depth, size, direction and tilt are drawn for each snapshot.
+/// A rigid body pressed onto the surface: position, depth, size, direction and tilt are drawn for each snapshot.
 ///
-/// Under the body the surface follows it; around it the surface is that of a sheet under tension on an elastic foundation
+/// The surface follows the body under it; around it, the surface is that of a sheet under tension on an elastic foundation
 /// (Pasternak 1954) with decay length λ = `spread_mm`: exp(−distance/λ) next to a cylinder or an edge, which are long in
 /// one direction, and the axisymmetric K₀(r/λ)/K₀(a/λ) around the contact radius a of a ball or a punch. A ball or a
-/// cylinder touches the sheet as far as its slope equals that of the free surface, so that there is no kink.
+/// cylinder touches the sheet up to where its slope equals that of the free surface, so that there is no kink.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Indenter {
-    /// Its shape with the range of its sizes.
+    /// Shape, with its range of sizes.
     pub shape: IndenterShape,
     /// Decay length λ of the surface around the indenter.
     pub spread_mm: f64,
 }
 
-/// Shapes of an indenter. Tilts are the largest slope against the surface; each is drawn from 0 to it.
+/// Shape of an indenter. A tilt is the largest slope relative to the surface; the slope is drawn from 0 to the tilt.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum IndenterShape {
     /// A ball.
     Sphere {
-        /// Its radius.
+        /// Radius.
         radius_mm: Span,
     },
     /// The flat end of a round bar.
     FlatPunch {
-        /// Its radius.
+        /// Radius.
         radius_mm: Span,
         /// Largest slope of its face.
         largest_tilt_degrees: f64,
     },
     /// A bar lying across the whole surface, in any direction.
     Cylinder {
-        /// Its radius.
+        /// Radius.
         radius_mm: Span,
         /// Largest slope along its axis.
         largest_tilt_degrees: f64,
@@ -57,14 +57,14 @@ pub enum IndenterShape {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Span {
-    /// The smallest.
+    /// Minimum.
     pub smallest: f64,
-    /// The largest.
+    /// Maximum.
     pub largest: f64,
 }
 
 impl Default for Indenter {
-    /// Balls of 2 to 6 mm radius; the surface comes back within 2 mm, the node pitch.
+    /// Balls of 2 to 6 mm radius; the surface recovers with a decay length of 2 mm, the node pitch.
     fn default() -> Self {
         Self {
             shape: IndenterShape::Sphere {
@@ -76,15 +76,15 @@ impl Default for Indenter {
 }
 
 impl Indenter {
-    /// Sizes offered.
+    /// Default sizes.
     const RADIUS_MM: Span = Span {
         smallest: 2.0,
         largest: 6.0,
     };
-    /// Tilt offered.
+    /// Default tilt.
     const TILT_DEGREES: f64 = 5.0;
 
-    /// The four shapes with sizes and tilts as offered, in the order of [`IndenterShape`].
+    /// Returns the four shapes with default sizes and tilts, in the order of [`IndenterShape`].
     pub fn all() -> [Self; 4] {
         let radius_mm = Self::RADIUS_MM;
         let largest_tilt_degrees = Self::TILT_DEGREES;
@@ -106,7 +106,7 @@ impl Indenter {
         })
     }
 
-    /// Its name.
+    /// Returns the name of the shape.
     pub fn name(&self) -> &'static str {
         match self.shape {
             IndenterShape::Sphere { .. } => "sphere",
@@ -116,7 +116,7 @@ impl Indenter {
         }
     }
 
-    /// Its radius in mm, unless it has none, and its largest tilt in degrees.
+    /// Returns the radius in mm, if the shape has one, and the largest tilt in degrees.
     pub fn radius_mm_and_tilt_degrees(&self) -> (Option<Span>, f64) {
         match self.shape {
             IndenterShape::Sphere { radius_mm } => (Some(radius_mm), 0.0),
@@ -148,12 +148,12 @@ impl Indenter {
         Ok(())
     }
 
-    /// Draws one press: its place uniform over the nodes, its depth uniform up to the stroke.
+    /// Draws one press: its position is uniform over the nodes, its depth uniform up to the stroke.
     pub(super) fn draw(&self, model: &SensorModel, stroke_mm: f64, rng: &mut impl Rng) -> Press {
         self.press_of(model, stroke_mm, || rng.random::<f64>())
     }
 
-    /// Number of uniform values that [`Self::press_of`] takes.
+    /// Number of uniform values used by [`Self::press_of`].
     pub(super) fn uniforms(&self) -> usize {
         match self.shape {
             IndenterShape::Sphere { .. } | IndenterShape::Edge { .. } => 5,
@@ -161,7 +161,7 @@ impl Indenter {
         }
     }
 
-    /// Index of the uniform value that becomes the direction, a full turn from 0 to 1.
+    /// Index of the uniform value for the direction: 0 to 1 is a full turn.
     pub(super) const DIRECTION: usize = 3;
 
     /// Returns the press determined by values that are uniform in [0, 1).
@@ -204,8 +204,8 @@ impl Indenter {
 }
 
 impl Indenter {
-    /// Deformation of the array when the indenter of middle size, upright, presses `depth_mm` deep at (x, y); a cylinder
-    /// or an edge along y.
+    /// Returns the deformation of the array when the upright indenter of middle size presses `depth_mm` deep at (x, y); a
+    /// cylinder or an edge is along y.
     pub(crate) fn press(&self, model: &SensorModel, place_mm: DVec2, depth_mm: f64) -> Deformation {
         let press = self.upright(place_mm, depth_mm);
         Deformation::from_fn(model.scale, |row, node| {
@@ -215,7 +215,7 @@ impl Indenter {
         })
     }
 
-    /// The part of the surface that touches the pressed indenter.
+    /// Returns the part of the surface that touches the pressed indenter.
     pub fn contact(&self, depth_mm: f64) -> Contact {
         self.upright(DVec2::ZERO, depth_mm).contact()
     }
@@ -237,7 +237,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn impossible_bodies_are_named() {
+    fn invalid_bodies_are_reported() {
         let mut indenter = Indenter::default();
         assert!(indenter.check().is_ok());
         indenter.spread_mm = 0.0;

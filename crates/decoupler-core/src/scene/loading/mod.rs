@@ -27,7 +27,7 @@ pub enum Loading {
         /// Distance over which the displacements of nodes stay correlated, in mm.
         correlation_length_mm: f64,
     },
-    /// A body of known shape is pressed somewhere onto the surface.
+    /// A body of known shape is pressed onto the surface at a random position.
     Indenter(Indenter),
 }
 
@@ -46,7 +46,7 @@ impl fmt::Display for Loading {
 impl FromStr for Loading {
     type Err = SceneError;
 
-    /// Reads `random`, `smooth:MM`, `indenter` (a ball) or `indenter:SHAPE` with its sizes as offered.
+    /// Parses `random`, `smooth:MM`, `indenter` (a ball) or `indenter:SHAPE` with default sizes.
     fn from_str(text: &str) -> Result<Self, SceneError> {
         let unknown = || SceneError::LoadingText(text.to_owned());
         let loading = match text.trim().split_once(':') {
@@ -94,7 +94,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn loadings_are_read_as_they_are_written() {
+    fn loadings_survive_formatting_and_parsing() {
         for text in [
             "random",
             "smooth:4",

@@ -14,35 +14,35 @@ pub(super) enum Body {
 /// Part of the surface that touches an upright indenter.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Contact {
-    /// A disc around the middle, under a ball or a punch.
+    /// A disc around the centre, under a ball or a punch.
     Disc {
-        /// Its radius.
+        /// Radius.
         radius_mm: f64,
     },
-    /// A strip along y, as far to the left as to the right of the middle, under a cylinder.
+    /// A strip along y, symmetric about the centre, under a cylinder.
     Strip {
-        /// Half its width.
+        /// Half the width.
         half_width_mm: f64,
     },
-    /// All to the left of the line through the middle along y, under a block.
+    /// The half-plane to the left of the line through the centre along y, under a block.
     HalfPlane,
 }
 
-/// One press of an indenter, prepared to be evaluated at many nodes.
+/// One press of an indenter, prepared for evaluation at many nodes.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Press {
     face: Face,
     place: DVec2,
-    /// Depth of the middle of the body.
+    /// Depth at the centre of the body.
     depth_mm: f64,
     /// Unit vector along which the body is inclined; the axis of a cylinder, the line of an edge.
     direction: DVec2,
-    /// Depth gained for each millimetre along `direction`.
+    /// Increase of depth per millimetre along `direction`.
     slope: f64,
     spread_mm: f64,
 }
 
-/// A body with its contact, where that is the same everywhere.
+/// A body with its contact, if it is the same everywhere.
 #[derive(Clone, Copy, Debug)]
 enum Face {
     Sphere { radius_mm: f64, contact: RoundContact },
@@ -52,7 +52,7 @@ enum Face {
 }
 
 impl Press {
-    /// Presses `body` at `place` so deep, inclined by `slope` along `direction`, on a surface of decay length
+    /// Presses `body` to a depth of `depth_mm` at `place`, inclined by `slope` along `direction`, on a surface of decay length
     /// `spread_mm`.
     pub(super) fn new(body: Body, place: DVec2, depth_mm: f64, direction: DVec2, slope: f64, spread_mm: f64) -> Self {
         let face = match body {
@@ -95,7 +95,7 @@ impl Press {
         }
     }
 
-    /// The part of the surface that touches the body, were it upright.
+    /// The part of the surface that touches the body if it is upright.
     pub(super) fn contact(&self) -> Contact {
         match self.face {
             Face::Sphere { contact, .. } | Face::FlatPunch(contact) => Contact::Disc {
@@ -108,8 +108,8 @@ impl Press {
         }
     }
 
-    /// A cylinder of this depth and radius at `distance` from its axis: the parabola depth − distance²/(2 radius) up to
-    /// where its slope equals the free surface's, a/radius = depth(a)/spread, and that surface beyond.
+    /// Depth at `distance` from the axis of a cylinder: the parabola depth − distance²/(2 radius) up to the distance a where
+    /// its slope equals that of the free surface, a/radius = depth(a)/spread, and the free surface beyond.
     fn cylinder(&self, depth_mm: f64, radius: f64, distance: f64) -> f64 {
         if depth_mm <= 0.0 {
             return 0.0;
@@ -135,8 +135,8 @@ impl Press {
 
 /// The surface around a round body on a sheet under tension on an elastic foundation (Pasternak 1954).
 ///
-/// Outside the contact the deflection w obeys w″ + w′/r = w/λ², λ being the decay length, so it is
-/// w(a) K₀(r/λ)/K₀(a/λ) at a distance r from the axis, with a the contact radius.
+/// Outside the contact the deflection w obeys w″ + w′/r = w/λ² with decay length λ. At a distance r from the axis it is
+/// w(a) K₀(r/λ)/K₀(a/λ), where a is the contact radius.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct RoundContact {
     /// a.
@@ -148,7 +148,7 @@ pub(super) struct RoundContact {
 }
 
 impl RoundContact {
-    /// A contact of this radius.
+    /// Creates a contact of this radius.
     pub(super) fn new(radius_mm: f64, decay_length_mm: f64) -> Self {
         Self {
             radius_mm,
@@ -157,13 +157,13 @@ impl RoundContact {
         }
     }
 
-    /// The contact of a ball of radius `ball_mm` pressed `depth_mm` deep, whose face is depth − r²/(2·ball): it ends
-    /// where the slopes of face and free surface agree, a/ball = w(a)/λ · K₁(a/λ)/K₀(a/λ), so that there is no kink.
+    /// Creates the contact of a ball of radius `ball_mm` pressed `depth_mm` deep, whose face is depth − r²/(2·ball). It ends
+    /// where the slopes of face and free surface are equal, a/ball = w(a)/λ · K₁(a/λ)/K₀(a/λ), so that there is no kink.
     pub(super) fn of_ball(ball_mm: f64, depth_mm: f64, decay_length_mm: f64) -> Self {
         Self::new(contact_radius_mm(ball_mm, depth_mm, decay_length_mm), decay_length_mm)
     }
 
-    /// Deflection at `distance_mm` from the axis as a share of that at the edge of the contact; 1 inside.
+    /// Deflection at `distance_mm` from the axis relative to that at the edge of the contact; 1 inside.
     pub(super) fn share_at(&self, distance_mm: f64) -> f64 {
         let beyond = distance_mm - self.radius_mm;
         if beyond <= 0.0 {
@@ -177,12 +177,12 @@ impl RoundContact {
 /// Solves the condition of [`RoundContact::of_ball`] in the unit of r₀ = √(2 ball·depth), where the face would meet the
 /// undeformed surface: with y = a/r₀, L = λ/r₀ and q(x) = K₀(x)/K₁(x), it is
 ///
-/// `y² + 2 L y q(y/L) = 1`, whose left side grows with y from 0.
+/// `y² + 2 L y q(y/L) = 1`, whose left side increases with y from 0.
 ///
-/// As q lies between 0 and 1, y lies between √(1 + L²) − L (the solution for a cylinder) and 1. Newton's method with
-/// q′ = q² + q/x − 1; where it would leave the bracket, that is halved instead.
+/// Because q is between 0 and 1, y is between √(1 + L²) − L (the solution for a cylinder) and 1. Solved by Newton's method
+/// with q′ = q² + q/x − 1, and by bisection where a step would leave the bracket.
 fn contact_radius_mm(ball_mm: f64, depth_mm: f64, decay_length_mm: f64) -> f64 {
-    /// Newton's method converges in 3 to 6 rounds; halving alone would in 60.
+    /// Newton's method converges in 3 to 6 iterations; bisection alone would need 60.
     const ROUNDS: usize = 100;
     let unit_mm = ball_mm.sqrt() * (2.0 * depth_mm).sqrt();
     if unit_mm <= 0.0 {
@@ -227,7 +227,7 @@ mod tests {
     }
 
     #[test]
-    fn the_surface_follows_the_body_and_comes_back() {
+    fn the_surface_follows_the_body_and_recovers() {
         let sphere = press(Body::Sphere(4.0), 0.0);
         assert!((sphere.depth_at_mm(3.0, -1.0) - 0.8).abs() < 1e-15);
         assert!((sphere.depth_at_mm(3.5, -1.0) - (0.8 - 0.25 / 8.0)).abs() < 1e-15);

@@ -8,7 +8,7 @@ use crate::{
     sensor::{ArrayScale, Geometry, SensorModel},
 };
 
-/// Draws deformations of one array in one scene; what all draws share is computed once.
+/// Draws deformations of one array in one scene; common quantities are computed once.
 #[derive(Clone, Debug)]
 pub struct DeformationSampler {
     model: SensorModel,
@@ -78,7 +78,7 @@ impl DeformationSampler {
     }
 }
 
-/// Displacement of a random node, from values that are uniform in [0, 1).
+/// Displacement of a random node from uniform values in [0, 1).
 pub(super) fn random_mm(movement: Movement, stroke_mm: f64, uniform: &mut impl FnMut() -> f64) -> DVec3 {
     let z = stroke_mm * uniform();
     match movement {
@@ -90,14 +90,14 @@ pub(super) fn random_mm(movement: Movement, stroke_mm: f64, uniform: &mut impl F
     }
 }
 
-/// Displacement of a node from values of smooth fields, which are uniform in [0, 1].
+/// Displacement of a node from the values of smooth fields, which are uniform in [0, 1].
 pub(super) fn field_mm(z: f64, sideways: Option<(f64, f64)>, stroke_mm: f64, shift_mm: f64) -> DVec3 {
     let (x, y) = sideways.map_or((0.0, 0.0), |(x, y)| (2.0 * x - 1.0, 2.0 * y - 1.0));
     DVec3::new(shift_mm * x, shift_mm * y, stroke_mm * z)
 }
 
-/// Displacement under a press of the node at `rest_mm`. Friction drags the surface along with the body by up to
-/// `sideways_mm`, in proportion to how far it is pressed.
+/// Displacement of the node at `rest_mm` under a press. Friction drags the surface along with the body by up to
+/// `sideways_mm`, in proportion to the depth.
 pub(super) fn dragged_mm(press: &Press, rest_mm: DVec3, sideways_mm: (f64, f64), stroke_mm: f64) -> DVec3 {
     let z = press.depth_at_mm(rest_mm.x, rest_mm.y).clamp(0.0, stroke_mm);
     let dragged = z / stroke_mm;
@@ -118,7 +118,7 @@ pub(crate) struct LatentRow {
 #[derive(Clone, Debug)]
 enum Latent {
     RandomNodes,
-    /// A field with this root of its covariance, row by row: nodes × variables of each axis.
+    /// Square root of the covariance of a field, row by row: nodes × variables of each axis.
     SmoothField {
         root: Vec<f64>,
         variables: usize,
@@ -127,7 +127,7 @@ enum Latent {
 }
 
 impl LatentRow {
-    /// The prior of row-wire `row`.
+    /// Prepares the prior of row-wire `row`.
     pub(crate) fn new(model: &SensorModel, scene: &Scene, row: usize) -> Self {
         let loading = match scene.loading {
             Loading::RandomNodes => Latent::RandomNodes,
@@ -153,7 +153,7 @@ impl LatentRow {
         match &self.loading {
             Latent::RandomNodes => axes * self.model.scale.nodes_per_row(),
             Latent::SmoothField { variables, .. } => axes * variables,
-            // A direction takes two variables, so that no turn of it is the last.
+            // A direction takes two variables, so that it has no discontinuity.
             Latent::Indenter(indenter) => indenter.uniforms() + 1 + (axes - 1),
         }
     }
@@ -211,8 +211,8 @@ impl LatentRow {
 /// A stationary Gaussian random field on the nodes with covariance exp(−distance² / (2 length²)), turned into a field
 /// that is uniform on [0, 1] at every node by its distribution function (a Gaussian copula).
 ///
-/// On a grid the covariance is a Kronecker product of one along x and one along y, so Rx Z Ryᵀ has it, with Z white and
-/// R a square root of each factor.
+/// On a grid the covariance is a Kronecker product of a factor along x and one along y. The field is therefore Rx Z Ryᵀ,
+/// where Z is white noise and Rx and Ry are square roots of the factors.
 #[derive(Clone, Debug)]
 pub(super) struct SmoothField {
     /// Row-wires × row-wires.
@@ -256,9 +256,9 @@ impl SmoothField {
 }
 
 /// Returns a square root of the covariance of `count` points `step` correlation lengths apart. The matrix is positive
-/// definite, but nearly singular for small steps: eigenvalues that rounding turned negative count as zero.
+/// definite, but nearly singular for small steps: eigenvalues that are negative due to rounding count as zero.
 fn root(count: usize, step: f64) -> Mat<f64> {
-    // A step that overflowed would make 0 · ∞ of the diagonal.
+    // An overflowed step would make the diagonal 0 · ∞.
     let step = step.min(f64::MAX);
     let covariance = Mat::from_fn(count, count, |i, j| {
         (-0.5 * (step * (i as f64 - j as f64)).powi(2)).exp()
@@ -270,7 +270,7 @@ fn root(count: usize, step: f64) -> Mat<f64> {
 }
 
 /// Returns `exp(x) K₀(x)` and `exp(x) K₁(x)`, the modified Bessel functions of the second kind scaled so that large `x`
-/// does not underflow, to about 1e-15. `x` is above 0; values beyond the range of normal numbers count as its ends.
+/// does not underflow, to about 1e-15. `x` is above 0 and is clamped to the range of normal numbers.
 ///
 /// Up to x = 2 by their power series (NIST Digital Library of Mathematical Functions, 10.31.1 and 10.31.2). Beyond, by
 /// `K_ν(x) = ∫ exp(−x cosh t) cosh νt dt` over t > 0 (10.32.9), which v² = x (cosh t − 1) turns into
@@ -288,14 +288,14 @@ pub(super) fn scaled_k0_k1(x: f64) -> (f64, f64) {
     }
 }
 
-/// Argument at which the series, which cancels beyond, hands over to the integral, whose integrand is analytic only up to
-/// √(2x) from the real axis.
+/// Argument at which the method changes from the series, which suffers from cancellation above, to the integral, whose
+/// integrand is analytic only up to √(2x) from the real axis.
 const LARGEST_OF_SERIES: f64 = 2.0;
 
 /// With y = x²/4, H_k the harmonic numbers and L = ln(x/2) + γ:
 /// K₀ = Σ (H_k − L) y^k/(k!)² and K₁ = 1/x + x Σ (L − (H_k + H_{k+1})/2) y^k/(2 k! (k+1)!).
 fn by_series(x: f64) -> (f64, f64) {
-    /// y is at most 1: the terms that follow are below 1e-19.
+    /// y is at most 1: the remaining terms are below 1e-19.
     const TERMS: u32 = 12;
     const EULER: f64 = 0.577_215_664_901_532_9;
     let y = 0.25 * x * x;
@@ -337,7 +337,7 @@ mod tests {
         scene::standard_normal,
     };
 
-    /// Means and products of all unknowns of a row over many draws agree with those of the sampler, in every scene.
+    /// In every scene, means and second moments of all unknowns of a row agree with those of the sampler.
     #[test]
     fn rows_are_distributed_as_the_sampler_draws_them() {
         const DRAWS: usize = 20_000;
@@ -400,7 +400,7 @@ mod tests {
     }
 
     #[test]
-    fn nodes_are_uniform_and_correlated_as_the_copula_says() {
+    fn nodes_are_uniform_and_correlated_as_in_the_copula() {
         let scale = "4x3_1x9".parse().unwrap();
         let field = SmoothField::new(scale, &Geometry::default(), 2.0);
         let mut rng = Seed(1).rng(Stream::Training);
@@ -433,7 +433,7 @@ mod tests {
     ];
 
     #[test]
-    fn values_are_those_of_scipy() {
+    fn values_match_scipy() {
         for (x, k0, k1) in SCIPY {
             let ours = scaled_k0_k1(x);
             assert!((ours.0 / k0 - 1.0).abs() < 3e-15, "{x}: {} {k0}", ours.0);
@@ -442,7 +442,7 @@ mod tests {
     }
 
     #[test]
-    fn series_and_integral_meet() {
+    fn series_and_integral_agree_at_the_boundary() {
         let (series, integral) = (by_series(2.0), by_integral(2.0));
         assert!((series.0 / integral.0 - 1.0).abs() < 5e-15);
         assert!((series.1 / integral.1 - 1.0).abs() < 5e-15);
