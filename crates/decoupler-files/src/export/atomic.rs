@@ -1,4 +1,4 @@
-//! Reading of files, of which none has to be a file of ours or even to end.
+//! Atomic writing of files, and bounded reading of JSON files.
 
 use std::{
     fs::{self, File, Permissions},
@@ -68,8 +68,8 @@ pub struct AtomicFile {
 #[derive(Debug)]
 enum Sink {
     /// Becomes the file at this target.
-    Beside(Unfinished, PathBuf),
-    /// A pipe or device, which nothing can replace.
+    Temporary(Unfinished, PathBuf),
+    /// A pipe or device, which cannot be replaced by renaming.
     Through(File),
 }
 
@@ -97,7 +97,7 @@ impl Place {
             Ok(old) if !old.is_file() => Ok(Self::Special),
             Ok(old) if old.permissions().readonly() => Err(WriteError::ReadOnly(path.to_owned())),
             Ok(old) => {
-                // What a link points to is replaced, not the link.
+                // The target of a link is replaced, not the link itself.
                 let target = fs::canonicalize(path).map_err(error)?;
                 let folder = target.parent().unwrap_or(&folder).to_owned();
                 let permissions = Some(old.permissions());
@@ -133,7 +133,7 @@ fn existing_folder(path: &Path, target: &Path) -> Result<PathBuf, WriteError> {
 
 /// Follows a link to a file that is missing, through further links.
 fn link_target(path: &Path) -> PathBuf {
-    /// As many as Linux follows.
+    /// The limit of Linux.
     const MAX_LINKS: usize = 40;
     let mut target = path.to_owned();
     for _ in 0..MAX_LINKS {
@@ -161,7 +161,7 @@ impl AtomicFile {
                 if let Some(permissions) = permissions {
                     file.as_file().set_permissions(permissions).map_err(error)?;
                 }
-                Sink::Beside(file, target)
+                Sink::Temporary(file, target)
             }
         };
         Ok(Self {
@@ -190,7 +190,7 @@ impl AtomicFile {
         let error = |source| WriteError::io(&self.path, source);
         match self.writer.into_inner().map_err(|e| error(e.into_error()))? {
             Sink::Through(_) => Ok(()),
-            Sink::Beside(file, target) => {
+            Sink::Temporary(file, target) => {
                 file.as_file().sync_all().map_err(error)?;
                 persist(file, &target).map_err(error)
             }
@@ -211,14 +211,14 @@ impl Write for AtomicFile {
 impl Write for Sink {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         match self {
-            Self::Beside(file, _) => file.as_file().write(bytes),
+            Self::Temporary(file, _) => file.as_file().write(bytes),
             Self::Through(file) => file.write(bytes),
         }
     }
 
     fn flush(&mut self) -> io::Result<()> {
         match self {
-            Self::Beside(file, _) => file.as_file().flush(),
+            Self::Temporary(file, _) => file.as_file().flush(),
             Self::Through(file) => file.flush(),
         }
     }
@@ -240,7 +240,7 @@ pub fn atomic_write(path: &Path, write: impl FnOnce(&mut dyn Write) -> io::Resul
 /// The path cannot be written.
 pub fn check_writable(path: &Path) -> Result<(), WriteError> {
     match Place::of(path)? {
-        // Opening and closing a pipe would tell its reader that nothing comes.
+        // Opening and closing a pipe would signal the end of the file to its reader.
         Place::Special => Ok(()),
         Place::File { .. } => AtomicFile::create(path).map(drop),
     }
@@ -274,12 +274,12 @@ fn is_same_on_disk(_one: &Path, _other: &Path) -> bool {
     false
 }
 
-/// Largest file of JSON that is read or written, in bytes: 1 GiB.
+/// Largest JSON file that is read or written, in bytes: 1 GiB.
 pub(super) const LARGEST_BYTES: u64 = 1 << 30;
-/// Length of the beginning that shows whether the rest is worth reading.
+/// Number of bytes that are read first, to decide whether to read the rest.
 const BEGINNING: u64 = 1 << 16;
 
-/// Reads the file of JSON at `path`. Where the beginning shows that it is none of ours, only the beginning is returned.
+/// Reads the JSON file at `path`. If its beginning shows that Decoupler did not write it, returns only the beginning.
 ///
 /// # Errors
 /// The operating system refuses, or the file does not end within [`LARGEST_BYTES`].
@@ -294,7 +294,7 @@ pub(super) fn read_limited(path: &Path) -> io::Result<Vec<u8>> {
     if matches!(Heading::read(&bytes), Err(NoHeading::NotJson(_) | NoHeading::Other)) {
         return Ok(bytes);
     }
-    // A pipe or device tells no length.
+    // The length of a pipe or device is unknown.
     (&file).take(LARGEST_BYTES + 1 - BEGINNING).read_to_end(&mut bytes)?;
     if bytes.len() as u64 > LARGEST_BYTES {
         return Err(too_large());
@@ -305,7 +305,7 @@ pub(super) fn read_limited(path: &Path) -> io::Result<Vec<u8>> {
 pub(super) fn too_large() -> io::Error {
     io::Error::new(
         ErrorKind::FileTooLarge,
-        "it is larger than 1 GiB, which no file of its kind is",
+        "it is larger than 1 GiB, the largest size of such files",
     )
 }
 
@@ -335,7 +335,7 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_written_is_said_before_any_work() {
+    fn unwritable_paths_are_reported_before_any_work() {
         let folder = tempfile::tempdir().unwrap();
         let read_only = folder.path().join("fixed.csv");
         fs::write(&read_only, "old").unwrap();
@@ -360,7 +360,7 @@ mod tests {
 
     #[cfg(unix)]
     #[test]
-    fn others_may_read_it_and_links_and_permissions_stay() {
+    fn links_and_permissions_are_preserved() {
         use std::os::unix::fs::PermissionsExt;
         let folder = tempfile::tempdir().unwrap();
         let [path, ordinary, link] = ["file", "ordinary", "link"].map(|name| folder.path().join(name));
@@ -379,7 +379,7 @@ mod tests {
 
     #[cfg(unix)]
     #[test]
-    fn links_to_a_file_that_is_missing_stay_links_and_the_file_is_made() {
+    fn dangling_links_stay_links_and_their_target_is_created() {
         use std::os::unix::fs::symlink;
         let folder = tempfile::tempdir().unwrap();
         let at = |name: &str| folder.path().join(name);
@@ -400,7 +400,7 @@ mod tests {
     }
 
     #[test]
-    fn a_new_file_never_takes_the_place_of_another() {
+    fn a_new_file_never_replaces_another() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("run.json");
         let write = |text: &[u8]| {
@@ -437,7 +437,7 @@ mod tests {
     }
 
     #[test]
-    fn only_the_beginning_is_read_of_what_is_no_json() {
+    fn only_the_beginning_of_other_files_than_json_is_read() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("file");
         let read = |bytes: &[u8]| {
@@ -452,7 +452,7 @@ mod tests {
     }
 
     #[test]
-    fn only_the_beginning_is_read_of_random_bytes() {
+    fn only_the_beginning_of_random_bytes_is_read() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("file");
         let mut bytes = vec![0; 100_000];
@@ -465,7 +465,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_too_large_is_refused_unread() {
+    fn oversized_files_are_refused_unread() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("file");
         fs::write(&path, "{\"format\":\"").unwrap();

@@ -17,10 +17,10 @@ use decoupler_core::{
 
 const KIND: DocumentKind = DocumentKind::Checkpoint;
 
-/// A run saved at some epoch. A resumed run gives bit-identical results.
+/// A run saved at an epoch. A resumed run gives bit-identical results.
 ///
 /// The file is JSON. It does not contain the samples: those of a simulated array follow from the settings, those of a recording
-/// are read again by its plan and recognised by their checksum. Another checksum (CRC-32) detects changes of the file.
+/// are read again by its plan and recognised by their checksum. Another checksum (CRC-32) detects changes to the file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CheckpointFile {
     /// Program and version that wrote the file.
@@ -46,10 +46,10 @@ struct Document {
 }
 
 impl CheckpointFile {
-    /// Takes the current state of `run`; `recorded` is the origin of its samples if they are recorded.
+    /// Captures the current state of `run`; `recorded` is the origin of its samples if they are recorded.
     ///
     /// # Errors
-    /// [`DocumentError::NoPlan`] if the samples are recorded and nothing says where.
+    /// [`DocumentError::NoPlan`] if the samples are recorded and no plan is given.
     pub fn from_run(run: &Run, recorded: Option<&Recorded>) -> Result<Self, DocumentError> {
         Ok(Self {
             program: PROGRAM.to_owned(),
@@ -63,13 +63,13 @@ impl CheckpointFile {
     /// Setup of the run.
     pub fn setup(&self) -> Setup {
         let plan = self.recorded.as_ref().map(|recorded| recorded.plan.clone());
-        Setup::of(self.settings, plan).expect("a file of a recording has its plan, as reading and writing check")
+        Setup::of(self.settings, plan).expect("reading and writing check that a recording has its plan")
     }
 
     /// Resumes the run from this epoch: draws or reads its samples again and restores every trainer.
     ///
     /// # Errors
-    /// The settings are impossible, the recording has changed or is missing, or the states do not fit the settings or each
+    /// The settings are invalid, the recording has changed or is missing, or the states do not fit the settings or each
     /// other.
     pub fn resume(self) -> Result<Run, SetupError> {
         let resumed = self.resume_unless(&|| false, &mut |_| ())?;
@@ -111,7 +111,7 @@ impl CheckpointFile {
             starts: self.starts.clone(),
         });
         let run = run.map_err(unsound)?;
-        // What was written must be readable: a weight that is not finite would be `null`.
+        // A weight that is not finite would be written as `null`, which cannot be read back.
         serde_json::from_str::<Document>(run.get()).map_err(unsound)?;
         Ok(Sealed::new(KIND, &self.program, &run).save(path, AtomicFile::commit)?)
     }

@@ -19,7 +19,7 @@ use decoupler_core::{
 
 pub(super) const PROGRAM: &str = concat!("decoupler ", env!("CARGO_PKG_VERSION"));
 
-/// Kinds of JSON files that the program writes and reads again.
+/// Kinds of JSON files that the program writes and reads back.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum DocumentKind {
@@ -40,7 +40,6 @@ pub enum DocumentKind {
 }
 
 impl DocumentKind {
-    /// Every kind.
     const ALL: [Self; 7] = [
         Self::Network,
         Self::Checkpoint,
@@ -51,9 +50,10 @@ impl DocumentKind {
         Self::SweepPlan,
     ];
 
-    /// Kind of the file at `path` by its beginning; `None` if it is none of them, or cannot be read.
+    /// Returns the kind of the file at `path`, determined by its beginning; `None` if it is of no kind or cannot be
+    /// read.
     pub fn of_file(path: &Path) -> Option<Self> {
-        /// Number of bytes in which the format is named, however a recipe is laid out by hand.
+        /// Number of bytes within which the format is named, even in a recipe formatted by hand.
         const BEGINNING: u64 = 512;
         let mut beginning = Vec::new();
         let file = fs::File::open(path).ok()?;
@@ -65,7 +65,7 @@ impl DocumentKind {
         Self::ALL.into_iter().find(|kind| kind.format() == format)
     }
 
-    /// Text of the field "format".
+    /// Value of the field `format`.
     pub(super) fn format(self) -> &'static str {
         match self {
             Self::Network => "decoupler network",
@@ -89,7 +89,7 @@ impl DocumentKind {
     /// Returns the origin of the samples of `run` for its file: `recorded`, or `None` if they are simulated.
     ///
     /// # Errors
-    /// [`DocumentError::NoPlan`] if the samples are recorded and nothing says where.
+    /// [`DocumentError::NoPlan`] if the samples are recorded and no plan is given.
     pub(super) fn recorded_of(self, run: &Run, recorded: Option<&Recorded>) -> Result<Option<Recorded>, DocumentError> {
         match (&run.settings().source, recorded) {
             (Source::Simulated(_), _) => Ok(None),
@@ -183,7 +183,7 @@ impl fmt::Display for DocumentKind {
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum DocumentError {
-    /// The operating system refuses to read it.
+    /// The operating system cannot read it.
     #[error("cannot read '{}': {}", .path.display(), system_cause(.source))]
     Read {
         /// The file.
@@ -235,13 +235,13 @@ pub enum DocumentError {
         /// Description of the defect, with the field or with line and column.
         defect: String,
     },
-    /// The samples are recorded, and nothing says where.
+    /// The samples are recorded, and no plan is given.
     #[error(
         "a {0} of recorded samples names the recording: give the plan that reads it, or save the networks with serde"
     )]
     NoPlan(DocumentKind),
     /// A recording is needed.
-    #[error("'{}' is the recipe of a simulated array: give that of a recording", .0.display())]
+    #[error("'{}' is the recipe of a simulated array: give the recipe of a recording", .0.display())]
     SimulatedRecipe(PathBuf),
     /// The run has values that could not be read back.
     #[error("'{}' is not saved: {defect}; train again with other settings", .path.display())]

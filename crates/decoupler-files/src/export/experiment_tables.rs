@@ -1,4 +1,4 @@
-//! Sentences next to the table of an experiment.
+//! Tables of the results of an experiment, and the sentences that are shown with them.
 
 use std::{
     io::{self, Write},
@@ -20,7 +20,8 @@ use decoupler_core::{
 
 use super::{Cell, Table, TableColumn, TableForm, format_duration, format_number};
 
-/// The results of an experiment for reading: the same columns in the terminal, in files and in the window.
+/// Table of the results of an experiment for readers, with the same columns in the terminal, in files and in the
+/// window.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ExperimentTable {
     /// Columns of the table.
@@ -59,7 +60,7 @@ pub enum ExperimentColumnKind {
     Other,
 }
 
-/// A column with the figure of a cell: its number and its text.
+/// A column, and the value of a cell in it as number and text.
 type CellFigure = (ExperimentColumn, Option<f64>, String);
 
 impl ExperimentTable {
@@ -98,7 +99,7 @@ impl ExperimentTable {
         }
     }
 
-    /// The table for other documents, with the training time in seconds.
+    /// Returns the table for export, with the training time in seconds.
     pub fn table(&self) -> Table {
         let is_axis = |column: &&ExperimentColumn| column.kind == ExperimentColumnKind::Axis;
         let axes = self.columns.iter().take_while(is_axis).count();
@@ -120,14 +121,14 @@ impl ExperimentTable {
     }
 }
 
-const NODES_NOTE: &str = "Medians, least and largest over seeds (and repeats). mean: always answering the training mean; \
-     linear: best affine map on resistance; bound: what so few hidden nodes can carry, the least-squares best answer of \
-     any network with them; epochs: mean of the starts; training: one network, all its starts.";
+const NODES_NOTE: &str = "Median, minimum and maximum over seeds (and repeats). mean: always answering the training mean; \
+     linear: best affine map on resistance; bound: least-squares optimum of any network with this number of hidden \
+     nodes; epochs: mean of the starts; training: one network, all its starts.";
 
-const TARGETS_NOTE: &str = "Medians, minimum and maximum over seeds. error: mean absolute error in percent of the range of \
+const TARGETS_NOTE: &str = "Median, minimum and maximum over seeds. error: mean absolute error in percent of the range of \
      the target, averaged over the targets that vary, and R² likewise; mean: always answering the training mean; ridge: \
-     ridge regression; bound: error of the best answer of any network with so few hidden nodes; epochs: mean of the \
-     starts; training: one network, all its starts.";
+     ridge regression; bound: error of the optimum of any network with this number of hidden nodes; epochs: mean of \
+     the starts; training: one network, all its starts.";
 
 fn has_bound(summary: &CellSummary) -> bool {
     summary.bound_percent.is_some_and(|percent| percent > 0.0)
@@ -191,7 +192,7 @@ impl Layout {
     }
 }
 
-/// The figures of every cell: for programs.
+/// Returns the table of all cells, for programs.
 pub fn cells_table(results: &ExperimentResults) -> Table {
     let rows = results.cells.iter().zip(results.summaries());
     let rows = rows.map(|(cell, summary)| {
@@ -239,7 +240,7 @@ pub fn cells_table(results: &ExperimentResults) -> Table {
 /// Names of the baselines in the fields of tables for programs.
 const BASELINES: [&str; 3] = ["mean", "linear", "bound"];
 
-/// Every trial: for programs. Repeats are counted from 1.
+/// Returns the table of all trials, for programs. Repeats are counted from 1.
 pub fn trials_table(results: &ExperimentResults) -> Table {
     let trials = results
         .cells
@@ -430,7 +431,7 @@ fn describe_samples(source: &Simulation, cross_validation: Option<CrossValidatio
         Some(CrossValidation { folds, repeats, unit }) => {
             let validation = match folds {
                 2 => "nothing held out for validation",
-                _ => "of the folds not tested one is held out for validation",
+                _ => "one of the other folds is held out for validation",
             };
             format!("{folds} folds by {unit}, {validation}, {}", counted(repeats, "repeat"))
         }
@@ -443,7 +444,7 @@ fn describe_division(recording: &ExperimentRecording, varies: bool) -> String {
     let division = &recording.division;
     let share = percent(division.test_fraction);
     let test = match (recording.has_test_files, varies, division.by) {
-        (true, ..) => "tested on files of their own".to_owned(),
+        (true, ..) => "tested on separate files".to_owned(),
         (false, true, _) => format!("{share} % of the samples for test"),
         (false, false, SplitBy::Time) => format!("the last {share} % of the samples for test"),
         (false, false, SplitBy::Group) => format!("groups with {share} % of the samples for test"),
@@ -466,14 +467,14 @@ pub fn describe_failures(results: &ExperimentResults) -> Vec<String> {
     results.cells.iter().flat_map(of_cell).collect()
 }
 
-/// Describes in a sentence every cell some of whose networks are worse than always answering the training mean.
+/// Describes every cell that has networks worse than always answering the training mean, one sentence per cell.
 pub fn describe_worse_than_mean(results: &ExperimentResults) -> Vec<String> {
     let of_cell = |cell: &CellResults| {
         let is_worse = |trial: &&Trial| is_worse_than_mean(trial);
         let (worse, trials) = (cell.trials.iter().filter(is_worse).count(), cell.trials.len());
         (worse > 0).then(|| {
             format!(
-                "At {}, {worse} of {trials} are worse than always answering the training mean: run more epochs, or take \
+                "At {}, {worse} of {trials} are worse than always answering the training mean: run more epochs, or use \
                  more samples, other hidden nodes or another method",
                 results.cell_labels(cell).join(", ")
             )
@@ -486,7 +487,7 @@ fn is_worse_than_mean(trial: &Trial) -> bool {
     let mean = &trial.baselines.mean;
     match (trial.errors.nodes(), mean.nodes()) {
         (Some(errors), Some(mean)) => errors.z_mm > mean.z_mm,
-        // An error that is not finite is worse than any.
+        // An error that is not finite counts as worse.
         _ => mean
             .percent()
             .is_some_and(|mean| trial.errors.percent().is_none_or(|percent| percent > mean)),

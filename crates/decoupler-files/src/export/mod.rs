@@ -1,13 +1,13 @@
-//! Files for later and for other programs: network files, checkpoints, recipes, tables, figures and reports (feature
-//! `figures`), and the one way in which all of them are written: whole or not at all.
+//! Output files: network files, checkpoints, recipes, tables, figures and reports (feature `figures`). All of them are
+//! written atomically: whole or not at all.
 //!
-//! # Files that are read again
+//! # Files that are read back
 //!
-//! All are JSON with the fields `format`, `version` and `program`, the program that wrote the file. There is one file of each
-//! kind for simulated arrays and for recordings, and a program reads one version of each: any other is refused with the
-//! version and the program that wrote it. Files that only the program writes keep their contents in the field `run`, whose
-//! CRC-32 is in `crc32`: any change is noticed. Paths of recordings are relative to the folder of the file; those of
-//! recordings in the user's home, seen from a folder elsewhere, are names alone.
+//! All are JSON with the fields `format`, `version` and `program`, the program that wrote the file. Each kind serves
+//! simulated arrays and recordings alike. A program reads one version of each kind; any other is refused with the
+//! version and the program that wrote it. Files that only the program writes keep their contents in the field `run`,
+//! whose CRC-32 is in `crc32`, which detects any change. Paths of recordings are relative to the folder of the file;
+//! recordings in the user's home, seen from a folder elsewhere, are stored by file name only.
 //!
 //! *Network file* (`decoupler network`, [`NetworkFile`]): `settings` of the run with its source, `recorded` (only of a
 //! recording: the plan that reads it, CRC-32 of each file and of the samples), `problem` (names, units and positions of
@@ -15,7 +15,7 @@
 //! starts, reason for stopping), and `scores` (errors of network and baselines on the test set).
 //!
 //! *Checkpoint* (`decoupler checkpoint`, [`CheckpointFile`]): `settings` and `recorded` as above, `wall_time`, and `starts`,
-//! the state of every training. It has no samples: they are drawn or read again, and those of a recording are compared with
+//! the state of every training. It has no samples: they are drawn or read again, and recorded samples are compared with
 //! their CRC-32.
 //!
 //! *Recipe* (`decoupler recipe`, [`RecipeFile`]), to be written by hand too: `source`, which is either `simulated` (sensor,

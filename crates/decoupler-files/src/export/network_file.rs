@@ -61,11 +61,11 @@ struct Document {
 }
 
 impl NetworkFile {
-    /// Takes the best network of `run` so far, with its record and errors; `recorded` is the origin of its samples if they are
-    /// recorded.
+    /// Captures the best network of `run` so far, with its record and errors; `recorded` is the origin of its samples
+    /// if they are recorded.
     ///
     /// # Errors
-    /// [`DocumentError::NoPlan`] if the samples are recorded and nothing says where.
+    /// [`DocumentError::NoPlan`] if the samples are recorded and no plan is given.
     pub fn from_run(run: &Run, recorded: Option<&Recorded>) -> Result<Self, DocumentError> {
         let scores = run.scores().ok_or(DocumentError::NoPlan(KIND))?;
         Ok(Self {
@@ -80,8 +80,8 @@ impl NetworkFile {
         })
     }
 
-    /// Takes the network that `run` would have kept had it been stopped at a past epoch, with its record until then and its
-    /// errors.
+    /// Captures the network that `run` would have kept if it had been stopped at a past epoch, with its record until
+    /// then and its errors.
     ///
     /// # Errors
     /// As [`Self::from_run`].
@@ -93,7 +93,7 @@ impl NetworkFile {
         Ok(file)
     }
 
-    /// Returns a parser of lines with the inputs of the network of a recording.
+    /// Returns a parser for lines with the inputs of a network that was trained on a recording.
     pub fn input_lines(&self) -> InputLines {
         let recorded = self.recorded.as_ref();
         let row_wire = recorded.and_then(|recorded| recorded.plan.import.row_wire.clone());
@@ -105,13 +105,13 @@ impl NetworkFile {
     /// Setup of the run.
     pub fn setup(&self) -> Setup {
         let plan = self.recorded.as_ref().map(|recorded| recorded.plan.clone());
-        Setup::of(self.settings, plan).expect("a file of a recording has its plan, as reading and writing check")
+        Setup::of(self.settings, plan).expect("reading and writing check that a recording has its plan")
     }
 
     /// Returns the test set of the run, drawn or read again, as a report of it needs.
     ///
     /// # Errors
-    /// The recording is missing or has changed, or the settings are impossible.
+    /// The recording is missing or has changed, or the settings are invalid.
     pub fn test_set(&self) -> Result<Arc<Dataset>, SetupError> {
         if let Some(settings) = self.settings.simulated() {
             return Ok(Arc::new(settings.draw_test()?));
@@ -180,8 +180,8 @@ impl NetworkFile {
     pub fn load(path: &Path) -> Result<Self, DocumentError> {
         let bytes = KIND.read(path)?;
         let read = Self::parse(&bytes, folder_of(path));
-        let sound = read.and_then(|file| defect(&file).map_or(Ok(file), Err));
-        sound.map_err(|defect| KIND.damaged(path, defect))
+        let checked = read.and_then(|file| defect(&file).map_or(Ok(file), Err));
+        checked.map_err(|defect| KIND.damaged(path, defect))
     }
 
     /// Describes the first defect that would keep the file from being read back.
@@ -205,7 +205,7 @@ impl NetworkFile {
     }
 }
 
-/// Layout of a file with a checksum: a heading and the record of a run. A change anywhere in the record is noticed.
+/// Layout of a file with a checksum: a heading and the record of a run. The checksum detects any change to the record.
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Sealed<'a> {
@@ -247,7 +247,7 @@ impl<'a> Sealed<'a> {
     /// # Errors
     /// The path cannot be written, or the file would be too large to be read again.
     pub(super) fn save(&self, path: &Path, commit: Commit) -> Result<(), WriteError> {
-        /// More than the heading takes.
+        /// Upper bound on the length of the heading.
         const HEADING: u64 = 1 << 10;
         let error = |source| WriteError::io(path, source);
         if self.run.get().len() as u64 + HEADING > LARGEST_BYTES {
@@ -310,7 +310,7 @@ pub(super) fn defect(file: &NetworkFile) -> Option<String> {
     ];
     let is_placed = |position: &TargetPosition| position.target < problem.targets.len();
     let problem_defect = match simulated {
-        Some(settings) if *problem != settings.source.problem() => Some("problem: it is not that of the array"),
+        Some(settings) if *problem != settings.source.problem() => Some("problem: it does not match the array"),
         None if problem.has_nodes => Some("problem: the targets of a recording are not nodes"),
         None if !problem.positions.iter().all(is_placed) => Some("problem.positions: a target does not exist"),
         _ => None,
@@ -320,7 +320,7 @@ pub(super) fn defect(file: &NetworkFile) -> Option<String> {
         .or_else(|| defects.into_iter().flatten().next())
 }
 
-/// Describes the first impossible value of the settings in a file, and its field.
+/// Describes the first invalid value of the settings in a file, and its field.
 pub(super) fn settings_defect(settings: &RunSettings, recorded: Option<&Recorded>) -> Option<String> {
     let at = |field: &str, defect: &dyn Display| format!("{field}: {defect}");
     let training = settings
@@ -397,8 +397,8 @@ fn mismatch(network: &DecouplingNetwork, problem: &Problem, hidden: usize) -> Op
     ))
 }
 
-/// Describes the first coordinate of a training whose range no node of the scene reaches, even with a stroke to spare.
-/// Expects networks whose sizes and number fit the settings, and says nothing of others.
+/// Describes the first coordinate whose training range is out of reach of the nodes of the scene, even with a margin of
+/// one stroke. Networks whose sizes or number do not match the settings are not checked.
 fn place_defect(networks: &Networks, settings: &SimulatedSettings) -> Option<String> {
     let source = &settings.source;
     let (sensor, scene) = (&source.sensor, &source.scene);
@@ -423,10 +423,10 @@ fn place_defect(networks: &Networks, settings: &SimulatedSettings) -> Option<Str
             });
             let rounding_mm = 1e-9 * (low.abs().max(high.abs()) + spare_mm);
             let possible = low - spare_mm - rounding_mm..=high + spare_mm + rounding_mm;
-            let (least, most) = outputs.extremes(channel);
-            if !(possible.contains(&least) && possible.contains(&most)) {
+            let (min, max) = outputs.extremes(channel);
+            if !(possible.contains(&min) && possible.contains(&max)) {
                 return Some(format!(
-                    "network: node {} was trained from {least:e} to {most:e} mm, but lies from {low} to {high} mm",
+                    "network: node {} was trained from {min:e} to {max:e} mm, but lies from {low} to {high} mm",
                     node + 1
                 ));
             }

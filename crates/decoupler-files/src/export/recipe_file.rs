@@ -17,7 +17,7 @@ const KIND: DocumentKind = DocumentKind::Recipe;
 ///  "source": {"simulated": {"sensor": {"scale": "10x6_3x18"}, "samples": 500}}}
 /// ```
 ///
-/// describes a simulated array; what is left out has the value of the paper's main experiment. With
+/// describes a simulated array; omitted fields have the values of the paper's main experiment. With
 /// `"source": {"recording": {"import": {"data": "press.csv", "inputs": ["c1..c8"], "targets": ["force"]}}}` the samples are
 /// those of files, whose paths are relative to the folder of the recipe.
 #[derive(Clone, Debug, PartialEq)]
@@ -59,7 +59,7 @@ impl From<&Setup> for RecipeSource {
         match (setup.plan(), setup.settings().source) {
             (Some(plan), _) => plan.into(),
             (None, Source::Simulated(simulation)) => simulation.into(),
-            (None, Source::Measured(_)) => unreachable!("the setup of a recording has its plan"),
+            (None, Source::Measured(_)) => unreachable!("the setup of a recording has a plan"),
         }
     }
 }
@@ -88,7 +88,7 @@ impl RecipeFile {
     /// Reads the source in the file at `path`, with paths relative to the working folder.
     ///
     /// # Errors
-    /// The file cannot be read, is of another kind or version, has an unknown field, or describes an impossible sensor or
+    /// The file cannot be read, is of another kind or version, has an unknown field, or describes an invalid sensor or
     /// scene.
     pub fn load(path: &Path) -> Result<RecipeSource, DocumentError> {
         let bytes = KIND.read(path)?;
@@ -115,7 +115,7 @@ impl RecipeFile {
     }
 }
 
-/// Describes what is impossible in a simulation.
+/// Describes the first invalid value of a simulation.
 fn check(source: Simulation) -> Result<(), String> {
     source.sensor.check().map_err(|error| error.to_string())?;
     source.scene.check().map_err(|error| error.to_string())?;

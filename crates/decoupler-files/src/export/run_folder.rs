@@ -39,9 +39,9 @@ pub struct KeptRun {
 
 /// The run list and the folder that keeps it.
 ///
-/// Each run is a network file of its own, written once and never again. Its name is another small file, and so is the
-/// pair that is compared; each is written when it changes. So several programs share a folder without locks: no two
-/// write the same run, the last name given counts, and [`Self::look`] finds what others have done.
+/// Each run is a separate network file, which is written once and never changed. Its name is another small file, and so
+/// is the pair that is compared; each is written when it changes. Several programs can therefore share a folder without
+/// locks: no two write the same run, the last name given counts, and [`Self::look`] finds the changes made by others.
 ///
 /// A run that cannot be written stays in memory.
 #[derive(Debug, Default)]
@@ -49,10 +49,10 @@ pub struct RunFolder {
     /// `None` if runs are not kept.
     path: Option<PathBuf>,
     kept: KeptRuns,
-    /// Runs that are in memory only.
+    /// Runs that exist only in memory.
     unwritten: BTreeSet<u64>,
     /// Problems that [`Self::look`] has returned.
-    told: BTreeSet<String>,
+    reported: BTreeSet<String>,
 }
 
 impl RunFolder {
@@ -75,7 +75,7 @@ impl RunFolder {
         self.path.as_deref()
     }
 
-    /// The list as it was last seen.
+    /// The list as of the last look.
     pub fn runs(&self) -> &KeptRuns {
         &self.kept
     }
@@ -136,7 +136,7 @@ impl RunFolder {
     }
 
     fn untold(&mut self, mut problems: Vec<String>) -> Vec<String> {
-        problems.retain(|problem| self.told.insert(problem.clone()));
+        problems.retain(|problem| self.reported.insert(problem.clone()));
         problems
     }
 
@@ -155,7 +155,7 @@ impl RunFolder {
         written
     }
 
-    /// Writes the run under an id that no other has, not even one that another program is writing just now.
+    /// Writes the run under a unique id, even while other programs write runs to the folder.
     fn write_run(&self, file: &NetworkFile, name: &str) -> (u64, Result<(), DocumentError>) {
         let now = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
         let mut id = u64::try_from(now.as_micros()).unwrap_or(0);
@@ -172,7 +172,7 @@ impl RunFolder {
         }
     }
 
-    /// Gives run `id` another name.
+    /// Renames run `id`.
     ///
     /// # Errors
     /// The name cannot be written; it then lasts until the next look.
@@ -199,7 +199,7 @@ impl RunFolder {
         }
     }
 
-    /// Removes run `id` for good.
+    /// Removes run `id` permanently.
     ///
     /// # Errors
     /// Its file cannot be removed; the next look finds it again.
@@ -219,7 +219,7 @@ impl RunFolder {
         removed
     }
 
-    /// The folder, if it has the file of run `id`.
+    /// Returns the folder if it has the file of run `id`.
     fn folder_of(&self, id: u64) -> Option<&Path> {
         self.path().filter(|folder| run_path(folder, id).exists())
     }
@@ -259,7 +259,7 @@ pub(super) fn ids(folder: &Path) -> io::Result<Vec<u64>> {
         let name = entry?.file_name();
         let id = name.to_str().and_then(|name| {
             let id = name.strip_prefix("run-")?.strip_suffix(".json")?.parse().ok()?;
-            // Not "run-007.json", which is no one's.
+            // Excludes "run-007.json", which no program writes.
             (run_path(Path::new(""), id) == Path::new(name)).then_some(id)
         });
         ids.extend(id);

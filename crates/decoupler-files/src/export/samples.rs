@@ -31,8 +31,8 @@ pub fn write_samples_header(scale: ArrayScale, with_decoded: bool, writer: &mut 
 }
 
 /// Writes the samples of `set` as CSV: snapshot and row-wire, M4 resistances in ohm, x, y, z of each node in
-/// millimetres, and the same as `decoded_mm` (samples × 3·M2) has it. Row-wires are written counted from 1, snapshots from
-/// `first_snapshot`; the row-wire is empty where it is not known.
+/// millimetres, and the decoded coordinates `decoded_mm` (samples × 3·M2). Row-wires are written counted from 1,
+/// snapshots from `first_snapshot`; the row-wire is empty where it is not known.
 ///
 /// # Errors
 /// Any error of `writer`.
@@ -85,7 +85,7 @@ pub fn write_decoded(
     writeln!(writer, ",{coordinates_outside}")
 }
 
-/// Writes `x_1,y_1,z_1,…` for the nodes of a row-wire, each name after `before`.
+/// Writes `x_1,y_1,z_1,…` for the nodes of a row-wire, each name prefixed with `before`.
 fn write_names(before: &str, nodes: usize, writer: &mut dyn Write) -> io::Result<()> {
     for node in 1..=nodes {
         let separator = if node == 1 { "" } else { "," };
@@ -94,7 +94,7 @@ fn write_names(before: &str, nodes: usize, writer: &mut dyn Write) -> io::Result
     Ok(())
 }
 
-/// Writes numbers, separated by commas, so that reading gives the same bits.
+/// Writes numbers separated by commas; they read back bit for bit.
 fn write_numbers<'a>(numbers: impl IntoIterator<Item = &'a f64>, writer: &mut dyn Write) -> io::Result<()> {
     let mut separator = "";
     for number in numbers {
@@ -108,7 +108,7 @@ fn write_numbers<'a>(numbers: impl IntoIterator<Item = &'a f64>, writer: &mut dy
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "Document", into = "Document")]
 pub struct TrainingRecord {
-    /// Reason for which training ended; `None` while it runs.
+    /// Reason why training ended; `None` while it runs.
     pub stop_reason: Option<StopReason>,
     /// Epoch of the best network.
     pub best_epoch: usize,
@@ -118,12 +118,12 @@ pub struct TrainingRecord {
     pub history: Vec<EpochRecord>,
     /// Training methods in the order in which they were used.
     pub stages: Vec<Stage>,
-    /// All starts of the run, of which the best gave the network. Empty for the network of a past epoch.
+    /// All starts of the run; the network is from the best one. Empty for the network of a past epoch.
     pub starts: Vec<StartRecord>,
 }
 
 impl TrainingRecord {
-    /// Takes the record of `run` so far.
+    /// Captures the record of `run` so far.
     pub(super) fn of(run: &Run) -> Self {
         let trainer = run.leader();
         Self {
@@ -136,7 +136,7 @@ impl TrainingRecord {
         }
     }
 
-    /// Takes the record of the start that led at a past epoch until then.
+    /// Captures the record, until a past epoch, of the start that was best at that epoch.
     pub(super) fn until(run: &Run, past: &PastNetwork) -> Self {
         let trainer = run.trainers().get(past.start).unwrap_or_else(|| run.leader());
         let epochs = trainer.history().partition_point(|record| record.epoch <= past.epoch);

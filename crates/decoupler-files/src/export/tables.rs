@@ -13,7 +13,8 @@ use serde_json::error::Category;
 
 use super::{Cell, Table, TableColumn, format_number};
 
-/// Returns the error table: a row for each decoder and baseline, in a recording for each of every target.
+/// Returns the error table: a row for each decoder and baseline; for a recording, a row for each of them and each
+/// target.
 pub fn error_table(table: &ErrorTable) -> Table {
     let has_targets = table.blocks.iter().any(|block| block.target.is_some());
     let target = has_targets.then(|| TableColumn::new("target", "Target", ""));
@@ -37,8 +38,8 @@ pub fn error_table(table: &ErrorTable) -> Table {
     }
 }
 
-/// Returns the table of measured decoders: for an array a row for each, and the Bayesian `reference` if it is more than
-/// rounding; for a recording a row for each decoder and target.
+/// Returns the table of measured decoders: for an array a row for each, and the Bayesian `reference` if it exceeds
+/// rounding errors; for a recording a row for each decoder and target.
 pub fn decoder_table(problem: &Problem, reports: &[DecoderReport], reference: Option<&TestErrors>) -> Table {
     if problem.has_nodes {
         array_decoder_table(reports, reference.and_then(TestErrors::nodes))
@@ -118,7 +119,7 @@ fn error_column(measure: ErrorMeasure) -> TableColumn {
     TableColumn::new(measure.field(), heading, unit)
 }
 
-/// Writes the errors of every epoch as CSV, in the manner of [`Table::write_csv`].
+/// Writes the errors of every epoch as CSV, formatted as by [`Table::write_csv`].
 ///
 /// # Errors
 /// Any error of `writer`.
@@ -152,7 +153,7 @@ fn write_optional(value: Option<f64>, writer: &mut dyn Write) -> io::Result<()> 
     }
 }
 
-/// The fields that identify a JSON file of ours, read before the rest, which differs between versions.
+/// Fields that identify a JSON file of Decoupler. They are read before the rest, which differs between versions.
 #[derive(Deserialize)]
 pub(super) struct Heading {
     pub(super) format: serde_json::Value,
@@ -162,7 +163,7 @@ pub(super) struct Heading {
     program: serde_json::Value,
 }
 
-/// Reasons for which a file has no heading of ours.
+/// Reasons why a file has no heading of Decoupler.
 pub(super) enum NoHeading {
     /// Not JSON; the parser's message, with line and column.
     NotJson(String),
@@ -179,7 +180,7 @@ impl Heading {
                 line: error.line(),
                 column: error.column(),
             };
-            // To the parser a number that ends with the file, as "1e", is invalid; to us the file was cut off.
+            // The parser reports an incomplete number such as "1e" as invalid, but the file was cut off.
             match error.classify() {
                 _ if bytes.trim_ascii().is_empty() => NoHeading::NotJson("it is empty".to_owned()),
                 Category::Eof => cut_off,
@@ -201,8 +202,7 @@ impl Heading {
     }
 }
 
-/// Returns whether the parser stopped in a number with which the file ends, as `1e`: to the parser it is invalid, to us
-/// the file was cut off.
+/// Returns true if the parser stopped in a number at the end of the file, such as `1e`.
 fn in_last_number(bytes: &[u8], error: &serde_json::Error) -> bool {
     let text = bytes.trim_ascii_end();
     let last_line = text.rsplit(|byte| *byte == b'\n').next().unwrap_or_default();
@@ -221,7 +221,7 @@ pub fn describe_determinacy(targets: &[Channel], measured: &[Result<Determinatio
     targets.iter().zip(measured).filter_map(of).collect()
 }
 
-/// Describes the positions of targets: their number, and the grid if they are one; `None` if no target has a position.
+/// Describes the positions of targets: their number, and the grid if they form one; `None` if no target has a position.
 pub fn describe_positions(positions: &[TargetPosition]) -> Option<String> {
     let count = match positions.len() {
         0 => return None,
@@ -234,7 +234,7 @@ pub fn describe_positions(positions: &[TargetPosition]) -> Option<String> {
     })
 }
 
-/// Describes how much of a target the readings explain, by the better of network and ridge.
+/// Describes how much of a target the readings explain, judged by the better of network and ridge.
 pub fn describe_target(name: &str, found: &TargetFindings) -> String {
     match found.best() {
         Some((_, best)) if found.network.is_some() => best.sentence(name),
@@ -260,7 +260,7 @@ pub fn describe_warnings(inputs: &[Channel], targets: &[Channel], findings: &Fin
 
 /// Warns of the targets on which the network is worse than ridge, or no better to three digits; `None` if there are none.
 pub fn describe_worse_than_ridge(problem: &Problem, scores: &Scores, method: Method) -> Option<String> {
-    /// Targets that are named; of a skin there can be hundreds.
+    /// Maximum number of targets that are named; a skin can have hundreds.
     const NAMED: usize = 3;
     let errors = scores.network.targets().iter().zip(scores.baselines.linear.targets());
     let all = problem.targets.iter().zip(errors);
@@ -291,7 +291,7 @@ pub fn describe_worse_than_ridge(problem: &Problem, scores: &Scores, method: Met
     };
     let targets = targets.join(", ");
     Some(format!(
-        "the network is {comparison} ridge regression for {targets}{more}: take ridge, {cure}"
+        "the network is {comparison} ridge regression for {targets}{more}: use ridge, {cure}"
     ))
 }
 
@@ -300,7 +300,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn an_error_table_has_gaps_where_the_paper_is_silent() {
+    fn an_error_table_has_gaps_where_the_paper_gives_no_error() {
         let row = ErrorRow {
             name: "published",
             errors: vec![Some(2.28), Some(0.22), Some(2.39e-12), None, None, None],

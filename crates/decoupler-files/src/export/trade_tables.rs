@@ -8,7 +8,7 @@ use decoupler_core::{
 use super::{Cell, Table, TableColumn, format_duration};
 use crate::figure::point_name;
 
-/// Every point of every level, with all its figures: for programs.
+/// Returns the table of all points of all levels with all their figures, for programs.
 pub fn trade_off_points(levels: &[TradeOffLevel]) -> Table {
     const FIELDS: [&str; 17] = [
         "noise",
@@ -83,7 +83,7 @@ pub fn trade_off_points(levels: &[TradeOffLevel]) -> Table {
     table
 }
 
-/// The points of one level, fastest first: for readers.
+/// Returns the table of the points of one level, fastest first, for readers.
 pub fn trade_off_summary(level: &TradeOffLevel) -> Table {
     let row = |point: &TradeOffPoint| {
         vec![
@@ -123,7 +123,7 @@ pub fn trade_off_summary(level: &TradeOffLevel) -> Table {
 }
 
 /// Describes the memory and time that a run will take on this machine. The first call measures its speed, which takes
-/// some 20 ms.
+/// about 20 ms.
 pub fn describe_workload(workload: &Workload) -> String {
     let gigabytes = |bytes: u64| format!("{:.1} GB", bytes as f64 * 1e-9);
     let memory = MachineMemory::of_this_machine();
@@ -138,7 +138,7 @@ pub fn describe_workload(workload: &Workload) -> String {
     } = workload.time();
     format!(
         "about {}{machine} of memory; on one thread about {} to draw the samples and {} per epoch, {} for {}; the \
-         figures of the decoders take further time",
+         figures of the decoders take additional time",
         gigabytes(workload.bytes),
         format_duration(drawing),
         format_duration(epoch),

@@ -12,26 +12,27 @@ use tempfile::{NamedTempFile, PersistError};
 const PREFIX: &str = ".decoupler-";
 const SUFFIX: &str = ".part";
 
-/// Paths of all files and folders in the making. A program that is ended from another thread drops nothing, so it looks here.
+/// Paths of all unfinished files and folders. A program that exits from another thread drops nothing, so [`exit_leaving_nothing`]
+/// removes these.
 static ALL: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
 
 fn all() -> MutexGuard<'static, BTreeSet<PathBuf>> {
-    // A set is whole at any time.
+    // A panic elsewhere does not leave the set inconsistent.
     ALL.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Folders in which this program has looked for what others left.
+/// Folders in which this program has removed the unfinished files of killed programs.
 static SWEPT: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
 
-/// A file in the making, removed when dropped. It is locked while it is worked on: one that is not locked was left by a
-/// program that was killed.
+/// An unfinished file, removed when dropped. It is locked while in use; an unlocked one was left by a program that was
+/// killed.
 #[derive(Debug)]
 pub(super) struct Unfinished {
     file: NamedTempFile,
     listed: Listed,
 }
 
-/// An entry of [`ALL`], while it lives.
+/// An entry of [`ALL`], removed when dropped.
 #[derive(Debug)]
 struct Listed(PathBuf);
 
@@ -42,8 +43,8 @@ impl Drop for Listed {
 }
 
 impl Unfinished {
-    /// Begins a temporary file in `folder`, created with the default permissions (0666 minus the umask). The first time
-    /// it removes what killed programs left there.
+    /// Creates a temporary file in `folder` with the default permissions (0666 minus the umask). The first call for a
+    /// folder removes files left there by killed programs.
     pub(super) fn begin(folder: &Path) -> io::Result<Self> {
         sweep_once(folder);
         let mut builder = tempfile::Builder::new();
@@ -56,7 +57,7 @@ impl Unfinished {
         let mut all = all();
         let file = loop {
             let file = builder.tempfile_in(folder).map_err(plain)?;
-            // Some file systems have no locks: no one will sweep there.
+            // Some file systems have no locks; nothing is swept there.
             let _ = file.as_file().lock();
             // Another program may have swept it before it was locked.
             if file.path().exists() {
@@ -72,12 +73,12 @@ impl Unfinished {
         self.file.as_file()
     }
 
-    /// Puts it in the place of `target`.
+    /// Renames it to `target`, replacing a file there.
     pub(super) fn persist(self, target: &Path) -> io::Result<()> {
         self.persist_by(target, NamedTempFile::persist)
     }
 
-    /// Puts it at `target`, where no file may be.
+    /// Renames it to `target`, which must not exist.
     pub(super) fn persist_new(self, target: &Path) -> io::Result<()> {
         self.persist_by(target, NamedTempFile::persist_noclobber)
     }
@@ -96,24 +97,24 @@ impl Unfinished {
     }
 }
 
-/// The system's own words: the default error repeats the temporary name, which means nothing to the user.
+/// Returns the system's error: the default one contains the temporary name, which the user does not know.
 fn plain(error: io::Error) -> io::Error {
     error.raw_os_error().map_or(error, io::Error::from_raw_os_error)
 }
 
-/// A folder in the making, removed when dropped, and locked as [`Unfinished`] is. Windows cannot lock a folder, so none
-/// is swept there.
+/// An unfinished folder, removed when dropped, and locked like [`Unfinished`]. Windows cannot lock folders, so none is
+/// swept there.
 #[derive(Debug)]
 pub(super) struct UnfinishedFolder {
     folder: tempfile::TempDir,
     listed: Listed,
-    /// Held open while the folder is worked on.
+    /// Open while the folder is in use.
     lock: Option<File>,
 }
 
 impl UnfinishedFolder {
-    /// Begins a temporary folder in `parent`, created with the default permissions (0777 minus the umask). The first time
-    /// it removes what killed programs left there.
+    /// Creates a temporary folder in `parent` with the default permissions (0777 minus the umask). The first call for a
+    /// parent removes what killed programs left there.
     pub(super) fn begin(parent: &Path) -> io::Result<Self> {
         sweep_once(parent);
         let mut builder = tempfile::Builder::new();
@@ -141,11 +142,11 @@ impl UnfinishedFolder {
         self.folder.path()
     }
 
-    /// Renames it to `target`, where nothing or an empty folder may be.
+    /// Renames it to `target`, which must be missing or an empty folder.
     pub(super) fn persist(self, target: &Path) -> io::Result<()> {
         let Self { folder, listed, lock } = self;
         fs::rename(folder.path(), target)?;
-        // It is not there any more under its temporary name.
+        // Its temporary name no longer exists.
         let _ = folder.keep();
         drop((listed, lock));
         sync_folder(folder_of(target));
@@ -153,7 +154,7 @@ impl UnfinishedFolder {
     }
 }
 
-/// Opens and locks a folder that no one else works on.
+/// Opens and locks a folder that is not in use.
 fn locked_folder(path: &Path) -> Option<File> {
     let folder = File::open(path).ok()?;
     folder.try_lock().is_ok().then_some(folder)
@@ -165,9 +166,9 @@ pub(super) fn folder_of(path: &Path) -> &Path {
     parent.unwrap_or(Path::new("."))
 }
 
-/// Has the names in `folder` outlast a power failure, as far as its file system can.
+/// Makes the names in `folder` survive a power failure, as far as its file system can.
 fn sync_folder(folder: &Path) {
-    // The file is whole and in its place, so there is nothing to fail; Windows opens no folders.
+    // Errors are ignored because the file is complete and in place. Windows cannot open folders.
     if cfg!(unix) {
         let _ = File::open(folder).and_then(|folder| folder.sync_all());
     }
@@ -184,7 +185,7 @@ fn sweep_once(folder: &Path) {
     }
 }
 
-/// Removes the unfinished files and folders in `folder` that no one works on. What cannot be removed stays.
+/// Removes the unfinished files and folders in `folder` that are not in use. Those that cannot be removed stay.
 fn sweep(folder: &Path) {
     let Ok(entries) = fs::read_dir(folder) else { return };
     for entry in entries.flatten() {
@@ -205,7 +206,7 @@ fn sweep(folder: &Path) {
 }
 
 fn is_our_name(name: &OsStr) -> bool {
-    /// As many as the random part has by default.
+    /// Default length of the random part.
     const RANDOM: usize = 6;
     let random = name
         .to_str()
@@ -213,12 +214,12 @@ fn is_our_name(name: &OsStr) -> bool {
     random.is_some_and(|random| random.len() == RANDOM && random.bytes().all(|byte| byte.is_ascii_alphanumeric()))
 }
 
-/// Ends the program with this exit status, from any thread. Files in the making leave nothing.
+/// Ends the program with this exit status, from any thread, after removing unfinished files.
 pub fn exit_leaving_nothing(status: i32) -> ! {
-    // Held to the end, so that no other thread begins one meanwhile.
+    // Held until the end, so no other thread can add an entry.
     let all = all();
     for path in all.iter() {
-        // It may have found its place or have been removed just now.
+        // It may have been renamed or removed just now.
         let _ = std::fs::remove_file(path).or_else(|_| std::fs::remove_dir_all(path));
     }
     std::process::exit(status)
@@ -229,7 +230,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_folder_at_work_stays_and_one_that_was_left_is_removed() {
+    fn a_folder_in_use_stays_and_one_that_was_left_is_removed() {
         let home = tempfile::tempdir().unwrap();
         let at_work = UnfinishedFolder::begin(home.path()).unwrap();
         fs::write(at_work.path().join("half"), "1").unwrap();

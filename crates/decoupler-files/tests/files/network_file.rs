@@ -151,7 +151,7 @@ fn impossible_contents_are_named() {
         (
             "another array",
             replaced("10×6_3×18", "10×8_4×24"),
-            "problem: it is not that of the array",
+            "problem: it does not match the array",
         ),
         (
             "no array",

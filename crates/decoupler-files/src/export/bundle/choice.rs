@@ -12,7 +12,7 @@ use super::{
     weights::{self, Digits},
 };
 
-/// Form in which a network leaves the program.
+/// Format in which a decoder is exported.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum BundleFormat {
     /// A graph for ONNX runtimes, opset 13.
@@ -27,7 +27,7 @@ pub enum BundleFormat {
     Json,
 }
 
-/// Numbers in which a bundle decodes.
+/// Numbers with which a bundle computes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum BundlePrecision {
     /// Double precision.
@@ -35,11 +35,11 @@ pub enum BundlePrecision {
     Double,
     /// Single precision; sums that would lose too much in it stay in double precision.
     Single,
-    /// Whole numbers only: weights and activations of 16 bits.
+    /// Integers only: weights and activations of 16 bits.
     Fixed16,
 }
 
-/// Error for a word that names no format or precision, or for a pair of them that does not exist.
+/// Errors of unknown formats, decoders and precisions, and of unsupported combinations.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 #[non_exhaustive]
 pub enum ChoiceError {
@@ -49,10 +49,10 @@ pub enum ChoiceError {
     /// No such decoder.
     #[error("'{0}' is not a decoder: give one of {all}", all = decoder_words())]
     Decoder(String),
-    /// Whole numbers for another decoder than a network.
+    /// Fixed point for a decoder other than a network.
     #[error("fixed16 is for networks only: give f64 or f32")]
     WholeNumbers,
-    /// A format that has no iterations.
+    /// A format that cannot express iterations.
     #[error(
         "{format} cannot express the iteration of {decoder} on the equations of the sensor: give {}, or take another decoder",
         iterating()
@@ -64,7 +64,7 @@ pub enum ChoiceError {
         decoder: BundleDecoder,
     },
     /// Equations in single precision.
-    #[error("{0} solves equations that magnify the rounding of readings in single precision beyond use: give f64")]
+    #[error("{0} solves equations that amplify the rounding errors of single-precision readings too much: give f64")]
     SingleEquations(BundleDecoder),
     /// No such precision.
     #[error("'{0}' is not a precision: give f64, f32 or fixed16")]
@@ -92,9 +92,9 @@ struct Entry {
 /// Functions that write a format.
 #[derive(Clone, Copy)]
 pub(super) struct Writer {
-    /// Writes the files of a folder in floating point, and evaluates them as they are read back.
+    /// Writes the files of a folder in floating point, reads them back and evaluates them.
     pub(super) export: fn(&mut Draft<'_>) -> Result<Vec<BundleCheck>, BundleError>,
-    /// Says how to call the bundle.
+    /// Returns the usage section of the README.
     pub(super) call: fn(&Call<'_>) -> String,
 }
 
@@ -168,7 +168,7 @@ impl BundleFormat {
         self.entry().precisions
     }
 
-    /// Says what each format is, for the help of a command.
+    /// Describes each format, for the help of a command.
     pub fn help() -> String {
         let lines = Self::ALL.map(|format| format!("{format}: {}", format.entry().help));
         lines.join("; ")
@@ -219,7 +219,7 @@ impl BundleFormat {
     }
 }
 
-/// Lists the formats that have iterations.
+/// Lists the formats that can express iterations.
 fn iterating() -> String {
     let formats = BundleFormat::ALL
         .into_iter()
@@ -278,7 +278,7 @@ impl FromStr for BundlePrecision {
     }
 }
 
-/// Decoder that leaves the program as a bundle.
+/// Decoder that is exported as a bundle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum BundleDecoder {
     /// One of the decoders that are compared with the network.
@@ -293,7 +293,7 @@ impl BundleDecoder {
         DecoderKind::ALL.into_iter().map(Self::Kind).chain([Self::Linear])
     }
 
-    /// Says what each decoder is, for the help of a command.
+    /// Describes each decoder, for the help of a command.
     pub fn help() -> String {
         let line = |decoder: Self| {
             let meaning = match decoder {
@@ -360,28 +360,29 @@ impl FromStr for BundleDecoder {
     }
 }
 
-/// Form in which a bundle takes readings, and to which its callers round what they have.
+/// Numbers in which a bundle takes readings; callers round their readings to them.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Taking<'a> {
     /// Double precision.
     Double,
     /// Single precision.
     Single,
-    /// Whole numbers of units.
+    /// Integer multiples of units.
     Whole(&'a FixedNetworks),
 }
 
-/// Changes of the outputs by rounding the readings to the form that a bundle takes, relative to their scales.
+/// Changes of the outputs caused by rounding the readings to the numbers that a bundle takes, relative to the scales of
+/// the outputs.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ReadingRounding {
     /// Largest change found.
     pub largest: f64,
-    /// Largest change possible, to first order, at the readings that were tried.
+    /// First-order bound on the change at the readings that were tried.
     pub bound: f64,
 }
 
 impl Taking<'_> {
-    /// The number that a bundle is given for a reading of a channel.
+    /// Returns the number that is passed to a bundle for a reading of a channel.
     pub(super) fn rounded(self, channel: usize, reading: f64) -> f64 {
         match self {
             Self::Double => reading,
@@ -396,7 +397,7 @@ impl Taking<'_> {
             Self::Double => 0.0,
             Self::Single => {
                 let of_digits = reading.abs() * Digits::Single.unit_roundoff();
-                // Below the smallest normal number there are fewer digits.
+                // Subnormal numbers have fewer digits.
                 of_digits.max(0.5 * f64::from(f32::from_bits(1)))
             }
             Self::Whole(networks) => 0.5 * networks.readings.unit(channel),
@@ -405,7 +406,7 @@ impl Taking<'_> {
 }
 
 impl ReadingRounding {
-    /// Largest change with which a bundle is still written.
+    /// Largest change for which a bundle is still written.
     pub(super) const LARGEST: f64 = 0.01;
 
     /// The larger of both figures.
@@ -423,7 +424,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn names_come_back_and_pairs_that_do_not_exist_are_refused_with_those_that_do() {
+    fn names_round_trip_and_unsupported_pairs_are_refused_with_the_supported_ones() {
         for format in BundleFormat::ALL {
             assert_eq!(format.to_string().parse(), Ok(format));
             assert_eq!(format.check(BundlePrecision::default()), Ok(()), "{format}");

@@ -8,10 +8,10 @@ use ndarray::{Array1, Array2, ArrayView1};
 
 use super::portable::{FoldedMap, Portable};
 
-/// Answer of a decoder to a reading, and how much rounding can change it.
+/// Answer of a decoder to a reading, and its sensitivity to rounding.
 #[derive(Clone, Debug)]
 pub(super) struct Exact {
-    /// Outputs, exact except for their own last digits.
+    /// Outputs, exact to about their last digits.
     pub(super) answers: Vec<f64>,
     /// Sums of magnitudes by which rounding errors grow.
     pub(super) growth: ErrorGrowth,
@@ -19,11 +19,11 @@ pub(super) struct Exact {
     slopes: Array2<f64>,
 }
 
-/// Largest changes of an output relative to its scale, to first order, per relative error of each number that is added up in
+/// Largest changes of an output relative to its scale, to first order, per relative error of each term of the sums in
 /// each layer.
 ///
 /// An error bound of a sum is a multiple of its magnitudes (N. J. Higham, Accuracy and Stability of Numerical Algorithms,
-/// section 3.1), here carried through the layers behind it to the outputs.
+/// section 3.1), here propagated through the following layers to the outputs.
 #[derive(Clone, Debug, Default)]
 pub(super) struct ErrorGrowth(pub(super) Vec<f64>);
 
@@ -40,10 +40,10 @@ impl ErrorGrowth {
     }
 }
 
-/// Values after a layer, with what is needed to carry errors through it.
+/// Values after a layer, with the quantities needed to propagate errors through it.
 struct Step {
     values: Vec<Twofold>,
-    /// Sums of magnitudes of what is added up to each value.
+    /// Sum of the magnitudes of the terms of each value.
     magnitudes: Vec<f64>,
     /// Slopes of the values (values × inputs of the layer).
     slopes: Array2<f64>,
@@ -85,7 +85,7 @@ fn taken(layer: &Layer<Twofold>, inputs: &[Twofold]) -> Step {
         Layer::Affine(affine) => sums(affine, inputs),
         Layer::Tanh => {
             let values: Vec<Twofold> = inputs.iter().map(|value| value.tanh()).collect();
-            // The slope of the hyperbolic tangent where it has this value.
+            // The slope of the hyperbolic tangent at this value.
             let slope = |value: &Twofold| (1.0 - value.to_f64()) * (1.0 + value.to_f64());
             let slopes: Vec<f64> = values.iter().map(slope).collect();
             let own = values.iter().zip(inputs).zip(&slopes);
@@ -188,8 +188,8 @@ fn blended(logarithms: &Step, consequents: &Step) -> Step {
 }
 
 impl Exact {
-    /// Bound on the change of an output relative to its scale, to first order, when each of the `readings` answered may be
-    /// wrong by up to `errors`.
+    /// Bound on the change of an output relative to its scale, to first order, when each of the `readings` may be wrong
+    /// by up to `errors`.
     pub(super) fn change_by(&self, portable: &Portable, map: &FoldedMap, readings: &[f64], errors: &[f64]) -> f64 {
         let steps = readings.iter().zip(errors).zip(&map.centre);
         let steps: Vec<f64> = steps
@@ -225,9 +225,9 @@ fn change(quantity: Quantity, ohm: f64, centre: f64) -> Twofold {
 /// Number of about 32 decimal digits: the unevaluated sum of two doubles, the second below half a unit in the last place
 /// of the first.
 ///
-/// Exported networks are judged against values computed with it, because the double precision of the program itself is
-/// no better than what is judged. Algorithms: T. J. Dekker, Numerische Mathematik 18 (1971), 224-242; Y. Hida, X. S. Li
-/// and D. H. Bailey, Library for double-double and quad-double arithmetic (2007).
+/// Exported networks are compared with values computed in it, because the program's own double precision is no more
+/// accurate than theirs. Algorithms: T. J. Dekker, Numerische Mathematik 18 (1971), 224-242; Y. Hida, X. S. Li and D.
+/// H. Bailey, Library for double-double and quad-double arithmetic (2007).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Twofold {
     high: f64,
@@ -265,7 +265,7 @@ impl Twofold {
         Self::from(near) + excess - excess * excess * Self::from(0.5)
     }
 
-    /// e to this power, up to some 700; 0 where that is below the smallest normal number.
+    /// e to this power, which is at most about 700; 0 if the result is below the smallest normal number.
     pub(super) fn exp(self) -> Self {
         /// r is divided by 2⁶ and the power squared as often.
         const HALVINGS: i32 = 6;

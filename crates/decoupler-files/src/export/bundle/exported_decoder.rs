@@ -27,14 +27,14 @@ pub struct ExportedDecoder<'a> {
     fitted: FittedDecoder,
 }
 
-/// Readings of one row with the index of the row-wire, 0 where that is no argument.
+/// Readings of one row with the index of the row-wire, 0 if it is not an argument.
 pub(super) type Drawn = Vec<(usize, Vec<f64>)>;
 
-/// Facts about a decoder, for people and programs that have only the bundle: names of fields and JSON values.
+/// Facts about a decoder, for users and programs that have only the bundle: names of fields and JSON values.
 pub(super) type Metadata = Map<String, Value>;
 
 impl<'a> From<&'a NetworkFile> for ExportedDecoder<'a> {
-    /// Takes the network of a file.
+    /// Exports the network of a file.
     fn from(file: &'a NetworkFile) -> Self {
         Self {
             fitted: FittedDecoder::of_networks(&file.network, file.scores.network.clone()),
@@ -45,8 +45,8 @@ impl<'a> From<&'a NetworkFile> for ExportedDecoder<'a> {
 }
 
 impl<'a> ExportedDecoder<'a> {
-    /// Fits a decoder to the training samples of the run of `file`; `sets` are its samples, drawn or read again. Takes the
-    /// network of the file if the decoder is the network.
+    /// Fits a decoder to the training samples of the run of `file`; `sets` are its samples, drawn or read again. If the
+    /// decoder is the network, uses the network of the file.
     ///
     /// # Errors
     /// The recording has changed, the samples cannot be scaled or decoded, or no other program can compute what the decoder
@@ -103,7 +103,7 @@ impl<'a> ExportedDecoder<'a> {
         }
     }
 
-    /// Readings in training of all row-wires, or of each where the row is an argument.
+    /// Ranges of the readings in training: one for all row-wires, or one for each if the row is an argument.
     pub(super) fn reading_ranges(&self) -> &[Option<ReadingRange>] {
         &self.fitted.reading_ranges
     }
@@ -124,14 +124,15 @@ impl<'a> ExportedDecoder<'a> {
         Ok(answer)
     }
 
-    /// Number of rows decoded since this was last asked whose equations have no solution, or more than one.
+    /// Returns the number of rows decoded since the last call whose equations have no solution or more than one.
     pub(super) fn take_open_rows(&mut self) -> usize {
         let solved = self.fitted.decoder.take_solved_rows();
         solved.unsolved + solved.undetermined
     }
 
-    /// Draws readings for the verification: the number of those that are golden vectors, which come first, and all. Those of
-    /// a simulated sensor are of its scene; of a recording nothing is known but their range, in which they are even.
+    /// Draws readings for the verification. Returns the number of golden vectors, which come first, and all readings.
+    /// Readings of a simulated sensor are drawn from its scene; readings of a recording are uniform in their range in
+    /// training.
     ///
     /// # Errors
     /// The scene could not be drawn, or the range is not known.
@@ -195,7 +196,7 @@ impl<'a> ExportedDecoder<'a> {
     }
 }
 
-/// The steps of the decoder with their sizes, in words.
+/// Describes the steps of the decoder with their sizes.
 fn layers(portable: &Portable) -> Vec<String> {
     let mut inputs = portable.channels;
     let layers = portable.layers().iter().map(|layer| {
@@ -277,12 +278,12 @@ fn ranges(portable: &Portable) -> Vec<Option<Value>> {
         .collect()
 }
 
-/// A decoder fitted to training samples, with what a bundle says of these.
+/// A decoder fitted to training samples, with the facts about them that a bundle contains.
 pub(super) struct FittedDecoder {
     pub(super) kind: BundleDecoder,
     pub(super) decoder: Box<dyn Decoder>,
     pub(super) description: Description,
-    /// Readings in training of all row-wires, or of each where the row is an argument.
+    /// Ranges of the readings in training: one for all row-wires, or one for each if the row is an argument.
     pub(super) reading_ranges: Vec<Option<ReadingRange>>,
     /// Smallest and largest target in training, likewise.
     pub(super) target_extremes: Vec<Vec<(f64, f64)>>,
@@ -291,7 +292,7 @@ pub(super) struct FittedDecoder {
 }
 
 impl FittedDecoder {
-    /// Takes trained networks, which know the range of their readings themselves, and their errors on the test samples.
+    /// Wraps trained networks, which contain the range of their readings, and their errors on the test samples.
     pub(super) fn of_networks(networks: &Networks, errors: TestErrors) -> Self {
         let all = networks.values().iter();
         let extremes = all.clone().map(|network| {
@@ -313,7 +314,7 @@ impl FittedDecoder {
     /// those trained with these settings, for the decoders that need them.
     ///
     /// # Errors
-    /// The samples cannot be scaled or decoded, or no program outside this one can compute what the decoder does.
+    /// The samples cannot be scaled or decoded, or no other program can compute what the decoder does.
     pub(super) fn fit(
         settings: RunSettings,
         sets: RunSets,
@@ -365,14 +366,14 @@ pub(super) struct Origin {
     pub(super) problem: Problem,
     /// Row-wires of the samples in ascending order, from 0, if they are known.
     pub(super) row_wires: Option<Vec<usize>>,
-    /// Names of the recordings, without the folders of anyone who trained; empty for a simulated array.
+    /// Names of the recordings without their folders; empty for a simulated array.
     pub(super) files: Vec<String>,
     /// Errors of the linear baseline on the test samples.
     pub(super) errors_of_linear: TestErrors,
 }
 
 impl Origin {
-    /// Takes the facts from the file of a trained network.
+    /// Returns the facts from the file of a trained network.
     pub(super) fn of_file(file: &NetworkFile) -> Self {
         Self {
             program: file.program.clone(),
@@ -384,7 +385,7 @@ impl Origin {
         }
     }
 
-    /// Takes the facts from the samples of `setup`, for a decoder without a network.
+    /// Returns the facts from the samples of `setup`, for a decoder without a network.
     ///
     /// # Errors
     /// The samples cannot be scaled or decoded.

@@ -13,8 +13,8 @@ use super::{
 };
 use crate::export::{NetworkFile, WriteError};
 
-/// Writes a decoder as a bundle at `path`: a folder, or for [`BundleFormat::Json`] a file. What was written is
-/// read back and compared with the decoder before it is put in its place.
+/// Writes a decoder as a bundle at `path`: a folder, or for [`BundleFormat::Json`] a file. The files are read back and
+/// compared with the decoder before they are moved into place.
 ///
 /// # Errors
 /// The format lacks the precision, the decoder cannot be written in it, `path` is taken or cannot be written, or the
@@ -88,7 +88,7 @@ fn export_network_file(exported: &ExportedDecoder<'_>, path: &Path) -> Result<Bu
     Ok(of_file(path, &portable, vec![check]))
 }
 
-/// The report on a single file in double precision.
+/// Returns the report on a single file in double precision.
 fn of_file(path: &Path, portable: &Portable, checks: Vec<BundleCheck>) -> BundleReport {
     let size = fs::metadata(path).map_or(0, |found| found.len());
     BundleReport {
@@ -107,11 +107,12 @@ fn of_file(path: &Path, portable: &Portable, checks: Vec<BundleCheck>) -> Bundle
     }
 }
 
-/// Single precision throughout where that is enough, and otherwise as many first layers in double as it takes.
+/// Returns single precision for all layers if it is accurate enough, otherwise double precision for as few of the first
+/// layers as possible.
 fn single_arithmetic(portable: &Portable, vectors: &Vectors) -> Arithmetic {
-    /// Part of the limit that single precision may use in this evaluation: others add up in another order.
+    /// Fraction of the limit that single precision may use in this evaluation; other programs sum in a different order.
     const PART: f64 = 0.2;
-    /// The part where the large products that nearly cancel are in double.
+    /// The same fraction if the large products that nearly cancel are computed in double precision.
     const PART_BEHIND_WIDE_LAYERS: f64 = 0.5;
     let is_enough = |wide_layers: &usize| {
         let single = Weights::of(portable, Arithmetic::single(*wide_layers));
@@ -127,7 +128,7 @@ fn single_arithmetic(portable: &Portable, vectors: &Vectors) -> Arithmetic {
     Arithmetic::single((0..layers).find(is_enough).unwrap_or(layers))
 }
 
-/// A bundle in the making.
+/// An unfinished bundle.
 struct Bundle<'a> {
     exported: ExportedDecoder<'a>,
     name: String,
@@ -145,10 +146,10 @@ impl Bundle<'_> {
         Vectors::of(&mut self.exported, &self.portable, taking)
     }
 
-    /// Notes what rounding the readings to single precision changes.
+    /// Records how much rounding the readings to single precision changes the outputs.
     ///
     /// # Errors
-    /// It changes too much.
+    /// The change is too large.
     fn admit(&mut self, vectors: &Vectors) -> Result<(), BundleError> {
         let (portable, rounding) = (&self.portable, vectors.rounding);
         let worst = rounding.worst();
@@ -228,7 +229,7 @@ impl Bundle<'_> {
             // Readings that it cannot take were refused when they were drawn.
             outputs.map(|outputs| fixed.in_own_units(&outputs)).unwrap_or_default()
         });
-        let mut checks = vec![BundleCheck::of("bit-exact model in whole numbers", found)];
+        let mut checks = vec![BundleCheck::of("bit-exact fixed-point model", found)];
         let mut remarks = Vec::new();
         if fixed.hidden_width == HiddenWidth::TwentyFour {
             let remark = "the hidden weights have 24 bits, because their large products nearly cancel; the rest has 16";
@@ -247,7 +248,7 @@ impl Bundle<'_> {
                 "C source, compiled and run, equal to the model bit for bit",
                 deviation,
             )),
-            Compiled::NoCompiler(why) => remarks.push(format!("the C source was not compiled: {why}")),
+            Compiled::NoCompiler(reason) => remarks.push(format!("the C source was not compiled: {reason}")),
         }
         self.remarks.extend(remarks);
         let limits = Deviation {
@@ -257,7 +258,7 @@ impl Bundle<'_> {
         self.finish(path, &vectors, checks, limits, Some(&fixed))
     }
 
-    /// Checks the deviations, adds the files that every bundle has, and puts the folder in its place.
+    /// Checks the deviations, adds the files common to all bundles, and moves the folder into place.
     fn finish(
         self,
         path: &Path,

@@ -15,7 +15,7 @@ use super::{
 };
 use crate::export::{WriteError, unfinished::UnfinishedFolder};
 
-/// A folder that is filled under a temporary name next to its target and then renamed, so that it is there whole or not at
+/// A folder that is filled under a temporary name next to its target and then renamed: it exists completely or not at
 /// all. Dropped before [`Self::commit`], it leaves nothing.
 #[derive(Debug)]
 pub(super) struct AtomicFolder {
@@ -83,10 +83,10 @@ impl AtomicFolder {
         Ok(sizes().map_err(|error| WriteError::io(&self.target, error))?)
     }
 
-    /// Puts one of its files in the place of its target, and leaves nothing of the folder.
+    /// Moves one of its files to the target, and removes the folder.
     ///
     /// # Errors
-    /// Something came to be there meanwhile, or the operating system refuses.
+    /// Something has been created there in the meantime, or the operating system refuses.
     pub(super) fn commit_only(self, name: &str) -> Result<(), BundleError> {
         if fs::symlink_metadata(&self.target).is_ok() {
             return Err(BundleError::Exists(self.target));
@@ -98,7 +98,7 @@ impl AtomicFolder {
     /// Renames it to its target.
     ///
     /// # Errors
-    /// Something came to be there meanwhile, or the operating system refuses.
+    /// Something has been created there in the meantime, or the operating system refuses.
     pub(super) fn commit(self) -> Result<(), BundleError> {
         let Self { target, folder } = self;
         if is_empty_folder(&target) {
@@ -114,7 +114,7 @@ fn is_empty_folder(path: &Path) -> bool {
     fs::read_dir(path).is_ok_and(|mut entries| entries.next().is_none())
 }
 
-/// Longest identifier: with what is added to it, within the 63 characters of MATLAB's.
+/// Maximum length of the identifier: with its suffixes it stays within the 63 characters of MATLAB.
 const LONGEST: usize = 40;
 
 /// Name for functions and files, after the folder of the bundle: lower-case letters, digits and underscores.
@@ -136,7 +136,7 @@ pub(super) fn identifier(path: &Path) -> String {
     joined
 }
 
-/// A bundle of floating-point numbers in the making, which its format fills.
+/// An unfinished bundle of floating-point numbers, which its format fills.
 pub(super) struct Draft<'a> {
     /// Prefix of the names of functions and files.
     pub(super) name: &'a str,
@@ -150,12 +150,12 @@ pub(super) struct Draft<'a> {
     pub(super) remarks: &'a mut Vec<String>,
 }
 
-/// What the README says of the way to call a bundle.
+/// Facts for the usage section of the README.
 pub(super) struct Call<'a> {
     /// Prefix of the names of functions and files.
     pub(super) name: &'a str,
     pub(super) portable: &'a Portable,
-    /// For a bundle in whole numbers.
+    /// For a bundle in fixed point.
     pub(super) fixed: Option<&'a FixedNetworks>,
     pub(super) precision: BundlePrecision,
 }
@@ -177,7 +177,7 @@ impl Draft<'_> {
 }
 
 impl Call<'_> {
-    /// True if answers to readings that no deformation explains are told apart.
+    /// True if readings that no deformation explains are reported.
     pub(super) fn tells_unexplained(&self) -> bool {
         let equations = self.portable.equations.as_ref();
         equations.is_some_and(|equations| equations.seeks_solution)
@@ -201,7 +201,7 @@ mod tests {
     use crate::export::test_folder::names;
 
     #[test]
-    fn it_is_there_whole_or_not_at_all() {
+    fn a_folder_exists_completely_or_not_at_all() {
         let home = tempfile::tempdir().unwrap();
         let target = home.path().join("bundle");
         let dropped = AtomicFolder::create(&target).unwrap();
@@ -219,7 +219,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_in_the_way_stays() {
+    fn existing_files_and_folders_are_kept() {
         let home = tempfile::tempdir().unwrap();
         let [file, full] = ["file", "full"].map(|name| home.path().join(name));
         fs::write(&file, "").unwrap();
@@ -240,7 +240,7 @@ mod tests {
     }
 
     #[test]
-    fn any_folder_gives_a_name() {
+    fn every_folder_gives_a_valid_name() {
         let cases = [
             ("out/Left hand-2", "left_hand_2"),
             ("10x10_5x30", "network_10x10_5x30"),

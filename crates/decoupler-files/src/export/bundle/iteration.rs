@@ -10,12 +10,12 @@ use decoupler_core::{
 
 /// Relative misfit (root mean square) below which an answer explains its readings.
 pub(super) const EXPLAINED: f64 = 1e-10;
-/// Smallest fraction of a step; one that must be shortened further leads out of the sensor.
+/// Smallest fraction of a step; a step that must be shortened further leads out of the sensor.
 pub(super) const SHORTEST_SHARE: f64 = 1e-3;
 /// Starts of a row whose readings must be explained: the first answer, mid-range, at rest and fully pressed.
 pub(super) const STARTS: usize = 4;
 
-/// Solves rows as the sources of a bundle do, which have these very steps.
+/// Solves rows with the same steps as the sources of a bundle.
 pub(super) struct Iteration<'a> {
     equations: &'a RowProblemDescription,
     conductance: RowConductance,
@@ -33,7 +33,7 @@ impl Attempt {
         self.misfit <= EXPLAINED
     }
 
-    /// The one of the least misfit, the earlier if none is less.
+    /// Returns the attempt with the smaller misfit, the earlier one if both are equal.
     fn better(best: Option<Self>, other: Self) -> Self {
         let is_best = best.as_ref().is_none_or(|best| other.misfit < best.misfit);
         if is_best { other } else { best.unwrap_or(other) }
@@ -48,8 +48,8 @@ impl<'a> Iteration<'a> {
         }
     }
 
-    /// Coordinates in mm for the readings of a row-wire in ohm, by its index among those read; `first` are the answers of the
-    /// map with an index.
+    /// Returns coordinates in mm for the readings in ohm of a row-wire, given by its index among those read; `first`
+    /// returns the answers of the map with an index.
     pub(super) fn decode(&mut self, row: usize, readings_ohm: &[f64], first: impl Fn(usize) -> Vec<f64>) -> Vec<f64> {
         let equations = self.equations;
         let starts = if equations.seeks_solution { STARTS } else { 1 };
@@ -63,7 +63,7 @@ impl<'a> Iteration<'a> {
             RowChoice::Tried { rest } => {
                 let order = order_of_rows(rest, readings_ohm);
                 let mut best: Option<Attempt> = None;
-                // Most row-wires tried are not the right one, and no other start helps them.
+                // Most row-wires tried are wrong, and further starts would not help.
                 for (starts, &row) in [1, starts]
                     .iter()
                     .flat_map(|&starts| order.iter().map(move |row| (starts, row)))
@@ -207,7 +207,7 @@ impl<'a> Iteration<'a> {
     }
 }
 
-/// Indices of the row-wires in the order of similarity of the readings with theirs at rest.
+/// Returns the indices of the row-wires, sorted by the similarity of the readings to theirs at rest.
 fn order_of_rows(rest: &[Vec<f64>], readings_ohm: &[f64]) -> Vec<usize> {
     let unlike = |row: &usize| -> f64 {
         let differences = rest[*row].iter().zip(readings_ohm).map(|(rest, ohm)| ohm.ln() - rest);

@@ -1,4 +1,4 @@
-//! Bundles as one function file for MATLAB and GNU Octave, and the numbers in it as they are read back.
+//! Bundles as one function file for MATLAB and GNU Octave, and reading back its numbers.
 
 use std::fmt::Write;
 
@@ -14,7 +14,7 @@ use decoupler_core::{
     network::Quantity,
 };
 
-/// Writes the function `name`. The matrices of the rows stand one below the other.
+/// Writes the function `name`. The matrices of the rows are stacked vertically.
 pub(super) fn write(name: &str, portable: &Portable, weights: &Weights) -> String {
     let (channels, rows) = (portable.channels, portable.rows());
     let (input, output) = (portable.meaning.readings(), portable.meaning.outputs());
@@ -22,7 +22,7 @@ pub(super) fn write(name: &str, portable: &Portable, weights: &Weights) -> Strin
     let (argument, help, check) = if portable.takes_row() {
         (
             ", row",
-            format!("%   ROW has the row of each sample, from 1 to {rows}; one number stands for all.\n"),
+            format!("%   ROW is the row of each sample, from 1 to {rows}; a scalar applies to all samples.\n"),
             format!(
                 "if isscalar(row)\n    row = repmat(row, samples, 1);\nend\nif numel(row) ~= samples || \
                  ~all(ismember(row, 1:{rows}))\n    error('row: give the row of each sample, from 1 to {rows}');\n\
@@ -209,7 +209,7 @@ pub(super) fn export(draft: &mut Draft<'_>) -> Result<Vec<BundleCheck>, BundleEr
     )])
 }
 
-/// How to call it, for the README.
+/// Returns the usage section of the README.
 pub(super) fn call(call: &Call<'_>) -> String {
     let portable = call.portable;
     let (takes_row, channels, outputs) = (portable.takes_row(), portable.channels, portable.outputs);
@@ -222,7 +222,7 @@ pub(super) fn call(call: &Call<'_>) -> String {
          in MATLAB (from R2016b) or GNU Octave. {input} is samples x {channels}, {output} samples x \
          {outputs}{row_text}.",
         row_text = if takes_row {
-            ";\nrow has the row of each sample, from 1"
+            ";\nrow is the row of each sample, from 1"
         } else {
             ""
         },

@@ -35,7 +35,7 @@ impl Meaning {
         self.either("one row-wire", "one sample")
     }
 
-    /// Identifier of the middles of the channels.
+    /// Identifier of the centres of the channels.
     pub(super) fn centre(&self) -> &'static str {
         self.either("centre_ohm", "centre")
     }
@@ -88,7 +88,7 @@ impl Meaning {
         }
     }
 
-    /// Figures of the outputs with their names and units: the largest of all coordinates, or that of each target.
+    /// Returns values of the outputs with their names and units: the largest over all coordinates, or one per target.
     pub(super) fn named(&self, figures: &[f64]) -> Vec<(Channel, f64)> {
         match self {
             Self::Array(_) => {
@@ -99,8 +99,8 @@ impl Meaning {
         }
     }
 
-    /// Sentences with the names and units of own data, in lines of at most 100 characters that can are in a comment of any
-    /// language; none for an array.
+    /// Sentences with the names and units of own data, in lines of at most 100 characters that fit into a comment of
+    /// any language; none for an array.
     pub(super) fn legend(&self) -> Vec<String> {
         let Self::Own {
             inputs,
@@ -115,7 +115,7 @@ impl Meaning {
             format!("{what}, in this order: {}.", titles.join(", "))
         };
         let mut sentences = vec![list("Readings", inputs), list("Targets", targets)];
-        // The usual numbering needs no words.
+        // The usual numbering is not mentioned.
         if row_wires.iter().enumerate().any(|(index, &row_wire)| index != row_wire) {
             let rows = row_wires.iter().enumerate();
             let rows: Vec<String> = rows
@@ -134,7 +134,7 @@ fn named(name: String, unit: &str) -> Channel {
     }
 }
 
-/// The text of a user without what would end a comment, or what compilers warn of in one.
+/// Replaces everything in a user's text that would end a comment or cause a compiler warning in one.
 pub(super) fn comment(text: &str) -> String {
     let plain = text.replace(is_unprintable, " ");
     plain
@@ -165,7 +165,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn names_of_users_end_no_comment() {
+    fn user_defined_names_do_not_end_comments() {
         let odd = ["a */ b", "/* c", "d\n*/", "e\u{202e}f", "??/", "**/", "*\n/", "/\u{7}*"];
         let channel = |name: &&str| Channel {
             name: (*name).to_owned(),

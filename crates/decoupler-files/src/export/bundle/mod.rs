@@ -1,10 +1,10 @@
-//! Bundles: decoders as other programs read them (feature `bundle`).
+//! Bundles: decoders exported for other programs (feature `bundle`).
 //!
-//! A decoder describes what it computes as a chain of a few kinds of layers, which is folded once into layers without any
-//! scaling (`portable`: readings to outputs, in the units of the user). Each format then writes these layers, and knows no
-//! decoders: an ONNX graph, C99 in floating point or (networks only) in whole numbers, a MATLAB function, NumPy arrays.
-//! What was written is read back and evaluated, and compared with the decoder computed with twice the digits (`exact`).
-//! Only a bundle that agrees is put in its place.
+//! A decoder describes its computation as a chain of a few kinds of layers, which is folded once into layers without
+//! any scaling (`portable`: readings to outputs, in the units of the user). Each format writes these layers and is
+//! independent of the decoder: an ONNX graph, C99 in floating point or (networks only) in fixed point, a MATLAB
+//! function, NumPy arrays. The files are read back, evaluated, and compared with the decoder computed with twice the
+//! digits (`exact`). Only a bundle that agrees is moved into place.
 
 mod c99;
 mod choice;

@@ -9,10 +9,11 @@ use super::{exact::Twofold, exported_decoder::ExportedDecoder, meaning::Meaning}
 use crate::export::format_number;
 
 /// Everything that a decoder computes, from readings (in ohm, or as the user has them) to outputs (in mm, or in the units of
-/// the targets), with all scaling folded into its layers. Every writer starts from it, and knows layers but no decoders.
+/// the targets), with all scaling folded into its layers. Every writer starts from it, and handles layers rather than
+/// decoders.
 ///
-/// The first layer takes the change x of each reading r from a value R₀ in the middle of its channel. The change is computed
-/// from the difference r − R₀, so that a number of few digits loses nothing where readings differ little:
+/// The first layer takes the change x of each reading r from a value R₀ in the middle of its channel. The change is
+/// computed from the difference r − R₀, which loses no digits in low precision where readings differ little:
 ///
 /// | quantity | change x |
 /// |---|---|
@@ -36,7 +37,7 @@ pub(super) struct Portable {
     pub(super) maps: Vec<FoldedMap>,
     /// Iteration on the equations of the sensor that begins at the answers of the maps.
     pub(super) equations: Option<RowProblemDescription>,
-    /// Readings in training of all row-wires, or of each where the row is an argument.
+    /// Ranges of the readings in training: one for all row-wires, or one for each if the row is an argument.
     pub(super) ranges: Vec<Option<ChannelRanges>>,
     /// Range to which deviations of each output are relative: the widest of any in training for the coordinates of an array,
     /// and its own for a target of own data, as units differ.
@@ -52,7 +53,7 @@ pub(super) struct ChannelRanges {
     pub(super) limits: Vec<(f64, f64)>,
 }
 
-/// Errors of folding the scaling of decoders into their layers.
+/// Errors that occur when the scaling of decoders is folded into their layers.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 #[non_exhaustive]
 pub enum FoldError {
@@ -118,17 +119,17 @@ impl Portable {
         })
     }
 
-    /// Returns `true` if there is a decoder for each known row, so that the row is an argument.
+    /// Returns `true` if there is a decoder for each known row, which makes the row an argument.
     pub(super) fn takes_row(&self) -> bool {
         self.rows() > 1
     }
 
-    /// Number of row-wires that are told apart; 1 if the row is no argument.
+    /// Number of row-wires that are distinguished; 1 if the row is not an argument.
     pub(super) fn rows(&self) -> usize {
         self.ranges.len()
     }
 
-    /// The layers of the first map, which have the shapes of all.
+    /// Returns the layers of the first map, whose shapes are those of all maps.
     pub(super) fn layers(&self) -> &[Layer<super::exact::Twofold>] {
         &self.maps[0].layers
     }
@@ -140,7 +141,7 @@ impl Portable {
             inputs = layer.outputs(inputs);
             inputs
         });
-        // Outputs are not added up any more.
+        // Outputs are not summed further.
         let mut widths: Vec<usize> = widths.collect();
         widths.pop();
         widths.into_iter().max().unwrap_or(0)
@@ -162,7 +163,7 @@ impl Portable {
         }
     }
 
-    /// A way to have a decoder that amplifies less.
+    /// Advice for a decoder that amplifies less.
     pub(super) fn smaller_weights(&self) -> &'static str {
         match (&self.meaning, self.decoder) {
             (Meaning::Own { .. }, decoder) if decoder != "network" => "take another decoder",
@@ -192,8 +193,8 @@ fn is_finite(map: &FoldedMap, quantity: Quantity) -> bool {
     all.all(|weight| (weight.to_f64() as f32).is_finite()) && map.centre.iter().all(|&ohm| quantity.accepts(ohm))
 }
 
-/// A map whose scalings are folded into its layers, and which takes the changes of the readings from a value in the middle
-/// of each channel.
+/// A map whose scalings are folded into its layers, and whose inputs are the changes of the readings from a value in
+/// the middle of each channel.
 #[derive(Clone, Debug)]
 pub(super) struct FoldedMap {
     /// R₀ of each channel, exact in single precision.
@@ -207,7 +208,7 @@ const NEVER: f64 = -1000.0;
 impl FoldedMap {
     /// Folds neighbouring affine layers into one, and the quantity into the first.
     pub(super) fn of(map: &LayeredMap) -> Self {
-        // Rounded to single precision, so that r − R₀ is the same number in both; the biases take up the rest.
+        // Rounded to single precision: r − R₀ is the same number in both precisions; the biases absorb the difference.
         let centre: Vec<f64> = map
             .centre
             .iter()
@@ -244,7 +245,7 @@ impl FoldedMap {
         Self { centre, layers }
     }
 
-    /// Widens the layers so that each has as many values as that of another map with the most; the added ones have no effect.
+    /// Pads each layer to the largest number of values of that layer in any map; the padding has no effect.
     pub(super) fn widen(maps: &mut [Self]) {
         let depth = maps.iter().map(|map| map.layers.len()).max().unwrap_or(0);
         let mut inputs = maps.iter().map(|map| map.centre.len()).max().unwrap_or(0);
@@ -281,7 +282,7 @@ fn of_changes(map: &LayeredMap, centre: &[f64]) -> AffineLayer<Twofold> {
     AffineLayer { weights, biases }
 }
 
-/// One affine layer in the place of two.
+/// Combines two affine layers into one.
 fn joined(first: &AffineLayer<Twofold>, second: &AffineLayer<Twofold>) -> AffineLayer<Twofold> {
     let (inputs, inner) = first.weights.dim();
     let outputs = second.outputs();
@@ -338,7 +339,7 @@ fn widened(layer: &Layer<Twofold>, inputs: usize, width: usize) -> Layer<Twofold
             consequents,
         } => {
             let (rules, outputs) = (memberships.outputs(), consequents.outputs() / memberships.outputs());
-            // Copies of the first rule, whose memberships are 0 compared with its own.
+            // The padding consists of copies of the first rule with negligible memberships.
             let source = |rule: usize| if rule < rules { rule } else { 0 };
             let of_rule = |column: usize| source(column / outputs) * outputs + column % outputs;
             let pick = |table: &Array2<Twofold>, columns: usize, of: &dyn Fn(usize) -> usize| {

@@ -20,13 +20,13 @@ use crate::{
     import::SetupError,
 };
 
-/// Files that an export wrote, and how far they are from the network.
+/// Files written by an export, and their deviation from the decoder.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct BundleReport {
     /// Form of the bundle.
     pub format: BundleFormat,
-    /// Numbers in which it decodes.
+    /// Numbers with which it computes.
     pub precision: BundlePrecision,
     /// The folder, or the file.
     pub path: PathBuf,
@@ -34,11 +34,11 @@ pub struct BundleReport {
     pub files: Vec<(String, u64)>,
     /// Readings with which the bundle was verified, and how many of them it contains.
     pub vectors: VectorCounts,
-    /// Evaluations of the bundle as it was read back.
+    /// Evaluations of the bundle after reading it back.
     pub checks: Vec<BundleCheck>,
     /// Largest deviation allowed, relative to [`Self::output_range_mm`], or to the range of each target of own data.
     pub limit: f64,
-    /// Changes of the outputs by rounding the readings to single precision; `None` for other precisions.
+    /// Changes of the outputs caused by rounding the readings to single precision; `None` for other precisions.
     pub rounding: Option<ReadingRounding>,
     /// Widest range of a coordinate in training, in mm; `None` for own data.
     pub output_range_mm: Option<f64>,
@@ -59,7 +59,7 @@ pub struct VectorCounts {
     pub golden: usize,
 }
 
-/// An evaluation of a bundle as it was read back.
+/// An evaluation of a bundle after reading it back.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BundleCheck {
     /// Name of the program that evaluated it.
@@ -67,7 +67,7 @@ pub struct BundleCheck {
     /// Largest deviation from the network, which takes the readings in double precision, where the bundle takes them as its
     /// callers must round them; relative as [`BundleReport::limit`].
     pub deviation: f64,
-    /// The part of it that is not the rounding of the readings.
+    /// The part of it that is not caused by rounding the readings.
     pub of_arithmetic: f64,
 }
 
@@ -83,7 +83,7 @@ impl BundleCheck {
     /// Checks the deviations.
     ///
     /// # Errors
-    /// One is above its limit, or not a number.
+    /// A deviation exceeds its limit or is NaN.
     pub(super) fn admit(&self, limits: Deviation) -> Result<(), BundleError> {
         for (deviation, limit) in [
             (self.of_arithmetic, limits.of_arithmetic),
@@ -102,7 +102,7 @@ impl BundleCheck {
 }
 
 impl BundleReport {
-    /// The sentence on [`Self::bounds`], if there are any.
+    /// Returns the sentence on [`Self::bounds`], if there are any.
     pub fn describe_bounds(&self) -> Option<String> {
         let bound = |(output, bound): &(Channel, f64)| {
             let unit = output.unit.as_ref().map_or(String::new(), |unit| format!(" {unit}"));
@@ -111,13 +111,13 @@ impl BundleReport {
         let bounds: Vec<String> = self.bounds.iter().map(bound).collect();
         (!bounds.is_empty()).then(|| {
             format!(
-                "Proven bound on the error of the whole numbers, for readings that are not out of range: {}",
+                "Proven bound on the error in fixed point, for readings that are not out of range: {}",
                 bounds.join(", ")
             )
         })
     }
 
-    /// The sentence on [`Self::rounding`], if there is one.
+    /// Returns the sentence on [`Self::rounding`], if there is one.
     pub fn describe_rounding(&self) -> Option<String> {
         self.rounding.map(|rounding| {
             format!(
@@ -128,13 +128,13 @@ impl BundleReport {
         })
     }
 
-    /// Largest deviation of all checks.
+    /// Returns the largest deviation of all checks.
     pub fn deviation(&self) -> f64 {
         self.checks.iter().map(|check| check.deviation).fold(0.0, f64::max)
     }
 }
 
-/// Writes the README of a bundle: how to call it, and what it is worth.
+/// Returns the README of a bundle: its usage and its accuracy.
 pub(super) fn readme(name: &str, portable: &Portable, fixed: Option<&FixedNetworks>, report: &BundleReport) -> String {
     let meaning = &portable.meaning;
     let subject = match meaning {
@@ -150,14 +150,14 @@ pub(super) fn readme(name: &str, portable: &Portable, fixed: Option<&FixedNetwor
     );
     text += &match meaning {
         Meaning::Array(_) => format!(
-            "It turns the {channels} readings of one row-wire (r_1 to r_{channels}, in ohm) into the {outputs} coordinates of\n\
+            "It converts the {channels} readings of one row-wire (r_1 to r_{channels}, in ohm) into the {outputs} coordinates of\n\
              its nodes (x_1, y_1, z_1, x_2, ... {last}, in mm).",
             channels = portable.channels,
             outputs = portable.outputs,
             last = meaning.targets().last().map_or("", |target| &target.name),
         ),
         Meaning::Own { .. } => format!(
-            "It turns {channels} readings into {outputs} targets.\n\n{legend}",
+            "It converts {channels} readings into {outputs} targets.\n\n{legend}",
             channels = portable.channels,
             outputs = portable.outputs,
             legend = meaning.legend().join("\n"),
@@ -171,7 +171,7 @@ pub(super) fn readme(name: &str, portable: &Portable, fixed: Option<&FixedNetwor
             portable.rows()
         );
     }
-    text += "\n\nHow to call it\n\n";
+    text += "\n\nUsage\n\n";
     let call = Call {
         name,
         portable,
@@ -179,7 +179,7 @@ pub(super) fn readme(name: &str, portable: &Portable, fixed: Option<&FixedNetwor
         precision: report.precision,
     };
     text += &(report.format.writer().call)(&call);
-    text += "\n\nWhat it is worth\n\n";
+    text += "\n\nAccuracy\n\n";
     for check in &report.checks {
         let _ = writeln!(
             text,
@@ -236,7 +236,7 @@ pub enum BundleError {
         /// The cause.
         reason: NotDescribed,
     },
-    /// Rows whose equations leave the answer open.
+    /// Rows whose equations have no unique solution.
     #[error(
         "{decoder} cannot be exported: the equations of {open} of {rows} rows drawn in the scene have no solution or more than one; take another decoder"
     )]
@@ -262,7 +262,7 @@ pub enum BundleError {
     /// The samples to which the decoder is fitted could not be drawn or read again.
     #[error(transparent)]
     Samples(#[from] SetupError),
-    /// Something is in the place of the bundle.
+    /// Something exists already at the path of the bundle.
     #[error("'{}' is there already: give another name, or delete it first", .0.display())]
     Exists(PathBuf),
     /// The bundle cannot be written.
@@ -271,7 +271,7 @@ pub enum BundleError {
     /// The network file cannot be written or read back.
     #[error(transparent)]
     NetworkFile(#[from] DocumentError),
-    /// A reading that is 0 or infinite in the numbers of the bundle.
+    /// A reading that becomes 0 or infinite in the numbers of the bundle.
     #[error(
         "a reading of {reading:.1e} ({channel}) is beyond the range of the numbers in which the bundle takes it: give --precision f64"
     )]

@@ -29,7 +29,7 @@ use decoupler_core::{
     scene::{Noise, Rows},
 };
 
-/// A network of a small array, hardly trained.
+/// A network of a small array after little training.
 fn trained(rows: Rows, quantity: Quantity, scaling: ScalingChoice, noise: f64) -> NetworkFile {
     run_of(trained_settings(rows, quantity, scaling, noise))
 }
@@ -71,9 +71,9 @@ fn networks() -> Vec<(String, NetworkFile)> {
     all
 }
 
-/// The program's own `decode` is the truth: it neither folds scaling nor takes differences from a centre.
+/// The reference is the program's own `decode`, which neither folds scaling nor subtracts a centre.
 #[test]
-fn the_exact_answers_and_the_folded_weights_are_those_of_decode() {
+fn exact_answers_and_folded_weights_agree_with_decode() {
     for (name, file) in networks() {
         let portable = Portable::of(&(&file).into()).unwrap();
         let vectors = Vectors::of(&mut (&file).into(), &portable, Taking::Single).unwrap();
@@ -98,7 +98,7 @@ fn the_exact_answers_and_the_folded_weights_are_those_of_decode() {
 }
 
 #[test]
-fn coordinates_that_did_not_vary_come_out_exactly() {
+fn constant_coordinates_are_exact() {
     for (name, file) in networks() {
         let portable = Portable::of(&(&file).into()).unwrap();
         let vectors = Vectors::of(&mut (&file).into(), &portable, Taking::Double).unwrap();
@@ -113,7 +113,7 @@ fn coordinates_that_did_not_vary_come_out_exactly() {
 }
 
 #[test]
-fn graphs_answer_as_the_network_count_readings_outside_and_refuse_what_is_invalid() {
+fn graphs_agree_with_the_network_count_readings_outside_and_refuse_invalid_ones() {
     for (name, file) in networks() {
         let portable = Portable::of(&(&file).into()).unwrap();
         for (precision, arithmetic, taking, limit) in [
@@ -150,7 +150,7 @@ fn graphs_answer_as_the_network_count_readings_outside_and_refuse_what_is_invali
 }
 
 #[test]
-fn weights_for_numpy_and_matlab_come_back_bit_for_bit() {
+fn weights_for_numpy_and_matlab_round_trip_bit_for_bit() {
     for (name, file) in networks() {
         let portable = Portable::of(&(&file).into()).unwrap();
         for arithmetic in [Arithmetic::DOUBLE, Arithmetic::single(1), Arithmetic::single(0)] {
@@ -169,7 +169,7 @@ fn weights_for_numpy_and_matlab_come_back_bit_for_bit() {
     }
 }
 
-/// The same network of own data: readings that may have any sign, in volts or newtons for all that is known.
+/// The same network of own data: readings of any sign and in any unit.
 fn own_data(array: &Portable) -> Portable {
     let channels = |count| {
         let named = |index| Channel {
@@ -189,9 +189,9 @@ fn own_data(array: &Portable) -> Portable {
     }
 }
 
-/// Overflow panics in tests, so that nothing wraps unnoticed.
+/// Overflow panics in tests, so it cannot go unnoticed.
 #[test]
-fn whole_numbers_stay_within_their_bound_inside_the_range_and_saturate_beyond_it() {
+fn fixed_point_stays_within_its_bound_inside_the_range_and_saturates_beyond_it() {
     let mut rng = ChaCha8Rng::seed_from_u64(0);
     let arrays = networks()
         .into_iter()
@@ -240,16 +240,16 @@ fn whole_numbers_stay_within_their_bound_inside_the_range_and_saturate_beyond_it
 }
 
 #[test]
-fn networks_whose_products_cancel_have_wider_hidden_weights() {
+fn networks_with_cancelling_products_have_wider_hidden_weights() {
     let file = trained(Rows::All, Quantity::LogResistance, ScalingChoice::Whitening, 1e-5);
     let fixed = FixedNetworks::of(&Portable::of(&(&file).into()).unwrap()).unwrap();
     assert_eq!(fixed.hidden_width, HiddenWidth::TwentyFour);
 }
 
 #[test]
-fn every_format_and_precision_is_written_verified_and_whole() {
+fn every_format_and_precision_is_written_verified_and_complete() {
     let home = tempfile::tempdir().unwrap();
-    // Compiling takes its time: one network for all rows and one of known rows.
+    // Compiling is slow: only one network for all rows and one of known rows.
     for (index, (name, file)) in networks().into_iter().enumerate().skip(3).take(2) {
         for format in BundleFormat::ALL {
             for &precision in format.precisions() {
@@ -281,7 +281,7 @@ fn every_format_and_precision_is_written_verified_and_whole() {
 }
 
 #[test]
-fn what_cannot_be_exported_is_refused_and_leaves_nothing() {
+fn refused_exports_leave_no_files() {
     let home = tempfile::tempdir().unwrap();
     let path = home.path().join("bundle");
     let mut file = trained(Rows::All, Quantity::Resistance, ScalingChoice::MinMax, 1e-3);
@@ -345,10 +345,10 @@ fn what_cannot_be_exported_is_refused_and_leaves_nothing() {
     assert!(left.into_iter().all(|name| !name.to_string_lossy().starts_with('.')));
 }
 
-/// The truth is `decode` of this program on readings in double precision, which no caller of a bundle in single precision
-/// can give to it.
+/// The reference is `decode` of this program on readings in double precision, which callers of a bundle in single
+/// precision cannot pass to it.
 #[test]
-fn single_precision_is_judged_by_the_readings_that_a_caller_has() {
+fn single_precision_is_judged_by_the_readings_of_the_caller() {
     let home = tempfile::tempdir().unwrap();
     let mut refused = 0;
     for (index, noise) in [0.0, 1e-6, 1e-4, 1e-2].into_iter().enumerate() {
@@ -390,7 +390,7 @@ fn single_precision_is_judged_by_the_readings_that_a_caller_has() {
                 let metadata: serde_json::Value = serde_json::from_str(&metadata).unwrap();
                 let found = metadata["change_by_rounding_readings"]["largest"].as_f64().unwrap();
                 assert!(found > 0.0 && found <= report.limit, "{metadata}");
-                // Golden vectors are readings that a caller has.
+                // Golden vectors are the readings of a caller.
                 let golden = fs::read_to_string(path.join("golden.csv")).unwrap();
                 let last = golden.lines().last().unwrap();
                 let ohm: f64 = last.split(',').nth(1).unwrap().parse().unwrap();
@@ -414,9 +414,9 @@ fn single_precision_is_judged_by_the_readings_that_a_caller_has() {
     assert!((1..4).contains(&refused), "{refused}");
 }
 
-/// A converter of 2 bits leaves channels that never vary: no whole number of a fine unit is within their limits.
+/// A converter of 2 bits leaves channels that never vary: no integer in fine units is within their limits.
 #[test]
-fn channels_that_never_varied_leave_in_whole_numbers() {
+fn constant_channels_are_exported_in_fixed_point() {
     let home = tempfile::tempdir().unwrap();
     let mut settings = trained_settings(Rows::All, Quantity::Resistance, ScalingChoice::MinMax, 0.0);
     settings.source.scene.noise.converter_bits = Some(2);
@@ -432,7 +432,7 @@ fn channels_that_never_varied_leave_in_whole_numbers() {
     assert!(report.deviation() <= report.limit, "{report:?}");
 }
 
-/// Answers of a bundle in C to readings, or `None` for a status that is not 0. `None` of all without a compiler.
+/// Answers of a bundle in C to readings, or `None` for a status that is not 0. `None` without a compiler.
 fn answers_in_c(folder: &std::path::Path, name: &str, readings: &[Vec<f64>]) -> Option<Vec<Option<Vec<f64>>>> {
     let upper = name.to_uppercase();
     let lines: Vec<String> = readings
@@ -472,7 +472,7 @@ fn answers_in_c(folder: &std::path::Path, name: &str, readings: &[Vec<f64>]) -> 
 }
 
 #[test]
-fn c_answers_extreme_readings_with_numbers_or_not_at_all() {
+fn c_answers_extreme_readings_with_finite_numbers_or_an_error() {
     let folder = tempfile::tempdir().unwrap();
     let file = trained(Rows::All, Quantity::Resistance, ScalingChoice::MinMax, 1e-3);
     let mut own = own_data(&Portable::of(&(&file).into()).unwrap());

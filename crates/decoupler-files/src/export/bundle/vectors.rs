@@ -17,13 +17,13 @@ use super::{
 /// Readings with the answers that the decoder gives to them.
 #[derive(Clone, Debug)]
 pub(super) struct Vectors {
-    /// The golden vectors first: of each row the smallest, middle and largest readings of its training range, and a
-    /// few of those drawn.
+    /// Golden vectors first: for each row the smallest, middle and largest readings of its training range, and a few of
+    /// the drawn readings.
     all: Vec<Vector>,
     golden: usize,
-    /// ErrorGrowth of rounding errors in the worst of them.
+    /// Largest growth of rounding errors over all vectors.
     pub(super) growth: ErrorGrowth,
-    /// Changes of the answers by rounding the readings to the form that the bundle takes.
+    /// Changes of the answers caused by rounding the readings to the numbers that the bundle takes.
     pub(super) rounding: ReadingRounding,
     /// The bound of [`Self::rounding`] if a constant in the middle of each channel had been subtracted from the readings.
     centred_bound: f64,
@@ -36,24 +36,24 @@ pub(super) struct Vectors {
 /// Readings of a row with the answer.
 #[derive(Clone, Debug)]
 pub(super) struct Vector {
-    /// Index of the row-wire where that is an argument, and 0 otherwise.
+    /// Index of the row-wire if it is an argument, otherwise 0.
     pub(super) row: usize,
-    /// As a caller has them, in double precision.
+    /// Readings of the caller, in double precision.
     pub(super) readings: Vec<f64>,
-    /// The readings in the form that the bundle takes.
+    /// Readings rounded to the numbers that the bundle takes.
     pub(super) taken: Vec<f64>,
     /// Exact answers to the readings.
     pub(super) answers: Vec<f64>,
-    /// Exact answers to the readings as taken.
+    /// Exact answers to the rounded readings.
     pub(super) answers_to_taken: Vec<f64>,
 }
 
 /// Largest differences of an evaluation, relative to the scales of the outputs. NaN if an answer is NaN.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Deviation {
-    /// From the answers of the decoder to the readings that a caller has.
+    /// Deviation from the answers of the decoder to the readings of the caller.
     pub(super) total: f64,
-    /// From the answers of the decoder to the readings as taken: by the arithmetic alone.
+    /// Deviation from the answers of the decoder to the rounded readings, which is caused by the arithmetic alone.
     pub(super) of_arithmetic: f64,
 }
 
@@ -109,7 +109,7 @@ impl Vectors {
                 .collect();
             let of_program = exported.decode(index, &readings)?;
             if portable.equations.is_some() {
-                // Equations are their own exact answer, to within what counts as their solution.
+                // The solution of the equations is exact to within the tolerance of solving them.
                 vectors.all.push(Vector {
                     row: index,
                     taken,
@@ -187,7 +187,7 @@ impl Vectors {
 
     /// Advice for a bundle in single precision that changes too much by rounding readings to it.
     pub(super) fn cure(&self, portable: &Portable) -> String {
-        /// Part of the change that may be left.
+        /// Fraction of the change that may remain.
         const WORTHWHILE: f64 = 0.1;
         let subtracted = match portable.meaning {
             Meaning::Own { .. } => self.centred_bound < WORTHWHILE * self.rounding.bound,
@@ -222,7 +222,7 @@ impl Vectors {
         &self.all[..self.golden]
     }
 
-    /// Largest differences of `decode`, which is to decode the readings as taken.
+    /// Returns the largest differences of `decode`, which is called with the rounded readings.
     pub(super) fn deviation(&self, mut decode: impl FnMut(&Vector) -> Vec<f64>) -> Deviation {
         self.all.iter().fold(Deviation::default(), |largest, vector| {
             let answers = decode(vector);
@@ -242,7 +242,7 @@ fn of_extremes(equations: &RowProblemDescription, takes_row: bool) -> Result<Dra
     let model = &equations.model;
     let mut readings = Drawn::new();
     for (index, &row) in equations.rows.iter().enumerate() {
-        // The unknowns end with z, the stroke of which is that of all nodes.
+        // The last unknown is a z, whose stroke is the same for all nodes.
         for pressed_mm in equations.ranges.last().map_or([0.0, 0.0], |&(low, high)| [low, high]) {
             let displacements = vec![glam::DVec3::Z * pressed_mm; model.scale.nodes_per_row()];
             let of_row = model.row_resistances(row, &displacements);
@@ -262,12 +262,12 @@ fn relative(answers: &[f64], expected: &[f64], scales: &[f64]) -> f64 {
     })
 }
 
-/// The larger of two deviations; once it is NaN it stays so.
+/// Returns the larger of two deviations, or NaN if either is NaN.
 fn larger(one: f64, other: f64) -> f64 {
     if one.is_nan() || one >= other { one } else { other }
 }
 
-/// Writes the golden vectors as CSV: the row from 1 where it is an argument, readings, outputs.
+/// Writes the golden vectors as CSV: the row from 1 if it is an argument, readings, outputs.
 pub(super) fn golden_csv(portable: &Portable, vectors: &[Vector]) -> String {
     let meaning = &portable.meaning;
     let row = portable.takes_row().then(|| "row".to_owned());
@@ -278,16 +278,16 @@ pub(super) fn golden_csv(portable: &Portable, vectors: &[Vector]) -> String {
             .chain(meaning.targets())
             .map(|channel| inert(&channel.name)),
     );
-    // The names of users may have commas.
+    // User-defined names may contain commas.
     let mut writer = csv::Writer::from_writer(Vec::new());
-    let mut write = |fields: Vec<String>| writer.write_record(fields).expect("memory takes everything");
+    let mut write = |fields: Vec<String>| writer.write_record(fields).expect("writing to memory does not fail");
     write(names.collect());
     for vector in vectors {
         let row = portable.takes_row().then(|| (vector.row + 1).to_string());
         let numbers = vector.readings.iter().chain(&vector.answers).map(f64::to_string);
         write(row.into_iter().chain(numbers).collect());
     }
-    let bytes = writer.into_inner().expect("memory takes everything");
+    let bytes = writer.into_inner().expect("writing to memory does not fail");
     String::from_utf8_lossy(&bytes).into_owned()
 }
 
@@ -295,27 +295,27 @@ pub(super) fn golden_csv(portable: &Portable, vectors: &[Vector]) -> String {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Tolerance {
     pub(super) limit: f64,
-    /// The limit of the precision, without regard to the decoder.
+    /// Limit of the precision, regardless of the decoder.
     usual: f64,
-    /// Change of an output, in parts of its range, per relative error of the numbers that are added up in a layer.
+    /// Change of an output, as a fraction of its range, per relative error of the terms of the sums in a layer.
     amplification: f64,
 }
 
 impl Tolerance {
     /// Usual limit of double precision.
     pub(super) const DOUBLE: f64 = 1e-12;
-    /// Largest limit, whatever the decoder.
+    /// Largest limit for any decoder.
     pub(super) const LARGEST: f64 = 0.01;
     /// Usual limit of single precision.
     pub(super) const SINGLE: f64 = 1e-5;
 
-    /// The usual limit. Where the `deviation` of an evaluation comes near it, because the decoder's own sums let rounding
-    /// errors grow this much, the bound on these: each of n numbers that are added up has a relative error of at most some
-    /// n units (N. J. Higham, Accuracy and Stability of Numerical Algorithms, section 3.1).
+    /// Returns the usual limit, or, if the `deviation` of an evaluation comes near it because the decoder's own sums
+    /// amplify rounding errors, the bound on them: each of n terms of a sum has a relative error of at most about n
+    /// units (N. J. Higham, Accuracy and Stability of Numerical Algorithms, section 3.1).
     pub(super) fn of(portable: &Portable, arithmetic: Arithmetic, growth: &ErrorGrowth, deviation: f64) -> Self {
-        /// Other programs add up in another order, and may be this much closer or farther.
+        /// Other programs sum in a different order and may deviate more or less by this factor.
         const NEAR: f64 = 0.5;
-        // Next to the sums: difference, division, logarithm, weight and the function of a layer.
+        // In addition to the sums: difference, division, logarithm, weight and the function of a layer.
         let operations = (portable.channels + portable.widest() + 10) as f64;
         let of_layer = |(index, growth): (usize, &f64)| growth * arithmetic.of_layer(index).unit_roundoff();
         let errors: f64 = growth.0.iter().enumerate().map(of_layer).sum();
@@ -335,7 +335,8 @@ impl Tolerance {
         }
     }
 
-    /// The limit of an iteration on the equations of the sensor: the error within which an answer counts as their solution.
+    /// Returns the limit of an iteration on the equations of the sensor: the tolerance within which they count as
+    /// solved.
     pub(super) fn of_equations() -> Self {
         Self {
             limit: LARGEST_ERROR,

@@ -31,7 +31,7 @@ pub(super) struct Arithmetic {
     pub(super) rest: Digits,
 }
 
-/// Rounded weights, as a bundle has them.
+/// Rounded weights of a bundle.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Weights {
     pub(super) quantity: Quantity,
@@ -47,8 +47,8 @@ pub(super) struct RoundedMap {
 }
 
 impl Digits {
-    /// Rounds to these digits. A sum, product, quotient or root of singles, computed in double and then rounded, is the
-    /// one of single precision (S. A. Figueroa, SIGNUM Newsletter 30 (1995), 21-26).
+    /// Rounds to these digits. A sum, product, quotient or root of singles that is computed in double and then rounded
+    /// equals the result of single precision (S. A. Figueroa, SIGNUM Newsletter 30 (1995), 21-26).
     pub(super) fn round(self, value: f64) -> f64 {
         match self {
             Self::Single => f64::from(value as f32),
@@ -79,7 +79,7 @@ impl Arithmetic {
         }
     }
 
-    /// Digits of a layer, by its index; those of the changes are those of the first.
+    /// Returns the digits of a layer by its index; the changes have the digits of the first layer.
     pub(super) fn of_layer(self, index: usize) -> Digits {
         if index < self.wide_layers {
             Digits::Double
@@ -239,7 +239,7 @@ fn read_weights(text: &str, portable: &Portable) -> Result<Weights, String> {
     })
 }
 
-/// Numbers of a bundle under the name that they have in its files.
+/// Numbers of a bundle, with their name in its files.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Table {
     pub(super) name: String,
@@ -253,7 +253,7 @@ pub(super) struct Table {
 /// Names of the tables of a layer.
 #[derive(Clone, Debug)]
 pub(super) struct LayerNames {
-    /// What the layer gives, in code.
+    /// Name of the layer's result in code.
     pub(super) result: String,
     /// Tables in the order of [`Layer::values`].
     pub(super) tables: Vec<String>,
@@ -331,7 +331,7 @@ impl Weights {
         tables
     }
 
-    /// Reads the numbers of `portable` in this arithmetic back; `read` returns the values of a table.
+    /// Reads back the numbers of `portable` in this arithmetic; `read` returns the values of a table.
     ///
     /// # Errors
     /// Those of `read`, or a table of another size.
@@ -346,7 +346,7 @@ impl Weights {
         for table in weights.tables(portable) {
             let values = read(&table)?;
             if values.len() != table.values.len() {
-                return Err(format!("'{}' has not as many numbers as it should", table.name));
+                return Err(format!("'{}' has the wrong number of values", table.name));
             }
             for (map, values) in of_maps.iter_mut().zip(values.chunks(table.size().max(1))) {
                 map.extend_from_slice(values);

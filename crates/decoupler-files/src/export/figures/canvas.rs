@@ -7,7 +7,7 @@ use decoupler_core::text::is_unprintable;
 
 /// Size of all text, in points.
 pub(super) const TEXT: f64 = 8.0;
-/// The average width of a character of this size: enough to leave room for a text.
+/// Average width of a character at this size, used to reserve room for a text.
 pub(super) const CHARACTER: f64 = 0.56 * TEXT;
 
 /// Overlap of neighbouring blocks in points: one pixel in print.
@@ -34,7 +34,7 @@ impl Stroke {
     }
 }
 
-/// Part of a text that is at its position.
+/// Part of a text that is placed at its position.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Anchor {
     Start,
@@ -42,7 +42,7 @@ pub(super) enum Anchor {
     End,
 }
 
-/// The part of the canvas that a plot or a panel takes.
+/// Area of the canvas occupied by a plot or a panel.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Area {
     pub left: f64,
@@ -118,8 +118,8 @@ impl Canvas {
         self.put("</g>");
     }
 
-    /// A piece of a surface. A hairline of its own colour closes the seam to its neighbours; where it lets shine through
-    /// what lies behind it, its edges are sharp instead, for the hairlines would show.
+    /// A facet of a surface. A hairline in its own colour closes the seam to its neighbours; a translucent facet has
+    /// crisp edges instead, because the hairlines would be visible.
     pub fn facet(&mut self, corners: &[At], fill: Rgb, opacity: f64) {
         let (points, fill, opacity) = (coordinates(corners), hex(fill), number(opacity));
         if opacity == "1" {
@@ -131,8 +131,8 @@ impl Canvas {
         }
     }
 
-    /// A filled rectangle with sharp edges. It reaches a little under its neighbours on the right and below, which are to
-    /// be drawn later, so that there is no seam between them.
+    /// A filled rectangle with sharp edges. It extends slightly under its neighbours on the right and below, which must
+    /// be drawn later, to avoid a seam.
     pub fn block(&mut self, area: Area, fill: Rgb) {
         let Area {
             left,
@@ -147,7 +147,7 @@ impl Canvas {
         ));
     }
 
-    /// Straight lines that do not cover each other.
+    /// Straight lines that do not overlap.
     pub fn segments(&mut self, ends: &[[At; 2]], stroke: Stroke, opacity: f64) {
         let pieces = ends.iter().map(|&[from, to]| format!("M{}L{}", pair(from), pair(to)));
         let (path, style) = (pieces.collect::<String>(), stroke_style(stroke));
@@ -190,13 +190,13 @@ impl Canvas {
         ));
     }
 
-    /// Text whose middle line runs through `at`.
+    /// Text that is centred vertically on `at`.
     pub fn text(&mut self, at: At, anchor: Anchor, colour: Rgb, text: &str) {
         let [x, y] = [at[0], at[1] + 0.36 * TEXT].map(number);
         self.write_text(&format!(r#"x="{x}" y="{y}""#), anchor, colour, 400, text);
     }
 
-    /// As [`Self::text`], in strong type.
+    /// As [`Self::text`], in semi-bold type.
     pub fn title(&mut self, at: At, text: &str) {
         let [x, y] = [at[0], at[1] + 0.36 * TEXT].map(number);
         self.write_text(&format!(r#"x="{x}" y="{y}""#), Anchor::Middle, INK, 600, text);
@@ -277,7 +277,7 @@ fn stroke_style(stroke: Stroke) -> String {
 }
 
 pub(super) fn escaped(text: &str) -> String {
-    // XML has no control characters, not even escaped.
+    // XML does not allow control characters, not even escaped ones.
     let text = text.replace(is_unprintable, " ");
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
 }

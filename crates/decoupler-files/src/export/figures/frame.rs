@@ -1,4 +1,4 @@
-//! The axes around a plot.
+//! Axes around a plot, colour bars and legends.
 //!
 //! The scale of colours next to a picture.
 //!
@@ -13,7 +13,7 @@ use super::{
 };
 use crate::figure::{ColourMap, Key, PlotAxis, share};
 
-/// Room that a number takes across and up, in points.
+/// Width and height of a number, in points.
 const NUMBER: At = [36.0, 20.0];
 
 /// Position of both axes on the canvas.
@@ -32,7 +32,7 @@ impl Frame<'_> {
         self.area.bottom() - self.area.height * share(place, &self.y.1)
     }
 
-    /// Position on the canvas of the places on both axes.
+    /// Returns the position on the canvas of a place on each axis.
     pub fn at(&self, [x, y]: [f64; 2]) -> At {
         [self.x_at(x), self.y_at(y)]
     }
@@ -74,7 +74,7 @@ const WIDTH: f64 = 9.0;
 /// Width of the bar with its numbers and name, in points.
 pub(super) const COLOUR_BAR_WIDTH: f64 = 54.0;
 
-/// Draws the bar of the places in `range` on `axis` from `top` down, `height` high.
+/// Draws the colour bar for `range` of `axis`, from `top` downwards and `height` high.
 pub(super) fn draw_colour_bar(
     canvas: &mut Canvas,
     left: f64,
@@ -119,7 +119,7 @@ const BETWEEN: f64 = 14.0;
 /// Height of a line of the legend, in points.
 pub(super) const LINE: f64 = 1.6 * TEXT;
 
-/// Left end of each key and the line in which it is, within this many points across.
+/// Returns the left end and the line of each key of a legend of this width in points.
 fn positions(keys: &[Key], width: f64) -> Vec<(f64, usize)> {
     let (mut left, mut line) = (0.0, 0);
     let position = |key: &Key| {

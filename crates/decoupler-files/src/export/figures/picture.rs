@@ -1,4 +1,4 @@
-//! Figures inside an HTML page that follows the reader's dark theme.
+//! Finished figures as SVG, as PNG, and in an HTML page that follows the reader's dark theme.
 //!
 //! The colours of figures: dark enough for paper.
 
@@ -52,7 +52,7 @@ pub enum PictureError {
     /// The figure cannot be drawn in pixels.
     #[error("the picture cannot be drawn in pixels: {0}; save it as SVG instead")]
     Pixels(String),
-    /// The name of the file tells no format.
+    /// The file name has no known extension.
     #[error("cannot write '{}': give a name that ends in .png or .svg", .0.display())]
     Name(PathBuf),
     /// The file.
@@ -61,7 +61,7 @@ pub enum PictureError {
 }
 
 impl PictureFormat {
-    /// The format that the extension of `path` names.
+    /// Returns the format given by the extension of `path`.
     ///
     /// # Errors
     /// The name ends neither in .svg nor in .png.
@@ -73,7 +73,7 @@ impl PictureFormat {
     }
 }
 
-/// The minimum that journals ask for.
+/// The minimum that journals require.
 const DOTS_PER_INCH: f32 = 300.0;
 
 impl Picture {
@@ -86,7 +86,7 @@ impl Picture {
         self.size
     }
 
-    /// The figure as SVG. Its text names the program's font and common ones to are in for it.
+    /// The figure as SVG. Its text names the program's font and common substitutes.
     pub fn svg(&self) -> &str {
         &self.svg
     }
@@ -94,7 +94,7 @@ impl Picture {
     /// The figure as the bytes of a PNG file, 300 pixels to the inch.
     ///
     /// # Errors
-    /// There is no memory for the pixels.
+    /// There is not enough memory for the pixels.
     pub fn png(&self) -> Result<Vec<u8>, PictureError> {
         let encoded = self.pixmap()?.encode_png();
         encoded.map_err(|error| PictureError::Pixels(error.to_string()))
@@ -103,7 +103,7 @@ impl Picture {
     /// The figure as pixels, 300 to the inch: width, height, and red, green, blue and opacity of each, row by row.
     ///
     /// # Errors
-    /// There is no memory for them.
+    /// There is not enough memory for them.
     pub fn pixels(&self) -> Result<([usize; 2], Vec<u8>), PictureError> {
         let pixmap = self.pixmap()?;
         let size = [pixmap.width() as usize, pixmap.height() as usize];
@@ -162,7 +162,7 @@ fn fonts() -> Arc<usvg::fontdb::Database> {
     Arc::clone(FONTS.get_or_init(load))
 }
 
-/// Colours of print, and those that take their place on a dark ground.
+/// Colours in print, and their replacements on a dark background.
 fn pairs() -> [(Rgb, Rgb); 11] {
     [
         ([0xff; 3], [0x1b, 0x1e, 0x24]),
@@ -179,12 +179,12 @@ fn pairs() -> [(Rgb, Rgb); 11] {
     ]
 }
 
-/// Style rules that show figures inside a page on a dark ground where the reader prefers that.
+/// Style rules that show the figures of a page on a dark background if the reader prefers a dark theme.
 pub(crate) fn dark_style() -> String {
     let hex = |[red, green, blue]: Rgb| format!("#{red:02x}{green:02x}{blue:02x}");
     let rules = pairs().map(|(print, dark)| {
         let (print, dark) = (hex(print), hex(dark));
-        // White dots mark nodes on any ground.
+        // White dots mark nodes on any background.
         let of_circles = if print == "#ffffff" { ":not(circle)" } else { "" };
         format!(
             "  svg [fill=\"{print}\"]{of_circles} {{ fill: {dark}; }}\n  svg [stroke=\"{print}\"] {{ stroke: {dark}; }}\n"
@@ -197,8 +197,8 @@ pub(crate) fn dark_style() -> String {
 }
 
 impl Picture {
-    /// The figure as part of an HTML page, as wide in proportion as on a printed one: without outside references, and with
-    /// names that no figure in another `place` has. `label` is read aloud in its place.
+    /// Returns the figure for an HTML page, with the same share of the page width as in print, without external
+    /// references, and with ids that are unique to `place`. `label` is its description for screen readers.
     pub(crate) fn inline_svg(&self, place: usize, label: &str) -> String {
         let label = super::canvas::escaped(label).replace('"', "&quot;");
         let [width, height] = self.size();
@@ -232,7 +232,7 @@ pub(super) fn rgb(hue: Hue) -> Rgb {
     }
 }
 
-/// A colour this much paler, from 0 (itself) to 1 (white).
+/// Returns a paler colour: 0 leaves it unchanged, 1 is white.
 pub(super) fn pale(colour: Rgb, paler: f64) -> Rgb {
     colour.map(|part| (f64::from(part) + paler * (255.0 - f64::from(part))).round() as u8)
 }

@@ -15,7 +15,7 @@ use crate::{
     },
 };
 
-/// Tint of a span on the ground, 1 being the ground itself.
+/// Paleness of a shaded span; 1 is the background.
 const SPAN_PALENESS: f64 = 0.88;
 
 pub(super) fn stroke(hue: Hue, style: LineStyle) -> Stroke {
@@ -34,7 +34,7 @@ pub(super) fn stroke(hue: Hue, style: LineStyle) -> Stroke {
     }
 }
 
-/// The plot within `area`; names and numbers stand outside it.
+/// Draws the plot within `area`; names and numbers are outside it.
 pub(super) fn draw_plot(plot: &Plot, area: Area, canvas: &mut Canvas) {
     let [x, y] = plot.ranges();
     let frame = Frame {
@@ -77,7 +77,7 @@ pub(super) fn draw_plot(plot: &Plot, area: Area, canvas: &mut Canvas) {
     });
 }
 
-/// The words next to points.
+/// Labels next to points.
 fn draw_point_labels(plot: &Plot, frame: &Frame<'_>, canvas: &mut Canvas) {
     // Most plots have none.
     if !plot.has_point_labels() {
@@ -200,7 +200,7 @@ pub(super) fn draw_marker(look: Look, at: At, canvas: &mut Canvas) {
     }
 }
 
-/// A sample of `look`, from the left end to the right.
+/// Draws a sample of `look`, from its left end to its right end.
 pub(super) fn draw_sample(look: Look, from: At, width: f64, canvas: &mut Canvas) {
     let [left, y] = from;
     if let Some(style) = look.line {
@@ -221,7 +221,7 @@ const RIGHT: f64 = 12.0;
 const BOTTOM: f64 = 34.0;
 
 impl PlotFigure {
-    /// Draws the figure, as wide as a page; a single square plot takes less.
+    /// Draws the figure at the width of a page; a single square plot is narrower.
     pub fn draw(&self) -> Picture {
         let square = self
             .plots
@@ -264,7 +264,7 @@ impl HeatMap {
         let (rows, columns) = self.values.dim();
         let left = 26.0 + CHARACTER * longest(&self.rows) as f64;
         let width = WIDTH - left - COLOUR_BAR_WIDTH - 16.0;
-        // Names that do not fit side by side are set upright.
+        // Names that do not fit side by side are drawn vertically.
         let column = width / columns.max(1) as f64;
         let name = CHARACTER * longest(&self.columns) as f64;
         let is_upright = name > column - 4.0;

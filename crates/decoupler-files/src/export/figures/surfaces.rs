@@ -16,14 +16,14 @@ use crate::figure::{
     },
 };
 
-/// Size of the type for which surfaces are laid out, in their points.
+/// Font size for which surfaces are laid out, in points of the layout.
 const TYPE_SIZE: f32 = 11.0;
-/// Points of the canvas to a point of the layout.
+/// Points of the canvas per point of the layout.
 const SCALE: f64 = TEXT / TYPE_SIZE as f64;
 /// Room for the title of a card, and for a line below the cards.
 const TITLE: f64 = 16.0;
 const LINE: f64 = 14.0;
-/// Height of a card: in its widths, and in points.
+/// Height of a card as a fraction of its width, and its limits in points.
 const TALL_PER_WIDE: f64 = 0.98;
 const HEIGHT: [f64; 2] = [150.0, 290.0];
 const BAR_STEPS: usize = 64;
@@ -31,8 +31,8 @@ const BAR_STEPS: usize = 64;
 const EDGE: Rgb = [0xa2, 0xa9, 0xb4];
 const WHITE: Rgb = [0xff; 3];
 
-/// Draws surfaces side by side, as wide as a page. A key to the colours is at the right of the last card that it
-/// belongs to.
+/// Draws surfaces side by side, as wide as a page. A colour bar is drawn to the right of the last card that it belongs
+/// to.
 pub(super) fn draw_surfaces(figure: &SurfaceFigure) -> Picture {
     let scales: Vec<ColourScale> = figure.surfaces.iter().map(Surface::scale).collect();
     let has_key = |card: usize| scales.get(card + 1) != Some(&scales[card]);
@@ -102,7 +102,7 @@ fn layout(width: f64, height: f64) -> Bounds {
     }
 }
 
-/// Size of a text, near enough to leave room for it.
+/// Estimated size of a text, used to reserve room for it.
 fn measure(text: &str) -> Vec2 {
     let width = |character: char| match character {
         '.' | ',' | ' ' => 0.3,
@@ -140,7 +140,7 @@ fn rgb(ink: Ink) -> Rgb {
     }
 }
 
-/// Paints what is laid out in an area of the canvas.
+/// Paints a layout into an area of the canvas.
 struct Pen<'a> {
     canvas: &'a mut Canvas,
     area: Area,

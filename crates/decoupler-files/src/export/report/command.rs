@@ -1,4 +1,4 @@
-//! The command of the terminal that trains a network again.
+//! The terminal command that repeats a training.
 
 use std::{fmt, path::Path};
 
@@ -20,8 +20,8 @@ impl fmt::Display for CommandGap {
     }
 }
 
-/// Returns the command that trains with `setup` in a terminal. Options that have their default are left out. A plan that was
-/// read from `recipe` is given by that file.
+/// Returns the terminal command that trains with `setup`. Options that have their default value are omitted. A plan
+/// that was read from `recipe` is given by that file.
 ///
 /// # Errors
 /// Settings for which the terminal has no option.
@@ -98,7 +98,7 @@ fn check_plan(plan: &Plan, recipe: Option<&Path>) -> Result<(), CommandGap> {
     let mut unnamed = plan.import.clone();
     unnamed.join.iter_mut().for_each(|joined| joined.stem = None);
     check([
-        (!is_same_limit, "several largest times between partners"),
+        (!is_same_limit, "a different --join-limit for each joined file"),
         (
             times != 0 && times != join.len(),
             "a time column of some of the joined files only",
@@ -119,7 +119,7 @@ impl Command {
         self.0 += &format!(" --{name} {}", quoted(Path::new(&value.to_string())));
     }
 
-    /// Adds an option that is not as usual.
+    /// Adds an option unless it has its usual value.
     fn option<T: PartialEq + fmt::Display>(&mut self, name: &str, value: T, usual: T) {
         if value != usual {
             self.add(name, value);
@@ -268,7 +268,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn words_are_quoted_as_a_shell_needs_it() {
+    fn words_are_quoted_for_a_shell() {
         let cases = [
             ("run.checkpoint", "run.checkpoint"),
             ("my runs/a.json", "'my runs/a.json'"),

@@ -32,7 +32,7 @@ pub struct RunReport<'a> {
     pub name: Option<&'a str>,
     /// Its network, record and errors.
     pub file: &'a NetworkFile,
-    /// Defect of its training.
+    /// Defect of its training, if there is one.
     pub defect: Option<&'a RunDefect>,
     /// Other decoders on its test set, as far as they were measured.
     pub decoders: &'a [DecoderReport],
@@ -47,7 +47,7 @@ impl RunReport<'_> {
     /// The path cannot be written.
     ///
     /// # Panics
-    /// If the test set is not that of the run.
+    /// If the test set does not belong to the run.
     pub fn save(&self, path: &Path) -> Result<(), WriteError> {
         let html = self.html(folder_of(path));
         atomic_write(path, |writer| writer.write_all(html.as_bytes()))
@@ -56,7 +56,7 @@ impl RunReport<'_> {
     /// Returns the report as HTML for a file in `folder`.
     ///
     /// # Panics
-    /// If the test set is not that of the run.
+    /// If the test set does not belong to the run.
     pub fn html(&self, folder: &Path) -> String {
         let Self { file, decoders, .. } = *self;
         let setup = self.setup(folder);
@@ -119,7 +119,7 @@ impl RunReport<'_> {
             (None, Some(recorded)) => html.facts(&recording_facts(file, &recorded.relative_to(folder), self.test)),
             (None, None) => {}
         });
-        html.section("How to repeat it", |html| self.repeat(&setup, html));
+        html.section("Repeating this run", |html| self.repeat(&setup, html));
         html.finish(&title, &format!("{}{}", include_str!("style.css"), dark_style()))
     }
 
@@ -146,7 +146,7 @@ impl RunReport<'_> {
         }
     }
 
-    /// The course of the training in two sentences.
+    /// Summary of the training in two sentences.
     fn summary(&self) -> String {
         let Self { file, .. } = *self;
         let training = &file.training;
@@ -170,7 +170,7 @@ impl RunReport<'_> {
         )
     }
 
-    /// Everything that a reader has to weigh, with cause and cure.
+    /// Returns all warnings and remarks on the run, with cause and remedy.
     fn remarks(&self, setup: &Setup, answers: &ndarray::Array2<f64>) -> Vec<String> {
         let mut remarks = Vec::from_iter(self.defect.map(ToString::to_string));
         match (setup.simulated(), setup.plan()) {
@@ -265,7 +265,7 @@ impl RunReport<'_> {
         table
     }
 
-    /// The command of the terminal, and what it does not repeat.
+    /// Adds the terminal command that repeats the run, and its limitations.
     fn repeat(&self, setup: &Setup, html: &mut Html) {
         let training = &self.file.training;
         let mut settings = *setup.settings();
@@ -287,7 +287,9 @@ impl RunReport<'_> {
                 html.element("pre", "", &command);
             }
             Err(gap) => {
-                let text = format!("No command repeats this run: {gap}. The window does, with the settings above.");
+                let text = format!(
+                    "No command repeats this run: {gap}. It can be repeated in the window with the settings above."
+                );
                 html.element("p", "", &text);
             }
         }
@@ -302,7 +304,7 @@ impl RunReport<'_> {
             html.element(
                 "p",
                 "dim",
-                "The run was cut short: the command ends after as many epochs.",
+                "The run was stopped early; the command stops at the same epoch.",
             );
         }
         let program = &self.file.program;
@@ -314,21 +316,21 @@ impl RunReport<'_> {
     }
 }
 
-/// The text with a capital and one full stop.
+/// Returns the text with an initial capital and one full stop.
 fn sentence(text: &str) -> String {
     let mut letters = text.trim_end_matches('.').chars();
     let first = letters.next().into_iter().flat_map(char::to_uppercase);
     first.chain(letters).chain(['.']).collect()
 }
 
-/// HTML in the making. Its elements are closed as in XML, so that programs can read it too.
+/// Builder of an HTML document. Elements are closed as in XML, which lets XML parsers read it too.
 #[derive(Default)]
 pub(super) struct Html {
     text: String,
 }
 
 impl Html {
-    /// Adds an element with nothing but text in it.
+    /// Adds an element that contains only text.
     pub fn element(&mut self, name: &str, class: &str, text: &str) {
         let class = attribute("class", class);
         self.text += &format!("<{name}{class}>{}</{name}>\n", escaped(text));
@@ -380,7 +382,7 @@ impl Html {
         self.text += "</tr>\n";
     }
 
-    /// Adds a picture; `svg` is put in as it is.
+    /// Adds a picture; `svg` is inserted unchanged.
     pub fn figure(&mut self, caption: &str, svg: &str) {
         self.text += &format!(
             "<figure>\n{svg}<figcaption>{}</figcaption></figure>\n",
@@ -388,7 +390,7 @@ impl Html {
         );
     }
 
-    /// The whole document.
+    /// Returns the whole document.
     pub fn finish(self, title: &str, style: &str) -> String {
         let (title, body) = (escaped(title), self.text);
         format!(
@@ -407,7 +409,7 @@ fn attribute(name: &str, value: &str) -> String {
     }
 }
 
-/// Escapes what HTML would take for markup, and leaves out control characters, which it does not allow.
+/// Escapes the special characters of HTML and leaves out control characters, which it does not allow.
 pub(super) fn escaped(text: &str) -> String {
     let mut escaped = String::with_capacity(text.len());
     for letter in text.chars() {

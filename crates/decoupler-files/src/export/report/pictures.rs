@@ -19,15 +19,15 @@ use decoupler_core::{
     surface::SurfaceMap,
 };
 
-/// Largest number of targets of a recording with figures of their own.
+/// Maximum number of targets of a recording that have their own figures.
 const MAX_TARGETS: usize = 8;
 
-/// Captions and figures of a run: `answers` are those of its network to `test`.
+/// Captions and figures of a run; `answers` are the outputs of its network for `test`.
 pub(super) fn pictures(file: &NetworkFile, test: &Dataset, answers: &Array2<f64>) -> Vec<(String, Figure)> {
     let training = &file.training;
     let of_training = [
         (
-            "Errors of every epoch, mean squared, in scaled units.".to_owned(),
+            "Mean squared error of every epoch, in scaled units.".to_owned(),
             loss_figure(&training.history, &training.stages, training.best_epoch).into(),
         ),
         (
@@ -60,7 +60,7 @@ fn array_errors(test: &Dataset, decoupled_mm: &Array2<f64>) -> [(String, Figure)
     ]
 }
 
-/// Errors of the targets of a recording, of the first if there are many.
+/// Errors of the targets of a recording; only of the first ones if there are many.
 fn target_errors(file: &NetworkFile, test: &Dataset, answers: &Array2<f64>) -> Vec<(String, Figure)> {
     let targets = file.problem.targets.iter().enumerate().take(MAX_TARGETS);
     let of_target = |(index, target): (usize, &Channel)| {
@@ -167,11 +167,11 @@ fn array_surfaces(
     };
     let heights = geometry.height_mm - source.stroke_mm()..=geometry.height_mm;
     let errors_mm = error.iter().map(|node| node.z.abs()).filter(|z| z.is_finite());
-    // Errors below a nanometre have no colour of their own.
+    // Errors below a nanometre are not distinguished by colour.
     let largest_mm = errors_mm.fold(1e-6, f64::max);
     let place = rows.iter().position(|&row| row == worst.row)?;
     let caption = format!(
-        "Snapshot {} of the test set, which has the worst node of all (row {}, node {}, marked).",
+        "Snapshot {} of the test set, which has the node with the largest error (row {}, node {}, marked).",
         worst.snapshot + 1,
         worst.row + 1,
         worst.node + 1

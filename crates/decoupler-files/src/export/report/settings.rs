@@ -1,4 +1,4 @@
-//! The settings of a run in words.
+//! The settings of a run as text.
 
 use crate::{
     export::{NetworkFile, format_number},

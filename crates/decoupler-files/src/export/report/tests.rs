@@ -49,7 +49,7 @@ fn parsed(html: &str) -> Document<'_> {
 }
 
 #[test]
-fn a_report_is_one_well_formed_file_that_asks_nobody_for_anything() {
+fn a_report_is_one_well_formed_file_without_external_references() {
     let run = run();
     let file = NetworkFile::from_run(&run, None).unwrap();
     let name = "</title><script>alert(1)</script> & \"50 %\" 'ü' \u{7}";
@@ -70,12 +70,12 @@ fn a_report_is_one_well_formed_file_that_asks_nobody_for_anything() {
     }
     assert!(
         !html.contains("http") && !html.contains("@import"),
-        "a reference to the outside"
+        "an external reference"
     );
     let heading = document.descendants().find(|node| node.has_tag_name("h1")).unwrap();
     let plain = name.replace('\u{7}', "");
     assert!(heading.text().unwrap().starts_with(&plain), "{heading:?}");
-    // Every name is there once, and every use finds its own.
+    // Every id is unique, and every reference has its target.
     let ids: Vec<&str> = elements().filter_map(|node| node.attribute("id")).collect();
     assert_eq!(ids.iter().collect::<HashSet<_>>().len(), ids.len(), "{ids:?}");
     for used in elements().filter_map(|node| node.attribute("clip-path")) {
@@ -88,7 +88,7 @@ fn a_report_is_one_well_formed_file_that_asks_nobody_for_anything() {
 }
 
 #[test]
-fn a_report_holds_the_figures_of_its_run() {
+fn a_report_contains_the_figures_of_its_run() {
     let run = run();
     let file = NetworkFile::from_run(&run, None).unwrap();
     let html = report("a run", &file, &run);
@@ -119,7 +119,7 @@ fn a_report_holds_the_figures_of_its_run() {
 }
 
 #[test]
-fn settings_that_the_terminal_lacks_are_named_instead_of_a_command_that_trains_something_else() {
+fn settings_without_an_option_are_named_instead_of_a_wrong_command() {
     let mut settings = SimulatedSettings::default();
     settings.source.sensor.geometry.height_mm = 6.0;
     settings.source.scene.largest_compression = 0.1;
@@ -210,7 +210,7 @@ fn a_report_of_a_recording_has_its_errors_figures_and_command() {
             "decoupler train --data press.csv --inputs a,b --targets d1..d4 --positions taxels.csv --hidden 2 --epochs 5"
         )
     );
-    // In another folder the recording is named as seen from there.
+    // In a report in another folder, the path of the recording is relative to that folder.
     let folder = root.path().join("reports");
     std::fs::create_dir(&folder).unwrap();
     report.save(&folder.join("report.html")).unwrap();
@@ -252,7 +252,8 @@ fn the_command_of_a_recording_names_files_columns_and_division() {
         "decoupler train --data press.csv --join 'my states.csv' --join-time t2 --join-limit 0.5 --inputs c2..c5 --targets \
          force --time t --group session --where 't>0' --missing -1 --split group --hidden 12"
     );
-    // The default method has settings of its own for recordings; others hold a part out for validation.
+    // The default method has settings of its own for recordings; with other methods, a part of the samples is held out
+    // for validation.
     let mut other = settings;
     other.training.method = Method::default();
     plan.division.by = SplitBy::Random;

@@ -1,6 +1,6 @@
 //! Files of the folder that a sweep fills: `TRIAL.json`, the result of a trial, and `sweep-PLAN.json`, the trials to be
-//! trained. Both are named by the hash of what they are for and never change, so any number of programs may write to
-//! one folder.
+//! trained. Both are named by a hash of the options of their trials and never change, so any number of programs may
+//! write to one folder.
 
 mod plan_file;
 mod row;
@@ -63,7 +63,7 @@ impl SweepFiles {
     }
 }
 
-/// Writes a file of this kind unless there is one; returns whether it was written.
+/// Writes a file of this kind unless it exists already; returns true if it was written.
 fn save_new(kind: DocumentKind, program: &str, value: &impl Serialize, path: &Path) -> Result<bool, WriteError> {
     let value = to_raw_value(value).map_err(|error| WriteError::io(path, error.into()))?;
     match Sealed::new(kind, program, &value).save(path, AtomicFile::commit_new) {

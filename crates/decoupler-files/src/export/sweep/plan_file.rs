@@ -28,7 +28,7 @@ const KIND: DocumentKind = DocumentKind::SweepPlan;
 /// Beginning of the name of a plan file.
 pub(super) const PREFIX: &str = "sweep-";
 
-/// All trials of a specification, in its order, kept next to the results so that missing ones can be named.
+/// All trials of a specification, in its order, kept next to the results to identify missing ones.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SweepPlan {
@@ -76,7 +76,7 @@ impl SweepPlan {
         if combinations == Some(plan.trials.len()) {
             Ok(plan)
         } else {
-            let defect = "trials: there are more or fewer than combinations of the axes' values".to_owned();
+            let defect = "trials: their number is not that of the combinations of the axes' values".to_owned();
             Err(KIND.damaged(path, defect))
         }
     }
@@ -114,11 +114,11 @@ fn written(value: &Value) -> String {
     }
 }
 
-/// Reasons for which an experiment of the window cannot be swept by the terminal.
+/// Reasons why an experiment of the window cannot be run as a sweep in the terminal.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum SpecificationGap {
-    /// Settings that the terminal lacks.
+    /// Settings that have no option in the terminal.
     #[error("{0}: a sweep in the terminal cannot train this")]
     Setting(CommandGap),
     /// Trials that are cross-validations.
@@ -143,7 +143,7 @@ pub fn sweep_specification(experiment: &Experiment, plan: Option<&Plan>) -> Resu
     for axis in experiment.axes() {
         axes.insert(option(axis.kind()).to_owned(), values(axis));
         if axis.kind() == AxisKind::Method {
-            // Settings are those of one method; each has its own here.
+            // `set` belongs to one method; here, each method has its own settings.
             train.remove("set");
         }
     }
@@ -207,14 +207,15 @@ fn texts(values: &[impl ToString]) -> Value {
     values.iter().map(ToString::to_string).collect()
 }
 
-/// Decoders in the order in which they are offered, each once: neither changes a result.
+/// Returns the decoders in the order in which they are offered, without duplicates: order and duplicates change no
+/// result.
 pub fn decoders_in_order(decoders: &[DecoderKind]) -> Vec<DecoderKind> {
     let all = DecoderKind::ALL.into_iter();
     all.filter(|kind| decoders.contains(kind)).collect()
 }
 
-/// Options that give exactly these settings and decoders, with every default written out, so that the same trial has
-/// the same options however it was specified. Those of a recording name no files.
+/// Returns the options for exactly these settings and decoders, with every default written out: the same trial has the
+/// same options however it was specified. Options of a recording name no files.
 pub fn train_options(settings: &RunSettings, decoders: &[DecoderKind]) -> TrialOptions {
     let training = &settings.training;
     let rules = &training.stopping;
@@ -301,7 +302,7 @@ fn simulation_options(source: &Simulation) -> TrialOptions {
     named.map(|(option, value)| (option.to_owned(), value)).collect()
 }
 
-/// Zero has two signs and one meaning.
+/// Negative zero is written as zero.
 fn number(value: f64) -> Value {
     Value::from(value + 0.0)
 }

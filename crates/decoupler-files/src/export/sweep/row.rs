@@ -14,10 +14,10 @@ use thiserror::Error;
 use super::{SweepFiles, SweepPlan, Trial, TrialId, TrialOptions};
 pub use crate::export::DocumentError;
 
-/// Fields of a report that are times: they differ from run to run, and nothing is compared by them.
+/// Fields of a report that are times: they differ from run to run and are excluded from comparisons.
 const TIMES: [&str; 4] = ["epoch_ms", "frame_us", "fit_seconds", "training_seconds"];
 
-/// A trial in a table: what it was, its results, and how long it took.
+/// A trial in a table: its options, its results and its times.
 #[derive(Clone, Debug, Serialize)]
 pub struct SweepRow {
     pub(crate) trial: TrialId,
@@ -26,7 +26,7 @@ pub struct SweepRow {
     pub options: TrialOptions,
     /// The report without its times.
     pub result: Value,
-    /// Times by their place in the report, and the whole time as `seconds`.
+    /// Times by their place in the report, and the total time as `seconds`.
     pub time: BTreeMap<String, Value>,
 }
 
@@ -68,7 +68,7 @@ impl SweepRow {
         let by_value = pairs.map(|((name, value), (other_name, other_value))| {
             let names = name.cmp(other_name);
             names.then_with(|| match (value.as_f64(), other_value.as_f64()) {
-                // Whole numbers beyond 2⁵³ are the same as floating-point numbers.
+                // Integers beyond 2⁵³ are compared as floating-point numbers.
                 (Some(one), Some(two)) => one.total_cmp(&two).then(value.as_u64().cmp(&other_value.as_u64())),
                 _ => value.to_string().cmp(&other_value.to_string()),
             })
@@ -78,7 +78,7 @@ impl SweepRow {
         decided.unwrap_or(length).then(self.trial.cmp(&other.trial))
     }
 
-    /// Cells of the row by column. Results that the options give already, and lists of objects, are left out.
+    /// Cells of the row by column. Results that repeat an option, and lists of objects, are left out.
     pub(super) fn cells(&self) -> BTreeMap<Column, String> {
         let mut cells = BTreeMap::new();
         cells.insert(Column::Trial, self.trial.to_string());
@@ -104,8 +104,8 @@ impl SweepRow {
 
     fn is_told_by_options(&self, field: &str) -> bool {
         let is_option = self.options.contains_key(&field.replace('_', "-"));
-        // The option is the largest number of epochs, the result the number that were run; of targets the option has the names,
-        // the result the errors.
+        // For epochs, the option is the maximum and the result the number run; for targets, the option has the names
+        // and the result the errors.
         (is_option && !["epochs", "targets"].contains(&field)) || ["scene", "inputs"].contains(&field)
     }
 }
@@ -157,7 +157,7 @@ fn take_times(value: &mut Value, place: &str, times: &mut BTreeMap<String, Value
     }
 }
 
-/// JSON with the fields of each object in the order of their names, in which objects need not be held.
+/// Returns JSON with the fields of each object sorted by name.
 fn sorted(value: &Value) -> String {
     match value {
         Value::Object(fields) => {
@@ -176,8 +176,8 @@ fn sorted(value: &Value) -> String {
     }
 }
 
-/// Visits everything in `value` that is no object, with its place. Objects of a list are placed by their names, if they have
-/// some.
+/// Visits every value in `value` that is not an object, with its place. Objects of a list are identified by their
+/// names, if they have any.
 fn flatten(value: &Value, place: &str, visit: &mut impl FnMut(&str, &Value)) {
     match value {
         Value::Object(fields) => {
@@ -206,14 +206,14 @@ fn joined(place: &str, name: &str) -> String {
     }
 }
 
-/// A cell: numbers so that reading gives the same bits, nothing where there is none; none for lists of objects.
+/// Returns the text of a cell: numbers read back bit for bit, `null` is empty; `None` for a list of objects.
 fn text(value: &Value) -> Option<String> {
     match value {
         Value::Null => Some(String::new()),
         Value::String(text) => Some(text.clone()),
         Value::Array(values) => {
             let texts: Option<Vec<_>> = values.iter().map(|value| value.as_str()).collect();
-            // Remarks are sentences, the values of an option are words.
+            // Remarks are sentences; values of an option are words.
             texts.map(|texts| {
                 texts.join(if texts.iter().any(|text| text.contains(' ')) {
                     "; "
@@ -230,14 +230,14 @@ fn text(value: &Value) -> Option<String> {
 /// Layout of a table.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum SweepTableFormat {
-    /// A line for each trial.
+    /// One line per trial.
     Csv,
     /// One object with every field of the results, and the missing and conflicting trials.
     Json,
 }
 
 impl SweepTableFormat {
-    /// The format that belongs to the ending of `path`.
+    /// Returns the format given by the extension of `path`.
     pub fn of(path: &Path) -> Option<Self> {
         let ending = path.extension().and_then(OsStr::to_str)?;
         match ending.to_ascii_lowercase().as_str() {
@@ -274,7 +274,7 @@ fn write_csv(merged: &MergedSweep, writer: &mut dyn Write) -> io::Result<()> {
     table.flush()
 }
 
-/// Reasons for which a folder has no table.
+/// Reasons why a folder has no table.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum SweepFolderError {
@@ -357,7 +357,7 @@ impl MergedSweep {
         let mut by_result: BTreeMap<String, Found> = BTreeMap::new();
         for found in same {
             let kept = by_result.entry(found.row.compared()).or_insert_with(|| found.clone());
-            // Of several versions of the program the last, whatever the order of the folders.
+            // Of several program versions, the latest is kept, whatever the order of the folders.
             if (&found.row.program, &found.path) > (&kept.row.program, &kept.path) {
                 *kept = found;
             }
@@ -390,11 +390,11 @@ impl Found {
 
 /// Trials of `plans` that are not finished, each once.
 fn missing(plans: &[SweepPlan], finished: &BTreeSet<TrialId>) -> Vec<String> {
-    let mut told = BTreeSet::new();
+    let mut listed = BTreeSet::new();
     let mut missing = Vec::new();
     for plan in plans {
         for (position, id) in plan.trials.iter().enumerate() {
-            if !finished.contains(id) && told.insert(id) {
+            if !finished.contains(id) && listed.insert(id) {
                 missing.push(format!("trial {} ({})", position + 1, plan.describe(position)));
             }
         }
@@ -414,7 +414,7 @@ mod tests {
     }
 
     #[test]
-    fn times_stand_apart_and_options_are_told_once() {
+    fn times_are_separate_and_options_are_listed_once() {
         let report = json!({
             "epochs": 20, "hidden": 8, "scene": {"rows": "all"}, "epoch_ms": 2.5, "published": null,
             "warnings": ["first of two", "second"], "starts": [{"epochs": 20}],
@@ -422,17 +422,17 @@ mod tests {
         });
         let row = row(json!({"epochs": 100, "hidden": 8, "decoder": ["ridge"]}), report);
         let cells = row.cells();
-        let told: Vec<_> = cells
+        let texts: Vec<_> = cells
             .iter()
             .map(|(column, text)| (column.heading(), text.as_str()))
             .collect();
-        let told: Vec<_> = told
+        let texts: Vec<_> = texts
             .iter()
             .map(|(heading, text)| (heading.as_str(), *text))
             .skip(2)
             .collect();
         assert_eq!(
-            told,
+            texts,
             [
                 ("decoder", "ridge"),
                 ("epochs", "100"),

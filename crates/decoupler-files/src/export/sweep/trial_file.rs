@@ -39,7 +39,7 @@ struct TrialDocument {
 }
 
 impl Trial {
-    /// The result of a trial by this program.
+    /// Creates the result of a trial run by this program.
     pub fn new(options: TrialOptions, report: Value, seconds: f64) -> Self {
         Self {
             program: PROGRAM.to_owned(),
@@ -49,7 +49,7 @@ impl Trial {
         }
     }
 
-    /// Identifier of a trial with these options by this program.
+    /// Returns the identifier of a trial with these options run by this program.
     pub fn id_of(options: &TrialOptions) -> TrialId {
         Self::id_by(PROGRAM, options)
     }
@@ -72,8 +72,8 @@ impl Trial {
         folder.join(format!("{id}.json"))
     }
 
-    /// Writes the trial to its file in `folder`, whole or not at all. A file that another program has written meanwhile
-    /// stays.
+    /// Writes the trial to its file in `folder`, whole or not at all. A file that another program has written in the
+    /// meantime is kept.
     ///
     /// # Errors
     /// The file cannot be written.
@@ -107,7 +107,7 @@ impl Trial {
             Ok(trial)
         } else {
             let defect = format!(
-                "its name belongs to another trial than its options, which are of {}",
+                "its name belongs to another trial: its options are those of trial {}",
                 trial.id()
             );
             Err(KIND.damaged(path, defect))
@@ -115,7 +115,7 @@ impl Trial {
     }
 }
 
-/// Digits of a written identifier.
+/// Number of digits of a written identifier.
 const DIGITS: usize = 32;
 
 /// 128-bit hash of what determines the result of a trial; names its files. SipHash-2-4 (Aumasson and Bernstein 2012) with
@@ -170,8 +170,8 @@ impl From<TrialId> for String {
 mod tests {
     use super::*;
 
-    /// Computed by a program that reproduces the authors' vector of the empty message with the key 00 01 … 0f, their bytes
-    /// read from the last to the first.
+    /// Expected values are from a program that reproduces the authors' test vector for the empty message with the key
+    /// 00 01 … 0f, with its bytes in reverse order.
     #[test]
     fn the_hash_is_that_of_the_published_algorithm() {
         for (text, id) in [

@@ -31,7 +31,7 @@ pub struct TableColumn {
     pub heading: String,
     /// Unit of its numbers; empty where they have none.
     pub unit: &'static str,
-    /// Definition of its numbers, shown as a tooltip; empty where the heading says it.
+    /// Definition of its numbers, shown as a tooltip; empty if the heading is enough.
     pub meaning: &'static str,
 }
 
@@ -46,7 +46,7 @@ impl TableColumn {
         }
     }
 
-    /// With this definition.
+    /// Returns the column with this definition.
     pub fn meaning(self, meaning: &'static str) -> Self {
         Self { meaning, ..self }
     }
@@ -70,13 +70,13 @@ impl TableColumn {
 /// Contents of a cell.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Cell {
-    /// Words.
+    /// A text.
     Text(String),
-    /// A whole number.
+    /// An integer.
     Count(u64),
     /// A number; `None` where there is none.
     Number(Option<f64>),
-    /// A number that readers see with this many decimals, as those of R²; `None` where there is none.
+    /// A number shown to readers with this many decimals, such as R²; `None` where there is none.
     Decimals(Option<f64>, usize),
 }
 
@@ -97,7 +97,7 @@ impl Cell {
         }
     }
 
-    /// Returns [`Self::exact`], so that no spreadsheet takes words for a formula.
+    /// Returns [`Self::exact`], quoted where a spreadsheet would treat the text as a formula.
     pub(super) fn for_spreadsheet(&self) -> String {
         match self {
             Self::Text(text) => inert(text),
@@ -160,7 +160,7 @@ impl Table {
         }
     }
 
-    /// Returns true if the column has nothing but numbers.
+    /// Returns true if the column contains only numbers.
     pub fn is_numeric(&self, column: usize) -> bool {
         let mut cells = self.rows.iter().filter_map(|row| row.get(column));
         cells.all(|cell| !matches!(cell, Cell::Text(_)))
@@ -176,8 +176,7 @@ impl Table {
         }
     }
 
-    /// Writes the table as CSV. Numbers are written so that reading gives the same bits; where there is none the field is
-    /// empty.
+    /// Writes the table as CSV. Numbers read back bit for bit; where there is none the field is empty.
     ///
     /// # Errors
     /// Any error of `writer`.
@@ -234,7 +233,7 @@ impl Serialize for Cell {
     }
 }
 
-/// Quotes a field of CSV where it needs it (RFC 4180).
+/// Quotes a CSV field if necessary (RFC 4180).
 fn quoted(text: &str) -> String {
     if text.contains([',', '"', '\n', '\r']) {
         format!("\"{}\"", text.replace('"', "\"\""))
@@ -290,7 +289,7 @@ fn alignment(table: &Table, column: usize) -> String {
     format!("S[table-format={}]", widest.format())
 }
 
-/// Places that the widest number of a column takes before and after its point, and in its exponent.
+/// Maximum number of digits of a column's numbers before and after the decimal point, and in the exponent.
 #[derive(Default)]
 struct NumberWidth {
     has_sign: bool,
@@ -322,7 +321,7 @@ impl NumberWidth {
     }
 }
 
-/// Escapes what LaTeX would take for a command.
+/// Escapes the special characters of LaTeX.
 fn escaped(text: &str) -> String {
     let mut escaped = String::with_capacity(text.len());
     // After the end of a row, LaTeX takes [ and * for arguments of \\, and a number stays one for siunitx.
@@ -347,7 +346,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn csv_gives_back_every_bit_and_every_letter() {
+    fn csv_round_trips_every_bit_and_every_letter() {
         let awkward = "a, \"b\"\nc";
         let numbers = [0.1 + 0.2, -1e-300, 5e-324, f64::MAX, 1.0];
         let table = Table {
@@ -386,7 +385,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_number_is_empty_for_programs_and_a_dash_for_readers() {
+    fn missing_numbers_are_empty_for_programs_and_a_dash_for_readers() {
         for cell in [Cell::Number(None), f64::NAN.into(), f64::INFINITY.into()] {
             assert_eq!((cell.exact().as_str(), cell.rounded().as_str()), ("", "–"));
         }

@@ -72,7 +72,7 @@ impl Table {
     }
 
     fn json(&self) -> String {
-        // Of texts and finite numbers, which always can be written.
+        // Texts and finite numbers can always be written.
         let json = serde_json::to_string_pretty(self);
         json.unwrap_or_default() + "\n"
     }
@@ -89,7 +89,7 @@ impl Table {
     }
 
     fn tab_separated(&self) -> String {
-        // A tab or line break inside a cell would begin another.
+        // A tab or line break inside a cell would start a new cell.
         let plain = |text: String| text.replace(['\t', '\n', '\r'], " ");
         let line = |cells: Vec<String>| cells.join("\t") + "\n";
         let mut text = line(
@@ -105,13 +105,13 @@ impl Table {
     }
 }
 
-/// Escapes what Markdown would take for markup.
+/// Escapes the special characters of Markdown.
 fn escaped(text: &str) -> String {
     let mut escaped = String::with_capacity(text.len());
     let mut before = ' ';
     let mut letters = text.chars().peekable();
     while let Some(letter) = letters.next() {
-        // Inside a word an underscore is one.
+        // Inside a word, Markdown treats an underscore as a plain character.
         let is_inside = before.is_alphanumeric() && letters.peek().is_some_and(|next| next.is_alphanumeric());
         match letter {
             '\n' | '\r' => escaped.push(' '),
@@ -144,7 +144,7 @@ mod tests {
     }
 
     #[test]
-    fn markdown_has_as_many_cells_in_every_line_whatever_the_names() {
+    fn markdown_lines_have_the_same_number_of_cells_for_any_names() {
         let text = table().text(TableForm::Markdown);
         let expected = "| Decoder | Z (%) | epochs |\n\
                         | --- | ---: | ---: |\n\
@@ -155,7 +155,7 @@ mod tests {
     }
 
     #[test]
-    fn spreadsheets_get_every_digit_and_one_line_a_row() {
+    fn spreadsheets_get_every_digit_and_one_line_per_row() {
         let text = table().text(TableForm::TabSeparated);
         let lines: Vec<Vec<&str>> = text.lines().map(|line| line.split('\t').collect()).collect();
         assert_eq!(lines[0], ["Decoder", "Z (%)", "epochs"]);
@@ -204,7 +204,7 @@ mod tests {
 
     /// Read back as a spreadsheet reads them.
     #[test]
-    fn names_are_no_formulas_and_numbers_stay_numbers() {
+    fn names_are_not_formulas_and_numbers_stay_numbers() {
         let names = ["=1+2", "+a", "-b", "@c", "-0.5", "plain"];
         let table = Table {
             columns: vec![TableColumn::new("=x", "=x", ""), TableColumn::new("z", "Z", "")],

@@ -9,7 +9,7 @@ use crate::export::bundle::{
 };
 use decoupler_core::network::Quantity;
 
-/// Declarations of the interface in whole numbers.
+/// Declarations of the interface in fixed point.
 pub(super) fn header<'a>(
     name: &'a str,
     portable: &'a Portable,
@@ -50,10 +50,10 @@ pub(super) fn outputs(portable: &Portable) -> &'static str {
 
 /// The sentences on units.
 pub(super) fn units(portable: &Portable, networks: &FixedNetworks) -> String {
-    let saturation = "Any readings whatever are decoded without overflow: numbers out of range saturate.";
+    let saturation = "All readings are decoded without overflow: numbers out of range saturate.";
     match portable.meaning {
         Meaning::Array(_) => format!(
-            "Readings are whole numbers of {:e} ohm, coordinates whole numbers of\n   nanometres. {saturation}\n   Error \
+            "Readings are integers in units of {:e} ohm, coordinates integers in\n   nanometres. {saturation}\n   Error \
              bound for readings that are not out of range: {:.4} mm.",
             networks.readings.unit(0),
             networks
@@ -64,7 +64,7 @@ pub(super) fn units(portable: &Portable, networks: &FixedNetworks) -> String {
         Meaning::Own { .. } => {
             let bounds: Vec<String> = networks.bounds.iter().map(|bound| format!("{bound:.2e}")).collect();
             format!(
-                "Readings and targets are whole numbers of the units below.\n   {saturation}\n   Error bounds of the \
+                "Readings and targets are integers in the units below.\n   {saturation}\n   Error bounds of the \
                  targets for readings that are not out of range: {}.",
                 bounds.join(", ")
             )
@@ -72,7 +72,7 @@ pub(super) fn units(portable: &Portable, networks: &FixedNetworks) -> String {
     }
 }
 
-/// The units of own data as initialisers of arrays; nothing for an array, whose units the names tell.
+/// Units of own data as initialisers of arrays; empty for an array, whose names contain the units.
 pub(super) fn unit_definitions(name: &str, portable: &Portable, networks: &FixedNetworks) -> String {
     if let Meaning::Array(_) = portable.meaning {
         return String::new();
@@ -86,7 +86,7 @@ pub(super) fn unit_definitions(name: &str, portable: &Portable, networks: &Fixed
         )
     };
     format!(
-        "/* Units of the whole numbers, in those of the columns. */\n{}{}\n",
+        "/* Units of the integers, in proportion to the units of the columns. */\n{}{}\n",
         define("READING", &networks.readings),
         define("TARGET", &networks.outputs)
     )
@@ -246,9 +246,9 @@ fn arithmetic(quantity: Quantity) -> String {
         }
     };
     let about = match quantity {
-        Quantity::Resistance | Quantity::Raw => "Difference of a reading from the centre of its channel",
-        Quantity::Conductance => "Relative difference of the conductance from the centre of its channel, in 2^-30",
-        Quantity::LogResistance => "Difference of the logarithm from the centre of its channel, in 2^-26",
+        Quantity::Resistance | Quantity::Raw => "Difference between a reading and the centre of its channel",
+        Quantity::Conductance => "Relative difference between the conductance and the centre of its channel, in 2^-30",
+        Quantity::LogResistance => "Difference between the logarithm and the centre of its channel, in 2^-26",
     };
     format!("{tangent}/* {about}. */\nstatic int64_t changed(int32_t reading, int32_t centre)\n{{\n{change}}}\n\n")
 }

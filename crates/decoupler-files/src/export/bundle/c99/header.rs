@@ -10,7 +10,7 @@ use crate::export::bundle::{
     weights::Digits,
 };
 
-/// Names and types that the header, source and self-test of a bundle in C have in common.
+/// Names and types shared by the header, source and self-test of a bundle in C.
 pub(super) struct Header<'a> {
     /// Prefix of all names.
     pub(super) name: &'a str,
@@ -21,7 +21,7 @@ pub(super) struct Header<'a> {
     /// Type and name of the outputs.
     pub(super) coordinate: &'static str,
     pub(super) coordinates: &'static str,
-    /// Sentences on units; empty where the names of the columns have them.
+    /// Sentences on units; empty if the names of the columns contain them.
     pub(super) units: &'a str,
     /// Definitions of units.
     pub(super) definitions: &'a str,
@@ -30,7 +30,7 @@ pub(super) struct Header<'a> {
 }
 
 impl Header<'_> {
-    /// The prefix in capitals.
+    /// Returns the prefix in upper case.
     pub(super) fn upper(&self) -> String {
         self.name.to_uppercase()
     }
@@ -149,7 +149,7 @@ impl Header<'_> {
             overflow = match self.reading {
                 "int32_t" => String::new(),
                 _ => format!(
-                    " Readings so extreme that the sums overflow and leave no answer\n   give {upper}_BAD_READING."
+                    " Readings so extreme that the sums overflow give {upper}_BAD_READING."
                 ),
             },
         );
@@ -203,23 +203,23 @@ pub(super) fn push_out_of_range(
     );
 }
 
-/// Golden vectors as a self-test has them.
+/// Golden vectors of a self-test.
 pub(super) struct SelfTest<'a> {
     pub(super) header: &'a Header<'a>,
     pub(super) vectors: &'a [Vector],
     /// Largest deviations allowed, relative to the range of the outputs.
     pub(super) limits: Deviation,
-    /// For a source in whole numbers.
+    /// For a source in fixed point.
     pub(super) whole: Option<WholeNumbers>,
 }
 
-/// Units of a source in whole numbers, and what it must answer.
+/// Units of a source in fixed point, and its expected outputs.
 pub(super) struct WholeNumbers {
     /// Number of units in 1 of each reading.
     pub(super) readings_per_one: Vec<f64>,
-    /// Unit of each decoded output, as the network has it.
+    /// Unit of each decoded output, relative to the output of the network.
     pub(super) units: Vec<f64>,
-    /// Whole numbers that must come out bit for bit, vector by vector.
+    /// Expected integers, bit for bit, vector by vector.
     pub(super) bits: Vec<i32>,
 }
 
@@ -303,7 +303,7 @@ impl SelfTest<'_> {
                 "(int32_t)lround(readings[v][i] * readings_per_one[i])",
                 "decoded[k] * units[k]",
                 "            if (decoded[k] != expected_bits[v][k]) {\n                \
-                 puts(\"an output differs from the model in whole numbers\");\n                \
+                 puts(\"an output differs from the fixed-point model\");\n                \
                  return 1;\n            }\n",
             )
         } else if self.is_single() {
@@ -315,7 +315,7 @@ impl SelfTest<'_> {
             format!(
                 "    if ({name}_decode(0, taken, decoded) != {upper}_NO_SUCH_ROW ||\n        \
                  {name}_decode({upper}_ROWS + 1, taken, decoded) != {upper}_NO_SUCH_ROW) {{\n        \
-                 puts(\"a row that the array does not have is not refused\");\n        \
+                 puts(\"a row that does not exist is not refused\");\n        \
                  return 1;\n    }}\n"
             )
         } else {

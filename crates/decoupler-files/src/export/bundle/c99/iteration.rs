@@ -103,7 +103,7 @@ fn tables(equations: &RowProblemDescription) -> Vec<(&'static str, Vec<usize>, V
     tables
 }
 
-/// The function that decodes, by how the row-wire is known.
+/// Returns the decoding function, which depends on how the row-wire is known.
 fn decode(header: &Header<'_>, equations: &RowProblemDescription) -> String {
     let upper = header.upper();
     let (readings, coordinates) = (header.readings, header.coordinates);

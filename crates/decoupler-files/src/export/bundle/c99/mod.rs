@@ -48,7 +48,7 @@ pub(super) fn write_floating(
     files(&header, floating::source(&header, weights), self_test.text())
 }
 
-/// Writes header, source and self-test in whole numbers.
+/// Writes header, source and self-test in fixed point.
 pub(super) fn write_fixed(
     name: &str,
     portable: &Portable,
@@ -102,12 +102,12 @@ pub(super) fn export(draft: &mut Draft<'_>) -> Result<Vec<BundleCheck>, BundleEr
     let mut checks = vec![BundleCheck::of("model of the C source", draft.deviation_of(weights))];
     match run_self_test(draft.folder.path(), draft.name)? {
         Compiled::Ran { deviation } => checks.push(BundleCheck::of("C source, compiled and run", deviation)),
-        Compiled::NoCompiler(why) => draft.remarks.push(format!("the C source was not compiled: {why}")),
+        Compiled::NoCompiler(reason) => draft.remarks.push(format!("the C source was not compiled: {reason}")),
     }
     Ok(checks)
 }
 
-/// How to call it, for the README.
+/// Returns the usage section of the README.
 pub(super) fn call(call: &Call<'_>) -> String {
     let portable = call.portable;
     let (name, takes_row, upper) = (call.name, portable.takes_row(), call.name.to_uppercase());
@@ -143,7 +143,7 @@ pub(super) fn call(call: &Call<'_>) -> String {
     let library = if call.fixed.is_some() { "" } else { " -lm" };
     let units = match (call.fixed, meaning) {
         (Some(_), Meaning::Own { .. }) => format!(
-            "\nReadings and targets are whole numbers of the units {upper}_READING_UNITS and {upper}_TARGET_UNITS \
+            "\nReadings and targets are integers in the units {upper}_READING_UNITS and {upper}_TARGET_UNITS \
              in the header:\nround(reading / unit) goes in, and unit * number comes out."
         ),
         _ => String::new(),
@@ -177,11 +177,11 @@ const FLAGS: [&str; 7] = [
 pub(in crate::export::bundle) enum Compiled {
     /// Largest deviations of the golden vectors, relative to the range of the outputs.
     Ran { deviation: Deviation },
-    /// Not compiled, and why.
+    /// Not compiled, with the reason.
     NoCompiler(&'static str),
 }
 
-/// Compiles the source and the self-test in `folder` and runs it; neither leaves anything there.
+/// Compiles the source and the self-test in `folder` and runs the self-test; no files are left there.
 ///
 /// # Errors
 /// The compiler refuses the source, or the self-test fails.
@@ -233,7 +233,7 @@ fn compile(sources: &[&Path], program: &Path) -> io::Result<Output> {
     command.output()
 }
 
-/// The first lines of a message, as one.
+/// Joins the first lines of a message.
 fn first_lines(text: &[u8]) -> String {
     let text = String::from_utf8_lossy(text);
     text.lines().take(3).collect::<Vec<_>>().join("; ")
@@ -247,7 +247,7 @@ pub(super) fn type_name(digits: Digits) -> &'static str {
     }
 }
 
-/// A number as C reads it back to the same bits; one beyond the largest that `digits` can have is this.
+/// Formats a number that C reads back bit for bit, limited to the range of `digits`.
 pub(super) fn number(digits: Digits, value: f64) -> String {
     match digits {
         Digits::Single => format!("{:e}f", (value as f32).clamp(f32::MIN, f32::MAX)),
@@ -255,7 +255,7 @@ pub(super) fn number(digits: Digits, value: f64) -> String {
     }
 }
 
-/// A 64-bit whole number.
+/// Formats a 64-bit integer.
 pub(super) fn long(value: i64) -> String {
     format!("INT64_C({value})")
 }
@@ -273,7 +273,7 @@ pub(super) fn push_array(
 }
 
 fn push_level(text: &mut String, shape: &[usize], elements: &mut impl Iterator<Item = impl Display>, depth: usize) {
-    /// Characters after which a line ends.
+    /// Number of characters after which a line ends.
     const WIDTH: usize = 100;
     let Some((&size, inner)) = shape.split_first() else {
         return;
@@ -283,7 +283,7 @@ fn push_level(text: &mut String, shape: &[usize], elements: &mut impl Iterator<I
     let mut line = indent.clone();
     for _ in 0..size {
         if inner.is_empty() {
-            // The iterator has as many elements as the shape says.
+            // The shape determines the number of elements.
             let Some(element) = elements.next() else { break };
             let _ = write!(line, "{element}, ");
             if line.len() > WIDTH {
@@ -309,7 +309,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn numbers_are_those_of_c() {
+    fn numbers_are_literals_of_c() {
         let cases = [
             (number(Digits::Double, 0.1), "1e-1"),
             (number(Digits::Double, -1.0 / 3.0), "-3.333333333333333e-1"),

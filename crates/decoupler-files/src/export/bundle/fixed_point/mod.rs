@@ -1,11 +1,11 @@
-//! Networks in whole numbers: 16-bit weights and activations, 64-bit sums; where the products of a hidden layer nearly
+//! Networks in fixed point: 16-bit weights and activations, 64-bit sums; where the products of a hidden layer nearly
 //! cancel, its weights have 24 bits. Readings and outputs are 32-bit numbers of small units.
 //!
-//! Every number has a range that holds for any readings whatever, because each step begins with a saturation; sums can
-//! therefore not wrap. The bound on the error is computed by interval analysis over the range of readings in training and
+//! Every number has a range that holds for all readings, because each step begins with a saturation; sums therefore
+//! cannot overflow. The bound on the error is computed by interval analysis over the range of readings in training and
 //! a tenth of it on either side.
 //!
-//! The decoder in whole numbers, step by step as the C source has it.
+//! The decoder in fixed point performs the same steps as the C source.
 
 mod quantise;
 mod scaled;
@@ -22,24 +22,24 @@ use crate::export::bundle::{
 };
 pub(super) use scaled::{CONDUCTANCE_BITS, HiddenWidth, LogTable, TangentTable};
 
-/// Reasons for which a network cannot leave in fixed point.
+/// Reasons why a network cannot be exported in fixed point.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
 pub enum FixedPointError {
-    /// Another decoder than a network.
+    /// A decoder other than a network.
     #[error("fixed16 is for networks only: give --precision f64 or f32")]
     NoNetwork,
-    /// The file does not tell the range of the readings.
+    /// The file does not contain the range of the readings.
     #[error(
         "fixed16 needs the range of the readings in training, which the network file does not have: train again, or give --precision f32"
     )]
     NoRange,
-    /// Resistances that no unit brings into 32 bits.
+    /// Resistances that exceed 32 bits in every unit.
     #[error(
         "fixed16 reads resistances up to 1e9 ohm, and in training they were up to {0:.1e} ohm: give --precision f32"
     )]
     Reading(f64),
-    /// Weights or outputs beyond what the numbers hold.
+    /// Weights or outputs beyond the range of the numbers.
     #[error("fixed16 cannot hold {what}: {cure}, which keeps weights small, or give --precision f32")]
     Range {
         /// A way to train a network with smaller weights.
@@ -47,9 +47,9 @@ pub enum FixedPointError {
         /// Name of the value that is too large.
         what: &'static str,
     },
-    /// An error bound that says nothing.
+    /// An error bound that is too large.
     #[error(
-        "in whole numbers the error is only known to be below {bound:.3} times {scale}: {cure} (the network amplifies differences of its readings too much), or give --precision f32"
+        "in fixed point the error is only known to be below {bound:.3} times {scale}: {cure} (the network amplifies differences of its readings too much), or give --precision f32"
     )]
     Coarse {
         /// The bound, in proportion to the range.
@@ -91,7 +91,7 @@ impl<'a> TwoLayers<'a> {
         .collect()
     }
 
-    /// Largest size of an output, whatever the activations.
+    /// Maximum magnitude of an output over all activations.
     pub(super) fn reach(&self, output: usize) -> f64 {
         let weights = self.output_weights.column(output);
         let of_weights: f64 = weights.iter().map(|weight| weight.to_f64().abs()).sum();
@@ -136,7 +136,7 @@ impl FixedNetworks {
                 .zip(&activations)
                 .map(|(&weight, activation)| i64::from(weight) * activation);
             let sum = shift(bias + products.sum::<i64>(), network.output_shifts[output]);
-            // Proven to fit when the weights were rounded.
+            // Rounding the weights ensured that it fits.
             sum.clamp(i64::from(-i32::MAX), i64::from(i32::MAX)) as i32
         });
         Some(outputs.collect())
@@ -163,17 +163,17 @@ fn shift(value: i64, bits: u8) -> i64 {
     (value + (1 << (bits - 1))) >> bits
 }
 
-/// Units of whole numbers: each is 10^−`decimals` of the unit in which the network has the reading or the output.
+/// Units of integers: each is 10^−`decimals` of the network's unit of the reading or output.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(in crate::export::bundle) struct Units {
     decimals: Vec<i32>,
 }
 
-/// Size that readings within their limits stay below, so that those outside have a factor of 2.
+/// Upper bound of readings within their limits, which leaves a factor of 2 for readings outside.
 const LARGEST_READING: f64 = (1_u32 << 30) as f64;
-/// Units in the range of an output of own data: more than a network in whole numbers can tell.
+/// Number of units in the range of an output of own data: finer than a fixed-point network can resolve.
 const OUTPUT_UNITS: f64 = 1e7;
-/// Size that outputs of own data stay below whatever the activations, so that their sums fit with all bits of a weight.
+/// Upper bound of outputs of own data for all activations: their sums fit with all bits of a weight.
 const LARGEST_OUTPUT: f64 = (1_u32 << 24) as f64;
 
 impl Units {
@@ -236,15 +236,15 @@ impl Units {
         (0..self.decimals.len()).map(|index| self.unit(index))
     }
 
-    /// The value in units, at most the largest number.
+    /// Returns the value in units, limited to the largest number.
     pub(in crate::export::bundle) fn whole(&self, index: usize, value: f64) -> i32 {
         (value * self.per_one(index)).round() as i32
     }
 }
 
-/// Most decimals with which `size` has at most `units` units.
+/// Returns the maximum number of decimals with which `size` has at most `units` units.
 fn max_decimals(size: f64, units: f64) -> i32 {
-    /// Far within the range of double precision, so that units and their squares are numbers.
+    /// Far within the range of double precision: units and their squares are finite.
     const MAX: f64 = 120.0;
     if size == 0.0 {
         return 0;
@@ -261,7 +261,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn units_are_as_small_as_the_numbers_allow() {
+    fn units_are_as_small_as_the_range_of_the_numbers_allows() {
         for (size, units, expected) in [
             (1.0, 1e7, 7),
             (9.9, 1e7, 6),

@@ -5,14 +5,14 @@ use super::{
 use crate::export::bundle::portable::Portable;
 use decoupler_core::network::Quantity;
 
-/// Part of the range of the outputs below which the bound on the error should be.
+/// Desired upper limit of the error bound, as a fraction of the range of the outputs.
 pub(in crate::export::bundle) const USUAL_BOUND: f64 = 0.01;
 /// Bits of an output weight with its sign.
 const OUTPUT_WIDTH: u32 = 16;
-/// Size that an output in units stays below whatever the activations.
+/// Upper bound of an output in units for all activations.
 const LARGEST_SUM: f64 = (1_u32 << 30) as f64;
 
-/// The networks of a file in whole numbers.
+/// The networks of a file in fixed point.
 #[derive(Clone, Debug)]
 pub(in crate::export::bundle) struct FixedNetworks {
     pub(in crate::export::bundle) quantity: Quantity,
@@ -24,17 +24,17 @@ pub(in crate::export::bundle) struct FixedNetworks {
     pub(in crate::export::bundle) networks: Vec<FixedNetwork>,
     pub(in crate::export::bundle) tangent: TangentTable,
     pub(in crate::export::bundle) logarithm: LogTable,
-    /// Bound on the error of each output within the limits of the readings, with that of rounding the readings to units,
-    /// as the network has the output.
+    /// Bound on the error of each output within the limits of the readings, including the rounding of readings to
+    /// units, in the network's unit of the output.
     pub(in crate::export::bundle) bounds: Vec<f64>,
-    /// The largest of them, in proportion to the scale of the output.
+    /// Largest bound relative to the scale of its output.
     pub(in crate::export::bundle) relative_bound: f64,
 }
 
-/// One network in whole numbers.
+/// One network in fixed point.
 #[derive(Clone, Debug)]
 pub(in crate::export::bundle) struct FixedNetwork {
-    /// Reading, or logarithm of one, from which the change of each channel is taken.
+    /// Reading, or its logarithm, relative to which the change of each channel is measured.
     pub(in crate::export::bundle) centres: Vec<i32>,
     /// Factor of the change of each channel, and the shift after it.
     pub(in crate::export::bundle) factors: Vec<i32>,
@@ -95,7 +95,7 @@ impl FixedNetworks {
             fixed.limits = (range.limits.iter().enumerate())
                 .map(|(channel, &(low, high))| {
                     let units = readings.per_one(channel);
-                    // Rounded as readings are, so that none within the limits is outside.
+                    // Rounded like the readings: no reading within the limits counts as outside.
                     ((low * units).round() as i32, (high * units).round() as i32)
                 })
                 .collect();
@@ -128,7 +128,7 @@ impl FixedNetworks {
         })
     }
 
-    /// The reading of a channel that comes nearest.
+    /// Returns the nearest reading that a channel can represent.
     pub(in crate::export::bundle) fn representable(&self, channel: usize, reading: f64) -> f64 {
         f64::from(self.readings.whole(channel, reading)) * self.readings.unit(channel)
     }
@@ -140,7 +140,7 @@ impl FixedNetworks {
         self.decode_whole(network, &readings)
     }
 
-    /// The outputs that [`Self::decode`] gives, as the network has them.
+    /// Returns the outputs of [`Self::decode`] in the units of the network.
     pub(in crate::export::bundle) fn in_own_units(&self, outputs: &[i32]) -> Vec<f64> {
         let of_units = |(&whole, unit)| f64::from(whole) * unit;
         outputs.iter().zip(self.outputs.all()).map(of_units).collect()
@@ -148,7 +148,7 @@ impl FixedNetworks {
 }
 
 impl FixedNetwork {
-    /// A network without nodes, which takes these changes of its readings.
+    /// Creates a network without nodes for these changes of the readings.
     fn reading(changes: &[Change], width: HiddenWidth) -> Self {
         let multipliers: Vec<_> = changes.iter().map(|change| change.multiplier(width)).collect();
         Self {

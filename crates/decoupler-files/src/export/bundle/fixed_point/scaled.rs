@@ -2,7 +2,7 @@ use decoupler_core::network::Quantity;
 
 use crate::export::bundle::exact::Twofold;
 
-/// A row of weights as whole numbers with a common power of two.
+/// A row of weights as integers with a common power of two.
 #[derive(Clone, Debug)]
 pub(super) struct ScaledRow {
     /// The weights times 2^`bits`, rounded.
@@ -12,7 +12,7 @@ pub(super) struct ScaledRow {
     pub(super) error: f64,
 }
 
-/// Most bits after the point of a weight.
+/// Maximum number of bits after the point of a weight.
 const MAX_BITS: i32 = 20;
 
 impl ScaledRow {
@@ -24,7 +24,7 @@ impl ScaledRow {
             .iter()
             .fold(0.0_f64, |largest, weight| largest.max(weight.abs()));
         let fitting = (f64::from((1 << (width - 1)) - 1) / largest).log2().floor();
-        // Not a number for a weight that is none, and infinite for zeros.
+        // NaN if a weight is NaN, and infinite if all are 0.
         if fitting.is_nan() || fitting < f64::from(fewest) {
             return None;
         }
@@ -43,7 +43,7 @@ impl ScaledRow {
     }
 }
 
-/// A factor as a whole number divided by a power of two.
+/// A factor as an integer divided by a power of two.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Multiplier {
     pub(super) factor: i32,
@@ -54,7 +54,7 @@ impl Multiplier {
     /// Relative rounding error.
     pub(super) const ERROR: f64 = 1.0 / (1_u32 << 29) as f64;
 
-    /// A factor from some 1e-6 to 2²⁹.
+    /// Rounds a factor from about 1e-6 to 2²⁹.
     pub(super) fn of(factor: f64) -> Self {
         let shift = (29 - factor.log2().floor() as i32).clamp(0, 60);
         Self {
@@ -89,14 +89,14 @@ impl HiddenWidth {
     }
 }
 
-/// The change x of a reading as slope · d + offset, where d is the whole number that the decoder computes.
+/// The change x of a reading as slope · d + offset, where d is the integer that the decoder computes.
 pub(super) struct Change {
     pub(super) centre: i32,
     pub(super) slope: Twofold,
     pub(super) offset: Twofold,
     /// Largest |d| within the limits, at least ½.
     pub(super) span: f64,
-    /// Largest error of d, with that of rounding the reading to a unit.
+    /// Largest error of d, including the rounding of the reading to a unit.
     error: f64,
 }
 
@@ -105,7 +105,7 @@ const HALF: f64 = 0.5;
 
 impl Change {
     pub(super) fn of(quantity: Quantity, units: f64, (low, high): (f64, f64), centre_ohm: f64) -> Self {
-        // Rounding to units takes readings at the limits this much further; of resistances, 1 is the smallest number.
+        // Rounding to units moves readings at the limits outwards by up to this; the smallest resistance is 1.
         let lowest = if quantity == Quantity::Raw { f64::MIN } else { 1.0 };
         let (low, high) = ((low * units - HALF).max(lowest), high * units + HALF);
         let origin = Twofold::from(centre_ohm) * Twofold::from(units);
@@ -161,7 +161,7 @@ impl Change {
     }
 }
 
-/// Natural logarithm of whole numbers: a table between 1 and 2, and three terms of the series from its nearest entry
+/// Natural logarithm of integers: a table between 1 and 2, and three terms of the series from its nearest entry
 /// below.
 #[derive(Clone, Debug)]
 pub(in crate::export::bundle) struct LogTable {
@@ -211,7 +211,7 @@ impl LogTable {
     }
 }
 
-/// Hyperbolic tangent of whole numbers: a table with linear interpolation.
+/// Hyperbolic tangent of integers: a table with linear interpolation.
 #[derive(Clone, Debug)]
 pub(in crate::export::bundle) struct TangentTable {
     /// tanh at multiples of 2^(STEP_BITS − FRACTION_BITS), with [`Self::ACTIVATION_BITS`] bits after the point.
@@ -269,7 +269,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn weights_take_all_bits_and_tell_their_error() {
+    fn weights_use_all_bits_and_have_their_rounding_error() {
         let row = ScaledRow::of(&[1.0, -0.3, 0.1], 16, 0).unwrap();
         assert_eq!((row.bits, &row.weights[..]), (14, &[16384, -4915, 1638][..]));
         assert!((row.error - (0.3 - 4915.0 / 16384.0_f64).abs() - (0.1 - 1638.0 / 16384.0_f64).abs()).abs() < 1e-15);

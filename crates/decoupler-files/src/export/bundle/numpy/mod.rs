@@ -29,7 +29,7 @@ pub(super) fn write_weights(portable: &Portable, weights: &Weights) -> Vec<u8> {
     if let Some(ranges) = portable.known_ranges() {
         let limit = |name: &str, pick: fn(&(f64, f64)) -> f64| NamedArray {
             name: name.to_owned(),
-            // Rounded as readings are, so that none within the limits is outside.
+            // Rounded like the readings: no reading within the limits counts as outside.
             digits: weights.arithmetic.rest,
             shape: vec![ranges.len(), portable.channels],
             values: ranges.iter().flat_map(|range| range.limits.iter().map(pick)).collect(),
@@ -41,7 +41,7 @@ pub(super) fn write_weights(portable: &Portable, weights: &Weights) -> Vec<u8> {
     npz::write(&arrays)
 }
 
-/// Reads the weights back, which are in this arithmetic.
+/// Reads back the weights, which are in this arithmetic.
 ///
 /// # Errors
 /// A description of the damage.
@@ -71,7 +71,7 @@ pub(super) fn write_program(portable: &Portable, arithmetic: Arithmetic) -> Stri
         ("", "    row = np.ones(len(r))\n".to_owned())
     };
     let row_text = if portable.takes_row() {
-        "; row: the row of each sample, from 1"
+        "; row: row of each sample, from 1"
     } else {
         ""
     };
@@ -139,7 +139,7 @@ import numpy as np
 MAPS = dict(np.load(pathlib.Path(__file__).with_name("{noun}.npz")))
 
 def decode_by(index, r):
-    """Answers readings by the map with this index."""
+    """Decodes readings with the map of this index."""
     w = {{name: array[index] for name, array in MAPS.items() if name not in {not_of_maps}}}
     x = r.astype(w["{centre}"].dtype)
 {steps}    return v.astype(r.dtype)
@@ -231,7 +231,7 @@ pub(super) fn export(draft: &mut Draft<'_>) -> Result<Vec<BundleCheck>, BundleEr
     )])
 }
 
-/// How to call it, for the README.
+/// Returns the usage section of the README.
 pub(super) fn call(call: &Call<'_>) -> String {
     let portable = call.portable;
     let (takes_row, channels, outputs) = (portable.takes_row(), portable.channels, portable.outputs);
@@ -243,7 +243,7 @@ pub(super) fn call(call: &Call<'_>) -> String {
          {output}, readings_outside = decode({input}{row})\n\n\
          {input} is samples x {channels}, {output} samples x {outputs}{row_text}.{explained}",
         row_text = if takes_row {
-            ";\nrow has the row of each sample, from 1"
+            ";\nrow is the row of each sample, from 1"
         } else {
             ""
         },

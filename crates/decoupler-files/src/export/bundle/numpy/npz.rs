@@ -31,7 +31,7 @@ pub(super) fn write(arrays: &[NamedArray]) -> Vec<u8> {
         }
         Ok(archive.finish()?.into_inner())
     };
-    archive().expect("writing to memory does not fail, and every array has a short name of its own and less than 4 GB")
+    archive().expect("writing to memory does not fail, and every array has a short, unique name and less than 4 GB")
 }
 
 fn write_array(array: &NamedArray) -> Vec<u8> {
@@ -155,13 +155,13 @@ mod tests {
     }
 
     #[test]
-    fn arrays_come_back() {
+    fn arrays_round_trip() {
         assert_eq!(read(&write(&arrays())).unwrap(), arrays());
     }
 
     /// The header as NumPy 2.4 writes it.
     #[test]
-    fn the_header_is_numpys() {
+    fn the_header_is_that_of_numpy() {
         let bytes = write_array(&arrays()[0]);
         let expected = b"\x93NUMPY\x01\x00v\x00{'descr': '<f8', 'fortran_order': False, 'shape': (1, 2, 3), }";
         assert!(bytes.starts_with(expected), "{}", String::from_utf8_lossy(&bytes));
@@ -171,7 +171,7 @@ mod tests {
     }
 
     #[test]
-    fn damage_is_noticed() {
+    fn damage_is_detected() {
         let whole = write(&arrays());
         let mut changed = whole.clone();
         changed[200] ^= 1;

@@ -1,11 +1,11 @@
-//! The operations of the ONNX specification, opset 13, as far as our graphs use them.
+//! The operations of the ONNX specification, opset 13, that exported graphs use.
 
 use std::collections::HashMap;
 
 use super::schema::{BOOL, DOUBLE, FLOAT, Graph, INT64, Node, TensorData};
 use crate::export::bundle::weights::Digits;
 
-/// Evaluates the operations that our graphs consist of, in the arithmetic of their element types.
+/// Evaluates the operations of exported graphs in the arithmetic of their element types.
 ///
 /// # Errors
 /// A description of the first value that is missing, or operation that is not known or does not fit its inputs.
@@ -25,7 +25,7 @@ pub(super) fn evaluate(graph: &Graph, inputs: Vec<(String, Tensor)>) -> Result<H
         };
         let value = apply(node, input).map_err(|defect| format!("{}: {defect}", node.name))?;
         let [output] = &node.output[..] else {
-            return Err(format!("{} has not one output", node.name));
+            return Err(format!("{} does not have exactly one output", node.name));
         };
         values.insert(output.clone(), value);
     }
@@ -64,7 +64,7 @@ fn apply<'a>(node: &Node, input: impl Fn(usize) -> Result<&'a Tensor, String>) -
             let tensor = input(0)?;
             let mut shape = tensor.shape.clone();
             if shape.get(1) != Some(&1) {
-                return Err("the axis to drop has not the size 1".to_owned());
+                return Err("the axis to drop does not have size 1".to_owned());
             }
             shape.remove(1);
             Ok(Tensor {
@@ -163,7 +163,7 @@ impl Tensor {
             Ok(tensor)
         } else {
             Err(format!(
-                "tensor '{}' has not as many elements as its shape",
+                "tensor '{}' does not have as many elements as its shape",
                 message.name
             ))
         }
@@ -261,11 +261,11 @@ fn compare<T: PartialOrd>(operation: &str, pairs: impl Iterator<Item = (T, T)>) 
     Ok(pairs.map(|(a, b)| of(&a, &b)).collect())
 }
 
-/// Takes each element of `yes` or `no`.
+/// Selects each element from `yes` or `no`.
 pub(super) fn select(condition: &Tensor, yes: &Tensor, no: &Tensor) -> Outcome {
     let (shape, all) = broadcast(&[condition, yes, no])?;
     let Values::Bool(condition) = &condition.values else {
-        return Err("the condition is not one".to_owned());
+        return Err("the condition is not Boolean".to_owned());
     };
     let values = match (&yes.values, &no.values) {
         (Values::Real(digits, yes), Values::Real(other, no)) if digits == other => {
@@ -299,7 +299,7 @@ pub(super) fn cast(tensor: &Tensor, element_type: i64) -> Outcome {
     })
 }
 
-/// Takes the parts of `table` along its first axis at `indices` (batch).
+/// Selects the slices of `table` along its first axis at `indices` (batch).
 pub(super) fn gather(table: &Tensor, indices: &Tensor) -> Outcome {
     let (Values::Real(digits, values), Values::Int(indices)) = (&table.values, &indices.values) else {
         return Err("it does not fit its elements".to_owned());
@@ -370,7 +370,7 @@ pub(super) fn reduce_sum(tensor: &Tensor, is_kept: bool) -> Outcome {
     })
 }
 
-/// Exponentials in proportion to their sum, along the last axis.
+/// Softmax along the last axis.
 pub(super) fn softmax(tensor: &Tensor) -> Outcome {
     let (Values::Real(digits, values), Some(&size)) = (&tensor.values, tensor.shape.last()) else {
         return Err("it does not fit its elements".to_owned());
@@ -388,10 +388,10 @@ pub(super) fn softmax(tensor: &Tensor) -> Outcome {
     Ok(Tensor::real(*digits, tensor.shape.clone(), shares))
 }
 
-/// Gives the elements another shape, in which 0 stands for the size as it was.
+/// Reshapes the elements; a size of 0 keeps the original size.
 pub(super) fn reshape(tensor: &Tensor, sizes: &Tensor) -> Outcome {
     let Values::Int(sizes) = &sizes.values else {
-        return Err("the shape is not one".to_owned());
+        return Err("the shape is not a list of integers".to_owned());
     };
     let size = |(axis, &size): (usize, &i64)| match size {
         0 => tensor.shape.get(axis).copied().unwrap_or(0),
@@ -407,15 +407,15 @@ pub(super) fn reshape(tensor: &Tensor, sizes: &Tensor) -> Outcome {
     })
 }
 
-/// The only one of a list of axes.
+/// Returns the only axis of a list.
 pub(super) fn only_axis(axes: &Tensor) -> Result<usize, String> {
     match &axes.values {
         Values::Int(axes) if axes.len() == 1 => usize::try_from(axes[0]).map_err(|error| error.to_string()),
-        _ => Err("there is not one axis".to_owned()),
+        _ => Err("there is not exactly one axis".to_owned()),
     }
 }
 
-/// Common shape, and for each of its elements the indices into the tensors.
+/// Returns the common shape, and for each of its elements the indices into the tensors.
 fn broadcast(tensors: &[&Tensor]) -> Result<(Vec<usize>, Vec<Vec<usize>>), String> {
     let dimensions = tensors.iter().map(|tensor| tensor.shape.len()).max().unwrap_or(0);
     let size = |tensor: &Tensor, axis: usize| {

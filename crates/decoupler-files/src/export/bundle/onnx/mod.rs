@@ -1,4 +1,4 @@
-//! Bundles as ONNX graphs (opset 13), and their evaluation as it is read back.
+//! Bundles as ONNX graphs (opset 13), which are read back and evaluated.
 //!
 //! | input | shape | type |
 //! |---|---|---|
@@ -61,7 +61,7 @@ impl OnnxGraph {
         Ok(Self { graph, digits })
     }
 
-    /// Answers all vectors in batches, whose values are all held at once.
+    /// Evaluates all vectors in batches; all values of a batch are in memory at once.
     ///
     /// # Errors
     /// A description of the first operation that fails.
@@ -127,14 +127,14 @@ pub(super) fn export(draft: &mut Draft<'_>) -> Result<Vec<BundleCheck>, BundleEr
     let graph = OnnxGraph::read(&bytes).map_err(damaged)?;
     let answers = graph.decode(draft.vectors.all()).map_err(damaged)?.answers;
     if answers.len() != draft.vectors.all().len() {
-        return Err(damaged("it has another number of answers".to_owned()));
+        return Err(damaged("it has a different number of answers".to_owned()));
     }
     let mut answers = answers.into_iter();
     let deviation = draft.vectors.deviation(|_| answers.next().unwrap_or_default());
     Ok(vec![BundleCheck::of("ONNX graph, read back and evaluated", deviation)])
 }
 
-/// How to call it, for the README.
+/// Returns the usage section of the README.
 pub(super) fn call(call: &Call<'_>) -> String {
     let portable = call.portable;
     let (takes_row, channels, outputs) = (portable.takes_row(), portable.channels, portable.outputs);

@@ -12,7 +12,7 @@ pub(super) const INT64: i32 = 7;
 pub(super) const BOOL: i32 = 9;
 pub(super) const DOUBLE: i32 = 11;
 
-/// Kind of an attribute that is a whole number.
+/// Kind of an attribute that is an integer.
 pub(super) const INT_ATTRIBUTE: i32 = 2;
 
 #[derive(Clone, PartialEq, Message)]
@@ -142,7 +142,7 @@ pub(super) struct Dimension {
     pub(super) dim_param: Option<String>,
 }
 
-/// A graph in the making. Values are named after what they are.
+/// Builder of a graph. Values are named after their meaning.
 #[derive(Default)]
 pub(super) struct GraphBuilder {
     graph: Graph,
@@ -155,7 +155,7 @@ impl GraphBuilder {
         name.to_owned()
     }
 
-    /// Adds an operation that computes the value `output`, and returns this name.
+    /// Adds an operation that computes the value `output`, and returns that name.
     pub(super) fn node(&mut self, operation: &str, inputs: &[&str], output: &str) -> String {
         self.add(operation, inputs, output, Vec::new())
     }

@@ -1,4 +1,4 @@
-//! Bundles of other decoders than networks against the decoders themselves.
+//! Bundles of decoders other than networks, compared with the decoders themselves.
 
 use std::{fs, path::Path};
 
@@ -46,9 +46,9 @@ fn decoder(file: &NetworkFile, kind: BundleDecoder) -> Result<ExportedDecoder<'_
     ExportedDecoder::of_run(file, sets, kind)
 }
 
-/// The program's own decoders, which share no code with the layers, are the truth.
+/// The reference is the program's own decoders, which share no code with the layers.
 #[test]
-fn descriptions_folded_and_answered_exactly_give_the_answers_of_the_decoders() {
+fn folded_descriptions_agree_with_the_decoders() {
     for rows in [Rows::All, Rows::Known, Rows::One(1)] {
         let file = run_of(settings(rows, 1e-3));
         for kind in LAYERED {
@@ -74,7 +74,7 @@ fn descriptions_folded_and_answered_exactly_give_the_answers_of_the_decoders() {
 }
 
 #[test]
-fn every_decoder_of_layers_leaves_in_every_format() {
+fn every_decoder_of_layers_is_exported_in_every_format() {
     let home = tempfile::tempdir().unwrap();
     let file = run_of(settings(Rows::Known, 1e-2));
     for kind in LAYERED {
@@ -98,7 +98,7 @@ fn every_decoder_of_layers_leaves_in_every_format() {
                 let metadata: serde_json::Value = serde_json::from_str(&read("metadata.json")).unwrap();
                 assert_eq!(metadata["decoder"], kind.to_string());
                 assert_eq!(metadata["row_numbers"], serde_json::json!([1, 3]));
-                // Its own errors, and not those of the network.
+                // The errors of the decoder, not of the network.
                 let error = metadata["errors"]["z_mm"].as_f64().unwrap();
                 assert!(
                     error > 0.0 && Some(error) != file.scores.network.nodes().map(|errors| errors.z_mm),
@@ -109,9 +109,9 @@ fn every_decoder_of_layers_leaves_in_every_format() {
     }
 }
 
-/// Changes nothing, whatever the numbers of rules and Gaussians of the other rows.
+/// Padding to the numbers of rules and Gaussians of the other rows changes no answer.
 #[test]
-fn maps_of_different_sizes_are_widened_without_effect() {
+fn padding_maps_of_different_sizes_has_no_effect() {
     let affine = |weights, biases: &[f64]| AffineLayer {
         weights,
         biases: biases.to_vec(),
@@ -193,9 +193,9 @@ fn export(file: &NetworkFile, kind: BundleDecoder, format: BundleFormat) -> Resu
     report
 }
 
-/// The model is the iteration in the sources, which knows neither damping nor side-by-side lanes; the truth are the decoders.
+/// The model is the iteration in the sources, which has neither damping nor lanes; the reference is the decoders.
 #[test]
-fn iterations_on_the_equations_find_the_answers_of_the_decoders() {
+fn iterations_on_the_equations_agree_with_the_decoders() {
     let sideways = {
         let mut settings = settings(Rows::Known, 0.0);
         settings.source.sensor = decoupler_core::sensor::SensorModel::new("2x2_3x18".parse().unwrap());
@@ -205,7 +205,7 @@ fn iterations_on_the_equations_find_the_answers_of_the_decoders() {
     let all = [Rows::All, Rows::Known, Rows::One(2)].map(|rows| settings(rows, 0.0));
     for settings in all.into_iter().chain([sideways]) {
         let file = run_of(settings);
-        // Three steps sideways after a network of four epochs are not yet at the answer.
+        // After a network of four epochs, three steps have not converged with sideways movement.
         let is_sideways = settings.source.scene.movement != Movement::Z;
         for kind in EQUATIONS.into_iter().take(if is_sideways { 1 } else { 2 }) {
             for format in [BundleFormat::C99, BundleFormat::NumPy] {
@@ -223,7 +223,7 @@ fn iterations_on_the_equations_find_the_answers_of_the_decoders() {
 }
 
 #[test]
-fn what_a_format_cannot_express_is_refused_with_the_reason() {
+fn decoders_that_a_format_cannot_express_are_refused_with_the_reason() {
     let (exact, noisy) = (run_of(settings(Rows::Known, 0.0)), run_of(settings(Rows::Known, 1e-3)));
     for kind in EQUATIONS {
         for format in [BundleFormat::Onnx, BundleFormat::Matlab, BundleFormat::Json] {
