@@ -19,12 +19,12 @@ pub struct Question {
     pub sensor: SensorModel,
     /// The rows that are read, the movement, and the noise of the readings.
     pub scene: Scene,
-    /// The even compression at which the Jacobian is taken, as a fraction of the height.
+    /// Uniform compression at which the Jacobian is evaluated, as a fraction of the height.
     pub compression: f64,
 }
 
 impl Question {
-    /// Sensor and scene of a training, pressed half as far as the scene presses.
+    /// Returns the question for the sensor and the scene of a training, at half the scene's largest compression.
     pub fn of(settings: &SimulatedSettings) -> Self {
         Self {
             sensor: settings.source.sensor,
@@ -41,48 +41,48 @@ pub struct Analysis {
     pub question: Question,
     /// Each row-wire that is read.
     pub rows: Vec<Identifiability>,
-    /// The place in [`Self::rows`] of the row with the smallest singular value.
+    /// Index in [`Self::rows`] of the row with the smallest singular value.
     pub worst: usize,
     /// Relative error of a reading (one standard deviation), from all sources of the scene.
     pub noise: RelativeNoise,
-    /// Spread of each unknown before reading (one standard deviation): that of an even distribution over the stroke.
+    /// Prior standard deviation of each unknown: that of a uniform distribution over the stroke.
     pub prior_mm: f64,
-    /// The most similar rows, if a decoder must tell them apart.
+    /// The most similar rows, if a decoder must distinguish them.
     pub alike: Option<RowPair>,
     /// Warnings, worst first.
     pub warnings: Vec<IdentifiabilityWarning>,
     /// The surface through the nodes.
     pub surface: Arc<SurfaceMap>,
-    /// For each axis that moves, the worst-seen pattern of every row, the largest deflection 1.
+    /// For each moving axis, the worst-seen pattern of every row, scaled to a largest deflection of 1.
     pub patterns: Vec<Frame>,
-    /// For each axis that moves, the sensitivity of every node in 1/mm.
+    /// For each moving axis, the sensitivity of every node in 1/mm.
     pub sensitivities: Vec<Frame>,
 }
 
-/// Reasons for which a question has no answer.
+/// Error of an analysis.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
 pub enum AnalysisError {
-    /// An impossible scene.
+    /// An invalid scene.
     #[error(transparent)]
     Scene(#[from] SceneError),
-    /// An impossible sensor.
+    /// An invalid sensor.
     #[error(transparent)]
     Sensor(#[from] SensorError),
-    /// The singular values are not known.
+    /// The singular values cannot be computed.
     #[error(transparent)]
     Identifiability(#[from] IdentifiabilityError),
-    /// No surface can be laid through the nodes.
+    /// No surface can be fitted through the nodes.
     #[error(transparent)]
     Surface(#[from] SurfaceError),
 }
 
 impl Analysis {
-    /// Looks at every row that is read; `None` once it `is_abandoned`. The surface of the last analysis is taken over
-    /// where its nodes are the same.
+    /// Analyses every row that is read; returns `None` once it `is_abandoned`. The surface of the last analysis is
+    /// reused if its nodes are the same.
     ///
     /// # Errors
-    /// An impossible sensor or scene, with the reason.
+    /// If the sensor or the scene is invalid.
     pub fn new(
         question: &Question,
         last: Option<&Self>,
@@ -148,25 +148,26 @@ impl Analysis {
         }))
     }
 
-    /// The row that sees its worst pattern least.
+    /// Returns the row with the smallest singular value.
     pub fn worst_row(&self) -> &Identifiability {
         &self.rows[self.worst]
     }
 
-    /// The singular value at which noise hides as much as the prior leaves open: patterns below it are not seen.
+    /// Returns the singular value at which the uncertainty due to noise equals the prior standard deviation. Patterns
+    /// below it are hidden by the noise.
     pub fn hidden_below_per_mm(&self) -> f64 {
         self.noise.own / self.prior_mm
     }
 
-    /// Number of deformation patterns of the worst row above the noise.
+    /// Returns the number of deformation patterns of the worst row above the noise.
     pub fn patterns_seen(&self) -> usize {
         let values = self.worst_row().singular_values_per_mm.iter();
         values.filter(|&&value| value > self.hidden_below_per_mm()).count()
     }
 }
 
-/// Turns each pattern like that of its neighbour, as the sign of one means nothing, so that a surface through all of them
-/// shows their shape.
+/// Flips patterns to match the sign of their neighbours. The sign of a singular vector is arbitrary, and a surface
+/// through the patterns should show their shape.
 fn align(rows: &mut [Identifiability]) {
     for row in 1..rows.len() {
         let (before, after) = rows.split_at_mut(row);
@@ -178,7 +179,7 @@ fn align(rows: &mut [Identifiability]) {
     }
 }
 
-/// x of the row-wires, y of the nodes on each.
+/// Returns x of the row-wires and y of the nodes on each.
 fn lattice(sensor: &SensorModel) -> (Vec<f64>, Vec<f64>) {
     let x_mm = (0..sensor.scale.rows()).map(|row| sensor.geometry.row_x_mm(row));
     let nodes = 0..sensor.scale.nodes_per_row();
@@ -215,7 +216,7 @@ mod tests {
     }
 
     #[test]
-    fn the_worst_row_is_the_one_that_sees_least_and_each_node_has_its_value() {
+    fn the_worst_row_has_the_smallest_singular_value_and_each_node_has_its_value() {
         let question = Question::of(&SimulatedSettings::default());
         let found = analysis(&question);
         assert_eq!((found.rows.len(), found.patterns.len()), (10, 1));
@@ -242,7 +243,7 @@ mod tests {
     }
 
     #[test]
-    fn neighbours_point_the_same_way() {
+    fn neighbouring_patterns_have_the_same_sign() {
         let found = analysis(&Question::of(&SimulatedSettings::default()));
         let nodes = &found.patterns[0].nodes_mm;
         for row in 1..10 {
@@ -270,7 +271,7 @@ mod tests {
     }
 
     #[test]
-    fn a_mirrored_layout_is_told_unless_the_row_is_known() {
+    fn a_mirrored_layout_gives_a_warning_unless_the_row_is_known() {
         let mut question = Question::of(&SimulatedSettings::default());
         question.sensor = SensorModel::new("10x6_3x18".parse().unwrap());
         // Column nodes at 7.5, 12.5 and 17.5 mirror the rows about x = 12.5.
@@ -287,7 +288,7 @@ mod tests {
     }
 
     #[test]
-    fn each_axis_that_moves_has_its_pictures_and_impossible_questions_their_reason() {
+    fn each_moving_axis_has_its_pictures_and_invalid_questions_give_a_reason() {
         let mut question = Question::of(&SimulatedSettings::default());
         question.scene.movement = Movement::SIDEWAYS;
         let found = analysis(&question);

@@ -1,4 +1,4 @@
-//! Facts derived from the singular values, in words.
+//! Identifiability of an array: pictures, findings, status line and exports.
 
 use std::{ops::RangeInclusive, sync::Arc};
 
@@ -26,7 +26,7 @@ use crate::window::{
     },
 };
 
-/// Pattern and sensitivity above, singular values and what they come to below.
+/// Shows pattern and sensitivity above, singular values and findings below.
 pub(super) fn identifiability_ui(
     ui: &mut Ui,
     shown: &mut IdentifiabilityView,
@@ -81,14 +81,14 @@ pub(super) fn singular_values(analysis: &Analysis) -> PlotFigure {
     singular_values_figure(&analysis.rows, analysis.worst, analysis.hidden_below_per_mm())
 }
 
-/// From no sensitivity to the largest of any axis.
+/// Returns the range from 0 to the largest sensitivity along any axis.
 fn sensitivity_range(analysis: &Analysis) -> RangeInclusive<f64> {
     let nodes = analysis.sensitivities.iter().flat_map(|frame| frame.nodes_mm.iter());
     let largest = nodes.map(|node| node.z).filter(|z| z.is_finite()).fold(0.0, f64::max);
     0.0..=largest.max(f64::MIN_POSITIVE)
 }
 
-/// The worst-seen pattern and the sensitivity of the nodes.
+/// Returns the surfaces of the worst-seen pattern and of the sensitivity of the nodes.
 pub(super) fn identifiability_figure(
     shown: &IdentifiabilityView,
     analysis: &Analysis,
@@ -123,8 +123,8 @@ pub(super) fn identifiability_figure(
     }
 }
 
-/// One of the two pictures: `axis` is the displayed one, `node` the one marked on both. Returns the place of the scale of its
-/// colours.
+/// Shows one of the two pictures; `axis` is the displayed axis, `node` the node marked on both. Returns the space for
+/// its colour scale.
 fn surface_ui(
     ui: &mut Ui,
     (surface, label): (&Surface, &str),
@@ -175,7 +175,7 @@ fn node_ui(ui: &mut Ui, analysis: &Analysis, surface: &Surface, node: usize) {
     ui.label(RichText::new(text).size(type_size().note));
 }
 
-/// Choice of the displayed coordinate, where several are unknown.
+/// Shows the choice of the displayed coordinate, if several are unknown.
 fn axes_ui(ui: &mut Ui, axis: &mut usize, analysis: &Analysis) {
     let axes = analysis.question.scene.movement.axes().indices();
     if axes.len() < 2 {
@@ -185,7 +185,7 @@ fn axes_ui(ui: &mut Ui, axis: &mut usize, analysis: &Analysis) {
     *axis = segmented_ui(ui, "Displayed axis", &options, *axis, false).unwrap_or(*axis);
 }
 
-/// The surfaces and the singular values.
+/// Returns the exports: surfaces and singular values.
 pub(super) fn analysis_exports<'a>(view: &'a IdentifiabilityView, shared: &'a Shared) -> Vec<Export<'a>> {
     let analysis = view.analysis.as_ref();
     let analysis = analysis.ok_or_else(|| match &view.problem {
@@ -228,7 +228,7 @@ pub(super) fn status_ui(ui: &mut Ui, shown: &IdentifiabilityView) {
     });
 }
 
-/// Warnings with what to change, then the figures.
+/// Shows warnings with what to change, then the figures.
 pub fn facts_ui(ui: &mut Ui, analysis: &Analysis) {
     section_heading_ui(ui, "Findings");
     if analysis.warnings.is_empty() {
@@ -332,7 +332,7 @@ fn noise_facts(analysis: &Analysis) -> [(&'static str, &'static str, String); 4]
         ),
         (
             "Uncertainty of the worst pattern",
-            "Standard deviation of the deformation pattern that is seen worst, in mm, from the readings alone.",
+            "Standard deviation of the worst-seen deformation pattern, in mm, from the readings alone.",
             spread,
         ),
         (

@@ -1,5 +1,5 @@
-//! The Identifiability view: what the readings determine. For a simulated array its model answers at once, as the geometry
-//! changes; for a recording `recording` measures it by cross-validation when asked.
+//! The Identifiability view: what the readings determine. For a simulated array it is computed from the model as the
+//! geometry changes; for a recording, `recording` measures it by cross-validation on request.
 
 mod analysis;
 mod array_view;

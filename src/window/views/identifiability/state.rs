@@ -1,5 +1,5 @@
-//! Answers questions in the background. Only the newest question counts: older ones that wait are dropped, and an answer
-//! that takes long is abandoned as soon as another question is asked.
+//! Answers questions in the background. Only the newest question counts: older waiting questions are dropped, and a
+//! slow analysis is abandoned as soon as another question is asked.
 
 use std::{
     sync::Arc,
@@ -18,17 +18,17 @@ use crate::window::job::{Job, Wake};
 /// The Identifiability view.
 #[derive(Debug)]
 pub struct IdentifiabilityView {
-    /// Question that is asked.
+    /// Current question.
     pub question: Question,
-    /// The newest answer; it stays in view while the next is computed.
+    /// The newest answer, displayed until the next one is computed.
     pub analysis: Option<Arc<Analysis>>,
-    /// Reason for which the question has no answer.
+    /// Reason why the question has no answer.
     pub problem: Option<String>,
-    /// True while the answer to the question is still to come.
+    /// True while the answer is being computed.
     pub is_pending: bool,
-    /// Along which axis pattern and sensitivity are drawn: 0 for x, 1 for y, 2 for z.
+    /// Axis along which pattern and sensitivity are drawn: 0 for x, 1 for y, 2 for z.
     pub axis: usize,
-    /// Sensor and scene of the Train view when the question was last taken from there.
+    /// Settings of the Train view when they were last adopted.
     followed: Option<(SensorModel, Scene)>,
     /// The node under the pointer, marked on both pictures.
     pub(super) node: Option<usize>,
@@ -38,7 +38,7 @@ pub struct IdentifiabilityView {
 }
 
 impl IdentifiabilityView {
-    /// Nothing asked yet. `wake` is called after each answer.
+    /// Creates the view with the default question; `wake` is called after each answer.
     pub fn new(wake: Wake) -> Self {
         Self {
             question: Question::of(&SimulatedSettings::default()),
@@ -53,14 +53,14 @@ impl IdentifiabilityView {
         }
     }
 
-    /// Asks the question.
+    /// Starts to answer the question.
     pub(super) fn ask(&mut self) {
         self.is_pending = true;
         self.worker.ask(self.question);
     }
 
-    /// Takes up these settings, unless they are as they were when last taken: then what was changed here stays.
-    /// Returns whether the question is a new one.
+    /// Adopts these settings if they have changed since they were last adopted; otherwise changes made here are kept.
+    /// Returns true if they were adopted.
     pub fn follow(&mut self, settings: &SimulatedSettings) -> bool {
         let present = (settings.source.sensor, settings.source.scene);
         if self.followed.replace(present) == Some(present) {
@@ -70,13 +70,14 @@ impl IdentifiabilityView {
         true
     }
 
-    /// Takes up these settings, whatever was changed here.
+    /// Adopts these settings, discarding changes made here.
     pub fn take(&mut self, settings: &SimulatedSettings) {
         self.followed = Some((settings.source.sensor, settings.source.scene));
         self.question = Question::of(settings);
     }
 
-    /// These settings with the sensor looked at; what was tried here stays when they come back.
+    /// Returns these settings with the sensor of the question. Changes made here are kept when these settings come
+    /// back.
     pub fn hand_over(&mut self, settings: &SimulatedSettings) -> SimulatedSettings {
         let sensor = self.question.sensor;
         self.followed = Some((sensor, settings.source.scene));
@@ -85,7 +86,7 @@ impl IdentifiabilityView {
         settings
     }
 
-    /// The place of [`Self::axis`] among the axes that move; z where that axis rests.
+    /// Returns the index of [`Self::axis`] among the moving axes, or that of z if this axis does not move.
     pub fn place_of_axis(&self, axes: Axes) -> usize {
         let indices = axes.indices();
         let found = indices.iter().position(|&index| index == self.axis);
@@ -93,10 +94,10 @@ impl IdentifiabilityView {
     }
 }
 
-/// An answer that takes less is finished though another question is asked, so that the picture follows a slider.
+/// An analysis faster than this is completed even if another question is asked, so that the picture follows a slider.
 const SHORT: Duration = Duration::from_millis(250);
 
-/// Result of an analysis; `None` if it was not computed to the end.
+/// Result of an analysis; `None` if it was abandoned.
 type Answered = Result<Option<Arc<Analysis>>, String>;
 
 /// Message of the thread to the window.
@@ -104,21 +105,21 @@ type Answered = Result<Option<Arc<Analysis>>, String>;
 pub struct Answer {
     /// True if no other question has been asked since.
     pub is_newest: bool,
-    /// Analysis, or the reason for which there is none.
+    /// Analysis, or the reason why there is none.
     pub analysis: Result<Arc<Analysis>, String>,
 }
 
-/// The window's end of the thread.
+/// Handle of the analysis thread.
 #[derive(Debug)]
 pub struct IdentifiabilityWorker {
     job: Job<Answered>,
-    /// The newest question, asked while another is answered.
+    /// The newest question, waiting while another is answered.
     waiting: Option<Question>,
     last: Option<Arc<Analysis>>,
 }
 
 impl IdentifiabilityWorker {
-    /// Nothing asked yet. `wake` is called after each answer.
+    /// Creates a worker without a question; `wake` is called after each answer.
     pub fn new(wake: Wake) -> Self {
         Self {
             job: Job::new("identifiability", wake),
@@ -127,7 +128,7 @@ impl IdentifiabilityWorker {
         }
     }
 
-    /// Asks.
+    /// Asks a question.
     pub fn ask(&mut self, question: Question) {
         if self.job.is_under_way() {
             self.job.cancel();
@@ -137,7 +138,7 @@ impl IdentifiabilityWorker {
         }
     }
 
-    /// The next answer, if one has come.
+    /// Returns the next answer, if there is one.
     pub fn next_answer(&mut self) -> Option<Answer> {
         loop {
             let answered = self.job.next_event()?;
@@ -181,7 +182,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_tried_here_stays_until_the_settings_change() {
+    fn changes_are_kept_until_the_settings_change() {
         let mut settings = SimulatedSettings::default();
         let mut state = IdentifiabilityView::new(Arc::new(|| ()));
         assert!(state.follow(&settings));
@@ -194,7 +195,7 @@ mod tests {
     }
 
     #[test]
-    fn an_axis_at_rest_gives_way_to_z() {
+    fn an_axis_that_does_not_move_is_replaced_by_z() {
         let mut state = IdentifiabilityView::new(Arc::new(|| ()));
         state.axis = 0;
         assert_eq!((state.place_of_axis(Axes::Z), state.place_of_axis(Axes::Xyz)), (0, 0));
@@ -239,7 +240,7 @@ mod tests {
     }
 
     #[test]
-    fn an_impossible_question_is_answered_with_its_reason() {
+    fn an_invalid_question_gives_a_reason() {
         let (mut worker, wakes) = worker();
         let mut question = Question::of(&SimulatedSettings::default());
         question.sensor.geometry.row_pitch_mm = 0.0;

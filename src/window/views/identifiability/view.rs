@@ -94,7 +94,7 @@ impl View for IdentifiabilityView {
     }
 }
 
-/// Array, geometry and scene to be tried, and the way back to the Train view.
+/// Shows geometry, array and scene, and the buttons that copy them to and from the Train view.
 pub fn array_form_ui(ui: &mut Ui, view: &mut IdentifiabilityView, shared: &Shared, effects: &mut Vec<Effect>) {
     let mut question = view.question;
     let mut is_taken = false;
@@ -215,7 +215,7 @@ fn scene_ui(ui: &mut Ui, question: &mut Question) {
     let usual = 0.5 * most;
     quantity_ui(ui, "Compression", hint, &mut percent, usually(usual, 0.0..=most), "%");
     stepped_slider_ui(ui, "Compression", &mut percent, usual, 0.0..=most, 0.5);
-    // Only what was changed, lest rounding change it.
+    // Only if it was changed: converting to percent and back may round it.
     if percent != 100.0 * question.compression {
         question.compression = percent / 100.0;
     }
@@ -232,8 +232,8 @@ fn stepped_slider_ui<N: Numeric>(
     form_slider_ui(ui, name, value, usual, |value| Slider::new(value, range).step_by(step));
 }
 
-/// A slider as wide as the form, which a double click sets to `usual`. A value beyond its ends stays as it is until the
-/// slider is moved.
+/// Shows a slider as wide as the form, which a double click resets to `usual`. A value out of its range is kept until
+/// the slider is moved.
 fn form_slider_ui<N: Numeric>(
     ui: &mut Ui,
     name: &str,
@@ -249,7 +249,7 @@ fn form_slider_ui<N: Numeric>(
     response.widget_info(|| WidgetInfo::slider(true, present, format!("{name} slider")));
 }
 
-/// Returns whether the question is to be that of the Train view again.
+/// Returns true if the question is to be reset to the Train view's.
 fn buttons_ui(ui: &mut Ui, view: &mut IdentifiabilityView, shared: &Shared, effects: &mut Vec<Effect>) -> bool {
     let question = view.question;
     let mut is_taken = false;

@@ -1,6 +1,4 @@
-//! Response of the points of the charts to the pointer.
-//!
-//! The points of a level of noise, fastest first.
+//! Charts and table of the points of a noise level, fastest first.
 
 use decoupler_core::evaluation::{TradeOffCost, TradeOffLevel, TradeOffPoint};
 use decoupler_files::{
@@ -19,11 +17,11 @@ use crate::window::{
     widgets::{ColumnWidth, TableCell, TableClick, TableColumn, TableRow, TableView, claim_right_click, dim_ui},
 };
 
-/// Half the side of the square in which a point answers the pointer.
+/// Half the side of the square in which a point responds to the pointer.
 const REACH: f32 = 7.0;
 
-/// Both charts over the space that is left, one point marked. A click marks a point and asks to load it, if it can be
-/// loaded; a right-click opens the formats in which its decoder can be exported from `source`.
+/// Shows both charts in the remaining space, with one point marked. A click marks a point and asks to load it, if it
+/// can be loaded; a right-click opens the formats in which its decoder can be exported from `source`.
 pub fn charts_ui(
     ui: &mut Ui,
     (level, figure): (&TradeOffLevel, &PlotFigure),
@@ -60,7 +58,7 @@ pub fn charts_ui(
     wish
 }
 
-/// Answers the pointer at a point with its name and figures.
+/// Shows the name and the figures of a point under the pointer.
 fn point_ui(
     ui: &mut Ui,
     (point, is_marked, can_load): (&TradeOffPoint, bool, bool),
@@ -99,7 +97,7 @@ fn point_ui(
     })
 }
 
-/// A level of noise, as one would type it.
+/// Returns a noise level as it would be typed.
 pub fn noise_name(noise: f64) -> String {
     if noise == 0.0 || noise >= 0.01 {
         noise.to_string()
@@ -120,7 +118,7 @@ enum Figure {
 impl Figure {
     const ALL: [Self; 4] = [Self::Error, Self::ToLimit, Self::Frame, Self::Training];
 
-    /// Heading; `has_nodes` is false for the targets of a recording.
+    /// Returns the heading; `has_nodes` is false for the targets of a recording.
     fn heading(self, has_nodes: bool) -> &'static str {
         match self {
             Self::Error if has_nodes => "Z %",
@@ -140,7 +138,7 @@ impl Figure {
         }
     }
 
-    /// The cost it shows, by its place in [`TradeOffCost::ALL`].
+    /// Returns the index in [`TradeOffCost::ALL`] of the cost it shows.
     fn cost(self) -> Option<usize> {
         match self {
             Self::Error | Self::ToLimit => None,
@@ -184,7 +182,7 @@ pub fn table_ui(ui: &mut Ui, level: &TradeOffLevel, marked: &mut Option<usize>) 
         let texts: Vec<String> = figures.iter().map(|figure| figure.text(point)).collect();
         let label = format!("{name}: {}", texts.join(", "));
         let cells = figures.iter().zip(texts).map(|(figure, cell)| {
-            // A cost is strong where nothing else costs as little for as small an error.
+            // Costs on the Pareto front are emphasised.
             let is_strong = figure.cost().is_some_and(|cost| on_fronts[cost]);
             let colour = if is_strong { palette.accent } else { text };
             TableCell::new(cell).colour(colour).strong(is_strong)

@@ -1,4 +1,4 @@
-//! The two questions and their answers, and the point that is marked.
+//! Form of a measurement, recommended decoders, and the marked point.
 
 use std::{ops::RangeInclusive, str::FromStr};
 
@@ -29,10 +29,10 @@ use crate::window::{
     widgets::{dim_ui, fields::quantity_ui, ghost_button, section_heading_ui},
 };
 
-/// A measurement as the user sets it up.
+/// Form of a measurement.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TradeOffForm {
-    /// Relative errors of a reading, as typed.
+    /// Noise levels, as typed.
     pub noises: String,
     /// Hidden nodes, as typed.
     pub hidden: String,
@@ -40,13 +40,13 @@ pub struct TradeOffForm {
     pub presets: WhichPresets,
     /// Training methods of the networks of a recording, in the order of [`Method::all`].
     pub methods: Vec<bool>,
-    /// Ways of decoding, in the order of [`DecoderKind::ALL`].
+    /// Decoders, in the order of [`DecoderKind::ALL`].
     pub decoders: [bool; DecoderKind::ALL.len()],
     /// Length of the trainings.
     pub thoroughness: Thoroughness,
-    /// The most training samples of a quick look.
+    /// Maximum number of training samples of a quick look.
     pub samples: usize,
-    /// The most epochs of a quick look.
+    /// Maximum number of epochs of a quick look.
     pub epochs: usize,
     /// Number of samples on which the errors are measured.
     pub test_samples: usize,
@@ -64,13 +64,13 @@ pub enum WhichPresets {
 /// Length of the trainings.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Thoroughness {
-    /// With few samples and epochs: a first look within a minute.
+    /// With few samples and epochs: a first look in less than a minute.
     Quick,
-    /// As the presets say, or for a recording the Train view.
+    /// As in the presets or, for a recording, as in the Train view.
     Full,
 }
 
-/// Reasons for which a form is not yet a measurement.
+/// Error in a form.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
 pub enum TradeOffFormError {
@@ -81,7 +81,7 @@ pub enum TradeOffFormError {
         what: &'static str,
         /// Text that was typed.
         text: String,
-        /// A list that can be understood.
+        /// Example of a valid list.
         example: &'static str,
     },
     /// A number out of its range.
@@ -91,9 +91,9 @@ pub enum TradeOffFormError {
         what: &'static str,
         /// Text that was typed.
         value: String,
-        /// The smallest.
+        /// The minimum.
         least: String,
-        /// The largest.
+        /// The maximum.
         most: String,
     },
     /// An empty list.
@@ -101,11 +101,11 @@ pub enum TradeOffFormError {
     Empty {
         /// The list.
         what: &'static str,
-        /// A list that can be understood.
+        /// Example of a valid list.
         example: &'static str,
     },
-    /// More than can be looked at.
-    #[error("{0} points are more than can be looked at: give fewer values, at most {MAX_POINTS} points")]
+    /// Too many points to display.
+    #[error("{0} points are too many to display: give fewer values, at most {MAX_POINTS} points")]
     TooMany(usize),
     /// No decoder.
     #[error("no decoder is chosen: choose at least one")]
@@ -115,12 +115,12 @@ pub enum TradeOffFormError {
     NoMethod,
 }
 
-/// The most points of one measurement.
+/// Maximum number of points of a measurement.
 const MAX_POINTS: usize = 1000;
 
 const NOISES: &str = "0, 1e-4, 1e-3, 1e-2";
 const HIDDEN: &str = "6, 12";
-/// Methods chosen at first for a recording.
+/// Methods chosen by default for a recording.
 const USUAL_METHODS: [&str; 2] = ["br", "lm"];
 
 impl Default for TradeOffForm {
@@ -143,10 +143,10 @@ impl Default for TradeOffForm {
 }
 
 impl TradeOffForm {
-    /// The measurement on the source of `base`, sound as far as can be known before it is run.
+    /// Returns the measurement on the source of `base`, validated as far as possible without running it.
     ///
     /// # Errors
-    /// If the form is not a possible measurement.
+    /// If the form is not a valid measurement.
     pub fn plan(&self, base: &Setup) -> Result<TradeOffPlan, TradeOffFormError> {
         let has_sensor = base.simulated().is_some();
         let chosen = DecoderKind::ALL.into_iter().zip(self.decoders);
@@ -172,7 +172,7 @@ impl TradeOffForm {
         }
     }
 
-    /// A level for each noise, in the sensor and the scene of `base`.
+    /// Returns a level for each noise, with the sensor and the scene of `base`.
     fn levels_of_array(
         &self,
         base: &SimulatedSettings,
@@ -197,8 +197,8 @@ impl TradeOffForm {
         Ok(noises.into_iter().map(level).collect())
     }
 
-    /// The settings of a preset at a level of noise, in the sensor and the scene of `base`. Which rows are read, and what
-    /// networks are given of the readings, is the preset's.
+    /// Returns the settings of a preset at a noise level, with the sensor and the scene of `base`. The preset
+    /// determines the rows that are read and the inputs of the networks.
     fn settings(&self, base: &SimulatedSettings, preset: Preset, noise: f64) -> SimulatedSettings {
         let noise = Noise {
             relative: noise,
@@ -223,8 +223,8 @@ impl TradeOffForm {
         settings
     }
 
-    /// A run for each method, on the recording that `plan` reads. Decoders without a network do not depend on the method,
-    /// so the first run measures them.
+    /// Returns a run for each method, on the recording that `plan` reads. Decoders without a network do not depend on
+    /// the method, so the first run measures them.
     fn level_of_recording(
         &self,
         base: &RunSettings,
@@ -240,7 +240,7 @@ impl TradeOffForm {
         }
         let run = |(place, method): (usize, &Method)| {
             let mut settings = *base;
-            // The method of the Train view has its settings there.
+            // The method of the Train view keeps its settings.
             if method.short_name() != base.training.method.short_name() {
                 let recorded = Method::recorded_regularization();
                 let is_recorded = method.short_name() == recorded.short_name();
@@ -251,7 +251,7 @@ impl TradeOffForm {
                 stopping.epochs = stopping.epochs.min(self.max_epochs());
             }
             let mut plan = plan.clone();
-            // A share of the user stays.
+            // A share set by the user is kept.
             if plan.division.validation_fraction == base.validation_fraction() {
                 plan.division.validation_fraction = settings.validation_fraction();
             }
@@ -273,7 +273,7 @@ impl TradeOffForm {
     }
 }
 
-/// The values of a list, each once, in their order.
+/// Parses a list; returns each value once, in the order of the list.
 fn list<N>(
     what: &'static str,
     text: &str,
@@ -309,7 +309,7 @@ where
     Ok(values)
 }
 
-/// "Fastest under", "most accurate under", and the marked point. Returns what the user wants to do with it; `source` gives
+/// Shows the recommended decoders and the marked point. Returns the action that the user chose for it; `source` returns
 /// what the decoder of a point is exported from.
 pub fn choices_ui(
     ui: &mut Ui,
@@ -355,7 +355,7 @@ pub fn choices_ui(
     }
 }
 
-/// The configuration that answers a question; a click marks it.
+/// Shows a recommended decoder; a click marks it.
 fn answer_ui(
     ui: &mut Ui,
     marked: &mut Option<usize>,
@@ -444,7 +444,7 @@ mod tests {
     }
 
     #[test]
-    fn the_form_begins_with_a_quick_look_at_everything() {
+    fn the_default_form_is_a_quick_look_at_all_decoders() {
         let plan = TradeOffForm::default().plan(&array()).unwrap();
         // Five without a network, then two sizes with two precisions and polish.
         assert_eq!(plan.points(), 4 * 2 * (5 + 2 * 3));
@@ -457,7 +457,7 @@ mod tests {
     }
 
     #[test]
-    fn a_thorough_measurement_is_the_presets_own_in_the_scene_at_hand() {
+    fn a_full_measurement_uses_the_presets_in_the_current_scene() {
         let mut base = SimulatedSettings::default();
         base.source.scene.largest_compression = 0.1;
         base.source.sensor.geometry.height_mm = 4.0;
@@ -477,7 +477,7 @@ mod tests {
     }
 
     #[test]
-    fn networks_of_a_recording_are_trained_by_each_method_and_other_decoders_once() {
+    fn each_method_trains_its_networks_and_other_decoders_are_measured_once() {
         let base = RunSettings::from(Measured { rows: RowModel::Shared });
         let recording = |plan: &Plan| Setup::recording(base, plan.clone());
         let plan = TradeOffForm::default().plan(&recording(&Plan::default())).unwrap();
@@ -504,7 +504,7 @@ mod tests {
             held_out
         };
         assert_eq!(held_out(&plan), [("br", 0.0), ("lm", 0.2)]);
-        // A share that the user has chosen holds for every method.
+        // A share set by the user applies to every method.
         let mut chosen = Plan::default();
         chosen.division.validation_fraction = 0.3;
         let plan = TradeOffForm::default().plan(&recording(&chosen)).unwrap();
@@ -516,7 +516,7 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_measured_says_why() {
+    fn invalid_forms_give_a_reason() {
         let base = array();
         let error = |form: TradeOffForm| form.plan(&base).unwrap_err().to_string();
         let with_noises = |text: &str| TradeOffForm {

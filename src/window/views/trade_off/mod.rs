@@ -1,5 +1,5 @@
-//! The Trade-off view: every decoder measured on this machine, its error against its time, on a recording or on a simulated
-//! array at several levels of noise. A thread of its own measures while the window stays free.
+//! The Trade-off view: error against time of every decoder, measured on this machine, on a recording or on a simulated
+//! array at several noise levels. The measurement runs in the background.
 
 mod chart;
 mod form;

@@ -1,5 +1,5 @@
-//! Measures speed against accuracy in the background. A measurement begins only when the one before it has let go of the
-//! processor, lest it disturb the times.
+//! Measures speed against accuracy in the background. A measurement begins only after the previous one has released the
+//! processor, because it would distort the times.
 
 use std::{
     collections::BTreeMap,
@@ -54,11 +54,11 @@ pub(super) enum PointWish {
 /// State of the display of a measurement.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct TradeOffLook {
-    /// The displayed level of noise.
+    /// The displayed noise level.
     pub level: usize,
-    /// The point marked in charts and table, by its place in the displayed level.
+    /// The point marked in charts and table, as an index in the displayed level.
     pub marked: Option<usize>,
-    /// The limits of the two questions.
+    /// Limits of error and time for the recommended decoders.
     pub limits: TradeOffLimits,
 }
 
@@ -72,9 +72,9 @@ pub struct TradeOffRunning {
 /// Ending of a measurement.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum TradeOffEnding {
-    /// Every point is there.
+    /// Every point was measured or refused.
     Complete,
-    /// By the user, or by an accident that was told.
+    /// Ended early by the user, or by an error that was reported.
     Cut,
 }
 
@@ -83,7 +83,7 @@ pub enum TradeOffEnding {
 pub struct TradeOffOutcome {
     /// Plan that is measured.
     pub plan: TradeOffPlan,
-    /// One for each level of noise, or a single one of a recording.
+    /// One for each noise level, or a single one for a recording.
     pub levels: Vec<TradeOffLevel>,
     /// Files of the trained networks, by level and point.
     pub networks: BTreeMap<(usize, usize), Arc<NetworkFile>>,
@@ -100,13 +100,13 @@ pub struct TradeOffOutcome {
 }
 
 impl TradeOffOutcome {
-    /// Points measured or refused, and points asked for.
+    /// Returns the number of points measured or refused, and the number of planned points.
     pub fn points(&self) -> (usize, usize) {
         let measured: usize = self.levels.iter().map(|level| level.points.len()).sum();
         (measured + self.refused.len(), self.plan.points())
     }
 
-    /// Setup with which a point of a level was measured, to be trained.
+    /// Returns the setup with which a point of a level was measured, to be trained.
     pub fn setup_of(&self, level: usize, point: usize) -> Option<Setup> {
         let point = self.levels.get(level)?.points.get(point)?;
         let is_of = |setup: &Setup| {
@@ -123,7 +123,7 @@ impl TradeOffOutcome {
         Some(run.setup.with_settings(point.settings))
     }
 
-    /// Samples and network from which the decoder of a point can be exported.
+    /// Returns the samples and the network from which the decoder of a point can be exported.
     pub(super) fn source_of(&self, level: usize, point: usize) -> Option<DecoderSource> {
         let setup = self.setup_of(level, point)?;
         Some(match self.networks.get(&(level, point)) {
@@ -137,7 +137,7 @@ impl TradeOffOutcome {
 }
 
 impl TradeOffView {
-    /// Nothing measured yet. `wake` is called when there are events.
+    /// Creates the view without results; `wake` is called when there are events.
     pub fn new(wake: Wake) -> Self {
         Self {
             form: TradeOffForm::default(),
@@ -148,7 +148,7 @@ impl TradeOffView {
         }
     }
 
-    /// Returns true if nothing else of this program computes, which would distort the times.
+    /// Returns true if no other computation of this program is running, which would distort the times.
     pub(super) fn is_quiet(&self, shared: &Shared) -> bool {
         !shared.phase.is_busy() && shared.working.iter().all(|&name| name == self.name())
     }
@@ -158,7 +158,7 @@ impl TradeOffView {
         self.running.is_none() && self.is_quiet(shared) && self.plan(shared).is_ok()
     }
 
-    /// Measures what the form says.
+    /// Starts the measurement that the form describes.
     pub(super) fn measure(&mut self, shared: &Shared, effects: &mut Vec<Effect>) {
         let Ok(plan) = self.plan(shared) else { return };
         effects.push(Effect::Settle(Matter::TradeOff));
@@ -166,21 +166,21 @@ impl TradeOffView {
         measure(&mut self.job, plan);
     }
 
-    /// Ends the measurement; what is measured stays.
+    /// Cancels the measurement; measured points are kept.
     pub(super) fn cancel(&mut self) {
         self.job.abandon();
         self.end(Instant::now());
     }
 
-    /// Returns the plan to be measured on the source of the Train view.
+    /// Returns the plan of the form on the source of the Train view.
     ///
     /// # Errors
-    /// If the recording is incomplete or the form is not a possible measurement, with what to do.
+    /// If the recording is incomplete or the form is not valid, with what to do.
     pub fn plan(&self, shared: &Shared) -> Result<TradeOffPlan, String> {
         self.form.plan(&shared.setup()?).map_err(|error| error.to_string())
     }
 
-    /// Makes room for the points of `plan`.
+    /// Prepares empty results for `plan`.
     fn begin(&mut self, plan: TradeOffPlan) {
         let level = |planned: &PlannedLevel| TradeOffLevel {
             noise: planned.noise,
@@ -211,7 +211,7 @@ impl TradeOffView {
         points.push(point);
     }
 
-    /// The measurement has ended.
+    /// Records the end of the measurement.
     pub fn end(&mut self, at: Instant) {
         let Some(running) = self.running.take() else { return };
         if let Some(outcome) = &mut self.outcome {
@@ -225,7 +225,7 @@ impl TradeOffView {
         }
     }
 
-    /// The displayed level.
+    /// Returns the displayed level.
     pub fn shown(&self) -> Option<&TradeOffLevel> {
         self.outcome
             .as_ref()
@@ -233,10 +233,10 @@ impl TradeOffView {
     }
 }
 
-/// A measurement as it is run.
+/// Plan of a measurement.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TradeOffPlan {
-    /// Levels, one after the other: those of noise of a simulated array, or a single one of a recording.
+    /// Levels, in order: the noise levels of a simulated array, or a single one for a recording.
     pub levels: Vec<PlannedLevel>,
     /// Numbers of hidden nodes of the networks.
     pub hidden: Vec<usize>,
@@ -245,16 +245,16 @@ pub struct TradeOffPlan {
 /// Runs of a level.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PlannedLevel {
-    /// Relative error of a reading, if it is simulated.
+    /// Relative noise of a reading, if it is simulated.
     pub noise: Option<f64>,
-    /// Runs by which its decoders are fitted.
+    /// Runs that fit its decoders.
     pub runs: Vec<PlannedRun>,
 }
 
-/// A run by which decoders are fitted.
+/// A run that fits decoders.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PlannedRun {
-    /// Preset from which its settings were derived, if they were.
+    /// Preset from which its settings were derived, if any.
     pub preset: Option<Preset>,
     /// Setup, except for the hidden nodes.
     pub setup: Setup,
@@ -273,13 +273,13 @@ impl TradeOffPlan {
         runs.flat_map(|run| &run.decoders).map(of_decoder).sum()
     }
 
-    /// Name of the source.
+    /// Returns the name of the source.
     pub fn source_name(&self) -> String {
         let run = self.levels.iter().flat_map(|level| &level.runs).next();
         run.map_or(String::new(), |run| run.setup.source_name())
     }
 
-    /// Training methods of its networks on a recording; empty for an array, whose presets have theirs.
+    /// Returns the training methods of its networks on a recording; empty for an array, whose presets define them.
     pub fn methods(&self) -> Vec<Method> {
         let runs = self.levels.iter().flat_map(|level| &level.runs);
         let recorded = runs.filter(|run| run.setup.plan().is_some());
@@ -287,25 +287,25 @@ impl TradeOffPlan {
     }
 }
 
-/// Event of the measurement begun last.
+/// Event of the most recent measurement.
 #[derive(Debug)]
 pub enum TradeOffEvent {
-    /// The samples of a run are there.
+    /// The samples of a run are ready.
     Samples {
-        /// Unit of them on which a decoder is timed, such as "a sample".
+        /// Unit for which decoding is timed, such as "a sample".
         decoded: String,
         /// Origin of recorded samples.
         recorded: Option<Box<Recorded>>,
     },
     /// A point of a level, with the file of its network if it has one.
     Measured(usize, Box<TradeOffPoint>, Option<Arc<NetworkFile>>),
-    /// A decoder cannot be used with the samples of a level, and why.
+    /// A decoder cannot be used with the samples of a level, with the reason.
     Refused(usize, String),
-    /// The measurement has ended, or why it could not go on.
+    /// The measurement has ended, with the reason if it could not continue.
     Ended(Result<(), String>),
 }
 
-/// Measures `plan`; a measurement that still runs is cancelled.
+/// Measures `plan`; a running measurement is cancelled.
 pub fn measure(job: &mut Job<TradeOffEvent>, plan: TradeOffPlan) {
     job.start(
         move |report| measure_all(&plan, report),
@@ -316,7 +316,7 @@ pub fn measure(job: &mut Job<TradeOffEvent>, plan: TradeOffPlan) {
     );
 }
 
-/// Level by level, in each run by run; sends each point as it is measured.
+/// Measures level by level and run by run, and reports each point as it is measured.
 fn measure_all(plan: &TradeOffPlan, report: &Report<TradeOffEvent>) -> Result<(), String> {
     let is_cancelled = || report.is_cancelled();
     let mut last: Option<(&Setup, SetupSets)> = None;
@@ -328,7 +328,7 @@ fn measure_all(plan: &TradeOffPlan, report: &Report<TradeOffEvent>) -> Result<()
                 checked.map_err(|error| error.to_string())?;
             }
             let sets = match last.take() {
-                // The same samples of a recording are read once.
+                // The samples of a recording are read only once.
                 Some((of, sets)) if of.plan().is_some() && of.plan() == run.setup.plan() => sets,
                 _ => {
                     let sets = run.setup.sets(Path::new(""), &is_cancelled, &mut |_| ());
@@ -343,7 +343,7 @@ fn measure_all(plan: &TradeOffPlan, report: &Report<TradeOffEvent>) -> Result<()
                 decoded: decoded_unit(&sets.sets.test),
                 recorded: recorded.cloned().map(Box::new),
             });
-            // Several decoders use one network.
+            // Several decoders share a network.
             let mut last_file: Option<Arc<NetworkFile>> = None;
             let is_whole = measure_trade_off(
                 run.setup.settings(),

@@ -1,4 +1,4 @@
-//! Exports of a measurement.
+//! The body, the form and the exports of the Trade-off view.
 
 use std::time::Instant;
 
@@ -114,7 +114,7 @@ impl View for TradeOffView {
     }
 }
 
-/// Both charts above, the table and the choices below.
+/// Shows both charts above, the table and the recommended decoders below.
 fn trade_ui(ui: &mut Ui, trade: &mut TradeOffView, shared: &Shared, effects: &mut Vec<Effect>) {
     let can_load = !shared.phase.is_busy();
     let whole = ui.available_rect_before_wrap();
@@ -196,7 +196,8 @@ fn head_ui(ui: &mut Ui, outcome: &TradeOffOutcome, look: &mut TradeOffLook) {
     });
 }
 
-/// Few levels are next to each other, many in a list; a recording has only one, without a name.
+/// Shows the choice of the noise level: buttons for a few levels, a list for many. A recording has only one level,
+/// without a name.
 fn level_ui(ui: &mut Ui, outcome: &TradeOffOutcome, look: &mut TradeOffLook) {
     let noises = outcome.levels.iter().filter_map(|level| level.noise);
     let names: Vec<String> = noises.map(noise_name).collect();
@@ -279,7 +280,7 @@ const POINTS: FileWords = FileWords {
     extensions: &["csv"],
 };
 
-/// The charts and the table at the displayed noise level, and every point.
+/// Returns the exports: charts and table at the displayed noise level, and every point.
 pub(super) fn trade_off_exports(view: &TradeOffView) -> Vec<Export<'_>> {
     let stem = || "trade_off".to_owned();
     let outcome = view.outcome.as_ref().filter(|outcome| outcome.points().0 > 0);

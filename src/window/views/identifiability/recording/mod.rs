@@ -1,4 +1,4 @@
-//! What the readings of a recording determine, measured by cross-validation on a thread of its own.
+//! What the readings of a recording determine, measured by cross-validation in the background.
 
 mod study;
 mod view;

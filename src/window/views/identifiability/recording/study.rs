@@ -18,7 +18,7 @@ use crate::window::{
     shared::{Effect, Matter, Notice, Unfinished},
 };
 
-/// Study of a recording: the window's end of the thread, and what it has measured.
+/// Study of a recording: its background thread and its results.
 #[derive(Debug)]
 pub struct RecordingStudy {
     job: Job<StudyEvent>,
@@ -26,11 +26,11 @@ pub struct RecordingStudy {
     pub(super) under_way: Option<UnderWay>,
     /// Progress of reading a file.
     pub(super) reading: Option<Progress>,
-    /// Findings on the recording, once they were measured.
+    /// Findings on the recording, once measured.
     pub(super) found: Option<Box<RecordingFindings>>,
     /// Errors of the last cross-validation.
     pub(super) validated: Option<Box<FoldsResult>>,
-    /// Model to be fitted again and again; the better of both if none is chosen.
+    /// Model that is refitted; the better of the two if `None`.
     pub(super) model: Option<FittedModel>,
     /// Extent of a cross-validation.
     pub(super) choice: FoldsChoice,
@@ -43,14 +43,14 @@ pub struct RecordingStudy {
 pub struct FoldsChoice {
     /// Number of folds.
     pub folds: usize,
-    /// True if the same is done with random folds, which shows how optimistic they are.
+    /// True to repeat the cross-validation with random folds, which shows how optimistic they are.
     pub compares_random: bool,
 }
 
 /// Work of the thread.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum UnderWay {
-    /// Findings, and their part once the files are read.
+    /// Findings, with the current step once the files are read.
     Findings(Option<StudyStep>),
     /// A cross-validation.
     CrossValidation,
@@ -61,18 +61,18 @@ pub enum UnderWay {
 pub enum StudyEvent {
     /// Progress of reading a file.
     Reading(Progress),
-    /// A part of the work has begun.
+    /// A step of the work has begun.
     Began(StudyStep),
     /// Findings on the recording.
     Found(Box<RecordingFindings>),
     /// The result of a cross-validation.
     Validated(Box<FoldsResult>),
-    /// The thread has ended, with the reason if it could not go on.
+    /// The thread has ended, with the reason if it could not continue.
     Ended(Result<(), String>),
 }
 
 impl RecordingStudy {
-    /// Nothing measured yet. `wake` is called after each event.
+    /// Creates a study without results; `wake` is called after each event.
     pub fn new(wake: Wake) -> Self {
         Self {
             job: Job::new("recording study", wake),
@@ -94,7 +94,7 @@ impl RecordingStudy {
         self.under_way.is_some()
     }
 
-    /// The work under way.
+    /// Returns the work under way.
     pub fn unfinished(&self) -> Option<Unfinished> {
         Some(match self.under_way? {
             UnderWay::Findings(None) => Unfinished::discarded("Analysis", "the files are being read".to_owned()),
@@ -111,7 +111,7 @@ impl RecordingStudy {
         self.start(UnderWay::Findings(None), setup, Task::Findings(self.model));
     }
 
-    /// Tests on every sample of the recording of `setup`.
+    /// Cross-validates the recording of `setup`.
     pub(super) fn cross_validate(&mut self, setup: Setup) {
         self.validated = None;
         self.start(UnderWay::CrossValidation, setup, Task::CrossValidation);
@@ -126,7 +126,7 @@ impl RecordingStudy {
         );
     }
 
-    /// Abandons the work under way.
+    /// Cancels the work under way.
     pub(super) fn cancel(&mut self) {
         self.job.abandon();
         self.under_way = None;
@@ -155,13 +155,13 @@ impl RecordingStudy {
 /// Work for the thread.
 #[derive(Clone, Debug)]
 pub enum Task {
-    /// Measure what the readings determine; without a model, that of the better of ridge and network.
+    /// Measure what the readings determine; without a model, with the better of ridge and network.
     Findings(Option<FittedModel>),
-    /// Test on every sample.
+    /// Cross-validate.
     CrossValidation,
 }
 
-/// Findings on a recording, with what they were measured on.
+/// Findings on a recording, with the data that they were measured on.
 #[derive(Clone, Debug)]
 pub struct RecordingFindings {
     /// Setup of the recording.

@@ -1,4 +1,4 @@
-//! Exports of the analysis and of the cross-validation of a recording.
+//! The form, the results and the exports of the study of a recording.
 
 use decoupler_core::{
     evaluation::{
@@ -38,7 +38,7 @@ use crate::window::{
 
 const CHANGED: &str = "The recording or the settings have changed since: analyse again.";
 
-/// What the readings determine on the left; the learning curve and the cross-validation on the right.
+/// Shows what the readings determine on the left, the learning curve and the cross-validation on the right.
 pub fn body_ui(ui: &mut Ui, study: &mut RecordingStudy, shared: &Shared) {
     let whole = ui.available_rect_before_wrap();
     let ready = ready(shared);
@@ -87,7 +87,7 @@ pub fn body_ui(ui: &mut Ui, study: &mut RecordingStudy, shared: &Shared) {
     ui.allocate_rect(whole, Sense::hover());
 }
 
-/// Setup that can be analysed now.
+/// Returns the setup, if it can be analysed now.
 fn ready(shared: &Shared) -> Option<Setup> {
     shared.setup().ok().filter(|_| !shared.phase.is_busy())
 }
@@ -109,7 +109,7 @@ fn empty_ui(ui: &mut Ui, study: &mut RecordingStudy, ready: Option<Setup>, share
     }
 }
 
-/// Says that a result is of another recording or other settings than those chosen now.
+/// Shows a note if a result is of another recording or other settings than the current ones.
 fn changed_ui(ui: &mut Ui, of: &Setup, now: Option<&Setup>) {
     if now.is_some_and(|now| now != of) {
         dim_ui(ui, CHANGED);
@@ -150,7 +150,7 @@ pub fn status_ui(ui: &mut Ui, study: &RecordingStudy, shared: &Shared) {
     });
 }
 
-/// Held-out errors of the cross-validation, and its remarks.
+/// Shows the held-out errors of the cross-validation and its remarks.
 pub fn folds_ui(ui: &mut Ui, validated: &FoldsResult) {
     section_heading_ui(ui, "Cross-validation");
     dim_ui(
@@ -170,7 +170,7 @@ pub fn folds_ui(ui: &mut Ui, validated: &FoldsResult) {
 /// Height of the learning curve.
 const CURVE_HEIGHT: f32 = space(60);
 
-/// What the readings determine, target by target, and the contribution of each channel.
+/// Shows what the readings determine, target by target, and the contribution of each channel.
 pub fn findings_ui(ui: &mut Ui, found: &RecordingFindings) {
     targets_ui(ui, found);
     channels_ui(ui, found);
@@ -243,7 +243,7 @@ fn channels_ui(ui: &mut Ui, found: &RecordingFindings) {
     TableView::new("channels", &columns).show_all(ui, rows.collect());
 }
 
-/// The learning curve of a target, and the gain from more samples in words.
+/// Shows the learning curve of a target and the gain from more samples.
 pub fn curve_ui(ui: &mut Ui, found: &RecordingFindings, target: &mut usize) {
     section_heading_ui(ui, "More samples");
     for (channel, of_target) in found.targets.iter().zip(&found.findings.targets) {
@@ -267,7 +267,7 @@ fn curve_figure(found: &RecordingFindings, target: usize) -> PlotFigure {
     )
 }
 
-/// The learning curve displayed.
+/// Returns the displayed learning curve.
 pub(super) fn shown_curve_figure(study: &RecordingStudy) -> Option<PlotFigure> {
     let found = study.found.as_ref()?;
     let last = found.targets.len().checked_sub(1)?;
@@ -294,7 +294,7 @@ const HELD_OUT: FileWords = FileWords {
     extensions: &["csv"],
 };
 
-/// The learning curve, the channels, and the errors of the cross-validation.
+/// Returns the exports: learning curve, channels and errors of the cross-validation.
 pub fn study_exports(study: &RecordingStudy) -> Vec<Export<'_>> {
     let nothing = || "The readings are not analysed yet: press “Analyse readings” first.".to_owned();
     let of_source = |source: &str, what: &str| format!("{source}-{what}");
@@ -328,7 +328,7 @@ pub fn study_exports(study: &RecordingStudy) -> Vec<Export<'_>> {
     exports
 }
 
-/// Growth of the error of each target without each channel.
+/// Returns the growth of the error of each target without each channel.
 fn channel_table(found: &RecordingFindings) -> Table {
     let mut rows = Vec::new();
     for channel in &found.findings.importance {
@@ -379,7 +379,7 @@ const MODELS: [(Option<FittedModel>, &str, &str); 3] = [
     ),
 ];
 
-/// Model and folds of the analysis, and the buttons that begin and end it.
+/// Shows model and folds of the analysis, and the buttons that start and cancel it.
 pub fn form_ui(ui: &mut Ui, study: &mut RecordingStudy, shared: &Shared) {
     scrolled_ui(ui, "recording study form", |ui| {
         section_heading_ui(ui, "Recording");
@@ -428,7 +428,7 @@ fn buttons_ui(ui: &mut Ui, study: &mut RecordingStudy, ready: Option<Setup>) {
             .inner
             .on_hover_text(with_shortcut(
                 ui,
-                "Ends the work under way without a result",
+                "Cancels the work in progress; no result is kept",
                 Key::Period,
             ))
             .clicked()
@@ -437,7 +437,7 @@ fn buttons_ui(ui: &mut Ui, study: &mut RecordingStudy, ready: Option<Setup>) {
         }
         return;
     }
-    let why_not = "Open a recording in the Train view, and wait for the end of a training.";
+    let why_not = "Open a recording in the Train view, and wait until no training is running.";
     ui.vertical_centered_justified(|ui| {
         let analyse = ui.add_enabled(ready.is_some(), primary_button("Analyse readings"));
         let hint = "Measures by cross-validation how well the readings determine each target, what each channel contributes, \
@@ -456,7 +456,7 @@ fn buttons_ui(ui: &mut Ui, study: &mut RecordingStudy, ready: Option<Setup>) {
     });
 }
 
-/// The work under way in words.
+/// Describes the work under way.
 pub(super) fn progress(under_way: UnderWay, study: &RecordingStudy) -> String {
     let reading = study.reading.map(|progress| match progress.of {
         Some(of) if of > 0 => format!("Reading the files… {:.0} %", 100.0 * progress.bytes as f64 / of as f64),
@@ -469,7 +469,7 @@ pub(super) fn progress(under_way: UnderWay, study: &RecordingStudy) -> String {
     }
 }
 
-/// Cost of the analysis in words.
+/// Describes the cost of the analysis.
 fn cost(study: &RecordingStudy, setup: &Setup, shared: &Shared) -> String {
     let folds = study.choice.folds;
     if study.model == Some(FittedModel::Ridge) {
@@ -484,7 +484,7 @@ fn cost(study: &RecordingStudy, setup: &Setup, shared: &Shared) -> String {
     let most = Findings::max_trainings(channels, folds);
     let least = match study.model {
         Some(_) => most,
-        // Ridge may turn out to do as well.
+        // Ridge may turn out to be as good.
         None => 2 * folds,
     };
     let range = if least == most {
