@@ -1,13 +1,12 @@
-//! The glossary: every term of the field with its definition and, where there is one, its equation. What stands under the
-//! pointer at a term and what the list of all terms says come from here; decoders and training methods describe
-//! themselves.
+//! Glossary: every term of the field with its definition and, if there is one, its equation. It is the source of the
+//! tooltips of terms and of the list of all terms; decoders and training methods provide their own descriptions.
 
 use decoupler_core::{
     decoupling::{DecoderKind, Precision},
     training::Method,
 };
 
-/// Defines the terms of a group: for each its name, its definition, and its equation if it has one.
+/// Defines the terms of a group, each with its name, its definition and an optional equation.
 macro_rules! terms {
     ($GROUP:ident: $($TERM:ident = $name:literal, $definition:literal $(, $equation:literal)?;)*) => {
         $(
@@ -20,21 +19,21 @@ macro_rules! terms {
             };
         )*
 
-        /// The terms of this group.
+        /// Terms of this group.
         pub(super) const $GROUP: &[crate::window::glossary::Term] = &[$($TERM),*];
     };
 }
 
-/// Terms that belong together.
+/// Group of related terms.
 #[derive(Clone, Debug)]
 pub struct Group {
-    /// Their subject.
+    /// Subject of the terms.
     pub heading: &'static str,
-    /// In the order of the pipeline.
+    /// Terms, in the order of the pipeline.
     pub terms: Vec<Term>,
 }
 
-/// Every term of the field, in the order of the pipeline.
+/// Returns all terms, in the order of the pipeline.
 pub fn groups() -> Vec<Group> {
     let described = |name, definition| Term {
         name,
@@ -58,21 +57,21 @@ pub fn groups() -> Vec<Group> {
     .into()
 }
 
-/// A term of the field.
+/// Term of the field.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Term {
-    /// Name, as it is in the window.
+    /// Name, as shown in the window.
     pub name: &'static str,
     /// Definition in one or two sentences, with the unit.
     pub definition: &'static str,
     /// Equation; empty for none.
     pub equation: &'static str,
-    /// Definition and equation: the text of the tooltip.
+    /// Text of the tooltip: definition and equation.
     pub hint: &'static str,
 }
 
 impl Term {
-    /// Returns true if every word of `typed` occurs in the name or the definition, in any order.
+    /// Returns true if each word in `typed` occurs in the name or the definition, in any order.
     pub fn matches(&self, typed: &str) -> bool {
         let text = format!("{} {}", self.name, self.definition).to_lowercase();
         typed.split_whitespace().all(|word| text.contains(&word.to_lowercase()))
@@ -101,7 +100,7 @@ terms! { ERROR_TERMS:
         "max(|decoupled z − z|)";
     LINEAR_MAP = "Linear map",
         "Best affine map from the resistances to the coordinates, one for each row-wire where the row is known to the network. A \
-         network that is not better is not worth its training.",
+         network that is not better is not worth training.",
         "coordinates = A · R + b";
     REFERENCE = "Reference",
         "Bayesian reference: the error that remains given the noise and the loading of the scene. On average, no decoder of a \
@@ -113,7 +112,7 @@ terms! { ERROR_TERMS:
          square). It needs no ground truth.",
         "rms((R − R of the decoded nodes) / R)";
     PARETO_FRONT = "Pareto front",
-        "The decoders that no other beats: whatever is more accurate costs more time.";
+        "The decoders for which no other is both faster and more accurate.";
 }
 
 terms! { NETWORK_TERMS:
@@ -132,8 +131,8 @@ terms! { NETWORK_TERMS:
         "Each channel scaled to −1 to 1, as in the paper.",
         "2 · (x − min) / (max − min) − 1";
     WHITENING = "Whitening",
-        "Principal components, each divided by its scatter: components of small variance count as much as large ones, \
-         unless noise hides them.",
+        "Principal components, each divided by its standard deviation: components of small variance count as much as \
+         large ones, unless noise hides them.",
         "component / √(σ² + noise²)";
     STARTS = "Starts",
         "Number of trainings from different random weights, side by side; the one with the lowest validation error is \
@@ -153,16 +152,18 @@ terms! { TRAINING_TERMS:
     TRAINING_SET = "Training set",
         "The samples to which the network is fitted.";
     VALIDATION_SET = "Validation set",
-        "Samples that select the best weights and end the training; 0 for none, and all epochs are run.";
+        "Samples that select the best weights and may end the training early; with 0 there are none, and all epochs are \
+         run.";
     TEST_SET = "Test set",
         "Held-out samples, on which all errors are measured and whose snapshots are shown. They are never trained on.";
     VALIDATION_FAILURES = "Validation failures",
         "Training ends after this many epochs without a new best validation error.";
     GRADIENT = "Gradient",
-        "Derivative of the training error by the weights; its norm falls towards 0 at a minimum.",
+        "Derivative of the training error with respect to the weights; its norm falls towards 0 at a minimum.",
         "∂ mse / ∂ weights";
     DAMPING = "Damping μ",
-        "Shortens the steps of Levenberg-Marquardt: large, they follow the gradient; small, they are Gauss-Newton steps.",
+        "Shortens the steps of Levenberg-Marquardt: with a large μ they follow the gradient, with a small μ they are \
+         Gauss-Newton steps.",
         "(J^T J + μ I) · step = −J^T · error";
     EFFECTIVE_PARAMETERS = "Effective parameters",
         "Number of weights that the data determine, as estimated by Bayesian regularisation. Near the number of weights, \
@@ -192,14 +193,14 @@ terms! { SENSOR_TERMS:
         "Samples of all row-wires at one moment, which share one deformation. Its readings alone, as they come from the \
          sensor, are a frame.";
     FRAME = "Frame",
-        "Readings of every row-wire at one moment, as they come from the sensor: what a decoder in use receives.";
+        "Readings of every row-wire at one moment, as they come from the sensor: the input of a decoder.";
     SAMPLE = "Sample",
         "The readings of one row-wire at one moment, with the coordinates of its nodes: one row of a recording.";
     GROUP = "Group",
-        "Samples that belong together, such as those of a snapshot or of one subject, and are never divided between \
+        "Samples that belong together, such as those of a snapshot or of one subject, and are never split between \
          training and test.";
     DECOUPLING = "Decoupling",
-        "Recovering the coordinates of each node from readings every one of which mixes many nodes.";
+        "Recovering the coordinates of each node from readings that each mix many nodes.";
     HEIGHT = "Height",
         "Height of the row-wires above the column-wires, undeformed, in mm.";
     RESISTIVITY = "Resistivity",
@@ -215,9 +216,9 @@ terms! { SENSOR_TERMS:
          small ones drown in the noise.",
         "∂ ln R / ∂u = U Σ V^T";
     UNLOADED_STATE = "Unloaded state",
-        "The readings while nothing presses. Re-zero takes the latest half second as such and divides readings by its \
-         gains, which removes the drift of amplifiers and temperature. A contact that is held on fewer than half of the \
-         rows is kept.",
+        "The readings while nothing presses the sensor. Re-zero measures them over the last half second and divides later \
+         readings by the resulting gains, which removes the drift of amplifiers and temperature. A steady contact on fewer \
+         than half of the rows is preserved.",
         "gain = R unloaded / R of the model at rest";
     WIRE_FAULT = "Fault",
         "A broken, shorted, drifting or stuck wire, named once four frames in a row contradict Eq. (2).";
@@ -255,7 +256,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_term_stands_once_with_a_sentence() {
+    fn every_term_is_listed_once_with_a_sentence() {
         let mut names = BTreeSet::new();
         for term in groups().into_iter().flat_map(|group| group.terms) {
             assert!(

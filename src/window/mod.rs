@@ -1,18 +1,18 @@
-//! The window. Its rooms are in this order, and each uses only those before it:
+//! The window. Its modules are listed in order of dependency; each uses only those before it:
 //!
-//! | room | what it holds |
+//! | module | contents |
 //! |---|---|
 //! | [`theme`] | colours, sizes, fonts |
 //! | `glossary` | every term of the field with its definition and equation |
-//! | `widgets` | the few components that egui lacks |
-//! | `plotting` | what all charts have in common |
+//! | `widgets` | components that egui lacks |
+//! | `plotting` | drawing of all charts |
 //! | [`surface_view`] | the surface plot |
 //! | `job` | background work |
-//! | `test_view`, `preview` | a test set ready to be drawn; what settings show before a training |
+//! | `test_view`, `preview` | test set ready to be drawn; preview of settings before a training |
 //! | `training_worker` | the thread that trains |
-//! | `shared` | what all views read: settings, current training, run list, look; and what a view may ask for |
-//! | `views` | one room each, none knows another |
-//! | `frame` | lays the views out and applies what they ask for |
+//! | `shared` | state shared by all views: settings, current training, run list, appearance; and the requests of views |
+//! | `views` | one module per view, independent of each other |
+//! | `frame` | layout of the views, and handling of their requests |
 
 mod frame;
 mod glossary;

@@ -9,18 +9,18 @@ use decoupler_core::{
     training::{GradientDescentSettings, Method, TrainingSettings},
 };
 
-/// Message of the thread to the window.
+/// Message from the thread to the window.
 #[derive(Debug)]
 pub enum PreviewEvent {
-    /// The test set of these settings.
+    /// Test set of these settings.
     Drawn(Box<SimulatedSettings>, Result<TestView, TestViewError>),
-    /// Baselines of these settings; none where they take long or are impossible, which a training would explain.
+    /// Baselines of these settings; `None` if they take long or cannot be computed, which a training would explain.
     Compared(Box<SimulatedSettings>, Option<Baselines>),
-    /// Neither.
+    /// The thread ended without a result.
     Failed(JobError),
 }
 
-/// Draws the test set of these settings. Only the newest request counts.
+/// Draws the test set of these settings; replaces an earlier request.
 pub fn draw(job: &mut Job<PreviewEvent>, settings: SimulatedSettings) {
     job.start(
         move |_| PreviewEvent::Drawn(Box::new(settings), TestView::draw(&settings)),
@@ -28,7 +28,7 @@ pub fn draw(job: &mut Job<PreviewEvent>, settings: SimulatedSettings) {
     );
 }
 
-/// Measures what will are next to the network of these settings. Only the newest request counts.
+/// Computes the baselines of these settings; replaces an earlier request.
 pub fn compare(job: &mut Job<PreviewEvent>, settings: SimulatedSettings) {
     job.start(
         move |report| PreviewEvent::Compared(Box::new(settings), baselines(&settings, &|| report.is_cancelled())),
@@ -36,7 +36,7 @@ pub fn compare(job: &mut Job<PreviewEvent>, settings: SimulatedSettings) {
     );
 }
 
-/// Returns the baselines of the settings; none where measuring them would keep the next request waiting.
+/// Returns the baselines of the settings; `None` if computing them would delay the next request.
 fn baselines(settings: &SimulatedSettings, is_cancelled: &dyn Fn() -> bool) -> Option<Baselines> {
     /// About a tenth of a second.
     const MAX_TERMS: usize = 50_000_000;
@@ -47,7 +47,7 @@ fn baselines(settings: &SimulatedSettings, is_cancelled: &dyn Fn() -> bool) -> O
     if samples.saturating_mul(resistances + linear_map) > MAX_TERMS {
         return None;
     }
-    // They depend on neither the network nor its method, so the cheapest ones do.
+    // Baselines depend on neither the network nor its method, so the cheapest settings suffice.
     let training = TrainingSettings {
         method: Method::GradientDescent(GradientDescentSettings::default()),
         ..TrainingSettings::default()

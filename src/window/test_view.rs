@@ -1,4 +1,4 @@
-//! A test set ready to be drawn: that of a simulated array, or of a recording.
+//! Test set of a simulated array or of a recording, ready to be drawn.
 
 use std::{ops::RangeInclusive, sync::Arc};
 
@@ -34,7 +34,7 @@ impl TestSet {
     /// Prepares the test set of `run`.
     ///
     /// # Errors
-    /// Nodes of an array through which no surface can be laid.
+    /// If no surface can be interpolated through the nodes of the array.
     pub fn of(run: &Run) -> Result<Self, TestViewError> {
         Ok(match run.settings().simulated() {
             Some(settings) => Self::Array(TestView::of(&settings, Arc::clone(run.test()))?),
@@ -42,7 +42,7 @@ impl TestSet {
         })
     }
 
-    /// The samples.
+    /// Samples.
     pub fn set(&self) -> &Arc<Dataset> {
         match self {
             Self::Array(test) => &test.set,
@@ -50,7 +50,7 @@ impl TestSet {
         }
     }
 
-    /// The nodes of a simulated array.
+    /// Returns the view of a simulated array; `None` for a recording.
     pub fn array(&self) -> Option<&TestView> {
         match self {
             Self::Array(test) => Some(test),
@@ -58,7 +58,7 @@ impl TestSet {
         }
     }
 
-    /// The targets of a recording.
+    /// Returns the view of a recording; `None` for a simulated array.
     pub fn recording(&self) -> Option<&RecordedTest> {
         match self {
             Self::Array(_) => None,
@@ -66,7 +66,7 @@ impl TestSet {
         }
     }
 
-    /// Number of test snapshots: whole frames of an array, samples of a recording.
+    /// Returns the number of test snapshots: whole frames of an array, or samples of a recording.
     pub fn snapshots(&self) -> usize {
         match self {
             Self::Array(test) => test.snapshots.len(),
@@ -74,53 +74,53 @@ impl TestSet {
         }
     }
 
-    /// Description of the channels, if the targets are those of a recording.
+    /// Returns the description of the channels of a recording; `None` for a simulated array.
     pub fn problem(&self) -> Option<&Problem> {
         self.recording().map(|test| &*test.problem)
     }
 }
 
-/// Look of the surfaces of a test set.
+/// Appearance of the surfaces of a test set.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct SurfaceStyle {
-    /// In space or from above.
+    /// Perspective view or top view.
     pub mode: ViewMode,
-    /// Colours of heights.
+    /// Colour map of heights.
     pub colours: SequentialMap,
-    /// Heights that colours and axes span.
+    /// Range of heights shown by colours and axes.
     pub heights: HeightScale,
-    /// Errors at the ends of the colours, in millimetres, while they are locked; else those displayed.
+    /// Range of the error colours in millimetres, if locked; else that of the displayed errors.
     pub error_limit_mm: Option<f64>,
 }
 
-/// Heights that colours and axes span.
+/// Range of heights shown by colours and axes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum HeightScale {
-    /// From full compression to rest, whatever is displayed.
+    /// Always from full compression to rest.
     #[default]
     Stroke,
     /// From the lowest to the highest displayed node.
     Fitted,
 }
 
-/// A test set ready to be drawn: its samples, and the surface through the array's nodes.
+/// Test set of an array, ready to be drawn: its samples, and the surface through the nodes.
 #[derive(Clone, Debug)]
 pub struct TestView {
-    /// The samples.
+    /// Samples.
     pub set: Arc<Dataset>,
-    /// The samples of each snapshot, rows from first to last.
+    /// Samples of each snapshot, from the first row to the last.
     pub snapshots: Arc<Vec<Vec<usize>>>,
-    /// Heights of nodes to heights of the drawn grid.
+    /// Interpolation from the heights of nodes to those of the drawn grid.
     pub surface: Arc<SurfaceMap>,
-    /// The sensor they were drawn for.
+    /// Sensor of the samples.
     pub sensor: SensorModel,
-    /// The row-wires read, from 0: those of the nodes drawn.
+    /// Row-wires that are read and drawn, from 0.
     pub rows: Vec<usize>,
-    /// The distance a node can travel.
+    /// Distance that a node can travel.
     pub stroke_mm: f64,
-    /// Readings of the sensor at rest, rows read × M4; none where it has none.
+    /// Readings of the sensor at rest, rows read × M4; `None` if they cannot be computed.
     pub unloaded_ohm: Option<Arc<Array2<f64>>>,
-    /// Outlook of the scene; none where it takes long or cannot be computed.
+    /// Outlook of the scene; `None` if it takes long or cannot be computed.
     pub outlook: Option<Outlook>,
 }
 
@@ -128,19 +128,19 @@ impl TestView {
     /// Draws the test set of `settings`.
     ///
     /// # Errors
-    /// An impossible sensor, scene, or number of samples.
+    /// If the sensor, the scene or the number of samples is invalid.
     pub fn draw(settings: &SimulatedSettings) -> Result<Self, TestViewError> {
         Ok(Self::of(settings, Arc::new(settings.draw_test()?))?)
     }
 
-    /// Prepares the surface for a test set already drawn.
+    /// Prepares the surface for an existing test set.
     ///
     /// # Errors
-    /// Nodes through which no surface can be laid.
+    /// If no surface can be interpolated through the nodes.
     pub fn of(settings: &SimulatedSettings, set: Arc<Dataset>) -> Result<Self, SurfaceError> {
         let sensor = settings.source.sensor;
         let row_count = sensor.scale.rows();
-        // Of a row that does not exist there is no set either.
+        // There is no test set of a row that does not exist.
         let rows = settings.source.scene.rows.read(row_count).unwrap_or_default();
         let x_mm: Vec<f64> = rows.iter().map(|&row| sensor.geometry.row_x_mm(row)).collect();
         let nodes = 0..sensor.scale.nodes_per_row();
@@ -161,24 +161,24 @@ impl TestView {
         })
     }
 
-    /// z from full compression to rest, in millimetres: what the height scale spans.
+    /// Returns the range of the height scale: z from full compression to rest, in millimetres.
     pub fn z_range_mm(&self) -> RangeInclusive<f64> {
         let height_mm = self.sensor.geometry.height_mm;
         height_mm - self.stroke_mm..=height_mm
     }
 
-    /// The number of a node among those drawn, row by row.
+    /// Returns the index of a node among the drawn nodes, row by row.
     pub fn node(&self, address: NodeAddress) -> Option<usize> {
         let row_index = self.rows.iter().position(|row_wire| *row_wire == address.row)?;
         Some(row_index * self.sensor.scale.nodes_per_row() + address.node)
     }
 
-    /// The nearest snapshot there is.
+    /// Returns the nearest existing snapshot.
     pub fn nearest_snapshot(&self, snapshot: usize) -> usize {
         snapshot.min(self.snapshots.len().saturating_sub(1))
     }
 
-    /// Nodes of one snapshot and the surface through them, from coordinates of the shape of the set's.
+    /// Returns the nodes of a snapshot and the surface through them; `coordinates_mm` has the shape of the set's coordinates.
     pub fn frame(&self, coordinates_mm: ArrayView2<'_, f64>, snapshot: usize) -> Frame {
         let samples = self.snapshots.get(snapshot).map_or(&[][..], Vec::as_slice);
         let coordinates = samples.iter().flat_map(|&sample| coordinates_mm.row(sample).to_vec());
@@ -186,7 +186,7 @@ impl TestView {
         self.frame_of(coordinates.chunks_exact(3).map(DVec3::from_slice))
     }
 
-    /// The surface through nodes at these places, row by row.
+    /// Returns the surface through nodes at these positions, row by row.
     pub fn frame_of(&self, nodes_mm: impl Iterator<Item = DVec3>) -> Frame {
         let nodes_mm: Arc<[DVec3]> = nodes_mm.collect();
         let z_mm: Vec<f64> = nodes_mm.iter().map(|node| node.z).collect();
@@ -194,8 +194,8 @@ impl TestView {
         Frame { nodes_mm, grid_mm }
     }
 
-    /// Drops of the readings below those at rest, in percent: rows read × M4; `None` where the sensor has none at rest, or
-    /// these are not of all rows.
+    /// Returns the drops of the readings below those at rest, in percent, rows read × M4; `None` if there are no readings at
+    /// rest, or the given readings do not cover all rows.
     pub fn drops_percent(&self, readings_ohm: &Array2<f64>) -> Option<Array2<f64>> {
         let unloaded_ohm = self.unloaded_ohm.as_deref()?;
         if readings_ohm.dim() != unloaded_ohm.dim() {
@@ -205,13 +205,13 @@ impl TestView {
         Some(ratios.map_collect(|reading, unloaded| 100.0 * (1.0 - reading / unloaded)))
     }
 
-    /// Readings of one snapshot: rows read × M4.
+    /// Returns the readings of a snapshot, rows read × M4.
     pub fn readings_ohm(&self, snapshot: usize) -> Array2<f64> {
         let samples = self.snapshots.get(snapshot).map_or(&[][..], Vec::as_slice);
         self.set.readings().select(Axis(0), samples)
     }
 
-    /// The surface of heights.
+    /// Returns the surface of heights.
     pub fn heights(&self, title: impl Into<String>, frame: &Frame, style: SurfaceStyle) -> Surface {
         Surface {
             quantity: Quantity::Height,
@@ -223,7 +223,7 @@ impl TestView {
         }
     }
 
-    /// The surface of errors of z.
+    /// Returns the surface of errors of z.
     pub fn errors(&self, title: impl Into<String>, frame: &Frame, style: SurfaceStyle) -> Surface {
         let locked = style.error_limit_mm.map(|limit| -limit..=limit);
         Surface {
@@ -239,7 +239,7 @@ impl TestView {
     }
 }
 
-/// The outlook of arrays for which it takes a moment; those of the paper take a millisecond.
+/// Returns the outlook if it can be computed quickly; the arrays of the paper take a millisecond.
 fn outlook(settings: &SimulatedSettings) -> Option<Outlook> {
     /// About a third of a second.
     const MAX_PRODUCTS: usize = 500_000_000;
@@ -253,7 +253,7 @@ fn outlook(settings: &SimulatedSettings) -> Option<Outlook> {
     Outlook::of(&settings.source).ok()
 }
 
-/// Reasons for which there is nothing to draw.
+/// Reasons why a test set cannot be drawn.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum TestViewError {
@@ -263,12 +263,12 @@ pub enum TestViewError {
     /// The samples cannot be read or drawn.
     #[error(transparent)]
     Setup(#[from] SetupError),
-    /// No surface can be laid through the nodes.
+    /// No surface can be interpolated through the nodes.
     #[error(transparent)]
     Surface(#[from] SurfaceError),
 }
 
-/// One snapshot to be drawn.
+/// Snapshot to be drawn.
 #[derive(Clone, Debug, Default)]
 pub struct Frame {
     /// Position of each node, row by row.
@@ -278,7 +278,7 @@ pub struct Frame {
 }
 
 impl Frame {
-    /// `decoupled` − this one: z of the nodes and of the grid.
+    /// Returns `decoupled` minus this frame: z of the nodes and of the grid.
     pub fn error_of(&self, decoupled: &Self) -> Self {
         let nodes = self.nodes_mm.iter().zip(decoupled.nodes_mm.iter());
         let grid = self.grid_mm.iter().zip(decoupled.grid_mm.iter());
@@ -290,19 +290,19 @@ impl Frame {
         }
     }
 
-    /// Returns the lowest and highest z of a node; `None` without any.
+    /// Returns the lowest and highest z of a node; `None` without nodes.
     pub fn range_mm(&self) -> Option<RangeInclusive<f64>> {
         let heights = || self.nodes_mm.iter().map(|node| node.z).filter(|z| z.is_finite());
         let (low, high) = (heights().reduce(f64::min)?, heights().reduce(f64::max)?);
-        // Nothing finer than a nanometre is told apart.
+        // The resolution is a nanometre.
         Some(low..=high.max(low + 1e-6))
     }
 
-    /// ± the largest z of a node, so that zero keeps its colour.
+    /// Returns a range symmetric about zero that contains z of all nodes, so that zero keeps its colour.
     pub fn symmetric_range_mm(&self) -> RangeInclusive<f64> {
         let heights = self.nodes_mm.iter().map(|node| node.z.abs());
         let largest = heights.filter(|z| z.is_finite()).fold(0.0, f64::max);
-        // Nothing finer than a nanometre is told apart.
+        // The resolution is a nanometre.
         let largest = largest.max(1e-6);
         -largest..=largest
     }
@@ -311,11 +311,11 @@ impl Frame {
 /// Test samples of a recording, ready to be drawn.
 #[derive(Clone, Debug)]
 pub struct RecordedTest {
-    /// The samples.
+    /// Samples.
     pub set: Arc<Dataset>,
     /// Description of the channels.
     pub problem: Arc<Problem>,
-    /// Smallest and largest value of each target.
+    /// Minimum and maximum of each target.
     pub ranges: Arc<[(f64, f64)]>,
     /// Positions of targets.
     pub positions: Positions,
@@ -324,20 +324,20 @@ pub struct RecordedTest {
 /// Positions of targets on the skin.
 #[derive(Clone, Debug)]
 pub enum Positions {
-    /// No target has one.
+    /// No target has a position.
     None,
-    /// No surface goes through them.
+    /// No surface can be interpolated through the positions.
     NoSurface(SurfaceError),
-    /// The surface through them.
+    /// Surface through the positions.
     Surface(Arc<TargetSurface>),
 }
 
-/// What charts of all test samples of a recording show: computed away from the window's thread.
+/// Charts of all test samples of a recording, computed in the background.
 #[derive(Debug)]
 pub struct TargetCharts {
-    /// Lines through the actual and decoded values of each target.
+    /// Regression lines through the actual and decoded values of each target.
     pub lines: Vec<RegressionLine>,
-    /// Error over the position, or why there is none.
+    /// Error over the position, or the reason why there is none.
     pub error_map: Result<Arc<HeatMap>, &'static str>,
 }
 
@@ -369,7 +369,7 @@ impl RecordedTest {
         }
     }
 
-    /// Computes the charts of these answers (samples × targets).
+    /// Computes the charts of these decoded values (samples × targets).
     pub fn charts(&self, answers: &Array2<f64>) -> TargetCharts {
         let line = |target| {
             let (actual, decoded) = (self.set.targets(), answers.column(target));
@@ -378,7 +378,7 @@ impl RecordedTest {
         TargetCharts {
             lines: (0..self.set.outputs()).map(line).collect(),
             error_map: match &self.positions {
-                // Targets that have positions are no positions themselves.
+                // Targets that have positions are not positions themselves.
                 Positions::None => error_map(&self.set, answers, &self.problem.targets),
                 _ => Err(NO_PAIR),
             },
@@ -397,8 +397,8 @@ fn error_map(set: &Dataset, answers: &Array2<f64>, targets: &[Channel]) -> Resul
         .ok_or("The positions of the test samples do not vary, so there is no map.")
 }
 
-/// Two targets that are positions in one unit, for a map: lengths, or without units coordinates by their names. Columns
-/// without names may be anything, and so coordinates too.
+/// Returns two targets that are coordinates in the same unit, for a map: lengths, or targets without units whose names are
+/// those of coordinates. Columns without names may be coordinates, too.
 fn position_pair(targets: &[Channel]) -> Option<[usize; 2]> {
     const LENGTHS: [&str; 6] = ["m", "cm", "mm", "µm", "um", "nm"];
     let may_be = |channel: &Channel| match &channel.unit {
@@ -411,7 +411,7 @@ fn position_pair(targets: &[Channel]) -> Option<[usize; 2]> {
     pairs.find(|[one, other]| targets[*one].unit == targets[*other].unit)
 }
 
-/// Returns `true` if a full name ends as that of a coordinate, such as `probe_x`, or is that of a column without a header.
+/// Returns `true` if a full name ends like that of a coordinate, such as `probe_x`, or is that of a column without a header.
 fn is_coordinate(name: &str) -> bool {
     let own = name.rsplit('.').next().unwrap_or(name).to_lowercase();
     let has_no_header = own

@@ -31,7 +31,7 @@ fn what_cannot_be_taken_is_refused_in_place_and_the_old_value_stays() {
         (
             "Height",
             "5 kg",
-            "“kg” is no unit of this field: type mm, µm, nm, cm, m, in or none.",
+            "“kg” is not a unit of this field: type mm, µm, nm, cm, m, in or none.",
         ),
         ("Height", "thick", "“thick” is not a number: type for instance 0.5 mm."),
         ("Largest compression", "120 %", "120 % is too large: at most 99 %."),

@@ -1,7 +1,7 @@
-//! Background work: a [`Job`] runs one piece of work at a time on a named thread, and the newest wins.
+//! Background work: a [`Job`] runs one task at a time on a named thread; a newer task replaces an older one.
 //!
-//! The work reports through a [`Report`], which wakes the window; the window takes it with
-//! [`Job::next_event`]. Every piece of work has a mailbox of its own, so nothing of an older one is ever seen.
+//! A task sends events through a [`Report`], which wakes the window; the window receives them with [`Job::next_event`].
+//! Every task has its own mailbox, so events of an older task are never seen.
 
 use std::{
     any::Any,
@@ -19,13 +19,13 @@ use std::{
 use thiserror::Error;
 use thread_priority::{ThreadPriority, ThreadPriorityValue};
 
-/// Longest time that closing waits for work that was cancelled. What takes longer ends with the program.
+/// Maximum time to wait for cancelled work when closing. Work that takes longer ends with the program.
 const LONGEST_WAIT: Duration = Duration::from_millis(150);
 
-/// Reasons for which work ends without a result.
+/// Reasons why work ends without a result.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum JobError {
-    /// A defect in the program.
+    /// A bug in the program.
     #[error("the thread '{name}' ended unexpectedly: {panic}")]
     Panicked {
         /// The thread.
@@ -33,16 +33,16 @@ pub enum JobError {
         /// Message of the panic.
         panic: String,
     },
-    /// The system has no thread left.
+    /// The system cannot start another thread.
     #[error("no thread could be started: {0}")]
     NoThread(String),
 }
 
-/// Work in the background, one piece at a time. Dropped, it cancels the work and waits a moment for its end.
+/// Background work, one task at a time. Dropping it cancels the task and waits briefly for its end.
 pub(super) struct Job<E> {
     name: &'static str,
     wake: Wake,
-    /// True if the work computes for long, and so yields to the window.
+    /// True for long computations, which run at lower priority than the window.
     yields: bool,
     newest: Option<Piece<E>>,
 }
@@ -54,7 +54,8 @@ struct Piece<E> {
 }
 
 impl<E: Send + 'static> Job<E> {
-    /// No work yet. `name` is the thread's; `wake` is called after each event. The work yields to the window.
+    /// Creates a job without work. `name` is the name of its threads; `wake` is called after each event. The work runs at lower
+    /// priority than the window.
     pub(super) fn new(name: &'static str, wake: Wake) -> Self {
         Self {
             name,
@@ -64,17 +65,17 @@ impl<E: Send + 'static> Job<E> {
         }
     }
 
-    /// As [`Self::new`], for work that the user waits for: it yields to nothing.
+    /// As [`Self::new`], at normal priority: for work that the user is waiting for.
     pub(super) fn prompt(name: &'static str, wake: Wake) -> Self {
         let mut job = Self::new(name, wake);
         job.yields = false;
         job
     }
 
-    /// Starts `work`, whose result becomes the last event by `last`, also where it panics or no thread can be started.
+    /// Starts `work`. `last` turns its result into the last event, also if it panics or no thread can be started.
     ///
-    /// Work that still runs is cancelled and heard no more. The new one waits until it has let go of the processor, so
-    /// that neither disturbs the other's timings.
+    /// Work that is still running is cancelled, and its events are discarded. The new work starts when the old one has ended,
+    /// so that neither affects the other's timings.
     pub(super) fn start<T: 'static>(
         &mut self,
         work: impl FnOnce(&Report<E>) -> T + Send + 'static,
@@ -115,24 +116,24 @@ impl<E: Send + 'static> Job<E> {
 }
 
 impl<E> Job<E> {
-    /// The next event, if one has come.
+    /// Returns the next event, if one has arrived.
     pub(super) fn next_event(&self) -> Option<E> {
-        self.heard()?.next_event()
+        self.mailbox()?.next_event()
     }
 
-    /// Returns true while an event is still to come.
+    /// Returns true while more events are expected.
     pub(super) fn is_under_way(&self) -> bool {
-        self.heard().is_some_and(Mailbox::has_more)
+        self.mailbox().is_some_and(Mailbox::has_more)
     }
 
-    /// Asks the work to end. What it still has to report is heard.
+    /// Asks the work to end. Its remaining events are received.
     pub(super) fn cancel(&self) {
         if let Some(piece) = &self.newest {
             piece.mailbox.cancel();
         }
     }
 
-    /// Asks the work to end. Nothing of it is heard any more.
+    /// Asks the work to end. Its remaining events are discarded.
     pub(super) fn abandon(&mut self) {
         self.cancel();
         if let Some(piece) = &mut self.newest {
@@ -140,18 +141,18 @@ impl<E> Job<E> {
         }
     }
 
-    /// Waits until the work has ended, at most this long.
+    /// Waits for the work to end, for at most `longest`.
     pub(super) fn wait(&mut self, longest: Duration) {
         let Some(piece) = &mut self.newest else { return };
         if piece.mailbox.wait_for_end(Some(longest))
             && let Some(thread) = piece.thread.take()
         {
-            // Panics of the work were caught.
+            // Panics in the work were caught.
             let _ = thread.join();
         }
     }
 
-    fn heard(&self) -> Option<&Mailbox<E>> {
+    fn mailbox(&self) -> Option<&Mailbox<E>> {
         let piece = self.newest.as_ref().filter(|piece| !piece.is_abandoned)?;
         Some(&piece.mailbox)
     }
@@ -170,28 +171,28 @@ impl<E> fmt::Debug for Job<E> {
     }
 }
 
-/// Lets this thread, and those it starts, yield a little: on a busy machine the window gets about fifteen times its
-/// share, and training is not starved by other programs.
+/// Lowers the priority of this thread and those it starts a little: on a busy machine the window gets about fifteen times
+/// their share, and training is not starved by other programs.
 fn yield_to_window() {
-    /// Of 0 to 99, where about 50 is normal.
+    /// From 0 to 99; about 50 is normal.
     const BELOW_NORMAL: u8 = 18;
     if let Ok(priority) = ThreadPriorityValue::try_from(BELOW_NORMAL) {
-        // Where the system refuses, the work merely competes with the window.
+        // If the system refuses, the work competes with the window.
         let _ = ThreadPriority::Crossplatform(priority).set_for_current();
     }
 }
 
-/// The message that a panic was given.
+/// Returns the message of a panic.
 fn message(panic: &(dyn Any + Send)) -> String {
     let text = panic.downcast_ref::<&str>().map(|text| (*text).to_owned());
     let text = text.or_else(|| panic.downcast_ref::<String>().cloned());
-    text.unwrap_or_else(|| "no reason is known".to_owned())
+    text.unwrap_or_else(|| "unknown cause".to_owned())
 }
 
-/// Makes the window draw a frame, in which it takes events.
+/// Callback that makes the window draw a frame, in which it receives events.
 pub(in crate::window) type Wake = Arc<dyn Fn() + Send + Sync>;
 
-/// Lies between one piece of work and the window: events one way, the wish to cancel the other.
+/// Channel between a task and the window: events to the window, cancellation to the task.
 pub(super) struct Mailbox<E> {
     is_cancelled: AtomicBool,
     inside: Mutex<Inside<E>>,
@@ -200,7 +201,7 @@ pub(super) struct Mailbox<E> {
 
 struct Inside<E> {
     events: VecDeque<E>,
-    /// True if the youngest of `events` is a progress, which the next progress replaces.
+    /// True if the latest of `events` is a progress report, which the next one replaces.
     has_progress: bool,
     has_ended: bool,
 }
@@ -219,7 +220,7 @@ impl<E> Mailbox<E> {
     }
 
     fn inside(&self) -> MutexGuard<'_, Inside<E>> {
-        // Events are put in and taken out whole.
+        // A panic elsewhere cannot leave the queue in an invalid state.
         self.inside.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
@@ -236,7 +237,7 @@ impl<E> Mailbox<E> {
         self.is_cancelled.store(true, Ordering::Relaxed);
     }
 
-    /// Waits until the work has ended, at most as long as given; returns whether it has.
+    /// Waits for the work to end, for at most `longest`; returns true if it has ended.
     pub(super) fn wait_for_end(&self, longest: Option<Duration>) -> bool {
         let inside = self.inside();
         let runs = |inside: &mut Inside<E>| !inside.has_ended;
@@ -254,7 +255,7 @@ impl<E> Mailbox<E> {
     }
 }
 
-/// The work's end of the mailbox.
+/// Sending end of the mailbox, used by the work.
 pub(in crate::window) struct Report<E> {
     mailbox: Arc<Mailbox<E>>,
     wake: Wake,
@@ -265,12 +266,12 @@ impl<E> Report<E> {
         Self { mailbox, wake }
     }
 
-    /// Returns true if the work is to end.
+    /// Returns true if the work should end.
     pub(in crate::window) fn is_cancelled(&self) -> bool {
         self.mailbox.is_cancelled.load(Ordering::Relaxed)
     }
 
-    /// Sends an event that must not be lost.
+    /// Sends an event that is never replaced.
     pub(in crate::window) fn send(&self, event: E) {
         self.put(|inside| {
             inside.events.push_back(event);
@@ -278,8 +279,8 @@ impl<E> Report<E> {
         });
     }
 
-    /// Sends the status of the work. It replaces the progress before, if the window has not taken that and nothing was told
-    /// since: a window that looks away finds the latest only. `keep` moves what must not be lost from the older one.
+    /// Sends a progress report. It replaces the previous one if the window has not received it and no other event was sent since,
+    /// so that a hidden window receives only the latest. `keep` moves data that must not be lost from the older one.
     pub(in crate::window) fn progress(&self, event: E, keep: impl FnOnce(E, &mut E)) {
         self.put(|inside| {
             let mut event = event;

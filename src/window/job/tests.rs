@@ -9,13 +9,13 @@ use std::{
 
 use super::{Job, JobError, Report};
 
-/// Far longer than any of this takes.
+/// Timeout, far longer than any test takes.
 const LONG: Duration = Duration::from_secs(60);
 
 #[derive(Debug, PartialEq)]
 enum Event {
     Said(&'static str),
-    /// The newest number, and the sum of all.
+    /// Latest number, and the sum of all numbers.
     Counted(u64, u64),
     Ended(Result<(), JobError>),
 }
@@ -24,7 +24,7 @@ fn job() -> Job<Event> {
     Job::new("test", Arc::new(|| ()))
 }
 
-/// Waits for the end and takes every event.
+/// Waits for the end and returns all events.
 fn all_of(job: &mut Job<Event>) -> Vec<Event> {
     job.wait(LONG);
     let events = std::iter::from_fn(|| job.next_event()).collect();
@@ -32,7 +32,7 @@ fn all_of(job: &mut Job<Event>) -> Vec<Event> {
     events
 }
 
-/// Work that says it has begun, waits until it is let go, and has more to say.
+/// Returns work that sends an event and signals that it has begun, waits for the gate to open, and sends another event.
 fn gated(before: &'static str, after: &'static str) -> (impl FnOnce(&Report<Event>) + Send, Receiver<()>, Sender<()>) {
     let (begun, has_begun) = channel();
     let (gate, opened) = channel::<()>();
@@ -59,7 +59,7 @@ fn events_come_in_order_and_the_result_last() {
         |report| ["one", "two", "three"].map(|word| report.send(Event::Said(word))),
         |ended| Event::Ended(ended.map(|_| ())),
     );
-    assert!(job.is_under_way(), "the last event is still to be taken");
+    assert!(job.is_under_way(), "the last event has not been received");
     let words = ["one", "two", "three"].map(Event::Said).into_iter();
     assert_eq!(
         all_of(&mut job),
@@ -68,7 +68,7 @@ fn events_come_in_order_and_the_result_last() {
 }
 
 #[test]
-fn nothing_of_older_work_is_seen_even_if_it_was_told_before_the_newer_began() {
+fn events_of_older_work_are_discarded_even_if_sent_before_the_newer_began() {
     let mut job = job();
     let (work, has_begun, gate) = gated("old, before", "old, after");
     job.start(work, Event::Ended);
@@ -79,7 +79,7 @@ fn nothing_of_older_work_is_seen_even_if_it_was_told_before_the_newer_began() {
 }
 
 #[test]
-fn newer_work_begins_once_each_older_one_has_let_go() {
+fn newer_work_starts_after_all_older_work_has_ended() {
     let log = Arc::new(Mutex::new(Vec::new()));
     let mut job = job();
     for number in 0..4 {
@@ -101,7 +101,7 @@ fn newer_work_begins_once_each_older_one_has_let_go() {
 }
 
 #[test]
-fn progress_nobody_took_is_replaced_and_what_it_carried_is_kept() {
+fn unreceived_progress_is_replaced_and_its_data_is_kept() {
     const STEPS: u64 = 10_000;
     let add = |older: Event, newer: &mut Event| match (older, newer) {
         (Event::Counted(_, before), Event::Counted(_, sum)) => *sum += before,
@@ -130,12 +130,12 @@ fn progress_nobody_took_is_replaced_and_what_it_carried_is_kept() {
     assert_eq!(
         all_of(&mut job),
         expected,
-        "an event keeps its place between progresses"
+        "an event keeps its place between progress reports"
     );
 }
 
 #[test]
-fn progress_that_was_taken_is_not_added_again() {
+fn received_progress_is_not_added_again() {
     let (woke, wakes) = channel();
     let (go_on, may_go_on) = channel();
     let mut job = Job::new("test", Arc::new(move || woke.send(()).unwrap_or(())));
@@ -157,7 +157,7 @@ fn progress_that_was_taken_is_not_added_again() {
 }
 
 #[test]
-fn a_panic_is_told_with_its_message_and_the_window_is_woken() {
+fn a_panic_is_reported_with_its_message_and_the_window_is_woken() {
     let expected = |panic: &str| {
         Event::Ended(Err(JobError::Panicked {
             name: "test",
@@ -180,14 +180,14 @@ fn a_panic_is_told_with_its_message_and_the_window_is_woken() {
     let events = all_of(&mut job);
     assert_eq!(events, [Event::Said("before"), expected("a reason with the number 7")]);
     job.start(|_| std::panic::panic_any(7_u8), Event::Ended);
-    assert_eq!(all_of(&mut job), [expected("no reason is known")]);
-    // And the job still works.
+    assert_eq!(all_of(&mut job), [expected("unknown cause")]);
+    // The job can be used again.
     job.start(|_| (), Event::Ended);
     assert_eq!(all_of(&mut job), [Event::Ended(Ok(()))]);
 }
 
 #[test]
-fn cancelled_work_ends_and_is_heard_unless_it_is_abandoned() {
+fn events_of_cancelled_work_are_received_unless_it_is_abandoned() {
     let work = |report: &Report<Event>| {
         spin_until_cancelled(report);
         report.send(Event::Said("cancelled"));
@@ -203,7 +203,7 @@ fn cancelled_work_ends_and_is_heard_unless_it_is_abandoned() {
 }
 
 #[test]
-fn a_dropped_job_has_cancelled_and_joined_its_thread() {
+fn dropping_a_job_cancels_and_joins_its_thread() {
     let held = Arc::new(());
     let mut job = job();
     let in_thread = Arc::clone(&held);
@@ -219,11 +219,11 @@ fn a_dropped_job_has_cancelled_and_joined_its_thread() {
 }
 
 #[test]
-fn dropping_does_not_wait_for_ever() {
+fn dropping_does_not_wait_forever() {
     let (work, has_begun, gate) = gated("before", "after");
     let mut job = job();
     job.start(work, Event::Ended);
     has_begun.recv().unwrap();
     drop(job);
-    gate.send(()).expect("the work still waits here");
+    gate.send(()).expect("the work is still waiting");
 }

@@ -1,4 +1,4 @@
-//! The frame of a heat map: names of rows and columns, and the scale of colours.
+//! Heat maps with names of rows and columns and a colour scale.
 
 use std::{f32::consts::FRAC_PI_2, sync::Arc};
 
@@ -19,13 +19,13 @@ use crate::window::{
 /// Click or hover on a cell.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum CellPointed {
-    /// Clicked it.
+    /// Clicked.
     Once,
-    /// Clicked it twice.
+    /// Double-clicked.
     Twice,
 }
 
-/// Draws the map over the space that is left, one cell marked; returns the cell (row, column) that the user clicked.
+/// Draws the map in the remaining space, with an optional `marked` cell; returns the cell (row, column) that the user clicked.
 pub fn heat_map_ui(ui: &mut Ui, map: &HeatMap, marked: Option<[usize; 2]>) -> Option<([usize; 2], CellPointed)> {
     let (palette, colours) = (Theme::of(ui).palette, map.colours.colours());
     let frame = HeatMapFrame::allocate_ui(ui, map);
@@ -41,12 +41,12 @@ pub fn heat_map_ui(ui: &mut Ui, map: &HeatMap, marked: Option<[usize; 2]>) -> Op
         let response = ui.interact(cell, ui.scope_id().with(("heat", row, column)), Sense::click());
         let is_marked = marked == Some([row, column]);
         value_under(ui, cell, number);
-        let words = &map.notes[[row, column]];
+        let note = &map.notes[[row, column]];
         response.widget_info(|| {
-            let name = words.lines().next().unwrap_or_default();
+            let name = note.lines().next().unwrap_or_default();
             WidgetInfo::selected(Role::Button, true, is_marked, name)
         });
-        let response = response.on_hover_cursor(CursorIcon::PointingHand).on_hover_text(words);
+        let response = response.on_hover_cursor(CursorIcon::PointingHand).on_hover_text(note);
         if response.clicked() {
             pointed = Some(([row, column], CellPointed::Once));
         }
@@ -74,10 +74,10 @@ pub fn heat_map_ui(ui: &mut Ui, map: &HeatMap, marked: Option<[usize; 2]>) -> Op
     pointed
 }
 
-/// Width of the scale of colours with its numbers and name, in points.
+/// Width of the colour scale with its numbers and name, in points.
 const SCALE_WIDTH: f32 = space(18);
 
-/// Places of the cells of a heat map and of what surrounds them.
+/// Layout of a heat map: its cells, names and colour scale.
 pub(super) struct HeatMapFrame {
     whole: Rect,
     scale: Rect,
@@ -88,7 +88,7 @@ pub(super) struct HeatMapFrame {
 }
 
 impl HeatMapFrame {
-    /// Takes the space that is left.
+    /// Allocates the remaining space.
     pub(super) fn allocate_ui(ui: &mut Ui, map: &HeatMap) -> Self {
         let (whole, _) = ui.allocate_exact_size(ui.available_size(), Sense::hover());
         let (whole, scale) = whole.split_left_right_at_x(whole.right() - SCALE_WIDTH);
@@ -103,7 +103,7 @@ impl HeatMapFrame {
         }
     }
 
-    /// Names, fewer where they would touch, and the meaning of the colours.
+    /// Draws the names, some left out where they would touch, and the colour scale.
     pub(super) fn decorate_ui(&self, ui: &Ui, map: &HeatMap) {
         let (grid, size, palette) = (self.grid, self.cell, Theme::of(ui).palette);
         let note = FontId::proportional(type_size().note);
@@ -131,7 +131,7 @@ impl HeatMapFrame {
     }
 }
 
-/// Width of the widest of these texts, in points.
+/// Returns the width of the widest of these texts, in points.
 pub(super) fn widest(ui: &Ui, texts: &[String]) -> f32 {
     let font = FontId::proportional(type_size().note);
     let width = |text: &String| {
@@ -143,7 +143,7 @@ pub(super) fn widest(ui: &Ui, texts: &[String]) -> f32 {
     texts.iter().map(width).fold(0.0, f32::max)
 }
 
-/// The meaning of the colours.
+/// Draws the colour scale.
 fn scale_ui(ui: &Ui, map: &HeatMap, place: Rect) {
     let (palette, colours) = (Theme::of(ui).palette, map.colours.colours());
     let bar = Rect::from_min_max(
@@ -173,7 +173,7 @@ fn scale_ui(ui: &Ui, map: &HeatMap, place: Rect) {
     upright_text(ui, &map.value_axis.name, pos2(place.right() - space(3), bar.center().y));
 }
 
-/// Text that reads upwards, its left edge and middle at `at`.
+/// Draws text that reads upwards, with the middle of its left edge at `at`.
 fn upright_text(ui: &Ui, text: &str, at: Pos2) {
     let colour = Theme::of(ui).palette.text;
     let font = FontId::proportional(type_size().small);
@@ -183,9 +183,8 @@ fn upright_text(ui: &Ui, text: &str, at: Pos2) {
         .add(TextShape::new(place, galley, colour).with_angle(-FRAC_PI_2));
 }
 
-/// Draws a map that changes all the time over the space that is left, as a picture called `label`: its cells have no
-/// numbers and are painted at once, however many they are. `marked` are the rows and columns to point out, from 0, and their
-/// colour.
+/// Draws a live map in the remaining space, as a picture called `label`: its cells have no text and are painted at once,
+/// however many there are. `marked` are the rows and columns to highlight, from 0, and their colour.
 /// Returns the cell (row, column) under the pointer.
 pub fn cells_ui(
     ui: &mut Ui,
@@ -196,7 +195,7 @@ pub fn cells_ui(
     let (palette, colours) = (Theme::of(ui).palette, map.colours.colours());
     let frame = HeatMapFrame::allocate_ui(ui, map);
     let (grid, size) = (frame.grid, frame.cell);
-    // A click picks a cell; by keys it is picked elsewhere.
+    // A click selects a cell; keyboard selection is handled elsewhere.
     let response = ui.interact(grid, ui.scope_id().with(("cells", label)), Sense::HOVER | Sense::CLICK);
     response.widget_info(|| WidgetInfo::labeled(Role::Image, true, label));
     ui.ctx().accesskit_node_builder(response.id, |node| {
@@ -217,7 +216,7 @@ pub fn cells_ui(
     let mut mesh = Mesh::default();
     mesh.reserve_vertices(4 * map.values.len());
     mesh.reserve_triangles(2 * map.values.len());
-    // Cells stand apart by a hairline where there is room for it.
+    // Cells are separated by a hairline where there is room for it.
     let gap = if size.min_elem() > 4.0 { 0.5 } else { 0.0 };
     for ((row, column), &value) in map.values.indexed_iter() {
         let corner = grid.min + vec2(column as f32, row as f32) * size;
@@ -244,8 +243,8 @@ pub fn cells_ui(
     Some((cell, response))
 }
 
-/// Keeps of the points of a line, which runs from left to right, those that are seen: of each column of pixels, `column`
-/// wide, the first and the last and between them the lowest and the highest.
+/// Decimates the points of a line that runs from left to right: in each column of pixels, `column` wide, keeps the first,
+/// last, lowest and highest point.
 pub(super) fn per_pixel(points: Vec<[f64; 2]>, column: f64) -> Vec<[f64; 2]> {
     if !(column.is_finite() && column > 0.0) {
         return points;
@@ -272,7 +271,7 @@ pub(super) fn per_pixel(points: Vec<[f64; 2]>, column: f64) -> Vec<[f64; 2]> {
     kept
 }
 
-/// A hue in the theme.
+/// Returns the colour of a hue in the theme.
 pub fn hue_colour(hue: Hue, palette: &Palette) -> Color32 {
     match hue {
         Hue::Blue => palette.accent,
@@ -291,7 +290,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_column_of_pixels_is_painted_as_with_all_points() {
+    fn decimation_preserves_every_column_of_pixels() {
         let points: Vec<[f64; 2]> = (0..100_000)
             .map(|at| {
                 [
@@ -324,7 +323,7 @@ mod tests {
     }
 
     #[test]
-    fn few_points_stay_as_they_are() {
+    fn few_points_are_not_decimated() {
         let points = vec![[0.0, 1.0], [1.0, 2.0], [1.0, 3.0]];
         assert_eq!(per_pixel(points.clone(), 100.0), points);
         assert_eq!(per_pixel(points.clone(), 0.0), points);

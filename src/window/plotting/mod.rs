@@ -1,4 +1,4 @@
-//! Figures on the screen: each is the value that is also printed. It knows no view.
+//! Figures on the screen, drawn from the same description as printed figures. Independent of the views.
 
 mod heat_map;
 mod plot;

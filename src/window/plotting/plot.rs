@@ -1,6 +1,6 @@
-//! A plot drawn with `egui_plot`, in the places of its axes: a logarithmic axis is linear in the logarithm.
+//! Plots drawn with `egui_plot`, in axis coordinates: a logarithmic axis is linear in the logarithm.
 //!
-//! Words at upright reference lines.
+//! Labels at vertical reference lines.
 
 use std::ops::RangeInclusive;
 
@@ -26,14 +26,14 @@ use crate::window::{
     widgets::focus_ring_ui,
 };
 
-/// Opacity of the tint of a span of an axis.
+/// Opacity of a shaded span of an axis.
 const SPAN_TINT: f32 = 0.12;
-/// Width of a tick's number with the room around it, in points.
+/// Width of the number at a tick with its margin, in points.
 const NUMBER_WIDTH: f64 = 50.0;
 const NUMBER_HEIGHT: f64 = 16.0;
-/// The least distance of grid lines, in points; the plot derives its scale from it.
+/// Minimum distance of grid lines, in points; the plot derives its scale from it.
 const MIN_GRID: f32 = 8.0;
-/// Points of a stepped line closer than this part of an axis are one: a sharp turn between them would be a spike.
+/// Points of a stepped line that are closer than this fraction of an axis are merged: a sharp turn would draw a spike.
 const COINCIDENT: f64 = 5e-4;
 
 /// Draws the plot over the space of `ui`; `id` distinguishes it from others in the window.
@@ -46,7 +46,7 @@ pub(super) fn plot_ui(ui: &mut Ui, id: Id, plot: &Plot, pointer: Pointer) -> (Pl
         hints
             .label(RichText::new(&axis.name).size(type_size().small).color(palette.dim))
             .formatter(move |mark, _| described.tick_text(mark.value, mark.step_size))
-            // Numbers are as bright as they come wherever they fit.
+            // Numbers have full brightness wherever they fit.
             .label_spacing(Rangef::new(apart, apart + 1.0))
             .tick_label_color(palette.dim)
             .tick_label_font(FontId::proportional(type_size().small))
@@ -68,7 +68,7 @@ pub(super) fn plot_ui(ui: &mut Ui, id: Id, plot: &Plot, pointer: Pointer) -> (Pl
         .allow_zoom(may_move)
         .allow_boxed_zoom(may_move)
         .show_crosshair(false)
-        .label_formatter(|position| words_under(plot, position).filter(|_| may_move))
+        .label_formatter(|position| tooltip_at(plot, position).filter(|_| may_move))
         .set_margin_fraction(Vec2::ZERO)
         .include_x(*x.start())
         .include_x(*x.end())
@@ -101,9 +101,9 @@ pub(super) fn plot_ui(ui: &mut Ui, id: Id, plot: &Plot, pointer: Pointer) -> (Pl
     (shown.transform, shown.response)
 }
 
-/// The ticks in view.
+/// Returns the visible ticks.
 fn marks(axis: &PlotAxis, input: &GridInput, number: f64) -> Vec<GridMark> {
-    // What a number takes on the axis.
+    // Length of a number on the axis.
     let apart = input.base_step_size * number / f64::from(MIN_GRID);
     let ticks = axis.ticks(&(input.bounds.0..=input.bounds.1), apart);
     let step_size = ticks.step;
@@ -111,8 +111,8 @@ fn marks(axis: &PlotAxis, input: &GridInput, number: f64) -> Vec<GridMark> {
     ticks.places.into_iter().map(mark).collect()
 }
 
-/// The words of the point under the pointer.
-fn words_under(plot: &Plot, position: &HoverPosition<'_>) -> Option<String> {
+/// Returns the tooltip of the point under the pointer.
+fn tooltip_at(plot: &Plot, position: &HoverPosition<'_>) -> Option<String> {
     let HoverPosition::NearDataPoint {
         plot_name, position, ..
     } = position
@@ -137,7 +137,7 @@ fn stroke(hue: Hue, style: LineStyle, palette: &Palette) -> (Stroke, DrawnStyle)
     }
 }
 
-/// Spans and reference lines.
+/// Draws spans and reference lines.
 fn lines_behind(plot_ui: &mut PlotUi<'_>, plot: &Plot, palette: &Palette) {
     for span in &plot.spans {
         if let [Some(from), Some(to)] = [span.range.start(), span.range.end()].map(|end| plot.x.place(*end)) {
@@ -171,7 +171,7 @@ fn draw_series(
     (ranges, column): ([&RangeInclusive<f64>; 2], f64),
     palette: &Palette,
 ) {
-    // The words under the pointer are found by it.
+    // The tooltip is looked up by this number.
     let number = plot.series.iter().position(|other| std::ptr::eq(other, series));
     let name = number.unwrap_or_default().to_string();
     let colour = hue_colour(series.look.hue, palette);
@@ -179,14 +179,14 @@ fn draw_series(
     if let Some(bar_width) = series.bar_width {
         let placed: Vec<_> = plot.placed(series).collect();
         let bars = placed.iter().map(|(_, [x, y])| Bar::new(*x, *y).width(bar_width));
-        let words: Vec<(f64, String)> = placed
+        let tooltips: Vec<(f64, String)> = placed
             .iter()
             .map(|(point, [x, _])| (*x, plot.words(series, point)))
             .collect();
         let chart = BarChart::new(&*name, bars.collect()).color(colour);
         plot_ui.bar_chart(chart.element_formatter(Box::new(move |bar, _| {
-            let words = words.iter().find(|(x, _)| *x == bar.argument);
-            words.map(|(_, words)| words.clone()).unwrap_or_default()
+            let tooltip = tooltips.iter().find(|(x, _)| *x == bar.argument);
+            tooltip.map(|(_, text)| text.clone()).unwrap_or_default()
         })));
     }
     if let Some(style) = series.look.line {
@@ -210,7 +210,7 @@ fn draw_series(
                 stretch = per_pixel(stretch, column);
             }
             let line = Line::new(&*name, PlotPoints::from(stretch)).id((&name, part));
-            // A band would make slopes of steps.
+            // A band would turn steps into slopes.
             plot_ui.line(line.stroke(stroke).style(style).allow_band(!is_stepped));
         }
     }
@@ -249,12 +249,12 @@ fn draw_series(
     plot_ui.points(points.radius(radius).color(colour));
 }
 
-/// The words next to points.
+/// Draws the labels of points.
 fn point_labels_ui(ui: &Ui, plot: &Plot, transform: &PlotTransform) {
     let palette = Theme::of(ui).palette;
     let frame = *transform.frame();
     let painter = ui.painter().with_clip_rect(frame);
-    // Most plots have none.
+    // Most plots have no labels.
     if !plot.has_point_labels() {
         return;
     }
@@ -287,7 +287,7 @@ fn point_labels_ui(ui: &Ui, plot: &Plot, transform: &PlotTransform) {
     }
 }
 
-/// Shows the words of each line at one of its ends; the pointer on them reads the line's whole name.
+/// Draws the label of each vertical reference line at one of its ends, with the full name of the line as a tooltip.
 pub(super) fn labels_ui(ui: &Ui, plot: &Plot, transform: &PlotTransform, id: Id) {
     let palette = Theme::of(ui).palette;
     let frame = *transform.frame();
@@ -310,7 +310,7 @@ pub(super) fn labels_ui(ui: &Ui, plot: &Plot, transform: &PlotTransform, id: Id)
         }
         let font = FontId::proportional(type_size().small);
         let galley = painter.layout_no_wrap(label.clone(), font, palette.text);
-        let rect = place_beside(x, galley.size(), frame, &points);
+        let rect = label_place(x, galley.size(), frame, &points);
         painter.galley(rect.min, galley, palette.text);
         let response = ui.interact(rect, id.with(("line", number)), Sense::hover());
         response.widget_info(|| WidgetInfo::labeled(Role::Label, true, &line.name));
@@ -318,15 +318,15 @@ pub(super) fn labels_ui(ui: &Ui, plot: &Plot, transform: &PlotTransform, id: Id)
     }
 }
 
-/// Place of the words at an upright line: at its upper end, at the right, where they fit and cover no point; else at another
-/// end or side.
-fn place_beside(x: f32, size: Vec2, frame: Rect, points: &[Pos2]) -> Rect {
+/// Returns the place of the label of a vertical line: to the right of its upper end if it fits there and covers no point,
+/// else at the other end or side.
+fn label_place(x: f32, size: Vec2, frame: Rect, points: &[Pos2]) -> Rect {
     let (right, left) = (x + space(1), x - space(1) - size.x);
     let (top, bottom) = (frame.top() + 1.0, frame.bottom() - 1.0 - size.y);
     let places = [(right, top), (left, top), (right, bottom), (left, bottom)];
     let places = places.map(|(x, y)| Rect::from_min_size(pos2(x, y), size));
     let fits = |rect: &&Rect| frame.x_range().contains(rect.left()) && frame.x_range().contains(rect.right());
-    // Markers reach beyond their points.
+    // Markers extend beyond their points.
     let is_free = |rect: &&Rect| !points.iter().any(|point| rect.expand(space(2)).contains(*point));
     let mut fitting = places.iter().filter(fits);
     let free = fitting.clone().find(is_free);
@@ -335,7 +335,7 @@ fn place_beside(x: f32, size: Vec2, frame: Rect, points: &[Pos2]) -> Rect {
 
 const SAMPLE_WIDTH: f32 = space(4);
 
-/// The width that a key takes with the room behind it, in points.
+/// Returns the width of a key with the space after it, in points.
 fn key_width(ui: &Ui, key: &Key) -> f32 {
     let font = FontId::proportional(type_size().note);
     let name = ui
@@ -344,12 +344,12 @@ fn key_width(ui: &Ui, key: &Key) -> f32 {
     SAMPLE_WIDTH + space(1) + name.size().x + space(3)
 }
 
-/// The width that [`legend_ui`] takes in one row, in points.
+/// Returns the width of [`legend_ui`] in one row, in points.
 pub fn legend_width(ui: &Ui, keys: &[Key]) -> f32 {
     keys.iter().map(|key| key_width(ui, key)).sum()
 }
 
-/// The keys side by side, in as many rows as they need; outside the plot, so that they cover nothing.
+/// Draws the keys side by side, in as many rows as needed; outside the plot, where they cover nothing.
 pub fn legend_ui(ui: &mut Ui, keys: &[Key]) {
     let available = ui.available_width();
     let mut rows: Vec<Vec<&Key>> = Vec::new();
@@ -401,7 +401,7 @@ fn paint_sample(ui: &Ui, look: Look, sample: Rect) {
         None => {}
     }
     if look.line.is_none() && look.marker.is_none() {
-        // An area: as pale as it is behind the curves, with an edge.
+        // A shaded area, as pale as behind the curves, with an edge.
         let area = sample.shrink2(vec2(0.0, space(1)));
         let (fill, edge) = (colour.gamma_multiply(0.3), Stroke::new(1.0, colour.gamma_multiply(0.6)));
         painter.rect(area, CornerRadius::ZERO, fill, edge, StrokeKind::Inside);
@@ -430,23 +430,23 @@ mod tests {
     use super::*;
 
     #[test]
-    fn words_at_a_line_cover_no_point_where_there_is_another_place() {
+    fn labels_of_lines_avoid_points() {
         let frame = Rect::from_min_max(pos2(100.0, 50.0), pos2(500.0, 250.0));
         let size = Vec2::new(40.0, 12.0);
-        let place = |x: f32, points: &[Pos2]| place_beside(x, size, frame, points);
+        let place = |x: f32, points: &[Pos2]| label_place(x, size, frame, points);
         assert_eq!(
             place(200.0, &[]).min,
             pos2(204.0, 51.0),
-            "at the right of the upper end"
+            "to the right of the upper end"
         );
-        assert_eq!(place(480.0, &[]).right(), 476.0, "no room at the right");
+        assert_eq!(place(480.0, &[]).right(), 476.0, "no room on the right");
         let point = pos2(220.0, 56.0);
-        assert_eq!(place(200.0, &[point]).right(), 196.0, "a point at the right");
+        assert_eq!(place(200.0, &[point]).right(), 196.0, "a point on the right");
         let below = place(110.0, &[pos2(130.0, 56.0)]);
         assert_eq!(
             (below.left(), below.bottom()),
             (114.0, 249.0),
-            "no room at the left either"
+            "no room on the left either"
         );
         let everywhere: Vec<Pos2> = (0..400)
             .map(|at| pos2(100.0 + (at % 20) as f32 * 20.0, 50.0 + (at / 20) as f32 * 10.0))
@@ -454,7 +454,7 @@ mod tests {
         assert_eq!(
             place(200.0, &everywhere).min,
             pos2(204.0, 51.0),
-            "where every place covers one, the first"
+            "the first place if every place covers a point"
         );
     }
 }

@@ -18,35 +18,35 @@ use crate::window::{
 /// Response of a plot to the pointer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Pointer {
-    /// It moves and zooms, and shows the words of the point under it.
+    /// The pointer pans and zooms the plot and shows the tooltip of a point.
     Moves,
-    /// The marks on the plot respond to it.
+    /// The points and bars respond to the pointer.
     Picks,
 }
 
-/// A plot as it is on the screen.
+/// Plot drawn on the screen.
 pub struct DrawnPlot<'a> {
     /// Plot that is drawn.
     pub plot: &'a Plot,
     /// True while the pointer is over it.
     pub has_pointer: bool,
-    /// Meaning of the point or bar under the pointer.
+    /// Index of the item under the pointer.
     pub hovered: Option<usize>,
-    /// Meaning of a point or bar that was just clicked.
+    /// Index of the item that was clicked in this frame.
     pub clicked: Option<usize>,
     transform: PlotTransform,
 }
 
 impl DrawnPlot<'_> {
-    /// Position of a point on the screen; `None` if an axis has no place for it.
+    /// Returns the position of a point on the screen; `None` if it cannot be shown on an axis.
     pub fn position(&self, x: f64, y: f64) -> Option<Pos2> {
         let [x, y] = self.plot.place(x, y)?;
         Some(self.transform.position_from_point(&Place::new(x, y)))
     }
 
-    /// Meaning of a point of the screen: the bar over it, or the nearest point in reach.
+    /// Returns the item at a screen position: the bar there, or the nearest point within reach.
     fn item_at(&self, at: Pos2) -> Option<usize> {
-        /// Distance within which the pointer is at a point.
+        /// Maximum distance between the pointer and a point.
         const REACH: f32 = 12.0;
         let value = self.transform.value_from_position(at);
         let mut nearest: Option<(f32, usize)> = None;
@@ -54,7 +54,7 @@ impl DrawnPlot<'_> {
             for (point, [x, y]) in self.plot.placed(series) {
                 let Some(item) = point.item else { continue };
                 let distance = match series.bar_width {
-                    // However low the bar, it is meant anywhere above its foot.
+                    // Even a low bar is hit anywhere above its base.
                     Some(width) if (x - value.x).abs() <= 0.5 * width => 0.0,
                     Some(_) => continue,
                     None => self.transform.position_from_point(&Place::new(x, y)).distance(at),
@@ -68,7 +68,7 @@ impl DrawnPlot<'_> {
     }
 }
 
-/// A title, the legend behind it or below where there is no room, and the plots.
+/// Draws a title with the legend next to it, or below if there is no room, and the plots.
 pub fn titled_plots_ui(ui: &mut Ui, title: &str, figure: &PlotFigure) {
     let has_room = ui.horizontal(|ui| {
         ui.label(RichText::new(title).font(semibold(type_size().title)));
@@ -80,7 +80,7 @@ pub fn titled_plots_ui(ui: &mut Ui, title: &str, figure: &PlotFigure) {
     plots_ui(ui, title, figure, Pointer::Moves);
 }
 
-/// The legend at the right end of a row, if there is room for it; returns whether there is.
+/// Draws the legend at the right end of a row, if there is room for it; returns true if it was drawn.
 pub fn legend_behind_ui(ui: &mut Ui, keys: &[Key]) -> bool {
     let spare = ui.available_width() - ui.spacing().item_spacing.x - legend_width(ui, keys);
     let has_room = spare >= space(3);
@@ -91,11 +91,10 @@ pub fn legend_behind_ui(ui: &mut Ui, keys: &[Key]) -> bool {
     has_room
 }
 
-/// Least width of the notes next to a square plot.
+/// Minimum width of the notes next to a square plot.
 const NOTES_WIDTH: f32 = space(36);
 
-/// The plots side by side over the space that is left, and the notes: next to a square plot that leaves room for them, else
-/// above.
+/// Draws the plots side by side in the remaining space, and the notes: next to a square plot if there is room, else above.
 pub fn plots_ui<'a>(ui: &mut Ui, id: &str, figure: &'a PlotFigure, pointer: Pointer) -> Vec<DrawnPlot<'a>> {
     let is_square = matches!(&figure.plots[..], [plot] if plot.has_equal_scales);
     let left_by_square = ui.available_width() - ui.available_height() - 2.0 * space(3);
@@ -106,7 +105,7 @@ pub fn plots_ui<'a>(ui: &mut Ui, id: &str, figure: &'a PlotFigure, pointer: Poin
     let whole = ui.available_rect_before_wrap();
     let count = figure.plots.len().max(1) as f32;
     let width = (whole.width() - (count - 1.0) * space(3)) / count;
-    // Square except for the numbers next to the axes.
+    // Square, apart from the numbers at the axes.
     let width = if is_square {
         width.min(whole.height() + space(3))
     } else {
@@ -132,8 +131,8 @@ pub fn plots_ui<'a>(ui: &mut Ui, id: &str, figure: &'a PlotFigure, pointer: Poin
     });
     let plots = plots.collect();
     if are_notes_beside {
-        let beside = whole.with_min_x(slot(1).left()).with_min_y(whole.top() + space(4));
-        notes_ui(&mut ui.new_child(UiBuilder::new().max_rect(beside)), figure);
+        let place = whole.with_min_x(slot(1).left()).with_min_y(whole.top() + space(4));
+        notes_ui(&mut ui.new_child(UiBuilder::new().max_rect(place)), figure);
     }
     ui.allocate_rect(whole, eframe::egui::Sense::hover());
     plots
@@ -145,16 +144,16 @@ fn notes_ui(ui: &mut Ui, figure: &PlotFigure) {
     }
 }
 
-/// One dot for each value on a line, with a box over the middle half of them.
+/// Strip chart: one dot per value on a line, with a box from the first to the third quartile.
 #[derive(Clone, Copy, Debug)]
 pub struct StripChart<'a> {
     /// Name of the picture, for assistive technology.
     pub label: &'a str,
     /// Name of the axis, drawn below it.
     pub axis: &'a str,
-    /// The values; those that are not numbers have no dot.
+    /// Values; NaN has no dot.
     pub values: &'a [Option<f64>],
-    /// The place of the value in the accent colour.
+    /// Index of the value in the accent colour.
     pub marked: usize,
     /// Quartiles and extremes of the values.
     pub spread: Spread,
@@ -162,7 +161,7 @@ pub struct StripChart<'a> {
 
 const DOT_RADIUS: f32 = 3.5;
 
-/// Draws the strip over the available width.
+/// Draws the chart over the available width.
 pub fn strip_ui(ui: &mut Ui, chart: &StripChart<'_>) {
     let palette = Theme::of(ui).palette;
     let line_height = type_size().small + space(1);
@@ -177,7 +176,7 @@ pub fn strip_ui(ui: &mut Ui, chart: &StripChart<'_>) {
         upper_quartile,
         largest,
     } = chart.spread;
-    // Values that are all alike get an axis around them.
+    // If all values are equal, the axis extends to both sides of them.
     let margin = if largest > smallest {
         0.0
     } else {
@@ -219,14 +218,14 @@ pub fn strip_ui(ui: &mut Ui, chart: &StripChart<'_>) {
 
     let pointer = response.hover_pos();
     let mut hovered = None;
-    // The marked one lies above the others.
+    // The marked dot is drawn above the others.
     let numbered = chart.values.iter().enumerate();
     let (others, marked): (Vec<_>, Vec<_>) = numbered.partition(|(number, _)| *number != chart.marked);
     for (number, value) in others.into_iter().chain(marked) {
         let Some(value) = value.filter(|value| value.is_finite()) else {
             continue;
         };
-        // Three heights keep dots of near values apart.
+        // Three heights separate the dots of similar values.
         let row = (number % 3) as f32 - 1.0;
         let centre = pos2(x(value), middle + row * 2.4 * DOT_RADIUS);
         let is_marked = number == chart.marked;
@@ -247,6 +246,6 @@ pub fn strip_ui(ui: &mut Ui, chart: &StripChart<'_>) {
     response.widget_info(|| WidgetInfo::labeled(Role::Image, true, format!("{}: {text}", chart.label)));
     match hovered {
         Some((number, value)) => response.on_hover_text(format!("Start {}: {}", number + 1, format_number(value))),
-        None => response.on_hover_text("One dot for each start, the kept one in colour; box: quartiles, line: median."),
+        None => response.on_hover_text("One dot per start; the kept one is in colour. Box: quartiles; line: median."),
     };
 }

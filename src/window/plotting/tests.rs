@@ -1,4 +1,4 @@
-//! The screen's picture and the printed one say the same.
+//! Figures on the screen and in print show the same content.
 
 use std::collections::BTreeSet;
 
@@ -24,14 +24,14 @@ use decoupler_files::figure::{
     regression_figure, singular_values_figure, trade_off_figure, training_state_figure, z_pairs_mm,
 };
 
-/// Text and counts of marks found in a picture.
+/// Texts and numbers of marks in a picture.
 #[derive(Debug, Default, PartialEq)]
 struct Seen {
     /// Discs, rings and dots.
     circles: usize,
-    /// Unbroken lines of at least [`LONG`] points.
+    /// Solid lines of at least [`LONG`] points.
     curves: usize,
-    /// Words, without the numbers at ticks.
+    /// Texts, without the numbers at ticks.
     words: BTreeSet<String>,
 }
 
@@ -62,11 +62,11 @@ fn on_screen(figure: &Figure) -> Seen {
     seen
 }
 
-/// Calls `look` with everything that the window draws for a figure.
+/// Calls `look` with every shape that the window draws for a figure.
 fn shapes_on_screen(figure: &Figure, mut look: impl FnMut(&Shape)) {
     let ctx = Context::default();
     theme::install(&ctx, true);
-    // The places of the axes are known after the first frame.
+    // The positions of the axes are known after the first frame.
     for frame in 0..3 {
         let input = RawInput {
             screen_rect: Some(Rect::from_min_size(Pos2::ZERO, vec2(1400.0, 600.0))),
@@ -98,7 +98,7 @@ fn in_print(figure: &Figure) -> Seen {
         let points = || element.attribute("points").unwrap_or_default().split(' ').count();
         match element.tag_name().name() {
             "circle" => seen.circles += 1,
-            // The screen cuts a dashed line into its dashes.
+            // On the screen, a dashed line is drawn as separate dashes.
             "polyline" if points() >= LONG && !element.has_attribute("stroke-dasharray") => seen.curves += 1,
             "text" => seen.read(element.text().unwrap_or_default()),
             _ => {}
@@ -161,7 +161,7 @@ fn figures_of_a_training_are_the_same_on_screen_and_in_print() {
     let pairs_mm = z_pairs_mm(run.test(), &decoupled_mm);
     same("histogram", error_histogram_figure(&pairs_mm, None));
     let regression = same("regression", regression_figure(&pairs_mm));
-    // A dot for each node, and one in the legend.
+    // One dot per node, and one in the legend.
     assert_eq!(regression.circles, pairs_mm.len() + 1);
     assert!(regression.words.iter().any(|word| word.starts_with("Correlation R = ")));
     let nodes: Vec<_> = pairs_mm.iter().map(|pair| glam::DVec3::Z * pair.0).collect();
@@ -186,7 +186,7 @@ fn figures_of_experiments_are_the_same_on_screen_and_in_print() {
         repeats: 2,
         unit: FoldUnit::Sample,
     });
-    // Two cells of four trials, each with an error of Z and of X; that of Y may be exactly 0.
+    // Two cells of four trials, each with an error of Z and of X; the error of Y may be exactly 0.
     assert!(same("Fig. 5", experiment_figure(&results(table_2))).circles >= 2 * 2 * 4 + 2);
     let published = ExperimentResults::new(PaperTable::ArrayScales.experiment());
     assert!(
@@ -235,9 +235,9 @@ fn figures_of_decoders_and_rows_are_the_same_on_screen_and_in_print() {
     assert_eq!(singular_values.circles, rows[2].unknowns() + 1);
 }
 
-/// Of a million epochs the chart on screen has a few points for each pixel, and every peak reaches as high as it does.
+/// The chart of a million epochs has a few points per pixel on screen, and every peak keeps its height.
 #[test]
-fn a_million_epochs_are_drawn_by_the_least_and_the_largest_of_each_pixel() {
+fn a_million_epochs_are_drawn_by_min_and_max_per_pixel() {
     const PEAKS: [usize; 3] = [31_337, 500_000, 999_983];
     let mse = |epoch: usize| match epoch {
         _ if PEAKS.contains(&epoch) => 80.0,
@@ -257,7 +257,7 @@ fn a_million_epochs_are_drawn_by_the_least_and_the_largest_of_each_pixel() {
         })
         .collect();
     let mut outline = EpochOutline::new();
-    history.chunks(10_000).for_each(|news| outline.extend(news));
+    history.chunks(10_000).for_each(|records| outline.extend(records));
     let figure = Figure::from(loss_figure(outline.records(), &[], 0));
     let mut curves = Vec::new();
     shapes_on_screen(&figure, |shape| curves_of(shape, &mut curves));
@@ -272,7 +272,7 @@ fn a_million_epochs_are_drawn_by_the_least_and_the_largest_of_each_pixel() {
         ends.fold((f32::MAX, f32::MIN), |(low, high), at| (low.min(at), high.max(at)))
     };
     let (top, bottom) = ends(|point| point.y, curve);
-    // The curve fills its width, so the places of the epochs follow from those of its ends.
+    // The curve spans the full width, so the positions of the epochs follow from its ends.
     let (from, to) = ends(|point| point.x, curve);
     for peak in PEAKS {
         let x = from + (to - from) * peak as f32 / 999_999.0;
@@ -289,7 +289,7 @@ fn a_million_epochs_are_drawn_by_the_least_and_the_largest_of_each_pixel() {
     }
 }
 
-/// Points of all lines, and both edges of bands that stand for dense ones.
+/// Collects the points of all lines, and both edges of the bands that replace dense lines.
 fn curves_of(shape: &Shape, curves: &mut Vec<Vec<Pos2>>) {
     match shape {
         Shape::Vec(shapes) => shapes.iter().for_each(|shape| curves_of(shape, curves)),

@@ -1,7 +1,6 @@
-//! The widget that shows a [`Surface`](decoupler_files::figure::surface::Surface) and lets the user turn it.
+//! Widget that shows a [`Surface`](decoupler_files::figure::surface::Surface) and lets the user rotate it.
 //!
-//! `view` is the widget, `painted` what it paints: the surface as laid out in its card, kept for as long as nothing in it
-//! changes.
+//! `view` is the widget; `painted` is the surface laid out in its card, cached until something changes.
 
 mod painted;
 mod view;

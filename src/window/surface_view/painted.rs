@@ -1,6 +1,6 @@
-//! A surface as it is painted, kept from frame to frame: a pointer that moves changes none of it.
+//! Painted surface, cached between frames: it does not change when the pointer moves.
 //!
-//! Thin, soft lines inside a mesh, so that what is drawn later hides them.
+//! Thin anti-aliased lines are part of the mesh, so that faces drawn later hide them.
 
 use std::sync::Arc;
 
@@ -18,7 +18,7 @@ use glam::Vec2;
 
 use crate::window::theme::{Palette, Theme, rgb, type_size};
 
-/// A laid-out surface and what it was made of.
+/// Laid-out surface with the arguments that it depends on.
 pub(super) struct Painted {
     surface: Surface,
     camera: OrbitCamera,
@@ -34,7 +34,7 @@ pub(super) struct Painted {
 }
 
 impl Painted {
-    /// Returns what the last frame painted if nothing has changed, or paints it again.
+    /// Returns the cached surface of the last frame if nothing has changed, else lays it out again.
     pub(super) fn of(surface: &Surface, camera: OrbitCamera, theme: &Theme, ui: &Ui, response: &Response) -> Arc<Self> {
         let (id, rect) = (response.id, response.rect);
         let kept: Option<Arc<Self>> = ui.data(|data| data.get_temp(id));
@@ -77,7 +77,8 @@ impl Painted {
         }
     }
 
-    /// The frame with its labels, the surface, the line of its section, and the dots with one of them marked and some lit.
+    /// Paints the axes with their labels, the surface, the line of its section, and the nodes, one of them marked and some
+    /// highlighted.
     pub(super) fn paint(
         &self,
         painter: &Painter,
@@ -113,7 +114,7 @@ impl Painted {
     }
 }
 
-/// Lines, and texts on whole pixels, which keep small text crisp.
+/// Paints lines, and texts at whole pixels, to keep small text crisp.
 pub(super) fn paint_frame(painter: &Painter, palette: &Palette, lines: &[Line], texts: &[Text]) {
     for line in lines {
         let ends = [line.from, line.to].map(to_egui);
@@ -127,7 +128,7 @@ pub(super) fn paint_frame(painter: &Painter, palette: &Palette, lines: &[Line], 
     }
 }
 
-/// Size of a label.
+/// Returns the size of a label.
 pub(super) fn measure(painter: &Painter, text: &str) -> Vec2 {
     let galley = painter.layout_no_wrap(text.to_owned(), label_font(), Color32::WHITE);
     Vec2::new(galley.size().x, galley.size().y)
@@ -195,14 +196,14 @@ pub(super) fn to_glam(point: Pos2) -> Vec2 {
     Vec2::new(point.x, point.y)
 }
 
-/// Half the width over which a line fades out, in points.
+/// Half the width over which the edge of a line fades out, in points.
 const REACH: f32 = 1.0;
 
-/// Vertices and triangles of one line.
+/// Number of vertices and triangles per line.
 pub(super) const VERTICES: usize = 6;
 pub(super) const TRIANGLES: usize = 4;
 
-/// Appends a line about one point wide whose colour fades out on both sides.
+/// Appends a line about one point wide whose colour fades out at both edges.
 pub(super) fn add_line(mesh: &mut Mesh, from: Pos2, to: Pos2, colour: Color32) {
     let along = to - from;
     let length = along.length();
@@ -223,17 +224,17 @@ pub(super) fn add_line(mesh: &mut Mesh, from: Pos2, to: Pos2, colour: Color32) {
 
 const STRIPS: usize = 128;
 
-/// The scale of colours next to one or more surfaces, as a vertical bar with ticks.
+/// Colour scale next to one or more surfaces: a vertical bar with ticks.
 #[derive(Clone, Debug)]
 pub struct ColourBar<'a> {
-    /// Scale of the colours.
+    /// Scale of the values.
     pub scale: &'a ColourScale,
-    /// Dark or light.
+    /// Dark or light theme.
     pub theme: &'a Theme,
 }
 
 impl ColourBar<'_> {
-    /// Width that the bar takes with its numbers, in points.
+    /// Width of the bar with its numbers, in points.
     pub const WIDTH: f32 = ColourScale::WIDTH;
 
     /// Draws the bar `height` points high.

@@ -1,4 +1,4 @@
-//! The widget.
+//! Surface widget.
 
 use eframe::egui::{
     self, EventFilter, Key, Label, Modifiers, PointerButton, Pos2, Rect, RectAlign, Response, RichText, Sense, Stroke,
@@ -15,61 +15,61 @@ use decoupler_files::{
     },
 };
 
-/// A surface plot that fills the space it is given.
+/// Surface plot that fills the available space.
 #[derive(Clone, Debug)]
 pub struct SurfaceView<'a> {
-    /// Name for assistive technology and tests, and the id among its siblings: "Actual surface".
+    /// Name for assistive technology and tests, such as "Actual surface"; must be unique among its siblings.
     pub label: &'a str,
     /// Surface that is drawn.
     pub surface: &'a Surface,
-    /// A node to mark, for instance the one hovered in a neighbouring view.
+    /// Node to mark, for instance the one under the pointer in a neighbouring view.
     pub marked_node: Option<usize>,
-    /// Nodes that are lit, for instance those of a chosen bar.
+    /// Nodes to highlight, for instance those of a selected bar.
     pub lit_nodes: &'a [usize],
-    /// Line along which a figure next to it cuts the surface.
+    /// Line of the section shown in a neighbouring figure.
     pub section: Option<&'a Section>,
-    /// Dark or light.
+    /// Dark or light theme.
     pub theme: &'a Theme,
 }
 
 /// Response of a [`SurfaceView`] to the pointer.
 #[derive(Clone, Debug)]
 pub struct SurfaceViewResponse {
-    /// The camera, turned by drags, scrolling and keys.
+    /// Camera after drags, scrolling and keys.
     pub camera: OrbitCamera,
-    /// The node under the pointer.
+    /// Node under the pointer.
     pub hovered_node: Option<usize>,
     /// Position of that node on the screen.
     pub hovered_at: Option<Pos2>,
-    /// The way back from points on the screen; `None` where there is no room for a picture.
+    /// Inverse projection from points on the screen; `None` if there is no room for a picture.
     pub sight: Option<Sight>,
-    /// Of the whole card.
+    /// Response of the whole card.
     pub response: Response,
 }
 
 impl SurfaceViewResponse {
-    /// Shows a tooltip above the hovered node, if there is one: `content` gets the node's index. Above, because what
-    /// the surface rises to is the node itself; next to it where the window ends.
+    /// Shows a tooltip for the node under the pointer, if there is one: `content` receives the index of the node. The tooltip is
+    /// above the node, where it does not hide the surface around it; next to it at the edge of the window.
     pub fn node_tooltip_ui(&self, content: impl FnOnce(&mut Ui, usize)) {
         if let (Some(node), Some(at)) = (self.hovered_node, self.hovered_at) {
             let anchor = Rect::from_center_size(at, Vec2::splat(20.0));
             let (ctx, layer) = (self.response.ctx.clone(), self.response.layer_id);
             let mut tooltip = Tooltip::always_open(ctx, layer, self.response.id.with("node"), anchor).gap(12.0);
-            let beside = &[RectAlign::RIGHT, RectAlign::LEFT, RectAlign::BOTTOM];
-            tooltip.popup = tooltip.popup.align(RectAlign::TOP).align_alternatives(beside);
+            let alternatives = &[RectAlign::RIGHT, RectAlign::LEFT, RectAlign::BOTTOM];
+            tooltip.popup = tooltip.popup.align(RectAlign::TOP).align_alternatives(alternatives);
             tooltip.show(|ui| content(ui, node));
         }
     }
 }
 
 impl SurfaceView<'_> {
-    /// Draws the surface in the space that is left and lets the user turn it.
+    /// Draws the surface in the remaining space and lets the user rotate it.
     pub fn show(self, ui: &mut Ui, camera: OrbitCamera) -> SurfaceViewResponse {
         self.show_with(ui, camera, Hand::Turns)
     }
 
-    /// As [`Self::show`], but the primary button, scrolling and the keys are left to the caller: drags with shift or another
-    /// button turn.
+    /// As [`Self::show`], but the primary button, scrolling and the keys are left to the caller; drags with Shift or another
+    /// button rotate.
     pub fn show_touched(self, ui: &mut Ui, camera: OrbitCamera) -> SurfaceViewResponse {
         self.show_with(ui, camera, Hand::Touches)
     }
@@ -117,7 +117,7 @@ impl SurfaceView<'_> {
         let nodes = (shown.hovered_node.or(self.marked_node), self.lit_nodes);
         painted.paint(&painter, &self.theme.palette, self.section, nodes);
         if let Some(note) = &painted.note {
-            // Below the axes, partly in the margin of the card, so that the picture keeps its size.
+            // Below the axes, partly in the margin of the card, to keep the size of the picture.
             let size = type_size().small;
             let line = Rect::from_x_y_ranges(rect.x_range(), rect.bottom() - 5.0..=rect.bottom() + size);
             let text = RichText::new(note.as_str())
@@ -127,7 +127,7 @@ impl SurfaceView<'_> {
         }
     }
 
-    /// Tells assistive technology what is seen: "z 4.0 to 5.0 mm".
+    /// Describes the surface to assistive technology: "z 4.0 to 5.0 mm".
     fn describe(&self, ui: &Ui, response: &Response) {
         response.widget_info(|| WidgetInfo::labeled(egui::accesskit::Role::Image, true, self.label));
         ui.ctx().accesskit_node_builder(response.id, |node| {
@@ -146,17 +146,17 @@ impl SurfaceView<'_> {
     }
 }
 
-/// Work of the primary button on a surface.
+/// Action of the primary button on a surface.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Hand {
-    /// It turns the surface.
+    /// Rotates the surface.
     Turns,
-    /// It does what the caller makes of it.
+    /// Handled by the caller.
     Touches,
 }
 
-/// Drags turn, drags with shift or another button shift, scrolling zooms, a double click goes back to the start.
-/// With the focus: arrow keys, plus, minus, Home.
+/// Moves the camera: drags rotate, drags with Shift or another button pan, scrolling zooms, and a double click resets. With
+/// the focus, the arrow keys, plus, minus and Home do the same.
 fn operate(ui: &Ui, response: &Response, camera: OrbitCamera, hand: Hand) -> OrbitCamera {
     let mut camera = camera.clamped();
     if response.clicked() || response.drag_started() {
@@ -176,7 +176,7 @@ fn operate(ui: &Ui, response: &Response, camera: OrbitCamera, hand: Hand) -> Orb
     }
     if response.contains_pointer() {
         let (scroll, pinch) = ui.input_mut(|input| {
-            // Taken, so that no scroll area around the view scrolls as well.
+            // Consumed, so that no enclosing scroll area scrolls as well.
             let scroll = std::mem::take(&mut input.smooth_scroll_delta);
             (scroll.y, input.zoom_delta())
         });

@@ -4,22 +4,22 @@ use eframe::egui::Color32;
 
 use super::Palette;
 
-/// Least contrast of text (WCAG 2.2, 1.4.3).
+/// Minimum contrast of text (WCAG 2.2, 1.4.3).
 const TEXT: f64 = 4.5;
-/// Least contrast of marks that carry meaning (WCAG 2.2, 1.4.11).
+/// Minimum contrast of marks that carry meaning (WCAG 2.2, 1.4.11).
 const MARKS: f64 = 3.0;
 
 #[test]
 fn contrast_of_black_and_white_is_21_and_of_equal_colours_1() {
     assert!((contrast(Color32::BLACK, Color32::WHITE) - 21.0).abs() < 1e-12);
     assert!((contrast(Color32::RED, Color32::RED) - 1.0).abs() < 1e-12);
-    // The greys that WebAIM gives as the last to pass and the first to fail on white.
+    // According to WebAIM, the lightest grey that passes on white and the darkest that fails.
     assert!(contrast(Color32::from_gray(0x76), Color32::WHITE) > TEXT);
     assert!(contrast(Color32::from_gray(0x77), Color32::WHITE) < TEXT);
 }
 
 #[test]
-fn all_text_can_be_read_on_all_that_lies_behind_it() {
+fn text_has_enough_contrast_on_every_background() {
     for (theme, palette) in themes() {
         for (ink, colour) in inks(&palette) {
             for (ground, behind) in grounds(&palette) {
@@ -35,10 +35,10 @@ fn all_text_can_be_read_on_all_that_lies_behind_it() {
 }
 
 #[test]
-fn all_marks_stand_out_from_the_card() {
+fn marks_have_enough_contrast_on_cards() {
     for (theme, palette) in themes() {
         let ends = [
-            ("least error", palette.error_stops[0]),
+            ("smallest error", palette.error_stops[0]),
             ("largest error", palette.error_stops[4]),
         ];
         for (mark, colour) in inks(&palette).into_iter().chain(ends) {
@@ -52,7 +52,7 @@ fn themes() -> [(&'static str, Palette); 2] {
     [("dark", Palette::DARK), ("light", Palette::LIGHT)]
 }
 
-/// Colours of text, which are also those of curves and symbols.
+/// Colours of text, also used for curves and symbols.
 fn inks(palette: &Palette) -> [(&'static str, Color32); 8] {
     [
         ("text", palette.text),
@@ -77,13 +77,13 @@ fn grounds(palette: &Palette) -> [(&'static str, Color32); 6] {
     ]
 }
 
-/// Contrast of two opaque colours, 1 to 21.
+/// Returns the contrast of two opaque colours, from 1 to 21.
 fn contrast(a: Color32, b: Color32) -> f64 {
     let (a, b) = (luminance(a), luminance(b));
     (a.max(b) + 0.05) / (a.min(b) + 0.05)
 }
 
-/// Relative luminance of an sRGB colour.
+/// Returns the relative luminance of an sRGB colour.
 fn luminance(colour: Color32) -> f64 {
     let linear = |channel: u8| {
         let value = f64::from(channel) / 255.0;

@@ -1,6 +1,6 @@
-//! The look of the window: tokens, colour maps, fonts, egui's visuals, and the few components egui lacks.
+//! Appearance of the window: design tokens, colour maps, fonts and egui's visuals.
 //!
-//! Panels take colours, sizes and distances from here and write none of their own.
+//! Panels use colours, sizes and distances from here and define none of their own.
 
 #[cfg(test)]
 mod contrast;
@@ -16,31 +16,31 @@ use eframe::egui::Color32;
 
 use decoupler_files::figure::{ColourMap, Rgb, SequentialMap, surface::Quantity};
 
-/// Everything that depends on dark or light.
+/// Dark or light theme.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Theme {
-    /// Light text on dark panels.
+    /// True for light text on dark panels.
     pub is_dark: bool,
     /// Named colours.
     pub palette: Palette,
-    /// Colours of errors: diverging, zero in the colour of the panel.
+    /// Diverging colour map of errors; zero has the colour of the panel.
     pub errors: ColourMap,
 }
 
 impl Theme {
-    /// The dark theme.
+    /// Returns the dark theme.
     pub fn dark() -> &'static Self {
         static DARK: OnceLock<Theme> = OnceLock::new();
         DARK.get_or_init(|| Self::new(true))
     }
 
-    /// The light theme.
+    /// Returns the light theme.
     pub fn light() -> &'static Self {
         static LIGHT: OnceLock<Theme> = OnceLock::new();
         LIGHT.get_or_init(|| Self::new(false))
     }
 
-    /// The theme that `ui` is drawn in.
+    /// Returns the theme of `ui`.
     pub fn of(ui: &eframe::egui::Ui) -> &'static Self {
         if ui.visuals().dark_mode {
             Self::dark()
@@ -58,7 +58,7 @@ impl Theme {
         }
     }
 
-    /// Colours of the values of a surface; `sequential` are those of values that do not diverge.
+    /// Returns the colour map of the values of a surface; `sequential` is used unless the quantity diverges.
     pub fn colours(&self, quantity: &Quantity, sequential: SequentialMap) -> &ColourMap {
         if quantity.is_diverging() {
             &self.errors
@@ -68,7 +68,7 @@ impl Theme {
     }
 }
 
-/// An opaque colour.
+/// Returns an opaque colour.
 pub fn rgb([red, green, blue]: Rgb) -> Color32 {
     Color32::from_rgb(red, green, blue)
 }

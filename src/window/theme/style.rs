@@ -1,6 +1,6 @@
-//! egui's visuals, made of our tokens.
+//! egui's visuals, built from the design tokens.
 //!
-//! Inter with tabular digits, in two weights; egui's own fonts stand behind it for rare signs.
+//! The font is Inter with tabular digits, in two weights; egui's own fonts are the fallback for rare characters.
 
 use std::sync::Arc;
 
@@ -13,7 +13,7 @@ use eframe::egui::{
 
 use super::tokens::{Palette, radius, space, type_size};
 
-/// Loads the fonts and both styles. Once, before the first frame.
+/// Installs the fonts and both styles; called once, before the first frame.
 pub fn install(ctx: &Context, is_dark: bool) {
     ctx.set_fonts(font_definitions());
     ctx.set_style_of(egui::Theme::Dark, style(true));
@@ -29,7 +29,7 @@ pub fn apply(ctx: &Context, is_dark: bool) {
 fn style(is_dark: bool) -> Style {
     let mut style = Style {
         visuals: visuals(is_dark),
-        // Answers show at once.
+        // No animations.
         animation_time: 0.0,
         ..Style::default()
     };
@@ -83,7 +83,7 @@ fn visuals(is_dark: bool) -> Visuals {
     visuals.widgets.noninteractive = widget(palette.panel, hairline, palette.text);
     visuals.widgets.inactive = widget(palette.raised, Stroke::NONE, palette.text);
     visuals.widgets.hovered = widget(palette.hovered, Stroke::NONE, palette.text);
-    // egui shows keyboard focus by the active state: the outline is the focus ring.
+    // egui shows keyboard focus with the active style: the outline is the focus ring.
     visuals.widgets.active = widget(palette.hovered, Stroke::new(1.0, palette.accent), palette.text);
     visuals.widgets.open = widget(palette.hovered, Stroke::NONE, palette.text);
 
@@ -127,12 +127,12 @@ fn shadow(blur: u8, is_dark: bool) -> Shadow {
 const REGULAR: &str = "Inter Tabular Regular";
 const SEMIBOLD: &str = "Inter Tabular SemiBold";
 
-/// The semi-bold face at a size in points.
+/// Returns the semi-bold font at a size in points.
 pub fn semibold(size: f32) -> FontId {
     FontId::new(size, FontFamily::Name(SEMIBOLD.into()))
 }
 
-/// The fonts of the window.
+/// Returns the fonts of the window.
 pub fn font_definitions() -> FontDefinitions {
     let mut fonts = FontDefinitions::default();
     let faces: [(&str, &'static [u8]); 2] = [

@@ -1,11 +1,11 @@
-//! The one file with raw colours, sizes and distances.
+//! Design tokens: the only file with raw colours, sizes and distances.
 
 use eframe::egui::Color32;
 
-/// The named colours of a theme.
+/// Named colours of a theme.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Palette {
-    /// Behind the cards.
+    /// Background of the window, behind the cards.
     pub background: Color32,
     /// Panels and cards.
     pub panel: Color32,
@@ -17,34 +17,34 @@ pub struct Palette {
     pub line: Color32,
     /// Text.
     pub text: Color32,
-    /// Text of second rank: units, ticks, hints.
+    /// Secondary text: units, ticks, hints.
     pub dim: Color32,
-    /// Colour of the selection, the network's own result and the one primary button.
+    /// Accent colour: the selection, the result of the network and the primary button.
     pub accent: Color32,
     /// The primary button under the pointer.
     pub accent_hovered: Color32,
-    /// Text on the accent.
+    /// Text on the accent colour.
     pub on_accent: Color32,
-    /// Behind a selected option: the accent, mixed into the raised colour.
+    /// Background of a selected option: the accent mixed into the raised colour.
     pub selected: Color32,
     /// Success.
     pub good: Color32,
-    /// Something to weigh.
+    /// Warning.
     pub warning: Color32,
-    /// Behind a warning.
+    /// Background of a warning.
     pub warning_tint: Color32,
-    /// Something failed.
+    /// Failure.
     pub bad: Color32,
-    /// A series told apart from all others.
+    /// Colour of an additional series.
     pub violet: Color32,
-    /// Another one.
+    /// Colour of another additional series.
     pub cyan: Color32,
-    /// The diverging map from most negative to most positive; its middle is the panel.
+    /// Diverging colour map from the most negative to the most positive value; its middle is the colour of the panel.
     pub error_stops: [Color32; 5],
 }
 
 impl Palette {
-    /// Dark.
+    /// Dark theme.
     pub const DARK: Self = Self {
         background: Color32::from_rgb(0x12, 0x14, 0x19),
         panel: Color32::from_rgb(0x1b, 0x1e, 0x24),
@@ -72,7 +72,7 @@ impl Palette {
         ],
     };
 
-    /// Light.
+    /// Light theme.
     pub const LIGHT: Self = Self {
         background: Color32::from_rgb(0xee, 0xf1, 0xf5),
         panel: Color32::from_rgb(0xff, 0xff, 0xff),
@@ -104,9 +104,9 @@ impl Palette {
 /// Type sizes in points.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TypeSizes {
-    /// Section heads in capitals, ticks.
+    /// Section headings in capitals, ticks.
     pub small: f32,
-    /// Hints, table heads.
+    /// Hints, table headings.
     pub note: f32,
     /// Everything else.
     pub body: f32,
@@ -114,7 +114,7 @@ pub struct TypeSizes {
     pub title: f32,
 }
 
-/// The four type sizes of the window.
+/// Returns the four type sizes of the window.
 pub const fn type_size() -> TypeSizes {
     TypeSizes {
         small: 11.0,
@@ -124,15 +124,15 @@ pub const fn type_size() -> TypeSizes {
     }
 }
 
-/// The unit of all distances, in points.
+/// Unit of all distances, in points.
 pub const SPACE: f32 = 4.0;
 
-/// `steps` units of distance, in points.
+/// Returns `steps` units of distance, in points.
 pub const fn space(steps: u8) -> f32 {
     SPACE * steps as f32
 }
 
-/// Corner radius of cards and controls, in points.
+/// Returns the corner radius of cards and controls, in points.
 pub const fn radius() -> u8 {
     6
 }

@@ -27,68 +27,68 @@ use crate::window::{
     test_view::{Frame, TargetCharts, TestSet, TestViewError},
 };
 
-/// Request of the window to the worker.
+/// Request from the window to the worker.
 #[derive(Debug)]
 pub enum Request {
-    /// Begin a training; one in progress is dropped.
+    /// Start a training; one in progress is discarded.
     Train(Box<Setup>),
-    /// Take up the training saved in this file and hold it; one in progress is dropped.
+    /// Load the training saved in this file and pause it; one in progress is discarded.
     Open(PathBuf),
-    /// Take up the training whose starts stand so, and hold it; one in progress is dropped.
+    /// Restore the training with these states of its starts and pause it; one in progress is discarded.
     TakeUp(Box<Setup>, Vec<TrainerState>),
-    /// Go on from the current weights with this method and this many epochs more.
+    /// Continue from the current weights with this method and this many additional epochs.
     Continue(TrainingSettings),
-    /// Step no further until told to resume.
+    /// Pause.
     Pause,
-    /// Go on.
+    /// Resume.
     Resume,
-    /// End the training; its network stays.
+    /// End the training and keep its network.
     Stop,
-    /// Look at this training, so long as no other has taken its place.
+    /// Inspect this training, unless another one has replaced it.
     Inspect(RunId, Inspection),
 }
 
-/// Message of the worker to the window.
+/// Message from the worker to the window.
 #[derive(Debug)]
 pub enum Event {
-    /// A training has begun, or why it cannot.
+    /// A training has begun, or an error.
     Began(Result<Box<Began>, TestViewError>),
-    /// A saved training stands where it was saved, or why it cannot.
+    /// A saved training has been restored, or an error.
     Opened(Result<Box<Began>, String>),
-    /// A training that was cancelled while it was prepared has not begun.
+    /// A training was cancelled during its preparation.
     Abandoned,
-    /// The training continues with these settings, or why it cannot.
+    /// The training continues with these settings, or an error.
     Continued(Result<Box<RunSettings>, String>),
-    /// Progress of reading a file before a training.
+    /// Progress of reading a recording before a training.
     Reading(Reading),
     /// Progress of the training.
     Progressed(Box<Progress>),
-    /// The current training has ended: what is to be kept of it, or why nothing can be.
+    /// The current training has ended: the network file to keep, or the reason why there is none.
     Finished(Result<Box<NetworkFile>, String>),
-    /// The thread has ended, and why, unless it was to end.
+    /// The thread has ended, with the reason unless it was asked to end.
     Died(Option<JobError>),
 }
 
-/// Takes what it needs from a training, or is informed why that is not there.
+/// Function called with a training, or with the reason why it is not available.
 pub struct Inspection(Box<Inspect>);
 
 type Inspect = dyn FnOnce(Result<&TrainedRun, &str>) + Send;
 
-/// A run of the worker, and where its samples come from if they are recorded.
+/// Run of the worker, with the origin of recorded samples.
 pub struct TrainedRun {
-    /// The run.
+    /// Run.
     pub run: Run,
     /// Origin of recorded samples; `None` for a simulated array.
     pub recorded: Option<Recorded>,
 }
 
 impl Inspection {
-    /// Runs `inspect` on the worker's thread.
+    /// Wraps `inspect`, which is called on the thread of the worker.
     pub fn new(inspect: impl FnOnce(Result<&TrainedRun, &str>) + Send + 'static) -> Self {
         Self(Box::new(inspect))
     }
 
-    /// Looks at `run`.
+    /// Calls the function with `run`.
     pub(super) fn inspect(self, run: Result<&TrainedRun, &str>) {
         (self.0)(run);
     }
@@ -100,28 +100,28 @@ impl fmt::Debug for Inspection {
     }
 }
 
-/// Tells trainings apart, also those of a worker that died.
+/// Identity of a training, unique also across workers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct RunId(u64);
 
 impl RunId {
-    /// That of no other training.
+    /// Returns a new, unique identity.
     pub fn new() -> Self {
         static BEGUN: AtomicU64 = AtomicU64::new(0);
         Self(BEGUN.fetch_add(1, Ordering::Relaxed))
     }
 }
 
-/// Facts known when a training begins.
+/// Data known when a training begins.
 #[derive(Debug)]
 pub struct Began {
     /// Its identity.
     pub id: RunId,
-    /// Setup asked for.
+    /// Requested setup.
     pub setup: Setup,
     /// Description of the readings and targets.
     pub problem: Arc<Problem>,
-    /// Weights and biases of the network.
+    /// Number of weights and biases of the network.
     pub weights: usize,
     /// The test set.
     pub test: TestSet,
@@ -132,22 +132,22 @@ pub struct Began {
 /// State of a training.
 #[derive(Debug)]
 pub struct Progress {
-    /// Epochs of the leader since the last report, or all where another start has taken the lead.
+    /// Epochs of the leading start since the last report, or all of them if another start has taken the lead.
     pub epochs: Vec<EpochRecord>,
-    /// The methods that the leader went through.
+    /// Methods of the leading start so far.
     pub stages: Vec<Stage>,
-    /// State of each start, where there are several; now and then only.
+    /// State of each start, if there are several; sent only occasionally.
     pub starts: Option<Vec<StartRecord>>,
     /// Networks of the epochs so far.
     pub past: PastNetworks,
     /// Result so far.
     pub result: RunResult,
-    /// Reason for which the training has ended, if it has.
+    /// Reason why the training has ended, if it has.
     pub stop_reason: Option<StopReason>,
 }
 
 impl Progress {
-    /// Takes the place of an older one that no one saw: its epochs, and how its starts stood, are not lost.
+    /// Merges in an older report that was not received, so that its epochs and the states of its starts are not lost.
     pub fn replace(&mut self, older: Self) {
         let newer = std::mem::replace(&mut self.epochs, older.epochs);
         append_epochs(&mut self.epochs, newer);
@@ -155,7 +155,7 @@ impl Progress {
     }
 }
 
-/// Adds newer epochs to a history, in the place of those that it had of another leader.
+/// Appends newer epochs to a history; replaces the history if it is that of another leading start.
 pub fn append_epochs(history: &mut Vec<EpochRecord>, newer: Vec<EpochRecord>) {
     if let Some(first) = newer.first() {
         history.retain(|record| record.epoch < first.epoch);
@@ -163,43 +163,43 @@ pub fn append_epochs(history: &mut Vec<EpochRecord>, newer: Vec<EpochRecord>) {
     history.extend(newer);
 }
 
-/// Result of the best network so far on the test set, and its cost.
+/// Result of the best network so far on the test set, with its cost.
 #[derive(Clone, Debug)]
 pub struct RunResult {
     /// Decoded values of the test set: samples × targets, in their units.
     pub answers: Arc<Array2<f64>>,
-    /// Charts over all test samples of a recording.
+    /// Charts of all test samples of a recording.
     pub charts: Option<Arc<TargetCharts>>,
-    /// Remarks on the errors of a recording, once the training is paused or has ended.
+    /// Remarks on the errors of a recording, when the training is paused or has ended.
     pub remarks: Vec<String>,
-    /// The snapshot that was displayed, and its surface: laid through the nodes here, so that the window need not.
+    /// Displayed snapshot and its surface, which is interpolated here to spare the window.
     pub frame: Option<(usize, Frame)>,
-    /// Their errors.
+    /// Errors of the decoded values.
     pub errors: TestErrors,
-    /// The epoch of the network.
+    /// Epoch of the network.
     pub best_epoch: usize,
-    /// Defect of its training, once that has ended.
+    /// Problem of the training, when it has ended.
     pub defect: Option<RunDefect>,
-    /// Epochs run by the start that is furthest.
+    /// Number of epochs of the start that is furthest ahead.
     pub epochs_run: usize,
     /// Number of starts that have ended.
     pub starts_ended: usize,
-    /// Time of the training by the clock, all starts side by side, if it is known.
+    /// Wall-clock time of the training, with all starts in parallel, if known.
     pub wall_time: Option<Duration>,
-    /// Time to decode one snapshot; measured when the training pauses or ends.
+    /// Decoding time of one snapshot, measured when the training pauses or ends.
     pub frame_time: Option<Duration>,
-    /// True once the training is paused or has ended.
+    /// True if the training is paused or has ended.
     pub is_idle: bool,
-    /// The networks.
+    /// Networks.
     pub networks: Arc<Networks>,
 }
 
-/// Gives `run` more epochs, counted from the start that is furthest. With the method it has, it continues as if they had
-/// been given from the beginning; another method, or one that had ended for another reason, starts from the current
-/// weights.
+/// Continues `run` for additional epochs, counted from the start that is furthest ahead. With the same method, the result is
+/// the same as if all epochs had been requested from the beginning; another method, or a training that ended for another
+/// reason, restarts from the current weights.
 ///
 /// # Errors
-/// A setting out of range, or networks too wide for the method; then nothing has changed.
+/// If a setting is out of range, or the networks are too wide for the method; the run is unchanged.
 pub fn continue_run(run: &mut Run, training: TrainingSettings) -> Result<(), RunError> {
     training.check().map_err(TrainingError::from)?;
     let stopping = StoppingRules {
@@ -217,28 +217,28 @@ pub fn continue_run(run: &mut Run, training: TrainingSettings) -> Result<(), Run
     Ok(())
 }
 
-/// The epoch of the start that is furthest.
+/// Returns the epoch of the start that is furthest ahead.
 pub fn furthest_epoch(run: &Run) -> usize {
     let epochs = run.trainers().iter().map(|trainer| trainer.latest().epoch);
     epochs.max().unwrap_or(0)
 }
 
-/// The window's end of the worker.
+/// Handle of the worker, used by the window.
 #[derive(Debug)]
 pub struct Worker {
     requests: Sender<Request>,
     job: Job<Event>,
-    /// Preparations of trainings asked for, and answered.
-    asked: Cell<u64>,
-    answered: Cell<u64>,
-    /// The last of those that are cancelled; those before are too.
+    /// Numbers of requested and finished preparations of trainings.
+    requested: Cell<u64>,
+    finished: Cell<u64>,
+    /// Number of the last cancelled preparation; all earlier ones are cancelled, too.
     cancelled: Arc<AtomicU64>,
-    /// The displayed snapshot.
+    /// Displayed snapshot.
     snapshot: Arc<AtomicUsize>,
 }
 
 impl Worker {
-    /// Starts the thread. `wake` is called after each event.
+    /// Starts the thread; `wake` is called after each event.
     pub fn start(wake: Wake) -> Self {
         let (requests, incoming) = channel();
         let cancelled = Arc::<AtomicU64>::default();
@@ -252,14 +252,14 @@ impl Worker {
         Self {
             requests,
             job,
-            asked: Cell::default(),
-            answered: Cell::default(),
+            requested: Cell::default(),
+            finished: Cell::default(),
             cancelled,
             snapshot,
         }
     }
 
-    /// A worker that is dying; `wake` is called when it has died.
+    /// Returns a worker whose thread panics; `wake` is called afterwards.
     #[cfg(test)]
     pub fn dying(wake: Wake) -> Self {
         let mut dead = Self::start(wake);
@@ -268,39 +268,39 @@ impl Worker {
         dead
     }
 
-    /// Asks for something. Stopping cancels a training that is being prepared, too. A worker that died is told by
-    /// [`Self::next_event`].
+    /// Sends a request. Stopping also cancels a training that is being prepared. If the worker has died,
+    /// [`Self::next_event`] reports it.
     pub fn ask(&self, request: Request) {
         match request {
-            Request::Train(_) | Request::Open(_) | Request::TakeUp(..) => self.asked.set(self.asked.get() + 1),
-            Request::Stop => self.cancelled.store(self.asked.get(), Ordering::Relaxed),
+            Request::Train(_) | Request::Open(_) | Request::TakeUp(..) => self.requested.set(self.requested.get() + 1),
+            Request::Stop => self.cancelled.store(self.requested.get(), Ordering::Relaxed),
             _ => {}
         }
-        // The other end is gone only if the worker died.
+        // The receiver is dropped only if the worker died.
         let _ = self.requests.send(request);
     }
 
-    /// Lays the surfaces of later results through the nodes of this snapshot.
+    /// Selects the snapshot whose surface is part of later results.
     pub fn watch(&self, snapshot: usize) {
         self.snapshot.store(snapshot, Ordering::Relaxed);
     }
 
     /// Returns true while a training is being prepared and not cancelled.
     pub fn is_preparing(&self) -> bool {
-        self.asked.get() > self.answered.get().max(self.cancelled.load(Ordering::Relaxed))
+        self.requested.get() > self.finished.get().max(self.cancelled.load(Ordering::Relaxed))
     }
 
-    /// The next event, if one has come.
+    /// Returns the next event, if one has arrived.
     pub fn next_event(&self) -> Option<Event> {
         loop {
             let event = self.job.next_event()?;
             if let Event::Began(_) | Event::Opened(_) | Event::Abandoned = event {
-                self.answered.set(self.answered.get() + 1);
+                self.finished.set(self.finished.get() + 1);
             }
-            let is_cancelled = self.answered.get() <= self.cancelled.load(Ordering::Relaxed);
+            let is_cancelled = self.finished.get() <= self.cancelled.load(Ordering::Relaxed);
             match event {
                 Event::Abandoned => {}
-                // What cannot begin is of no interest any more.
+                // Errors of a cancelled preparation are ignored.
                 Event::Began(Err(_)) | Event::Opened(Err(_)) if is_cancelled => {}
                 event => return Some(event),
             }
@@ -312,7 +312,7 @@ impl Worker {
 mod tests {
     use super::*;
 
-    /// Epochs of the start with this error.
+    /// Returns epochs of a start with this error.
     fn epochs(start: f64, numbers: std::ops::Range<usize>) -> Vec<EpochRecord> {
         let record = |epoch| EpochRecord {
             epoch,
@@ -328,7 +328,7 @@ mod tests {
     }
 
     #[test]
-    fn no_epoch_is_lost_where_progress_replaces_progress() {
+    fn no_epoch_is_lost_when_progress_is_replaced() {
         let [a, b] = [1.0, 2.0];
         let cases = [
             (
@@ -352,9 +352,9 @@ mod tests {
                 epochs(a, 7..12),
             ),
         ];
-        for (sentence, mut older, newer, expected) in cases {
+        for (case, mut older, newer, expected) in cases {
             append_epochs(&mut older, newer);
-            assert_eq!(older, expected, "{sentence}");
+            assert_eq!(older, expected, "{case}");
         }
     }
 }

@@ -1,5 +1,5 @@
-//! The worker: one named thread that trains and writes files about the training. Requests go in, events come out, and each
-//! event wakes the window.
+//! Training worker: one named thread that trains networks and writes their files. It receives requests and sends events;
+//! each event wakes the window.
 
 mod message;
 mod training_loop;

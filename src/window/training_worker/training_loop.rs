@@ -27,33 +27,33 @@ use decoupler_files::{
     import::{Progress, Setup, SetupSets},
 };
 
-/// The shortest time between two reports of a training. Each makes the window draw a frame, so this leaves time
-/// between them in which the user is answered at once, also where frames are drawn without a graphics card.
+/// Minimum time between two progress reports. Each makes the window draw a frame; the time in between keeps the window
+/// responsive, even if frames are drawn without a graphics card.
 const REPORT_INTERVAL: Duration = Duration::from_millis(100);
 
-/// The shortest time between two looks at all starts, each of which costs a decoupling of the test set.
+/// Minimum time between two evaluations of all starts, each of which decodes the test set.
 const STARTS_INTERVAL: Duration = Duration::from_millis(500);
 
-/// The thread's own state.
+/// State of the thread.
 pub(super) struct TrainingLoop<'a> {
     report: &'a Report<Event>,
-    /// The last preparation that is cancelled.
+    /// Number of the last cancelled preparation.
     cancelled: &'a AtomicU64,
-    /// The displayed snapshot.
+    /// Displayed snapshot.
     snapshot: &'a AtomicUsize,
-    /// Preparations so far.
+    /// Number of preparations so far.
     preparations: u64,
     run: Option<TrainedRun>,
-    /// Its test set, as it is drawn.
+    /// Its test set, ready to be drawn.
     test: Option<TestSet>,
     /// Networks of its past epochs.
     past: PastNetworks,
     /// Identity of the training `run`.
     id: Option<RunId>,
     is_paused: bool,
-    /// True once the window was told the result of the run that is to be kept.
+    /// True if the result of a finished run has been sent to the window.
     is_kept: bool,
-    /// The start last reported, and how many of its epochs.
+    /// Start of the last report, and its number of reported epochs.
     reported: (usize, usize),
     next_report: Instant,
     next_starts: Instant,
@@ -78,7 +78,7 @@ impl<'a> TrainingLoop<'a> {
         }
     }
 
-    /// Answers requests and trains until there is no window.
+    /// Handles requests and trains until the window is closed.
     pub(super) fn run(&mut self, requests: &Receiver<Request>) {
         while !self.report.is_cancelled() {
             let request = if self.is_training() {
@@ -125,7 +125,7 @@ impl<'a> TrainingLoop<'a> {
                 let prepared = self.prepare_setup(&setup, resume);
                 self.begin(prepared.map_err(|error| error.to_string()), true, Event::Opened);
             }
-            Request::Continue(training) => self.go_on(training),
+            Request::Continue(training) => self.continue_training(training),
             Request::Pause => {
                 self.is_paused = true;
                 self.report_progress();
@@ -140,13 +140,13 @@ impl<'a> TrainingLoop<'a> {
             Request::Inspect(id, inspection) => inspection.inspect(match &self.run {
                 Some(run) if self.id == Some(id) => Ok(run),
                 Some(_) => Err(REPLACED),
-                // The window offers no export before a training, so there was one.
+                // The window offers no export before the first training, so a training was lost.
                 None => Err(LOST),
             }),
         }
     }
 
-    /// Draws or reads the samples of `setup` and starts its networks; `None` once that is cancelled.
+    /// Draws or reads the samples of `setup` and initialises its networks; returns `None` if cancelled.
     fn prepare_setup(
         &self,
         setup: &Setup,
@@ -161,7 +161,7 @@ impl<'a> TrainingLoop<'a> {
         })
     }
 
-    /// Gets a run by `get`, which may be cancelled and reports how far a recording has been read; `None` once that is
+    /// Prepares a run with `get`, which can be cancelled and reports the progress of reading a recording; returns `None` if
     /// cancelled.
     fn prepare(
         &self,
@@ -175,7 +175,7 @@ impl<'a> TrainingLoop<'a> {
         Ok(trained.map(begun).transpose()?.filter(|_| !is_cancelled()))
     }
 
-    /// Puts a new run in the place of an older one, which stays, with its files, where the new one is impossible.
+    /// Replaces the current run by a new one; the current run and its files stay if the new one is invalid.
     fn begin<X>(
         &mut self,
         prepared: Result<Option<(TrainedRun, Box<Began>)>, X>,
@@ -188,7 +188,7 @@ impl<'a> TrainingLoop<'a> {
             Ok(None) => return self.report.send(Event::Abandoned),
             Err(error) => return self.report.send(event(Err(error))),
         };
-        // What had ended before it was saved was kept when it ended.
+        // A run that had ended before it was saved was kept when it ended.
         self.is_kept = trained.run.stop_reason().is_some();
         self.past = PastNetworks::default();
         self.past.record(&trained.run);
@@ -200,7 +200,7 @@ impl<'a> TrainingLoop<'a> {
         self.report_progress();
     }
 
-    fn go_on(&mut self, training: TrainingSettings) {
+    fn continue_training(&mut self, training: TrainingSettings) {
         let continued = match &mut self.run {
             Some(TrainedRun { run, .. }) => continue_run(run, training)
                 .map(|()| *run.settings())
@@ -249,7 +249,7 @@ impl<'a> TrainingLoop<'a> {
         let is_idle = self.is_paused || run.stop_reason().is_some();
         let starts = (has_several && (is_idle || begun >= self.next_starts)).then(|| run.starts());
         if starts.is_some() {
-            // At most a tenth of the time.
+            // Uses at most a tenth of the time.
             self.next_starts = Instant::now() + STARTS_INTERVAL.max(9 * (begun.elapsed() - cost));
         }
         let reported = match self.reported {
@@ -292,12 +292,12 @@ impl<'a> TrainingLoop<'a> {
             }
         });
         self.reported = (number, trainer.history().len());
-        // A large test set takes long to decouple; let it take at most a fifth of the time.
+        // Decoding a large test set takes long; it may use at most a fifth of the time.
         self.next_report = Instant::now() + REPORT_INTERVAL.max(4 * cost);
         self.report_finished();
     }
 
-    /// Remarks on these answers to the test samples of a recording.
+    /// Returns the remarks on the decoded test samples of a recording.
     fn remarks(&self, answers: &Array2<f64>, errors: &TestErrors) -> Vec<String> {
         let recorded = self
             .run
@@ -320,7 +320,7 @@ impl<'a> TrainingLoop<'a> {
         remarks
     }
 
-    /// Hands over, once, what is to be kept of a run that has ended.
+    /// Sends the result of a finished run, once.
     fn report_finished(&mut self) {
         let Some(trained) = self.run.as_ref().filter(|trained| trained.run.stop_reason().is_some()) else {
             return;
@@ -329,20 +329,20 @@ impl<'a> TrainingLoop<'a> {
             return;
         }
         let file = trained.network_file();
-        let sound = file.and_then(|file| file.defect().map_or(Ok(Box::new(file)), Err));
-        let finished = sound.map_err(|defect| format!("This training is not kept in the run list: {defect}"));
+        let checked = file.and_then(|file| file.defect().map_or(Ok(Box::new(file)), Err));
+        let finished = checked.map_err(|defect| format!("This training was not added to the run list: {defect}"));
         self.report.send(Event::Finished(finished));
     }
 }
 
-/// Message where the current training is not in the worker: only a worker that died lost it.
-pub const LOST: &str = "the network was lost when the training thread ended: train again";
+/// Message if the worker does not have the current training, which happens only after an earlier worker died.
+pub const LOST: &str = "the network was lost when the training thread ended; train again";
 
-/// Message where a file was asked for before another training began.
-const REPLACED: &str = "the file was not written, for another training has replaced the one to be saved; finished \
+/// Message if a file was requested before another training began.
+const REPLACED: &str = "the file was not written, because another training has replaced the one to be saved; finished \
                         trainings are in the run list of the Compare view";
 
-/// A run, and what the window is to know of it.
+/// Returns a run with the data that the window needs.
 fn begun(trained: TrainedRun) -> Result<(TrainedRun, Box<Began>), TestViewError> {
     let run = &trained.run;
     let plan = trained.recorded.as_ref().map(|recorded| recorded.plan.clone());
@@ -368,12 +368,12 @@ impl TrainedRun {
         }
     }
 
-    /// Takes the best network so far, with its record and errors.
+    /// Returns the best network so far, with its history and errors.
     pub fn network_file(&self) -> Result<NetworkFile, String> {
         NetworkFile::from_run(&self.run, self.recorded.as_ref()).map_err(|error| error.to_string())
     }
 
-    /// Takes the current state, to be resumed.
+    /// Returns the current state, to be resumed later.
     pub fn checkpoint_file(&self) -> Result<CheckpointFile, String> {
         CheckpointFile::from_run(&self.run, self.recorded.as_ref()).map_err(|error| error.to_string())
     }

@@ -1,6 +1,6 @@
-//! The few components that egui lacks, each reachable by its label.
+//! Components that egui lacks, each accessible by its label.
 //!
-//! Parts that all fields share: the reason for which typed text was not taken, and the menu of a value.
+//! Parts shared by all fields: the reason why typed text was refused, and the menu of a value.
 
 use eframe::egui::{
     self, Align, Button, CollapsingHeader, Color32, Context, DragValue, FontId, Frame, Id, Key, KeyboardShortcut,
@@ -13,13 +13,13 @@ use eframe::egui::{
 use super::fields::value_under;
 use crate::window::theme::{Theme, radius, semibold, space, type_size};
 
-/// Tooltip of an action with its shortcut: "Pauses the training (Ctrl+P).", with the Command key on macOS.
+/// Returns the tooltip of an action with its shortcut: "Pauses the training (Ctrl+P).", with the Command key on macOS.
 pub fn with_shortcut(ui: &Ui, text: &str, key: Key) -> String {
     let shortcut = KeyboardShortcut::new(Modifiers::COMMAND, key);
     format!("{text} ({}).", ui.ctx().format_shortcut(&shortcut))
 }
 
-/// The head of a section, in small capitals: "SENSOR ARRAY".
+/// Heading of a section, in small capitals: "SENSOR ARRAY".
 pub fn section_heading_ui(ui: &mut Ui, text: &str) -> Response {
     ui.add_space(space(2));
     let text = RichText::new(text.to_uppercase())
@@ -32,8 +32,7 @@ pub fn section_heading_ui(ui: &mut Ui, text: &str) -> Response {
     response
 }
 
-/// Contents that scroll up and down where they are higher than their place; the scroll bar has a strip of its own next to
-/// them.
+/// Shows contents that scroll vertically if they are higher than the available space; the scroll bar does not cover them.
 pub fn scrolled_ui(ui: &mut Ui, id: &str, contents: impl FnOnce(&mut Ui)) {
     let strip = Margin {
         right: 10,
@@ -47,7 +46,7 @@ pub fn scrolled_ui(ui: &mut Ui, id: &str, contents: impl FnOnce(&mut Ui)) {
     });
 }
 
-/// Scrolls what has just got the focus into sight.
+/// Scrolls a widget that has just received the focus into view.
 fn follow_focus(ui: &Ui) {
     let focused = ui.memory(|memory| memory.focused());
     let response = focused.and_then(|id| ui.ctx().read_response(id));
@@ -59,7 +58,7 @@ fn follow_focus(ui: &Ui) {
     }
 }
 
-/// A card on the background that fills `rect`.
+/// Shows a card that fills `rect`.
 pub fn card_ui(ui: &mut Ui, rect: Rect, contents: impl FnOnce(&mut Ui)) {
     let mut card = ui.new_child(UiBuilder::new().max_rect(rect).layout(Layout::top_down(Align::Min)));
     card.set_clip_rect(rect.intersect(ui.clip_rect()));
@@ -73,7 +72,7 @@ pub fn card_ui(ui: &mut Ui, rect: Rect, contents: impl FnOnce(&mut Ui)) {
     });
 }
 
-/// The one button that matters most.
+/// Primary button.
 #[must_use = "a button shows only where it is added"]
 pub struct PrimaryButton {
     text: String,
@@ -81,7 +80,7 @@ pub struct PrimaryButton {
 }
 
 impl PrimaryButton {
-    /// At least this large.
+    /// Sets the minimum size.
     pub fn min_size(mut self, min_size: Vec2) -> Self {
         self.min_size = min_size;
         self
@@ -96,7 +95,7 @@ impl Widget for PrimaryButton {
             widgets.inactive.weak_bg_fill = palette.accent;
             widgets.hovered.weak_bg_fill = palette.accent_hovered;
             widgets.active.weak_bg_fill = palette.accent_hovered;
-            // On the accent its own colour could not be seen.
+            // On the accent colour, a ring of the same colour would be invisible.
             widgets.active.bg_stroke.color = palette.text;
             let text = RichText::new(self.text)
                 .font(semibold(type_size().body))
@@ -107,7 +106,7 @@ impl Widget for PrimaryButton {
     }
 }
 
-/// The one button that matters most.
+/// Primary button.
 pub fn primary_button(text: impl Into<String>) -> PrimaryButton {
     PrimaryButton {
         text: text.into(),
@@ -115,12 +114,12 @@ pub fn primary_button(text: impl Into<String>) -> PrimaryButton {
     }
 }
 
-/// A button as high as [`primary_button`], in the colour of controls.
+/// Button as high as [`primary_button`], in the colour of controls.
 pub fn ghost_button(text: impl Into<WidgetText>) -> Button<'static> {
     Button::new(text.into()).min_size(vec2(0.0, space(7)))
 }
 
-/// A tinted note: something the user should weigh.
+/// Shows a tinted note, for a warning.
 pub fn note_ui(ui: &mut Ui, text: &str) -> Response {
     let palette = &Theme::of(ui).palette;
     Frame::new()
@@ -135,8 +134,8 @@ pub fn note_ui(ui: &mut Ui, text: &str) -> Response {
         .response
 }
 
-/// A row of options of which one is selected, filling the available width if `fill_width`. Returns the option the
-/// user has newly picked. `label` names the group for assistive technology; each option is found by its own text.
+/// Shows a row of options, one of them selected; it fills the available width if `fill_width`. Returns the option that the
+/// user has just selected. `label` names the group for assistive technology; each option is labelled with its own text.
 pub fn segmented_ui<T: Copy + PartialEq>(
     ui: &mut Ui,
     label: &str,
@@ -148,7 +147,7 @@ pub fn segmented_ui<T: Copy + PartialEq>(
     explained_options_ui(ui, label, &options, selected, fill_width)
 }
 
-/// As [`segmented_ui`], each option with its meaning, which shows under the pointer.
+/// As [`segmented_ui`], each option with a tooltip.
 pub fn explained_options_ui<T: Copy + PartialEq>(
     ui: &mut Ui,
     label: &str,
@@ -167,7 +166,7 @@ pub fn explained_options_ui<T: Copy + PartialEq>(
     let response = group
         .show(ui, |ui| {
             ui.spacing_mut().item_spacing.x = 0.0;
-            // Options are flat until the pointer is on them.
+            // Options are flat until the pointer is over them.
             ui.visuals_mut().widgets.inactive.weak_bg_fill = Color32::TRANSPARENT;
             ui.visuals_mut().widgets.inactive.fg_stroke.color = palette.dim;
             ui.horizontal(|ui| {
@@ -194,13 +193,13 @@ pub fn explained_options_ui<T: Copy + PartialEq>(
     picked
 }
 
-/// Tabs: the selected one is underlined. Returns the tab the user has newly picked.
+/// Shows tabs, with the selected one underlined. Returns the tab that the user has just selected.
 pub fn tabs_ui<T: Copy + PartialEq>(ui: &mut Ui, label: &str, tabs: &[(T, &str)], selected: T) -> Option<T> {
     let palette = Theme::of(ui).palette;
     let mut picked = None;
     let response = ui
         .horizontal(|ui| {
-            // As wide as when selected, so that no tab moves; nearer to each other where there is little room.
+            // As wide as when selected, so that no tab moves; closer to each other if there is little room.
             let width = |text: &str| {
                 let galley = ui
                     .painter()
@@ -250,7 +249,8 @@ pub fn tabs_ui<T: Copy + PartialEq>(ui: &mut Ui, label: &str, tabs: &[(T, &str)]
     picked
 }
 
-/// From left to right also where the layout runs from right to left, as at the right end of a title.
+/// Returns the options in the order of the layout, so that they read from left to right also in a right-to-left layout, as
+/// at the right end of a title.
 fn reading_order<'a, T>(ui: &Ui, options: &'a [T]) -> Vec<&'a T> {
     if ui.layout().prefer_right_to_left() {
         options.iter().rev().collect()
@@ -272,13 +272,13 @@ fn name_group(ui: &Ui, id: Id, label: &str) {
     });
 }
 
-/// Text of second rank, in the size of notes.
+/// Shows secondary text, in the size of notes.
 pub fn dim_ui(ui: &mut Ui, text: &str) -> Response {
     let dim = Theme::of(ui).palette.dim;
     ui.label(RichText::new(text).size(type_size().note).color(dim))
 }
 
-/// Shows a state behind a dot of its colour; what follows in the line keeps its distance.
+/// Shows a state after a dot of its colour, with a space to whatever follows in the line.
 pub fn state_ui(ui: &mut Ui, colour: Color32, text: &str) {
     ui.spacing_mut().item_spacing.x = space(4);
     let (dot, _) = ui.allocate_exact_size(Vec2::splat(space(2)), Sense::hover());
@@ -286,7 +286,7 @@ pub fn state_ui(ui: &mut Ui, colour: Color32, text: &str) {
     ui.label(RichText::new(text).size(type_size().note));
 }
 
-/// Shows the progress of work over the available width: `name` is the work, `text` is written into the bar.
+/// Shows a progress bar over the available width: `name` is the name of the work, `text` is shown inside the bar.
 pub fn progress_bar_ui(ui: &mut Ui, name: &str, share: f32, text: &str) -> Response {
     let palette = &Theme::of(ui).palette;
     let label = format!("{name}: {text}");
@@ -322,7 +322,7 @@ fn percent(share: f32) -> String {
     format!("{:.0} %", 100.0 * share.clamp(0.0, 1.0))
 }
 
-/// A sentence in the middle of an empty card: why there is nothing, and what to do.
+/// Shows a sentence in the middle of an empty card: the reason why it is empty, and what to do.
 pub fn placeholder_ui(ui: &mut Ui, text: &str) {
     let dim = Theme::of(ui).palette.dim;
     let text = RichText::new(text).color(dim);
@@ -335,8 +335,7 @@ pub fn placeholder_ui(ui: &mut Ui, text: &str) {
     });
 }
 
-/// A sentence in the middle of an empty card: what would be there, and the one click that brings it. Returns true if the
-/// user wants that.
+/// Shows a sentence in the middle of an empty card, and a button that fills it. Returns true if the button was clicked.
 pub fn invitation_ui(ui: &mut Ui, text: &str, button: &str, is_possible: bool) -> bool {
     let dim = Theme::of(ui).palette.dim;
     let width = ui.available_width().min(space(80));
@@ -351,13 +350,13 @@ pub fn invitation_ui(ui: &mut Ui, text: &str, button: &str, is_possible: bool) -
     invited.inner
 }
 
-/// A figure with its name, and its meaning under the pointer.
+/// Shows a figure with its name, and its meaning as a tooltip.
 pub fn fact_ui(ui: &mut Ui, name: &str, meaning: &str, value: &str) {
     let text = Theme::of(ui).palette.text;
     coloured_fact_ui(ui, name, meaning, value, text);
 }
 
-/// As [`fact_ui`], in a colour that means something.
+/// As [`fact_ui`], in a given colour.
 pub fn coloured_fact_ui(ui: &mut Ui, name: &str, meaning: &str, value: &str, colour: Color32) {
     let dim = Theme::of(ui).palette.dim;
     ui.horizontal(|ui| {
@@ -373,18 +372,18 @@ pub fn coloured_fact_ui(ui: &mut Ui, name: &str, meaning: &str, value: &str, col
     });
 }
 
-/// A place of the window that others point at.
+/// Place in the window that the tour points at.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Landmark {
-    /// The actual surface.
+    /// Actual surface.
     ActualSurface,
     /// Array scale, hidden nodes and method.
     Choices,
-    /// The button that begins a training.
+    /// Button that starts a training.
     Train,
-    /// The error table.
+    /// Error table.
     Errors,
-    /// The button of the Export menu.
+    /// Button of the Export menu.
     Export,
 }
 
@@ -393,7 +392,7 @@ impl Landmark {
         Id::unique(("landmark", self))
     }
 
-    /// Takes note of where the landmark is drawn in this frame.
+    /// Records where the landmark is drawn in this frame.
     pub fn stands_at(self, ui: &Ui, rect: Rect) {
         let seen = rect.intersect(ui.clip_rect());
         let frame = ui.ctx().cumulative_frame_nr();
@@ -407,7 +406,7 @@ impl Landmark {
     }
 }
 
-/// Rings what has the focus and shows it by nothing else.
+/// Draws a focus ring around a widget that does not show the focus otherwise.
 pub fn focus_ring_ui(ui: &Ui, response: &Response) {
     if response.has_focus() {
         let stroke = Stroke::new(1.0, Theme::of(ui).palette.accent);
@@ -417,16 +416,16 @@ pub fn focus_ring_ui(ui: &Ui, response: &Response) {
     }
 }
 
-/// A part of a form that is folded away until its name is clicked; `summary` tells next to the name the status of it.
-/// `contents` is added only while it is unfolded.
+/// Shows a collapsible section of a form, with a `summary` of its status next to its name. `contents` is added only while
+/// the section is open.
 pub fn fold_ui(ui: &mut Ui, name: &str, summary: &str, contents: impl FnOnce(&mut Ui)) {
     let dim = Theme::of(ui).palette.dim;
-    // What stands above may come and go without a change to the ids in here: who types in a field keeps it.
+    // Ids do not depend on the widgets above, so a field keeps the focus when those change.
     let scope = UiBuilder::new().scope_id(ui.scope_id().with(name));
     let header = ui
         .scope_builder(scope, |ui| {
             let visuals = ui.visuals_mut();
-            // The whole line can be clicked, and shows so under the pointer.
+            // The whole line can be clicked, and is highlighted under the pointer.
             visuals.collapsing_header_frame = true;
             visuals.widgets.inactive.weak_bg_fill = Color32::TRANSPARENT;
             let shown = CollapsingHeader::new(name).id_salt(name).show_unindented(ui, |ui| {
@@ -448,16 +447,16 @@ pub fn fold_ui(ui: &mut Ui, name: &str, summary: &str, contents: impl FnOnce(&mu
     place.min.x += space(7) + text_width.size().x + space(2);
     place.max.x -= space(1);
     let layout = Layout::right_to_left(Align::Center);
-    let mut beside = ui.new_child(UiBuilder::new().max_rect(place).layout(layout));
+    let mut summary_ui = ui.new_child(UiBuilder::new().max_rect(place).layout(layout));
     let text = RichText::new(summary).size(type_size().note).color(dim);
-    beside.add(Label::new(text).truncate().selectable(false));
+    summary_ui.add(Label::new(text).truncate().selectable(false));
 }
 
-/// Text that was typed and could not be taken, with the reason.
+/// Typed text that was refused, with the reason.
 #[derive(Clone, Debug, PartialEq)]
 struct Refusal {
     reason: String,
-    /// The value that stayed; the refusal goes when it changes.
+    /// Value that was kept; the refusal is cleared when it changes.
     kept: String,
 }
 
@@ -465,7 +464,8 @@ fn refusal_id(field: Id) -> Id {
     field.with("refusal")
 }
 
-/// Marks a field while what was `tried` last is refused; `value` is the text of its value.
+/// Marks a field while the last input is refused; `tried` is the result of an input in this frame, `value` the text of the
+/// value.
 pub(super) fn take_refusal(ui: &Ui, response: &Response, tried: Option<Result<(), String>>, value: &str) {
     let id = refusal_id(response.id);
     match tried {
@@ -494,7 +494,7 @@ pub(super) fn take_refusal(ui: &Ui, response: &Response, tried: Option<Result<()
     });
 }
 
-/// Shows below a field why the typed value was refused.
+/// Shows the reason why the typed value was refused, below the field.
 pub fn refusal_ui(ui: &mut Ui, field: &Response) {
     let refusal = ui.data(|data| data.get_temp::<Refusal>(refusal_id(field.id)));
     if let Some(refusal) = refusal {
@@ -503,7 +503,7 @@ pub fn refusal_ui(ui: &mut Ui, field: &Response) {
     }
 }
 
-/// Copies the value as `shown`, or sets the usual one, which has a text too.
+/// Shows a menu that copies the value as `shown`, or resets it to the `usual` value, given with its text.
 pub(super) fn menu_ui<T: Copy + PartialEq>(ui: &mut Ui, value: &mut T, shown: &str, usual: Option<(T, String)>) {
     if ui.button(format!("Copy {shown}")).clicked() {
         ui.ctx().copy_text(shown.to_owned());
@@ -517,12 +517,12 @@ pub(super) fn menu_ui<T: Copy + PartialEq>(ui: &mut Ui, value: &mut T, shown: &s
     }
 }
 
-/// The number of the snapshot or sample (`what`) displayed, to be typed or dragged too, and arrows to its neighbours; returns
-/// the one picked.
+/// Shows the number of the displayed snapshot or sample (`what`), which can be typed or dragged, with arrows to the previous
+/// and next one; returns a newly selected one.
 pub fn snapshot_ui(ui: &mut Ui, what: &str, shown: usize, snapshots: usize) -> Option<usize> {
     let mut picked = None;
     let title = format!("Test {what}");
-    // Right to left: next, number, previous.
+    // The layout is right to left: next, number, previous.
     let next = ui.add_enabled(shown + 1 < snapshots, arrow_button("›"));
     if name(next, format!("Next {what}"))
         .on_hover_text(format!("Next {what} of the test set (Page down)"))

@@ -1,10 +1,5 @@
-//! One row of the configuration: a name on the left, a value on the right.
-//!
-//! The one slider.
-//!
-//! The one field for values that are not numbers.
-//!
-//! The one field for numbers.
+//! Fields of the configuration, each a row with a name on the left and a value on the right: numbers with units, text,
+//! options, and sliders.
 
 use std::{cell::RefCell, fmt::Display, ops::RangeInclusive, str::FromStr};
 
@@ -22,8 +17,8 @@ use super::{
 };
 use crate::window::theme::{Theme, space};
 
-/// Lays out `name` and the widget made by `value_ui`; joins them for assistive technology and tests. Below it is why
-/// what was typed into it was not taken.
+/// Lays out `name` and the widget of `value_ui`, which `name` labels for assistive technology and tests. The reason for a
+/// refused input is shown below.
 pub fn field_ui(ui: &mut Ui, name: &str, hint: &str, value_ui: impl FnOnce(&mut Ui) -> Response) -> Response {
     let field = ui.horizontal(|ui| {
         let label = ui.label(name).on_hover_text(hint);
@@ -34,19 +29,19 @@ pub fn field_ui(ui: &mut Ui, name: &str, hint: &str, value_ui: impl FnOnce(&mut 
     field.inner
 }
 
-/// A whole number.
+/// Field for a whole number.
 pub fn count_ui(ui: &mut Ui, name: &str, hint: &str, value: &mut usize, limits: impl Into<Limits<usize>>) -> Response {
     let limits = limits.into();
     field_ui(ui, name, hint, |ui| number_ui(ui, value, &limits, "", FIELD_SIZE))
 }
 
-/// The number from which a random draw begins.
+/// Field for the seed of random numbers.
 pub fn seed_ui(ui: &mut Ui, name: &str, hint: &str, seed: &mut u64, usual: u64) -> Response {
     let limits = usually(usual, 0..=u64::MAX);
     field_ui(ui, name, hint, |ui| whole_ui(ui, seed, &limits, FIELD_SIZE))
 }
 
-/// A number with its unit; typing takes any notation, also 1e-3, and other units of the same kind.
+/// Field for a number with its unit; any notation, such as 1e-3, and other units of the same quantity can be typed.
 pub fn quantity_ui(
     ui: &mut Ui,
     name: &str,
@@ -59,7 +54,7 @@ pub fn quantity_ui(
     field_ui(ui, name, hint, |ui| number_ui(ui, value, &limits, unit, FIELD_SIZE))
 }
 
-/// A quantity kept as a share of one and shown in percent; `usual` is a share too.
+/// Field for a fraction of one shown in percent; `usual` is a fraction, too.
 pub fn percent_ui(
     ui: &mut Ui,
     name: &str,
@@ -75,17 +70,17 @@ pub fn percent_ui(
     }
 }
 
-/// A share of one in percent.
+/// Returns a fraction of one in percent.
 pub fn in_percent(share: f64) -> f64 {
     to_twelve_digits(100.0 * share)
 }
 
-/// 100 · 0.07 would show as 7.000000000000001, and 0.7 % would be another share than 0.007.
+/// Rounds to twelve digits: 100 · 0.07 would be shown as 7.000000000000001, and 0.7 % would differ from 0.007.
 fn to_twelve_digits(value: f64) -> f64 {
     format!("{value:.11e}").parse().unwrap_or(value)
 }
 
-/// One of a few options side by side, each with its meaning. Returns the one newly picked.
+/// Field for one of a few options side by side, each with a tooltip. Returns the one just selected.
 pub fn options_ui<T: Copy + PartialEq>(
     ui: &mut Ui,
     name: &str,
@@ -103,7 +98,7 @@ pub fn options_ui<T: Copy + PartialEq>(
     .inner
 }
 
-/// One of a list that opens, each with its meaning. Returns the one newly picked.
+/// Field for one option of a drop-down list, each with a tooltip. Returns the one just selected.
 pub fn list_ui<T: Copy + PartialEq>(
     ui: &mut Ui,
     name: &str,
@@ -130,8 +125,7 @@ pub fn list_ui<T: Copy + PartialEq>(
     picked
 }
 
-/// A slider `width` points wide. A double click asks for the usual value, which the caller sets where the response is
-/// double-clicked.
+/// Slider `width` points wide. On a double click, the caller should reset the value to its default.
 pub fn slider_ui(ui: &mut Ui, slider: Slider<'_>, width: f32) -> Response {
     ui.scope(|ui| {
         slider_style(ui);
@@ -143,7 +137,7 @@ pub fn slider_ui(ui: &mut Ui, slider: Slider<'_>, width: f32) -> Response {
     .inner
 }
 
-/// Makes the sliders of this `ui` look like ours: accent up to the handle, a ring as the handle.
+/// Styles the sliders of this `ui`: the accent colour up to the handle, a ring as the handle.
 fn slider_style(ui: &mut Ui) {
     let palette = Theme::of(ui).palette;
     let visuals = ui.visuals_mut();
@@ -162,8 +156,8 @@ fn slider_style(ui: &mut Ui) {
     }
 }
 
-/// A value as text, which counts when Enter is pressed or the field is left. What is none is refused: the old value stays,
-/// and the reason is shown below the field. A right click copies, or sets the `usual` value.
+/// Field for a value as text, which is applied when Enter is pressed or the field loses the focus. Invalid text is refused:
+/// the old value stays, and the reason is shown below the field. A right-click menu copies the value or resets it to `usual`.
 pub fn text_ui<T>(ui: &mut Ui, name: &str, hint: &str, value: &mut T, usual: T) -> Response
 where
     T: Copy + Display + FromStr<Err: Display> + PartialEq,
@@ -200,7 +194,7 @@ fn id() -> Id {
     Id::unique("value under the pointer")
 }
 
-/// Registers that `text` is the value shown in `rect`, so that a right click there can copy it.
+/// Registers `text` as the value shown in `rect`, so that a right click there can copy it.
 pub fn value_under(ui: &Ui, rect: Rect, text: &str) {
     if ui.input(|input| input.pointer.secondary_clicked()) && ui.rect_contains_pointer(rect) {
         ui.data_mut(|data| data.insert_temp(id(), text.to_owned()));
@@ -213,22 +207,22 @@ pub fn take_value_under(ctx: &Context) -> Option<String> {
 }
 
 fn claim_id() -> Id {
-    Id::unique("right click is answered")
+    Id::unique("right click is handled")
 }
 
-/// Registers that a widget answers a right click on it by a menu of its own.
+/// Registers that a widget has its own menu for right clicks.
 pub fn claim_right_click(ui: &Ui, widget: &Response) {
     if widget.secondary_clicked() {
         ui.data_mut(|data| data.insert_temp(claim_id(), true));
     }
 }
 
-/// Returns true if a widget answers the right click of this frame, once.
+/// Returns true, once, if a widget handles the right click of this frame.
 pub fn take_claim(ctx: &Context) -> bool {
     ctx.data_mut(|data| data.remove_temp(claim_id())).unwrap_or(false)
 }
 
-/// Numbers that a field takes.
+/// Range and default of a field.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Limits<N> {
     range: RangeInclusive<N>,
@@ -241,7 +235,7 @@ impl<N> From<RangeInclusive<N>> for Limits<N> {
     }
 }
 
-/// The range of a field that a double click sets back to its `usual` value.
+/// Returns the range of a field that a double click resets to its `usual` value.
 pub fn usually<N>(usual: N, range: RangeInclusive<N>) -> Limits<N> {
     Limits {
         range,
@@ -249,20 +243,20 @@ pub fn usually<N>(usual: N, range: RangeInclusive<N>) -> Limits<N> {
     }
 }
 
-/// A number with its unit, to be dragged or typed: "0.5 mm", "1e-3", "20%". What is not a number, out of `limits`, or of
-/// another unit is refused: the old value stays, and [`refusal_ui`] tells why. A double click sets the usual value; a right
-/// click copies.
+/// Field for a number with its unit, to be dragged or typed: "0.5 mm", "1e-3", "20%". Input that is not a number, is outside
+/// `limits` or has an incompatible unit is refused: the old value stays, and [`refusal_ui`] shows the reason. A double click
+/// resets the value; a right click copies it.
 pub fn number_ui<N: Numeric>(ui: &mut Ui, value: &mut N, limits: &Limits<N>, unit: &str, size: Vec2) -> Response {
     let shown = input_text(value.to_f64());
     typed_number_ui(ui, value, limits, (unit, &shown), size).0
 }
 
-/// As [`number_ui`] for a whole number all of whose digits count.
+/// As [`number_ui`], for a whole number with full 64-bit precision.
 pub fn whole_ui(ui: &mut Ui, value: &mut u64, limits: &Limits<u64>, size: Vec2) -> Response {
     let shown = value.to_string();
     let before = *value;
     let (mut response, typed) = typed_number_ui(ui, value, limits, ("", &shown), size);
-    // More digits than the field computes with.
+    // The number field computes with fewer digits.
     if let Some(exact) = typed.and_then(|typed| typed.trim().parse().ok())
         && limits.range.contains(&exact)
     {
@@ -274,7 +268,7 @@ pub fn whole_ui(ui: &mut Ui, value: &mut u64, limits: &Limits<u64>, size: Vec2) 
     response
 }
 
-/// Shows a field; `shown` is the text of its value. Returns what was typed and taken, too.
+/// Shows a field; `shown` is the text of its value. Also returns a typed text that was accepted.
 fn typed_number_ui<N: Numeric>(
     ui: &mut Ui,
     value: &mut N,
@@ -283,7 +277,7 @@ fn typed_number_ui<N: Numeric>(
     size: Vec2,
 ) -> (Response, Option<String>) {
     let range = limits.range.start().to_f64()..=limits.range.end().to_f64();
-    // Dragging moves a value by a hundredth of itself for each point, whole numbers by at least a step in ten points.
+    // Dragging changes a value by 1 % per point, a whole number by at least 1 per ten points.
     let speed = (0.01 * value.to_f64().abs()).max(if N::INTEGRAL { 0.1 } else { 1e-12 });
     let suffix = if unit.is_empty() {
         String::new()

@@ -1,4 +1,4 @@
-//! The few components that egui lacks. They know no view.
+//! Components that egui lacks, independent of the views.
 
 mod components;
 pub mod fields;

@@ -1,10 +1,10 @@
-//! Numbers with units as one types them: "0.5 mm", "20%", "120 kohm".
+//! Parser of typed numbers with units: "0.5 mm", "20%", "120 kohm".
 
 use std::ops::RangeInclusive;
 
 use super::fields::input_text;
 
-/// Units of a field and how many of its own each is. The first is its own.
+/// Returns the units accepted by a field of this unit, with their conversion factors to it. The first is the unit itself.
 fn units_of(unit: &str) -> &'static [(&'static str, f64)] {
     match unit {
         "mm" => &[
@@ -51,32 +51,32 @@ fn units_of(unit: &str) -> &'static [(&'static str, f64)] {
             ("s", 1e6),
         ],
         "Hz" => &[("Hz", 1.0), ("kHz", 1e3)],
-        // A share of one.
+        // A fraction of one.
         "" => &[("%", 0.01), ("‰", 1e-3)],
         _ => &[],
     }
 }
 
-/// Returns the number that `text` gives a field of this unit.
+/// Parses `text` for a field of this unit and returns the number in this unit.
 ///
 /// # Errors
-/// The reason why it gives none: no number, another unit, not whole where it `is_whole`, or out of the range.
+/// If it is not a number, has an incompatible unit, is not whole although `is_whole`, or is out of range.
 pub(super) fn parse(text: &str, unit: &str, range: &RangeInclusive<f64>, is_whole: bool) -> Result<f64, String> {
     let typed = text.trim().replace('−', "-");
-    let (number, rest) = split_number(&typed).ok_or_else(|| no_number(&typed, unit))?;
+    let (number, rest) = split_number(&typed).ok_or_else(|| not_a_number(&typed, unit))?;
     let factor = match rest {
         "" => 1.0,
         _ if is_whole && unit.is_empty() => return Err(format!("“{typed}” is not a number: type digits only.")),
         _ => factor_of(rest, unit)?,
     };
-    // The unit's own numbers are taken as they are, and rounding is not shown: 0.07 · 100 is 7.
+    // Numbers in the unit itself are not changed; converted ones are rounded: 0.07 · 100 is 7.
     let value = if factor == 1.0 {
         number
     } else {
         format!("{:.14e}", number * factor).parse().unwrap_or(number * factor)
     };
     if !value.is_finite() {
-        return Err(format!("“{typed}” is larger than any number that can be kept."));
+        return Err(format!("“{typed}” is too large to be stored."));
     }
     if is_whole && value.fract() != 0.0 {
         return Err(format!("“{typed}” is not a whole number."));
@@ -102,7 +102,7 @@ pub(super) fn parse(text: &str, unit: &str, range: &RangeInclusive<f64>, is_whol
     Ok(value)
 }
 
-/// The longest beginning that is a number, and what follows it.
+/// Returns the longest prefix that is a number, and the rest.
 fn split_number(text: &str) -> Option<(f64, &str)> {
     let is_of_number = |c: char| c.is_ascii_digit() || "+-.eE".contains(c);
     let longest = text.find(|c| !is_of_number(c)).unwrap_or(text.len());
@@ -112,19 +112,19 @@ fn split_number(text: &str) -> Option<(f64, &str)> {
     })
 }
 
-fn no_number(typed: &str, unit: &str) -> String {
+fn not_a_number(typed: &str, unit: &str) -> String {
     let example = match units_of(unit) {
         [(own, _), ..] if !unit.is_empty() => format!("0.5 {own}"),
         _ => "0.5 or 5e-1".to_owned(),
     };
     if typed.is_empty() {
-        format!("Nothing was typed: a number is needed, for instance {example}.")
+        format!("The field is empty: type a number, for instance {example}.")
     } else {
         format!("“{typed}” is not a number: type for instance {example}.")
     }
 }
 
-/// Returns how many of the field's own unit one of `named` is.
+/// Returns the conversion factor from the unit `named` to the unit of the field.
 fn factor_of(named: &str, unit: &str) -> Result<f64, String> {
     if named == unit && !unit.is_empty() {
         return Ok(1.0);
@@ -134,7 +134,7 @@ fn factor_of(named: &str, unit: &str) -> Result<f64, String> {
     if let Some((_, factor)) = exact {
         return Ok(*factor);
     }
-    // In other capitals, where all that it could be are the same.
+    // Ignoring case, if all matching units have the same factor.
     let alike: Vec<f64> = units
         .iter()
         .filter(|(name, _)| name.to_lowercase() == named.to_lowercase())
@@ -150,7 +150,7 @@ fn factor_of(named: &str, unit: &str) -> Result<f64, String> {
     }
     let mut names: Vec<&str> = Vec::new();
     for (name, factor) in units {
-        // Of spellings of one unit, the first.
+        // Of several spellings of a unit, the first.
         let is_new = !units
             .iter()
             .take_while(|(other, _)| other != name)
@@ -160,10 +160,13 @@ fn factor_of(named: &str, unit: &str) -> Result<f64, String> {
         }
     }
     Err(match &names[..] {
-        [] if unit.is_empty() => format!("“{named}” is no unit of this field: it has none."),
-        [] => format!("“{named}” is no unit of this field: it is in {unit}."),
-        [only] => format!("“{named}” is no unit of this field: type {only} or none."),
-        names => format!("“{named}” is no unit of this field: type {} or none.", names.join(", ")),
+        [] if unit.is_empty() => format!("“{named}” is not a unit of this field: it has no unit."),
+        [] => format!("“{named}” is not a unit of this field: it is in {unit}."),
+        [only] => format!("“{named}” is not a unit of this field: type {only} or none."),
+        names => format!(
+            "“{named}” is not a unit of this field: type {} or none.",
+            names.join(", ")
+        ),
     })
 }
 
@@ -174,7 +177,7 @@ mod tests {
     const ALL: RangeInclusive<f64> = f64::MIN..=f64::MAX;
 
     #[test]
-    fn numbers_are_taken_in_the_units_that_people_type() {
+    fn typed_numbers_and_units_are_parsed() {
         let cases = [
             ("0.5 mm", "mm", 0.5),
             ("0.5", "mm", 0.5),
@@ -209,13 +212,13 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_taken_has_a_reason_and_a_cure() {
+    fn refused_input_has_a_reason_and_a_cure() {
         let cases = [
             (
                 "",
                 "mm",
                 false,
-                "Nothing was typed: a number is needed, for instance 0.5 mm.",
+                "The field is empty: type a number, for instance 0.5 mm.",
             ),
             (
                 "thick",
@@ -225,16 +228,21 @@ mod tests {
             ),
             ("nan", "mm", false, "“nan” is not a number"),
             ("inf", "", false, "“inf” is not a number"),
-            ("1e999", "mm", false, "larger than any number"),
+            ("1e999", "mm", false, "is too large to be stored"),
             (
                 "5 kg",
                 "mm",
                 false,
-                "“kg” is no unit of this field: type mm, µm, nm, cm, m, in or none.",
+                "“kg” is not a unit of this field: type mm, µm, nm, cm, m, in or none.",
             ),
-            ("5 mm", "%", false, "“mm” is no unit of this field: type %, ‰ or none."),
-            // Milli or mega: which is meant cannot be told.
-            ("5 MOHM", "Ω", false, "“MOHM” is no unit of this field"),
+            (
+                "5 mm",
+                "%",
+                false,
+                "“mm” is not a unit of this field: type %, ‰ or none.",
+            ),
+            // Milli or mega: ambiguous.
+            ("5 MOHM", "Ω", false, "“MOHM” is not a unit of this field"),
             ("0,5 mm", "mm", false, "Write the decimals with a point"),
             ("1,000", "", true, "“1,000” is not a number: type digits only."),
             ("2.5", "", true, "“2.5” is not a whole number."),

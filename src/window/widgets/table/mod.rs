@@ -1,8 +1,8 @@
-//! The one table of the window: a head that stays in sight, names on the left, figures aligned on the right.
+//! Tables, with a header that stays visible, text aligned left and figures aligned right.
 //!
 //! A short table ([`TableView::show_all`]) is as high as its rows. A table of any number of rows ([`TableView::show`]) fills
-//! its place and scrolls under its head; only the rows in view are made and laid out. Where the columns are wider than
-//! their place, the type is smaller; where that is not enough, the table scrolls sideways and its first column stays in sight.
+//! the available space and scrolls under its header; only visible rows are created and laid out. If the columns are too wide,
+//! the font becomes smaller; if that is not enough, the table scrolls sideways and its first column stays visible.
 
 mod row;
 mod show;
@@ -18,24 +18,24 @@ const ROW_HEIGHT: f32 = space(6);
 /// Width of a column.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum ColumnWidth<'a> {
-    /// As wide as the widest of its cells: for tables of few rows, as the first [`row::MEASURED_ROWS`] are made for it.
+    /// As wide as the widest of its cells; for short tables, since it is measured on the first [`row::MEASURED_ROWS`].
     Content,
-    /// As wide as this text, the longest of its cells.
+    /// As wide as this text, which must be the longest of its cells.
     Fits(&'a str),
     /// This many points.
     Points(f32),
-    /// An equal share of what the other columns leave.
+    /// An equal share of the width that the other columns leave.
     Rest,
 }
 
 impl<'a> ColumnWidth<'a> {
-    /// As wide as the longest of `texts`; it may be a point or two narrower than the widest, which the gap takes.
+    /// Returns the width of the longest of `texts`; it may be a point or two narrower than the widest, which the gap absorbs.
     pub fn of_longest(texts: impl Iterator<Item = &'a str>) -> Self {
         Self::Fits(texts.max_by_key(|text| text.chars().count()).unwrap_or_default())
     }
 }
 
-/// A column: texts are aligned on the left, figures on the right.
+/// Column: text is aligned left, figures right.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TableColumn<'a> {
     heading: &'a str,
@@ -45,7 +45,7 @@ pub struct TableColumn<'a> {
 }
 
 impl<'a> TableColumn<'a> {
-    /// A column of texts, as wide as they are.
+    /// Returns a text column that fits its cells.
     pub const fn text(heading: &'a str) -> Self {
         Self {
             heading,
@@ -55,7 +55,7 @@ impl<'a> TableColumn<'a> {
         }
     }
 
-    /// A column of figures, as wide as they are. Assistive technology reads each cell with the name of its row and this
+    /// Returns a column of figures that fits its cells. Assistive technology reads each cell with the name of its row and this
     /// heading.
     pub const fn figure(heading: &'a str) -> Self {
         Self {
@@ -64,31 +64,31 @@ impl<'a> TableColumn<'a> {
         }
     }
 
-    /// With a tooltip at the heading: what the column shows, and its unit.
+    /// Sets the tooltip of the heading: the meaning of the column, and its unit.
     pub const fn meaning(self, meaning: &'a str) -> Self {
         Self { meaning, ..self }
     }
 
-    /// With this width.
+    /// Sets the width.
     pub const fn width(self, width: ColumnWidth<'a>) -> Self {
         Self { width, ..self }
     }
 }
 
-/// An action of the user on a table.
+/// User action on a table.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum TableClick {
-    /// Chose another order.
+    /// Sort order chosen.
     Sort(SortBy),
-    /// Selected the row in this place.
+    /// Row with this index selected.
     Select(usize),
-    /// Opened the row in this place by a double click.
+    /// Row with this index opened by a double click.
     Open(usize),
-    /// Points at the row in this place.
+    /// Pointer over the row with this index.
     Point(usize),
 }
 
-/// A table to be shown.
+/// Table widget.
 #[derive(Clone, Copy, Debug)]
 #[must_use = "a table is laid out by `show` or `show_all`"]
 pub struct TableView<'a> {
@@ -100,7 +100,7 @@ pub struct TableView<'a> {
 }
 
 impl<'a> TableView<'a> {
-    /// A table with these columns. `id` differs from that of every other table in the same place.
+    /// Returns a table with these columns. `id` must be unique among the tables of the same parent.
     pub const fn new(id: &'a str, columns: &'a [TableColumn<'a>]) -> Self {
         Self {
             id,
@@ -111,7 +111,7 @@ impl<'a> TableView<'a> {
         }
     }
 
-    /// With headings that sort, in this order now.
+    /// Makes the headings sort the table; `sort` is the current order.
     pub const fn sorted(self, sort: SortBy) -> Self {
         Self {
             sort: Some(sort),
@@ -119,7 +119,7 @@ impl<'a> TableView<'a> {
         }
     }
 
-    /// With rows that can be selected and opened.
+    /// Makes the rows selectable and openable.
     pub const fn clickable(self) -> Self {
         Self {
             is_clickable: true,
@@ -127,13 +127,13 @@ impl<'a> TableView<'a> {
         }
     }
 
-    /// With rows of this height in points, for cells with controls.
+    /// Sets the height of the rows in points, for cells with controls.
     pub const fn row_height(self, row_height: f32) -> Self {
         Self { row_height, ..self }
     }
 }
 
-/// Lays out the table that `table` describes, as wide as its place.
+/// Shows the table described by `table` over the available width.
 pub fn described_table_ui(ui: &mut eframe::egui::Ui, id: &str, table: &export::Table) {
     let titles: Vec<String> = table.columns.iter().map(export::TableColumn::title).collect();
     let described = table.columns.iter().zip(&titles).enumerate();

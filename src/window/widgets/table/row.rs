@@ -1,6 +1,4 @@
-//! Rows and cells of a table.
-//!
-//! Widths of the columns of a table.
+//! Rows and cells of a table, and the widths of its columns.
 
 use decoupler_files::export;
 use eframe::egui::{Color32, FontId, Ui};
@@ -11,13 +9,13 @@ use crate::window::{
     widgets::fields::capitalised,
 };
 
-/// A row, with one cell for each column; columns without a cell stay empty.
+/// Row with one cell per column; columns without a cell stay empty.
 #[derive(Default)]
 #[must_use = "a row shows only in a table"]
 pub struct TableRow<'a> {
-    /// Name in the labels of its figures; empty where these have none of their own.
+    /// Name in the labels of its figures; empty if the figures have no labels of their own.
     pub(super) name: String,
-    /// Label of the row as a whole; empty where it is none for assistive technology.
+    /// Label of the row as a whole for assistive technology; empty for none.
     pub(super) label: String,
     pub(super) meaning: &'a str,
     pub(super) is_selected: bool,
@@ -26,17 +24,17 @@ pub struct TableRow<'a> {
     pub(super) cells: Vec<TableCell<'a>>,
 }
 
-/// Adds the controls of a cell.
+/// Function that adds the controls of a cell.
 type Controls<'a> = Box<dyn FnOnce(&mut Ui) + 'a>;
 
-/// A cell of a table: a text, or controls.
+/// Table cell: a text, or controls.
 #[derive(Default)]
 #[must_use = "a cell shows only in a table"]
 pub struct TableCell<'a> {
     pub(super) text: String,
     /// Adds the controls of the cell in place of the text.
     pub(super) controls: Option<Controls<'a>>,
-    /// None for the colour of texts.
+    /// `None` for the default text colour.
     pub(super) colour: Option<Color32>,
     pub(super) is_strong: bool,
     pub(super) meaning: &'a str,
@@ -45,7 +43,7 @@ pub struct TableCell<'a> {
 }
 
 impl<'a> TableRow<'a> {
-    /// A row of these cells.
+    /// Returns a row of these cells.
     pub fn new(cells: impl IntoIterator<Item = TableCell<'a>>) -> Self {
         Self {
             cells: cells.into_iter().collect(),
@@ -53,7 +51,7 @@ impl<'a> TableRow<'a> {
         }
     }
 
-    /// A row of figures behind their name, which is shown with a capital.
+    /// Returns a row of figures after their name, which is capitalised.
     pub fn figures(name: impl Into<String>, figures: impl IntoIterator<Item = String>) -> Self {
         let name = name.into();
         let cells = std::iter::once(capitalised(&name)).chain(figures).map(TableCell::new);
@@ -64,7 +62,7 @@ impl<'a> TableRow<'a> {
         }
     }
 
-    /// A heading across all columns.
+    /// Returns a heading across all columns.
     pub fn section(title: impl Into<String>) -> Self {
         Self {
             is_section: true,
@@ -72,7 +70,7 @@ impl<'a> TableRow<'a> {
         }
     }
 
-    /// Returns the rows of a table that is described for every form: names in the first column, rounded figures after it.
+    /// Returns the rows of an exported table: names in the first column, followed by rounded figures.
     pub fn of_table(table: &export::Table) -> Vec<Self> {
         let row = |cells: &Vec<export::Cell>| {
             let mut texts = cells.iter().map(export::Cell::rounded);
@@ -81,7 +79,7 @@ impl<'a> TableRow<'a> {
         table.rows.iter().map(row).collect()
     }
 
-    /// With this name in the labels of its figures: `name, heading: figure`.
+    /// Sets the name in the labels of its figures: `name, heading: figure`.
     pub fn named(self, name: impl Into<String>) -> Self {
         Self {
             name: name.into(),
@@ -89,7 +87,7 @@ impl<'a> TableRow<'a> {
         }
     }
 
-    /// With a label for the row as a whole.
+    /// Sets the label of the row as a whole.
     pub fn labelled(self, label: impl Into<String>) -> Self {
         Self {
             label: label.into(),
@@ -97,29 +95,29 @@ impl<'a> TableRow<'a> {
         }
     }
 
-    /// With a tooltip.
+    /// Sets the tooltip.
     pub fn meaning(self, meaning: &'a str) -> Self {
         Self { meaning, ..self }
     }
 
-    /// Selected or not.
+    /// Sets the selection state.
     pub fn selected(self, is_selected: bool) -> Self {
         Self { is_selected, ..self }
     }
 
-    /// With all texts in this colour.
+    /// Sets the colour of all texts.
     pub fn colour(mut self, colour: Color32) -> Self {
         self.cells.iter_mut().for_each(|cell| cell.colour = Some(colour));
         self
     }
 
-    /// With all texts strong or not.
+    /// Makes all texts bold or not.
     pub fn strong(mut self, is_strong: bool) -> Self {
         self.cells.iter_mut().for_each(|cell| cell.is_strong = is_strong);
         self
     }
 
-    /// With a small warning mark behind the first text, which means this; empty for none.
+    /// Adds a small warning mark with this meaning after the first text; empty for none.
     pub fn mark(mut self, mark: &'a str) -> Self {
         if let Some(first) = self.cells.first_mut() {
             first.mark = mark;
@@ -127,13 +125,13 @@ impl<'a> TableRow<'a> {
         self
     }
 
-    /// With a cell of controls behind the others, added by `controls`.
+    /// Appends a cell with controls, added by `controls`.
     pub fn controls(mut self, controls: impl FnOnce(&mut Ui) + 'a) -> Self {
         self.cells.push(TableCell::controls(controls));
         self
     }
 
-    /// With a dot before the first text.
+    /// Adds a dot before the first text.
     pub fn dot(mut self, dot: impl Into<Option<Color32>>) -> Self {
         if let Some(first) = self.cells.first_mut() {
             first.dot = dot.into();
@@ -143,7 +141,7 @@ impl<'a> TableRow<'a> {
 }
 
 impl<'a> TableCell<'a> {
-    /// A text.
+    /// Returns a text cell.
     pub fn new(text: impl Into<String>) -> Self {
         Self {
             text: text.into(),
@@ -151,7 +149,7 @@ impl<'a> TableCell<'a> {
         }
     }
 
-    /// Controls, added by `controls` into the place of the cell.
+    /// Returns a cell with controls, added by `controls`.
     pub fn controls(controls: impl FnOnce(&mut Ui) + 'a) -> Self {
         Self {
             controls: Some(Box::new(controls)),
@@ -159,7 +157,7 @@ impl<'a> TableCell<'a> {
         }
     }
 
-    /// In this colour.
+    /// Sets the colour.
     pub fn colour(self, colour: Color32) -> Self {
         Self {
             colour: Some(colour),
@@ -167,12 +165,12 @@ impl<'a> TableCell<'a> {
         }
     }
 
-    /// Strong or not.
+    /// Makes the text bold or not.
     pub fn strong(self, is_strong: bool) -> Self {
         Self { is_strong, ..self }
     }
 
-    /// With a tooltip; empty for none.
+    /// Sets the tooltip; empty for none.
     pub fn meaning(self, meaning: &'a str) -> Self {
         Self { meaning, ..self }
     }
@@ -181,15 +179,15 @@ impl<'a> TableCell<'a> {
 /// Column by which the rows are sorted.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct SortBy {
-    /// Its place; none before the user chooses one.
+    /// Index of the column; `None` until the user chooses one.
     pub column: Option<usize>,
-    /// Largest first.
+    /// True for largest first.
     pub is_descending: bool,
 }
 
 impl SortBy {
-    /// Returns the rows in this order. `cell` gives the figure of a row in a column, if it has one, and a text: rows without
-    /// a figure come last, by their texts.
+    /// Returns the row indices in this order. `cell` returns the figure of a row in a column, if it has one, and a text; rows
+    /// without a figure come last, sorted by text.
     pub fn order<'a>(self, rows: usize, cell: impl Fn(usize, usize) -> (Option<f64>, &'a str)) -> Vec<usize> {
         let mut order: Vec<usize> = (0..rows).collect();
         let Some(column) = self.column else { return order };
@@ -210,28 +208,28 @@ impl SortBy {
     }
 }
 
-/// Rows that are measured for the width of a column.
+/// Number of rows measured for the width of a column.
 pub(super) const MEASURED_ROWS: usize = 100;
-/// Smallest gap between columns.
+/// Minimum gap between columns.
 const MIN_GAP: f32 = space(1);
-/// Smallest gap in type of the usual size.
+/// Minimum gap at the default font size.
 const READABLE_GAP: f32 = space(2);
-/// Gap between columns where one of them takes the rest.
+/// Gap between columns if one of them takes the remaining width.
 const USUAL_GAP: f32 = space(4);
-/// Largest gap in a table that fills its place.
+/// Maximum gap in a table that fills the available width.
 const MAX_GAP: f32 = space(8);
-/// Smallest width of a column that takes the rest.
+/// Minimum width of a column that takes the remaining width.
 const MIN_REST: f32 = space(24);
 /// Width of the arrow of a sorted column.
 const ARROW: f32 = space(2);
 /// Radius of the dot before a text.
 pub(super) const DOT: f32 = 3.0;
-/// Width of the dot with its distance from the text.
+/// Width of the dot and its distance from the text.
 pub(super) const DOT_WIDTH: f32 = space(3);
-/// Width of a mark with its distance from the text.
+/// Width of a mark and its distance from the text.
 pub(super) const MARK_WIDTH: f32 = space(4);
 
-/// Places of the columns in a line, in points from its left end, and the size of their type.
+/// Positions of the columns in a line, in points from its left end, and the font size.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Widths {
     pub size: f32,
@@ -247,19 +245,19 @@ pub(super) struct ColumnPlace {
     pub right: f32,
 }
 
-/// A request for widths.
+/// Input for the computation of column widths.
 pub(super) struct Request<'a> {
     pub columns: &'a [TableColumn<'a>],
     pub is_sortable: bool,
-    /// Room at both ends of a line.
+    /// Margin at both ends of a line.
     pub padding: f32,
     pub available: f32,
-    /// True for a table that fills its place, whose columns do not drift apart.
+    /// True for a table that fills the available width; limits the gaps between its columns.
     pub fills: bool,
 }
 
 impl Request<'_> {
-    /// Returns widths that fill the line where they can, in smaller type where there is less room.
+    /// Returns widths that fill the line if possible, with a smaller font if there is less room.
     pub(super) fn widths(&self, ui: &Ui, rows: &[TableRow<'_>]) -> Widths {
         let gaps = (self.columns.len().saturating_sub(1)) as f32;
         let total = |widths: &[f32], gap: f32| widths.iter().sum::<f32>() + gap * gaps + 2.0 * self.padding;
@@ -270,7 +268,7 @@ impl Request<'_> {
         );
         if total(&widths, min_gap) > self.available {
             let small = self.min_widths(ui, rows, type_size().small);
-            // A table that scrolls sideways needs no smaller type.
+            // A table that scrolls sideways needs no smaller font.
             if total(&small, MIN_GAP) <= self.available {
                 (widths, size, min_gap) = (small, type_size().small, MIN_GAP);
             }
@@ -306,7 +304,7 @@ impl Request<'_> {
         }
     }
 
-    /// Smallest widths of the columns.
+    /// Returns the minimum widths of the columns.
     fn min_widths(&self, ui: &Ui, rows: &[TableRow<'_>], size: f32) -> Vec<f32> {
         let width = |text: &str, font: FontId| {
             let galley = ui.painter().layout_no_wrap(text.to_owned(), font, Color32::WHITE);
@@ -337,7 +335,7 @@ impl Request<'_> {
     }
 }
 
-/// The font of a cell.
+/// Returns the font of a cell.
 pub(super) fn font(size: f32, is_strong: bool) -> FontId {
     if is_strong {
         semibold(size)

@@ -14,13 +14,13 @@ use crate::window::{
     widgets::{components::focus_ring_ui, fields::value_under},
 };
 
-/// Width of the strip of a scroll bar.
+/// Width of a scroll bar.
 const SCROLL_BAR: f32 = space(3);
-/// Largest share of the place that the first column keeps while the others scroll.
+/// Maximum fraction of the width that the first column keeps while the others scroll.
 const MAX_PINNED: f32 = 0.6;
 
 impl TableView<'_> {
-    /// Lays out all `rows`, as wide as their place and as high as they are.
+    /// Shows all `rows` over the available width, without vertical scrolling.
     pub fn show_all(self, ui: &mut Ui, rows: Vec<TableRow<'_>>) -> Option<TableClick> {
         let widths = self.request(ui.available_width(), false).widths(ui, &rows);
         let size = vec2(widths.total, self.row_height * (rows.len() + 1) as f32);
@@ -34,15 +34,15 @@ impl TableView<'_> {
         let scroll = ScrollArea::horizontal().id_salt(self.id).auto_shrink([false, true]);
         let scrolled = scroll.show_viewport(ui, |ui, viewport| {
             let (rect, _) = ui.allocate_exact_size(size, Sense::hover());
-            // All rows are laid out: the place around scrolls up and down.
+            // All rows are laid out; an enclosing area scrolls vertically.
             let view = Rect::from_x_y_ranges(viewport.translate(rect.min.to_vec2()).x_range(), rect.y_range());
             shown.lay_out(ui, rect.min, view, &mut make)
         });
         scrolled.inner
     }
 
-    /// Lays out a table of `rows` rows that fills the available space and scrolls where it is larger; `row` makes those in
-    /// view.
+    /// Shows a table of `rows` rows that fills the available space and scrolls if it is larger; `row` creates the visible
+    /// rows.
     pub fn show<'r>(self, ui: &mut Ui, rows: usize, row: impl Fn(usize) -> TableRow<'r>) -> Option<TableClick> {
         let is_measured = |column: &TableColumn<'_>| column.width == super::ColumnWidth::Content;
         let measured = if self.columns.iter().any(is_measured) {
@@ -54,7 +54,7 @@ impl TableView<'_> {
         let measured: Vec<TableRow<'_>> = (0..measured).map(&row).collect();
         let widths = self.request(available, true).widths(ui, &measured);
         let shown = Shown::new(&self, &widths, rows);
-        // The scroll bars have strips of their own.
+        // The scroll bars do not cover the contents.
         let below = if widths.total > available + 0.5 {
             SCROLL_BAR
         } else {
@@ -81,27 +81,27 @@ impl TableView<'_> {
     }
 }
 
-/// A table with its widths.
+/// Table with its column widths.
 struct Shown<'a> {
     table: &'a TableView<'a>,
     widths: &'a Widths,
     rows: usize,
 }
 
-/// TablePanes of the view that scroll apart from each other.
+/// Parts of the table that scroll separately.
 struct TablePanes {
-    /// Left end of the lines, scrolled.
+    /// Left end of the scrolled lines.
     left: f32,
-    /// Shift of the first column, which stays in sight.
+    /// Shift of the first column, which stays visible.
     pin: f32,
-    /// The head.
+    /// Header.
     head: Rect,
-    /// The part of the view to the right of the first column.
+    /// Part of the view to the right of the first column.
     columns: Rangef,
 }
 
 impl TablePanes {
-    /// The part of `line` that the column in this place may be seen in.
+    /// Returns the part of `line` in which the column with index `place` is visible.
     fn clip(&self, line: Rect, place: usize) -> Rect {
         if place == 0 || self.pin == 0.0 {
             line
@@ -110,7 +110,7 @@ impl TablePanes {
         }
     }
 
-    /// The place of a column in the line at this height.
+    /// Returns the rectangle of a column in the line with the vertical range `y`.
     fn rect(&self, column: &ColumnPlace, place: usize, left: f32, y: Rangef) -> Rect {
         let shift = self.left + if place == 0 { self.pin } else { 0.0 };
         Rect::from_x_y_ranges(shift + left..=shift + column.right, y)
@@ -122,7 +122,7 @@ impl<'a> Shown<'a> {
         Self { table, widths, rows }
     }
 
-    /// Lays out what is in `view`, the part in sight of a table whose upper left corner is at `origin`.
+    /// Lays out the contents of `view`, the visible part of a table whose upper left corner is at `origin`.
     fn lay_out<'r>(
         &self,
         ui: &mut Ui,
@@ -176,7 +176,7 @@ impl<'a> Shown<'a> {
         click
     }
 
-    /// Shows a heading. Returns the order that the user chose by it.
+    /// Shows a heading. Returns the sort order that the user chose with it.
     fn heading_ui(
         &self,
         ui: &Ui,
@@ -254,7 +254,7 @@ impl<'a> Shown<'a> {
             let builder = UiBuilder::new().max_rect(rect).layout(layout).id_salt(place);
             let mut cell_ui = ui.new_child(builder);
             cell_ui.set_clip_rect(parts.clip(body, place));
-            // A row that is a whole for assistive technology names itself.
+            // A row with a label of its own needs no label here.
             let label = match place {
                 1.. if column.is_figure && !row.name.is_empty() => {
                     format!("{}, {}: {}", row.name, column.heading, cell.text)
@@ -308,7 +308,7 @@ impl<'a> Shown<'a> {
         );
     }
 
-    /// Shows the ground of a row. Returns what the user did with the row.
+    /// Shows the background of a row. Returns the user action on the row.
     fn ground_ui(&self, ui: &Ui, parts: &TablePanes, place: usize, row: &TableRow<'_>) -> Option<TableClick> {
         let palette = Theme::of(ui).palette;
         let line = ui.max_rect();
@@ -346,7 +346,7 @@ impl<'a> Shown<'a> {
             return None;
         }
         if response.gained_focus() {
-            // Clear of the head, and of the first column.
+            // Not under the header or the first column.
             let room = vec2(0.0, parts.head.height());
             ui.scroll_to_rect(
                 Rect::from_center_size(line.center(), vec2(0.0, line.height()) + 2.0 * room),
@@ -363,7 +363,7 @@ impl<'a> Shown<'a> {
     }
 }
 
-/// Names what is painted in `rect`, with a tooltip; nothing for an empty label and tooltip.
+/// Adds a label and a tooltip for the contents of `rect`; does nothing if both are empty.
 fn label_ui(ui: &Ui, rect: Rect, id: Id, label: &str, meaning: &str) {
     if label.is_empty() && meaning.is_empty() {
         return;
@@ -382,13 +382,13 @@ fn label_ui(ui: &Ui, rect: Rect, id: Id, label: &str, meaning: &str) {
     }
 }
 
-/// A text that was painted.
+/// Painted text.
 struct Painted {
     rect: Rect,
     is_cut: bool,
 }
 
-/// Paints the text of a cell: a figure at the right and never cut, a text at the left as far as there is room.
+/// Paints the text of a cell: a figure is aligned right and never truncated; text is aligned left and truncated to fit.
 fn text_ui(ui: &Ui, rect: Rect, is_figure: bool, cell: &TableCell<'_>, size: f32) -> Painted {
     let colour = cell.colour.unwrap_or_else(|| Theme::of(ui).palette.text);
     let font = font(size, cell.is_strong);
@@ -397,7 +397,7 @@ fn text_ui(ui: &Ui, rect: Rect, is_figure: bool, cell: &TableCell<'_>, size: f32
         let rect = ui.painter().text(place, Align2::RIGHT_CENTER, &cell.text, font, colour);
         return Painted { rect, is_cut: false };
     }
-    // The width was measured from the same text, but places are rounded.
+    // The width was measured from the same text, but positions are rounded.
     let room = rect.width() + 0.5;
     let text = WidgetText::from(cell.text.as_str());
     let galley = text.into_galley(ui, Some(TextWrapMode::Truncate), room, font);
@@ -408,7 +408,7 @@ fn text_ui(ui: &Ui, rect: Rect, is_figure: bool, cell: &TableCell<'_>, size: f32
     Painted { rect: painted, is_cut }
 }
 
-/// A small triangle that points up, behind a text.
+/// Paints a small upward-pointing triangle after a text.
 fn mark_ui(ui: &Ui, text: Rect, meaning: &str) {
     let rect = Rect::from_center_size(
         pos2(text.right() + 0.5 * MARK_WIDTH + 1.0, text.center().y),

@@ -16,7 +16,7 @@ fn row(place: usize) -> TableRow<'static> {
 }
 
 #[test]
-fn only_the_rows_in_view_are_laid_out_and_the_head_stays() {
+fn only_visible_rows_are_laid_out_and_the_header_stays() {
     let made = Cell::new(0);
     let mut harness = Harness::builder()
         .with_size(vec2(400.0, 300.0))
@@ -49,7 +49,7 @@ fn only_the_rows_in_view_are_laid_out_and_the_head_stays() {
 }
 
 #[test]
-fn headings_sort_and_rows_are_marked_wherever_they_are_clicked() {
+fn headings_sort_and_rows_are_selected_by_a_click_anywhere() {
     let clicks = RefCell::new(Vec::new());
     let sort = Cell::new(SortBy::default());
     let mut harness = Harness::builder()
@@ -63,7 +63,7 @@ fn headings_sort_and_rows_are_marked_wherever_they_are_clicked() {
             if let Some(TableClick::Sort(by)) = click {
                 sort.set(by);
             }
-            // The pointer points at a row all the while.
+            // The pointer is over a row in every frame.
             let click = click.filter(|click| !matches!(click, TableClick::Point(_)));
             clicks.borrow_mut().extend(click);
         });
@@ -81,7 +81,7 @@ fn headings_sort_and_rows_are_marked_wherever_they_are_clicked() {
     assert_eq!(*clicks.borrow(), expected);
 }
 
-/// A table of one text and many figures, in a place of this width.
+/// Returns a table with one text column and many columns of figures, in this width.
 fn wide(width: f32, figures: usize) -> Harness<'static> {
     let headings: Vec<String> = (0..figures).map(|place| format!("figure {place}")).collect();
     let harness = Harness::builder()
@@ -111,7 +111,7 @@ fn scroll_sideways(harness: &mut Harness<'_>, label: &str, points: f32) {
 }
 
 #[test]
-fn the_first_column_stays_in_sight_when_the_others_scroll_sideways() {
+fn the_first_column_stays_visible_when_the_others_scroll_sideways() {
     let mut harness = wide(400.0, 12);
     harness.run();
     let place = |harness: &Harness<'_>, label: &str| harness.get_by_label(label).rect();
@@ -136,7 +136,7 @@ fn a_table_with_room_does_not_scroll() {
 }
 
 #[test]
-fn a_described_table_shows_all_its_rows_rounded_below_what_is_above_it() {
+fn a_described_table_shows_all_rows_rounded_below_the_widgets_above() {
     let table = export::Table {
         columns: vec![
             export::TableColumn::new("decoder", "Decoder", ""),
@@ -170,7 +170,7 @@ fn a_described_table_shows_all_its_rows_rounded_below_what_is_above_it() {
 }
 
 #[test]
-fn controls_in_a_cell_are_worked_in_their_row() {
+fn controls_in_a_cell_can_be_clicked() {
     const COLUMNS: [TableColumn<'_>; 2] = [
         TableColumn::text("name"),
         TableColumn::text("choice").width(ColumnWidth::Points(80.0)),
