@@ -164,14 +164,14 @@ fn a_broken_wire_is_named_left_out_and_forgotten_once_it_is_mended() {
 fn re_zero_takes_a_drift_away_and_its_gains_are_saved() {
     let folder = tempfile::tempdir().unwrap();
     let mut driver = open(folder.path());
-    driver.enter("Frames a second", "0.1");
+    driver.enter("Frames per second", "0.1");
     start(&mut driver);
     driver.click_button("Re-zero");
     driver.wait("the reason", |driver| {
         driver.says("Not re-zeroed: ") && driver.says("and 25 are needed")
     });
     driver.click("■ Stop");
-    driver.enter("Frames a second", "50");
+    driver.enter("Frames per second", "50");
     start(&mut driver);
     driver.click_button("Lift");
     pick(&mut driver, "Wire fault", "Gain drift");

@@ -34,7 +34,7 @@ use crate::window::{
     },
 };
 
-/// The decoupled surface, the actual one next to it where it is known, and the scale of their colours.
+/// Shows the decoupled surface, the actual one next to it if it is known, and their colour scale.
 pub fn surfaces_ui(ui: &mut Ui, rect: Rect, view: &mut LiveView, shared: &Shared, effects: &mut Vec<Effect>) {
     let Some(frame) = &view.shown.frame else { return };
     let figure = surface_figure(frame, view.node, shared.look);
@@ -66,7 +66,7 @@ pub fn surfaces_ui(ui: &mut Ui, rect: Rect, view: &mut LiveView, shared: &Shared
     view.node = node;
 }
 
-/// The surfaces of a frame with one scale.
+/// Returns the surfaces of a frame on a common scale.
 pub fn surface_figure(frame: &LiveFrame, marked_node: Option<usize>, look: Look) -> SurfaceFigure {
     let surface = |title: &str, heights: &Frame| Surface {
         title: title.to_owned(),
@@ -126,41 +126,41 @@ fn surface_ui(
     });
 }
 
-/// End of the colours of the readings: it follows the largest drop, in round steps and slowly downwards, so that colours
-/// mean the same for a while.
+/// Upper limit of the colour scale of the readings. It follows the largest drop in round steps and falls slowly, which
+/// keeps colours comparable from frame to frame.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct DropScale {
     peak_percent: f64,
     watched: Option<Watched>,
 }
 
-/// Smallest end of the colours, in percent.
+/// Minimum of the upper limit, in percent.
 const MIN_PERCENT: f64 = 0.5;
-/// Remainder of the peak after a frame.
+/// Decay of the peak per frame.
 const DECAY: f64 = 0.999;
 
 impl DropScale {
-    /// Takes a frame; wires at fault do not count.
+    /// Updates the limit with a frame; faulty wires do not count.
     pub fn take(&mut self, frame: &LiveFrame) {
         let wire = match &frame.watched {
             Watched::Named(diagnosis) => Some(diagnosis.wire),
             Watched::Off(_) | Watched::Normal | Watched::Unexplained => None,
         };
-        let is_sound = |row: usize, column: usize| {
+        let is_healthy = |row: usize, column: usize| {
             wire.is_none_or(|wire| !wire.is_row(frame.rows[row]) && !wire.columns().contains(&Some(column)))
         };
         let drops = frame.drops_percent.indexed_iter();
-        let drops = drops.filter(|((row, column), drop)| is_sound(*row, *column) && drop.is_finite());
+        let drops = drops.filter(|((row, column), drop)| is_healthy(*row, *column) && drop.is_finite());
         let largest = drops.map(|(_, &drop)| drop).fold(0.0, f64::max);
         if self.watched.as_ref() != Some(&frame.watched) {
-            // What a fault has made of the scale is forgotten.
+            // Discard the peak that a fault has caused.
             self.watched = Some(frame.watched.clone());
             self.peak_percent = 0.0;
         }
         self.peak_percent = largest.max(DECAY * self.peak_percent);
     }
 
-    /// The end of the colours in percent: 1, 2 or 5 times a power of ten.
+    /// Returns the upper limit in percent: 1, 2 or 5 times a power of ten.
     pub fn largest_percent(&self) -> f64 {
         let peak = self.peak_percent.max(MIN_PERCENT);
         let decade = 10_f64.powf(peak.log10().floor());
@@ -172,7 +172,7 @@ impl DropScale {
     }
 }
 
-/// The text of an empty view, and the one click that fills it.
+/// Shows the text of an empty view, and the button that starts decoding.
 pub fn invitation_ui(ui: &mut Ui, view: &mut LiveView, shared: &Shared, effects: &mut Vec<Effect>) {
     let palette = Theme::of(ui).palette;
     ui.vertical_centered(|ui| {
@@ -216,8 +216,8 @@ fn words(view: &LiveView, shared: &Shared) -> (String, String) {
             SourcePlan::Stream(source) => source.to_string(),
         };
         let text = match &counts.last_bad {
-            Some(reason) => format!("Lines that are no frame: {}. The last: {reason}.", counts.bad),
-            None => "It appears here as soon as it comes.".to_owned(),
+            Some(reason) => format!("Malformed lines: {}. Last: {reason}.", counts.bad),
+            None => "It appears here as soon as it arrives.".to_owned(),
         };
         return (format!("Waiting for the first frame from {source}"), text);
     }
@@ -238,14 +238,14 @@ fn words(view: &LiveView, shared: &Shared) -> (String, String) {
         ),
         _ => match view.obstacle(shared) {
             Some(obstacle) => obstacle,
-            None if view.has_sensor(shared) => format!("The network '{name}' decodes its frames as they come."),
-            None => format!("The network '{name}' decodes its samples as they come, by the names of their columns."),
+            None if view.has_sensor(shared) => format!("The network '{name}' decodes its frames as they arrive."),
+            None => format!("The network '{name}' decodes its samples as they arrive, by the names of their columns."),
         },
     };
     ("Decode live readings".to_owned(), text)
 }
 
-/// Readings of the frame as a map of rows and columns, or the gains of the unloaded state.
+/// Shows the readings of the frame as a map of rows and columns, or the gains of the unloaded state.
 pub fn readings_ui(ui: &mut Ui, view: &mut LiveView, colours: SequentialMap) {
     let Some(frame) = &view.shown.frame else { return };
     let gains = view.zero.as_ref().and_then(|zero| gains_of(zero, frame));
@@ -280,17 +280,17 @@ pub fn readings_ui(ui: &mut Ui, view: &mut LiveView, colours: SequentialMap) {
     cell.on_hover_text_at_pointer(format!("Row-wire {row}, column-wire {}\n{text}", column + 1));
 }
 
-/// The map of the readings of a frame.
+/// Returns the map of the readings of a frame.
 pub fn figure_of(frame: &LiveFrame, largest_percent: f64) -> HeatMap {
     readings_figure(frame.drops_percent.clone(), &frame.rows, largest_percent)
 }
 
-/// Gains in the shape of the frame.
+/// Returns the gains in the shape of the frame.
 fn gains_of(zero: &ZeroGains, frame: &LiveFrame) -> Option<Array2<f64>> {
     Array2::from_shape_vec(frame.drops_percent.dim(), zero.gains.clone()).ok()
 }
 
-/// Places of the rows and columns whose wires are at fault.
+/// Returns the rows and columns of the map whose wires are faulty.
 fn marked(frame: &LiveFrame) -> (Vec<usize>, Vec<usize>) {
     let Watched::Named(diagnosis) = &frame.watched else {
         return (Vec::new(), Vec::new());
@@ -303,11 +303,11 @@ fn marked(frame: &LiveFrame) -> (Vec<usize>, Vec<usize>) {
     (rows.collect(), columns.collect())
 }
 
-/// The fault of the simulated wires, as the user sets it up.
+/// Form of the fault of the simulated wires.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FaultForm {
     kind: Option<FaultKind>,
-    /// Row-wire or column-wire, from 1; the first of two that touch.
+    /// Row-wire or column-wire, from 1; the first of two shorted wires.
     wire: usize,
     /// Node before which a wire is broken, from 1.
     node: usize,
@@ -338,7 +338,7 @@ impl Default for FaultForm {
 }
 
 impl FaultForm {
-    /// The fault in an array of this scale; a wire that it does not have counts as its last.
+    /// Returns the fault in an array of this scale; the number of the wire is limited to that of the last wire.
     pub fn fault(&self, scale: ArrayScale) -> Option<Fault> {
         let last = self.kind?.wires(scale);
         let (wire, node) = (self.wire.clamp(1, last.max(1)) - 1, self.node.max(1) - 1);
@@ -365,7 +365,7 @@ impl FaultForm {
         })
     }
 
-    /// Shows the form for an array of this scale, of which these row-wires are read.
+    /// Shows the form for an array of this scale in which these row-wires are read.
     pub fn form_ui(&mut self, ui: &mut Ui, scale: ArrayScale, read: &[usize]) {
         let hint = "A fault of the simulated wires or electronics, which takes effect at once.";
         if let Some(kind) = list_ui(ui, "Wire fault", hint, &KINDS, self.kind) {
@@ -389,7 +389,7 @@ impl FaultForm {
             }
             FaultKind::Gain => {
                 let hint = "Error of the amplifier's gain, in percent: all readings of the column-wire are too large by \
-                            as much.";
+                            this much.";
                 quantity_ui(ui, "Gain error", hint, &mut self.gain_percent, -90.0..=1000.0, "%");
             }
             FaultKind::Saturated => {
@@ -403,11 +403,11 @@ impl FaultForm {
             FaultKind::ShortedRows | FaultKind::ShortedColumns => {}
         }
         if let Some(problem) = self.problem(scale, read) {
-            note_ui(ui, &format!("No such fault here: {problem}."));
+            note_ui(ui, &format!("This fault is not possible: {problem}."));
         }
     }
 
-    /// Reason for which the array cannot have this fault.
+    /// Returns the reason why the array cannot have this fault, if there is one.
     pub fn problem(&self, scale: ArrayScale, read: &[usize]) -> Option<String> {
         let checked = self.fault(scale)?.check(scale, read);
         checked.err().map(|error| error.to_string())
@@ -449,7 +449,7 @@ const KINDS: [(Option<FaultKind>, &str, &str); 7] = [
 ];
 
 impl FaultKind {
-    /// Number of wires that can have it.
+    /// Returns the number of wires that can have it.
     fn wires(self, scale: ArrayScale) -> usize {
         match self {
             Self::BrokenRow => scale.rows(),

@@ -17,7 +17,7 @@ use decoupler_core::{
 };
 use decoupler_files::export::{format_duration, format_number, format_percent};
 
-/// Confidence, faults, the stream, the unloaded state and the recording.
+/// Shows confidence, faults, the stream, the unloaded state and the recording.
 pub fn figures_ui(ui: &mut Ui, view: &mut LiveView, shared: &Shared, effects: &mut Vec<Effect>) {
     let Some(frame) = view.shown.frame.clone() else { return };
     warnings_ui(ui, &frame);
@@ -32,7 +32,7 @@ pub fn figures_ui(ui: &mut Ui, view: &mut LiveView, shared: &Shared, effects: &m
     ui.add_space(space(2));
 }
 
-/// Warnings, above everything else.
+/// Shows warnings, above everything else.
 fn warnings_ui(ui: &mut Ui, frame: &LiveFrame) {
     match &frame.watched {
         Watched::Named(diagnosis) => {
@@ -57,13 +57,13 @@ fn warnings_ui(ui: &mut Ui, frame: &LiveFrame) {
     }
 }
 
-/// Rate, latency and losses of the stream.
+/// Shows rate, latency and losses of the stream.
 pub fn stream_ui(ui: &mut Ui, view: &LiveView) {
     let counts = &view.shown.counts;
     let rate = if counts.is_waiting {
         "waiting".to_owned()
     } else {
-        format!("{:.0} frames a second", counts.frames_per_second)
+        format!("{:.0} frames per second", counts.frames_per_second)
     };
     fact_ui(ui, "Rate", "Frames per second (recent).", &rate);
     let latency = counts.latency.map_or_else(
@@ -79,9 +79,9 @@ pub fn stream_ui(ui: &mut Ui, view: &LiveView) {
         "Frames decoded since the start.",
         &counts.decoded.to_string(),
     );
-    let hint = "Frames (of a device: lines) that came faster than they could be decoded: the latest wins.";
+    let hint = "Frames (lines of a device) that were replaced by newer ones before they could be decoded.";
     fact_ui(ui, "Dropped", hint, &counts.dropped.to_string());
-    let hint = "Lines that were no frame, and frames without an answer.";
+    let hint = "Malformed lines, and frames that could not be decoded.";
     fact_ui(ui, "Bad", hint, &counts.bad.to_string());
     if let Some(reason) = &counts.last_bad {
         dim_ui(ui, &format!("Last: {reason}"));
@@ -96,7 +96,7 @@ fn confidence_ui(ui: &mut Ui, view: &LiveView, frame: &LiveFrame, shared: &Share
         residual += &format!(" ({} × noise)", format_number(frame.residual / noise));
     }
     let hint = format!(
-        "{}\n\nIt is as small as the noise of a reading if the answer explains everything.",
+        "{}\n\nIt is as small as the noise of a reading if the answer explains the readings.",
         glossary::RESIDUAL.hint
     );
     fact_ui(ui, "Residual of Eq. (2)", &hint, &residual);
@@ -115,12 +115,12 @@ fn confidence_ui(ui: &mut Ui, view: &LiveView, frame: &LiveFrame, shared: &Share
         Some(mm) => format!("{} mm", format_number(mm)),
         None => format_number(None),
     };
-    let hint = "Mean |error| of z over all nodes against the simulated truth, over the last frames.";
+    let hint = "Mean |error| of z over all nodes, compared with the simulated truth, over the latest frames.";
     fact_ui(ui, "Error", hint, &in_mm(errors.shown_mm));
     if let Some([by_all, left_out]) = errors.since_named_mm {
         let hint = "Mean |error| of z since the fault was named, by the network with all wires.";
         fact_ui(ui, "Error with all wires", hint, &in_mm(Some(by_all)));
-        let hint = "Mean |error| of z since the fault was named, without the wires at fault.";
+        let hint = "Mean |error| of z since the fault was named, without the faulty wires.";
         fact_ui(ui, "Error without the fault", hint, &in_mm(Some(left_out)));
     }
 }
@@ -152,7 +152,7 @@ fn zero_ui(ui: &mut Ui, view: &mut LiveView, effects: &mut Vec<Effect>) {
     let Some(zero) = view.zero.clone() else {
         dim_ui(
             ui,
-            "Readings are compared with the model at rest. Re-zero takes the array as it is now instead.",
+            "Readings are compared with the model at rest. Re-zero uses the current state of the array instead.",
         );
         return;
     };

@@ -1,7 +1,7 @@
-//! The Live view: frames of an array, or samples for a network of a recording, decoded as they come, from a simulated source,
-//! a file, a serial port or a socket.
+//! The Live view: frames of an array, or samples for a network of a recording, decoded as they arrive from a simulated
+//! source, a file, a serial port or a socket.
 //!
-//! `engine` decodes on a thread of its own; `state` starts it, takes its events and tells it what the user wants; the other
+//! `engine` decodes in the background; `state` starts it, takes its events and sends it the user's commands; the other
 //! files show the form on the left and the cards in the middle.
 
 mod cards;

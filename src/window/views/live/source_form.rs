@@ -30,7 +30,7 @@ use crate::window::{
     },
 };
 
-/// The source of the frames, as the user sets it up.
+/// Form of the source of the frames.
 #[derive(Debug)]
 pub struct SourceForm {
     /// Kind of source.
@@ -42,7 +42,7 @@ pub struct SourceForm {
     /// Recorded seconds per second.
     pub speed: f64,
     frames_per_second: f64,
-    /// Noise of a reading, if it is another than that of the network's scene.
+    /// Noise of a reading, if it differs from that of the network's scene.
     noise: Option<f64>,
     port: String,
     baud: usize,
@@ -63,10 +63,11 @@ pub enum SourceKind {
     Tcp,
 }
 
-/// Noise of a reading of a real source where the network's scene has none.
+/// Default noise of a reading of a real source if the network's scene has none.
 const USUAL_NOISE: f64 = 1e-3;
 
-/// The same of the simulated source: a network trained without noise amplifies more than this beyond recognition.
+/// Default noise of the simulated source if the network's scene has none: networks trained without noise amplify noise
+/// strongly.
 const SLIGHT_NOISE: f64 = 1e-5;
 
 impl Default for SourceForm {
@@ -87,7 +88,7 @@ impl Default for SourceForm {
 }
 
 impl SourceForm {
-    /// Noise of a reading, relative to it, for a network of these settings.
+    /// Returns the noise of a reading, relative to the reading, for a network with these settings.
     pub fn noise(&self, settings: &SimulatedSettings) -> f64 {
         let noise = settings.source.scene.noise.in_test();
         let of_scene = match self.kind {
@@ -98,10 +99,11 @@ impl SourceForm {
         self.noise.unwrap_or(of_scene)
     }
 
-    /// The source; that of a file begins at `at_s`. Asked in every frame, it asks no file system.
+    /// Returns the source; a replay begins at `at_s`. This is called in every frame and does not access the file
+    /// system.
     ///
     /// # Errors
-    /// If something is still to be filled in, with what to do.
+    /// If a field is empty or invalid, with what to do.
     pub fn plan(&self, fault: Option<Fault>, at_s: f64) -> Result<SourcePlan, String> {
         let filled = |text: &str, todo: &str| match text.trim() {
             "" => Err(todo.to_owned()),
@@ -149,8 +151,8 @@ impl SourceForm {
         true
     }
 
-    /// Shows the form; `settings` are those of the network, if one of an array is chosen, and `has_sensor` is false for one
-    /// of a recording. What begins with the source can be changed only while none is running.
+    /// Shows the form. `settings` are those of the chosen network if it is of an array; `has_sensor` is false for a
+    /// network of a recording. Only the motion of the indenter can be changed while a source is running.
     pub fn form_ui(
         &mut self,
         ui: &mut Ui,
@@ -172,13 +174,13 @@ impl SourceForm {
                 SourceKind::Simulated => {
                     let hint = "Rate at which the simulated array is read.";
                     let rate = &mut self.frames_per_second;
-                    quantity_ui(ui, "Frames a second", hint, rate, 0.1..=10_000.0, "Hz");
+                    quantity_ui(ui, "Frames per second", hint, rate, 0.1..=10_000.0, "Hz");
                 }
                 SourceKind::Replay => self.file_ui(ui, has_sensor, effects),
                 SourceKind::Serial => {
                     let hint = "Name of the port: /dev/ttyUSB0, /dev/ttyACM0, COM3.";
                     text_ui(ui, "Port", hint, &mut self.port);
-                    let hint = "Bits a second, as the device sends: 8 data bits, no parity, 1 stop bit.";
+                    let hint = "Bits per second, as set in the device: 8 data bits, no parity, 1 stop bit.";
                     count_ui(ui, "Baud", hint, &mut self.baud, 1..=100_000_000);
                     dim_ui(ui, if has_sensor { LINES } else { INPUT_LINES });
                 }
@@ -205,11 +207,11 @@ impl SourceForm {
         let Some(settings) = settings else { return };
         let hint = match self.kind {
             SourceKind::Simulated => {
-                "Noise of a simulated reading, relative to the reading (standard deviation). Faults are judged by it."
+                "Noise of a simulated reading, relative to the reading (standard deviation). Fault detection uses it."
             }
             _ => {
-                "Noise of a reading of your device, relative to the reading (standard deviation). Faults and contacts \
-                 are judged by it: too small a value finds faults that are none."
+                "Noise of a reading of your device, relative to the reading (standard deviation). Fault and contact \
+                 detection use it: too small a value causes false alarms."
             }
         };
         let before = self.noise(settings);
@@ -240,9 +242,9 @@ impl SourceForm {
         dim_ui(
             ui,
             if has_sensor {
-                "Frames without a column time_s come 50 times a second."
+                "Frames without a column time_s are replayed at 50 per second."
             } else {
-                "Samples come 50 times a second."
+                "Samples are replayed at 50 per second."
             },
         );
     }
@@ -262,13 +264,13 @@ fn text_ui(ui: &mut Ui, name: &str, hint: &str, text: &mut String) {
     ui.add(edit).labelled_by(label.id).on_hover_text(hint);
 }
 
-/// Network, source and fault.
+/// Shows the network, the source and the fault.
 pub fn form_ui(ui: &mut Ui, view: &mut LiveView, shared: &Shared, effects: &mut Vec<Effect>) {
     scrolled_ui(ui, "live form", |ui| {
         section_heading_ui(ui, "Network");
         let is_another = view.network.form_ui(ui, &shared.runs, effects);
         if is_another && view.running.is_some() {
-            view.start_again(shared);
+            view.restart(shared);
         }
         section_heading_ui(ui, "Source");
         let network = view.network.network(&shared.runs).map(|(_, file)| file.clone());
@@ -335,7 +337,7 @@ impl NetworkChoice {
         }
     }
 
-    /// The network chosen and its name; `None` if there is none.
+    /// Returns the chosen network and its name; `None` if there is none.
     pub fn network<'a>(&'a self, runs: &'a RunList) -> Option<(&'a str, &'a Arc<NetworkFile>)> {
         let run = match self.pick {
             NetworkPick::File => {
@@ -345,19 +347,19 @@ impl NetworkChoice {
             NetworkPick::Run(id) => runs.run(id),
             NetworkPick::Newest => None,
         };
-        // A run that was removed gives way to the newest.
+        // A run that was removed is replaced by the newest.
         let run = run.or(runs.workspace.runs.last())?;
         Some((&run.name, &run.file))
     }
 
-    /// Decodes with this network, which is of no run.
+    /// Decodes with this network, which does not belong to a run.
     pub fn take(&mut self, name: &str, file: Arc<NetworkFile>) {
         self.problem = None;
         self.file = Some((name.to_owned(), file));
         self.pick = NetworkPick::File;
     }
 
-    /// Takes the file that the user has opened; returns `true` once its network is there.
+    /// Takes the file that the user has opened; returns `true` once its network is loaded.
     pub fn take_events(&mut self) -> bool {
         if let Some(path) = self.chosen.as_ref().and_then(|chosen| chosen.try_recv().ok()) {
             self.chosen = None;
@@ -432,7 +434,7 @@ impl NetworkChoice {
     }
 }
 
-/// Array and rows of a network, and its error, each in a line.
+/// Describes a network in two lines: its array and rows, and its error.
 fn in_words(file: &NetworkFile) -> (String, String) {
     let rows = file
         .settings

@@ -20,24 +20,24 @@ use crate::window::{
     shared::{Effect, Matter, Notice, Shared},
 };
 
-/// Reason for which a network of a recording has no simulated source.
+/// Reason why a network of a recording has no simulated source.
 const NOTHING_TO_SIMULATE: &str = "A network of a recording decodes a file, a serial port or a TCP address: there is no sensor \
                                    model to simulate. Choose one of them as the source.";
 
 /// The Live view.
 #[derive(Debug)]
 pub struct LiveView {
-    /// The latest frame, with the status of decoding; it stays in view after the end.
+    /// The latest frame, with the status of decoding; it stays on the screen after the end.
     pub shown: LiveShown,
     /// Decoding under way. It is dropped before the job, which then ends at once.
     pub running: Option<Running>,
     /// Gains of the unloaded state by which readings are divided.
     pub zero: Option<ZeroGains>,
-    /// Reason for which there are none.
+    /// Reason why there are none.
     pub zero_problem: Option<String>,
     /// File of the recording under way.
     pub recording: Option<PathBuf>,
-    /// The last recording that is whole.
+    /// The last finished recording.
     pub recorded: Option<Recorded>,
     pub(super) network: NetworkChoice,
     pub(super) sample: Sample,
@@ -48,7 +48,7 @@ pub struct LiveView {
     pub(super) shows_zero: bool,
     /// The node under the pointer, marked on both surfaces.
     pub(super) node: Option<usize>,
-    /// True if the window has a frame that the thread does not know to be drawn.
+    /// True if the window has received a frame and not yet reported to the thread that it was drawn.
     is_to_be_drawn: bool,
     job: Job<LiveEvent>,
 }
@@ -64,7 +64,7 @@ pub struct Running {
 }
 
 impl LiveView {
-    /// Nothing decoded yet. `wake` is called when there are events.
+    /// Creates the view without frames; `wake` is called when there are events.
     pub fn new(wake: Wake) -> Self {
         Self {
             shown: LiveShown::default(),
@@ -85,10 +85,10 @@ impl LiveView {
         }
     }
 
-    /// The plan of decoding as it is set up now.
+    /// Returns the plan for the current settings.
     ///
     /// # Errors
-    /// If there is no network, or something is to be filled in; with what to do.
+    /// If there is no network or a setting is missing, with what to do.
     fn plan(&self, shared: &Shared, at_s: f64) -> Result<(String, LivePlan), String> {
         let (name, network) = self
             .network
@@ -134,7 +134,7 @@ impl LiveView {
         network.is_none_or(|(_, file)| file.settings.source.simulation().is_some())
     }
 
-    /// Reason for which decoding cannot begin, with what to do.
+    /// Returns the reason why decoding cannot begin, with what to do.
     pub(super) fn obstacle(&self, shared: &Shared) -> Option<String> {
         self.plan(shared, 0.0).err()
     }
@@ -149,12 +149,12 @@ impl LiveView {
         self.begin(network, plan);
     }
 
-    /// Lays out the sample recording and its network, to be played as soon as they are there.
+    /// Writes the sample recording and its network to files, to be played as soon as they are ready.
     pub(super) fn ask_for_sample(&mut self, shared: &Shared) {
-        self.sample.lay_out(folder(shared).join("samples"));
+        self.sample.write(folder(shared).join("samples"));
     }
 
-    /// Plays the sample once it is there.
+    /// Plays the sample once it is ready.
     pub(super) fn take_sample(&mut self, shared: &Shared, effects: &mut Vec<Effect>) {
         match self.sample.next() {
             Some(Ok(sample)) => {
@@ -168,8 +168,8 @@ impl LiveView {
         }
     }
 
-    /// Continues with the network that is chosen now, from the present place of a replay.
-    pub(super) fn start_again(&mut self, shared: &Shared) {
+    /// Restarts with the network that is chosen now, from the current position of a replay.
+    pub(super) fn restart(&mut self, shared: &Shared) {
         let replay = self.shown.replay;
         let Ok((network, mut plan)) = self.plan(shared, replay.map_or(0.0, |replay| replay.at_s)) else {
             return;
@@ -202,33 +202,33 @@ impl LiveView {
         );
     }
 
-    /// Ends decoding; what was shown last stays.
+    /// Stops decoding; the last frame stays on the screen.
     pub(super) fn stop(&mut self) {
-        // The thread ends once no one commands it.
+        // The thread ends once the sender of its commands is dropped.
         self.running = None;
     }
 
-    /// Tells the thread, if it runs.
+    /// Sends a command to the thread, if it is running.
     pub(super) fn command(&self, command: Command) {
         if let Some(running) = &self.running {
-            // A thread that has just ended has nothing to change.
+            // A thread that has just ended ignores commands.
             let _ = running.commands.send(command);
         }
     }
 
-    /// Asks for the unloaded state in the latest frames.
+    /// Takes the latest frames as the unloaded state.
     pub(super) fn re_zero(&mut self) {
         self.zero_problem = None;
         self.command(Command::Zero);
     }
 
-    /// Divides readings by no gains any more.
+    /// Stops dividing readings by gains.
     pub(super) fn clear_zero(&mut self) {
         (self.zero, self.zero_problem, self.shows_zero) = (None, None, false);
         self.command(Command::UseZero(None));
     }
 
-    /// Returns true if the frames that come can be recorded.
+    /// Returns true if incoming frames can be recorded.
     pub(super) fn can_record(&self) -> bool {
         let is_replay = |running: &Running| matches!(running.source, SourcePlan::Replay { .. });
         // Frames of an array are recorded; samples of other sensors have columns of their own.
@@ -253,16 +253,16 @@ impl LiveView {
         }
     }
 
-    /// The recording of a thread that is heard no more.
+    /// Keeps the recording of a thread that has ended without reporting it.
     fn keep_recording(&mut self) {
         let Some(path) = self.recording.take() else { return };
         let (frames, seconds) = self.shown.recording.unwrap_or_default();
         self.recorded = Some(Recorded { path, frames, seconds });
     }
 
-    /// Takes what the thread has to report.
+    /// Takes the events of the thread.
     pub(super) fn follow(&mut self, effects: &mut Vec<Effect>) {
-        let mut tell = |notice| effects.push(Effect::Tell(Matter::Live, notice));
+        let mut notify = |notice| effects.push(Effect::Tell(Matter::Live, notice));
         while let Some(event) = self.job.next_event() {
             match event {
                 LiveEvent::Source(source) => {
@@ -280,19 +280,19 @@ impl LiveView {
                 LiveEvent::Zeroed(Ok(gains)) => (self.zero, self.zero_problem) = (Some(gains), None),
                 LiveEvent::Zeroed(Err(reason)) => self.zero_problem = Some(reason),
                 LiveEvent::Recording(path) => self.recording = Some(path),
-                LiveEvent::NotRecorded(reason) => tell(Notice::Failed(reason)),
+                LiveEvent::NotRecorded(reason) => notify(Notice::Failed(reason)),
                 LiveEvent::Recorded(recorded, reason) => {
                     (self.recording, self.recorded) = (None, Some(recorded));
                     if let Some(reason) = reason {
-                        tell(Notice::Failed(reason));
+                        notify(Notice::Failed(reason));
                     }
                 }
                 LiveEvent::Ended(end) => {
                     let running = self.running.take();
                     self.keep_recording();
                     match end {
-                        Err(reason) => tell(Notice::Failed(reason)),
-                        Ok(()) if running.is_some() => tell(Notice::Done("The source has ended.".to_owned())),
+                        Err(reason) => notify(Notice::Failed(reason)),
+                        Ok(()) if running.is_some() => notify(Notice::Done("The source has ended.".to_owned())),
                         Ok(()) => {}
                     }
                 }
@@ -300,18 +300,18 @@ impl LiveView {
         }
     }
 
-    /// The frame is on the screen: the thread may show the next.
-    pub(super) fn tell_drawn(&mut self) {
+    /// Reports that the frame was drawn, so that the thread may send the next one.
+    pub(super) fn report_drawn(&mut self) {
         if std::mem::take(&mut self.is_to_be_drawn) {
             self.command(Command::Drawn);
         }
     }
 }
 
-/// The folder for files of this view: next to the runs, or for this session.
+/// Returns the folder for files of this view: next to the runs, or a temporary one.
 fn folder(shared: &Shared) -> PathBuf {
-    let beside = shared.runs.path.as_ref().and_then(|runs| runs.parent());
-    beside.map_or_else(std::env::temp_dir, PathBuf::from)
+    let parent = shared.runs.path.as_ref().and_then(|runs| runs.parent());
+    parent.map_or_else(std::env::temp_dir, PathBuf::from)
 }
 
 const NETWORK: (&str, &str) = (
@@ -323,15 +323,15 @@ const RECORDING: (&str, &str) = (
     include_str!("../../../../assets/samples/recording.csv"),
 );
 
-/// The sample recording, laid out as a file next to the user's own, and the network that decodes it.
+/// The sample recording, written to a file next to the user's recordings, and the network that decodes it.
 #[derive(Debug)]
 pub struct Sample {
-    job: Job<Result<Laid, String>>,
+    job: Job<Result<SampleFiles, String>>,
 }
 
 /// The sample on the disk.
 #[derive(Debug)]
-pub struct Laid {
+pub struct SampleFiles {
     /// The recording.
     pub recording: PathBuf,
     /// Name of the network.
@@ -341,28 +341,28 @@ pub struct Laid {
 }
 
 impl Sample {
-    /// Nothing laid out yet. `wake` is called when it is.
+    /// Creates a sample that is not written yet; `wake` is called when it is.
     pub(super) fn new(wake: Wake) -> Self {
         Self {
             job: Job::prompt("sample", wake),
         }
     }
 
-    /// Lays the sample out in `folder`.
-    pub(super) fn lay_out(&mut self, folder: PathBuf) {
+    /// Writes the sample to `folder`.
+    pub(super) fn write(&mut self, folder: PathBuf) {
         self.job.start(
-            move |_| lay_out(&folder),
-            |laid| laid.unwrap_or_else(|error| Err(error.to_string())),
+            move |_| write(&folder),
+            |files| files.unwrap_or_else(|error| Err(error.to_string())),
         );
     }
 
-    /// Returns the sample once it is laid out, or the reason why it cannot be.
-    pub(super) fn next(&mut self) -> Option<Result<Laid, String>> {
+    /// Returns the sample once it is written, or the reason why it cannot be.
+    pub(super) fn next(&mut self) -> Option<Result<SampleFiles, String>> {
         self.job.next_event()
     }
 }
 
-fn lay_out(folder: &Path) -> Result<Laid, String> {
+fn write(folder: &Path) -> Result<SampleFiles, String> {
     let refused = |error: &dyn std::fmt::Display| format!("the sample cannot be written: {error}");
     fs::create_dir_all(folder).map_err(|error| refused(&error))?;
     let write = |(name, text): (&str, &str)| {
@@ -372,7 +372,7 @@ fn lay_out(folder: &Path) -> Result<Laid, String> {
     };
     let (network, recording) = (write(NETWORK)?, write(RECORDING)?);
     let network = NetworkFile::load(&network).map_err(|error| error.to_string())?;
-    Ok(Laid {
+    Ok(SampleFiles {
         recording,
         name: NETWORK.0,
         network: Box::new(network),

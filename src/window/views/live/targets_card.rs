@@ -19,8 +19,8 @@ use decoupler_files::{
     },
 };
 
-/// Targets of a recording as they are decoded: their surface if they have positions, their values over time, the latest
-/// values, and the stream.
+/// Shows the targets of a recording as they are decoded: their surface if they have positions, their values over time,
+/// the latest values, and the stream.
 pub fn targets_ui(ui: &mut Ui, whole: Rect, view: &mut LiveView, shared: &Shared, effects: &mut Vec<Effect>) {
     let Some(targets) = view.shown.targets.clone() else {
         return;
@@ -56,12 +56,12 @@ pub fn targets_ui(ui: &mut Ui, whole: Rect, view: &mut LiveView, shared: &Shared
     });
 }
 
-/// Values of all targets over time.
+/// Returns the chart of the values of all targets over time.
 pub fn chart(targets: &LiveTargets) -> PlotFigure {
     targets_over_time_figure(&targets.problem.targets, &targets.history)
 }
 
-/// The surface through the latest values; `None` if the targets have no positions.
+/// Returns the surface through the latest values; `None` if the targets have no positions.
 pub fn surface_figure(targets: &LiveTargets, marked_node: Option<usize>, look: Look) -> Option<SurfaceFigure> {
     let through = targets.surface.as_ref()?;
     let values = targets.values();

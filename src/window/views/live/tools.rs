@@ -1,4 +1,4 @@
-//! Files of the Live view, as the user is asked for them.
+//! The toolbar, the replay bar, the actions, the exports and the files of the Live view.
 
 use std::{
     fs::File,
@@ -30,7 +30,7 @@ use crate::window::{
     widgets::{dim_ui, ghost_button, primary_button, slider_ui, with_shortcut},
 };
 
-/// The buttons that run the source, from right to left.
+/// Shows the buttons that control the source, from right to left.
 pub fn tools_ui(ui: &mut Ui, view: &mut LiveView, shared: &Shared, effects: &mut Vec<Effect>) {
     let is_running = view.running.is_some();
     let stop = ui.add_enabled(is_running, ghost_button("■ Stop"));
@@ -86,7 +86,7 @@ fn record_ui(ui: &mut Ui, view: &LiveView) {
     if button
         .on_hover_text(with_shortcut(
             ui,
-            "Writes every frame with its time to a file of its own, as it arrives",
+            "Writes every frame with its time to a new file, as it arrives",
             Key::R,
         ))
         .on_disabled_hover_text(why_not)
@@ -96,7 +96,7 @@ fn record_ui(ui: &mut Ui, view: &LiveView) {
     }
 }
 
-/// Offers what can be done with the source.
+/// Offers the actions on the source.
 pub fn offer_actions(view: &mut LiveView, offers: &mut Offers<'_>, shared: &Shared, effects: &mut Vec<Effect>) {
     let is_running = view.running.is_some();
     let can_start = !is_running && view.obstacle(shared).is_none();
@@ -119,10 +119,10 @@ pub fn offer_actions(view: &mut LiveView, offers: &mut Offers<'_>, shared: &Shar
     }
 }
 
-/// Height of the bar, in points.
+/// Height of the replay bar, in points.
 pub const REPLAY_BAR_HEIGHT: f32 = space(12);
 
-/// The place in the recording, and the speed.
+/// Shows the position in the recording and the speed.
 pub fn replay_bar_ui(ui: &mut Ui, view: &mut LiveView) {
     let Some(replay) = view.shown.replay else { return };
     let is_running = view.running.is_some();
@@ -177,7 +177,7 @@ fn speed_ui(ui: &mut Ui, view: &mut LiveView) {
     dim_ui(ui, "Speed");
 }
 
-/// The pictures of the latest frame, the recording and the unloaded state.
+/// Returns the exports: pictures of the latest frame, the recording and the unloaded state.
 pub fn live_exports<'a>(view: &'a LiveView, shared: &'a Shared) -> Vec<Export<'a>> {
     if let Some(targets) = &view.shown.targets {
         return target_exports(targets, shared);
@@ -202,7 +202,7 @@ pub fn live_exports<'a>(view: &'a LiveView, shared: &'a Shared) -> Vec<Export<'a
             "Unloaded state",
             "JSON",
             zero,
-            "There is none: press Re-zero while a source runs.",
+            "There is no unloaded state yet: press Re-zero while a source runs.",
         ),
     ];
     picture_exports("Surface", "live-surface".to_owned(), surfaces)
@@ -217,7 +217,7 @@ const VALUES: FileWords = FileWords {
     extensions: &["csv"],
 };
 
-/// The displayed values of a network of a recording.
+/// Returns the exports of the displayed values of a network of a recording.
 fn target_exports<'a>(targets: &'a LiveTargets, shared: &'a Shared) -> Vec<Export<'a>> {
     let chart = Ok(move || Figure::from(targets_card::chart(targets)));
     let mut exports: Vec<Export<'a>> = picture_exports("Decoded values", "live-values".to_owned(), chart).collect();
@@ -282,7 +282,7 @@ const ZERO: FileWords = FileWords {
     extensions: &["json"],
 };
 
-/// Words of a file about frames.
+/// A file that the user opens in the Live view.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LiveFile {
     /// A network to decode with.
@@ -292,7 +292,7 @@ pub enum LiveFile {
 }
 
 impl LiveFile {
-    /// Name of its button.
+    /// Returns the label of its button.
     pub fn button(self) -> &'static str {
         match self {
             Self::Network => "Open network file…",
@@ -300,7 +300,7 @@ impl LiveFile {
         }
     }
 
-    /// Words that describe it.
+    /// Returns its description.
     pub fn words(self) -> FileWords {
         match self {
             Self::Network => NETWORK,
@@ -308,7 +308,7 @@ impl LiveFile {
         }
     }
 
-    /// Asks for its path, which `chosen` is told.
+    /// Asks for its path, which is sent to `chosen`.
     pub fn choose(self, chosen: Sender<PathBuf>) -> FileTask {
         let suggestion = match self {
             Self::Network => "network.json",
@@ -326,7 +326,7 @@ impl LiveFile {
 pub fn save_recording(recorded: &Recorded) -> FileTask {
     let from = recorded.path.clone();
     let write = move |path: &Path| -> Result<(), WriteError> {
-        // The copy may be asked for where the recording itself is.
+        // The chosen path may be that of the recording itself.
         let is_same = path
             .canonicalize()
             .ok()

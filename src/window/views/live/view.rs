@@ -24,7 +24,7 @@ impl View for LiveView {
     fn take_events(&mut self, shared: &Shared, effects: &mut Vec<Effect>) {
         self.follow(effects);
         if self.network.take_events() && self.running.is_some() {
-            self.start_again(shared);
+            self.restart(shared);
         }
         self.source.take_events();
         self.take_sample(shared, effects);
@@ -61,7 +61,7 @@ impl View for LiveView {
 
     fn body_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) {
         live_ui(ui, self, shared, effects);
-        self.tell_drawn();
+        self.report_drawn();
     }
 
     fn status_ui(&self, ui: &mut Ui, _shared: &Shared) {
@@ -69,7 +69,7 @@ impl View for LiveView {
     }
 }
 
-/// Surfaces above, readings and figures below, and where a recording is replayed its bar at the bottom.
+/// Shows the surfaces above, readings and figures below, and the replay bar at the bottom.
 fn live_ui(ui: &mut Ui, view: &mut LiveView, shared: &Shared, effects: &mut Vec<Effect>) {
     let whole = ui.available_rect_before_wrap();
     if !view.shown.has_answer() {
@@ -137,7 +137,7 @@ fn status_ui(ui: &mut Ui, view: &LiveView) {
             };
             dim(ui, format!("{}, {source}", running.network));
             if counts.decoded > 0 {
-                dim(ui, format!("{:.0} frames a second", counts.frames_per_second));
+                dim(ui, format!("{:.0} frames per second", counts.frames_per_second));
             }
         }
         if let Some((frames, seconds)) = view.shown.recording.filter(|_| view.recording.is_some()) {

@@ -18,7 +18,7 @@ use decoupler_core::{
 use decoupler_files::export::NetworkFile;
 
 /// Decodes frames of one sensor: divides them by the gains of the unloaded state, decodes them with the network or
-/// without the wires at fault, and compares with the truth where it is known.
+/// without the faulty wires, and compares them with the truth if it is known.
 #[derive(Debug)]
 pub(super) struct Decoding {
     network: Arc<NetworkFile>,
@@ -37,7 +37,7 @@ pub(super) struct Decoding {
     /// Its answer: rows × 3·M2.
     answer_mm: Vec<f64>,
     by_all_mm: Vec<f64>,
-    /// Sums of the errors since a fault was named, with all wires and without those at fault, and their number.
+    /// Sums of the errors since a fault was named, with all wires and without the faulty ones, and their number.
     since_named: ([f64; 2], u64),
 }
 
@@ -45,7 +45,7 @@ impl Decoding {
     /// Prepares to decode frames with the noise of `scene`.
     ///
     /// # Errors
-    /// A sensor or scene that has no frames, with the reason.
+    /// If the sensor or the scene is invalid, with the reason.
     pub(super) fn new(network: Arc<NetworkFile>, scene: &Scene, zero: Option<ZeroGains>) -> Result<Self, String> {
         let settings = network
             .settings
@@ -91,16 +91,16 @@ impl Decoding {
         })
     }
 
-    /// Number of readings of a frame: rows × M4.
+    /// Returns the number of readings of a frame: rows × M4.
     pub(super) fn readings(&self) -> usize {
         self.rest_ohm.len()
     }
 
-    /// Decodes a frame of readings in ohm, all finite and above 0. Returns the mean |error| of z in millimetres where the
+    /// Decodes a frame of readings in ohm, all finite and above 0. Returns the mean |error| of z in millimetres if the
     /// true deformation is given.
     ///
     /// # Errors
-    /// If the network has no answer to it.
+    /// If the network cannot decode it.
     pub(super) fn decode(
         &mut self,
         readings_ohm: &[f64],
@@ -157,7 +157,7 @@ impl Decoding {
         sum / (self.rows.len() * nodes) as f64
     }
 
-    /// Errors where the truth is known; `shown_mm` are those of late.
+    /// Returns the errors if the truth is known; `shown_mm` is the recent mean error.
     pub(super) fn truth_errors(&self, shown_mm: Option<f64>) -> TruthErrors {
         let (sums, count) = self.since_named;
         let is_named = matches!(self.watch.state(), Watched::Named(_));
@@ -167,7 +167,7 @@ impl Decoding {
         }
     }
 
-    /// The unloaded state in the latest frames; readings are divided by it from now on.
+    /// Takes the unloaded state from the latest frames, and divides readings by its gains from now on.
     pub(super) fn take_zero(&mut self) -> Result<ZeroGains, String> {
         let gains = self.re_zero.gains().map_err(|error| error.to_string())?;
         self.zero = Some(gains.clone());
@@ -180,13 +180,13 @@ impl Decoding {
         self.zero = zero.filter(|zero| zero.is_sound(self.rows.len(), columns));
     }
 
-    /// The decoded nodes and the surface through them.
+    /// Returns the decoded nodes and the surface through them.
     pub(super) fn decoupled(&self) -> Frame {
         let nodes_mm = self.answer_mm.chunks_exact(3).map(DVec3::from_slice).collect();
         self.frame(nodes_mm)
     }
 
-    /// The nodes of a deformation and the surface through them.
+    /// Returns the nodes of a deformation and the surface through them.
     pub(super) fn actual(&self, truth: &Deformation) -> Frame {
         let nodes_mm = self.rows.iter().flat_map(|&row| {
             let of_row = truth.row_mm(row).iter().enumerate();
@@ -203,7 +203,7 @@ impl Decoding {
         }
     }
 
-    /// Drop of each reading of the last frame from its value without load, in percent: rows × M4.
+    /// Returns the drop of each reading of the last frame from its value without load, in percent: rows × M4.
     pub(super) fn drops_percent(&self) -> Array2<f64> {
         let columns = self.sensor.scale.columns();
         Array2::from_shape_fn((self.rows.len(), columns), |(row, column)| {
@@ -212,8 +212,8 @@ impl Decoding {
         })
     }
 
-    /// Root mean square of m/R − 1 over the readings m of the last frame that are not left out, with R from Eq. (2) at its
-    /// answer; infinite if the model has no resistance there.
+    /// Returns the root mean square of m/R − 1 over the readings m of the last frame that are not left out, with R from
+    /// Eq. (2) at its answer; infinite if the model has no resistance there.
     pub(super) fn residual(&self) -> f64 {
         let scale = self.sensor.scale;
         let (mut sum, mut count) = (0.0, 0);
@@ -237,8 +237,8 @@ impl Decoding {
         (sum / f64::from(count.max(1))).sqrt()
     }
 
-    /// Readings, without those left out, and coordinates of the last frame outside the range seen in training; `None` where
-    /// that is not known.
+    /// Returns the number of readings, except those left out, and of coordinates of the last frame outside the range
+    /// seen in training; `None` if that is not known.
     pub(super) fn outside(&self) -> (Option<usize>, usize) {
         let mut outside = (Some(0), 0);
         for (index, (ohm, mm)) in self.lines().enumerate() {
@@ -253,7 +253,7 @@ impl Decoding {
         outside
     }
 
-    /// Readings and answer of each row of the last frame.
+    /// Returns readings and answer of each row of the last frame.
     fn lines(&self) -> impl Iterator<Item = (&[f64], &[f64])> {
         let scale = self.sensor.scale;
         let rows = self.frame_ohm.chunks_exact(scale.columns());
@@ -287,7 +287,7 @@ mod tests {
     }
 
     #[test]
-    fn the_residual_is_the_librarys_and_that_of_a_fault_only_of_the_wires_used() {
+    fn the_residual_equals_the_librarys_and_leaves_out_faulty_wires() {
         let network = network();
         let scene = Scene {
             noise: Noise::relative(1e-3),

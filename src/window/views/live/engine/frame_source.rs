@@ -21,7 +21,7 @@ use super::{
     session::Tally,
 };
 
-/// A source of frames under way.
+/// An open source of frames.
 #[derive(Debug)]
 pub(super) enum FrameSource {
     Simulated(Box<SimulatedFrames>),
@@ -29,21 +29,21 @@ pub(super) enum FrameSource {
     Stream(Box<StreamFrames>),
 }
 
-/// The answer of a source that is asked for a frame.
+/// Result of asking a source for a frame.
 #[derive(Debug)]
 pub(super) enum Next {
     /// A frame.
     Frame(Arrived),
-    /// Something that is no frame, and why.
+    /// A malformed line, with the reason.
     Bad(String),
     /// Nothing yet.
     Nothing,
-    /// The source has ended, with the reason unless that is regular.
+    /// The source has ended, with the reason if it failed.
     End(Result<(), String>),
 }
 
 impl LivePlan {
-    /// The scene of `settings` with the noise of the readings.
+    /// Returns the scene of `settings` with the noise of the readings.
     pub(super) fn scene(&self, settings: &SimulatedSettings) -> Scene {
         let scene = settings.source.scene;
         Scene {
@@ -65,7 +65,7 @@ impl FrameSource {
         is_wanted: &dyn Fn() -> bool,
     ) -> Result<Option<Self>, String> {
         let (sensor, scene): (SensorModel, Scene) = (settings.source.sensor, plan.scene(settings));
-        // The rows of a frame are told apart also where the network does not know them.
+        // The rows of a frame are distinguished even if they are not an input of the network.
         let rows = match scene.rows {
             Rows::All => Rows::Known,
             rows => rows,
@@ -100,7 +100,7 @@ impl FrameSource {
         }))
     }
 
-    /// When the next frame is due, of a source that keeps time: `None` while it is paused.
+    /// Returns the time at which the next frame of a timed source is due; `None` while it is paused.
     pub(super) fn due(&self, now: Instant) -> Option<Instant> {
         match self {
             Self::Simulated(frames) => Some(frames.due()),
@@ -109,7 +109,7 @@ impl FrameSource {
         }
     }
 
-    /// Writes the next frame, for which a stream waits at most so long.
+    /// Writes the next frame; a stream waits for it at most for `patience`.
     pub(super) fn next(&mut self, patience: Duration, frame_ohm: &mut [f64], tally: &mut Tally) -> Next {
         let arrived = match self {
             Self::Simulated(frames) => frames.next(frame_ohm, tally),
@@ -123,8 +123,8 @@ impl FrameSource {
         }
     }
 
-    /// Obeys a command about the source.
-    pub(super) fn obey(&mut self, command: &Command) -> Result<(), String> {
+    /// Applies a command to the source.
+    pub(super) fn apply(&mut self, command: &Command) -> Result<(), String> {
         let now = Instant::now();
         match (self, command) {
             (Self::Simulated(frames), Command::Move(motion)) => frames.source.set_motion(*motion),
@@ -139,7 +139,7 @@ impl FrameSource {
         Ok(())
     }
 
-    /// The true deformation of the last frame, where it is known.
+    /// Returns the true deformation of the last frame, if it is known.
     pub(super) fn truth(&self) -> Option<&Deformation> {
         match self {
             Self::Simulated(frames) => Some(frames.source.deformation()),
@@ -147,7 +147,7 @@ impl FrameSource {
         }
     }
 
-    /// Returns `true` for a source that comes by itself, and so may fall silent.
+    /// Returns `true` for a live stream, which may fall silent.
     pub(super) fn is_stream(&self) -> bool {
         matches!(self, Self::Stream(_))
     }
@@ -158,7 +158,7 @@ impl FrameSource {
 pub(super) struct SimulatedFrames {
     pub(super) source: Simulated,
     between: Duration,
-    /// When the next frame is due.
+    /// Time at which the next frame is due.
     due: Instant,
 }
 
@@ -179,12 +179,12 @@ impl SimulatedFrames {
         })
     }
 
-    /// When the next frame is due.
+    /// Returns the time at which the next frame is due.
     pub(super) fn due(&self) -> Instant {
         self.due
     }
 
-    /// Writes the next frame, if it is due. Frames that no one took in time are dropped.
+    /// Writes the next frame, if it is due. Frames that were not taken in time are dropped.
     pub(super) fn next(&mut self, frame_ohm: &mut [f64], tally: &mut Tally) -> Result<Option<Arrived>, String> {
         let now = Instant::now();
         if now < self.due {
@@ -212,7 +212,7 @@ pub(super) struct StreamFrames {
     columns: usize,
     /// Latest readings of every row read: rows × M4.
     latest_ohm: Vec<f64>,
-    /// Rows of which readings came since the last frame.
+    /// Rows with readings since the last frame.
     is_new: Vec<bool>,
 }
 
@@ -235,7 +235,7 @@ impl StreamFrames {
         })
     }
 
-    /// Waits for a line, at most so long, and writes the frame if it is whole with this line.
+    /// Waits for a line at most for `patience`, and writes the frame if the line completes it.
     pub(super) fn next(&mut self, patience: Duration, frame_ohm: &mut [f64], tally: &mut Tally) -> Next {
         let next = self.take_line(patience, frame_ohm);
         self.lines.count_dropped(tally);
@@ -289,10 +289,10 @@ impl StreamFrames {
     }
 }
 
-/// Time between looks at whether the source is still wanted.
+/// Time between checks whether the source is still wanted.
 const BETWEEN_LOOKS: Duration = Duration::from_millis(20);
 
-/// Opens a source on a thread of its own: connecting may take minutes, and ending must not. Returns `None` if the source
+/// Opens a source on its own thread: connecting may take minutes, but cancelling must not. Returns `None` if the source
 /// is no longer wanted.
 ///
 /// # Errors
@@ -301,7 +301,7 @@ pub(super) fn open(source: &Source, is_wanted: &dyn Fn() -> bool) -> Result<Opti
     let (send, opened) = channel();
     let wanted = source.clone();
     let open = move || {
-        // No one waits for a source that is no longer wanted.
+        // The receiver is gone if the source is no longer wanted.
         let _ = send.send(wanted.open());
     };
     let thread = thread::Builder::new().name("open source".to_owned()).spawn(open);
@@ -323,7 +323,7 @@ pub(super) struct SourceLines {
     begins_anywhere: bool,
     lines: Lines,
     dropped: u64,
-    /// When reading began.
+    /// Time at which reading began.
     begun: Instant,
 }
 
@@ -332,12 +332,12 @@ pub(super) struct SourceLine<'a> {
     pub(super) number: u64,
     pub(super) arrived: Arrived,
     pub(super) text: &'a [u8],
-    /// True for a first line of which only the end may have been read.
+    /// True for a first line whose beginning may be missing.
     pub(super) is_fragment: bool,
 }
 
 impl SourceLines {
-    /// Reads what was `opened` in a thread of its own; the latest `kept` lines wait to be taken.
+    /// Reads `opened` on its own thread and queues the latest `kept` lines.
     pub(super) fn new(source: &Source, opened: Box<dyn Read + Send>, kept: usize) -> Result<Self, String> {
         let lines = Lines::spawn(opened, source.keeping(), source.begins_anywhere());
         let mut lines = lines.map_err(|error| format!("no thread could be started: {error}"))?;
@@ -351,15 +351,15 @@ impl SourceLines {
         })
     }
 
-    /// Changes the number of lines that wait to be taken.
+    /// Sets the maximum number of queued lines.
     pub(super) fn set_kept(&mut self, kept: usize) {
         self.lines.set_kept(kept);
     }
 
-    /// Waits for a line, at most so long.
+    /// Waits for a line at most for `patience`.
     ///
     /// # Errors
-    /// What came in its place: nothing, a line that is too long, or the end.
+    /// If there is no line, the line is too long, or the source has ended.
     pub(super) fn take(&mut self, patience: Duration) -> Result<SourceLine<'_>, Next> {
         let line = match self.lines.next(patience) {
             NextLine::Line(line) => line,

@@ -22,11 +22,12 @@ use decoupler_files::{export::NetworkFile, figure::TargetSurface};
 pub struct LivePlan {
     /// The network.
     pub network: Arc<NetworkFile>,
-    /// Settings of the network with its sensor and scene; `None` of a recording.
+    /// Settings of the network with its sensor and scene; `None` for a network of a recording.
     pub settings: Option<SimulatedSettings>,
     /// Source of the frames.
     pub source: SourcePlan,
-    /// Noise of a reading, relative to it (standard deviation); a simulated source has it, and faults are judged by it.
+    /// Noise of a reading, relative to the reading (standard deviation). Simulated sources add it, and fault detection
+    /// needs it.
     pub noise: f64,
     /// Gains of the unloaded state by which readings are divided, if it was taken before.
     pub zero: Option<ZeroGains>,
@@ -54,7 +55,7 @@ pub enum SourcePlan {
         at_s: f64,
         /// Recorded seconds per second.
         speed: f64,
-        /// False to are paused.
+        /// False if it begins paused.
         is_playing: bool,
     },
     /// A device or socket.
@@ -62,8 +63,8 @@ pub enum SourcePlan {
 }
 
 impl SourcePlan {
-    /// The source by what is at its path: a named pipe or a device has no end to go back from, and is a stream. Asks the
-    /// file system, which may take its time.
+    /// Returns the source according to the file at its path: a named pipe or a device cannot be rewound, and is a
+    /// stream. Accesses the file system, which may be slow.
     pub(super) fn looked_up(self) -> Self {
         match self {
             Self::Replay { path, .. } if path.exists() && !path.is_file() && !path.is_dir() => {
@@ -77,11 +78,11 @@ impl SourcePlan {
 /// Change to what is decoded.
 #[derive(Clone, Debug)]
 pub enum Command {
-    /// The last frame is drawn: the next is wanted.
+    /// The last frame was drawn: send the next one.
     Drawn,
-    /// Move the simulated indenter so.
+    /// Set the motion of the simulated indenter.
     Move(Motion),
-    /// Give the simulated wires this fault, or none.
+    /// Set or clear the fault of the simulated wires.
     Break(Option<Fault>),
     /// Take the unloaded state from the latest frames.
     Zero,
@@ -95,37 +96,37 @@ pub enum Command {
     Seek(f64),
     /// Replay at this speed.
     Speed(f64),
-    /// Go on, or are paused.
+    /// Resume or pause the replay.
     Play(bool),
 }
 
 /// Event from the thread.
 #[derive(Debug)]
 pub enum LiveEvent {
-    /// The source, by what was found at its path.
+    /// The source, according to the file at its path.
     Source(SourcePlan),
     /// The latest frame, with the status of decoding.
     Shown(Box<LiveShown>),
-    /// Gains of the unloaded state, or the reason for which there are none.
+    /// Gains of the unloaded state, or the reason why there are none.
     Zeroed(Result<ZeroGains, String>),
     /// A recording has begun.
     Recording(PathBuf),
-    /// A recording has ended, with the reason if it was none of the user's.
+    /// A recording has ended, with the reason if the user did not end it.
     Recorded(Recorded, Option<String>),
-    /// No recording could be begun.
+    /// A recording could not be started.
     NotRecorded(String),
-    /// Decoding has ended, with the reason if it could not go on.
+    /// Decoding has ended, with the reason if it could not continue.
     Ended(Result<(), String>),
 }
 
-/// A recording that is whole.
+/// A finished recording.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Recorded {
     /// Its file.
     pub path: PathBuf,
     /// Number of frames.
     pub frames: u64,
-    /// Time from the first to the last, in seconds.
+    /// Time from the first to the last frame, in seconds.
     pub seconds: f64,
 }
 
@@ -140,7 +141,7 @@ pub struct LiveShown {
     pub counts: Counts,
     /// Frames and seconds of the recording under way.
     pub recording: Option<(u64, f64)>,
-    /// Place in the recording that is replayed.
+    /// Position in the replayed recording.
     pub replay: Option<ReplayState>,
 }
 
@@ -156,7 +157,7 @@ impl LiveShown {
 pub struct LiveTargets {
     /// Description of the targets.
     pub problem: Arc<Problem>,
-    /// Surface through the targets, if they have positions that one goes through.
+    /// Surface through the targets, if they have positions.
     pub surface: Option<Arc<TargetSurface>>,
     /// Smallest and largest value of each target so far.
     pub ranges: Vec<(f64, f64)>,
@@ -169,7 +170,7 @@ pub struct LiveTargets {
 }
 
 impl LiveTargets {
-    /// The latest values.
+    /// Returns the latest values.
     pub fn values(&self) -> &[f64] {
         self.history.last().map_or(&[], |(_, values)| values)
     }
@@ -206,10 +207,10 @@ pub struct LiveFrame {
     pub errors: Option<TruthErrors>,
 }
 
-/// Result of watching for faults.
+/// Result of fault detection.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Watched {
-    /// Faults are not looked for, and why.
+    /// Faults are not looked for, with the reason.
     Off(&'static str),
     /// Eq. (2) explains the readings.
     Normal,
@@ -222,9 +223,9 @@ pub enum Watched {
 /// Mean |error| of z over all nodes, in millimetres.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct TruthErrors {
-    /// Over the last second or so, by the answers shown.
+    /// Over the last second or so, of the displayed answers.
     pub shown_mm: Option<f64>,
-    /// Since a fault was named: by the network with all wires, and with the wires at fault left out.
+    /// Since a fault was named: of the network with all wires, and with the faulty wires left out.
     pub since_named_mm: Option<[f64; 2]>,
 }
 
@@ -233,21 +234,21 @@ pub struct TruthErrors {
 pub struct Counts {
     /// Frames decoded.
     pub decoded: u64,
-    /// Frames decoded in a second, recently.
+    /// Frames decoded per second, recently.
     pub frames_per_second: f64,
     /// Median and 99th percentile of the time from reading a frame to its answer.
     pub latency: Option<[Duration; 2]>,
-    /// Frames, or lines of a device, that newer ones overtook.
+    /// Frames, or lines of a device, dropped in favour of newer ones.
     pub dropped: u64,
-    /// Lines that were no frame, and frames without an answer.
+    /// Malformed lines, and frames that could not be decoded.
     pub bad: u64,
-    /// Reason of the last of them.
+    /// Reason for the last of them.
     pub last_bad: Option<String>,
-    /// True if none has come for a while.
+    /// True if no frame has arrived for a while.
     pub is_waiting: bool,
 }
 
-/// Place in a recording.
+/// Position in a recording.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ReplayState {
     /// Time of the displayed frame, from the first, in seconds.
@@ -258,11 +259,11 @@ pub struct ReplayState {
     pub is_playing: bool,
 }
 
-/// A frame as it comes.
+/// Arrival of a frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Arrived {
     /// Time in its source, in seconds.
     pub(super) time_s: f64,
-    /// When its last byte was read, or when it was there otherwise.
+    /// Time at which its last byte was read, or at which it was simulated or due.
     pub(super) read_at: Instant,
 }

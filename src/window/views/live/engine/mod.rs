@@ -1,8 +1,9 @@
-//! The thread that decodes: a source gives frames, each is decoded as it comes, and the window is shown the latest.
+//! The decoding thread: a source supplies frames, each frame is decoded as it arrives, and the window displays the
+//! latest.
 //!
-//! [`run`] is the loop; a [`LivePlan`] says what it decodes and by what, [`Command`]s change it on the way, and
-//! [`LiveEvent`]s report it. A [`LiveShown`] goes to the window only once the one before has been drawn, so that nothing
-//! queues up and no frame is drawn for no one.
+//! [`run`] is the loop. A [`LivePlan`] holds the source and the network, [`Command`]s change them while the loop runs,
+//! and [`LiveEvent`]s report the results. A [`LiveShown`] is sent only after the window has drawn the previous one, so
+//! frames do not queue up.
 
 mod decoding;
 mod frame_source;

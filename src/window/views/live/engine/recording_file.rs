@@ -7,7 +7,7 @@ use std::{
 use super::message::Recorded;
 use decoupler_core::{live::Recorder, text::system_cause};
 
-/// A recording under way: every frame is in the file as soon as it has come.
+/// A recording in progress: every frame is written to the file as soon as it arrives.
 #[derive(Debug)]
 pub(super) struct RecordingFile {
     path: PathBuf,
@@ -18,10 +18,10 @@ pub(super) struct RecordingFile {
 }
 
 impl RecordingFile {
-    /// Creates a file with a name of its own in `folder`, which is made if it is missing.
+    /// Creates a file with a unique name in `folder`, which is created if it is missing.
     ///
     /// # Errors
-    /// If there can be no such file, with the reason.
+    /// If the file cannot be created, with the reason.
     pub(super) fn create(folder: &Path, rows: &[usize], columns: usize) -> Result<Self, String> {
         let created = fs::create_dir_all(folder).and_then(|()| new_file(folder));
         let refused = |error: io::Error| {
@@ -45,18 +45,18 @@ impl RecordingFile {
     /// Writes a frame.
     ///
     /// # Errors
-    /// If it cannot be written, with the reason; the frames before stay in the file.
+    /// If it cannot be written, with the reason; earlier frames stay in the file.
     pub(super) fn record(&mut self, time_s: f64, frame_ohm: &[f64]) -> Result<(), String> {
         self.recorder.record(time_s, frame_ohm).map_err(|error| {
             let (path, cause) = (self.path.display(), system_cause(&error));
-            format!("the recording '{path}' has ended: {cause}; the frames before are kept")
+            format!("the recording '{path}' has ended: {cause}; earlier frames are kept")
         })?;
         self.frames += 1;
         self.span_s = Some((self.span_s.map_or(time_s, |(first_s, _)| first_s), time_s));
         Ok(())
     }
 
-    /// Number of frames, and time from the first to the last in seconds.
+    /// Returns the number of frames and the time from the first to the last, in seconds.
     pub(super) fn length(&self) -> (u64, f64) {
         (
             self.frames,
@@ -95,7 +95,7 @@ mod tests {
     use decoupler_core::live::Recording;
 
     #[test]
-    fn every_recording_has_a_file_of_its_own_that_is_whole_after_each_frame() {
+    fn each_recording_has_its_own_file_that_is_complete_after_every_frame() {
         let folder = tempfile::tempdir().unwrap();
         let folder = folder.path().join("not yet there");
         let [mut first, second] = [0, 1].map(|_| RecordingFile::create(&folder, &[0], 2).unwrap());
@@ -111,7 +111,7 @@ mod tests {
     }
 
     #[test]
-    fn a_folder_that_cannot_be_made_is_told() {
+    fn a_folder_that_cannot_be_created_is_reported() {
         let folder = tempfile::tempdir().unwrap();
         let file = folder.path().join("file");
         fs::write(&file, "").unwrap();

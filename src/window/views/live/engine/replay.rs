@@ -19,18 +19,18 @@ use super::{
     session::Tally,
 };
 
-/// A recording whose frames come at their times, faster or slower.
+/// Replay of a recording: its frames come at their recorded times, at an adjustable speed.
 #[derive(Debug)]
 pub(super) struct ReplayFrames {
     recording: Recording,
     /// Recorded seconds per second.
     speed: f64,
     is_playing: bool,
-    /// Recorded time at a moment, from which time continues while it plays.
+    /// Recorded time at an instant, from which it advances while playing.
     anchor: (f64, Instant),
-    /// Index of the frame that comes next.
+    /// Index of the next frame.
     next: usize,
-    /// True if the next frame is wanted whatever its time.
+    /// True if the next frame is due now, whatever its time.
     is_wanted: bool,
 }
 
@@ -38,7 +38,7 @@ pub(super) struct ReplayFrames {
 const SPEEDS: RangeInclusive<f64> = 0.1..=10.0;
 
 impl ReplayFrames {
-    /// Begins with the frame at `at_s` after the first.
+    /// Creates a replay that begins `at_s` seconds after the first frame.
     pub(super) fn new(recording: Recording, at_s: f64, speed: f64, is_playing: bool, now: Instant) -> Self {
         let mut replay = Self {
             recording,
@@ -62,7 +62,7 @@ impl ReplayFrames {
         self.recording.times_s().len()
     }
 
-    /// Recorded time now.
+    /// Returns the recorded time at `now`.
     fn time_s(&self, now: Instant) -> f64 {
         let (time_s, since) = self.anchor;
         if self.is_playing {
@@ -77,7 +77,7 @@ impl ReplayFrames {
         self.speed = speed.clamp(*SPEEDS.start(), *SPEEDS.end());
     }
 
-    /// Continues, from the beginning after the end, or is paused.
+    /// Pauses or resumes the replay; after the end, it restarts from the beginning.
     pub(super) fn play(&mut self, is_playing: bool, now: Instant) {
         if is_playing && self.next >= self.frames() {
             self.seek(0.0, now);
@@ -86,7 +86,7 @@ impl ReplayFrames {
         self.is_playing = is_playing;
     }
 
-    /// Shows the frame at a time in seconds after the first, and continues from there if it plays.
+    /// Seeks to a time in seconds after the first frame, and continues from there if it is playing.
     pub(super) fn seek(&mut self, at_s: f64, now: Instant) {
         let time_s = self.first_s() + at_s.max(0.0);
         self.next = self.recording.frame_at(time_s);
@@ -94,7 +94,7 @@ impl ReplayFrames {
         self.is_wanted = true;
     }
 
-    /// When the next frame is due; `None` while it is paused.
+    /// Returns the time at which the next frame is due; `None` while it is paused.
     pub(super) fn due(&self, now: Instant) -> Option<Instant> {
         if self.is_wanted {
             return Some(now);
@@ -104,7 +104,7 @@ impl ReplayFrames {
         Some(now + Duration::try_from_secs_f64(wait_s.max(0.0)).unwrap_or(Duration::MAX / 4))
     }
 
-    /// Writes the next frame, if it is due. Frames that no one took in time are dropped.
+    /// Writes the next frame, if it is due. Frames that were not taken in time are dropped.
     pub(super) fn next(&mut self, frame_ohm: &mut [f64], tally: &mut Tally, now: Instant) -> Option<Arrived> {
         if self.due(now)? > now {
             return None;
@@ -128,7 +128,7 @@ impl ReplayFrames {
         Some(Arrived { time_s, read_at: now })
     }
 
-    /// Place of the frame at `time_s`.
+    /// Returns the position of the frame at `time_s`.
     pub(super) fn state(&self, time_s: f64) -> ReplayState {
         let last_s = self.recording.times_s().last().copied().unwrap_or_default();
         ReplayState {
@@ -139,16 +139,16 @@ impl ReplayFrames {
     }
 }
 
-/// Largest file that is replayed: all of it is kept in memory.
+/// Size limit of a replayed file, which is kept in memory as a whole.
 const LARGEST_BYTES: u64 = 1 << 30;
-/// Rate of frames that come without times.
+/// Rate of frames without times, per second.
 pub(super) const RATE_WITHOUT_TIMES: f64 = 50.0;
 
 /// Reads the frames of `read` row-wires from a file: a recording with a time for each frame, or else lines as `decode`
-/// reads them, at an even rate. Lines that are no frame are counted in `tally`, and frames that lack a row left out.
+/// reads them, at an even rate. Malformed lines are counted in `tally`, and incomplete frames are skipped.
 ///
 /// # Errors
-/// If the file cannot be read or has no whole frame.
+/// If the file cannot be read or has no complete frame.
 pub(super) fn read_replay(
     path: &Path,
     scale: ArrayScale,
@@ -162,7 +162,7 @@ pub(super) fn read_replay(
     let bytes = file.metadata().map_err(system)?.len();
     if bytes > LARGEST_BYTES {
         return Err(refused(&format_args!(
-            "it has {:.1} GB, and at most 1 GB is kept in memory; cut it, or decode it with decoupler decode",
+            "it has {:.1} GB, and at most 1 GB can be replayed; split it, or decode it with decoupler decode",
             bytes as f64 / 1e9
         )));
     }
@@ -205,7 +205,7 @@ fn read_lines(
                 if index * scale.columns() != frame_ohm.len() {
                     frame_ohm.clear();
                 }
-                // Otherwise a row before it is missing, and the frame is not whole.
+                // Otherwise an earlier row is missing, and the frame is incomplete.
                 if index * scale.columns() == frame_ohm.len() {
                     frame_ohm.extend_from_slice(readings_ohm);
                 }
@@ -241,16 +241,16 @@ mod tests {
         ReplayFrames::new(Recording::at_rate(frames, 20.0).unwrap(), 0.0, speed, true, start)
     }
 
-    /// The frames that come until `millis` after the start, looked for every 5 ms.
+    /// Returns the frames that come in `millis` after the start, polled every 5 ms.
     fn frames(replay: &mut ReplayFrames, tally: &mut Tally, start: Instant, millis: std::ops::Range<u64>) -> Vec<f64> {
-        let mut came = Vec::new();
+        let mut received = Vec::new();
         for k in millis.step_by(5) {
             let mut ohm = [0.0];
             while replay.next(&mut ohm, tally, start + Duration::from_millis(k)).is_some() {
-                came.push(ohm[0]);
+                received.push(ohm[0]);
             }
         }
-        came
+        received
     }
 
     #[test]
@@ -258,15 +258,15 @@ mod tests {
         let start = Instant::now();
         let mut tally = Tally::new(start);
         for (speed, expected) in [(1.0, 11), (10.0, 100), (0.1, 2)] {
-            let came = frames(&mut replay(speed, start), &mut tally, start, 0..505);
+            let received = frames(&mut replay(speed, start), &mut tally, start, 0..505);
             let numbers: Vec<f64> = (1..=expected).map(f64::from).collect();
-            assert_eq!(came, numbers, "{speed}");
+            assert_eq!(received, numbers, "{speed}");
         }
         assert_eq!(tally.counts().dropped, 0);
     }
 
     #[test]
-    fn a_frame_sought_comes_at_once_and_the_end_stands_still() {
+    fn seeking_shows_a_frame_at_once_and_the_replay_stops_at_the_end() {
         let start = Instant::now();
         let (mut tally, mut replay) = (Tally::new(start), replay(1.0, start));
         replay.play(false, start);
@@ -283,7 +283,7 @@ mod tests {
     }
 
     #[test]
-    fn the_latest_frame_wins_over_those_that_nobody_took() {
+    fn frames_not_taken_in_time_are_dropped() {
         let start = Instant::now();
         let (mut tally, mut replay) = (Tally::new(start), replay(1.0, start));
         assert_eq!(frames(&mut replay, &mut tally, start, 0..5), [1.0]);
@@ -327,14 +327,14 @@ mod tests {
     }
 
     #[test]
-    fn names_that_lack_a_resistance_are_refused() {
+    fn headers_that_lack_a_resistance_are_refused() {
         let (refused, _) = read(b"time,r_1,r_2\n1,2,3\n4,5,6\n", Rows::Known);
         let message = refused.unwrap_err();
         assert!(message.contains("line 1: there is no column r_3"), "{message}");
     }
 
     #[test]
-    fn a_frame_with_a_bad_line_is_left_out_and_the_line_told() {
+    fn a_frame_with_a_bad_line_is_left_out_and_the_line_reported() {
         let (recording, tally) = read(b"1,2,3\n4,#,6\n1,2,3\n4,5,6\n", Rows::Known);
         assert_eq!(recording.unwrap().times_s().len(), 1);
         let counts = tally.counts();

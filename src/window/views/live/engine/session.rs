@@ -20,7 +20,7 @@ use super::{
 };
 use crate::window::job::Report;
 
-/// A source and what decodes and records its frames.
+/// A source with the decoder and the recording of its frames.
 #[derive(Debug)]
 pub(super) struct Session {
     plan: LivePlan,
@@ -28,11 +28,11 @@ pub(super) struct Session {
     decoding: Decoding,
     tally: Tally,
     recording: Option<RecordingFile>,
-    /// The last frame as it came: rows × M4, in ohm.
+    /// The last frame as received: rows × M4, in ohm.
     readings_ohm: Vec<f64>,
     /// The last frame with an answer.
     arrived: Option<Arrived>,
-    /// True if something has come that the window does not know.
+    /// True if there is something to report to the window.
     has_events: bool,
 }
 
@@ -77,7 +77,7 @@ impl Session {
         }
     }
 
-    /// The last frame with an answer, with the status of decoding.
+    /// Returns the last frame with an answer and the status of decoding.
     fn shown(&self) -> LiveShown {
         let time_s = self.arrived.map_or(0.0, |arrived| arrived.time_s);
         LiveShown {
@@ -138,7 +138,7 @@ impl LiveSession for Session {
             }
             Next::Nothing if self.source.is_stream() => self.has_events |= self.tally.falls_silent(Instant::now()),
             Next::Nothing => {}
-            // Nothing was shown, and the view would say nothing of why.
+            // No frame was displayed, so the view would give no reason.
             Next::End(Ok(())) if self.tally.counts().decoded == 0 => {
                 let reason = self.tally.counts().last_bad;
                 let reason = reason.unwrap_or_else(|| "it has no line of readings".to_owned());
@@ -149,7 +149,7 @@ impl LiveSession for Session {
         None
     }
 
-    fn obey(&mut self, command: Command, send: &dyn Fn(LiveEvent)) -> Result<(), String> {
+    fn apply(&mut self, command: Command, send: &dyn Fn(LiveEvent)) -> Result<(), String> {
         match command {
             Command::Drawn => {}
             Command::Zero => send(LiveEvent::Zeroed(self.decoding.take_zero())),
@@ -167,7 +167,7 @@ impl LiveSession for Session {
             Command::Record => {}
             Command::EndRecording => self.end_recording(None, send),
             Command::Move(_) | Command::Break(_) | Command::Seek(_) | Command::Speed(_) | Command::Play(_) => {
-                self.source.obey(&command)?;
+                self.source.apply(&command)?;
                 self.has_events = true;
             }
         }
@@ -194,7 +194,7 @@ pub(super) struct Tally {
     span: Span,
     /// Mean error over the last whole span, in millimetres.
     error_mm: Option<f64>,
-    /// When the last frame came, or counting began.
+    /// Time at which the last frame arrived, or counting began.
     last: Instant,
 }
 
@@ -222,7 +222,7 @@ impl Tally {
         }
     }
 
-    /// Counts a frame that was decoded `now`, with its error in millimetres where that is known.
+    /// Counts a frame that was decoded `now`, with its error in millimetres if that is known.
     pub(super) fn good(&mut self, read_at: Instant, now: Instant, error_mm: Option<f64>) {
         self.counts.decoded += 1;
         self.counts.is_waiting = false;
@@ -247,7 +247,7 @@ impl Tally {
         self.counts.last_bad = Some(reason);
     }
 
-    /// Counts frames that newer ones overtook.
+    /// Counts dropped frames.
     pub(super) fn dropped(&mut self, frames: u64) {
         self.counts.dropped += frames;
     }
@@ -264,7 +264,7 @@ impl Tally {
         false
     }
 
-    /// Mean error of the answers shown recently, in millimetres.
+    /// Returns the mean error of the recently displayed answers, in millimetres.
     pub(super) fn error_mm(&self) -> Option<f64> {
         self.error_mm
     }
@@ -289,42 +289,42 @@ impl Span {
     }
 }
 
-/// Shortest time between frames that are shown.
+/// Minimum time between displayed frames.
 const BETWEEN_SHOWN: Duration = Duration::from_micros(16_600);
-/// Longest wait for a line of a device between looks at commands.
+/// Maximum wait for a line of a device between checks for commands.
 const BETWEEN_LOOKS: Duration = Duration::from_millis(20);
-/// Longest wait for a command of a source that is paused.
+/// Maximum wait for a command while the source is paused.
 const LONGEST_WAIT: Duration = Duration::from_secs(60);
 
-/// A source under way and what decodes it.
+/// An open source and its decoder.
 pub(super) trait LiveSession {
-    /// When the next frame is due, of a source that keeps time: `None` while it is paused.
+    /// Returns the time at which the next frame of a timed source is due; `None` while it is paused.
     fn due(&self, now: Instant) -> Option<Instant>;
 
-    /// Returns `true` for a source that comes by itself, and so may fall silent.
+    /// Returns `true` for a live stream, which may fall silent.
     fn is_stream(&self) -> bool;
 
-    /// Returns `true` if something has come that the window does not know.
+    /// Returns `true` if there is something to report to the window.
     fn has_events(&self) -> bool;
 
-    /// Takes what the source has, waiting for a stream at most until `latest`. Returns the end of the source once it
-    /// comes.
+    /// Takes the next frame of the source, waiting for a stream at most until `latest`. Returns the result of the
+    /// source once it has ended.
     fn take_next(&mut self, latest: Instant, send: &dyn Fn(LiveEvent)) -> Option<Result<(), String>>;
 
-    /// Obeys a command.
-    fn obey(&mut self, command: Command, send: &dyn Fn(LiveEvent)) -> Result<(), String>;
+    /// Applies a command.
+    fn apply(&mut self, command: Command, send: &dyn Fn(LiveEvent)) -> Result<(), String>;
 
     /// Ends the recording, if there is one.
     fn end_recording(&mut self, reason: Option<String>, send: &dyn Fn(LiveEvent));
 
-    /// The last frame with an answer, with the status of decoding, to be shown now.
+    /// Returns the last frame with an answer and the status of decoding, to be displayed now.
     fn show(&mut self) -> LiveShown;
 }
 
-/// Decodes what `plan` says until its source ends, the sender of the commands is gone, or the work is cancelled.
+/// Runs `plan` until its source ends, the sender of the commands is gone, or the work is cancelled.
 ///
 /// # Errors
-/// If decoding cannot begin or go on, with the reason.
+/// If decoding cannot begin or continue, with the reason.
 pub fn run(plan: LivePlan, commands: &Receiver<Command>, report: &Report<LiveEvent>) -> Result<(), String> {
     let send = |event| report.send(event);
     let source = plan.source.looked_up();
@@ -338,7 +338,7 @@ pub fn run(plan: LivePlan, commands: &Receiver<Command>, report: &Report<LiveEve
     let Some(mut session) = session else { return Ok(()) };
     let end = decode(&mut *session, commands, report);
     session.end_recording(None, &send);
-    // The last frame stays in view.
+    // The last frame stays on the screen.
     show(&mut *session, report);
     end
 }
@@ -373,7 +373,7 @@ fn decode(
         };
         match command {
             Ok(Command::Drawn) => is_drawn = true,
-            Ok(command) => session.obey(command, &send)?,
+            Ok(command) => session.apply(command, &send)?,
             Err(RecvTimeoutError::Timeout) => {
                 if let Some(end) = session.take_next(now + BETWEEN_LOOKS, &send) {
                     return end;
@@ -389,7 +389,7 @@ fn show(session: &mut dyn LiveSession, report: &Report<LiveEvent>) {
     report.progress(LiveEvent::Shown(Box::new(session.show())), |_, _| {});
 }
 
-/// Watches frames for faults of wires, and decodes without the wires at fault.
+/// Detects faults of wires, and decodes without the faulty wires.
 #[derive(Debug)]
 pub(super) struct Watch {
     state: Watched,
@@ -403,17 +403,17 @@ struct LiveParts {
     left_out: LeftOutDecoder,
 }
 
-/// Shortest time between checks, so that they cost no frame.
+/// Minimum time between checks, so that no frame is dropped because of them.
 const BETWEEN_CHECKS: Duration = Duration::from_millis(10);
 
 impl Watch {
     /// Prepares to watch frames of `rows` with the noise of `scene`.
     ///
     /// # Errors
-    /// A sensor without resistances.
+    /// If the sensor model has no resistances.
     pub(super) fn new(sensor: &SensorModel, scene: &Scene, rows: &[usize]) -> Result<Self, SensorError> {
         let reason = if scene.noise.is_none() {
-            Some("not looked for: without noise there is nothing to judge readings by; give the noise of a reading")
+            Some("not looked for: without noise, deviations cannot be judged; give the noise of a reading")
         } else if !FaultMonitor::is_affordable(sensor.scale, scene) {
             Some("not looked for: the array is too large to check every frame")
         } else {
@@ -445,7 +445,8 @@ impl Watch {
         }
     }
 
-    /// Checks a frame, which came as `raw_ohm` and was divided by the gains of the unloaded state, unless another was checked just now. Returns `true` if another fault is named than before.
+    /// Checks a frame for faults, unless another was checked just now. `raw_ohm` are its readings, and `frame_ohm` the
+    /// same divided by the gains of the unloaded state. Returns `true` if the fault named has changed.
     pub(super) fn check(&mut self, raw_ohm: &[f64], frame_ohm: &[f64], now: Instant) -> bool {
         let Some(parts) = &mut self.parts else { return false };
         let is_due = |checked: Instant| now.saturating_duration_since(checked) >= BETWEEN_CHECKS;
@@ -466,7 +467,7 @@ impl Watch {
         matches!(event, FaultEvent::Named(_))
     }
 
-    /// Decodes a frame without the wires of the fault that is named; returns `false` if there is none, or no answer.
+    /// Decodes a frame without the wires of the named fault; returns `false` if there is no fault or no answer.
     pub(super) fn decode(&mut self, frame_ohm: &[f64], answer_mm: &mut [f64]) -> bool {
         match (&self.state, &mut self.parts) {
             (Watched::Named(_), Some(parts)) => {
@@ -497,7 +498,7 @@ mod tests {
     }
 
     #[test]
-    fn silence_is_told_once_and_ends_with_a_frame() {
+    fn silence_is_reported_once_and_ends_with_a_frame() {
         let start = Instant::now();
         let mut tally = Tally::new(start);
         assert!(!tally.falls_silent(start + Duration::from_secs(1)));

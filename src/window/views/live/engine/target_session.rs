@@ -28,7 +28,7 @@ use super::{
 
 /// Length of the history in seconds.
 const HISTORY_S: f64 = 20.0;
-/// Most values in the history, over all targets.
+/// Maximum number of values in the history, over all targets.
 const MAX_VALUES: usize = 20_000;
 
 /// A source of samples, and the network of a recording that decodes them.
@@ -40,7 +40,7 @@ pub(super) struct TargetSession {
     compiled: CompiledNetworks<f64>,
     source: TargetSource,
     tally: Tally,
-    /// The last sample as it came: index of its network, then the readings.
+    /// The last sample as received: index of its network, then the readings.
     sample: Vec<f64>,
     answer: Vec<f64>,
     history: VecDeque<(f64, Arc<[f64]>)>,
@@ -91,7 +91,7 @@ impl TargetSession {
         for ((low, high), &value) in self.ranges.iter_mut().zip(&self.answer) {
             (*low, *high) = (low.min(value), high.max(value));
         }
-        // A replay that went back begins its history again.
+        // Seeking backwards clears the history.
         if self.history.back().is_some_and(|(time_s, _)| *time_s > arrived.time_s) {
             self.history.clear();
         }
@@ -142,7 +142,7 @@ impl LiveSession for TargetSession {
     }
 
     /// Re-zero, faults and recordings of frames need the model of an array.
-    fn obey(&mut self, command: Command, _send: &dyn Fn(LiveEvent)) -> Result<(), String> {
+    fn apply(&mut self, command: Command, _send: &dyn Fn(LiveEvent)) -> Result<(), String> {
         if let TargetSource::Replay(replay) = &mut self.source {
             let now = Instant::now();
             match command {
@@ -225,7 +225,7 @@ impl TargetSource {
         }))
     }
 
-    /// Writes the next sample, for which a stream waits at most so long.
+    /// Writes the next sample; a stream waits for it at most for `patience`.
     pub(super) fn next(&mut self, patience: Duration, sample: &mut [f64], tally: &mut Tally) -> Next {
         match self {
             Self::Replay(replay) => match replay.next(sample, tally, Instant::now()) {
@@ -402,7 +402,7 @@ mod tests {
     }
 
     #[test]
-    fn a_file_without_an_input_is_refused_by_its_name() {
+    fn a_file_without_an_input_is_refused_and_the_input_named() {
         let folder = tempfile::tempdir().unwrap();
         let (network, _) = network(folder.path());
         let path = folder.path().join("other.csv");
