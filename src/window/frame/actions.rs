@@ -362,7 +362,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn words_in_any_order_find_an_action_and_possible_ones_come_first() {
+    fn words_in_any_order_find_an_action_and_available_ones_come_first() {
         let action = |name: &str, is_possible| Action {
             name: name.to_owned(),
             keys: None,

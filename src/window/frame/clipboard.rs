@@ -266,7 +266,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_clipboard_that_refuses_is_told_as_a_failure_and_never_as_copied() {
+    fn a_refusing_clipboard_is_reported_as_a_failure_and_never_as_copied() {
         let refusing: Arc<Put> = Arc::new(|_| Err("another program holds it.".to_owned()));
         let text = Content::Text("1".to_owned());
         let picture = Content::Picture {

@@ -419,7 +419,7 @@ mod tests {
     }
 
     #[test]
-    fn dropping_waits_for_what_is_being_written() {
+    fn dropping_waits_for_files_being_written() {
         let (begun, has_begun) = channel();
         let (gate, opened) = channel::<()>();
         let folder = tempfile::tempdir().unwrap();

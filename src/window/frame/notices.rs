@@ -143,7 +143,7 @@ mod tests {
     }
 
     #[test]
-    fn what_works_takes_its_failures_along_and_no_others() {
+    fn a_success_removes_failures_of_the_same_matter_only() {
         let mut notices = Notices::default();
         notices.fail(Matter::File, "no folder");
         notices.fail(Matter::File, "no folder");
@@ -159,7 +159,7 @@ mod tests {
     }
 
     #[test]
-    fn what_works_closes_by_itself_and_what_failed_does_not() {
+    fn a_success_closes_by_itself_and_a_failure_does_not() {
         let mut notices = Notices::default();
         notices.add(Matter::File, done("saved"));
         notices.fail(Matter::RunList, "unreadable");

@@ -144,7 +144,7 @@ pub(super) struct Memory {
     written: Remembered,
     latest: Remembered,
     job: Job<Written>,
-    has_told: bool,
+    has_reported: bool,
 }
 
 impl Memory {
@@ -155,7 +155,7 @@ impl Memory {
             written: remembered.clone(),
             latest: remembered,
             job: Job::prompt("memory", wake),
-            has_told: false,
+            has_reported: false,
         }
     }
 
@@ -176,7 +176,7 @@ impl Memory {
             Ok(Err(error)) => error.to_string(),
             Err(error) => error.to_string(),
         };
-        let is_first = !std::mem::replace(&mut self.has_told, true);
+        let is_first = !std::mem::replace(&mut self.has_reported, true);
         is_first.then(|| format!("View, theme and settings will not be restored at the next start: {reason}"))
     }
 }
@@ -184,7 +184,7 @@ impl Memory {
 impl Drop for Memory {
     fn drop(&mut self) {
         self.job.wait(LONGEST_WAIT);
-        if self.latest != self.written && !self.has_told {
+        if self.latest != self.written && !self.has_reported {
             // No one is left to notify.
             let _ = self.latest.write(&self.path);
         }
@@ -243,7 +243,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_written_is_read_again_bit_by_bit() {
+    fn the_file_is_read_back_bit_by_bit() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("not yet there").join("window.json");
         let mut draft = SimulatedSettings::default();
@@ -261,7 +261,7 @@ mod tests {
     }
 
     #[test]
-    fn a_value_that_cannot_be_read_is_forgotten_and_the_others_are_not() {
+    fn an_unreadable_value_is_dropped_and_the_others_are_kept() {
         for text in ["", "[]", "{", "{}", "\u{0}"] {
             assert_eq!(read(text), Remembered::default(), "{text}");
         }
@@ -274,7 +274,7 @@ mod tests {
     }
 
     #[test]
-    fn settings_out_of_limits_are_forgotten() {
+    fn settings_outside_the_limits_are_dropped() {
         let change: [fn(&mut SimulatedSettings); 6] = [
             |draft| draft.hidden = 0,
             |draft| draft.source.samples = usize::MAX,

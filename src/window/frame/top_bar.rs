@@ -321,7 +321,7 @@ mod tests {
     }
 
     #[test]
-    fn columns_are_as_wide_as_they_were_drawn_within_limits_that_leave_the_middle_its_own() {
+    fn columns_have_the_chosen_widths_within_limits_that_leave_room_for_the_middle() {
         assert_eq!(widths(None, None, 1440.0), [272.0, 384.0], "the usual widths");
         assert_eq!(widths(Some(300.0), Some(400.0), 1440.0), [300.0, 400.0]);
         for wish in [-1e30, 0.0, 1e4, f32::INFINITY] {

@@ -44,7 +44,7 @@ pub fn error_table_ui(ui: &mut Ui, table: &ErrorTable) {
     let shown = Vec::from_iter((0..table.measures.len()).filter(|&place| is_in_table(table.measures[place])));
     let measures = shown.iter().map(|&place| column(table.measures[place]));
     let columns = Vec::from_iter(std::iter::once(TableColumn::text("")).chain(measures));
-    // The error by which the network is judged.
+    // The error that decides whether a baseline is better.
     let judged = table
         .measures
         .iter()

@@ -18,28 +18,28 @@ use decoupler_files::{
 use super::Effect;
 use crate::window::training_worker::{RunId, TrainedRun};
 
-/// A thing that a view can export, in one form, or the reason why it cannot now.
+/// An item that a view can export in one form, or the reason why it is not available now.
 pub struct Export<'a> {
     /// Part of the menu.
     pub group: ExportGroup,
-    /// Name of the thing: "Error table".
+    /// Name of the item: "Error table".
     pub name: String,
     /// Its form: "CSV".
     pub form: String,
     /// Description of the form in a sentence or two.
     pub description: &'static str,
-    /// Asks the window for it, or the reason for which it cannot be had now.
+    /// Request to the window, or the reason why the item is not available now.
     pub ask: Result<Ask<'a>, String>,
 }
 
-/// Makes the request to the window, which may copy what is to be exported.
+/// Makes the request to the window, which may copy the exported data.
 pub type Ask<'a> = Box<dyn FnOnce() -> Effect + 'a>;
 
 /// Parts of the Export menu.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum ExportGroup {
     /// The network of a past epoch that is displayed.
-    NetworkOnShow(usize),
+    DisplayedNetwork(usize),
     /// The best network of a training, of this epoch.
     BestNetwork(usize),
     /// Networks for other programs.
@@ -60,7 +60,7 @@ impl ExportGroup {
     /// Heading of the part.
     pub fn heading(self) -> Cow<'static, str> {
         let heading = match self {
-            Self::NetworkOnShow(epoch) => return format!("Displayed network, epoch {epoch}").into(),
+            Self::DisplayedNetwork(epoch) => return format!("Displayed network, epoch {epoch}").into(),
             Self::BestNetwork(epoch) => return format!("Best network, epoch {epoch}").into(),
             Self::Network => "Network",
             Self::Report => "Report",
@@ -86,7 +86,7 @@ impl Export<'_> {
         }
     }
 
-    /// Returns true for what goes to the clipboard.
+    /// Returns true for a copy to the clipboard.
     pub fn is_copy(&self) -> bool {
         self.group == ExportGroup::Copies || self.form == COPY
     }
@@ -108,7 +108,8 @@ impl fmt::Debug for Export<'_> {
     }
 }
 
-/// The picture as SVG and as PNG, in files named after `stem`, and to the clipboard; `figure` gives it, or the reason why there is none.
+/// The picture as SVG and PNG files named after `stem`, and as a copy to the clipboard; `figure` returns it, or the reason
+/// why there is none.
 pub fn picture_exports<'a>(
     name: &str,
     stem: String,
@@ -123,7 +124,7 @@ pub fn picture_exports<'a>(
         },
         PictureFormat::Png => FileWords {
             kind: "picture as PNG",
-            description: "The picture as shown, on a light background at publication size: pixels, 300 to the inch.",
+            description: "The picture as shown, on a light background at publication size: pixels at 300 dpi.",
             extensions: &["png"],
         },
     };
@@ -132,7 +133,7 @@ pub fn picture_exports<'a>(
         group: ExportGroup::Figures,
         name: name.clone(),
         form: COPY.to_owned(),
-        description: "Copies the picture as shown, on a light background: pixels, 300 to the inch.",
+        description: "Copies the picture as shown, on a light background: pixels at 300 dpi.",
         ask: figure.clone().map(|figure| -> Ask<'a> {
             let notice = format!("Copied the {} as a picture", name.to_lowercase());
             Box::new(move || Effect::CopyPicture {
@@ -163,7 +164,7 @@ pub fn picture_exports<'a>(
     files.chain([copied])
 }
 
-/// The table to the clipboard, in every form; `table` gives it, or the reason why there is none.
+/// Copies of the table to the clipboard, in every form; `table` returns it, or the reason why there is none.
 pub fn copy_exports<'a>(
     name: &str,
     table: Result<impl Fn() -> Table + Clone + 'a, String>,
@@ -198,7 +199,7 @@ pub fn copy_exports<'a>(
     })
 }
 
-/// The displayed errors as a CSV file named after `stem`; `table` gives them, or the reason why there are none.
+/// The displayed errors as a CSV file named after `stem`; `table` returns them, or the reason why there are none.
 pub fn error_table_export<'a>(stem: String, table: Result<impl Fn() -> Table + 'a, String>) -> Export<'a> {
     let words = FileWords {
         kind: "error table",
@@ -231,7 +232,7 @@ pub fn loss_export<'a>(stem: String, history: Result<&'a [EpochRecord], String>)
     }
 }
 
-/// The table as a CSV file; `table` gives it, or the reason why there is none.
+/// The table as a CSV file; `table` returns it, or the reason why there is none.
 pub fn csv_export<'a>(
     name: &str,
     words: FileWords,
@@ -253,15 +254,15 @@ pub fn csv_export<'a>(
     }
 }
 
-/// A file whose path is to be asked for. It carries what is to be written, as it is when it is asked for: what the user
-/// does until the path is known changes nothing.
+/// A file whose path the user is asked for. It holds the contents as they were at the request: later changes do not affect
+/// it.
 #[derive(Clone, Debug)]
 pub struct FileTask {
     /// Words that describe the file.
     pub words: FileWords,
-    /// Its name, unless the user says otherwise.
+    /// Suggested name.
     pub suggestion: String,
-    /// Read or write, and of which content.
+    /// Whether the file is read or written, and its contents.
     pub purpose: Purpose,
 }
 
@@ -272,12 +273,12 @@ pub struct FileWords {
     pub kind: &'static str,
     /// Content in a sentence.
     pub description: &'static str,
-    /// Extensions that it may have, without the dot; the first unless the user says otherwise. None for a folder.
+    /// Allowed extensions without the dot, the default first. None for a folder.
     pub extensions: &'static [&'static str],
 }
 
 impl FileWords {
-    /// Returns the name of the file with the usual extension.
+    /// Returns the name of the file with the default extension.
     pub fn file_name(&self, stem: &str) -> String {
         match self.extensions.first() {
             Some(extension) => format!("{stem}.{extension}"),
@@ -289,17 +290,17 @@ impl FileWords {
 /// Action on a file once its path is known.
 #[derive(Clone, Debug)]
 pub enum Purpose {
-    /// Take up the training saved in it.
+    /// Open the training saved in it.
     Open,
-    /// Tell its path to the view that asked for it.
+    /// Pass its path to the view that asked for it.
     Choose(Sender<PathBuf>),
-    /// Write it about this training, which the worker has.
+    /// Write it about this training, which the worker owns.
     SaveTraining(RunId, ContentsOfRun),
     /// Write it.
     Save(Contents),
 }
 
-/// Writes a file and returns what was written, or why not.
+/// Contents of a file: a function that writes them and returns a message for the user, or the reason why it failed.
 #[derive(Clone)]
 pub struct Contents(Arc<Write>);
 
@@ -308,14 +309,14 @@ type Write = dyn Fn(&Path) -> Result<String, String> + Send + Sync;
 impl Contents {
     /// The contents that `write` writes.
     pub fn new<X: ToString>(write: impl Fn(&Path) -> Result<(), X> + Send + Sync + 'static) -> Self {
-        Self::telling(move |path| {
+        Self::with_message(move |path| {
             let saved = || format!("Saved {}", path.display());
             write(path).map(|()| saved()).map_err(|error| error.to_string())
         })
     }
 
-    /// The contents that `write` writes, which returns the message for the user then.
-    pub fn telling(write: impl Fn(&Path) -> Result<String, String> + Send + Sync + 'static) -> Self {
+    /// The contents that `write` writes; it returns the message for the user.
+    pub fn with_message(write: impl Fn(&Path) -> Result<String, String> + Send + Sync + 'static) -> Self {
         Self(Arc::new(write))
     }
 
@@ -334,7 +335,7 @@ impl fmt::Debug for Contents {
     }
 }
 
-/// Takes from a training what is to be written about it, or says why there is nothing.
+/// Extracts the contents of a file from a training, or the reason why there are none.
 #[derive(Clone)]
 pub struct ContentsOfRun(Arc<Take>);
 
@@ -366,7 +367,8 @@ impl FileTask {
         }
     }
 
-    /// The file about the training `run`, named after `stem`. `take` runs on the worker's thread and leaves the writing to what it returns.
+    /// The file about the training `run`, named after `stem`. `take` runs on the worker's thread; the contents that it
+    /// returns are written on another.
     pub fn save_run(
         words: FileWords,
         stem: &str,
@@ -390,12 +392,12 @@ impl FileTask {
         matches!(self.purpose, Purpose::Open | Purpose::Choose(_))
     }
 
-    /// The word for what is done with it.
+    /// Returns the verb for the action on the file.
     pub fn verb(&self) -> &'static str {
         if self.is_read() { "Open" } else { "Save" }
     }
 
-    /// Returns the path that is suggested to the user.
+    /// Returns the suggested path.
     pub fn suggested_path(&self) -> PathBuf {
         std::env::current_dir().unwrap_or_default().join(&self.suggestion)
     }

@@ -1,6 +1,6 @@
-//! Networks and the reports of their runs as exports, of the current training or of a kept run.
+//! Exports of networks and of reports, of the current training or of a kept run.
 //!
-//! Exports of single decoders, next to where their errors are shown.
+//! Exports of single decoders, offered next to their errors.
 
 use std::{path::Path, sync::Arc};
 
@@ -29,7 +29,7 @@ const NETWORK: BundleDecoder = BundleDecoder::Kind(DecoderKind::Network);
 /// A trained network that can be exported.
 #[derive(Clone, Debug)]
 pub enum NetworkSource {
-    /// Of the current training, which the worker has.
+    /// Of the current training, which the worker owns.
     Training(RunId, Box<Setup>),
     /// Of a past epoch of the current training.
     Past(RunId, Box<Setup>, usize, PastNetworks),
@@ -38,7 +38,7 @@ pub enum NetworkSource {
 }
 
 impl NetworkSource {
-    /// The file that `contents` makes of the network and its record.
+    /// Returns the file with the `contents` made from the network and its record.
     pub(super) fn task(
         &self,
         words: FileWords,
@@ -58,8 +58,7 @@ impl NetworkSource {
                 let take = move |trained: &TrainedRun| {
                     let (run, recorded) = (&trained.run, trained.recorded.as_ref());
                     let network = past.at(epoch, &run.network());
-                    let network =
-                        network.ok_or_else(|| format!("the network of epoch {epoch} is not kept any more"))?;
+                    let network = network.ok_or_else(|| format!("the network of epoch {epoch} is no longer kept"))?;
                     let file = NetworkFile::from_past(run, recorded, &network).map_err(|error| error.to_string())?;
                     Ok(contents(Arc::new(file), None))
                 };
@@ -74,8 +73,8 @@ impl NetworkSource {
     }
 }
 
-/// The network in every form and the report of its run; `source` gives it, or the reason why there is none. `prefix`
-/// comes before every name.
+/// The network in every form and the report of its run; `source` is the network, or the reason why there is none.
+/// `prefix` comes before every name.
 pub fn network_exports<'a>(
     prefix: &str,
     source: &Result<NetworkSource, String>,
@@ -135,7 +134,7 @@ fn bundle_export<'a>(
 
 /// The contents that `export` writes and verifies.
 fn bundle_contents(export: impl Fn(&Path) -> Result<BundleReport, BundleError> + Send + Sync + 'static) -> Contents {
-    Contents::telling(move |path| {
+    Contents::with_message(move |path| {
         export(path)
             .map(|report| said_of(&report))
             .map_err(|error| error.to_string())
@@ -166,8 +165,8 @@ pub(super) fn bundle_words(format: BundleFormat, decoder: BundleDecoder) -> File
         ),
         (BundleFormat::C99, true) => (
             "network as C99",
-            "A folder with one header and one source in C99 and a self-test: readings in, targets out. fixed16 computes in whole \
-             numbers only, for microcontrollers.",
+            "A folder with one header and one source in C99 and a self-test: readings in, targets out. fixed16 uses integer \
+             arithmetic only, for microcontrollers.",
         ),
         (BundleFormat::C99, false) => (
             "decoder as C99",
@@ -194,7 +193,7 @@ pub(super) fn bundle_words(format: BundleFormat, decoder: BundleDecoder) -> File
             "Layers, scaling, array, geometry, training record and errors, as JSON; the terminal commands decode and \
              export read it.",
         ),
-        (BundleFormat::Json, false) => ("decoder", "The numbers of the decoder as JSON, with what they mean."),
+        (BundleFormat::Json, false) => ("decoder", "The parameters of the decoder as JSON, with their meanings."),
     };
     FileWords {
         kind,
@@ -264,7 +263,7 @@ fn report_task(source: &NetworkSource, decoders: Vec<DecoderReport>) -> FileTask
     })
 }
 
-/// A name that tells the files of different runs apart: what the file holds, and of which run. Without extension.
+/// Returns a file name without extension that distinguishes runs: the contents, and the main settings of the run.
 pub fn file_stem(what: &str, setup: &Setup) -> String {
     let source = setup.source_name().replace('×', "x");
     let settings = setup.settings();
@@ -276,7 +275,7 @@ pub fn file_stem(what: &str, setup: &Setup) -> String {
     format!("{what}-{source}-h{hidden}-{method}{starts}-seed{}", settings.seed)
 }
 
-/// Samples and network from which an exported decoder is made.
+/// Samples and network that an exported decoder is made from.
 #[derive(Clone, Debug)]
 pub enum DecoderSource {
     /// Run with a trained network.
@@ -299,7 +298,7 @@ impl DecoderSource {
         };
         match self {
             Self::Run(source) => source.task(words, &what, move |file: Arc<NetworkFile>, _| {
-                Contents::telling(move |path| {
+                Contents::with_message(move |path| {
                     let exported = if decoder.is_network() {
                         Ok(ExportedDecoder::from(&*file))
                     } else {
@@ -311,7 +310,7 @@ impl DecoderSource {
             Self::Samples(setup, recorded) => {
                 let stem = file_stem(&what, setup);
                 let (setup, recorded) = (setup.clone(), recorded.clone());
-                let contents = Contents::telling(move |path| {
+                let contents = Contents::with_message(move |path| {
                     let exported = samples(&setup).and_then(|sets| {
                         sets.check_saved(recorded.as_deref())?;
                         ExportedDecoder::of_setup(&setup, sets, decoder)

@@ -3,19 +3,19 @@ use std::path::{Path, PathBuf};
 use decoupler_files::export::is_same;
 use eframe::egui::{Context, Key, KeyboardShortcut, Modifiers};
 
-/// Something that the user can do, as the list of all actions shows it.
+/// An action of the user, as shown in the list of all actions.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Action {
     /// Its name, a verb first.
     pub name: String,
-    /// The keys that do it too.
+    /// Its keyboard shortcut.
     pub keys: Option<KeyboardShortcut>,
-    /// False if there is nothing to do it with now.
+    /// False if it is not available now.
     pub is_possible: bool,
 }
 
-/// The actions of this frame: who offers an action does it when [`Self::offer`] returns true, because its keys were
-/// pressed or it was picked from the list.
+/// The actions of this frame. The caller that offers an action carries it out when [`Self::offer`] returns true: its keys
+/// were pressed, or it was picked from the list.
 #[derive(Debug)]
 pub struct Offers<'a> {
     ctx: &'a Context,
@@ -25,8 +25,8 @@ pub struct Offers<'a> {
 }
 
 impl<'a> Offers<'a> {
-    /// Nothing offered yet; `picked` is the name of the action picked from the list. While a question waits for its answer
-    /// keys mean nothing else (`hears_keys`).
+    /// Nothing offered yet; `picked` is the name of the action picked from the list. While a question is open, actions
+    /// ignore their keys (`hears_keys` is false).
     pub fn new(ctx: &'a Context, picked: Option<String>, hears_keys: bool) -> Self {
         Self {
             ctx,
@@ -36,19 +36,19 @@ impl<'a> Offers<'a> {
         }
     }
 
-    /// Offers an action that has no keys. Returns true if the user wants it now.
+    /// Offers an action without a shortcut. Returns true if the user invoked it.
     pub fn offer(&mut self, name: impl Into<String>, is_possible: bool) -> bool {
         self.add(name.into(), None, is_possible)
     }
 
-    /// Offers an action that also these keys do. Returns true if the user wants it now.
+    /// Offers an action with this shortcut. Returns true if the user invoked it.
     pub fn offer_keys(&mut self, name: impl Into<String>, modifiers: Modifiers, key: Key, is_possible: bool) -> bool {
         self.add(name.into(), Some(KeyboardShortcut::new(modifiers, key)), is_possible)
     }
 
     fn add(&mut self, name: String, keys: Option<KeyboardShortcut>, is_possible: bool) -> bool {
         let is_picked = self.picked.take_if(|picked| *picked == name).is_some();
-        // What is being typed keeps its own keys.
+        // Text being typed keeps its own keys.
         let may_hear = |keys: &KeyboardShortcut| {
             self.hears_keys && is_possible && !(self.ctx.text_edit_focused() && is_for_typing(keys))
         };
@@ -63,18 +63,18 @@ impl<'a> Offers<'a> {
         is_possible && (is_picked || keys_pressed)
     }
 
-    /// Everything offered, in the order in which it was.
+    /// Returns all actions in the order in which they were offered.
     pub fn into_actions(self) -> Vec<Action> {
         self.actions
     }
 }
 
-/// Returns true for keys with which one writes or repairs what one has written.
+/// Returns true for keys that type or edit text.
 fn is_for_typing(keys: &KeyboardShortcut) -> bool {
     keys.modifiers.is_none() || matches!(keys.logical_key, Key::Z | Key::Y)
 }
 
-/// A file that the program needs, and that nothing is saved over.
+/// A file in use, which must not be overwritten.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum FileInUse {
     /// A recording or another file that is read again.
@@ -88,7 +88,7 @@ pub enum FileInUse {
 }
 
 impl FileInUse {
-    /// Reason for which nothing may be saved over the file at `path`, if this is that file.
+    /// Returns the reason why the file at `path` must not be overwritten, if it is this file.
     fn reason(&self, path: &Path) -> Option<&'static str> {
         let (is_this, reason) = match self {
             Self::Recording(used) => (is_same(used, path), "it is a recording that is open"),
@@ -106,11 +106,10 @@ impl FileInUse {
     }
 }
 
-/// Says why nothing may be saved over the file at `path`, if it is one of `used`, by whatever name. Asks the file system,
-/// which may take its time.
+/// Checks that the file at `path` is not one of `used` under any name. Asks the file system, which may be slow.
 ///
 /// # Errors
-/// If it is one of them, with what to do.
+/// If it is one of them; the message says what to do.
 pub fn refuse_in_use(path: &Path, used: &[FileInUse]) -> Result<(), String> {
     match used.iter().find_map(|used| used.reason(path)) {
         Some(reason) => Err(format!("'{}' is in use: {reason}; give another name", path.display())),
@@ -170,7 +169,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_impossible_is_listed_and_not_done() {
+    fn an_unavailable_action_is_listed_and_not_done() {
         let stop = Some((Modifiers::COMMAND, Key::Period));
         let (actions, done) = frame(Some("Stop"), stop, true);
         assert_eq!(done, [false; 3]);
@@ -181,13 +180,13 @@ mod tests {
     }
 
     #[test]
-    fn an_open_question_hears_the_keys_alone() {
+    fn actions_ignore_keys_while_a_question_is_open() {
         let enter = Some((Modifiers::COMMAND, Key::Enter));
         assert_eq!(frame(None, enter, false).1, [false; 3]);
     }
 
     #[test]
-    fn a_file_in_use_is_refused_by_any_of_its_names_and_others_are_not() {
+    fn a_file_in_use_is_refused_under_any_name_and_others_are_not() {
         let folder = tempfile::tempdir().unwrap();
         let at = |name: &str| folder.path().join(name);
         fs::create_dir(at("kept")).unwrap();

@@ -1,10 +1,9 @@
-//! Every finished training is kept, and all of them survive a restart. A thread of its own keeps their
-//! folder.
+//! The run list: every finished training is kept and survives a restart.
 //!
-//! The thread that keeps the run list in its folder. Requests go in, the list as it then is comes out, which wakes the
-//! window. When the window closes it waits for what is still to be written.
+//! A separate thread keeps the runs in a folder. It answers each request with the updated list, which wakes the window.
+//! When the window closes, it waits for pending writes.
 //!
-//! The one place that changes the run list: at once what is shown, and the folder as soon as the thread can.
+//! The run list is changed only here: the displayed list at once, and the folder as soon as the thread gets to it.
 
 use std::{
     cell::Cell,
@@ -31,7 +30,7 @@ const LONGEST_WRITE: Duration = Duration::from_secs(5);
 pub(super) enum RunsRequest {
     /// Keep the runs in this folder.
     Open(PathBuf),
-    /// See what other windows have changed.
+    /// Take over the changes of other windows.
     Look,
     /// Add a finished training.
     Keep(Arc<NetworkFile>),
@@ -46,7 +45,7 @@ pub(super) enum RunsRequest {
 /// The run list after a request.
 pub(super) struct Listed {
     pub(super) runs: KeptRuns,
-    /// Folder in which they are kept, if they are.
+    /// Folder in which they are kept, if any.
     pub(super) path: Option<PathBuf>,
     /// Files that cannot be read or written.
     pub(super) problems: Vec<String>,
@@ -56,7 +55,7 @@ pub(super) struct Listed {
 pub(super) enum RunsEvent {
     /// The run list after a request.
     Listed(Listed),
-    /// The thread has ended, and why, unless it was to end.
+    /// The thread has ended, with the reason if it was not supposed to.
     Died(Option<JobError>),
 }
 
@@ -95,7 +94,7 @@ impl RunsWorker {
         self.ask(RunsRequest::Open(path));
     }
 
-    /// Shows what other windows have changed.
+    /// Takes over the changes of other windows.
     pub fn look(&self) {
         self.ask(RunsRequest::Look);
     }
@@ -107,14 +106,14 @@ impl RunsWorker {
 
     pub(super) fn ask(&self, request: RunsRequest) {
         if let Some(requests) = &self.requests {
-            // The other end is gone only if the thread died, which is the last event.
+            // The receiver is gone only if the thread died, which is reported as its last event.
             if requests.send(request).is_ok() {
                 self.unanswered.set(self.unanswered.get() + 1);
             }
         }
     }
 
-    /// The next event, if one has come.
+    /// Returns the next event, if one has come.
     pub(super) fn next_event(&self) -> Option<RunsEvent> {
         let event = self.job.next_event()?;
         if let RunsEvent::Listed(_) = event {
@@ -123,7 +122,7 @@ impl RunsWorker {
         Some(event)
     }
 
-    /// Returns true if the last list taken knows of everything that was asked for.
+    /// Returns true if the last list taken includes the effect of every request.
     pub(super) fn is_up_to_date(&self) -> bool {
         self.unanswered.get() == 0
     }
@@ -131,14 +130,14 @@ impl RunsWorker {
 
 impl Drop for RunsWorker {
     fn drop(&mut self) {
-        // The thread ends when everything asked for is done.
+        // The thread ends when all requests are done.
         self.requests = None;
         self.job.wait(LONGEST_WRITE);
     }
 }
 
 fn answer(request: RunsRequest, folder: &mut RunFolder) -> Listed {
-    // Changes are made to what is there now.
+    // Changes apply to the current contents of the folder.
     let mut problems = folder.look();
     match request {
         RunsRequest::Open(path) => match RunFolder::open(&path) {
@@ -182,19 +181,19 @@ pub struct RunList {
 }
 
 impl RunList {
-    /// The run with this number.
+    /// Returns the run with this number.
     pub fn run(&self, id: u64) -> Option<&KeptRun> {
         self.workspace.runs.iter().find(|run| run.id == id)
     }
 
-    /// The run in one of the two places.
+    /// Returns the run in one of the two places.
     pub fn pinned(&self, place: usize) -> Option<&KeptRun> {
         self.run(self.workspace.pinned[place]?)
     }
 }
 
 impl RunList {
-    /// Takes the list from the thread; returns what the user is to be predicted.
+    /// Takes the list from the thread; returns a notice for the user, if any.
     pub fn take_events(&mut self, worker: &RunsWorker) -> Option<Notice> {
         let mut notice = None;
         while let Some(event) = worker.next_event() {

@@ -23,15 +23,15 @@ use crate::window::{
     widgets::{Landmark, ghost_button, primary_button, state_ui, status_progress_ui, with_shortcut},
 };
 
-/// A training as far as the window knows it.
+/// A training as known to the window.
 #[derive(Debug)]
 pub struct RunView {
     /// Its identity.
     pub id: RunId,
     /// Setup it is trained with.
     pub setup: Setup,
-    /// Setup on the left when it began or was continued: as [`Self::setup`], but the epochs are those asked
-    /// for from where it was.
+    /// Setup on the left when it began or was continued: as [`Self::setup`], but with the number of epochs requested
+    /// from that point.
     pub asked: Setup,
     /// Description of the readings and targets.
     pub problem: Arc<Problem>,
@@ -45,11 +45,11 @@ pub struct RunView {
     pub published: Option<PublishedErrors>,
     /// Every epoch of the leader so far.
     pub history: Vec<EpochRecord>,
-    /// Of these, what its curves need.
+    /// The part of the history that the curves need.
     pub outline: EpochOutline,
     /// The methods that the leader went through.
     pub stages: Vec<Stage>,
-    /// State of each start when last reported; empty where there is one only.
+    /// State of each start when last reported; empty if there is only one.
     pub starts: Vec<StartRecord>,
     /// Networks of the epochs so far.
     pub past: PastNetworks,
@@ -57,7 +57,7 @@ pub struct RunView {
     pub result: Option<RunResult>,
     /// Reason for which it ended, if it has.
     pub stop_reason: Option<StopReason>,
-    /// True while it is as in the checkpoint that it was opened from.
+    /// True while it is unchanged since it was opened from a checkpoint.
     pub is_saved: bool,
 }
 
@@ -115,7 +115,7 @@ impl RunView {
         ErrorTable::of_scores(&self.problem, &self.scores(result), self.published.as_ref())
     }
 
-    /// Takes the worker's events.
+    /// Takes the progress reported by the worker.
     pub fn progress(&mut self, progress: Progress) {
         let Progress {
             epochs,
@@ -136,24 +136,24 @@ impl RunView {
         self.result = Some(result);
     }
 
-    /// The latest epoch.
+    /// Returns the latest epoch.
     pub fn latest(&self) -> Option<&EpochRecord> {
         self.history.last()
     }
 }
 
-/// Wish of the user for a training.
+/// Command of the user for a training.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum RunWish {
+pub enum RunCommand {
     /// Begin one.
     Train,
-    /// Go on from the current weights with the settings as they are now.
+    /// Continue from the current weights with the current settings.
     Continue,
-    /// Hold it.
+    /// Pause it.
     Pause,
-    /// Go on with it.
+    /// Resume it.
     Resume,
-    /// End it.
+    /// Stop it.
     Stop,
 }
 
@@ -163,10 +163,10 @@ pub fn run_buttons_ui(
     phase: Phase,
     (can_train, can_continue): (bool, bool),
     hint: &str,
-) -> Option<RunWish> {
-    let mut wish = None;
+) -> Option<RunCommand> {
+    let mut command = None;
     let is_busy = phase.is_busy();
-    // In a narrow window the signs must do.
+    // In a narrow window the buttons show only their symbols.
     let is_short = ui.available_width() < space(120);
     let stop = ui.add_enabled(is_busy, ghost_button(if is_short { "■" } else { "■ Stop" }));
     name(&stop, "■ Stop");
@@ -178,12 +178,12 @@ pub fn run_buttons_ui(
         ))
         .clicked()
     {
-        wish = Some(RunWish::Stop);
+        command = Some(RunCommand::Stop);
     }
     let (text, toggled) = if phase == Phase::Paused {
-        ("▶ Resume", RunWish::Resume)
+        ("▶ Resume", RunCommand::Resume)
     } else {
-        ("⏸ Pause", RunWish::Pause)
+        ("⏸ Pause", RunCommand::Pause)
     };
     let can_pause = matches!(phase, Phase::Training | Phase::Paused);
     let sign = text.split(' ').next().unwrap_or(text);
@@ -193,7 +193,7 @@ pub fn run_buttons_ui(
         .on_hover_text(with_shortcut(ui, "Pauses or resumes the training", Key::P))
         .clicked()
     {
-        wish = Some(toggled);
+        command = Some(toggled);
     }
     let train = ui.add_enabled(can_train && !is_busy, primary_button("▶ Train"));
     Landmark::Train.stands_at(ui, train.rect);
@@ -203,27 +203,27 @@ pub fn run_buttons_ui(
         with_shortcut(ui, &capitalised(hint), Key::Enter)
     };
     if train.on_hover_text(hint).clicked() {
-        wish = Some(RunWish::Train);
+        command = Some(RunCommand::Train);
     }
     if can_continue {
         let hint = "Continues from the current weights with the method and the epochs on the left, counted from here. \
                     Train starts again from random weights.";
-        let go_on = ui.add(ghost_button("Continue"));
-        if go_on.on_hover_text(hint).clicked() {
-            wish = Some(RunWish::Continue);
+        let button = ui.add(ghost_button("Continue"));
+        if button.on_hover_text(hint).clicked() {
+            command = Some(RunCommand::Continue);
         }
     }
-    wish
+    command
 }
 
-/// Gives the button its whole name, for assistive technology.
+/// Gives the button its full name for assistive technology.
 fn name(button: &Response, name: &str) {
     let is_enabled = button.enabled();
     button.widget_info(|| WidgetInfo::labeled(Role::Button, is_enabled, name));
 }
 
-/// Shows the state of the training: phase, epoch, error, speed, time left, and why it stopped; before it how much of a
-/// recording is read.
+/// Shows the state of the training: phase, epoch, error, speed, time left, and why it stopped; before it, the progress of
+/// reading a recording.
 pub fn training_status_ui(ui: &mut Ui, shared: &Shared) {
     let palette = Theme::of(ui).palette;
     ui.horizontal_centered(|ui| {
@@ -252,7 +252,7 @@ pub fn training_status_ui(ui: &mut Ui, shared: &Shared) {
     });
 }
 
-/// Colour and words of the phase.
+/// Returns the colour and text of the phase.
 fn phase_in_words(shared: &Shared, palette: &Palette) -> (Color32, String) {
     let is_recording = shared.source == SourceKind::Recording;
     match shared.phase {

@@ -63,7 +63,7 @@ pub struct RecordingDraft {
 }
 
 impl RecordingDraft {
-    /// Reason for which there is no plan before a file is opened.
+    /// Reason why there is no plan before a file is opened.
     pub const NOTHING_OPEN: &str = "Open a recording first: drop files on the window.";
 }
 
@@ -85,7 +85,7 @@ pub enum Phase {
     Preparing,
     /// Stepping.
     Training,
-    /// Held.
+    /// Paused.
     Paused,
     /// Ended, and why.
     Ended(StopReason),
@@ -154,7 +154,7 @@ impl Shared {
     /// Setup of the next training.
     ///
     /// # Errors
-    /// What is missing, and what to do.
+    /// If something is missing; the message says what to do.
     pub fn setup(&self) -> Result<Setup, String> {
         match self.source {
             SourceKind::Array => Ok(self.draft.into()),
@@ -165,7 +165,7 @@ impl Shared {
         }
     }
 
-    /// Nodes of the current test set: the training's, or the draft's if that has moved on; none of a recording.
+    /// Returns the nodes of the current test set: the training's, or the draft's if it has another one; none for a recording.
     pub fn test(&self) -> Option<&TestView> {
         match &self.preview {
             Some(preview) if self.source == SourceKind::Array => Some(&preview.test),
@@ -173,12 +173,12 @@ impl Shared {
         }
     }
 
-    /// Displayed test samples of a recording.
+    /// Returns the displayed test samples of a recording.
     pub fn recorded_test(&self) -> Option<&RecordedTest> {
         self.shown_run().and_then(|run| run.test.recording())
     }
 
-    /// The current training: none if it is of the other source, or the draft has moved on to another test set.
+    /// Returns the current training; none if it has the other source, or the draft has another test set by now.
     pub fn shown_run(&self) -> Option<&RunView> {
         let run = self.run.as_ref()?;
         let is_recording = run.setup.plan().is_some();
@@ -199,7 +199,7 @@ impl Shared {
     /// must be the same. A paused training is resumed instead, unless the method or the stopping rules change.
     pub fn can_continue(&self) -> bool {
         let Some(run) = self.shown_run() else { return false };
-        let may_go_on = match self.phase {
+        let may_continue = match self.phase {
             Phase::Paused => self.settings().training != run.asked.settings().training,
             Phase::Ended(reason) => reason != StopReason::Diverged,
             _ => false,
@@ -209,7 +209,7 @@ impl Shared {
             training: run.asked.settings().training,
             ..*setup.settings()
         });
-        may_go_on && fixed == run.asked
+        may_continue && fixed == run.asked
     }
 
     /// The current result.
@@ -219,7 +219,7 @@ impl Shared {
 }
 
 /// Settings with which the window opens for the first time: the paper's experiment, but with a ball pressed somewhere
-/// onto the surface, which everybody recognises as touch, in place of nodes that are pressed each by itself.
+/// onto the surface, which is easily recognised as touch, instead of independently pressed nodes.
 pub fn opening_settings() -> SimulatedSettings {
     let paper = SimulatedSettings::default();
     SimulatedSettings {
@@ -237,18 +237,18 @@ pub fn opening_settings() -> SimulatedSettings {
 /// Work that closing the window would cut short.
 #[derive(Debug)]
 pub struct Unfinished {
-    /// Name of the work, which tells it apart from other work of the same view: "Training".
+    /// Name that distinguishes the work from other work of the same view: "Training".
     pub work: &'static str,
     /// Its progress: "epoch 12 of 1000".
     pub progress: String,
     /// Saves what has been done so far, if that is possible.
     pub saving: Option<FileTask>,
-    /// True if its result survives the window once the work has ended.
+    /// True if the result is kept after the window closes once the work has ended.
     pub is_kept: bool,
 }
 
 impl Unfinished {
-    /// Work that can only be discarded, and whose result is gone with the window.
+    /// Work that can only be discarded, and whose result is lost when the window closes.
     pub fn discarded(work: &'static str, progress: String) -> Self {
         Self {
             work,

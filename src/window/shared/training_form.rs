@@ -42,7 +42,7 @@ pub fn method_choice_ui(ui: &mut Ui, method: &mut Method) {
     ui.label(RichText::new(method.description()).size(type_size().note).color(dim));
 }
 
-/// The settings of the chosen method and the number of starts; changes both. A training that is held (`is_new` is false)
+/// The settings of the chosen method and the number of starts; changes both. A paused training (`is_new` is false)
 /// keeps its starts.
 pub fn method_settings_ui(ui: &mut Ui, method: &mut Method, starts: &mut usize, is_new: bool) {
     for setting in method.settings() {
@@ -107,81 +107,81 @@ pub fn stopping_ui(ui: &mut Ui, stopping: &mut StoppingRules) {
     );
 }
 
-/// Request of a view to the window, which carries all of them out in one place once everything is drawn.
+/// Request of a view to the window, which applies all of them in one place once everything is drawn.
 #[derive(Clone, Debug)]
 pub enum Effect {
     /// Change the settings of the next training.
     Configure(Box<SimulatedSettings>),
     /// Change the settings of the next training on a recording.
     ConfigureRecording(Box<RunSettings>),
-    /// Train on this plan of an import from now on, or say what it lacks.
+    /// Use this plan of an import for the next training, or show what it lacks.
     Import(Result<Arc<Plan>, String>),
-    /// Train on a source of this kind from now on.
+    /// Select the kind of source to train on.
     ChooseSource(SourceKind),
-    /// Show the setup of another run as that of the next training.
+    /// Use the setup of another run for the next training.
     TakeSetup(Box<Setup>),
-    /// Show the view that trains.
+    /// Show the Train view.
     ShowTraining,
     /// Begin training.
     Train,
-    /// Take up the training saved in this checkpoint.
+    /// Open the training saved in this checkpoint.
     OpenTraining(PathBuf),
-    /// Show the training that has these settings and whose starts stand so.
+    /// Show the training with this setup and these states of its starts.
     TakeUp(Box<Setup>, Vec<TrainerState>),
-    /// Hold the training.
+    /// Pause the training.
     Pause,
-    /// Go on with it.
+    /// Resume it.
     Resume,
-    /// End it.
+    /// Stop it.
     Stop,
-    /// Go on from the current weights with the method and the epochs of the settings.
+    /// Continue from the current weights with the method and the epochs of the settings.
     Continue,
-    /// Look at all surfaces so.
+    /// Set the look of all surfaces.
     Look(Look),
-    /// Show this snapshot of the results to come.
+    /// Decode this snapshot in the results to come.
     Watch(usize),
     /// Ask for the path of a file.
     ChooseFile(FileTask),
     /// Ask for the path in the window itself.
     TypePath(FileTask),
-    /// Put this text on the clipboard, and tell so.
+    /// Put this text on the clipboard.
     Copy {
         /// The text.
         text: String,
-        /// Sentence that reports so.
+        /// Message for the user.
         notice: String,
     },
-    /// Put this picture on the clipboard, and tell so.
+    /// Put this picture on the clipboard.
     CopyPicture {
         /// The picture.
         figure: Box<Figure>,
-        /// Sentence that reports so.
+        /// Message for the user.
         notice: String,
     },
     /// Keep the run of a network file that was opened.
     KeepRun(Box<NetworkFile>),
-    /// Call the kept run with this number so.
+    /// Rename the kept run with this number.
     RenameRun(u64, String),
     /// Show the kept run with this number in one of the two places, or nothing.
     PinRun(usize, Option<u64>),
-    /// Keep the run with this number no longer.
+    /// Remove the run with this number.
     RemoveRun(u64),
-    /// Tell the user.
+    /// Show a notice to the user.
     Tell(Matter, Notice),
-    /// Withdraw the failures said about this, which have been assigned with.
+    /// Withdraw the failures of this subject, which have been resolved.
     Settle(Matter),
 }
 
-/// Something to tell the user, once.
+/// Notice to the user, shown once.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Notice {
-    /// It worked.
+    /// Success.
     Done(String),
-    /// It did not, and what to do.
+    /// Failure, with what to do.
     Failed(String),
 }
 
-/// Subject of a notice. Work that succeeds takes the failures of the same subject along.
+/// Subject of a notice. A success also withdraws the failures of the same subject.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Matter {
     /// The current training, or one that was to be shown.
@@ -196,16 +196,16 @@ pub enum Matter {
     Clipboard,
     /// The run list.
     RunList,
-    /// The view with the paper's tables and sweeps.
+    /// The Experiments view.
     Experiments,
-    /// The view of what the readings determine.
+    /// The Identifiability view.
     Identifiability,
-    /// The view with what each way of decoding costs.
+    /// The Trade-off view.
     TradeOff,
-    /// Frames decoded as they come.
+    /// The Live view.
     Live,
     /// Files of the recording that is trained on.
     Recording,
-    /// The file by which the next window opens as this one was left.
+    /// The file of the state restored at the next start.
     Memory,
 }

@@ -1,4 +1,4 @@
-//! What the surfaces of all views have in common: their mode, their camera, and the node that is marked on neighbours.
+//! The interface of all views, and the shared state of their surfaces: mode, camera, colours, and the marked node.
 
 use std::{fmt::Debug, path::PathBuf};
 
@@ -23,16 +23,16 @@ use crate::window::{
     widgets::{section_heading_ui, segmented_ui},
 };
 
-/// One of the views. It owns what only it shows and the handles of its own threads; it reads what is shared, and asks the
-/// window for everything else.
+/// One of the views. It owns its private state and the handles of its threads, reads the shared state, and requests
+/// everything else from the window.
 pub trait View: Debug {
-    /// Its name in the top bar.
+    /// Returns its name in the top bar.
     fn name(&self) -> &'static str;
 
-    /// It is displayed.
+    /// Called when the view is displayed.
     fn enter(&mut self, _shared: &Shared) {}
 
-    /// Takes what its threads have to report and follows what is shared, also while another view is displayed.
+    /// Takes the events of its threads and follows the shared state, even while another view is displayed.
     fn take_events(&mut self, _shared: &Shared, _effects: &mut Vec<Effect>) {}
 
     /// Returns true while its threads compute.
@@ -45,20 +45,20 @@ pub trait View: Debug {
         false
     }
 
-    /// Returns the work that closing the window would cut short, also while it is being prepared.
+    /// Returns the work that closing the window would cut short, including work being prepared.
     fn unfinished(&self, _shared: &Shared) -> Vec<Unfinished> {
         Vec::new()
     }
 
-    /// Returns the files that it needs, over which nothing is to be saved.
+    /// Returns the files in use, which must not be overwritten.
     fn files_in_use(&self) -> Vec<FileInUse> {
         Vec::new()
     }
 
-    /// Offers what can be done in it, and does what the user wants of that.
+    /// Offers its actions, and carries out the ones that the user asked for.
     fn offer_actions(&mut self, _offers: &mut Offers<'_>, _shared: &Shared, _effects: &mut Vec<Effect>) {}
 
-    /// Does what the pointer means before anything is drawn, so that all of the window shows it in the same frame.
+    /// Handles the pointer before anything is drawn, so that the whole window shows the effect in the same frame.
     fn take_pointer(&mut self, _ctx: &Context, _shared: &Shared) {}
 
     /// Returns the columns of a window of this width in points.
@@ -69,22 +69,22 @@ pub trait View: Debug {
         }
     }
 
-    /// Its tools at the right of the top bar, from right to left.
+    /// Shows its tools at the right of the top bar, from right to left.
     fn tools_ui(&mut self, _ui: &mut Ui, _shared: &Shared, _effects: &mut Vec<Effect>) {}
 
-    /// Returns everything that it can export, and what it cannot now with the reason. The order is that of the menu;
-    /// forms of one thing follow each other.
+    /// Returns all exports, unavailable ones with the reason, in the order of the menu; forms of the same item follow each
+    /// other.
     fn exports<'a>(&'a self, _shared: &'a Shared) -> Vec<Export<'a>> {
         Vec::new()
     }
 
-    /// Its column on the left.
+    /// Shows its column on the left.
     fn form_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>);
 
-    /// Its column on the right, where [`Self::columns`] has one.
+    /// Shows its column on the right, where [`Self::columns`] has one.
     fn report_ui(&mut self, _ui: &mut Ui, _shared: &Shared, _effects: &mut Vec<Effect>) {}
 
-    /// Its middle.
+    /// Shows its middle.
     fn body_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>);
 
     /// Shows the status line at the bottom: that of the training, unless the view has one of its own.
@@ -113,9 +113,9 @@ pub struct Look {
     pub is_dark: bool,
     /// Colours of values that do not diverge.
     pub colours: SequentialMap,
-    /// Heights that colours and axes span.
+    /// Range of heights that colours and axes span.
     pub heights: HeightScale,
-    /// Errors at the ends of the colours, in millimetres, while they are locked.
+    /// Error at the ends of the colour scale, in millimetres, while it is locked.
     pub error_limit_mm: Option<f64>,
 }
 
@@ -131,10 +131,10 @@ impl Look {
     }
 }
 
-/// Surface shown of a network.
+/// Surface shown for a network.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum RightCard {
-    /// The surface that it found.
+    /// The decoded surface.
     #[default]
     Decoupled,
     /// Its difference from the actual one.
@@ -154,7 +154,7 @@ pub fn follow_surface(shown: &SurfaceViewResponse, look: Look, marked: &mut Opti
         let camera = shown.camera;
         effects.push(Effect::Look(Look { camera, ..look }));
     }
-    // Each card speaks for the pointer only while it is over it, so that the other card's mark stays.
+    // Each card sets the mark only while the pointer is over it, so that it keeps the mark of the other card.
     if shown.response.contains_pointer() && shown.hovered_node != *marked {
         *marked = shown.hovered_node;
         shown.response.ctx.request_repaint();
@@ -179,13 +179,13 @@ pub fn target_choice_ui(ui: &mut Ui, name: &str, id: &str, targets: &[Channel], 
     });
 }
 
-/// Width of the sample of a map, in points.
+/// Width of the sample of a colour map, in points.
 const SAMPLE: f32 = space(16);
 /// Pieces of which it consists.
 const PIECES: usize = 32;
 
-/// The scale of colours in `slot`. A click opens what can be chosen of it: its colours, and whether it is locked. `note` is
-/// shown under the pointer.
+/// The colour scale in `slot`. A click opens its options: the colour map, and whether the scale is locked. `note` is shown
+/// under the pointer.
 pub fn colour_scale_ui(
     ui: &mut Ui,
     slot: Rect,
@@ -219,7 +219,7 @@ pub fn colour_scale_ui(
     }
 }
 
-/// The choices that a scale offers; changes `look`.
+/// The options of a colour scale; changes `look`.
 fn choices_ui(ui: &mut Ui, scale: &ColourScale, look: Look, changed: &mut Look) {
     let theme = Theme::of(ui);
     if scale.quantity.is_diverging() {
@@ -268,7 +268,7 @@ fn choices_ui(ui: &mut Ui, scale: &ColourScale, look: Look, changed: &mut Look) 
     }
 }
 
-/// A map to choose, with a sample of it. Returns true if the user newly picked it.
+/// A choice of a colour map, with a sample. Returns true if the user newly picked it.
 fn map_ui(ui: &mut Ui, map: SequentialMap, chosen: SequentialMap) -> bool {
     let (picked, sample) = ui
         .horizontal(|ui| {

@@ -35,7 +35,7 @@ fn tabs(shared: &Shared, is_narrow: bool, has_readings: bool) -> Vec<(BottomTab,
     tabs.map(short).collect()
 }
 
-/// The charts below the surfaces; the readings are one of them where they have no card of their own.
+/// The charts below the surfaces, including the readings unless they have their own card.
 pub fn charts_card_ui(
     ui: &mut Ui,
     view: &mut TrainView,
@@ -169,7 +169,7 @@ pub fn readings_of_view_ui(ui: &mut Ui, view: &mut TrainView, shared: &Shared) {
 }
 
 impl TrainView {
-    /// Offers each chart, and the steps through what one of them shows.
+    /// Offers each chart, and the steps through sections and bars.
     pub(super) fn offer_charts(&mut self, offers: &mut Offers<'_>, shared: &Shared) {
         // Readings have a card of their own where there is room.
         for (tab, name) in BottomTab::offered(shared, false) {
@@ -261,7 +261,7 @@ impl From<Chart> for Figure {
     }
 }
 
-/// The displayed chart, with what is lit standing out; `None` before there is anything to draw.
+/// Returns the displayed chart with the lit items highlighted; `None` before there is anything to draw.
 pub(super) fn chart(view: &TrainView, shared: &Shared) -> Option<Chart> {
     if view.tab == BottomTab::ErrorMap {
         let charts = view.result(shared)?.charts.as_ref()?;
@@ -325,7 +325,7 @@ fn figure(view: &TrainView, shared: &Shared) -> Option<PlotFigure> {
     })
 }
 
-/// All displayed targets of the sample of a recording, actual and decoded.
+/// Returns the chart of all displayed targets of the sample of a recording, actual and decoded.
 pub(super) fn all_targets_figure(view: &TrainView, shared: &Shared) -> Option<PlotFigure> {
     let (test, result) = (shared.recorded_test()?, view.result(shared)?);
     if view.snapshot >= test.set.samples() {
@@ -348,9 +348,9 @@ pub enum BottomTab {
     ErrorHistogram,
     /// Decoupled against actual z, or decoded against actual values of a target.
     Regression,
-    /// All targets of a sample of a recording, where surfaces take the place above.
+    /// All targets of a sample of a recording, if surfaces are shown above.
     Sample,
-    /// Error over the position, where targets of a recording are a position.
+    /// Error over the position, if targets of a recording are a position.
     ErrorMap,
     /// The nodes of the snapshot: the paper's Fig. 6.
     Nodes,
@@ -361,7 +361,7 @@ pub enum BottomTab {
 }
 
 impl BottomTab {
-    /// The word for the chart in a file's name.
+    /// Returns the word for the chart in file names.
     pub(super) fn file_word(self) -> &'static str {
         match self {
             Self::Loss => "loss",
@@ -395,7 +395,7 @@ impl BottomTab {
         (Self::ErrorMap, "Error map"),
     ];
 
-    /// The charts of the current source, with their names. Readings are among them unless they have a card of their own.
+    /// Returns the charts of the current source with their names, including the readings unless they have their own card.
     pub(super) fn offered(shared: &Shared, has_readings: bool) -> Vec<(Self, &'static str)> {
         let all = match shared.source {
             SourceKind::Array => &Self::OF_ARRAY[..],

@@ -1,7 +1,7 @@
-//! Results of other decoders on the test set: measured on a thread of their own once a training is paused and the
-//! user has unfolded their table, and shown as they come.
+//! Results of other decoders on the test set: measured on a separate thread once a training is paused and the user has
+//! unfolded their table, and shown as they arrive.
 //!
-//! Measures decoders in the background. It ends after the last, or after the one in hand when no one waits for more.
+//! The thread ends after the last decoder, or after the current one if it is cancelled.
 
 use std::{cell::RefCell, path::Path, sync::Arc};
 
@@ -27,7 +27,7 @@ use crate::window::{
 enum MeasuringEvent {
     /// Report of the decoder at this place in the list.
     Measured(usize, Result<DecoderReport, String>),
-    /// Nothing more will come.
+    /// The thread has ended.
     Ended(Result<(), JobError>),
 }
 
@@ -48,8 +48,8 @@ impl DecoderMeasuring {
         }
     }
 
-    /// Takes events, forgets what is of a network that is another one by now, and measures the displayed networks once they
-    /// are paused and their table is unfolded.
+    /// Takes events, discards results of networks that have changed since, and measures the displayed networks once the
+    /// training is paused and the table is unfolded.
     pub fn follow(&mut self, shared: &Shared, state: &mut DecodersState) {
         self.take_events(state);
         let standing = shared.run.as_ref().and_then(|run| {
@@ -84,10 +84,10 @@ impl DecoderMeasuring {
         );
     }
 
-    /// Takes what the thread has to report.
+    /// Takes the events of the thread.
     fn take_events(&mut self, state: &mut DecodersState) {
-        while let Some(news) = self.job.next_event() {
-            match news {
+        while let Some(event) = self.job.next_event() {
+            match event {
                 MeasuringEvent::Measured(place, report) => state.take(place, report),
                 MeasuringEvent::Ended(Ok(())) => {}
                 MeasuringEvent::Ended(Err(error)) => state.end(&format!("{error}: close the table and open it again")),
@@ -135,11 +135,11 @@ pub struct DecodersState {
 /// Result of a decoder.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DecoderResult {
-    /// Which.
+    /// Kind of decoder.
     pub kind: DecoderKind,
-    /// In what its network computes.
+    /// Precision of its network.
     pub precision: Precision,
-    /// Report of the decoder, or why it cannot be used; none while it is still to be measured.
+    /// Report of the decoder, or why it cannot be used; none until it has been measured.
     pub report: Option<Result<DecoderReport, String>>,
 }
 
@@ -156,7 +156,7 @@ impl DecoderResult {
 }
 
 impl DecodersState {
-    /// Returns true while a result is still to come.
+    /// Returns true while a result is missing.
     pub fn is_measuring(&self) -> bool {
         let results = self.measured.iter().flatten();
         results.into_iter().any(|result| result.report.is_none())
@@ -169,7 +169,7 @@ impl DecodersState {
         }
     }
 
-    /// Nothing more will come: what is not there failed for this reason.
+    /// Marks the missing results as failed for this reason.
     pub fn end(&mut self, reason: &str) {
         let results = self.measured.iter_mut().flatten();
         for result in results.filter(|result| result.report.is_none()) {
@@ -178,7 +178,7 @@ impl DecodersState {
     }
 }
 
-/// What is measured of a decoder.
+/// Figure measured for a decoder.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Figure {
     ZPercent,
@@ -191,7 +191,7 @@ enum Figure {
 }
 
 impl Figure {
-    /// The figures of this problem, from left to right.
+    /// Returns the figures for this problem, from left to right.
     fn of(problem: &Problem, has_limit: bool) -> Vec<Self> {
         if !problem.has_nodes {
             return vec![Self::RangePercent, Self::Rmse, Self::R2, Self::FrameTime];
@@ -237,7 +237,7 @@ impl Figure {
         }
     }
 
-    /// The same of the limit.
+    /// Returns the same figure of the limit.
     fn of_limit(self, limit: &Errors) -> Option<f64> {
         match self {
             Self::ZPercent => limit.z_percent,
@@ -248,8 +248,8 @@ impl Figure {
 }
 
 /// The other decoders on the same test set, folded away until the user asks for them, next to the errors `limit` of the
-/// Bayesian reference. `target` is the one whose errors are shown of a recording. Each decoder can be exported as one of
-/// `source`; returns the file asked for.
+/// Bayesian reference. `target` is the target whose errors are shown for a recording. Each decoder can be exported with
+/// `source`; returns the requested file.
 pub fn decoders_ui(
     ui: &mut Ui,
     decoders: &mut DecodersState,
@@ -294,7 +294,7 @@ fn measured_ui(
     source: Option<&DecoderSource>,
 ) -> Option<FileTask> {
     let palette = Theme::of(ui).palette;
-    // Without noise there is no limit but rounding, and nothing to be compared with it.
+    // Without noise the only limit is rounding, so there is nothing to compare with.
     let limit = limit.filter(|limit| !limit.is_rounding());
     if !problem.has_nodes {
         target_choice_ui(ui, "RMSE and R² of", "target of the decoders", &problem.targets, target);
@@ -375,7 +375,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn decoders_that_cannot_be_measured_say_why_and_none_is_left_waiting() {
+    fn decoders_that_cannot_be_measured_say_why_and_none_stays_pending() {
         let mut settings = SimulatedSettings {
             hidden: 2,
             ..SimulatedSettings::default()
@@ -424,7 +424,7 @@ mod tests {
     }
 
     #[test]
-    fn a_decoder_worse_than_the_mean_says_so_with_cause_and_cure() {
+    fn a_decoder_worse_than_the_mean_says_so_with_cause_and_remedy() {
         let mut settings = decoupler_core::evaluation::SimulatedSettings::default();
         settings.source.sensor.scale = "2x3_2x9".parse().unwrap();
         settings.source.samples = 40;
@@ -453,7 +453,7 @@ mod tests {
     }
 
     #[test]
-    fn a_decoder_that_fails_says_why_and_the_others_stand() {
+    fn a_decoder_that_fails_says_why_and_the_others_are_kept() {
         let mut decoders = unfolded();
         decoders.take(0, Err("no resistance at rest".to_owned()));
         let harness = shown(decoders);

@@ -9,7 +9,7 @@ use crate::window::{
 use decoupler_core::{dataset::Dataset, evaluation::node_rms_mm};
 use decoupler_files::figure::{TargetSurface, surface::Surface, target_pairs, z_pairs_mm};
 
-/// Drawings of the current test set. They are made only when that, the result, the snapshot or the target changes.
+/// Drawings of the current test set. They are rebuilt only when it, the result, the snapshot or the target changes.
 #[derive(Debug, Default)]
 pub struct Drawn {
     /// The displayed snapshot.
@@ -20,22 +20,22 @@ pub struct Drawn {
     pub target_surfaces: Option<[Surface; 3]>,
     of: Option<Of>,
     snapshot: usize,
-    /// The target of [`Self::pairs`]; none of the nodes of an array.
+    /// The target of [`Self::pairs`]; none for the nodes of an array.
     target: Option<usize>,
     spread_mm: OnceCell<Vec<f64>>,
     pairs: OnceCell<Vec<(f64, f64)>>,
 }
 
-/// The snapshot being drawn. Of a recording the height of a node is the value of its target, in its unit.
+/// The displayed snapshot. For a recording the height of a node is the value of its target, in its unit.
 #[derive(Clone, Debug, Default)]
 pub struct Frames {
-    /// As it is.
+    /// Actual surface.
     pub actual: Frame,
-    /// As the network finds it, and the difference (decoupled − actual).
+    /// Surface decoded by the network, and its error (decoupled − actual).
     pub decoupled: Option<(Frame, Frame)>,
 }
 
-/// A test set and what the network makes of it.
+/// A test set and the outputs of the network on it.
 #[derive(Debug)]
 struct Of {
     test: Arc<Dataset>,
@@ -53,8 +53,8 @@ impl Of {
 }
 
 impl Drawn {
-    /// Follows the current test set and the network's `result` on it, at the snapshot nearest to the one wished for.
-    /// `target` is the one whose values a recording's charts show. Returns the snapshot.
+    /// Follows the current test set and the network's `result` on it, at the snapshot nearest to `snapshot`.
+    /// `target` is the target whose values the charts of a recording show. Returns the snapshot.
     pub(super) fn follow(
         &mut self,
         shared: &Shared,
@@ -72,7 +72,7 @@ impl Drawn {
         }
     }
 
-    /// Forgets what is of another test set, result or snapshot. Returns true if nothing is left to be drawn.
+    /// Discards drawings of another test set, result or snapshot. Returns true if everything is up to date.
     fn is_drawn(&mut self, test: &Arc<Dataset>, result: Option<&RunResult>, snapshot: usize) -> bool {
         let answers = result.map(|result| &result.answers);
         let is_same = self.of.as_ref().is_some_and(|of| of.is(test, answers));
@@ -81,7 +81,7 @@ impl Drawn {
         }
         if !is_same {
             let is_same_test = self.of.as_ref().is_some_and(|of| Arc::ptr_eq(&of.test, test));
-            // The surface of what is actual stays while the network learns.
+            // The actual surface stays while the network is trained.
             let actual = if is_same_test && self.snapshot == snapshot {
                 std::mem::take(&mut self.frames.actual)
             } else {
@@ -213,7 +213,7 @@ mod tests {
     }
 
     #[test]
-    fn what_the_whole_test_set_is_looked_at_for_is_made_once_for_each_result() {
+    fn drawings_of_the_whole_test_set_are_made_once_per_result() {
         let mut settings = SimulatedSettings {
             hidden: 2,
             ..SimulatedSettings::default()
@@ -246,7 +246,11 @@ mod tests {
             "the last of four snapshots"
         );
         assert_ne!(drawn.frames.actual.nodes_mm, actual);
-        assert_eq!(drawn.pairs().unwrap().as_ptr(), pairs, "not made again for a snapshot");
+        assert_eq!(
+            drawn.pairs().unwrap().as_ptr(),
+            pairs,
+            "not remade for another snapshot"
+        );
         assert_eq!(drawn.spread_mm().unwrap().as_ptr(), spread);
 
         run.step();

@@ -20,7 +20,7 @@ use crate::window::shared::{
     picture_exports,
 };
 
-/// A saved training to go on from.
+/// A saved training that can be resumed.
 pub const CHECKPOINT: FileWords = FileWords {
     kind: "checkpoint",
     description: "The training in its current state, paused or ended. Resumed here or in a terminal (train --checkpoint FILE \
@@ -61,7 +61,7 @@ pub(super) fn open_task(shared: &Shared) -> FileTask {
     }
 }
 
-/// Everything that can be exported of the current training.
+/// Returns all exports of the current training.
 pub(super) fn train_exports<'a>(view: &'a TrainView, shared: &'a Shared) -> Vec<Export<'a>> {
     let shown = shared.shown_run().and_then(|run| Some((run, run.result.as_ref()?)));
     let shown = shown.ok_or_else(|| "Nothing is trained yet: press Train first.".to_owned());
@@ -121,7 +121,7 @@ pub(super) fn train_exports<'a>(view: &'a TrainView, shared: &'a Shared) -> Vec<
     exports
 }
 
-/// What is drawn above the charts: the surfaces, or all targets of a sample.
+/// Returns the figure above the charts: the surfaces, or all targets of a sample.
 fn upper_figure(view: &TrainView, shared: &Shared) -> Figure {
     let surfaces = surface_figure(view, shared);
     match all_targets_figure(view, shared) {
@@ -130,7 +130,7 @@ fn upper_figure(view: &TrainView, shared: &Shared) -> Figure {
     }
 }
 
-/// The best network, and before it that of a past epoch while it is displayed.
+/// Returns the exports of the best network, and before them those of a past epoch while it is displayed.
 fn networks<'a>(view: &'a TrainView, shown: &Result<(&'a RunView, &'a RunResult), String>) -> Vec<Export<'a>> {
     let source = shown
         .as_ref()
@@ -151,16 +151,16 @@ fn networks<'a>(view: &'a TrainView, shown: &Result<(&'a RunView, &'a RunResult)
         .collect();
     if let Some(epoch) = view.scrub.result().map(|past| past.epochs_run) {
         let source = NetworkSource::Past(run.id, Box::new(run.setup.clone()), epoch, run.past.clone());
-        // The decoders were measured next to the best network.
+        // The decoders were measured together with the best network.
         let past = network_exports("", &Ok(source), Vec::new).into_iter();
         let past = past
-            .map(in_group(ExportGroup::NetworkOnShow(epoch)))
+            .map(in_group(ExportGroup::DisplayedNetwork(epoch)))
             .map(|export| Export {
                 name: format!("{} of epoch {epoch}", export.name),
                 ..export
             });
         exports.extend(past);
-        // Each part of the menu for itself.
+        // Each has its own part of the menu.
         exports.sort_by_key(|export| export.group);
     }
     exports
@@ -173,7 +173,7 @@ fn measured(view: &TrainView) -> Vec<DecoderReport> {
     reports.cloned().collect()
 }
 
-/// A figure of the paper that the window can show: its configuration, trained and looked at in its way.
+/// A figure of the paper that the window can show: its configuration, and how its results are displayed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PaperFigure {
     /// Surfaces of 10×10_5×30 from above.
@@ -190,7 +190,7 @@ impl PaperFigure {
     /// In the paper's order.
     pub const ALL: [Self; 4] = [Self::Four, Self::Six, Self::Seven, Self::Eight];
 
-    /// Its array and the way in which it is seen.
+    /// Returns its array and how it is displayed.
     pub fn name(self) -> &'static str {
         match self {
             Self::Four => "10×10, top view",
@@ -234,7 +234,7 @@ impl PaperFigure {
         settings
     }
 
-    /// From where its surfaces are seen; `None` where it shows none.
+    /// Returns how its surfaces are viewed; `None` if it shows none.
     pub fn mode(self) -> Option<ViewMode> {
         match self {
             Self::Four | Self::Eight => Some(ViewMode::Top),
@@ -243,7 +243,7 @@ impl PaperFigure {
         }
     }
 
-    /// Its chart; `None` where it shows none.
+    /// Returns its chart; `None` if it shows none.
     pub fn tab(self) -> Option<BottomTab> {
         (self == Self::Six).then_some(BottomTab::Nodes)
     }

@@ -1,4 +1,4 @@
-//! Reading errors: what the pointer lights up, the section through the surfaces, and the nodes in a bar of the histogram.
+//! Inspecting errors: items lit by the pointer, the section through the surfaces, and the nodes in a bar of the histogram.
 
 use decoupler_core::{evaluation::NodeAddress, text::counted};
 use decoupler_files::{
@@ -31,7 +31,7 @@ pub fn lit_nodes(view: &TrainView, shared: &Shared) -> Vec<usize> {
         .into_iter()
         .flat_map(|row| row * per_row..(row + 1) * per_row);
     let mut nodes: Vec<usize> = of_row.collect();
-    // The bars are those of the test set, not of what is pressed.
+    // The bars are those of the test set, not of a pressed surface.
     if view.tab == BottomTab::ErrorHistogram && !view.press.is_pressing() {
         let of_bar = places_in_bar(view, shared).into_iter().map(|(place, _)| place);
         let of_bar = of_bar.filter(|place| place.snapshot == view.snapshot);
@@ -54,7 +54,7 @@ pub(super) fn places_in_bar(view: &TrainView, shared: &Shared) -> Vec<(TestPlace
     placed.collect()
 }
 
-/// Place of one of the pairs of actual and decoded values.
+/// Returns the place of one of the pairs of actual and decoded values.
 fn place_of_pair(view: &TrainView, shared: &Shared, pair: usize) -> Option<TestPlace> {
     match (shared.test(), shared.recorded_test()) {
         (Some(test), _) => Some(TestPlace::of_node(pair_address(&test.set, pair)?, test)),
@@ -68,8 +68,8 @@ fn place_of_pair(view: &TrainView, shared: &Shared, pair: usize) -> Option<TestP
     }
 }
 
-/// Actual and decoded value that stand out among those of the test set: of the node that is lit, or of the target and the
-/// sample displayed of a recording.
+/// Returns the actual and decoded value that are highlighted among those of the test set: those of the lit node, or for a
+/// recording those of the displayed target and sample.
 fn lit_pair(view: &TrainView, shared: &Shared) -> Option<(f64, f64)> {
     if let Some(test) = shared.recorded_test() {
         let at = [view.snapshot, view.target_of(test)];
@@ -81,7 +81,7 @@ fn lit_pair(view: &TrainView, shared: &Shared) -> Option<(f64, f64)> {
     Some((frames.actual.nodes_mm.get(node)?.z, decoupled.nodes_mm.get(node)?.z))
 }
 
-/// Returns the chart with what is lit standing out.
+/// Returns the chart with the lit items highlighted.
 pub fn with_lights(mut figure: PlotFigure, view: &TrainView, shared: &Shared) -> PlotFigure {
     match view.tab {
         BottomTab::Nodes | BottomTab::Section => {
@@ -109,7 +109,7 @@ pub fn with_lights(mut figure: PlotFigure, view: &TrainView, shared: &Shared) ->
     }
 }
 
-/// Returns the chart of all targets of a sample with the one under the pointer standing out.
+/// Returns the chart of all targets of a sample with the one under the pointer highlighted.
 pub fn with_lit_targets(figure: PlotFigure, view: &TrainView, shared: &Shared) -> PlotFigure {
     let target = shared
         .recorded_test()
@@ -125,7 +125,7 @@ pub fn take_pointed_target(view: &mut TrainView, plots: &[DrawnPlot<'_>], shared
     }
 }
 
-/// Lights up what the pointer is on in a chart, and does what a click there means.
+/// Lights up the item under the pointer in a chart, and handles a click there.
 pub fn take_pointed(view: &mut TrainView, tab: BottomTab, plots: &[DrawnPlot<'_>], shared: &Shared) {
     let Some(plot) = plots.iter().find(|plot| plot.has_pointer) else {
         return;
@@ -144,7 +144,7 @@ pub fn take_pointed(view: &mut TrainView, tab: BottomTab, plots: &[DrawnPlot<'_>
         }
         BottomTab::ErrorHistogram => {
             if plot.clicked.is_some() {
-                // Another click takes it back.
+                // Another click clears the choice.
                 view.lights.bar = plot.clicked.filter(|_| plot.clicked != view.lights.bar);
             }
         }
@@ -152,10 +152,10 @@ pub fn take_pointed(view: &mut TrainView, tab: BottomTab, plots: &[DrawnPlot<'_>
     }
 }
 
-/// The thing under the pointer, in whatever picture: it lights up in all of them.
+/// The item under the pointer in one of the pictures, which lights up in all of them.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Lighting {
-    /// A node, by its number among those drawn; of a recording the target there.
+    /// A node, by its number among those drawn; for a recording the target there.
     pub node: Option<usize>,
     /// A row-wire, by its place among those read: a reading is that of all its nodes.
     pub row: Option<usize>,
@@ -163,7 +163,7 @@ pub struct Lighting {
     pub bar: Option<usize>,
 }
 
-/// Place of a value of the test set: its snapshot, and its node among those drawn. Of a recording the snapshot is a sample,
+/// Place of a value of the test set: its snapshot, and its node among those drawn. For a recording the snapshot is a sample,
 /// and a node a target: by its number on the surface through the targets, or by its own where there is none.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct TestPlace {
@@ -183,7 +183,7 @@ impl TestPlace {
     }
 }
 
-/// Number among the nodes drawn of a target.
+/// Returns the number of a target among the nodes drawn.
 pub fn node_of_target(test: &RecordedTest, target: usize) -> Option<usize> {
     match &test.positions {
         Positions::Surface(through) => through.nodes().iter().position(|node| node.target == target),
@@ -191,7 +191,7 @@ pub fn node_of_target(test: &RecordedTest, target: usize) -> Option<usize> {
     }
 }
 
-/// Target of a node drawn.
+/// Returns the target of a node drawn.
 pub fn target_of_node(test: &RecordedTest, node: usize) -> Option<usize> {
     match &test.positions {
         Positions::Surface(through) => Some(through.nodes().get(node)?.target),
@@ -199,7 +199,7 @@ pub fn target_of_node(test: &RecordedTest, node: usize) -> Option<usize> {
     }
 }
 
-/// Number of nodes that the pointer can light up.
+/// Returns the number of nodes that the pointer can light up.
 pub fn drawn_nodes(shared: &Shared, of_frame: usize) -> usize {
     match shared.recorded_test() {
         Some(test) if !matches!(test.positions, Positions::Surface(_)) => test.set.outputs(),
@@ -318,7 +318,7 @@ pub struct SectionChoice {
     /// Place of the row-wire among those read.
     row: usize,
     column: usize,
-    /// False until somebody chose a wire: before, it is the middle one.
+    /// False until the user chooses a wire; before that it is the middle one.
     is_chosen: bool,
 }
 
@@ -361,7 +361,7 @@ impl SectionChoice {
         }
     }
 
-    /// True if there is a wire before this one (`by` −1) or after it (+1).
+    /// Returns true if there is a wire before this one (`by` −1) or after it (+1).
     pub fn can_step(&self, by: isize, test: &TestView) -> bool {
         let (place, count) = self.place(test);
         place.checked_add_signed(by).is_some_and(|place| place < count)
@@ -454,7 +454,7 @@ pub fn section_bar_ui(ui: &mut Ui, choice: &mut SectionChoice, test: &TestView) 
             ui,
             "‹",
             "Previous section",
-            "Cuts along the wire before ([).",
+            "Cuts along the previous wire ([).",
             choice.can_step(-1, test),
         ) {
             choice.step(-1, test);

@@ -1,4 +1,4 @@
-//! The Train view: one training and what it makes of the sensor.
+//! The Train view: one training and its results.
 
 mod charts_card;
 mod configuration;

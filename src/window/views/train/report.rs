@@ -37,7 +37,7 @@ use crate::window::{
     },
 };
 
-/// The error table, what can be opened, and what it cost. Before a training, what the network has to beat.
+/// The error table, the buttons that open a checkpoint, and the cost of the training. Before a training, the baselines.
 pub fn report_ui(ui: &mut Ui, view: &mut TrainView, shared: &Shared, effects: &mut Vec<Effect>) {
     scrolled_ui(ui, "report", |ui| {
         press_section_ui(ui, &mut view.press, shared);
@@ -97,7 +97,7 @@ fn expectation_ui(ui: &mut Ui, shared: &Shared) {
     }
     let known = shared.preview.as_ref();
     if let Some((preview, baselines)) = known.and_then(|preview| Some((preview, preview.baselines.clone()?))) {
-        // The settings may have moved on to a scene whose figures are still to come.
+        // The settings may have changed to a scene whose baselines are still being computed.
         let (of_preview, of_draft) = (&preview.settings.source, &shared.draft.source);
         let is_of_draft = (of_preview.sensor, of_preview.scene) == (of_draft.sensor, of_draft.scene);
         let published = shared.draft.published().filter(|_| is_of_draft);
@@ -126,7 +126,7 @@ fn expectation_ui(ui: &mut Ui, shared: &Shared) {
 /// The name of the network's row.
 const NETWORK: &str = "network";
 
-/// Reports where the network loses and what would help, or by how much it wins; nothing while it is being trained.
+/// Reports where a baseline is better and what would help, or by how much the network is better; nothing during training.
 fn verdict_ui(ui: &mut Ui, shared: &Shared, run: &RunView, result: &RunResult) {
     let Some(reason) = run.stop_reason else { return };
     ui.add_space(space(2));
@@ -141,7 +141,7 @@ fn verdict_ui(ui: &mut Ui, shared: &Shared, run: &RunView, result: &RunResult) {
     }
 }
 
-/// What the errors of a recording do not show, or by how much the network is better than ridge regression.
+/// Remarks on the errors of a recording, or by how much the network is better than ridge regression.
 fn verdict_on_targets_ui(ui: &mut Ui, run: &RunView, result: &RunResult) {
     let defect = result.defect.as_ref().map(|defect| capitalised(&defect.to_string()));
     for remark in defect.iter().chain(&result.remarks) {
@@ -248,11 +248,11 @@ fn cost_ui(ui: &mut Ui, run: &RunView, result: &RunResult) {
     } else {
         "Training"
     };
-    let told = |time: Option<Duration>| time.map_or_else(|| "–".to_owned(), format_duration);
-    let mut rows = vec![(training, told(result.wall_time))];
+    let text = |time: Option<Duration>| time.map_or_else(|| "–".to_owned(), format_duration);
+    let mut rows = vec![(training, text(result.wall_time))];
     if epochs > 0 {
         let an_epoch = result.wall_time.map(|time| time.div_f64(epochs as f64));
-        rows.push(("Time per epoch", told(an_epoch)));
+        rows.push(("Time per epoch", text(an_epoch)));
     }
     rows.push(("Best epoch", result.best_epoch.to_string()));
     if let Some(time) = result.frame_time {
@@ -298,7 +298,7 @@ fn is_badly_conditioned(outlook: &Outlook) -> bool {
     outlook.worst_row.condition() >= Identifiability::LARGEST_CONDITION
 }
 
-/// Says that the scene is ill-conditioned, lest its errors be taken for the network's fault.
+/// Notes that the scene is ill-conditioned, so that its errors are not blamed on the network.
 pub fn conditioning_ui(ui: &mut Ui, test: &TestView) {
     let Some(outlook) = test.outlook.as_ref().filter(|outlook| is_badly_conditioned(outlook)) else {
         return;
@@ -309,8 +309,8 @@ pub fn conditioning_ui(ui: &mut Ui, test: &TestView) {
         _ => "infinite".to_owned(),
     };
     let text = format!(
-        "This scene is ill-conditioned (condition number {condition}): whatever the decoder, some deformations cannot \
-         be told apart. The note under Scene says what to change."
+        "This scene is ill-conditioned (condition number {condition}): no decoder can \
+         distinguish some deformations. The note under Scene says what to change."
     );
     note_ui(ui, &text);
 }

@@ -1,5 +1,5 @@
-//! Scrubbing: the networks of past epochs, brought back by a slider under the loss curves or replayed one after the
-//! other. What they make of the test set is computed in the background, the newest wish first.
+//! Scrubbing: the networks of past epochs, selected with a slider under the loss curves or replayed one after the other.
+//! Their results on the test set are computed in the background; the latest request wins.
 
 use std::{sync::Arc, time::Duration};
 
@@ -24,9 +24,9 @@ const REPLAY_SECONDS: f64 = 6.0;
 /// The displayed past epoch, if one is.
 #[derive(Debug)]
 pub struct ScrubState {
-    /// The training that it is of.
+    /// The training of the epoch.
     of: Option<RunId>,
-    /// The epoch wished for; `None` for the latest.
+    /// Requested epoch; `None` for the latest.
     wanted: Option<usize>,
     /// Result of the network of an epoch.
     result: Option<RunResult>,
@@ -36,7 +36,7 @@ pub struct ScrubState {
 }
 
 impl ScrubState {
-    /// On the latest epoch. `wake` is called when a result is there.
+    /// Starts on the latest epoch. `wake` is called when a result is there.
     pub fn new(wake: Wake) -> Self {
         Self {
             of: None,
@@ -47,17 +47,17 @@ impl ScrubState {
         }
     }
 
-    /// The result of the displayed past epoch; `None` while the latest is.
+    /// Returns the result of the displayed past epoch; `None` while the latest is displayed.
     pub fn result(&self) -> Option<&RunResult> {
         self.result.as_ref().filter(|_| self.wanted.is_some())
     }
 
-    /// The epoch wished for; `None` for the latest.
+    /// Returns the requested epoch; `None` for the latest.
     pub fn epoch(&self) -> Option<usize> {
         self.wanted
     }
 
-    /// Returns true while epochs follow each other.
+    /// Returns true while a replay is running.
     pub fn is_replaying(&self) -> bool {
         self.replay.is_some()
     }
@@ -73,7 +73,7 @@ impl ScrubState {
         (self.wanted, self.replay) = (None, None);
     }
 
-    /// Replays from the displayed epoch, or from the first one; or stops there.
+    /// Starts a replay at the displayed past epoch, or at the first one; stops a running replay.
     pub fn toggle_replay(&mut self, now_seconds: f64, past: &PastNetworks) {
         self.replay = match self.replay {
             Some(_) => None,
@@ -84,7 +84,7 @@ impl ScrubState {
         };
     }
 
-    /// Shows the epoch that the replay has come to. Early epochs change most, so it runs by their logarithm.
+    /// Shows the current epoch of the replay. Early epochs change most, so it advances on a logarithmic scale.
     pub fn replay(&mut self, now_seconds: f64, past: &PastNetworks) {
         let (Some((begun, first)), Some(last)) = (self.replay, past.epochs().next_back()) else {
             return;
@@ -98,7 +98,7 @@ impl ScrubState {
         self.show(epoch.round() as usize, past);
     }
 
-    /// Leaves an epoch of another training, and computes what the one wished for makes of the test set.
+    /// Leaves an epoch of another training, and computes the results of the requested epoch on the test set.
     pub fn follow(&mut self, shared: &Shared) {
         let run = shared.shown_run();
         let id = run.map(|run| run.id);
@@ -130,7 +130,7 @@ impl ScrubState {
         let Some(present) = &run.result else { return };
         let (past, networks, test) = (run.past.clone(), Arc::clone(&present.networks), run.test.clone());
         let (is_idle, source) = (present.is_idle, run.settings().source);
-        // The displayed surface is laid there too, as with the training's own results.
+        // The displayed snapshot is decoded too, as in the results of the training itself.
         let snapshot = present.frame.as_ref().map_or(0, |(snapshot, _)| *snapshot);
         self.job.start(
             move |_| {
@@ -249,7 +249,7 @@ fn epoch_slider_ui(ui: &mut Ui, scrub: &mut ScrubState, past: &PastNetworks, las
     }
     slider.widget_info(|| WidgetInfo::slider(true, epochs[place.min(last)] as f64, "Epoch of the displayed network"));
     if place != shown {
-        // The hand takes over from the replay.
+        // Dragging stops the replay.
         if scrub.is_replaying() {
             scrub.toggle_replay(0.0, past);
         }
@@ -257,10 +257,10 @@ fn epoch_slider_ui(ui: &mut Ui, scrub: &mut ScrubState, past: &PastNetworks, las
         ui.request_repaint();
     }
     let hint = match past.stride() {
-        1 => "Brings back the network that a training stopped at this epoch would have kept.".to_owned(),
+        1 => "Shows the network that a training stopped at this epoch would have kept.".to_owned(),
         stride => format!(
-            "Brings back the network that a training stopped at this epoch would have kept. Every {stride}th is \
-             remembered, so that they take no more than {} MB.",
+            "Shows the network that a training stopped at this epoch would have kept. Every {stride}th epoch is \
+             stored, to use no more than {} MB.",
             PastNetworks::MAX_BYTES >> 20
         ),
     };

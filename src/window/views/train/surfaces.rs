@@ -1,4 +1,4 @@
-//! What takes the place of the surfaces where a recording has none: all displayed targets of the sample.
+//! The surfaces of the Train view, or all displayed targets of the sample if a recording has no surfaces.
 
 use std::ops::RangeInclusive;
 
@@ -36,7 +36,7 @@ const HANDS: [(Hand, &str, &str); 2] = [
     (Hand::Turn, "Turn", "Drag to turn the surface; the wheel zooms."),
 ];
 
-/// Both surfaces side by side, and the scale of their colours; where a recording has none, all targets of the sample.
+/// Both surfaces side by side with their colour scale; all targets of the sample if a recording has no surfaces.
 pub fn surfaces_ui(ui: &mut Ui, rect: Rect, view: &mut TrainView, shared: &Shared, effects: &mut Vec<Effect>) {
     if shared.source == SourceKind::Recording && !has_target_surface(shared) {
         card_ui(ui, rect, |ui| sample_card_ui(ui, view, shared));
@@ -59,16 +59,16 @@ pub fn surfaces_ui(ui: &mut Ui, rect: Rect, view: &mut TrainView, shared: &Share
     }
 }
 
-/// The displayed surfaces of the snapshot: the actual one, and once there is a network what its card shows.
+/// Returns the displayed surfaces of the snapshot: the actual one, and the one of the network if there is one.
 pub fn surface_figure(view: &TrainView, shared: &Shared) -> SurfaceFigure {
     let (frames, style) = (view.frames(), shared.look.style());
     let of_array = |test: &TestView| {
-        let beside = frames.decoupled.as_ref().map(|(decoupled, error)| match view.right {
+        let right = frames.decoupled.as_ref().map(|(decoupled, error)| match view.right {
             RightCard::Decoupled => test.heights("Decoupled", decoupled, style),
             RightCard::Error => test.errors("Error", error, style),
         });
         let actual = test.heights("Actual", &frames.actual, style);
-        std::iter::once(actual).chain(beside).collect()
+        std::iter::once(actual).chain(right).collect()
     };
     SurfaceFigure {
         surfaces: shared
@@ -82,17 +82,17 @@ pub fn surface_figure(view: &TrainView, shared: &Shared) -> SurfaceFigure {
     .with_common_scales()
 }
 
-/// The surfaces through the targets of a recording.
+/// Returns the surfaces through the targets of a recording.
 fn target_surfaces(view: &TrainView, look: Look) -> Vec<Surface> {
     let Some([actual, decoded, error]) = &view.drawn.target_surfaces else {
         return Vec::new();
     };
-    let beside = match view.right {
+    let right = match view.right {
         RightCard::Decoupled => decoded,
         RightCard::Error => error,
     };
     let has_result = view.drawn.frames.decoupled.is_some();
-    let shown = std::iter::once(actual).chain(has_result.then_some(beside));
+    let shown = std::iter::once(actual).chain(has_result.then_some(right));
     let looking = |surface: &Surface| Surface {
         mode: look.mode,
         colours: look.colours,
@@ -107,7 +107,7 @@ fn target_surfaces(view: &TrainView, look: Look) -> Vec<Surface> {
     shown.map(looking).collect()
 }
 
-/// Smallest and largest value at the nodes.
+/// Returns the smallest and largest value at the nodes.
 fn range_of_nodes(surface: &Surface) -> Option<RangeInclusive<f64>> {
     let values = || {
         surface
@@ -119,21 +119,21 @@ fn range_of_nodes(surface: &Surface) -> Option<RangeInclusive<f64>> {
     Some(values().reduce(f64::min)?..=values().reduce(f64::max)?)
 }
 
-/// The line of the section, while that is displayed.
+/// Returns the line of the section while it is displayed.
 fn section(view: &TrainView, shared: &Shared) -> Option<Section> {
     let test = shared.test().filter(|_| view.tab == BottomTab::Section)?;
     Some(view.section.section(test))
 }
 
-/// The invitation of a card without a network: to press, which a small one answers, or to train.
+/// The invitation on a card without a network: to press, which a small network answers, or to train.
 fn invitation_ui(ui: &mut Ui, view: &mut TrainView, shared: &Shared) {
     let text = if view.press.is_pressing() {
         view.press.waiting_text(shared)
     } else if shared.phase.is_busy() {
-        "What the network makes of the readings appears here with its first epoch. Meanwhile, press the surface on the left."
+        "The decoded surface appears here with the first epoch. Meanwhile, press the surface on the left."
     } else {
-        "Press the surface on the left: what a network makes of its readings appears here. Or train your own, which \
-         takes shape here while it learns."
+        "Press the surface on the left: a network decodes its readings here. Or train your own and watch \
+         its surface take shape here."
     };
     placeholder_ui(ui, text);
     if view.press.is_pressing() {
@@ -151,7 +151,7 @@ fn invitation_ui(ui: &mut Ui, view: &mut TrainView, shared: &Shared) {
     }
 }
 
-/// The card's title, where the options next to it, `options_width` wide, leave room for it.
+/// The title of the card, if the options next to it, `options_width` wide, leave room for it.
 fn title_ui(ui: &mut Ui, title: &str, note: &str, options_width: f32) {
     let font = semibold(type_size().title);
     let galley = ui
@@ -262,7 +262,7 @@ fn surface_ui(
             .outline_ui(painter, &theme.palette, shown.response.hover_pos(), test.stroke_mm);
     }
     follow_surface(&shown, look, &mut view.lights.node, effects);
-    // What is pressed is cut too.
+    // A pressed surface is cut too.
     let is_chosen = shown.response.clicked() || (is_touched && shown.response.is_pointer_button_down_on());
     if let (true, true, Some(test), Some(at), Some(sight)) = (
         view.tab == BottomTab::Section,
@@ -282,10 +282,10 @@ fn surface_ui(
     });
 }
 
-/// Words about a node and its value.
+/// Description of a node and its values.
 struct NodeWords {
     name: String,
-    /// Name of the actual value, and of the one found.
+    /// Names of the actual and of the decoded value.
     values: [&'static str; 2],
     /// With a space before it; empty for none.
     unit: String,

@@ -21,8 +21,8 @@ use super::{
 use crate::window::{
     job::Wake,
     shared::{
-        Columns, Effect, Export, FileInUse, Look, Matter, Notice, Offers, Phase, RightCard, RunResult, RunView,
-        RunWish, Shared, SourceKind, Unfinished, View, run_buttons_ui,
+        Columns, Effect, Export, FileInUse, Look, Matter, Notice, Offers, Phase, RightCard, RunCommand, RunResult,
+        RunView, Shared, SourceKind, Unfinished, View, run_buttons_ui,
     },
     test_view::RecordedTest,
     theme::space,
@@ -126,13 +126,13 @@ impl View for TrainView {
             SourceKind::Array => "draws the sets and trains the network",
             SourceKind::Recording => "reads the recording and trains the network",
         };
-        let wish = run_buttons_ui(ui, shared.phase, (can_train, shared.can_continue()), hint);
-        effects.extend(wish.map(|wish| match wish {
-            RunWish::Train => Effect::Train,
-            RunWish::Continue => Effect::Continue,
-            RunWish::Pause => Effect::Pause,
-            RunWish::Resume => Effect::Resume,
-            RunWish::Stop => Effect::Stop,
+        let command = run_buttons_ui(ui, shared.phase, (can_train, shared.can_continue()), hint);
+        effects.extend(command.map(|command| match command {
+            RunCommand::Train => Effect::Train,
+            RunCommand::Continue => Effect::Continue,
+            RunCommand::Pause => Effect::Pause,
+            RunCommand::Resume => Effect::Resume,
+            RunCommand::Stop => Effect::Stop,
         }));
         ui.add_space(space(4));
         let what = snapshot_word(shared.source);
@@ -171,7 +171,7 @@ impl View for TrainView {
     }
 }
 
-/// The word for what the test set consists of.
+/// Returns the word for an item of the test set.
 fn snapshot_word(source: SourceKind) -> &'static str {
     match source {
         SourceKind::Array => "snapshot",
@@ -179,7 +179,7 @@ fn snapshot_word(source: SourceKind) -> &'static str {
     }
 }
 
-/// The training that is being prepared, or has epochs that are nowhere saved.
+/// Returns the training if it is being prepared or has unsaved epochs.
 fn unfinished_training(shared: &Shared) -> Option<Unfinished> {
     let training = |progress, saving| Unfinished {
         work: "Training",
@@ -212,16 +212,16 @@ fn unfinished_training(shared: &Shared) -> Option<Unfinished> {
 /// Position of the report.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum WorkbenchLayout {
-    /// In a column of its own, right of the workbench.
+    /// In its own column, right of the workbench.
     ReportBeside,
-    /// On a card below the surfaces, next to the charts: narrow windows leave the surfaces their width.
+    /// On a card below the surfaces, next to the charts, so that the surfaces keep their width in narrow windows.
     ReportBelow,
 }
 
 impl WorkbenchLayout {
-    /// That of a window this many points wide.
+    /// Returns the position in a window of this width in points.
     pub fn of_width(width: f32) -> Self {
-        /// A column next to the surfaces must leave them this window.
+        /// Window width from which a column next to the surfaces leaves them enough room.
         const MIN_FOR_COLUMN: f32 = 1400.0;
         if width < MIN_FOR_COLUMN {
             Self::ReportBelow
@@ -275,17 +275,17 @@ pub struct TrainView {
     pub snapshot: usize,
     /// Target of a recording whose values the charts show.
     pub(super) target: usize,
-    /// The snapshot that the worker was informed of.
+    /// Snapshot last sent to the worker.
     pub(super) watched: usize,
     /// Surface shown on the right-hand card.
     pub right: RightCard,
     /// The chart below.
     pub tab: BottomTab,
-    /// The thing that the pointer lights up in every picture.
+    /// Item lit by the pointer, in every picture.
     pub lights: Lighting,
     /// The wire along which the surfaces are cut.
     pub section: SectionChoice,
-    /// True if each decoupled node has a bar of its root mean square error.
+    /// True if each decoupled node has an error bar of its root mean square error.
     pub has_error_bars: bool,
     /// Drawings of the test set.
     pub drawn: Drawn,
@@ -293,7 +293,7 @@ pub struct TrainView {
     pub press: PressState,
     /// The displayed past epoch.
     pub scrub: ScrubState,
-    /// Recording that is trained on.
+    /// Editor of the recording that is trained on.
     pub(in crate::window) recording: RecordingEditor,
     /// Results of other decoders on the test set.
     pub decoders: DecodersState,
@@ -332,17 +332,17 @@ impl TrainView {
         self.lights.node = self.lights.node.filter(|&node| node < nodes);
     }
 
-    /// The current result: of the training so far, or of the past epoch that was brought back.
+    /// Returns the current result: that of the training so far, or of the displayed past epoch.
     pub fn result<'a>(&'a self, shared: &'a Shared) -> Option<&'a RunResult> {
         result_of(&self.scrub, shared)
     }
 
-    /// The displayed surfaces: those under the finger, or those of the test set.
+    /// Returns the displayed surfaces: those under the finger, or those of the test set.
     pub fn frames(&self) -> &Frames {
         self.press.frames().unwrap_or(&self.drawn.frames)
     }
 
-    /// Drops of the readings of the displayed surface below those at rest, in percent: rows read × M4.
+    /// Returns the drops of the readings of the displayed surface from those at rest, in percent: rows read × M4.
     pub fn drops_percent(&self) -> Option<&Array2<f64>> {
         match self.press.shown() {
             Some(shown) => shown.drops_percent.as_ref(),
@@ -356,14 +356,14 @@ impl TrainView {
         self.press.let_go();
     }
 
-    /// Number of snapshots of the current test set: frames of an array, samples of a recording.
+    /// Returns the number of snapshots of the current test set: frames of an array, samples of a recording.
     pub(super) fn snapshots(shared: &Shared) -> usize {
         let of_recording = || shared.recorded_test().map(|test| test.set.samples());
         let of_array = shared.test().map(|test| test.snapshots.len());
         of_array.or_else(of_recording).unwrap_or(0)
     }
 
-    /// Target of `test` whose values the charts show: the one chosen, or the last.
+    /// Returns the target of `test` whose values the charts show: the one chosen, or the last.
     pub(super) fn target_of(&self, test: &RecordedTest) -> usize {
         self.target.min(test.set.outputs().saturating_sub(1))
     }
@@ -379,7 +379,7 @@ impl TrainView {
         self.lights.node = place.node;
     }
 
-    /// Looks at a figure of the paper, and trains what it shows unless that is there.
+    /// Displays a figure of the paper, and trains its network unless that is the current one.
     pub(super) fn show_paper_figure(&mut self, figure: PaperFigure, shared: &Shared, effects: &mut Vec<Effect>) {
         let settings = figure.settings();
         effects.push(Effect::Configure(Box::new(settings)));

@@ -1,4 +1,4 @@
-//! The folded parts of the configuration, in a few words each.
+//! The configuration form, with a short summary of each folded part.
 
 use decoupler_core::{
     evaluation::{Measured, Outlook, Preset, RunSettings, SimulatedSettings, Simulation},
@@ -26,8 +26,7 @@ use crate::window::{
     },
 };
 
-/// The source and the settings of the next training. Returns the paper's figure that is to be shown, if the user picked
-/// one.
+/// The source and the settings of the next training. Returns the figure of the paper that the user picked, if any.
 pub fn configuration_ui(
     ui: &mut Ui,
     recording: &mut RecordingEditor,
@@ -98,7 +97,7 @@ fn array_ui(ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) -> Option<P
         fold_ui(ui, "Scene", &of_scene(&draft), |ui| {
             scene_section_ui(ui, &mut draft, outlook(shared));
         });
-        // How many samples are best depends on whether there is noise.
+        // The best number of samples depends on the noise.
         if let Some(preset) = followed.filter(|_| draft.source.scene.noise != scene.noise) {
             draft = applied(preset, &draft);
         }
@@ -200,7 +199,7 @@ fn reset_ui<S: Copy + PartialEq>(
     }
 }
 
-/// Returns the outlook of the scene of the draft, where it is known.
+/// Returns the outlook of the scene of the draft, if it is known.
 fn outlook(shared: &Shared) -> Option<&Outlook> {
     let (settings, test) = match (&shared.preview, &shared.run) {
         (Some(preview), _) => (preview.settings, &preview.test),
@@ -231,7 +230,7 @@ fn paper_section_ui(ui: &mut Ui) -> Option<PaperFigure> {
     picked
 }
 
-/// Shows the presets on which the settings are based; changes `draft`.
+/// Shows the presets of the settings; changes `draft`.
 pub fn preset_section_ui(ui: &mut Ui, draft: &mut SimulatedSettings) {
     ui.add_space(space(2));
     let options = [
@@ -255,12 +254,12 @@ pub fn preset_section_ui(ui: &mut Ui, draft: &mut SimulatedSettings) {
     }
 }
 
-/// The preset that `draft` follows, if any.
+/// Returns the preset that `draft` follows, if any.
 pub fn present(draft: &SimulatedSettings) -> Option<Preset> {
     Preset::ALL.into_iter().find(|&preset| applied(preset, draft) == *draft)
 }
 
-/// `draft` with what `preset` decides: how readings are decoded and trained on, not what happens to the sensor.
+/// Returns `draft` with the settings of `preset`: how readings are decoded and trained on, not the scene.
 pub fn applied(preset: Preset, draft: &SimulatedSettings) -> SimulatedSettings {
     let settings = preset.settings_in(draft.source.scene.noise);
     SimulatedSettings {
@@ -310,13 +309,13 @@ pub(super) fn of_samples(draft: &SimulatedSettings) -> String {
     )
 }
 
-/// Height, and whether anything else differs from what is assumed.
+/// Height, and whether the geometry differs from the assumed one.
 pub(super) fn of_geometry(geometry: &Geometry) -> String {
     let height = input_text(geometry.height_mm);
     if *geometry == Geometry::default() {
         format!("assumed, {height} mm high")
     } else {
-        format!("yours, {height} mm high")
+        format!("custom, {height} mm high")
     }
 }
 
@@ -449,7 +448,7 @@ pub fn array_inputs_ui(ui: &mut Ui, draft: &mut SimulatedSettings) {
     let scale = draft.source.sensor.scale;
     let varying_axes = match (draft.source.scene.movement, draft.source.scene.rows) {
         (Movement::Xyz { .. }, _) => 3,
-        // Without knowing the row a network must find its x, which differs from row to row; y never does.
+        // Without the row number a network must find x, which differs from row to row; y never does.
         (Movement::Z, Rows::All) if scale.rows() > 1 => 2,
         (Movement::Z, _) => 1,
     };
@@ -458,7 +457,7 @@ pub fn array_inputs_ui(ui: &mut Ui, draft: &mut SimulatedSettings) {
 }
 
 /// The inputs of the network of a recording with these numbers of inputs and targets, and its size; changes `settings`. One
-/// network per row-wire is offered if a column has their numbers.
+/// network per row-wire is offered if a column contains the row numbers.
 pub fn recording_inputs_ui(
     ui: &mut Ui,
     settings: &mut RunSettings,
@@ -502,7 +501,7 @@ fn weights_ui<S>(ui: &mut Ui, settings: &RunSettings<S>, (inputs, outputs): (usi
         hidden: settings.hidden,
         outputs,
     };
-    // Components that do not vary are left out, which only the samples show.
+    // Components that do not vary are left out, which is known only from the samples.
     let at_most = match settings.inputs.scaling {
         ScalingChoice::MinMax => "",
         ScalingChoice::Whitening => "at most ",

@@ -1,4 +1,4 @@
-//! The settings of the next training: array scale, hidden nodes and method first, the rest folded beneath them in the
+//! The settings of the next training: array scale, hidden nodes and method first, the rest folded below them in the
 //! order of the pipeline.
 
 mod form;

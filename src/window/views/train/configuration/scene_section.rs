@@ -257,7 +257,7 @@ fn condition_ui(ui: &mut Ui, outlook: Option<&Outlook>) {
     dim_ui(ui, &text).on_hover_text(glossary::CONDITION_NUMBER.hint);
 }
 
-/// Shows the warnings of the scene, which stand there also while its settings are folded away.
+/// Shows the warnings of the scene, which stay visible while its settings are folded away.
 pub fn outlook_notes_ui(ui: &mut Ui, draft: &SimulatedSettings, outlook: Option<&Outlook>) {
     let Some(outlook) = outlook else { return };
     let sideways = draft.source.scene.movement != Movement::Z;
@@ -269,13 +269,13 @@ pub fn outlook_notes_ui(ui: &mut Ui, draft: &SimulatedSettings, outlook: Option<
     }
 }
 
-/// Returns the effect of sideways shifts on the readings, in words.
+/// Returns the effect of sideways shifts on the readings as a sentence.
 fn sideways_in_words(outlook: &Outlook) -> String {
     if outlook.noise.total() > 0.0 {
         let spread = format_number(outlook.worst_spread_mm);
         format!("With this noise, the worst-seen movement is known only to ±{spread} mm.")
     } else {
-        // One millimetre of the movement seen worst against the reading it changes.
+        // Relative change of the readings for 1 mm of the worst-seen movement.
         let change = format_number(100.0 * outlook.worst_row.worst_spread_mm(1.0).recip());
         format!(
             "Sideways shifts are hard to see: 1 mm of the worst-seen movement changes the readings by {change} %. \
@@ -284,10 +284,10 @@ fn sideways_in_words(outlook: &Outlook) -> String {
     }
 }
 
-/// The scenes that stand ready, one click each; changes `draft`. Everything else about a scene is folded beneath them.
+/// The ready-made scenes, one click each; changes `draft`. All other settings of a scene are folded below them.
 pub fn scene_choice_ui(ui: &mut Ui, draft: &mut SimulatedSettings) {
     ui.add_space(space(1));
-    // Which rows share a network is the preset's.
+    // The preset decides which rows share a network.
     let scene = &mut draft.source.scene;
     let [print, paper] = [opening_settings().source.scene, Scene::default()].map(|ready| Scene {
         rows: scene.rows,
@@ -297,17 +297,17 @@ pub fn scene_choice_ui(ui: &mut Ui, draft: &mut SimulatedSettings) {
         (
             print,
             "Indenter's print",
-            "Each sample is the print of a ball of 2 to 6 mm radius, pressed somewhere onto the surface: what a touch \
-             looks like.",
+            "Each sample is the print of a ball of 2 to 6 mm radius, pressed somewhere onto the surface: as a touch \
+             would leave it.",
         ),
         (paper, "Paper's scene", glossary::RANDOM_NODES.hint),
     ];
-    if let Some(picked) = explained_options_ui(ui, "Ready scenes", &options, *scene, true) {
+    if let Some(picked) = explained_options_ui(ui, "Ready-made scenes", &options, *scene, true) {
         *scene = picked;
     }
 }
 
-/// Shows the noise of the readings; changes `noise`. A line tells it where the settings are folded away.
+/// Shows the noise of the readings; changes `noise`. A line summarises it while the settings are folded away.
 pub fn noise_ui(ui: &mut Ui, noise: &mut Noise) {
     let shown = CollapsingHeader::new("Noise on resistance").show(ui, |ui| settings_ui(ui, noise));
     focus_ring_ui(ui, &shown.header_response);
@@ -425,7 +425,7 @@ pub fn hidden_choice_ui(ui: &mut Ui, hidden: &mut usize, channels: Option<(usize
     ));
 }
 
-/// Memory and time of a training that takes much of either.
+/// Notes the memory and time of a training that needs much of either.
 pub fn workload_ui(ui: &mut Ui, draft: &SimulatedSettings) {
     if let Ok(workload) = Workload::of(draft)
         && workload.is_large()
@@ -464,7 +464,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn noise_is_told_in_a_line() {
+    fn noise_is_summarised_in_a_line() {
         let noise = Noise {
             relative: 0.07,
             converter_bits: Some(12),
@@ -475,8 +475,8 @@ mod tests {
     }
 
     #[test]
-    fn a_large_training_tells_its_memory_and_time_before_it_begins() {
-        for (hidden, is_told) in [(12, false), (512, true)] {
+    fn a_large_training_states_its_memory_and_time_before_it_begins() {
+        for (hidden, is_shown) in [(12, false), (512, true)] {
             let mut draft = SimulatedSettings {
                 hidden,
                 ..SimulatedSettings::default()
@@ -484,7 +484,7 @@ mod tests {
             draft.source.sensor.scale = "10x10_5x512".parse().unwrap();
             let harness = Harness::new_ui(move |ui| workload_ui(ui, &draft));
             let found = harness.query_by_label_contains("of memory");
-            assert_eq!(found.is_some(), is_told, "{hidden} hidden nodes");
+            assert_eq!(found.is_some(), is_shown, "{hidden} hidden nodes");
         }
     }
 }

@@ -7,7 +7,7 @@ use decoupler_core::{
     evaluation::{DecoderSet, Pressed, PressedAnswer},
 };
 
-/// Decoders next to the network.
+/// Decoders compared with the network.
 const KINDS: [DecoderKind; 5] = [
     DecoderKind::Mean,
     DecoderKind::Ridge,
@@ -16,7 +16,7 @@ const KINDS: [DecoderKind; 5] = [
     DecoderKind::Newton,
 ];
 
-/// A decoder as it is.
+/// A decoder and its latest answer.
 #[derive(Debug)]
 pub(super) struct Compared {
     pub(super) kind: DecoderKind,
@@ -34,13 +34,13 @@ enum FitEvent {
     Ended(Result<(), JobError>),
 }
 
-/// The decoders, handed back, with the answers of those that had the time.
+/// The decoders returned by the thread, with the answers of those that were fast enough.
 struct Decoded {
     decoders: Vec<Fitted>,
     answers: Vec<(DecoderKind, Result<PressedAnswer, String>)>,
 }
 
-/// The other decoders under the finger: fitted in the background once somebody presses, and asked there one touch at a
+/// The other decoders under the finger: fitted in the background once the user presses, and asked there one touch at a
 /// time; the newest touch wins.
 pub(super) struct Comparing {
     fits: Job<FitEvent>,
@@ -91,7 +91,7 @@ impl Comparing {
         let is_answered = !is_new && self.rows.iter().all(|row| row.is_present || !self.has(row.kind));
         if self.decoding.is_under_way() {
             if is_new {
-                // Whoever is slow leaves it; the answers that are there come, and then this touch is asked.
+                // Slow decoders give up; the answers so far arrive, and then the decoders are asked about this touch.
                 self.decoding.cancel();
             }
         } else if !self.decoders.is_empty() && !is_answered {
@@ -144,8 +144,8 @@ impl Comparing {
     }
 
     fn take_events(&mut self) {
-        while let Some(news) = self.fits.next_event() {
-            match news {
+        while let Some(event) = self.fits.next_event() {
+            match event {
                 FitEvent::Fitted(kind, Ok(decoder)) => self.decoders.push((kind, decoder)),
                 FitEvent::Fitted(kind, Err(reason)) => self.fail(|other| other == kind, &reason),
                 FitEvent::Ended(Ok(())) => {}
@@ -155,12 +155,12 @@ impl Comparing {
         while let Some(decoded) = self.decoding.next_event() {
             match decoded {
                 Ok(Decoded { decoders, answers }) => {
-                    // Those fitted meanwhile stand behind.
+                    // Decoders fitted meanwhile come last.
                     let newer = std::mem::replace(&mut self.decoders, decoders);
                     self.decoders.extend(newer);
                     for (kind, mut answer) in answers {
                         if let Some(row) = self.rows.iter_mut().find(|row| row.kind == kind) {
-                            // A touch that was left too soon for a time leaves that of the one before.
+                            // A touch that was left before its decoding was timed keeps the previous time.
                             if let (Ok(answer), Some(Ok(before))) = (&mut answer, &row.answer) {
                                 answer.time = answer.time.or(before.time);
                             }

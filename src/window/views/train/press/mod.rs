@@ -1,9 +1,9 @@
-//! Pressing: the user's finger on the actual surface, and what every decoder makes of it.
+//! Pressing: the user's finger on the actual surface, and the answers of all decoders.
 //!
-//! `finger` is what presses, `pointer` turns mouse and keys into a [`Touch`](decoupler_core::scene::Touch) before anything of the
-//! frame is drawn, and `shown` computes what there is to see of it: in that frame, or behind it for arrays that take
-//! longer. `subject` finds the network that answers; until one is trained that is a small one made by `ready`.
-//! `comparing` asks the other decoders in the background. The rest shows it.
+//! `state` holds the finger and its [`Touch`](decoupler_core::scene::Touch), and has the touch answered in the same frame,
+//! or in the background for large arrays. `pointer` turns mouse and keys into a touch before anything of the frame is
+//! drawn, and trains a small network that answers until there is another. `comparing` asks the other decoders in the
+//! background. `section` computes and shows the answers.
 
 mod comparing;
 mod pointer;

@@ -18,23 +18,23 @@ use crate::window::{
     views::train::drawn::Frames,
 };
 
-/// Deeper by a turn of the wheel of this many points: the whole stroke in about ten turns of a usual wheel.
+/// Share of the stroke per point of scrolling: the whole stroke takes about ten notches of a typical wheel.
 const SHARE_PER_POINT: f64 = 0.002;
-/// Deeper by a press of a key.
+/// Share of the stroke per press of a key.
 const SHARE_PER_KEY: f64 = 0.05;
-/// Points by which a node seen from above is dragged through the whole stroke.
+/// Distance by which a node seen from above is dragged through the whole stroke, in points.
 const POINTS_PER_STROKE: f64 = 120.0;
 
 impl PressState {
-    /// Does what mouse and keys mean in this frame, before anything of it is drawn. `frames` are those displayed, and `lit` is
-    /// the node that the pointer lights up.
+    /// Handles mouse and keys before anything of this frame is drawn. `frames` are those displayed, and `lit` is the node lit
+    /// by the pointer.
     pub fn take_pointer(&mut self, ctx: &Context, test: Option<&TestView>, frames: &Frames, lit: Option<usize>) {
-        let nobody_types = ctx.memory(|memory| memory.focused().is_none())
+        let is_not_typing = ctx.memory(|memory| memory.focused().is_none())
             || self
                 .target
                 .as_ref()
                 .is_some_and(|target| ctx.memory(|memory| memory.has_focus(target.id)));
-        if self.is_pressing() && nobody_types && ctx.input_mut(|input| input.consume_key(Modifiers::NONE, Key::Escape))
+        if self.is_pressing() && is_not_typing && ctx.input_mut(|input| input.consume_key(Modifiers::NONE, Key::Escape))
         {
             self.let_go();
         }
@@ -91,11 +91,13 @@ impl PressState {
         let nodes_mm = &frames.actual.nodes_mm;
         let lit = lit.and_then(|node| Some((node, *nodes_mm.get(node)?)));
         // Next to a lit node on a crest the line of sight may miss the surface, or meet it far behind: the node is meant.
-        let beside = lit.and_then(|(_, place)| ray.at_level(place.z));
-        let met = match (target.surface.pick(&ray), beside, lit) {
-            (Some(picked), Some(beside), Some((_, place))) if beside.distance(place) < picked.distance(place) => beside,
+        let on_level = lit.and_then(|(_, place)| ray.at_level(place.z));
+        let met = match (target.surface.pick(&ray), on_level, lit) {
+            (Some(picked), Some(on_level), Some((_, place))) if on_level.distance(place) < picked.distance(place) => {
+                on_level
+            }
             (Some(picked), _, _) => picked,
-            (None, Some(beside), _) => beside,
+            (None, Some(on_level), _) => on_level,
             (None, None, _) => return Grip::Missed,
         };
         if self.finger.tool != Tool::OneNode {
@@ -134,7 +136,7 @@ impl PressState {
     fn take_wheel_and_keys(&mut self, ctx: &Context, response: &Response, target: &Target, test: &TestView) {
         let before = self.finger;
         if response.contains_pointer() {
-            // Taken, so that nothing else scrolls or zooms; with Ctrl it zooms as ever.
+            // Consumed, so that nothing else scrolls or zooms; with Ctrl it zooms as usual.
             let points = ctx.input_mut(|input| std::mem::take(&mut input.smooth_scroll_delta).y);
             self.finger.deepen(-SHARE_PER_POINT * f64::from(points));
         }
@@ -172,7 +174,7 @@ fn points(at: Pos2) -> DVec2 {
     DVec2::new(f64::from(at.x), f64::from(at.y))
 }
 
-/// The nearest place that is drawn.
+/// Returns the nearest place that is drawn.
 fn within(target: &Target, place_mm: DVec3) -> DVec2 {
     let grid = target.surface.map.grid();
     let ends = |axis: &[f64]| (axis[0], axis[axis.len() - 1]);
@@ -180,7 +182,7 @@ fn within(target: &Target, place_mm: DVec3) -> DVec2 {
     place_mm.truncate().clamp(DVec2::new(x0, y0), DVec2::new(x1, y1))
 }
 
-/// Row-wire and number of a node drawn, and its place at rest.
+/// Returns the row-wire and number of a node drawn, and its place at rest.
 fn at_rest(test: &TestView, node: usize) -> Option<((usize, usize), DVec3)> {
     let per_row = test.sensor.scale.nodes_per_row();
     let (row, node) = (*test.rows.get(node / per_row)?, node % per_row);
@@ -190,13 +192,13 @@ fn at_rest(test: &TestView, node: usize) -> Option<((usize, usize), DVec3)> {
     ))
 }
 
-/// The height to which the pointer lifts or lowers a node, where that can be seen.
+/// Returns the height to which the pointer lifts or lowers a node, if it can be determined from this camera.
 fn height_mm(target: &Target, test: &TestView, node: usize, at: Pos2) -> Option<f64> {
     let (_, rest) = at_rest(test, node)?;
     target.sight.height_mm(rest, test.stroke_mm, points(at))
 }
 
-/// The touch that leaves every node at its height.
+/// Returns the touch that leaves every node at its height.
 fn of_frame(test: &TestView, frames: &Frames) -> Touch {
     let nodes = frames.actual.nodes_mm.iter().enumerate();
     let depths = nodes.filter_map(|(node, place)| {
@@ -209,7 +211,7 @@ fn of_frame(test: &TestView, frames: &Frames) -> Touch {
     }
 }
 
-/// Pieces of a circle.
+/// Number of segments of a circle.
 const PIECES: usize = 64;
 /// Length of a dash and of the gap behind it, in points.
 const DASH: [f32; 2] = [4.0, 3.0];
@@ -244,7 +246,7 @@ impl PressState {
     }
 }
 
-/// The rim of the contact on the surface, in pieces where the surface ends.
+/// Returns the rim of the contact on the surface, in several pieces if it crosses the edge of the surface.
 fn outline(target: &Target, print: &Print) -> Vec<Vec<Pos2>> {
     let middle = print.place_mm;
     let grid = target.surface.map.grid();
@@ -274,11 +276,11 @@ fn shaft(target: &Target, print: &Print) -> Option<[Pos2; 2]> {
     let top = print.place_mm.extend(*target.surface.range.end());
     let [over, under] = [top, top - DVec3::Z].map(|place| target.sight.point(place));
     let top = to_egui(over);
-    // From above there is nothing of it to be seen.
+    // It cannot be seen from above.
     (over.distance(under) > 1.0 && top.distance(foot) > DASH[0]).then_some([foot, top])
 }
 
-/// The point on the screen of the surface at a place; `None` where there is none.
+/// Returns the point on the screen of the surface at a place; `None` outside the surface.
 fn on_surface(target: &Target, place_mm: DVec2) -> Option<Pos2> {
     let down = Ray {
         from_mm: place_mm.extend(0.0),
@@ -294,15 +296,15 @@ fn to_egui(at: DVec2) -> Pos2 {
 /// Message of the thread to the window.
 type Trained = Result<Result<Option<Networks>, RunError>, JobError>;
 
-/// A small network for the sensor displayed, trained in the background in a moment once somebody is about to press and there
-/// is no other.
+/// A small network for the displayed sensor, trained quickly in the background once the user is about to press and there is
+/// no other.
 #[derive(Debug)]
 pub struct ReadyNetwork {
     job: Job<Trained>,
     /// Settings of the network that is there or being trained.
     of: Option<SimulatedSettings>,
     networks: Option<Arc<Networks>>,
-    /// Reason why there is none.
+    /// Reason why it could not be trained.
     pub(super) failure: Option<String>,
 }
 
@@ -327,7 +329,7 @@ impl ReadyNetwork {
         }
     }
 
-    /// Trains the network of the current test set, unless it is there or too large to be trained in a moment.
+    /// Trains the network of the current test set, unless it exists or is too large to be trained quickly.
     pub(super) fn ask(&mut self, shared: &Shared) {
         let Some(settings) = settings_of(shared) else { return };
         if self.of == Some(settings) {
@@ -352,7 +354,7 @@ impl ReadyNetwork {
         self.of.is_some() && self.of == settings_of(shared) && self.job.is_under_way()
     }
 
-    /// The network, if it is that of the current test set.
+    /// Returns the network, if it is that of the current test set.
     pub(super) fn subject(&self, shared: &Shared) -> Option<Subject> {
         let settings = settings_of(shared).filter(|settings| self.of == Some(*settings))?;
         Some(Subject {
@@ -364,7 +366,7 @@ impl ReadyNetwork {
     }
 }
 
-/// Settings of the ready-made network for the current test set; `None` where it would take long.
+/// Returns the settings of the ready-made network for the current test set; `None` if training would take long.
 fn settings_of(shared: &Shared) -> Option<SimulatedSettings> {
     let settings = match (&shared.preview, &shared.run) {
         (Some(preview), _) => preview.settings,

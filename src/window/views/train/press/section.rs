@@ -69,7 +69,7 @@ pub fn press_section_ui(ui: &mut Ui, press: &mut PressState, shared: &Shared) {
     } else if press.is_pressing() {
         dim_ui(ui, "Computing the readings…");
     } else {
-        // The surface says so too: in a low window the error table comes first.
+        // The surface shows it too: in a low window the error table comes first.
         if ui.clip_rect().height() > space(70) {
             dim_ui(ui, "Press on the actual surface; the wheel sets the depth.");
         }
@@ -211,7 +211,7 @@ fn cells_of(answer: Option<&Result<PressedAnswer, String>>) -> (Vec<String>, Opt
     }
 }
 
-/// The time with two digits, which is as many as hold from frame to frame.
+/// Formats a time with two digits: further ones vary from frame to frame.
 fn microseconds(time: Option<Duration>) -> String {
     match time.map(|time| 1e6 * time.as_secs_f64()) {
         None => format_number(None),
@@ -220,7 +220,7 @@ fn microseconds(time: Option<Duration>) -> String {
     }
 }
 
-/// Says what the figures rest on.
+/// Shows remarks on the basis of the figures.
 fn remarks_ui(ui: &mut Ui, press: &PressState, shown: &Shown, shared: &Shared) {
     let readings = shown.pressed.readings_ohm().len();
     if shown.outside > 0 {
@@ -243,7 +243,7 @@ fn remarks_ui(ui: &mut Ui, press: &PressState, shown: &Shown, shared: &Shared) {
         Some(_) => "",
         None if press.ready.is_awaited(shared) => "A small network is being trained to answer…",
         None if shared.phase == Phase::Preparing => "The network answers once its training has begun.",
-        None => "Train a network to see what it makes of this.",
+        None => "Train a network to see how it decodes this touch.",
     };
     if !text.is_empty() {
         dim_ui(ui, text);
@@ -273,7 +273,7 @@ impl PressState {
         } else if shared.phase.is_busy() {
             "The network answers here once its training has begun."
         } else {
-            "This array is too large for a network in a moment: press Train, and yours answers here."
+            "This array is too large for a quick network: press Train, and your network answers here."
         }
     }
 }
@@ -287,7 +287,7 @@ pub struct ReadingPointed {
     pub is_clicked: bool,
 }
 
-/// The head of the card of the readings.
+/// The header of the card of the readings.
 pub fn readings_head_ui(ui: &mut Ui, drops_percent: Option<&Array2<f64>>) {
     ui.horizontal(|ui| {
         ui.set_min_height(space(6));
@@ -302,7 +302,7 @@ pub fn readings_head_ui(ui: &mut Ui, drops_percent: Option<&Array2<f64>>) {
     });
 }
 
-/// Readings of the displayed surface as a map of row-wires and column-wires, in `colours` and with one row pointed out;
+/// Readings of the displayed surface as a map of row-wires and column-wires, in `colours` and with one row marked;
 /// `drops_percent` are their drops below those at rest. Returns the one under the pointer.
 pub fn readings_ui(
     ui: &mut Ui,
@@ -332,9 +332,9 @@ pub fn readings_ui(
     })
 }
 
-/// Colours from none to the largest drop, up to a round number so that they hold while the finger moves a little.
+/// Returns the map with colours from 0 to the largest drop, rounded up so that the scale is stable under small movements.
 fn readings_map(drops_percent: &Array2<f64>, rows: &[usize]) -> HeatMap {
-    /// The end of the colours of a sensor at rest.
+    /// Upper end of the colour scale for a sensor at rest.
     const MIN_PERCENT: f64 = 0.01;
     let largest = drops_percent.iter().copied().filter(|drop| drop.is_finite());
     let largest = largest.fold(MIN_PERCENT, f64::max);
@@ -352,7 +352,7 @@ pub(super) struct Question {
     pub(super) subject: Option<Subject>,
 }
 
-/// A touch with everything that is shown of it.
+/// A touch with everything that is shown about it.
 #[derive(Clone, Debug)]
 pub struct Shown {
     pub(super) question: Question,
@@ -369,7 +369,7 @@ pub struct Shown {
 }
 
 impl Question {
-    /// Returns true if both ask the same.
+    /// Returns true if both questions are the same.
     pub(super) fn is(&self, other: &Self) -> bool {
         let is_same_subject = match (&self.subject, &other.subject) {
             (Some(one), Some(other)) => one.is(other),
@@ -378,8 +378,8 @@ impl Question {
         is_same_subject && self.is_of(&other.test) && self.touch == other.touch
     }
 
-    /// Returns true if it is about this sensor, with its rows and its stroke: a training begins with another test set of the
-    /// same.
+    /// Returns true if it is about this sensor, with the same rows and stroke: a new training has another test set of the
+    /// same sensor.
     pub(super) fn is_of(&self, test: &TestView) -> bool {
         let of = |test: &TestView| (test.sensor, test.stroke_mm);
         of(&self.test) == of(test) && self.test.rows == test.rows
@@ -387,9 +387,9 @@ impl Question {
 
     /// Returns true if the answer takes a few milliseconds at most.
     pub(super) fn is_light(&self) -> bool {
-        /// About three milliseconds.
+        /// Takes about three milliseconds.
         const MAX_PAIRS: f64 = 2e6;
-        /// Weights of the networks: as long.
+        /// Weights of the networks: take as long.
         const MAX_WEIGHTS: usize = 2_000_000;
         let weights = self.subject.as_ref().map_or(0, |subject| subject.networks.weights());
         Pressed::node_pairs(&self.test.sensor, &self.test.rows) <= MAX_PAIRS && weights <= MAX_WEIGHTS

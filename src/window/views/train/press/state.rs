@@ -22,7 +22,7 @@ use crate::window::{
     views::train::drawn::Frames,
 };
 
-/// The touch, and everything known of it.
+/// The touch, and everything known about it.
 #[derive(Debug)]
 pub struct PressState {
     /// Work of the pointer on the actual surface.
@@ -36,7 +36,7 @@ pub struct PressState {
     /// The actual surface as last drawn.
     pub(super) target: Option<Target>,
     pub(super) ready: ReadyNetwork,
-    /// True once somebody was about to press.
+    /// True once the user was about to press.
     pub(super) is_wanted: bool,
     shown: Option<Shown>,
     comparing: Comparing,
@@ -89,7 +89,7 @@ impl PressState {
         self.comparing.rows()
     }
 
-    /// Reason why nothing is shown of the touch.
+    /// Returns the reason why nothing is shown of the touch.
     pub(super) fn failure(&self) -> Option<&str> {
         let failed = self.failed.as_ref().filter(|_| self.is_pressing())?;
         Some(&failed.1)
@@ -122,7 +122,7 @@ impl PressState {
         });
     }
 
-    /// Lets what is pressed follow a finger that has changed.
+    /// Updates the touch after a change of the finger.
     pub(super) fn follow_finger(&mut self, stroke_mm: f64) {
         if let Some(print) = self.touch.as_mut().and_then(|touch| touch.print.as_mut())
             && let Some(changed) = self.finger.print(print.place_mm, stroke_mm)
@@ -142,7 +142,7 @@ impl PressState {
         self.is_wanted |= self.hand == Hand::Press && drawn.response.hovered();
     }
 
-    /// Answers what is pressed; `result` is that of the displayed network.
+    /// Answers the touch; `result` is that of the displayed network.
     pub fn follow(&mut self, shared: &Shared, result: Option<&RunResult>) {
         self.ready.take_events();
         if shared.source == SourceKind::Recording {
@@ -185,7 +185,7 @@ impl PressState {
         }
     }
 
-    /// Answers a question in this frame if it is light, otherwise behind it, one at a time.
+    /// Answers a question in this frame if that is quick, otherwise in the background, one at a time.
     fn ask(&mut self, question: Question) {
         while let Some(answered) = self.answering.next_event() {
             let answered = answered.unwrap_or_else(|error| Err(error.to_string()));
@@ -219,9 +219,9 @@ pub struct Subject {
     pub networks: Arc<Networks>,
     /// Settings that it was trained with.
     pub settings: SimulatedSettings,
-    /// True for the small one that was not asked for.
+    /// True for the small one that was trained automatically.
     pub is_ready_made: bool,
-    /// True once it changes no more.
+    /// True once it no longer changes.
     pub is_idle: bool,
 }
 
@@ -243,7 +243,7 @@ pub(super) struct Target {
 /// Hold of the pointer on the surface while its button is down.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Grip {
-    /// An indenter moves in the level in which the surface was met, so that it does not jump as the surface gives way.
+    /// An indenter moves in the horizontal plane of the first contact, so that it does not jump as the surface gives way.
     Level(f64),
     /// A node moves up and down.
     Node {
@@ -344,7 +344,7 @@ impl Finger {
         matches!(self.tool, Tool::Sphere | Tool::FlatPunch | Tool::Cylinder)
     }
 
-    /// Deeper by a part of the stroke.
+    /// Presses deeper by a part of the stroke.
     pub(super) fn deepen(&mut self, share: f64) {
         self.depth_share = (self.depth_share + share).clamp(0.0, 1.0);
     }

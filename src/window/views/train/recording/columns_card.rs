@@ -1,6 +1,6 @@
-//! The middle of the Train view while a recording is imported: its columns, and the samples that they give.
+//! The middle of the Train view while a recording is imported: its columns, and the resulting samples.
 //!
-//! Sentences about splits and imports.
+//! It also words the notes about splits and the errors of imports.
 
 use std::{collections::BTreeMap, path::Path};
 
@@ -26,7 +26,7 @@ use crate::window::{
 impl RecordingEditor {
     /// Shows the columns of the files with the samples below, or an invitation to open files.
     pub fn columns_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) {
-        /// Share of the height that the samples take, and its limits.
+        /// Share of the height used by the samples, and its limits.
         const SAMPLES: (f32, f32, f32) = (0.2, space(28), space(48));
         let whole = ui.available_rect_before_wrap();
         if self.draft.is_none() {
@@ -154,7 +154,7 @@ fn checked_ui(ui: &mut Ui, checked: &Checked, draft: &Draft) {
 pub(super) struct Renaming(BTreeMap<String, String>);
 
 impl Renaming {
-    /// The names that change where `older` files are read with these stems; `None` is that of the first file.
+    /// The names that change when `older` files are read with these stems; `None` is that of the first file.
     pub(super) fn new<'a>(older: &[InspectedFile], stems: impl Iterator<Item = (&'a Path, Option<&'a str>)>) -> Self {
         let mut names = BTreeMap::new();
         for (path, stem) in stems {
@@ -175,7 +175,7 @@ impl Renaming {
         Self(names)
     }
 
-    /// Conditions as typed, with the new names. A text that is no condition yet stays.
+    /// Returns the conditions as typed, with the new names. A text that is not a condition yet is unchanged.
     pub(super) fn conditions(&self, text: &str) -> String {
         match text.parse::<Condition>() {
             Ok(condition) if !self.0.is_empty() => condition.renamed(|name| self.0.get(name).cloned()).to_string(),
@@ -183,7 +183,7 @@ impl Renaming {
         }
     }
 
-    /// Cells that mean missing as typed, with the new names.
+    /// Returns the missing-cell markers as typed, with the new names.
     pub(super) fn missing(&self, text: &str) -> String {
         if self.0.is_empty() {
             return text.to_owned();
@@ -210,7 +210,7 @@ pub(in crate::window::views::train) fn bias(by: SplitBy) -> &'static str {
     }
 }
 
-/// Returns an error of the import, with its cure in terms of the window.
+/// Returns an error of the import, with the remedy in terms of the window.
 pub(super) fn in_window(error: &ImportError) -> String {
     error.with_cure(|cure| match cure {
         Cure::CallMissing(text) => {

@@ -1,6 +1,6 @@
 //! Table of the columns of all files with their meanings.
 //!
-//! Cells of the table of columns.
+//! It shows the range, the histogram and remarks of each column, and edits its meaning and unit.
 
 use std::{cell::Cell, rc::Rc};
 
@@ -43,7 +43,7 @@ enum Line {
     Column(usize, usize),
 }
 
-/// A wish of the user.
+/// A change made by the user.
 enum Change {
     Meaning(usize, usize, Meaning),
     All(usize, Meaning),
@@ -74,14 +74,14 @@ fn table_ui(ui: &mut Ui, draft: &Draft) -> Option<Change> {
     let lines: Vec<Line> = draft.files.iter().enumerate().flat_map(of_file).collect();
     let palette = Theme::of(ui).palette;
     let change = Cell::new(None);
-    let wish = |found: Option<Change>| {
+    let request = |found: Option<Change>| {
         if found.is_some() {
             change.set(found);
         }
     };
     let row = |place: usize| match lines[place] {
-        Line::File(file) => file_row(draft, file, &palette, &wish),
-        Line::Column(file, column) => column_row(draft, (file, column), &palette, &wish),
+        Line::File(file) => file_row(draft, file, &palette, &request),
+        Line::Column(file, column) => column_row(draft, (file, column), &palette, &request),
     };
     let table = TableView::new("columns", &COLUMNS).row_height(ROW_HEIGHT);
     table.show(ui, lines.len(), row);
@@ -89,7 +89,7 @@ fn table_ui(ui: &mut Ui, draft: &Draft) -> Option<Change> {
 }
 
 /// The heading of a file, with a choice for all of its columns.
-fn file_row<'a>(draft: &'a Draft, file: usize, palette: &Palette, wish: &'a dyn Fn(Option<Change>)) -> TableRow<'a> {
+fn file_row<'a>(draft: &'a Draft, file: usize, palette: &Palette, request: &'a dyn Fn(Option<Change>)) -> TableRow<'a> {
     let inspected = &draft.files[file];
     let name = file_name(&inspected.path);
     let of_all = move |ui: &mut Ui| {
@@ -100,7 +100,7 @@ fn file_row<'a>(draft: &'a Draft, file: usize, palette: &Palette, wish: &'a dyn 
         let shown = combo.show_ui(ui, |ui| {
             for meaning in [Meaning::Input, Meaning::Target, Meaning::Unused] {
                 if ui.selectable_label(false, format!("all {meaning}")).clicked() {
-                    wish(Some(Change::All(file, meaning)));
+                    request(Some(Change::All(file, meaning)));
                 }
             }
         });
@@ -119,7 +119,7 @@ fn column_row<'a>(
     draft: &'a Draft,
     (file, column): (usize, usize),
     palette: &Palette,
-    wish: &'a dyn Fn(Option<Change>),
+    request: &'a dyn Fn(Option<Change>),
 ) -> TableRow<'a> {
     let palette = *palette;
     let inspected = &draft.files[file];
@@ -143,7 +143,7 @@ fn column_row<'a>(
         let name = of();
         move |ui: &mut Ui| {
             let picked = meaning_ui(ui, &name, meaning, MEANING_WIDTH - space(3));
-            wish(picked.map(|meaning| Change::Meaning(file, column, meaning)));
+            request(picked.map(|meaning| Change::Meaning(file, column, meaning)));
         }
     };
     let unit_cell = {
@@ -151,7 +151,7 @@ fn column_row<'a>(
         move |ui: &mut Ui| {
             if matches!(meaning, Meaning::Input | Meaning::Target) {
                 let unit = unit_ui(ui, &name, &draft.unit(file, column), UNIT_WIDTH - space(4));
-                wish(unit.map(|unit| Change::Unit(file, column, unit)));
+                request(unit.map(|unit| Change::Unit(file, column, unit)));
             }
         }
     };
@@ -251,11 +251,11 @@ fn explanation(meaning: Meaning) -> &'static str {
     }
 }
 
-/// The unit, to be changed in place. What is typed counts at once: a row that scrolls out of view reports no end of typing. Returns it
-/// if it has changed.
+/// The unit, editable in place. Typing takes effect at once, because a row that scrolls out of view does not report the end
+/// of editing. Returns the unit if it has changed.
 pub(super) fn unit_ui(ui: &mut Ui, name: &str, unit: &str, width: f32) -> Option<String> {
     let id = ui.scope_id().with(("unit", name));
-    // As typed, with the spaces that a unit does not end with.
+    // As typed, including trailing spaces, which are not part of the unit.
     let kept: Option<String> = ui.data(|data| data.get_temp(id));
     let mut typed = kept.clone().unwrap_or_else(|| unit.to_owned());
     let edit = ui.add(TextEdit::singleline(&mut typed).id(id).desired_width(width));
@@ -269,7 +269,7 @@ pub(super) fn unit_ui(ui: &mut Ui, name: &str, unit: &str, width: f32) -> Option
     (edit.changed() && typed.trim() != unit).then_some(typed)
 }
 
-/// A figure at the right of its cell: the first of `texts` for which there is room, for a figure that is cut is another one.
+/// A figure at the right of its cell: the first of `texts` that fits, because a truncated figure would be wrong.
 /// `label` names it.
 pub(super) fn figure_ui(ui: &mut Ui, texts: &[String], label: &str, colour: Color32) -> Response {
     let rect: Rect = ui.max_rect();
@@ -294,8 +294,8 @@ pub(super) fn figure_ui(ui: &mut Ui, texts: &[String], label: &str, colour: Colo
     response
 }
 
-/// The ends of a range, the most exact text first: with decimals that distinguish them well, with fewer, and at last
-/// rounded, with the width where they would look the same.
+/// Returns texts of the ends of a range, the most exact first: with enough decimals to distinguish them, with fewer, and
+/// rounded, with the width if they would look the same.
 pub(super) fn range_texts(min: f64, max: f64) -> Vec<String> {
     let span = max - min;
     let largest = min.abs().max(max.abs());
@@ -319,7 +319,7 @@ pub(super) fn range_texts(min: f64, max: f64) -> Vec<String> {
     texts
 }
 
-/// Number of rows in which a cell is missing; where there is no room for it, its share.
+/// Returns texts of the number of rows with a missing cell: the number, and its share for narrow cells.
 pub(super) fn missing_texts(missing: usize, rows: usize) -> Vec<String> {
     if missing == 0 {
         return vec!["–".to_owned()];
@@ -363,7 +363,7 @@ pub(super) fn paint_histogram(ui: &Ui, rect: Rect, bars: &[usize], colour: Color
             continue;
         }
         let left = rect.left() + width * place as f32;
-        // One sample among thousands is still seen.
+        // One sample among thousands is still visible.
         let height = (rect.height() * count as f32 / most as f32).max(1.0);
         let top_left = pos2(left, rect.bottom() - height);
         let bar = Rect::from_min_max(top_left, pos2(left + width - 1.0, rect.bottom()));

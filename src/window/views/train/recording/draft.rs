@@ -12,35 +12,35 @@ use decoupler_files::import::{Condition, InspectedFile, Joined, Meaning, Missing
 
 use super::columns_card::Renaming;
 
-/// A column by its file and its name there, which stay where another file becomes the first.
+/// A column by its file and its name there, which do not change when another file becomes the first.
 pub(super) type ColumnKey = (PathBuf, String);
 
-/// An import as the user has it now: the files, what each column means, and how the samples are divided.
+/// The current state of an import: the files, the meaning of each column, and the division of the samples.
 #[derive(Clone, Debug)]
 pub(super) struct Draft {
     /// The files, the first with the rows to which the others are joined.
     pub(super) files: Vec<InspectedFile>,
-    /// Everything but the meanings and units of the columns, the conditions, the missing cells and the test files.
+    /// Everything except the meanings and units of the columns, the conditions, the missing cells and the test files.
     pub(super) plan: Plan,
     /// Conditions as typed.
     pub(super) conditions: String,
     /// Cells that mean missing, as typed, with commas between them.
     pub(super) missing: String,
-    /// Meanings that the user or a recipe has chosen, also of columns that another layout hides.
+    /// Meanings chosen by the user or a recipe, including columns hidden by the current layout.
     chosen: BTreeMap<ColumnKey, Meaning>,
-    /// Units that the user or a recipe has given, likewise.
+    /// Units given by the user or a recipe, likewise.
     units: BTreeMap<ColumnKey, String>,
-    /// Rule of division that the user or a recipe has chosen; without one it follows from the groups.
+    /// Rule of division chosen by the user or a recipe; without one it follows from the groups.
     split: Option<SplitBy>,
-    /// Files of test samples by the recordings in whose place they are read.
+    /// Files of test samples, by the recording that each one replaces.
     tests: BTreeMap<PathBuf, PathBuf>,
-    /// The plan of the recipe in its own words, and the same plan as this import writes it.
+    /// The plan of the recipe as read, and the same plan as this import writes it.
     of_recipe: Option<Box<[Plan; 2]>>,
     cache: RefCell<PlanCache>,
 }
 
 impl Draft {
-    /// The import of a plan, whose files were looked at.
+    /// The import of a plan whose files have been inspected.
     pub(super) fn new(mut plan: Plan, files: Vec<InspectedFile>) -> Self {
         let import = &mut plan.import;
         let (conditions, missing) = (joined(&import.conditions, " and "), joined(&import.missing, ", "));
@@ -56,7 +56,7 @@ impl Draft {
         let of_tests = of_tests
             .iter()
             .flat_map(|test| std::iter::once(&test.data).chain(&test.join));
-        // The meanings of the columns are next to the columns.
+        // The meanings of the columns are kept with the columns.
         (import.time, import.group, import.row_wire) = (None, None, None);
         (import.inputs, import.targets) = (Vec::new(), Vec::new());
         let paths = files.iter().map(|file| file.path.clone());
@@ -74,7 +74,7 @@ impl Draft {
         }
     }
 
-    /// The import of a recipe, whose files were looked at: nothing in it is a guess.
+    /// The import of a recipe whose files have been inspected: nothing in it is a guess.
     pub(super) fn of_recipe(plan: Plan, files: Vec<InspectedFile>) -> Self {
         let mut draft = Self::new(plan.clone(), files);
         draft.split = Some(plan.division.by);
@@ -87,7 +87,7 @@ impl Draft {
         draft
     }
 
-    /// This import with what the user has chosen in an older one, as far as it fits the files.
+    /// Returns this import with the choices of the user in an older one, as far as they fit the files.
     pub(super) fn keeping(mut self, older: &Self) -> Self {
         let stems = self
             .files
@@ -140,7 +140,7 @@ impl Draft {
             self.chosen.insert(path, Meaning::Unused);
         }
         let key = self.key(file, column);
-        // Columns that another layout hides give it up too.
+        // Columns hidden by the current layout give it up too.
         for ((path, _), other) in &mut self.chosen {
             if *other == meaning && is_taken(meaning, *path == key.0) {
                 *other = Meaning::Unused;
@@ -172,7 +172,7 @@ impl Draft {
         given_up
     }
 
-    /// Gives all inputs, targets and unused columns of a file this meaning, except for those that hold no numbers.
+    /// Gives all inputs, targets and unused columns of a file this meaning, except for non-numeric ones.
     pub(super) fn choose_all(&mut self, file: usize, meaning: Meaning) {
         for column in 0..self.files[file].meanings.len() {
             let of_column = &self.files[file].inspection.columns[column];
@@ -185,13 +185,13 @@ impl Draft {
         }
     }
 
-    /// Divides the samples by this rule from now on, as far as there are groups for it.
+    /// Sets the rule of division; a division by group takes effect only if there are groups.
     pub(super) fn split_by(&mut self, by: SplitBy) {
         self.split = Some(by);
         self.settle_split();
     }
 
-    /// The rule of division: that of the user, or by groups where there are any.
+    /// Returns the rule of division: that of the user, or by group if there are any groups.
     fn settle_split(&mut self) {
         self.plan.division.by = match (self.split, self.has(Meaning::Group)) {
             (Some(SplitBy::Group), false) | (None, false) => SplitBy::Time,
@@ -205,7 +205,7 @@ impl Draft {
         self.files.iter().any(|file| file.meanings.contains(&meaning))
     }
 
-    /// Number of columns of this meaning.
+    /// Returns the number of columns of this meaning.
     pub(super) fn count(&self, meaning: Meaning) -> usize {
         let meanings = self.files.iter().flat_map(|file| &file.meanings);
         meanings.filter(|other| **other == meaning).count()
@@ -216,7 +216,7 @@ impl Draft {
         (file.path.clone(), file.inspection.columns[column].name.clone())
     }
 
-    /// Unit of a column as typed or in the header.
+    /// Returns the unit of a column as typed or in the header.
     pub(super) fn unit(&self, file: usize, column: usize) -> String {
         let given = self.units.get(&self.key(file, column));
         let found = self.files[file].inspection.columns[column].unit.as_ref();
@@ -235,12 +235,12 @@ impl Draft {
         }
     }
 
-    /// Paths of the files, except for those of the test.
+    /// Returns the paths of the files, except for those of the test.
     pub(super) fn paths(&self) -> Vec<PathBuf> {
         self.files.iter().map(|file| file.path.clone()).collect()
     }
 
-    /// Files for the test, each with the recording in whose place it is read.
+    /// Returns the files for the test, each with the recording that it replaces.
     pub(super) fn tests(&self) -> impl Iterator<Item = (&Path, &Path)> {
         let found = self
             .files
@@ -249,15 +249,15 @@ impl Draft {
         found.map(|(recording, test)| (recording.as_path(), test.as_path()))
     }
 
-    /// Returns `true` if the test samples have files of their own.
+    /// Returns `true` if the test samples have their own files.
     pub(super) fn has_tests(&self) -> bool {
         !self.tests.is_empty()
     }
 
-    /// Adds a file of test samples, for the first recording that has none. The one of a single recording is replaced.
+    /// Adds a file of test samples for the first recording that has none. With a single recording its test file is replaced.
     ///
     /// # Errors
-    /// If it cannot be one; with what to do.
+    /// If it cannot be one; the message says what to do.
     pub(super) fn add_test_file(&mut self, path: PathBuf) -> Result<(), String> {
         let name = file_name(&path);
         let lacking = self.files.iter().find(|file| !self.tests.contains_key(&file.path));
@@ -265,31 +265,31 @@ impl Draft {
             (Some(file), _) | (None, [file]) => file.path.clone(),
             _ => {
                 return Err(format!(
-                    "{name} is not opened: each of the {} recordings has its file for the test. To use others, close \
-                     those files first.",
+                    "{name} was not opened: each of the {} recordings already has a file for the test. To use others, \
+                     close those files first.",
                     self.files.len()
                 ));
             }
         };
-        // A file joined to both may be the same: its times tell its rows apart.
+        // The same file may be joined to both: its times distinguish its rows.
         if recording == path && self.files.first().is_some_and(|first| first.path == path) {
             return Err(format!(
-                "{name} is trained on, so it cannot be a test file: choose a recording of its own for the test."
+                "{name} is trained on, so it cannot be a test file: choose a separate recording for the test."
             ));
         }
         self.tests.insert(recording, path);
         Ok(())
     }
 
-    /// Closes the file that is read for the test in the place of this recording.
+    /// Closes the file that replaces this recording for the test.
     pub(super) fn close_test_file(&mut self, recording: &Path) {
         self.tests.remove(recording);
     }
 
-    /// Plan of the import with absolute paths.
+    /// Returns the plan of the import with absolute paths.
     ///
     /// # Errors
-    /// If a text cannot be understood, or a file for the test is missing; with what to do.
+    /// If a text cannot be understood, or a file for the test is missing; the message says what to do.
     pub(super) fn planned(&self) -> Result<Arc<Plan>, String> {
         self.cache.borrow_mut().planned(self)
     }
@@ -332,7 +332,7 @@ impl Draft {
             joined.time = times.as_ref().map(|times| times[number + 1].clone());
         }
         plan.test = self.test_files()?;
-        // What has not changed keeps its words, such as ranges of columns.
+        // Unchanged parts keep their notation, such as ranges of columns.
         match self.of_recipe.as_deref() {
             Some([recipe, own]) if *own == plan => Ok(recipe.clone()),
             _ => Ok(plan),
@@ -360,7 +360,7 @@ impl Draft {
         }))
     }
 
-    /// Everything that a plan is made of and that can change: the recipe and the files stay.
+    /// Returns the parts of the draft that determine the plan and can change; the recipe and the files do not.
     pub(super) fn made_of(&self) -> MadeOf {
         MadeOf {
             plan: self.plan.clone(),
@@ -387,19 +387,19 @@ impl Draft {
             && now.eq(meanings)
     }
 
-    /// Reason for which there is nothing to train on yet, with what to do.
+    /// Returns the reason why there is nothing to train on yet, with what to do.
     pub(super) fn obstacle(&self) -> Option<String> {
         self.planned().err().or_else(|| self.lack())
     }
 
-    /// Says which meaning no column has yet.
+    /// Returns a sentence about a required meaning that no column has yet.
     pub(super) fn lack(&self) -> Option<String> {
         let needed = [(Meaning::Input, "an input"), (Meaning::Target, "a target")];
         let lacking = needed.into_iter().find(|(meaning, _)| !self.has(*meaning));
         lacking.map(|(_, what)| format!("No column is {what}: choose one in the table of columns."))
     }
 
-    /// The files joined, with their number in the list of files.
+    /// Returns the joined files, with their numbers in the list of files.
     pub(super) fn joined(&mut self) -> &mut [Joined] {
         &mut self.plan.import.join
     }
@@ -414,7 +414,7 @@ fn is_taken(meaning: Meaning, is_same_file: bool) -> bool {
     }
 }
 
-/// Name of the column of times of a file, without its stem.
+/// Returns the name of the time column of a file, without its stem.
 fn time(file: &InspectedFile) -> Option<String> {
     let column = file.meanings.iter().position(|meaning| *meaning == Meaning::Time)?;
     Some(file.inspection.columns[column].name.clone())
@@ -435,7 +435,7 @@ pub(super) fn joined<T: ToString>(items: &[T], separator: &str) -> String {
         .join(separator)
 }
 
-/// Name of a file without its folder.
+/// Returns the name of a file without its folder.
 pub(super) fn file_name(path: &Path) -> String {
     path.file_name().map_or_else(
         || path.display().to_string(),
@@ -443,18 +443,18 @@ pub(super) fn file_name(path: &Path) -> String {
     )
 }
 
-/// Parts of a draft that its plan is made of and that can change.
+/// Parts of a draft that determine its plan and can change.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct MadeOf {
     pub(super) plan: Plan,
     pub(super) texts: [String; 2],
     pub(super) units: BTreeMap<ColumnKey, String>,
     pub(super) tests: BTreeMap<PathBuf, PathBuf>,
-    /// Those of the columns of each file.
+    /// Meanings and units of the columns of each file.
     pub(super) meanings: Vec<Vec<Meaning>>,
 }
 
-/// Last plan or the reason for which there is none, and what it was made of.
+/// Last plan or the reason why there is none, and the parts that it was made from.
 #[derive(Clone, Debug, Default)]
 pub(super) struct PlanCache(Option<(MadeOf, Result<Arc<Plan>, String>)>);
 

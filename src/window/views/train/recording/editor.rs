@@ -32,9 +32,9 @@ use decoupler_files::{
 pub struct RecordingEditor {
     /// The import, once files are open.
     pub(super) draft: Option<Draft>,
-    /// An import of which files are missing.
+    /// An import with missing files.
     pub(super) missing: Option<Box<Reopened>>,
-    /// Names of files with other contents than at the time of the run whose import this is.
+    /// Names of files that have changed since the run with this import.
     pub(super) changed: Vec<String>,
     pub(super) opening: Opening,
     pub(super) checking: Checking,
@@ -44,11 +44,11 @@ pub struct RecordingEditor {
     pub(super) tests: ChosenPaths,
     /// Paths of files with positions of targets.
     pub(super) positions: ChosenPaths,
-    /// Missing file that is being looked for, and the path that the user chooses.
+    /// Missing file to be found, and the path that the user chooses.
     pub(super) finding: Option<(PathBuf, ChosenPaths)>,
-    /// True if the user looks at the columns while there is a run to show.
+    /// True if the user is viewing the columns while there is a run to show.
     pub(super) shows_columns: bool,
-    /// The run of which the window knew last.
+    /// The run that the window knew last.
     run: Option<RunId>,
     /// Share held out for validation that the method needs; `None` if the share of a plan is to be kept.
     held_out: Option<f64>,
@@ -130,7 +130,7 @@ impl RecordingEditor {
         }
     }
 
-    /// Looks for the recordings of the checkpoint at `path`, which could not be resumed: they may be missing.
+    /// Checks the recordings of the checkpoint at `path`, which could not be resumed: they may be missing.
     pub fn look_for_recordings(&mut self, path: PathBuf) {
         self.opening.start(ToOpen::Missing(path));
     }
@@ -321,7 +321,7 @@ impl RecordingEditor {
         }
     }
 
-    /// Holds out for validation what the method needs, when another method needs another share; a share of the user stays.
+    /// Sets the share held out for validation when another method needs another share, unless the user has set it.
     fn follow_method(&mut self, settings: &RunSettings) {
         let fraction = settings.validation_fraction();
         let is_new = self.held_out.is_some_and(|before| before != fraction) && !self.opening.is_reopening;
@@ -331,7 +331,7 @@ impl RecordingEditor {
         self.held_out = Some(fraction);
     }
 
-    /// Trains one network for all rows where no column has the numbers of the row-wires.
+    /// Selects one network for all rows if no column contains the row numbers.
     fn follow_row_wires(&self, settings: &RunSettings, effects: &mut Vec<Effect>) {
         if settings.source.row_model() == RowModel::Each && !self.has_row_wires() && !self.opening.is_reopening {
             effects.push(Effect::ConfigureRecording(Box::new(RunSettings {
@@ -341,7 +341,7 @@ impl RecordingEditor {
         }
     }
 
-    /// Plan of the import, or what is missing and what to do.
+    /// Returns the plan of the import, or what is missing and what to do.
     fn plan(&self) -> Result<Arc<Plan>, String> {
         if let Some(missing) = self
             .missing
@@ -363,19 +363,19 @@ impl RecordingEditor {
         }
     }
 
-    /// Plan of the import, if it is complete.
+    /// Returns the plan of the import, if it is complete.
     pub(super) fn planned(&self) -> Option<Arc<Plan>> {
         self.draft.as_ref()?.planned().ok()
     }
 
-    /// Numbers of inputs and targets, once there are both.
+    /// Returns the numbers of inputs and targets, once there are both.
     pub fn channels(&self) -> Option<(usize, usize)> {
         let draft = self.draft.as_ref()?;
         let channels = (draft.count(Meaning::Input), draft.count(Meaning::Target));
         (channels.0 > 0 && channels.1 > 0).then_some(channels)
     }
 
-    /// Returns true if a column has the numbers of the row-wires.
+    /// Returns true if a column contains the row numbers.
     pub fn has_row_wires(&self) -> bool {
         self.draft.as_ref().is_some_and(|draft| draft.has(Meaning::RowWire))
     }
@@ -385,7 +385,7 @@ impl RecordingEditor {
         shared.source == SourceKind::Recording && (self.shows_columns || shared.shown_run().is_none())
     }
 
-    /// Returns the files of the import, over which nothing is to be saved.
+    /// Returns the files of the import, which must not be overwritten.
     pub fn files_in_use(&self) -> Vec<FileInUse> {
         let plan = self.planned();
         let files = plan.iter().flat_map(|plan| plan.files().cloned());

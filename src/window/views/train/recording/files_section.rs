@@ -1,4 +1,4 @@
-//! Recordings that are not where they were when a run was saved.
+//! The files of a recording, including files that have moved or changed since a run was saved.
 
 use std::{
     fs,
@@ -54,7 +54,7 @@ impl RecordingEditor {
             self.close_file(file);
         }
         for name in &self.changed {
-            note_ui(ui, &format!("{name} has other contents than when the run was saved."));
+            note_ui(ui, &format!("{name} has changed since the run was saved."));
         }
         self.samples_line_ui(ui);
         if let Some((name, progress)) = &self.opening.under_way {
@@ -67,17 +67,17 @@ impl RecordingEditor {
         self.buttons_ui(ui, effects);
         if self.is_empty() {
             let button = ui.add(ghost_button("Open the sample recording"));
-            let hint = "Simulated readings of a soft skin with the force on it and its place: a recording to try the \
-                        program with.";
+            let hint = "Simulated readings of a soft skin with the force on it and its position: a recording for \
+                        trying out the program.";
             if button.on_hover_text(hint).clicked() {
-                let beside = shared.runs.path.as_ref().and_then(|runs| runs.parent());
-                let folder = beside.map_or_else(std::env::temp_dir, PathBuf::from);
+                let data_folder = shared.runs.path.as_ref().and_then(|runs| runs.parent());
+                let folder = data_folder.map_or_else(std::env::temp_dir, PathBuf::from);
                 self.open_sample(folder.join("samples"));
             }
         }
     }
 
-    /// Missing files, each with the way to find it.
+    /// Lists the missing files, each with buttons to find it.
     fn missing_ui(&mut self, ui: &mut Ui, effects: &mut Vec<Effect>) {
         let Some(reopened) = &self.missing else { return };
         let missing: Vec<PathBuf> = reopened.missing().into_iter().map(PathBuf::from).collect();
@@ -88,7 +88,7 @@ impl RecordingEditor {
             ui.horizontal(|ui| {
                 let find = ui.add(ghost_button("Find…"));
                 find.widget_info(|| WidgetInfo::labeled(Role::Button, true, format!("Find {name}")));
-                let find = find.on_hover_text("Chooses the file at its new place. Its contents are compared.");
+                let find = find.on_hover_text("Choose the file in its new place. Its contents are checked.");
                 let typed = ui.add(ghost_button("Type path…"));
                 typed.widget_info(|| WidgetInfo::labeled(Role::Button, true, format!("Type the path of {name}")));
                 if !find.clicked() && !typed.clicked() {
@@ -119,7 +119,7 @@ impl RecordingEditor {
         }
     }
 
-    /// Numbers of channels and samples, or what is wrong with the import.
+    /// Shows the numbers of channels and samples, or the error of the import.
     fn samples_line_ui(&self, ui: &mut Ui) {
         let Some(draft) = &self.draft else { return };
         if let Some(reason) = draft.obstacle() {
@@ -171,11 +171,11 @@ impl RecordingEditor {
         });
     }
 
-    /// The button that shows the columns in place of the results.
+    /// Shows the button that displays the columns in place of the results.
     pub fn columns_button_ui(&mut self, ui: &mut Ui, shared: &Shared) {
         if self.draft.is_some() && !self.is_on_show(shared) {
             let button = ui.add(ghost_button("Columns…"));
-            let hint = "Shows the columns of the files, and what they mean, in place of the results.";
+            let hint = "Shows the columns of the files and their meanings in place of the results.";
             if button.on_hover_text(hint).clicked() {
                 self.shows_columns = true;
                 ui.request_repaint();
@@ -234,7 +234,7 @@ pub(super) fn write_sample(folder: &Path) -> Result<PathBuf, String> {
     let path = folder.join(NAME);
     let refused = |error: &dyn std::fmt::Display| format!("the sample recording cannot be written: {error}");
     fs::create_dir_all(folder).map_err(|error| refused(&error))?;
-    // The same file keeps its time of change.
+    // An unchanged file keeps its modification time.
     if fs::read(&path).is_ok_and(|written| written == TEXT.as_bytes()) {
         return Ok(path);
     }
@@ -267,7 +267,7 @@ pub fn recipe_export(shared: &Shared) -> Export<'static> {
     }
 }
 
-/// An import to be opened again: its plan, and checksums of its files where they are known.
+/// An import to be opened again: its plan, and the known checksums of its files.
 #[derive(Clone, Debug)]
 pub(super) struct Reopened {
     /// Plan with absolute paths, and checksums; an empty checksum is not known.
@@ -289,7 +289,7 @@ impl From<Recorded> for Reopened {
 }
 
 impl From<Plan> for Reopened {
-    /// Returns the import of a plan of whose files no checksums are known.
+    /// Returns the import of a plan without known checksums.
     fn from(plan: Plan) -> Self {
         let unknown = |path: &PathBuf| FileChecksum {
             path: path.clone(),
@@ -304,7 +304,7 @@ impl From<Plan> for Reopened {
 }
 
 impl Reopened {
-    /// Paths of the files that are not where they were.
+    /// Returns the paths of files that no longer exist.
     pub(super) fn missing(&self) -> Vec<&Path> {
         self.recorded.missing()
     }
@@ -312,7 +312,7 @@ impl Reopened {
     /// Notes the names of files whose contents have changed.
     ///
     /// # Errors
-    /// If a file cannot be read, or a training is to be resumed with other contents.
+    /// If a file cannot be read, or has changed while a training is to be resumed with it.
     pub(super) fn compare(&mut self) -> Result<(), String> {
         let mut changed = Vec::new();
         for file in &self.recorded.files {
@@ -322,8 +322,8 @@ impl Reopened {
         }
         if let (Some(_), Some(name)) = (&self.checkpoint, changed.first()) {
             return Err(format!(
-                "{name} has other contents than when the training was saved, so the training cannot be resumed with it. \
-                 Use the file of that time."
+                "{name} has changed since the training was saved, so the training cannot be resumed with it. \
+                 Use the original file."
             ));
         }
         self.changed = changed;
@@ -338,11 +338,11 @@ impl Reopened {
         self.recorded = self.recorded.relocated(missing, found);
         let folder = found.parent().unwrap_or(Path::new(""));
         for file in self.recorded.files.clone() {
-            let beside = file.path.file_name().map(|name| folder.join(name));
-            if let Some(beside) = beside.filter(|beside| !file.path.exists() && beside.is_file())
-                && has_checksum(&beside, &file.crc32)?
+            let neighbour = file.path.file_name().map(|name| folder.join(name));
+            if let Some(neighbour) = neighbour.filter(|neighbour| !file.path.exists() && neighbour.is_file())
+                && has_checksum(&neighbour, &file.crc32)?
             {
-                self.recorded = self.recorded.relocated(&file.path, &beside);
+                self.recorded = self.recorded.relocated(&file.path, &neighbour);
             }
         }
         Ok(())
@@ -365,7 +365,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_file_is_found_with_its_neighbours_and_other_contents_are_named() {
+    fn a_file_is_found_with_its_neighbours_and_changed_contents_are_reported() {
         let folder = tempfile::tempdir().unwrap();
         let at = |name: &str| folder.path().join(name);
         for (name, text) in [("sensor.csv", "1\n"), ("states.csv", "2\n"), ("other.csv", "3\n")] {
@@ -386,7 +386,7 @@ mod tests {
 
         let mut found = reopened.clone();
         found.relocate(&gone("sensor.csv"), &at("sensor.csv")).unwrap();
-        assert!(found.missing().is_empty(), "the other file lies next to it");
+        assert!(found.missing().is_empty(), "the other file is next to it");
         assert_eq!(found.recorded.plan.import.join[0].file, at("states.csv"));
         found.compare().unwrap();
         assert!(found.changed.is_empty());

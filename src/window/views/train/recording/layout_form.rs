@@ -1,6 +1,4 @@
-//! The join of files, and the layout of those of text.
-//!
-//! The folded parts of an import: division of the samples, rows that count, positions, joins and the layout of text.
+//! The folded parts of an import: division of the samples, filter of rows, positions, joins and the layout of text files.
 
 use decoupler_core::{dataset::SplitBy, evaluation::RunSettings};
 use decoupler_files::import::{Condition, Decimal, DialectChoice, Encoding, Format, Meaning, Separator};
@@ -22,10 +20,10 @@ use crate::window::{
     },
 };
 
-/// Largest number of lines before a table.
+/// Maximum number of lines before a table.
 const MAX_LINES: usize = 1_000_000;
 
-/// The join of the files in words.
+/// Summary of the join of the files.
 pub(super) fn joined_summary(draft: &Draft) -> String {
     let is_by_time = draft.files.iter().all(|file| file.meanings.contains(&Meaning::Time));
     if is_by_time {
@@ -77,16 +75,16 @@ pub(super) fn joined_ui(ui: &mut Ui, draft: &mut Draft) {
     }
 }
 
-/// Returns `true` if the layout is as found.
+/// Summary of the layout: detected, or set by the user.
 pub(super) fn layout_summary(draft: &Draft) -> String {
     if draft.plan.import.dialect == DialectChoice::default() {
-        "found".to_owned()
+        "detected".to_owned()
     } else {
-        "yours".to_owned()
+        "custom".to_owned()
     }
 }
 
-/// The layout of files of text; changes `draft`. Returns true if the files are to be looked at again.
+/// The layout of text files; changes `draft`. Returns true if the files must be inspected again.
 pub(super) fn layout_ui(ui: &mut Ui, draft: &mut Draft) -> bool {
     for file in &draft.files {
         if let Format::Text(dialect) = &file.format {
@@ -95,14 +93,14 @@ pub(super) fn layout_ui(ui: &mut Ui, draft: &mut Draft) -> bool {
     }
     let dialect = &mut draft.plan.import.dialect;
     let before = *dialect;
-    let found = (None, "found", "As found at the beginning of each file.");
+    let detected = (None, "detected", "As detected at the beginning of each file.");
     let separators = [
-        found,
+        detected,
         (Some(Separator::Comma), "comma", ","),
         (Some(Separator::Semicolon), "semicolon", ";"),
-        (Some(Separator::Tab), "tab", "Tabulator"),
+        (Some(Separator::Tab), "tab", "Tab character"),
         (Some(Separator::Bar), "bar", "|"),
-        (Some(Separator::Space), "space", "Any number of spaces or tabulators"),
+        (Some(Separator::Space), "space", "Any number of spaces or tabs"),
     ];
     if let Some(picked) = list_ui(
         ui,
@@ -113,9 +111,9 @@ pub(super) fn layout_ui(ui: &mut Ui, draft: &mut Draft) -> bool {
     ) {
         dialect.separator = picked;
     }
-    let found = (None, "found", "As found at the beginning of each file.");
+    let detected = (None, "detected", "As detected at the beginning of each file.");
     let decimals = [
-        found,
+        detected,
         (Some(Decimal::Point), "point", "1.5"),
         (Some(Decimal::Comma), "comma", "1,5"),
     ];
@@ -128,9 +126,9 @@ pub(super) fn layout_ui(ui: &mut Ui, draft: &mut Draft) -> bool {
     ) {
         dialect.decimal = picked;
     }
-    let found = (None, "found", "As found at the beginning of each file.");
+    let detected = (None, "detected", "As detected at the beginning of each file.");
     let headers = [
-        found,
+        detected,
         (Some(true), "yes", "The first row has the names of the columns."),
         (
             Some(false),
@@ -141,9 +139,9 @@ pub(super) fn layout_ui(ui: &mut Ui, draft: &mut Draft) -> bool {
     if let Some(picked) = list_ui(ui, "Header", "Names in the first row.", &headers, dialect.header) {
         dialect.header = picked;
     }
-    let found = (None, "found", "As found at the beginning of each file.");
+    let detected = (None, "detected", "As detected at the beginning of each file.");
     let encodings = [
-        found,
+        detected,
         (Some(Encoding::Utf8), "utf-8", "With or without a byte-order mark"),
         (Some(Encoding::Latin1), "latin-1", "ISO 8859-1"),
         (Some(Encoding::Utf16Le), "utf-16le", "Little-endian"),
@@ -202,7 +200,7 @@ pub(super) fn positions_ui(ui: &mut Ui, task: FileTask, effects: &mut Vec<Effect
 
 const TEST_FILES: FileWords = FileWords {
     kind: "recording for the test",
-    description: "A recording with the same columns, of which all samples are test samples.",
+    description: "A recording with the same columns; all its samples are test samples.",
     ..FILES
 };
 
@@ -313,7 +311,7 @@ fn split_ui(ui: &mut Ui, draft: &mut Draft, usual_validation: f64, task: FileTas
     }
     let button = ui.add(ghost_button("Test file…"));
     if button
-        .on_hover_text("A recording of its own for the test, instead of a share.")
+        .on_hover_text("A separate recording for the test, instead of a share.")
         .clicked()
     {
         effects.push(Effect::ChooseFile(task));
@@ -328,9 +326,9 @@ fn filter_summary(draft: &Draft) -> String {
     }
 }
 
-/// Returns true if the files are to be read again.
+/// Returns true if the files must be read again.
 fn filter_ui(ui: &mut Ui, draft: &mut Draft) -> bool {
-    let hint = "Only rows that meet this are used, such as c4<145.1 and c5!=0. Columns by their names in the table.";
+    let hint = "Only rows that meet this condition are used, such as c4<145.1 and c5!=0. Columns have their names in the table.";
     let response = text_ui(ui, "Only rows with", hint, "c4 < 145.1", &mut draft.conditions);
     let typed = draft.conditions.trim();
     if let (false, false, Err(error)) = (typed.is_empty(), response.has_focus(), typed.parse::<Condition>()) {

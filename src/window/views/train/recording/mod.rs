@@ -1,7 +1,7 @@
 //! Recordings as the source of a training: their files, the meaning of their columns, and the division of their samples.
 //!
-//! [`editor`] owns the import. [`opening`] reads files in the background; a [`draft`] holds the choices of the user, which
-//! [`checking`] tries out whenever they change; [`missing`] describes files that are not where they were.
+//! [`editor`] owns the import. [`opening`] reads files in the background, and checks the import whenever it changes; a
+//! [`draft`] holds the choices of the user; [`files_section`] shows the files, including missing ones.
 
 mod columns_card;
 mod columns_table;

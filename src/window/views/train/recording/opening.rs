@@ -34,7 +34,7 @@ pub(super) enum ToOpen {
     Files(Files),
     /// Files of a plan.
     Import(Box<Reopened>),
-    /// As [`Self::Import`], after the missing file at the first path was found at the second.
+    /// As [`Self::Import`], with the missing file at the first path found at the second.
     Found(Box<Reopened>, PathBuf, PathBuf),
     /// Recordings of a checkpoint that the worker could not resume.
     Missing(PathBuf),
@@ -68,7 +68,7 @@ pub(super) enum Opened {
     Import(Box<Draft>, Box<Reopened>),
     /// Import of a plan of which files are missing.
     Missing(Box<Reopened>),
-    /// A network, and its import or the reason for which there is none; `None` for a simulated array.
+    /// A network, and its import or the reason why there is none; `None` for a simulated array.
     Network(Box<NetworkFile>, Option<Result<Box<Opened>, String>>),
     /// A checkpoint, which is for the worker.
     Checkpoint(PathBuf),
@@ -81,7 +81,7 @@ pub(super) enum Opened {
 pub(super) enum OpeningEvent {
     /// Progress of reading this file.
     Reading(Progress),
-    /// The files, or the reason for which they cannot be opened.
+    /// The files, or the reason why they cannot be opened.
     Opened(Result<Opened, String>),
 }
 
@@ -122,7 +122,7 @@ impl Opening {
         );
     }
 
-    /// Opens them no longer.
+    /// Cancels opening files.
     pub(super) fn cancel(&mut self) {
         self.job.abandon();
         (self.under_way, self.is_reopening) = (None, false);
@@ -162,7 +162,7 @@ fn open(to_open: ToOpen, report: &Report<OpeningEvent>) -> Result<Opened, String
             reopened.relocate(&missing, &found)?;
             return reopen(*reopened, &mut watch);
         }
-        // The window has reported what is wrong with the file.
+        // The window has reported the error in the file.
         ToOpen::Missing(path) => return Ok(missing_of_checkpoint(&path).unwrap_or(Opened::Nothing)),
         ToOpen::Sample(folder) => Files {
             new: vec![write_sample(&folder)?],
@@ -218,7 +218,7 @@ fn open(to_open: ToOpen, report: &Report<OpeningEvent>) -> Result<Opened, String
     let recipe = to_look_at(paths, files.older.as_deref());
     let inspected_files = recipe.inspect(Path::new(""), &mut watch);
     let inspected_files = inspected_files.map_err(|error| in_window(&error))?;
-    // Which file has the readings is guessed only where there are others than before.
+    // The file with the readings is guessed only if the set of files has changed.
     let mut plan = if is_same_files {
         suggested_plan_in_order(&inspected_files)
     } else {
@@ -239,8 +239,8 @@ fn open(to_open: ToOpen, report: &Report<OpeningEvent>) -> Result<Opened, String
     Ok(Opened::Recordings(inspected(plan, Draft::new, &mut watch)?))
 }
 
-/// The recipe by which recordings are looked at for the first time: laid out as those of an older import, whose stems they
-/// keep. Cells that mean missing in a column are left out, as its name may change.
+/// Returns the recipe for the first inspection of recordings, with the layout and stems of an older import. Missing-cell
+/// markers of single columns are left out, because the names of columns may change.
 fn to_look_at(paths: Vec<PathBuf>, older: Option<&Draft>) -> Recipe {
     let of_older = |file: &PathBuf| {
         let mut joined = older.iter().flat_map(|older| &older.plan.import.join);
@@ -263,7 +263,7 @@ fn to_look_at(paths: Vec<PathBuf>, older: Option<&Draft>) -> Recipe {
     }
 }
 
-/// The import of a plan.
+/// Inspects the files of a plan.
 fn inspected(plan: Plan, draft: fn(Plan, Vec<InspectedFile>) -> Draft, watch: Watch<'_>) -> Result<Box<Draft>, String> {
     let files = plan.import.inspect(Path::new(""), watch);
     Ok(Box::new(draft(plan, files.map_err(|error| in_window(&error))?)))
@@ -299,7 +299,7 @@ fn open_document(kind: DocumentKind, path: &Path, watch: Watch<'_>) -> Result<Op
         }
         DocumentKind::Checkpoint => match missing_of_checkpoint(path) {
             Ok(opened @ Opened::Missing(_)) => Ok(opened),
-            // The worker reports what is wrong with the file.
+            // The worker reports the error in the file.
             _ => Ok(Opened::Checkpoint(path.to_owned())),
         },
         other => Err(format!(
@@ -329,11 +329,11 @@ pub(super) struct Checked {
     pub(super) samples: [usize; 3],
     /// Number of rows of the files, dropped ones included.
     pub(super) rows: usize,
-    /// Rows that are no samples, by reason.
+    /// Rows that are not samples, by reason.
     pub(super) dropped: Vec<Dropped>,
     /// The files, and how they are joined.
     pub(super) files: Vec<FileReport>,
-    /// Positions of targets, in words.
+    /// Positions of targets, as text.
     pub(super) positions: Option<String>,
     /// Warnings for the user.
     pub(super) warnings: Vec<String>,
@@ -342,7 +342,7 @@ pub(super) struct Checked {
 #[derive(Debug)]
 struct CheckingEvent(Result<Box<Checked>, String>);
 
-/// Check under way, and the outcome of the last one.
+/// Current check, and the outcome of the last one.
 #[derive(Debug)]
 pub(super) struct Checking {
     job: Job<CheckingEvent>,
