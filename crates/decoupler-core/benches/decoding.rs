@@ -1,8 +1,8 @@
-//! How fast frames are decoded: `cargo bench -p decoupler-core --bench decoding`.
+//! Decoding speed: `cargo bench -p decoupler-core --bench decoding`.
 //!
-//! One thread; medians of many frames, taken in turns within one run. Only ratios are worth remembering: what the
-//! arithmetic alone takes, divisions, square roots, hyperbolic tangents and multiplications in plain loops of the same
-//! number, is measured next to.
+//! One thread; medians of many frames, measured in turns within one run. Only ratios are comparable between machines:
+//! the minimum arithmetic (divisions, square roots, hyperbolic tangents and multiplications, the same number in plain
+//! loops) is measured alongside.
 #![expect(clippy::print_stdout, reason = "a benchmark's result is what it prints")]
 #![allow(missing_docs, clippy::unwrap_used)]
 
@@ -31,7 +31,7 @@ use untrained::untrained_networks;
 /// A piece of work with its name.
 type Work<'a> = (String, Box<dyn FnMut() + 'a>);
 
-/// Nanoseconds of each piece of work: medians of blocks, taken in turns.
+/// Nanoseconds of each piece of work: medians of blocks, measured in turns.
 fn medians_ns(works: &mut [Work<'_>]) -> Vec<f64> {
     const TURNS: usize = 15;
     const BLOCK_NS: f64 = 2e6;
@@ -61,8 +61,8 @@ fn medians_ns(works: &mut [Work<'_>]) -> Vec<f64> {
     times.iter_mut().map(middle).collect()
 }
 
-/// What decoding of a frame by networks cannot avoid, in the precision of the array. The type rather than a closure, which
-/// would be too long to be moved into the code for vector registers.
+/// Minimum arithmetic of decoding a frame by networks, in the precision of the array. A type rather than a closure,
+/// which would be too long to be inlined into the SIMD-dispatched function.
 macro_rules! arithmetic {
     ($real:ty, $tanh:path, $divisions:expr, $tangents:expr, $products:expr) => {{
         struct Arithmetic<'a>(&'a mut [$real], &'a [$real]);
@@ -75,7 +75,7 @@ macro_rules! arithmetic {
                 for value in self.0 {
                     *value = 1.0 / *value;
                 }
-                // Several sums, so that additions need not wait for each other.
+                // Several sums to hide the latency of additions.
                 let mut sums = [[0.0; LANES]; 4];
                 for blocks in self.1.as_chunks::<LANES>().0.as_chunks::<4>().0 {
                     for (sums, block) in sums.iter_mut().zip(blocks) {
@@ -98,7 +98,7 @@ macro_rules! arithmetic {
 }
 
 impl RowArithmetic {
-    /// Of Gaussians around `centres`, each with an exponential of about 16 products.
+    /// Arithmetic of Gaussians around `centres`, each with an exponential of about 16 products.
     fn of_radial_basis(scale: ArrayScale, centres: usize) -> Self {
         let (inputs, outputs) = (scale.columns(), scale.nodes_per_row());
         Self {
@@ -108,8 +108,8 @@ impl RowArithmetic {
         }
     }
 
-    /// Of `rounds` of expectation propagation over all nodes: a quadrature of 97 points and two products with the factor
-    /// of the covariance each.
+    /// Arithmetic of `rounds` of expectation propagation over all nodes: for each node a quadrature of 97 points and
+    /// two products with the factor of the covariance.
     fn of_propagation(scale: ArrayScale, rounds: usize) -> Self {
         let nodes = scale.nodes_per_row();
         Self {
@@ -120,7 +120,8 @@ impl RowArithmetic {
     }
 }
 
-/// Evaluations that Newton takes from an affine estimate: its error of a hundredth of the stroke is squared each time.
+/// Number of evaluations by Newton's method from an affine estimate: its error of a hundredth of the stroke is
+/// squared each time.
 const NEWTON_EVALUATIONS: usize = 3;
 
 fn print_scale(scale: ArrayScale) {
@@ -275,7 +276,7 @@ fn print_scale(scale: ArrayScale) {
         works.push((format!("arithmetic of {name}"), Box::new(arithmetic.work(m1))));
     }
     let times = medians_ns(&mut works);
-    println!("\n{scale}: {m1} rows a frame");
+    println!("\n{scale}: {m1} rows per frame");
     println!("{:38} {:>12} {:>12}", "", "ns per row", "us per frame");
     for ((name, _), ns) in works.iter().zip(&times) {
         println!("{name:38} {:>12.0} {:>12.3}", ns / m1 as f64, ns * 1e-3);

@@ -23,7 +23,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     settings.source.samples = 4000;
     settings.training.stopping.epochs = 60;
     let nominal = settings.source.sensor;
-    // A recording would stand here: 60 frames of a sensor that is not quite as drawn, with the presses known.
+    // In place of a recording: 60 frames of a sensor that differs from the drawing, with known presses.
     let mut real = nominal;
     real.geometry.height_mm *= 1.05;
     real.geometry.node_pitch_mm *= 0.95;
@@ -32,7 +32,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         let scene = settings.source.scene;
         let mut set = Dataset::simulate(&real, &scene, 10 * snapshots, &mut Seed(seed).rng(Stream::Training))?;
         set.disturb(&real, &scene.noise, &mut Seed(seed).rng(Stream::TrainingNoise))?;
-        Ok(rebased(&set, &real, &nominal)?) // Only displacements are known, not where the nodes really are.
+        Ok(rebased(&set, &real, &nominal)?) // Only displacements are known, not the true positions.
     };
     let (frames, test) = (recorded(60, 1)?, recorded(100, 2)?);
 
@@ -64,7 +64,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// Counts, over 50 recordings, how often the truth is within the interval of each parameter, and of all together.
+/// Counts, over 50 recordings, how often the true value is within the interval of each parameter, and of all
+/// together.
 fn coverage(
     nominal: &SensorModel,
     real: &SensorModel,

@@ -1,6 +1,6 @@
-//! Breaks wires of a simulated array at random, and prints how often the right one is named and what leaving it out is
-//! worth: `cargo run --release --example faults -- [FAULTS [SOUND-FRAMES [ARRAY]]]`; 1000 faults and 100 000 frames without a fault
-//! take a few minutes.
+//! Breaks wires of a simulated array at random, and prints how often the right one is named and how much leaving it
+//! out improves the answer: `cargo run --release --example faults -- [FAULTS [FAULTLESS-FRAMES [ARRAY]]]`; 1000
+//! faults and 100 000 frames without a fault take a few minutes.
 #![expect(clippy::print_stdout, reason = "an example's result is what it prints")]
 
 use std::error::Error;
@@ -23,10 +23,10 @@ const KINDS: [&str; 6] = [
     "gain",
     "stuck",
 ];
-/// Frames between presses that are decoded, and frames in all with each fault.
+/// Number of frames between presses that are decoded, and in all with each fault.
 const FRAMES: usize = 20;
 
-/// What became of the faults of one kind.
+/// Results for the faults of one kind.
 #[derive(Default)]
 struct Tally {
     faults: usize,
@@ -41,7 +41,7 @@ struct Tally {
 fn main() -> Result<(), Box<dyn Error>> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let argument = |index: usize, default: &str| arguments.get(index).map_or(default, String::as_str).to_owned();
-    let (faults, sound_frames): (usize, usize) = (argument(0, "12").parse()?, argument(1, "500").parse()?);
+    let (faults, frames_without_fault): (usize, usize) = (argument(0, "12").parse()?, argument(1, "500").parse()?);
     let mut settings = Preset::Best.settings_in(Noise::relative(1e-3));
     settings.source.sensor.scale = argument(2, "10x10_5x30").parse()?;
     settings.source.scene.loading = Loading::Indenter(Indenter::default());
@@ -64,25 +64,25 @@ fn main() -> Result<(), Box<dyn Error>> {
             &mut tallies[kind],
         )?;
     }
-    println!("fault           right  wrong  of    frames  error: sound  faulty  left out (mm)");
+    println!("fault           right  wrong  of    frames  error: intact faulty  left out (mm)");
     for (name, tally) in KINDS.iter().zip(&tallies) {
         let Tally {
             right, wrong, faults, ..
         } = tally;
         let frames = tally.frames as f64 / (*right).max(1) as f64;
-        let [sound, faulty, left_out] = tally.errors_mm.map(|sum| sum / tally.values.max(1) as f64);
+        let [intact, faulty, left_out] = tally.errors_mm.map(|sum| sum / tally.values.max(1) as f64);
         println!(
-            "{name:<14} {right:>6} {wrong:>6} {faults:>4} {frames:>8.1}       {sound:.4}  {faulty:.4}    {left_out:.4}"
+            "{name:<14} {right:>6} {wrong:>6} {faults:>4} {frames:>8.1}       {intact:.4}  {faulty:.4}    {left_out:.4}"
         );
     }
     let right: usize = tallies.iter().map(|tally| tally.right).sum();
     println!("right wire named: {right} of {faults}");
-    let alarms = false_alarms(&settings, sound_frames)?;
-    println!("false alarms: {alarms} in {sound_frames} frames without a fault");
+    let alarms = false_alarms(&settings, frames_without_fault)?;
+    println!("false alarms: {alarms} in {frames_without_fault} frames without a fault");
     Ok(())
 }
 
-/// Draws a fault of one kind, with the wires that should be named. Errors of a gain are from 1 to 20 %.
+/// Draws a fault of one kind, with the wires that should be named. Gain errors are 1 to 20 %.
 fn draw(kind: usize, scale: ArrayScale, rng: &mut impl Rng) -> (Fault, FaultyWire) {
     let mut below = |count: usize| rng.random_range(0..count);
     let (row, column) = (below(scale.rows()), below(scale.columns()));
@@ -119,7 +119,7 @@ fn draw(kind: usize, scale: ArrayScale, rng: &mut impl Rng) -> (Fault, FaultyWir
     }
 }
 
-/// Runs the source with the fault until it is named, and decodes frames without and with the wire left out.
+/// Runs the source with the fault until it is named, and decodes frames with and without the wire.
 fn examine(
     settings: &SimulatedSettings,
     seed: Seed,
@@ -129,16 +129,16 @@ fn examine(
     tally: &mut Tally,
 ) -> Result<(), Box<dyn Error>> {
     let (sensor, scene) = (&settings.source.sensor, &settings.source.scene);
-    let mut sound = Simulated::new(sensor, scene, seed, 10.0)?;
+    let mut intact = Simulated::new(sensor, scene, seed, 10.0)?;
     let mut source = Simulated::new(sensor, scene, seed, 10.0)?;
     source.set_fault(Some(fault))?;
     let mut monitor = FaultMonitor::new(sensor, scene, source.rows())?;
-    let (mut sound_ohm, mut frame_ohm) = (vec![0.0; source.readings()], vec![0.0; source.readings()]);
+    let (mut intact_ohm, mut frame_ohm) = (vec![0.0; source.readings()], vec![0.0; source.readings()]);
     let mut answer_mm = vec![0.0; source.rows().len() * network.outputs()];
     let mut left_out: Option<LeftOutDecoder> = None;
     tally.faults += 1;
     for frame in 0..FRAMES {
-        sound.next_frame(&mut sound_ohm)?;
+        intact.next_frame(&mut intact_ohm)?;
         source.next_frame(&mut frame_ohm)?;
         if let Some(FaultEvent::Named(found)) = monitor.check(&frame_ohm) {
             if found.wire == wire {
@@ -165,7 +165,7 @@ fn examine(
             });
             Ok(errors.sum())
         };
-        tally.errors_mm[0] += error_mm(network, &sound_ohm)?;
+        tally.errors_mm[0] += error_mm(network, &intact_ohm)?;
         tally.errors_mm[1] += error_mm(network, &frame_ohm)?;
         tally.errors_mm[2] += error_mm(left_out, &frame_ohm)?;
         tally.values += source.rows().len() * sensor.scale.nodes_per_row();
@@ -176,7 +176,7 @@ fn examine(
     Ok(())
 }
 
-/// Events of the monitor in frames without a fault.
+/// Number of events of the monitor in frames without a fault.
 fn false_alarms(settings: &SimulatedSettings, frames: usize) -> Result<usize, Box<dyn Error>> {
     let (sensor, scene) = (&settings.source.sensor, &settings.source.scene);
     let mut source = Simulated::new(sensor, scene, Seed(12345), 100.0)?;

@@ -12,14 +12,14 @@ use decoupler_core::{
 };
 
 fn main() -> Result<(), Box<dyn Error>> {
-    // A recording would stand here: 600 moments, 3 readings of any unit, the position of a probe and its force.
+    // In place of a recording: 600 moments, 3 readings of any unit, the position of a probe and its force.
     let probe = |sample: usize| ((0.37 * sample as f64).sin(), (0.011 * sample as f64).cos());
     let readings = Array2::from_shape_fn((600, 3), |(sample, channel)| {
         let (x, force) = probe(sample);
         force * (-(x - channel as f64 + 1.0).powi(2)).exp()
     });
     let targets = Array2::from_shape_fn((600, 2), |(s, target)| [probe(s).0, probe(s).1][target]);
-    // Moments of one press belong together: 20 to a group.
+    // Moments of one press form a group of 20.
     let set = Dataset::new(readings, targets, None, (0..600).map(|sample| sample / 20).collect())?;
     let settings = RunSettings::from(Measured { rows: RowModel::Shared });
     let folds = CrossValidation {

@@ -8,11 +8,11 @@
 
 use std::f64::consts::PI;
 
-/// Places pressed, samples of each press, and the time between them in seconds.
+/// Positions pressed, samples of each press, and the time between samples in seconds.
 const PRESSES: usize = 40;
 const SAMPLES: usize = 15;
 const INTERVAL_S: f64 = 0.02;
-/// Channels: place in millimetres, offset in millitesla, sensitivity in millitesla per millimetre.
+/// Channels: position in millimetres, offset in millitesla, sensitivity in millitesla per millimetre.
 const CHANNELS: [(f64, f64, f64, f64); 7] = [
     (10.0, 10.0, 0.42, 1.31),
     (3.0, 6.0, -0.18, 1.12),
@@ -42,7 +42,7 @@ impl Random {
         ((mixed ^ (mixed >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
     }
 
-    /// Returns a normally distributed number by the transform of Box and Muller.
+    /// Returns a normally distributed number by the Box-Muller transform.
     fn normal(&mut self) -> f64 {
         let (radius, angle) = (1.0 - self.uniform(), self.uniform());
         (-2.0 * radius.ln()).sqrt() * (2.0 * PI * angle).cos()

@@ -1,4 +1,4 @@
-//! Trains a network for a simulated array and prints what it is worth: `cargo run --release --example train`.
+//! Trains a network for a simulated array and prints its errors: `cargo run --release --example train`.
 #![expect(clippy::print_stdout, reason = "an example's result is what it prints")]
 
 use decoupler_core::evaluation::{ErrorTable, Run, RunError, SimulatedSettings};

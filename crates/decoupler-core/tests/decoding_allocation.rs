@@ -1,4 +1,4 @@
-//! What runs for every frame allocates nothing.
+//! Code that runs for every frame does not allocate.
 
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
@@ -37,7 +37,7 @@ fn a_frame_is_decoded_by_networks_without_allocating() {
     let mut coordinates_mm = vec![0.0; rows * model.scale.coordinates_per_row()];
     let mut rng = Seed(0).rng(Stream::Start);
     for quantity in Quantity::ALL {
-        // Without noise, single precision has sums in double precision; with noise it has not.
+        // Without noise, single precision computes some sums in double precision; with noise it does not.
         for noise in [0.0, 1e-2] {
             let unseen = Noise::relative(noise).source(&model).unwrap();
             let scaling = ScalingChoice::Whitening;
@@ -101,7 +101,7 @@ fn a_frame_is_decoded_by_radial_basis_and_newton_without_allocating() {
     let frames = set.frames().unwrap();
     let decoders: [&mut dyn Decoder; 3] = [&mut polished, &mut newton, &mut basis];
     for decoder in decoders {
-        // The first frame shows which rows there are.
+        // The first frame determines the number of rows.
         decoder.decode(frames.frame(0), &mut coordinates_mm).unwrap();
         let allocated = allocations(|| decoder.decode(frames.frame(1), &mut coordinates_mm).unwrap());
         assert_eq!(allocated, 0);
@@ -122,7 +122,7 @@ fn the_forward_model_and_its_jacobian_do_not_allocate() {
 }
 
 #[test]
-fn a_line_is_parsed_and_watched_for_faults_without_allocating() {
+fn a_line_is_parsed_and_monitored_without_allocating() {
     let (model, scene) = (
         SensorModel::new("10x6_3x18".parse().unwrap()),
         Scene {
@@ -156,7 +156,7 @@ fn a_line_is_parsed_and_watched_for_faults_without_allocating() {
                 .unwrap();
             latencies.add(std::time::Duration::from_micros(7));
         });
-        // The first line shows how many fields there are.
+        // The first line determines the number of fields.
         assert!(frame == 0 || found == 0, "{frame}: {found}");
     }
 }

@@ -1,11 +1,11 @@
-//! The arithmetic that decoding a row cannot avoid, in plain loops.
+//! Minimum arithmetic of decoding a row, in plain loops.
 
 use std::hint::black_box;
 
 use decoupler_core::sensor::ArrayScale;
 use pulp::{Simd, WithSimd};
 
-/// Square roots, divisions and products that a decoder cannot avoid in a row.
+/// Number of square roots, divisions and products that any decoder needs for a row.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct RowArithmetic {
     pub(crate) roots: usize,
@@ -14,7 +14,8 @@ pub(crate) struct RowArithmetic {
 }
 
 impl RowArithmetic {
-    /// Of `evaluations` of Eq. (2) and its derivatives along z, each with its normal equations and their factor.
+    /// Arithmetic of `evaluations` of Eq. (2) and its derivatives along z, each with its normal equations and their
+    /// factorisation.
     pub(crate) fn of_newton(scale: ArrayScale, evaluations: usize) -> Self {
         let (nodes, columns) = (scale.nodes_per_row(), scale.columns());
         let distances = nodes * scale.nodes_per_column() * columns;
@@ -26,7 +27,7 @@ impl RowArithmetic {
         }
     }
 
-    /// The work of `rows` rows in plain loops.
+    /// Returns the work of `rows` rows in plain loops.
     pub(crate) fn work(self, rows: usize) -> impl FnMut() {
         struct Loops<'a>(&'a mut [f64], &'a mut [f64], &'a [f64]);
         impl WithSimd for Loops<'_> {

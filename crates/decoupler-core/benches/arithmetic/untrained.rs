@@ -1,4 +1,4 @@
-//! Networks for benches of decoding.
+//! Networks for decoding benchmarks.
 
 use decoupler_core::{
     dataset::{Dataset, PerRow, Seed, Stream},
@@ -6,7 +6,7 @@ use decoupler_core::{
     scene::{NoiseSource, RowModel},
 };
 
-/// Untrained networks of known rows: speed does not depend on the weights.
+/// Untrained networks of known rows: the speed does not depend on the weights.
 pub(crate) fn untrained_networks(training: &Dataset, choice: InputChoice, hidden: usize) -> Networks {
     let mut rng = Seed(0).rng(Stream::Start);
     let network = |set: &Dataset| {

@@ -1,4 +1,4 @@
-//! What a frame of one array takes.
+//! Computing time of a frame of one array.
 
 use std::hint::black_box;
 
@@ -24,9 +24,9 @@ pub(crate) struct Array {
     set: Dataset,
 }
 
-/// Frames that are drawn, so that every channel varies.
+/// Number of frames drawn, enough for every channel to vary.
 const FRAMES: usize = 4;
-/// Repetitions of which the median is taken.
+/// Number of repetitions, of which the median is used.
 const TURNS: usize = 7;
 
 impl Array {
@@ -76,7 +76,7 @@ impl Array {
         median(&mut Vec::from_iter((0..TURNS).map(|_| repeat(times))))
     }
 
-    /// Milliseconds that networks with this many hidden nodes take for a frame, in double and in single precision.
+    /// Milliseconds per frame of networks with this many hidden nodes, in double and in single precision.
     pub(crate) fn network_ms(&self, hidden: usize) -> [f64; 2] {
         let networks = self.networks(hidden);
         let rows = self.scale.rows();
@@ -94,7 +94,7 @@ impl Array {
         untrained_networks(&self.set, choice, hidden)
     }
 
-    /// What the Gauss-Newton method takes for a frame.
+    /// Measures the Gauss-Newton method on a frame.
     pub(crate) fn newton(&self) -> NewtonFrame {
         let rows = Vec::from_iter(0..self.scale.rows());
         let rules = NewtonRules::default();
@@ -131,10 +131,10 @@ impl Array {
 /// A frame solved by the Gauss-Newton method.
 pub(crate) struct NewtonFrame {
     pub(crate) ms: f64,
-    /// Square roots, divisions and products of as many evaluations in plain loops.
+    /// The same number of square roots, divisions and products in plain loops.
     pub(crate) arithmetic_ms: f64,
     pub(crate) steps_per_row: f64,
-    /// Rows without a unique solution.
+    /// Number of rows without a unique solution.
     pub(crate) unsolved: usize,
     /// Largest error of a coordinate.
     pub(crate) error_mm: f64,

@@ -1,4 +1,4 @@
-//! Frames of large arrays, and the memory that training for them states.
+//! Frames of large arrays, and the estimated memory for training.
 
 use decoupler_core::{
     evaluation::{Preset, Workload},
@@ -12,9 +12,9 @@ const ARRAYS: [&str; 4] = ["10x10_5x30", "32x32_16x96", "64x64_32x192", "100x80_
 pub(crate) fn print() {
     println!("\n## A frame of large arrays, known rows, without noise, one thread\n");
     println!(
-        "Milliseconds; networks with 12 hidden nodes. Newton's arithmetic is that of as many evaluations as it takes"
+        "Milliseconds; networks with 12 hidden nodes. Newton's arithmetic is that of one evaluation per"
     );
-    println!("steps. Memory is what training 1000 snapshots with preset best states before it begins.\n");
+    println!("step. Memory is the estimate for training 1000 snapshots with preset best.\n");
     println!(
         "| array | nodes | draw | network, 64 bits | 32 bits | Newton | times the arithmetic | steps | unsolved rows | largest error in mm | memory to train |"
     );

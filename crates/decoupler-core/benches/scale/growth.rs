@@ -1,4 +1,4 @@
-//! Growth of a frame's time with rows, nodes and hidden nodes.
+//! Scaling of the time per frame with rows, nodes and hidden nodes.
 
 use crate::{
     array::{Array, NewtonFrame},
@@ -6,11 +6,11 @@ use crate::{
 };
 
 pub(crate) fn print() {
-    println!("\n## Growth of a frame's time, one thread\n");
+    println!("\n## Scaling of the time per frame, one thread\n");
     println!(
-        "Milliseconds, and the exponent of the power law through them. Nodes of a row-wire bring three times as many"
+        "Milliseconds, and the exponent of the power law through them. The array has three times as many"
     );
-    println!("column-wires and half as many nodes on each with them.\n");
+    println!("column-wires as nodes on a row-wire, and half as many nodes on a column-wire as rows.\n");
     println!("| growing | sizes | what | milliseconds | exponent |\n|---|---|---|---|---:|");
     let rows = [10, 20, 40, 80];
     let by_rows = rows.map(|rows| Array::new(&format!("{rows}x16_{}x48", rows / 2)));

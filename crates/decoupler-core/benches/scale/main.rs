@@ -1,7 +1,7 @@
-//! Large arrays and many samples: `cargo bench -p decoupler-core --bench scale`, or a part of it with its name behind
-//! `--`: `arrays`, `growth` or `samples`.
+//! Large arrays and many samples: `cargo bench -p decoupler-core --bench scale`, or one part of it with its name
+//! after `--`: `arrays`, `growth` or `samples`.
 //!
-//! One thread; medians. Only ratios and exponents are worth remembering.
+//! One thread; medians. Only ratios and exponents are comparable between machines.
 #![expect(clippy::print_stdout, reason = "a benchmark's result is what it prints")]
 #![allow(missing_docs, clippy::unwrap_used)]
 
@@ -29,7 +29,7 @@ fn main() {
         ("growth", growth::print),
         ("samples", samples::print),
     ];
-    // What begins with two dashes comes from cargo.
+    // Arguments with two dashes come from cargo.
     let named: Vec<&String> = arguments.iter().filter(|name| !name.starts_with("--")).collect();
     for name in &named {
         assert!(parts.iter().any(|(part, _)| part == name), "there is no part {name}");

@@ -1,4 +1,4 @@
-//! Growth of an epoch's time and memory with the samples of a whole run.
+//! Scaling of the time and memory of an epoch with the samples of a whole run.
 
 use std::{fs, process::Command};
 
@@ -10,25 +10,25 @@ use crate::{
     timing::{median, time_ms},
 };
 
-/// Argument that makes this program the measured process.
+/// Argument that starts this program as the measured process.
 const FLAG: &str = "--peak-of-run";
 const SAMPLES: [usize; 5] = [1000, 10_000, 100_000, 300_000, 999_000];
 
 pub(crate) fn print() {
     println!("\n## A run of 10×10_5×30 with 12 hidden nodes, Levenberg-Marquardt, one thread\n");
-    println!("Memory is the most that a process held, less what one holds that trains 100 samples.\n");
-    println!("| samples | an epoch, ms | peak, MB | stated, MB |\n|---:|---:|---:|---:|");
+    println!("Memory is the peak of a process, minus that of one with 100 samples.\n");
+    println!("| samples | ms per epoch | peak, MB | estimated, MB |\n|---:|---:|---:|---:|");
     let min_mb = peak_mb(100);
     let mut times = Vec::new();
     for samples in SAMPLES {
         let ms = epoch_ms(samples);
         times.push(ms);
         let peak = match (peak_mb(samples), min_mb) {
-            (Some(peak), Some(least)) => format!("{:.0}", peak - least),
-            _ => "not measured here".to_owned(),
+            (Some(peak), Some(min)) => format!("{:.0}", peak - min),
+            _ => "not available".to_owned(),
         };
-        let stated = Workload::of(&settings(samples)).unwrap().bytes as f64 * 1e-6;
-        println!("| {samples} | {ms:.1} | {peak} | {stated:.0} |");
+        let estimated = Workload::of(&settings(samples)).unwrap().bytes as f64 * 1e-6;
+        println!("| {samples} | {ms:.1} | {peak} | {estimated:.0} |");
     }
     println!("\nExponent {:.2}.", exponent(&SAMPLES, &times));
 }
@@ -39,10 +39,10 @@ fn settings(samples: usize) -> SimulatedSettings {
     settings
 }
 
-/// Does `work` on one thread.
+/// Runs `work` on one thread.
 fn on_one_thread<T: Send>(work: impl FnOnce() -> T + Send) -> T {
     let pool = ThreadPoolBuilder::new().num_threads(1).build();
-    pool.expect("a thread can be had").install(work)
+    pool.expect("the thread pool can be built").install(work)
 }
 
 fn epoch_ms(samples: usize) -> f64 {
@@ -60,7 +60,7 @@ fn peak_mb(samples: usize) -> Option<f64> {
     Some(kilobytes * 1024.0 / 1e6)
 }
 
-/// Returns the number of samples to train if this is the measured process.
+/// Returns the number of samples to train on if this is the measured process.
 pub(crate) fn asked(arguments: &[String]) -> Option<usize> {
     match arguments {
         [flag, samples] if flag == FLAG => samples.parse().ok(),

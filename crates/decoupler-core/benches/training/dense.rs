@@ -1,5 +1,5 @@
-//! Levenberg-Marquardt as in the textbooks, with the dense Jacobian and the same GEMM library: the reference for the time
-//! and the path of the structured normal equations.
+//! Textbook Levenberg-Marquardt with the dense Jacobian and the same GEMM library: the reference for the time and the
+//! iterates of the structured normal equations.
 
 use decoupler_core::{
     network::{Mlp, Shape},
@@ -79,7 +79,7 @@ impl Dense {
     }
 }
 
-/// Prints the ratio of the epochs' times and the largest difference between the two paths.
+/// Prints the ratio of the times per epoch and the largest difference between the iterates.
 pub(crate) fn print() {
     let shape = Shape {
         inputs: 30,
@@ -94,7 +94,7 @@ pub(crate) fn print() {
         |largest| Mlp::from_weights(shape, numbers(1, shape.weights(), largest).into_raw_vec_and_offset().0);
     let (teacher, start) = (network(0.5), network(0.3));
     let inputs = numbers(1000, shape.inputs, 1.0);
-    // Not to be reached exactly: else the damping vanishes, and rounding decides the path of both.
+    // The targets cannot be reached exactly: otherwise the damping vanishes and rounding decides both paths.
     let targets = teacher.forward(inputs.view()) + numbers(1000, shape.outputs, 0.5);
     let problem = Problem {
         training: Examples::new(inputs.view(), targets.view()),

@@ -1,4 +1,4 @@
-//! Time of an epoch of Levenberg-Marquardt relative to its largest matrix product.
+//! Time per epoch of Levenberg-Marquardt relative to its largest matrix product.
 
 use std::hint::black_box;
 
@@ -53,7 +53,7 @@ pub(crate) fn print() {
         }));
     }
     let product_ms = median(&mut products);
-    println!("## An epoch of Levenberg-Marquardt, 30-12-20, 1000 samples, one thread\n");
+    println!("## Levenberg-Marquardt epoch, 30-12-20, 1000 samples, one thread\n");
     println!("| | median ms | ratio | of |\n|---|---:|---:|---:|");
     println!("| GEMM 78×1000×496 | {product_ms:.3} | 1.00 | {TURNS} |");
     for (rejected, epochs) in epochs.iter_mut().enumerate().filter(|(_, epochs)| !epochs.is_empty()) {

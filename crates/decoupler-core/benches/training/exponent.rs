@@ -1,6 +1,6 @@
 //! Power laws.
 
-/// The exponent of the power law through some points, by least squares on logarithms.
+/// Returns the exponent of the power law through some points, by least squares on logarithms.
 pub(crate) fn exponent(x: &[usize], y: &[f64]) -> f64 {
     let logarithms = || x.iter().zip(y).map(|(&x, y)| ((x as f64).ln(), y.ln()));
     let count = x.len() as f64;

@@ -1,13 +1,13 @@
-//! Growth of an epoch's time and memory with samples, hidden nodes and the array.
+//! Scaling of the time and memory of an epoch with samples, hidden nodes and the array.
 
 use decoupler_core::training::Method;
 
 use crate::{exponent::exponent, memory::peak_mb, problem::Sizes};
 
 pub(crate) fn print() {
-    println!("\n## Growth of Levenberg-Marquardt, one thread\n");
-    println!("From 10×10, 12 hidden nodes, 1000 samples. Memory is the most that a process held, less what one holds");
-    println!("that trains next to nothing.\n");
+    println!("\n## Scaling of Levenberg-Marquardt, one thread\n");
+    println!("From 10×10, 12 hidden nodes, 1000 samples. Memory is the peak of a process, minus that of one");
+    println!("with next to no work.\n");
     println!("| growing | sizes | milliseconds | exponent | megabytes | exponent |\n|---|---|---|---:|---|---:|");
     row("samples", &[1000, 10_000, 100_000], |samples| {
         Sizes::array(10, 12, samples)
@@ -33,7 +33,7 @@ fn row(growing: &str, values: &[usize], sizes: impl Fn(usize) -> Sizes) {
     };
     let cells = |measured: Option<Vec<f64>>| match measured {
         Some(measured) => format!("{} | {:.2}", list(&measured), exponent(values, &measured)),
-        None => "not measured here | ".to_owned(),
+        None => "not available | ".to_owned(),
     };
     let min_mb = peak_mb(Sizes::array(1, 1, 1));
     let times = with(&|sizes| Some(sizes.epoch_ms(Method::default(), 1, 9)));

@@ -1,7 +1,7 @@
-//! Speed of training: `cargo bench -p decoupler-core --bench training`, or a part of it with its name behind
-//! `--`: `epoch`, `dense`, `sizes`, `growth` or `methods`.
+//! Speed of training: `cargo bench -p decoupler-core --bench training`, or one part of it with its name after `--`:
+//! `epoch`, `dense`, `sizes`, `growth` or `methods`.
 //!
-//! Every figure is a median. Figures that are compared are measured in turns within one run, since a machine's speed
+//! Every figure is a median. Figures to be compared are measured in turns within one run, since a machine's speed
 //! drifts; only ratios are comparable between runs.
 #![expect(clippy::print_stdout, reason = "a benchmark's result is what it prints")]
 #![allow(missing_docs)]
@@ -29,7 +29,7 @@ fn main() {
         memory::print_peak(sizes);
         return;
     }
-    // What begins with two dashes comes from cargo.
+    // Arguments with two dashes come from cargo.
     let named: Vec<&String> = arguments.iter().filter(|name| !name.starts_with("--")).collect();
     for name in &named {
         assert!(parts.iter().any(|(part, _)| part == name), "there is no part {name}");

@@ -7,11 +7,11 @@ use rayon::ThreadPoolBuilder;
 
 use crate::problem::Sizes;
 
-/// Argument that makes this program the measured process.
+/// Argument that starts this program as the measured process.
 const FLAG: &str = "--peak-of";
 
-/// Returns the peak memory in megabytes of a process that trains a few epochs of Levenberg-Marquardt on one thread; `None`
-/// where the system does not report it.
+/// Returns the peak memory in megabytes of a process that trains a few epochs of Levenberg-Marquardt on one thread;
+/// `None` if the system does not report it.
 pub(crate) fn peak_mb(sizes: Sizes) -> Option<f64> {
     let Sizes { shape, samples } = sizes;
     let numbers = [shape.inputs, shape.hidden, shape.outputs, samples].map(|number| number.to_string());
@@ -41,7 +41,7 @@ pub(crate) fn asked(arguments: &[String]) -> Option<Sizes> {
 /// Trains and prints the peak memory in kilobytes, as Linux reports it.
 pub(crate) fn print_peak(sizes: Sizes) {
     let pool = ThreadPoolBuilder::new().num_threads(1).build();
-    pool.expect("a thread can be had").install(|| {
+    pool.expect("the thread pool can be built").install(|| {
         let mut trainer = sizes.trainer(Method::default());
         (0..3).for_each(|_| {
             trainer.step();

@@ -52,16 +52,16 @@ fn train(method: Method, seed: u64) -> Outcome {
 }
 
 pub(crate) fn print() {
-    println!("\n## Methods: 10×10_5×30, 12 hidden nodes, 1000 samples, 200 to validate, 100 to test\n");
+    println!("\n## Methods: 10×10_5×30, 12 hidden nodes, 1000 samples, 200 for validation, 100 for testing\n");
     println!(
-        "Same samples, split and start for all; medians of {} seeds. Each ends by its own rules (the validation error",
+        "Same samples, split and start for all; medians of {} seeds. Each stops by its own rules (the validation error",
         SEEDS.len()
     );
     println!(
         "reached no new best for 6 epochs, the gradient vanished, mu grew too large) or after {} seconds.\n",
         MAX_TIME.as_secs()
     );
-    println!("| method | epochs | seconds | Z % | X % | ended by time |\n|---|---:|---:|---:|---:|---:|");
+    println!("| method | epochs | seconds | Z % | X % | timed out |\n|---|---:|---:|---:|---:|---:|");
     for method in Method::all() {
         let outcomes = SEEDS.map(|seed| train(method, seed));
         let of = |value: fn(&Outcome) -> f64| median(&mut outcomes.iter().map(value).collect::<Vec<_>>());

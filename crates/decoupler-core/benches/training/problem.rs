@@ -48,7 +48,7 @@ impl Sizes {
         let pool = ThreadPoolBuilder::new()
             .num_threads(threads)
             .build()
-            .expect("threads can be had");
+            .expect("the thread pool can be built");
         pool.install(|| {
             let mut trainer = self.trainer(method);
             median(&mut (0..epochs).map(|_| time_ms(|| trainer.step())).collect::<Vec<_>>())

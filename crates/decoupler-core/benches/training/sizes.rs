@@ -1,4 +1,4 @@
-//! An epoch of every method at every size.
+//! Time per epoch of every method at every size.
 
 use decoupler_core::training::Method;
 
@@ -18,7 +18,7 @@ pub(crate) fn print() {
         ("100 000", Sizes::array(10, 12, 100_000)),
     ];
     println!("\n## Epochs, milliseconds, one thread\n");
-    println!("12 hidden nodes and 1000 samples, then 10×10 with other numbers of them.\n");
+    println!("12 hidden nodes and 1000 samples; other values for 10×10.\n");
     println!("| method |{} |", sizes.map(|(name, _)| format!(" {name}")).join(" |"));
     println!("|---|{}", "---:|".repeat(sizes.len()));
     for method in Method::all() {

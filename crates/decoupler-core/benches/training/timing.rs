@@ -2,7 +2,7 @@
 
 use std::{hint::black_box, time::Instant};
 
-/// Returns the time that `work` takes, in milliseconds.
+/// Returns the time of `work` in milliseconds.
 pub(crate) fn time_ms<T>(work: impl FnOnce() -> T) -> f64 {
     let begun = Instant::now();
     black_box(work());

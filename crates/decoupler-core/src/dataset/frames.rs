@@ -15,7 +15,7 @@ pub struct Frames {
 
 /// Error for a set with incomplete frames.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
-#[error("the snapshot of sample {} is not whole: {found} samples of row-wire {}, where each row-wire read needs one", .sample + 1, .row_wire + 1)]
+#[error("the snapshot of sample {} is incomplete: {found} samples of row-wire {}, but each row-wire read needs exactly one", .sample + 1, .row_wire + 1)]
 pub struct FramesError {
     /// Index of the first sample of the snapshot, from 0.
     pub sample: usize,
@@ -199,7 +199,7 @@ mod tests {
         let lacking = set(Some(&[0, 1, 1]), &[0, 0, 1]).frames().unwrap_err();
         assert_eq!(
             lacking.to_string().split(':').next(),
-            Some("the snapshot of sample 3 is not whole")
+            Some("the snapshot of sample 3 is incomplete")
         );
         assert_eq!((lacking.row_wire, lacking.found), (0, 0));
         let twice = set(Some(&[0, 1, 1]), &[0, 0, 0]).frames().unwrap_err();

@@ -89,12 +89,12 @@ impl AffineMap {
     /// take 6 % more time.
     #[inline(always)]
     fn read(&mut self, readings: &[f64], of: impl Fn(f64) -> f64) -> bool {
-        let mut is_sound = true;
+        let mut all_valid = true;
         for ((value, &reading), centre) in self.values.iter_mut().zip(readings).zip(&self.centre) {
             *value = of(reading) - centre;
-            is_sound &= self.quantity.accepts(reading);
+            all_valid &= self.quantity.accepts(reading);
         }
-        is_sound
+        all_valid
     }
 }
 
@@ -108,11 +108,11 @@ impl Decoder for AffineMap {
     }
 
     fn decode_row(&mut self, _row_index: usize, readings: &[f64], targets: &mut [f64]) -> Result<(), DecodeError> {
-        let is_sound = match self.quantity {
+        let all_valid = match self.quantity {
             Quantity::Conductance => self.read(readings, |ohm| 1.0 / ohm),
             quantity => self.read(readings, |reading| quantity.of(reading)),
         };
-        if !is_sound {
+        if !all_valid {
             DecodeError::check_for(self.quantity, readings)?;
         }
         self.changes.fill(0.0);
@@ -401,7 +401,7 @@ mod tests {
     }
 
     #[test]
-    fn targets_that_are_affine_in_the_quantity_come_back_by_ridge() {
+    fn ridge_recovers_targets_affine_in_the_quantity() {
         let set = with_target(&draw("1x4_2x12", 60), |ohm| 4.0 + 20.0 / ohm[3] - 7.0 / ohm[8]);
         for scaling in [ScalingChoice::Whitening, ScalingChoice::MinMax] {
             let choice = InputChoice {
@@ -414,14 +414,14 @@ mod tests {
             )
             .unwrap();
             for (answer, truth) in answer.rows().into_iter().zip(set.targets().rows()) {
-                assert_eq!(answer[0], truth[0], "what does not vary stays");
+                assert_eq!(answer[0], truth[0], "constant targets keep their value");
                 assert!((answer[2] - truth[2]).abs() < 1e-6, "{} {}", answer[2], truth[2]);
             }
         }
     }
 
     #[test]
-    fn readings_outside_the_quantitys_domain_are_named() {
+    fn readings_outside_the_domain_are_refused() {
         let set = draw("1x4_2x12", 30);
         let mut readings = set.sample_readings(0).to_vec();
         readings[5] = -1.0;

@@ -117,11 +117,11 @@ impl DecodeError {
     /// Checks that `is_valid` holds for all readings of a row, in a single vectorised pass, since invalid readings
     /// are rare.
     #[inline(always)]
-    fn check_that(readings: &[f64], is_sound: impl Fn(f64) -> bool) -> Result<(), Self> {
-        if readings.iter().fold(true, |all, &value| all & is_sound(value)) {
+    fn check_that(readings: &[f64], is_valid: impl Fn(f64) -> bool) -> Result<(), Self> {
+        if readings.iter().fold(true, |all, &value| all & is_valid(value)) {
             return Ok(());
         }
-        let channel = readings.iter().position(|&value| !is_sound(value)).unwrap_or(0);
+        let channel = readings.iter().position(|&value| !is_valid(value)).unwrap_or(0);
         Err(Self {
             row_index: 0,
             channel,

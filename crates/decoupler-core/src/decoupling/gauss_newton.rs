@@ -110,7 +110,7 @@ impl LinearisedRow {
 /// over a grid with steps of about 1, which finds the deepest of several valleys, refined by golden-section search.
 ///
 /// `of` returns the values of all functions, each at its own position, so that shared work is done once.
-pub(super) fn least(range: (f64, f64), count: usize, of: impl Fn(&[f64]) -> Vec<f64>) -> Vec<(f64, f64)> {
+pub(super) fn minima(range: (f64, f64), count: usize, of: impl Fn(&[f64]) -> Vec<f64>) -> Vec<(f64, f64)> {
     let (low, high) = range;
     let steps = (high - low).ceil().max(1.0);
     let step = (high - low) / steps;
@@ -279,15 +279,15 @@ mod tests {
     fn the_deepest_valley_of_each_function_is_found_and_narrowed() {
         let two_valleys = |at: f64| ((at - 2.7).powi(2)).min((at + 20.3).powi(2) - 0.1);
         let parabola = |at: f64| (at - 4.1).powi(2);
-        let found = least((-30.0, 5.0), 2, |at| vec![two_valleys(at[0]), parabola(at[1])]);
+        let found = minima((-30.0, 5.0), 2, |at| vec![two_valleys(at[0]), parabola(at[1])]);
         let (at, value) = found[0];
         assert!((at + 20.3).abs() < 0.02 && (value + 0.1).abs() < 1e-3, "{at} {value}");
         assert!((found[1].0 - 4.1).abs() < 0.02, "{found:?}");
         for (range, expected) in [((-3.0, 4.5), -3.0), ((7.0, 7.2), 7.0)] {
-            assert_eq!(least(range, 1, |at| at.to_vec())[0].0, expected);
+            assert_eq!(minima(range, 1, |at| at.to_vec())[0].0, expected);
         }
-        assert_eq!(least((1.0, 3.0), 1, |at| vec![-at[0]])[0].0, 3.0);
-        assert_eq!(least((1.0, 3.0), 1, |_| vec![f64::NAN])[0].0, 1.0);
-        assert!(least((1.0, 3.0), 0, |_| Vec::new()).is_empty());
+        assert_eq!(minima((1.0, 3.0), 1, |at| vec![-at[0]])[0].0, 3.0);
+        assert_eq!(minima((1.0, 3.0), 1, |_| vec![f64::NAN])[0].0, 1.0);
+        assert!(minima((1.0, 3.0), 0, |_| Vec::new()).is_empty());
     }
 }

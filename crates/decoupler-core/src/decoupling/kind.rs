@@ -118,14 +118,14 @@ impl DecoderKind {
             Self::Fuzzy => Entry {
                 word: "fuzzy",
                 name: "Fuzzy rules",
-                meaning: "A Takagi-Sugeno system: fuzzy rules with affine consequents, as many as a cross-validation chooses",
+                meaning: "A Takagi-Sugeno system: fuzzy rules with affine consequents, their number chosen by cross-validation",
                 needs: Needs::Nothing,
                 fit: fit_fuzzy,
             },
             Self::Newton => Entry {
                 word: "newton",
                 name: "Newton",
-                meaning: "Newton's method on Eq. (2) from mid-stroke, and other starts where that fails; with noise and prior where the scene has noise or the readings leave the answer open",
+                meaning: "Newton's method on Eq. (2) from mid-stroke, with restarts if that fails; with noise and prior if the scene has noise or the readings do not determine the answer",
                 needs: Needs::Sensor,
                 fit: fit_newton,
             },
@@ -311,7 +311,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn words_are_read_back_and_others_are_told_the_choice() {
+    fn names_parse_and_errors_list_the_choices() {
         for kind in DecoderKind::ALL {
             assert_eq!(kind.to_string().parse(), Ok(kind));
         }

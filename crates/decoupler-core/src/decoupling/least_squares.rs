@@ -196,7 +196,7 @@ mod tests {
     use crate::network::{InputScaling, Quantity};
 
     #[test]
-    fn what_overflows_when_scaled_is_an_error_and_no_map_of_zeros() {
+    fn overflow_when_scaled_is_an_error() {
         let tiny = MinMax::fit(array![[0.0], [1e-200]].view()).unwrap();
         let readings = array![[1e200], [-1e200], [3.0]];
         let set = Dataset::new(readings, array![[1.0], [2.0], [3.0]], None, vec![0, 1, 2]).unwrap();
@@ -210,7 +210,7 @@ mod tests {
 
     /// A = [[3, 1], [4, 2], [0, 2]], b = A (2, −1) + 5 (8, −6, 2)/…: the last term is orthogonal to both columns.
     #[test]
-    fn least_squares_and_the_pseudo_inverse_are_those_of_the_normal_equations() {
+    fn least_squares_and_the_pseudo_inverse_match_the_normal_equations() {
         // (8, −6, 2): 3·8 − 4·6 + 0 = 0 and 8 − 12 + 4 = 0.
         let system = [3.0, 1.0, 5.0 + 8.0, 4.0, 2.0, 6.0 - 6.0, 0.0, 2.0, -2.0 + 2.0];
         let mut triangle = Triangle::default();

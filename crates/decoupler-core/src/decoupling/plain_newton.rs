@@ -69,7 +69,7 @@ const LARGEST_STARTS_BYTES: usize = 256 << 20;
 /// Max number of steps; quadratic convergence needs no more.
 const MAX_STEPS: usize = 12;
 /// Initial steps exempt from the contraction test.
-const STEPS_ON_THE_WAY: usize = 2;
+const EXEMPT_STEPS: usize = 2;
 
 impl PlainNewton {
     pub(super) fn new(model: &SensorModel, scene: &Scene) -> Self {
@@ -190,7 +190,7 @@ impl PlainNewton {
                 continue;
             }
             lane.state = State::GivenUp;
-            if lane.residual <= lane.first_residual && self.equations.is_sound(index) {
+            if lane.residual <= lane.first_residual && self.equations.is_well_conditioned(index) {
                 let report = self.judge(index, inverse_row, (NewtonStop::StepsTaken, rules.steps));
                 self.lanes[index].state = State::Judged(report);
             }
@@ -289,7 +289,7 @@ impl PlainNewton {
     /// Takes one step of the row in `lane`.
     fn move_on(&mut self, index: usize, step: usize, tolerance: f64) -> State {
         let lane = &mut self.lanes[index];
-        if !self.equations.is_sound(index) {
+        if !self.equations.is_well_conditioned(index) {
             return State::GivenUp;
         }
         let (mut length, mut length_mm, mut part, mut is_finite) = (0.0_f64, 0.0_f64, 1.0_f64, true);
@@ -305,7 +305,7 @@ impl PlainNewton {
             length = length.max(share.abs());
             length_mm = length_mm.max(step_mm.abs());
         }
-        if !is_finite || part < SHORTEST_SHARE || step > STEPS_ON_THE_WAY && length > 0.5 * lane.length {
+        if !is_finite || part < SHORTEST_SHARE || step > EXEMPT_STEPS && length > 0.5 * lane.length {
             return State::GivenUp;
         }
         for (place, (unknown, range)) in lane.unknowns_mm.iter_mut().zip(&self.ranges).enumerate() {

@@ -328,7 +328,7 @@ mod tests {
     };
 
     #[test]
-    fn gaussians_on_every_sample_come_close_to_the_samples() {
+    fn gaussians_at_every_sample_reproduce_the_samples() {
         let model = SensorModel::new("1x4_2x12".parse().unwrap());
         let mut rng = Seed(0).rng(Stream::Training);
         let set = Dataset::simulate(&model, &Scene::default(), 40, &mut rng).unwrap();
@@ -415,13 +415,13 @@ mod tests {
                 moved_mm = moved_mm.max((answer[target] - moved[target]).abs());
             }
         }
-        let what = format!("{ours_mm:e} {plain_mm:e}, a unit in the last place {moved_mm:e}");
-        assert!(ours_mm < 2.0 * plain_mm && ours_mm < 4.0 * moved_mm, "{what}");
-        assert!(moved_mm > 1e-9 && ours_mm < 1e-5, "{what}");
+        let message = format!("{ours_mm:e} {plain_mm:e}, a unit in the last place {moved_mm:e}");
+        assert!(ours_mm < 2.0 * plain_mm && ours_mm < 4.0 * moved_mm, "{message}");
+        assert!(moved_mm > 1e-9 && ours_mm < 1e-5, "{message}");
     }
 
     #[test]
-    fn centres_side_by_side_are_those_one_by_one() {
+    fn centres_side_by_side_match_single_ones() {
         for (count, inputs) in [(1, 1), (7, 3), (100, 30), (33, 0)] {
             let centres = Array2::from_shape_fn((count, inputs), |(c, i)| (1.7 * c as f64 + 0.3 * i as f64).sin());
             let x = Array2::from_shape_fn((1, inputs), |(_, i)| (0.9 * i as f64).cos());

@@ -1,7 +1,7 @@
 use faer::Mat;
 use ndarray::{Array2, ArrayView2, Axis};
 
-use super::gauss_newton::least;
+use super::gauss_newton::minima;
 use crate::network::ScalingError;
 
 /// Ridge regressions of outputs on inputs for any penalty, from one singular value decomposition, with their
@@ -31,7 +31,7 @@ pub(super) struct Ridge {
 struct LeftOut {
     /// Left singular vectors U of the samples: samples × singular values.
     samples: Mat<f64>,
-    /// Squares of [`Self::u`].
+    /// Squares of the entries of U.
     squares: Mat<f64>,
     /// The same vectors of the noise: its sources × singular values.
     noise: Mat<f64>,
@@ -138,7 +138,7 @@ impl Ridge {
             let penalties: Vec<f64> = decades.iter().map(|decade| 10.0_f64.powf(*decade)).collect();
             self.leave_one_out(&penalties)
         };
-        let found = least(decades, self.y_mean.len(), errors);
+        let found = minima(decades, self.y_mean.len(), errors);
         let penalty = |((decade, error), of_mean): ((f64, f64), &f64)| {
             if error < *of_mean {
                 10.0_f64.powf(decade)
@@ -159,7 +159,7 @@ impl Ridge {
             let penalties = vec![10.0_f64.powf(decades[0]); self.y_mean.len()];
             vec![self.leave_one_out(&penalties).iter().sum()]
         };
-        let (decade, error) = least(decades, 1, error)[0];
+        let (decade, error) = minima(decades, 1, error)[0];
         if error < self.left_out.of_mean.iter().sum() {
             10.0_f64.powf(decade)
         } else {
@@ -271,7 +271,7 @@ mod tests {
 
     /// Compares with fits that leave out each sample in turn.
     #[test]
-    fn leave_one_out_errors_are_those_of_fits_without_each_sample() {
+    fn leave_one_out_errors_match_refits() {
         for (samples, inputs) in [(25, 6), (9, 8), (9, 20)] {
             let mut x = normal(samples, inputs, 3);
             // Singular values over six decades.
@@ -312,7 +312,7 @@ mod tests {
 
     /// If the map goes through all samples, residuals and 1 − leverage are pure rounding unless computed separately.
     #[test]
-    fn fits_through_every_sample_are_still_told_apart() {
+    fn interpolating_fits_keep_distinct_errors() {
         let x = normal(12, 30, 6);
         let ridge = Ridge::new(x.view(), normal(12, 1, 7).view(), &ones(&x), none(30).view()).unwrap();
         let smooth = [1e-3, 1e-6, 1e-9, 1e-12].map(|penalty| ridge.leave_one_out(&[penalty])[0]);
@@ -322,7 +322,7 @@ mod tests {
     }
 
     #[test]
-    fn unseen_noise_is_answered_with_a_penalty_of_its_size() {
+    fn unseen_noise_gives_a_penalty_of_its_size() {
         // One input of variance 1 and noise of variance 1/4: the best gain is 1 / (1 + 1/4).
         let x = normal(20_000, 1, 8);
         let unseen = Array2::from_elem((1, 1), 0.5);
@@ -333,7 +333,7 @@ mod tests {
 
     /// Compares with fits to all copies, leaving out all copies of each sample in turn.
     #[test]
-    fn weighted_samples_are_as_many_copies_that_are_left_out_together() {
+    fn a_weight_equals_copies_left_out_together() {
         let (x, y) = (normal(9, 4, 9), normal(9, 2, 10));
         let weights = [1.0, 3.0, 2.0, 7.0, 1.0, 1.0, 5.0, 2.0, 4.0];
         let copies: Vec<usize> = (0..9).flat_map(|s| vec![s; weights[s] as usize]).collect();
@@ -364,7 +364,7 @@ mod tests {
     }
 
     #[test]
-    fn each_output_has_the_penalty_that_it_would_have_alone() {
+    fn each_output_has_its_own_penalty() {
         let x = normal(40, 12, 11);
         let mut y = normal(40, 3, 12);
         // Exact, noisy, and noise alone.

@@ -232,7 +232,7 @@ pub struct RowProblemDescription {
     pub steps: usize,
     /// Step length, relative to the range of the unknown, below which the iteration ends.
     pub tolerance: f64,
-    /// True if the method restarts when the first start leads to no solution, which a bundle reports as an error.
+    /// True if the method restarts when a start leads to no solution, and failure of all starts is an error.
     pub seeks_solution: bool,
 }
 
@@ -410,7 +410,7 @@ mod tests {
 
     /// The prior of shifts is proportional to them, down to lengths whose squares underflow.
     #[test]
-    fn no_length_is_too_short_for_a_prior_of_its_own() {
+    fn priors_scale_down_to_tiny_lengths() {
         let (long, short) = (prior(0.25), prior(0.25 * 1e-170));
         assert!((&long.inverse_root - &short.inverse_root).norm_max() < 1e-9 * long.inverse_root.norm_max());
         for (long, short) in long.mean.iter().zip(&short.mean) {

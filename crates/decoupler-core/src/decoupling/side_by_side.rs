@@ -46,7 +46,7 @@ impl SideBySide {
     }
 
     /// Returns `true` if the problem in `lane` is well conditioned enough for its normal equations.
-    pub(super) fn is_sound(&self, lane: usize) -> bool {
+    pub(super) fn is_well_conditioned(&self, lane: usize) -> bool {
         self.min_left[lane] > MIN_LEFT
     }
 
@@ -282,13 +282,13 @@ mod tests {
         problems.set(7, &equations(&dependent));
         problems.solve();
         for (lane, expected) in [(0, [2.0, -1.0]), (3, [1.0, -2.0])] {
-            assert!(problems.is_sound(lane));
+            assert!(problems.is_well_conditioned(lane));
             for (unknown, expected) in expected.into_iter().enumerate() {
                 let found = problems.solution(lane, unknown);
                 assert!((found - expected).abs() < 1e-13, "{lane}: {found}");
             }
         }
-        assert!(!problems.is_sound(7) && !problems.is_sound(1));
+        assert!(!problems.is_well_conditioned(7) && !problems.is_well_conditioned(1));
         // (AᵀA)⁻¹ = [[9, −11], [−11, 25]] / 104, in lane 3 divided by 4 and times 4.
         let norms = problems.largest_inverse_rows();
         assert!((norms[0] - (25.0_f64 / 104.0).sqrt()).abs() < 1e-13, "{norms:?}");

@@ -31,7 +31,7 @@ pub(super) struct Units {
 impl Units {
     /// Min number of units that are left out in turn: with fewer, the rest represents the set badly, and samples are
     /// left out one by one.
-    const FEWEST: usize = 10;
+    const MIN_UNITS: usize = 10;
     /// Min ratio of distinct values of an identifying channel to distinct samples.
     const IDENTIFYING: f64 = 0.9;
 
@@ -70,7 +70,7 @@ impl Units {
             return singles();
         }
         let mut units: Vec<Vec<usize>> = Vec::new();
-        if seen.len() >= Self::FEWEST && Self::is_identified(readings, seen.len()) {
+        if seen.len() >= Self::MIN_UNITS && Self::is_identified(readings, seen.len()) {
             let mut unit_of = HashMap::new();
             for (sample, first) in first.into_iter().enumerate() {
                 let unit = *unit_of.entry(first).or_insert(units.len());
@@ -84,7 +84,7 @@ impl Units {
             let runs = order.chunk_by(|&one, &next| first[one] == first[next]);
             units.extend(runs.map(<[usize]>::to_vec));
         }
-        if units.len() < Self::FEWEST { singles() } else { units }
+        if units.len() < Self::MIN_UNITS { singles() } else { units }
     }
 
     /// Returns `true` if a channel has nearly as many distinct values as there are `distinct` samples.
@@ -147,7 +147,7 @@ mod tests {
     }
 
     #[test]
-    fn frequencies_of_coarse_readings_count_as_for_scikit_learn() {
+    fn repeated_coarse_samples_count_as_in_scikit_learn() {
         let cases = include_str!("../../tests/fixtures/repeated_samples.json");
         let cases: Vec<Case> = serde_json::from_str(cases).unwrap();
         assert_eq!(cases.len(), 3);
@@ -195,7 +195,7 @@ mod tests {
         let once = decode_set(&mut map((0..25).collect()), &test).unwrap();
         assert!(
             once.iter().all(|answer| answer.abs() < 3.0),
-            "nothing is fitted by heart"
+            "no overfitting"
         );
         for order in [(0..250).map(|s| s / 10).collect(), (0..250).map(|s| s % 25).collect()] {
             let often = decode_set(&mut map(order), &test).unwrap();

@@ -1,4 +1,4 @@
-//! The posterior's medians against sequential Monte Carlo on Eq. (2) itself: no linearisation, no expectation
+//! The medians of the posterior against sequential Monte Carlo on Eq. (2) itself: no linearisation, no expectation
 //! propagation.
 //!
 //! `cargo test --release --test posterior_sampling -- --ignored --nocapture` prints the table over ten decades of noise.
@@ -69,7 +69,7 @@ fn errors(array: &str, truth: Truth, movement: Movement, samples: usize, particl
 }
 
 #[test]
-fn medians_err_as_much_as_those_of_sampling() {
+fn medians_are_as_accurate_as_sampling() {
     let cases = [
         Truth {
             relative: 1e-2,
@@ -111,7 +111,8 @@ fn medians_err_as_much_as_those_of_sampling() {
     }
 }
 
-/// The table, or of it the ARRAYS and the NOISE given in the environment, from SAMPLES rows of PARTICLES particles each.
+/// The table, optionally restricted to the environment variables ARRAYS and NOISE, from SAMPLES rows with PARTICLES
+/// particles each.
 #[test]
 #[ignore = "prints the whole table in minutes"]
 fn table() {

@@ -1,4 +1,4 @@
-//! Sequential Monte Carlo on Eq. (2), written without anything of the decoders.
+//! Sequential Monte Carlo on Eq. (2), independent of the decoders.
 
 use decoupler_core::{
     glam::DVec3,
@@ -9,7 +9,7 @@ use decoupler_core::{
 
 pub(crate) const ROW: usize = 0;
 
-/// What a noise does to the readings of one row, written down again.
+/// Effect of noise on the readings of one row, implemented independently.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Truth {
     pub(crate) relative: f64,
@@ -175,7 +175,7 @@ impl Sampler {
                     return -0.5 * outside * outside;
                 }
                 let (low, high) = ((low - ohm) / deviation, (high - ohm) / deviation);
-                // On the side of the tail, where differences keep their digits.
+                // In the tail, where differences keep their digits.
                 let mass = if low > 0.0 {
                     normal_cdf(-low) - normal_cdf(-high)
                 } else {
@@ -190,7 +190,7 @@ impl Sampler {
         terms.sum()
     }
 
-    /// Medians of the posterior by sequential Monte Carlo from the prior, whose moves are differences of particles
+    /// Medians of the posterior by sequential Monte Carlo from the prior, with moves along differences of particles
     /// (differential evolution; ter Braak 2006).
     pub(crate) fn medians(&self, readings: &[f64], count: usize, rng: &mut impl Rng) -> Vec<f64> {
         let is_hard = self.truth.bits.is_some() && self.truth.relative == 0.0 && self.truth.additive_ohm == 0.0;
@@ -226,7 +226,7 @@ impl Sampler {
             } else {
                 let (mut low, mut high) = (power, if is_hard { power.max(1e-6) * 1e6 } else { 1.0 });
                 for _ in 0..80 {
-                    // Powers spread over many decades.
+                    // Step sizes over many decades.
                     let middle = if low > 0.0 { (low * high).sqrt() } else { high * 1e-3 };
                     if effective(middle) > 0.5 {
                         low = middle;

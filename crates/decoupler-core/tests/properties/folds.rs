@@ -1,4 +1,4 @@
-//! Folds and held-out samples of sets whose snapshots are of arbitrary size and order.
+//! Folds and held-out samples of sets with snapshots of arbitrary size and order.
 
 use std::collections::BTreeSet;
 
@@ -8,7 +8,7 @@ use proptest::prelude::*;
 
 use crate::cases;
 
-/// A set whose only reading is the number of the sample.
+/// A set whose only reading is the index of the sample.
 fn sets() -> impl Strategy<Value = Dataset> {
     prop::collection::vec(0..8_usize, 2..60).prop_map(|groups| {
         let column = |first: f64| Array2::from_shape_fn((groups.len(), 1), |(sample, _)| first + sample as f64);
@@ -63,7 +63,7 @@ proptest! {
     }
 
     #[test]
-    fn held_out_snapshots_are_whole_and_nothing_is_lost(set in sets(), held_out in 0..10_usize, seed in any::<u64>()) {
+    fn held_out_snapshots_are_whole_and_no_sample_is_lost(set in sets(), held_out in 0..10_usize, seed in any::<u64>()) {
         let split = hold_out(set.clone(), held_out, &mut Seed(seed).rng(Stream::Split));
         let groups = |set: &Dataset| BTreeSet::from_iter(set.groups().iter().copied());
         let numbers = |set: &Dataset| set.readings().iter().map(|&number| number as usize).collect::<Vec<_>>();

@@ -9,7 +9,7 @@ mod training;
 
 use proptest::test_runner::{Config, RngSeed};
 
-/// This many cases of a property, the same in every run; hence nothing needs to be written down after a failure.
+/// Number of cases of a property, the same in every run; failures need no record.
 fn cases(count: u32) -> Config {
     Config {
         cases: count,

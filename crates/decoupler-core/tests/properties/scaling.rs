@@ -6,7 +6,7 @@ use proptest::prelude::*;
 
 use crate::cases;
 
-/// Samples × channels; each channel has a magnitude and an offset of its own, and one may be constant.
+/// Samples × channels; each channel has its own magnitude and offset, and one may be constant.
 fn tables() -> impl Strategy<Value = Array2<f64>> {
     (2..30_usize, 1..6_usize).prop_flat_map(|(samples, channels)| {
         let channel = (-6.0..6.0_f64, -10.0..10.0_f64, prop::bool::weighted(0.2));
@@ -40,7 +40,7 @@ proptest! {
     #![proptest_config(cases(64))]
 
     #[test]
-    fn ranges_become_minus_one_to_one_and_are_restored(values in tables()) {
+    fn ranges_are_scaled_to_minus_one_to_one_and_back(values in tables()) {
         let scaling = MinMax::fit(values.view()).unwrap();
         let scaled = scaling.scale(values.view());
         prop_assert_eq!(scaled.dim(), (values.nrows(), scaling.varying().len()));
@@ -71,7 +71,7 @@ proptest! {
         prop_assert_eq!(MinMax::fit(values.view()), MinMax::fit(shuffled.view()));
     }
 
-    /// Of channels of one magnitude: whitening takes the weakest patterns of very different ones for rounding.
+    /// For channels of one magnitude: whitening treats the weakest patterns of very different ones as rounding.
     #[test]
     fn whitened_samples_are_uncorrelated_and_restored(
         values in (12..30_usize, 1..6_usize).prop_flat_map(|(samples, channels)| {

@@ -6,7 +6,7 @@ use proptest::prelude::*;
 
 use crate::cases;
 
-/// A sensor with a row-wire of it, pressed.
+/// A sensor and one of its row-wires, pressed.
 #[derive(Clone, Debug)]
 struct Pressed {
     sensor: SensorModel,
@@ -61,7 +61,7 @@ fn largest_relative(a: impl IntoIterator<Item = f64>, b: impl IntoIterator<Item 
 proptest! {
     #![proptest_config(cases(64))]
 
-    /// With every length `unit` times as long, and the resistance per millimetre as much lower.
+    /// With every length multiplied by `unit` and the resistance per millimetre divided by it.
     #[test]
     fn the_unit_of_length_does_not_matter(pressed in pressed(), exponent in -6.0..6.0_f64) {
         let unit = 10_f64.powf(exponent);
@@ -96,7 +96,8 @@ proptest! {
         prop_assert!(off < 1e-11, "{off:e}");
     }
 
-    /// A row is centred over the column-wires: reflected along y it is itself, its nodes and columns counted backwards.
+    /// A row is centred over the column-wires: its reflection along y is the row itself with its nodes and columns
+    /// reversed.
     #[test]
     fn mirrored_rows_have_mirrored_resistances_and_derivatives(pressed in pressed()) {
         let reflected = |vector: DVec3| DVec3::new(vector.x, -vector.y, vector.z);
@@ -112,7 +113,7 @@ proptest! {
         prop_assert!(off < 1e-11, "{off:e}");
     }
 
-    /// A path from a node to a column's nodes depends on where the node is, and not on its number.
+    /// A path from a node to a column's nodes depends on the node's position, not on its index.
     #[test]
     fn swapping_two_nodes_swaps_their_derivatives(pressed in pressed(), (a, b) in (0..6_usize, 0..6_usize)) {
         let nodes = pressed.displacements_mm.len();

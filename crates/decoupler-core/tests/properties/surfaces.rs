@@ -18,7 +18,7 @@ impl Lattice {
         SurfaceMap::new(&self.x_mm, &self.y_mm).unwrap()
     }
 
-    /// The same nodes in other places.
+    /// The same nodes at other positions.
     fn moved(&self, place: impl Fn(f64) -> f64) -> Self {
         Self {
             x_mm: self.x_mm.iter().map(|&x| place(x)).collect(),
@@ -96,7 +96,7 @@ proptest! {
         prop_assert!(off < 1e-10, "{off:e}");
     }
 
-    /// The origin costs the digits that the coordinates lose by it.
+    /// The origin costs as many digits as the coordinates lose.
     #[test]
     fn the_origin_does_not_matter(lattice in lattices(), origin in -1e4..1e4_f64) {
         let off = largest_difference(&lattice.surface(), &lattice.moved(|place| place + origin).surface());
@@ -125,7 +125,7 @@ proptest! {
         prop_assert!(off < 1e-11, "{off:e}");
     }
 
-    /// Reflecting the array reflects its surface, and a raised array has a raised surface.
+    /// Reflecting the array reflects its surface; raising the array raises its surface.
     #[test]
     fn mirrored_and_raised_arrays_have_mirrored_and_raised_surfaces(lattice in lattices(), raise_mm in -5.0..5.0_f64) {
         let mut mirrored = lattice.moved(|place| -place).surface();

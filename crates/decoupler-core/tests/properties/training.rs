@@ -1,4 +1,4 @@
-//! What a training step does not depend on.
+//! Invariances of a training step.
 
 use decoupler_core::{
     network::{Mlp, Shape},

@@ -30,7 +30,7 @@ fn real(nominal: &SensorModel) -> SensorModel {
     real
 }
 
-/// Snapshots of the real sensor, of which only the displacements are known: told as coordinates of the nominal one.
+/// Snapshots of the real sensor with only the displacements known, given as coordinates of the nominal sensor.
 fn recorded(settings: &SimulatedSettings, snapshots: usize, seed: u64) -> Dataset {
     let (scene, nominal) = (&settings.source.scene, &settings.source.sensor);
     let real = real(nominal);
@@ -48,7 +48,7 @@ fn trained(settings: SimulatedSettings) -> Networks {
 }
 
 #[test]
-fn calibrating_and_fine_tuning_bring_a_network_to_the_real_sensor() {
+fn calibration_and_fine_tuning_adapt_a_network_to_the_real_sensor() {
     let mut settings = settings();
     let nominal = settings.source.sensor;
     let (frames, test) = (recorded(&settings, 40, 1), recorded(&settings, 60, 2));
@@ -60,7 +60,7 @@ fn calibrating_and_fine_tuning_bring_a_network_to_the_real_sensor() {
     let networks = trained(settings);
     let moved = rebased(&test, &nominal, &calibration.model).unwrap();
     let calibrated = z_mm(&moved, &networks);
-    // What a network trained on the real sensor itself reaches.
+    // The error of a network trained on the real sensor itself.
     settings.source.sensor = real(&nominal);
     let limit = z_mm(&rebased(&test, &nominal, &real(&nominal)).unwrap(), &trained(settings));
     assert!(calibrated < 0.2 * before, "{before} {calibrated}");
@@ -78,7 +78,7 @@ fn calibrating_and_fine_tuning_bring_a_network_to_the_real_sensor() {
         .unwrap()
         .unwrap();
     assert!(z_mm(&moved, &tuned) < 1.2 * calibrated);
-    // A network of another sensor learns much from the frames.
+    // A network of another sensor improves greatly with the frames.
     settings.source.sensor = nominal;
     let untold = trained(settings);
     let tuned = fine_tune(&untold, &split, settings.training, &|| false)

@@ -1,4 +1,4 @@
-//! Faults of wires and electronics: what they do to readings, and whether the right wire is named.
+//! Faults of wires and electronics: their effect on readings, and whether the right wire is named.
 
 use decoupler_core::{
     dataset::{Seed, Stream},
@@ -10,8 +10,8 @@ use decoupler_core::{
 use glam::DVec3;
 use rand::RngExt;
 
-/// Currents of a resistor network by nodal analysis: every row-wire and column-wire is two pieces, before and after a
-/// break, joined where the wire is whole.
+/// Currents of a resistor network by nodal analysis: every row-wire and column-wire consists of two pieces, before
+/// and after a break, which are joined if the wire is intact.
 struct Network {
     pieces: usize,
     /// Conductance between pieces, and of each piece to its driver or amplifier.
@@ -19,7 +19,7 @@ struct Network {
     to_ground: Vec<f64>,
 }
 
-/// Resistance of a driver and an amplifier, in ohm, and that of a joint: small next to those of the rubber.
+/// Resistance of a driver and an amplifier, in ohm, and that of a joint: small compared with the rubber.
 const DRIVER_OHM: f64 = 1e-5;
 const JOINT_OHM: f64 = 1e-9;
 
@@ -112,7 +112,7 @@ impl Network {
 }
 
 #[test]
-fn faulty_readings_are_those_of_the_resistor_network() {
+fn faulty_readings_match_the_resistor_network() {
     let model = SensorModel::new("3x2_2x4".parse().unwrap());
     let mut rng = Seed(0).rng(Stream::Test);
     let deformation = Deformation::from_fn(model.scale, |_, _| DVec3::Z * rng.random::<f64>());
@@ -128,8 +128,8 @@ fn faulty_readings_are_those_of_the_resistor_network() {
         let fault: Fault = text.parse().unwrap();
         let network = Network::new(&model, &deformation, fault);
         let faulty = FaultySensor::new(&model, Noise::default(), fault).unwrap();
-        let sound = (0..3).flat_map(|row| model.row_resistances(row, deformation.row_mm(row)).unwrap());
-        let mut readings_ohm: Vec<f64> = sound.collect();
+        let intact = (0..3).flat_map(|row| model.row_resistances(row, deformation.row_mm(row)).unwrap());
+        let mut readings_ohm: Vec<f64> = intact.collect();
         let full_scale_ohm = 2.0 * at_rest_ohm(&model);
         faulty.before_noise(&[0, 1, 2], &deformation, &mut readings_ohm);
         for row in 0..3 {
@@ -165,7 +165,7 @@ fn sensor_and_scene() -> (SensorModel, Scene) {
 }
 
 #[test]
-fn the_wire_at_fault_is_named_with_its_cause_and_forgotten_when_it_is_mended() {
+fn the_faulty_wire_is_named_with_its_cause_until_it_recovers() {
     let (sensor, scene) = sensor_and_scene();
     let row = FaultyWire::Row;
     let column = FaultyWire::Column;
@@ -207,7 +207,7 @@ fn the_wire_at_fault_is_named_with_its_cause_and_forgotten_when_it_is_mended() {
             (found, cause) => assert_eq!(found, cause, "{text}"),
         }
         source.set_fault(None).unwrap();
-        // Wires that touch are forgotten once their readings differ, and these two are far from the press at first.
+        // Shorted wires recover once their readings differ; these two are far from the press at first.
         if cause == FaultCause::Shorted {
             let found = events(&mut source, 400);
             assert!(matches!(found[..], [(_, FaultEvent::Recovered)]), "{text}: {found:?}");
@@ -223,7 +223,7 @@ fn the_wire_at_fault_is_named_with_its_cause_and_forgotten_when_it_is_mended() {
 }
 
 #[test]
-fn sound_frames_raise_no_alarm_and_two_faults_are_not_taken_for_one() {
+fn intact_frames_raise_no_alarm_and_two_faults_are_not_named_as_one() {
     let (sensor, scene) = sensor_and_scene();
     let mut source = Simulated::new(&sensor, &scene, Seed(5), 10.0).unwrap();
     let mut monitor = FaultMonitor::new(&sensor, &scene, source.rows()).unwrap();
@@ -270,9 +270,9 @@ fn frames(
     }
 }
 
-/// Two row-wires that touch have readings that Eq. (2) explains: only that they stay equal gives them away.
+/// Eq. (2) explains the readings of two row-wires that touch: only their constant equality reveals the short.
 #[test]
-fn rows_that_touch_are_named_by_readings_that_stay_equal_and_forgotten_when_they_differ() {
+fn shorted_rows_are_named_by_equal_readings_until_these_differ() {
     let sensor = SensorModel::new("6x4_2x12".parse().unwrap());
     for loading in ["random", "smooth:4", "indenter:sphere"] {
         let scene = Scene {
@@ -307,9 +307,9 @@ fn rows_that_touch_are_named_by_readings_that_stay_equal_and_forgotten_when_they
     }
 }
 
-/// Rows on both sides of the columns' middle read the same at rest, or wherever they are pressed alike.
+/// Rows on both sides of the columns' middle have equal readings at rest, or wherever they are pressed alike.
 #[test]
-fn equal_readings_of_symmetric_rows_at_rest_or_under_a_held_press_are_no_short() {
+fn equal_readings_of_symmetric_rows_are_not_a_short() {
     let mut sensor = SensorModel::new("2x4_2x12".parse().unwrap());
     sensor.geometry.row_x0_mm = 16.0;
     let scene = Scene {
@@ -338,7 +338,7 @@ fn equal_readings_of_symmetric_rows_at_rest_or_under_a_held_press_are_no_short()
 }
 
 #[test]
-fn an_answer_without_a_wire_depends_on_no_frame_before() {
+fn an_answer_without_a_wire_does_not_depend_on_earlier_frames() {
     let (sensor, scene) = sensor_and_scene();
     let rows = Vec::from_iter(0..10);
     let mut decoder = LeftOutDecoder::new(&sensor, &scene, &rows).unwrap();
@@ -376,7 +376,7 @@ fn an_answer_without_a_wire_depends_on_no_frame_before() {
         backwards.reverse();
         assert_eq!(forwards, backwards, "{wire}");
     }
-    // A row without signal is between its neighbours.
+    // A row without signal is interpolated from its neighbours.
     decoder.leave_out(Some(Diagnosis {
         wire: FaultyWire::Row(4),
         cause: FaultCause::NoSignal,
@@ -388,9 +388,9 @@ fn an_answer_without_a_wire_depends_on_no_frame_before() {
     assert!((z_mm(4) - 0.5 * (z_mm(3) + z_mm(5))).abs() < 1e-12);
 }
 
-/// Errors in mm of z, of frames that the fault spoils, with all wires and without those at fault.
+/// Errors in mm of z, of frames affected by the fault, with all wires and without the faulty ones.
 #[test]
-fn leaving_the_wire_out_brings_the_answer_back() {
+fn leaving_the_wire_out_restores_the_answer() {
     let (sensor, scene) = sensor_and_scene();
     for (text, gain) in [("open-column:7", 1.5), ("gain:11=0.05", 1.5), ("stuck:2=low", 1.5)] {
         let mut source = Simulated::new(&sensor, &scene, Seed(7), 10.0).unwrap();
@@ -418,7 +418,7 @@ fn leaving_the_wire_out_brings_the_answer_back() {
 }
 
 #[test]
-fn faults_are_read_as_they_are_written_and_others_are_refused() {
+fn faults_round_trip_as_text_and_invalid_ones_are_refused() {
     for text in [
         "open-row:3@1",
         "open-column:30@5",

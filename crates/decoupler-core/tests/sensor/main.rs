@@ -1,4 +1,4 @@
-//! The sensor: its model, its faults, its calibration, and what its readings determine.
+//! The sensor: its model, its faults, its calibration, and the information in its readings.
 
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 

@@ -84,7 +84,7 @@ fn golden_vectors_agree_to_1e_12() {
 fn the_jacobian_agrees_with_central_differences() {
     let step_mm = 1e-4;
     for (model, case) in golden() {
-        // Sideways too, so that no derivative is zero by symmetry.
+        // Sideways too, to avoid derivatives that vanish by symmetry.
         let at: Vec<DVec3> = displacements(&case)
             .iter()
             .map(|u| *u + DVec3::new(0.1, -0.05, 0.0))

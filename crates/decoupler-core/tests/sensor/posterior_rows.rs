@@ -1,4 +1,4 @@
-//! Rows with noise that are solved side by side: each has the answer that it has by itself.
+//! Rows with noise that are solved side by side have the same answers as alone.
 
 use decoupler_core::{
     dataset::{Dataset, PerRow, Seed, Stream},
@@ -32,8 +32,8 @@ fn bits(values: &[f64]) -> Vec<u64> {
     values.iter().map(|value| value.to_bits()).collect()
 }
 
-/// Medians of one frame as they were found row by row, with vector registers along the columns of one matrix, before rows
-/// were solved side by side. Each moves by less than 1e-11 mm if readings change by a unit in the last place.
+/// Medians of one frame recorded when rows were solved one by one, with vector registers along the columns of one
+/// matrix. Each moves by less than 1e-11 mm if readings change by a unit in the last place.
 #[derive(serde::Deserialize)]
 struct Past {
     array: String,
@@ -49,7 +49,7 @@ struct Past {
 }
 
 #[test]
-fn medians_are_those_that_rows_had_one_by_one() {
+fn medians_match_rows_solved_one_by_one() {
     let past: Vec<Past> = serde_json::from_str(include_str!("../fixtures/posterior_medians.json")).unwrap();
     for case in past {
         let model = SensorModel::new(case.array.parse().unwrap());
@@ -82,10 +82,10 @@ fn medians_are_those_that_rows_had_one_by_one() {
     }
 }
 
-/// Also next to rows whose readings no deformation explains, which take ten times as many linearisations, and in a decoder
-/// that has learnt which rows take long.
+/// Also next to rows whose readings no deformation explains, which take ten times as many linearisations, and in a
+/// decoder that has recorded which rows are slow.
 #[test]
-fn a_frame_gives_the_bits_and_the_standing_of_its_rows() {
+fn frames_are_bit_identical_to_rows_with_the_same_status() {
     let relative = Noise::relative(1e-3);
     let noises = [
         relative,
@@ -146,7 +146,7 @@ fn a_frame_gives_the_bits_and_the_standing_of_its_rows() {
 }
 
 #[test]
-fn a_set_has_the_bits_of_its_frames() {
+fn sets_are_bit_identical_to_their_frames() {
     let model = SensorModel::new("3x2_2x6".parse().unwrap());
     let scene = Scene {
         rows: Rows::Known,
@@ -167,7 +167,7 @@ fn a_set_has_the_bits_of_its_frames() {
 }
 
 #[test]
-fn a_reading_that_is_no_resistance_is_named() {
+fn invalid_readings_are_named() {
     let model = SensorModel::new("7x2_2x6".parse().unwrap());
     for rows in [Rows::Known, Rows::All] {
         let scene = Scene {
@@ -189,7 +189,7 @@ fn a_reading_that_is_no_resistance_is_named() {
                 assert_eq!(error.value.to_bits(), value.to_bits());
             }
         }
-        // Of a set, the sample is named, also beyond the first block.
+        // For a set, the error names the sample, also beyond the first block.
         let mut readings = set.readings().to_owned();
         readings[[1300, 2]] = -1.0;
         let row_wires: Vec<usize> = (0..set.samples()).map(|sample| set.row_wire(sample).unwrap()).collect();

@@ -1,4 +1,4 @@
-//! What the recorded readings determine, judged on sets whose truth is known by construction.
+//! Analysis of recorded readings, on sets whose truth is known by construction.
 
 use decoupler_core::{
     dataset::{Dataset, DividedSamples, Division, Folds, Seed, SplitBy, Stream},
@@ -35,8 +35,8 @@ fn settings() -> RunSettings {
 }
 
 #[test]
-fn a_random_split_flatters_where_samples_of_a_group_are_alike() {
-    // Readings tell the group and nothing else, and each group has an offset of its own.
+fn a_random_split_is_optimistic_if_samples_of_a_group_are_alike() {
+    // Readings identify the group and nothing else, and each group has its own offset.
     let mut rng = ChaCha8Rng::seed_from_u64(3);
     let offsets: Vec<f64> = (0..20).map(|_| rng.random_range(-1.0..1.0)).collect();
     let readings = Array2::from_shape_fn((400, 20), |(sample, channel)| {
@@ -54,7 +54,7 @@ fn a_random_split_flatters_where_samples_of_a_group_are_alike() {
             .unwrap()
             .unwrap()
     };
-    // Whichever split was asked for, where there are groups random folds are compared with folds by group.
+    // For any split, random folds are compared with folds by group if there are groups.
     for by in SplitBy::ALL {
         let compared = compared(&alike, by);
         assert_eq!(compared.by, SplitBy::Group);
@@ -78,7 +78,7 @@ fn a_random_split_flatters_where_samples_of_a_group_are_alike() {
 }
 
 #[test]
-fn the_error_grows_without_a_channel_by_what_only_that_channel_tells() {
+fn the_error_grows_by_the_information_unique_to_a_left_out_channel() {
     let set = set(2000, 4, 5, |c, rng| 2.0 * c[0] + 0.5 * c[1] + 0.5 * normal(rng));
     let folds = Folds::by(&set, 5, SplitBy::Time, &mut Seed(0).rng(Stream::Split)).unwrap();
     let importance = |set: &Dataset, model| {
@@ -86,7 +86,7 @@ fn the_error_grows_without_a_channel_by_what_only_that_channel_tells() {
         found.unwrap().unwrap()
     };
     let found = importance(&set, FittedModel::Ridge);
-    // √(2² + 0.5²)/0.5, √(0.5² + 0.5²)/0.5, and nothing.
+    // √(2² + 0.5²)/0.5, √(0.5² + 0.5²)/0.5, and no growth.
     for (channel, expected) in [(0, 4.123), (1, 1.414), (2, 1.0), (3, 1.0)] {
         let growth = found[channel].growth[0].unwrap();
         assert!((growth.value / expected - 1.0).abs() < 0.05, "{channel}: {growth:?}");
@@ -96,7 +96,7 @@ fn the_error_grows_without_a_channel_by_what_only_that_channel_tells() {
         );
         assert_eq!(found[channel].is_dispensable(), channel > 1, "{channel}: {growth:?}");
     }
-    // A copy makes the channel dispensable, which permuting it would not show.
+    // A copy makes the channel redundant, which permuting it would not show.
     let copied = set.of_channels(&[0, 1, 2, 0]);
     let found = importance(&copied, FittedModel::Ridge);
     assert!(found[0].largest().unwrap().value < 1.01 && found[1].largest().unwrap().value > 1.3);
@@ -122,7 +122,7 @@ fn the_error_grows_without_a_channel_by_what_only_that_channel_tells() {
 }
 
 #[test]
-fn a_learning_curve_foretells_the_error_with_twice_the_samples() {
+fn a_learning_curve_predicts_the_error_with_twice_the_samples() {
     // Least squares with p = 20 readings: the error is σ √(1 + p/(n − p − 1)) for n samples, on average.
     let all = set(4000, 20, 6, |c, rng| c.iter().sum::<f64>() + 3.0 * normal(rng));
     let curve = |samples: usize, by| {
@@ -178,7 +178,7 @@ fn a_learning_curve_foretells_the_error_with_twice_the_samples() {
 }
 
 #[test]
-fn a_network_no_better_than_ridge_is_said_to_be_no_better() {
+fn a_network_no_better_than_ridge_is_reported_as_such() {
     let gain = |set: &Dataset| {
         let folds = Folds::by(set, 5, SplitBy::Time, &mut Seed(0).rng(Stream::Split)).unwrap();
         let validated = CrossValidated::on_folds(&settings(), set, folds, || false)
@@ -194,7 +194,7 @@ fn a_network_no_better_than_ridge_is_said_to_be_no_better() {
 }
 
 #[test]
-fn folds_of_every_rule_are_validated_and_seeded() {
+fn folds_of_every_rule_are_checked_and_seeded() {
     let set = set(120, 3, 9, |c, rng| c[0] - c[2] + 0.1 * normal(rng));
     for by in SplitBy::ALL {
         let validate = || {

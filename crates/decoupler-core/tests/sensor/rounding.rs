@@ -1,4 +1,4 @@
-//! Rounding of the resistance model and of its derivatives, in units in the last place, against sums of 200 bits.
+//! Rounding of the resistance model and of its derivatives, in units in the last place, against sums in 200 bits.
 
 #![expect(clippy::print_stdout, reason = "the table is shown with --nocapture")]
 
@@ -47,8 +47,8 @@ fn distances(model: &SensorModel, row: usize, node: usize, u_mm: DVec3, column: 
     [dx, dy, exact(height_mm) - exact(u_mm.z)]
 }
 
-/// Worst rounding in ulps of the resistances, and of the derivatives of conductance in ulps of their largest possible
-/// size Σ|term|.
+/// Max rounding error in ulps of the resistances, and of the derivatives of conductance in ulps of their largest
+/// possible size Σ|term|.
 fn worst_ulps(model: &SensorModel, row: usize, columns: &[usize], at: &[DVec3]) -> (f64, f64) {
     let mut conductance = RowConductance::new(model, Axes::Xyz);
     conductance.evaluate(model, row, at);
@@ -84,7 +84,7 @@ fn worst_ulps(model: &SensorModel, row: usize, columns: &[usize], at: &[DVec3]) 
     worst
 }
 
-/// Worst rounding over compressions from none to nearly touching and a few row-wires, for random nodes.
+/// Max rounding error over compressions from none to nearly touching and a few row-wires, for random nodes.
 fn worst_of(array: &str, change: impl FnOnce(&mut Geometry), shift: f64) -> (f64, f64) {
     let mut model = SensorModel::new(array.parse().unwrap());
     model.resistivity_ohm_per_mm = 470.0 / 3.0;
@@ -151,7 +151,7 @@ fn pitches(geometry: &mut Geometry, factor: f64) {
 }
 
 #[test]
-fn resistances_and_derivatives_are_right_to_a_few_units_in_the_last_place() {
+fn resistances_and_derivatives_are_accurate_to_a_few_units_in_the_last_place() {
     type Change = fn(&mut Geometry);
     let changes: [(&str, Change, f64); 11] = [
         ("default", |_| (), 0.0),

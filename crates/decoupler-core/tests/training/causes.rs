@@ -1,4 +1,4 @@
-//! Trainings that come to nothing say why, and what to change.
+//! Failed trainings report the cause and what to change.
 
 use decoupler_core::training::{
     Method, SettingError, StopReason, StoppingRules, Trainer, TrainingDefect, TrainingSettings,
@@ -6,7 +6,7 @@ use decoupler_core::training::{
 
 use crate::problems::{problem, start};
 
-/// Names of settings, and the values they are given.
+/// Names and values of settings.
 type Values = &'static [(&'static str, f64)];
 
 /// The method of this short name with these settings.
@@ -26,13 +26,13 @@ fn trained(method: Method, epochs: usize) -> Trainer {
         epochs,
         ..StoppingRules::default()
     };
-    let mut trainer = Trainer::new(start(), problem(), TrainingSettings { method, stopping }).expect("it can begin");
+    let mut trainer = Trainer::new(start(), problem(), TrainingSettings { method, stopping }).expect("the training can start");
     while trainer.step().is_none() {}
     trainer
 }
 
 #[test]
-fn settings_that_cannot_work_are_refused_with_the_way_out() {
+fn invalid_settings_are_refused_with_a_remedy() {
     let cases = [
         (
             "lm",
@@ -66,13 +66,13 @@ fn settings_that_cannot_work_are_refused_with_the_way_out() {
         assert!(refused.to_string().contains(words), "{name}: {refused}");
         assert!(Trainer::new(start(), problem(), settings).is_err(), "{name}");
     }
-    // Momentum of gradients is the gradient of the epoch before: it works.
+    // Momentum of gradients is the gradient of the epoch before, which is valid.
     assert!(method("gdm", &[("momentum", 1.0)]).check().is_ok());
 }
 
-/// The defect names the method's own settings, never those of another.
+/// The defect names only the method's own settings.
 #[test]
-fn a_training_that_leaves_its_start_or_diverges_says_why_and_what_to_change() {
+fn stalled_or_diverged_trainings_report_cause_and_remedy() {
     let cases: [(&str, Values, &str); 8] = [
         ("scg", &[("lambda", 1e300)], "lambda to 5e-7 (now 1e300)"),
         ("gdx", &[("learning rate", 1e300)], "learning rate to 0.01 (now 1e300)"),
@@ -113,7 +113,7 @@ fn a_training_that_leaves_its_start_or_diverges_says_why_and_what_to_change() {
 }
 
 #[test]
-fn a_valid_training_has_no_defect_and_one_under_way_not_yet() {
+fn valid_and_unfinished_trainings_have_no_defect() {
     for method in Method::all() {
         let trainer = trained(method, 200);
         assert_eq!(TrainingDefect::of(&trainer), None, "{method}");
@@ -123,9 +123,9 @@ fn a_valid_training_has_no_defect_and_one_under_way_not_yet() {
     assert_eq!(TrainingDefect::of(&trainer), None);
 }
 
-/// Step lengths that only grow lower the error for a while before it grows without end.
+/// Step lengths that only grow reduce the error for a while before it diverges.
 #[test]
-fn a_training_that_diverges_late_names_the_epoch_and_keeps_the_best_weights() {
+fn late_divergence_names_the_epoch_and_keeps_the_best_weights() {
     let mut found = false;
     for increase in [1.3, 1.6, 2.0, 3.0, 5.0] {
         let growing = [
@@ -151,11 +151,11 @@ fn a_training_that_diverges_late_names_the_epoch_and_keeps_the_best_weights() {
         assert_eq!(trainer.best_mse(), errors.fold(f64::INFINITY, f64::min));
         assert!(trainer.best_mse() < history[0].validation_mse.unwrap());
     }
-    assert!(found, "one of these diverges after a good beginning");
+    assert!(found, "one of these diverges after initial progress");
 }
 
 #[test]
-fn no_reason_of_stopping_advises_a_setting_that_the_method_has_not() {
+fn remedies_name_only_settings_of_the_method() {
     for reason in [StopReason::Diverged, StopReason::MuLarge, StopReason::LambdaLarge] {
         for mut method in Method::all() {
             let text = format!("{reason} {}", reason.remedy(&method));

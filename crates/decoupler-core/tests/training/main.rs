@@ -1,4 +1,4 @@
-//! Trainings: each method, how it stops, what it says, and that neither threads nor pauses change a bit.
+//! Training: each method, its stopping rules and messages, and bit-identical results with any threads and pauses.
 
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 

@@ -37,7 +37,7 @@ pub(crate) fn start() -> Mlp {
     Mlp::from_weights(shape, (0..shape.weights()).map(|index| wave(index, 7)).collect())
 }
 
-/// Nothing but the number of epochs stops it.
+/// Only the number of epochs stops it.
 pub(crate) fn trainer(method: Method) -> Trainer {
     let stopping = StoppingRules {
         epochs: 100_000,

@@ -1,4 +1,4 @@
-//! A training that is interrupted, saved, read and resumed gives the same bits as one that is not.
+//! A training that is interrupted, saved, loaded and resumed is bit-identical to one that is not.
 
 use decoupler_core::training::{
     Method, ResumeError, StopReason, StoppingRules, Trainer, TrainerState, TrainingSettings,
@@ -14,11 +14,11 @@ fn run(trainer: &mut Trainer, epochs: usize) {
 
 fn through_a_file(trainer: &Trainer) -> TrainerState {
     let text = serde_json::to_string(&trainer.state()).expect("a state can be written");
-    serde_json::from_str(&text).expect("what was written can be read")
+    serde_json::from_str(&text).expect("a written state can be read")
 }
 
 #[test]
-fn interrupted_and_uninterrupted_trainings_are_the_same_bits_for_every_method() {
+fn interrupted_trainings_are_bit_identical_for_every_method() {
     for method in Method::all() {
         let mut whole = trainer(method);
         let mut first = trainer(method);
@@ -37,7 +37,7 @@ fn interrupted_and_uninterrupted_trainings_are_the_same_bits_for_every_method() 
 }
 
 #[test]
-fn another_method_goes_on_from_the_present_weights() {
+fn another_method_continues_from_the_current_weights() {
     let [lm, .., gd] = Method::all();
     let mut trainer = trainer(gd);
     run(&mut trainer, 5);
@@ -50,7 +50,7 @@ fn another_method_goes_on_from_the_present_weights() {
 }
 
 #[test]
-fn more_epochs_let_a_finished_training_go_on() {
+fn more_epochs_continue_a_finished_training() {
     let few = StoppingRules {
         epochs: 3,
         ..StoppingRules::default()
@@ -88,7 +88,7 @@ fn a_damaged_or_foreign_state_is_refused() {
     let damaged = |error| matches!(error, ResumeError::Damaged(_));
     assert!(damaged(edited(|value| value["shape"]["hidden"] = 7.into())), "layers");
     let gap = text.replacen("\"epoch\":[0,1,", "\"epoch\":[0,5,", 1);
-    let error = serde_json::from_str::<TrainerState>(&gap).expect_err("a gap is noticed");
+    let error = serde_json::from_str::<TrainerState>(&gap).expect_err("a gap is detected");
     assert!(error.to_string().contains("epoch 1 is missing"), "{error}");
     assert!(damaged(edited(|value| value["best_epoch"] = 4.into())), "best epoch");
     assert!(

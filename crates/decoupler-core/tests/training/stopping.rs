@@ -1,11 +1,11 @@
-//! The stopping rules follow the field's toolbox.
+//! The stopping rules are those of the field's toolbox.
 
 use decoupler_core::training::{EpochRecord, Method, StopReason, StoppingRules, Trainer, TrainingSettings};
 
 use crate::problems::{problem, start, trainer};
 
-/// `val_fail` as the toolbox counts it: 0 at a new best validation error, one more at an error above the best, unchanged
-/// at an error equal to it.
+/// `val_fail` as the toolbox counts it: 0 at a new best validation error, incremented at an error above the best,
+/// unchanged at an error equal to it.
 fn toolbox_failures(history: &[EpochRecord]) -> Vec<usize> {
     let (mut best, mut failures) = (f64::INFINITY, 0);
     let count = |record: &EpochRecord| {
@@ -42,11 +42,11 @@ fn validation_failures_count_epochs_without_a_new_best() {
             .windows(2)
             .any(|pair| pair[1].validation_mse < pair[0].validation_mse && pair[1].validation_failures > 0);
     }
-    assert!(fell_without_a_new_best, "nothing told this rule from counting rises");
+    assert!(fell_without_a_new_best, "the data do not distinguish this rule from counting increases");
 }
 
 #[test]
-fn training_ends_at_the_first_epoch_with_so_many_failures() {
+fn training_stops_at_the_first_epoch_with_max_failures() {
     for method in Method::all() {
         for max_fail in [1, 3, 6] {
             let stopping = StoppingRules {
@@ -82,10 +82,10 @@ fn another_method_starts_counting_from_zero() {
         trainer.step();
     }
     let best_mse = trainer.best_mse();
-    trainer.continue_with(rp).expect("it can go on");
+    trainer.continue_with(rp).expect("the training can continue");
     trainer.step();
     let latest = trainer.latest();
-    // The best error so far remains what is to be beaten.
+    // The best error so far remains the reference.
     let is_worse = latest.validation_mse > Some(best_mse);
     assert_eq!(latest.validation_failures, usize::from(is_worse));
 }

@@ -1,4 +1,4 @@
-//! The number of threads changes no bit.
+//! Results are bit-identical for any number of threads.
 
 use decoupler_core::{
     network::{Mlp, Shape},
@@ -8,7 +8,7 @@ use ndarray::Array2;
 
 use crate::problems::wave;
 
-/// Weights after `epochs` of a problem that is large enough to be divided.
+/// Weights after `epochs` of a problem that is large enough to be parallelised.
 fn train(method: Method, samples: usize, threads: usize, epochs: usize) -> Mlp {
     let shape = Shape {
         inputs: 40,
@@ -28,7 +28,7 @@ fn train(method: Method, samples: usize, threads: usize, epochs: usize) -> Mlp {
         stopping: StoppingRules::default(),
     };
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
-    pool.expect("threads can be had").install(|| {
+    pool.expect("the thread pool can be built").install(|| {
         let mut trainer = Trainer::new(start, problem, settings).expect("it can be trained");
         for _ in 0..epochs {
             trainer.step();
@@ -37,9 +37,9 @@ fn train(method: Method, samples: usize, threads: usize, epochs: usize) -> Mlp {
     })
 }
 
-/// With few samples for this many weights conjugate gradients are cheaper, with many the factored equations.
+/// With few samples for this many weights conjugate gradients are faster, with many the factorised equations.
 #[test]
-fn one_two_and_three_threads_give_the_same_bits() {
+fn one_two_and_three_threads_are_bit_identical() {
     for method in Method::all() {
         for samples in [2100, 7000] {
             let one = train(method, samples, 1, 2);

@@ -1,4 +1,4 @@
-//! Every method walks the path that an independent program walks from the same start
+//! Every method reproduces the iterates of an independent program from the same start
 //! (tests/fixtures/training_traces.py).
 
 use std::collections::BTreeMap;
@@ -57,7 +57,7 @@ impl Traces {
     }
 }
 
-/// The fixture's learning rate where it differs from the default.
+/// The fixture's learning rate, if it differs from the default.
 fn with_the_fixtures_settings(mut method: Method) -> Method {
     if ["gd", "gdms", "gdx"].contains(&method.short_name()) {
         *method.settings()[0].value = 0.1;
@@ -65,8 +65,8 @@ fn with_the_fixtures_settings(mut method: Method) -> Method {
     method
 }
 
-/// Largest relative difference from the fixture's weights: rounding, amplified where the problem is stiff (most where the output
-/// layer follows the hidden layer exactly, `varpro`) or where two gradients 5e-5 apart are subtracted (`scg`).
+/// Max relative difference from the fixture's weights: rounding, amplified if the problem is stiff (most if the
+/// output layer follows the hidden layer exactly, `varpro`) or if two gradients 5e-5 apart are subtracted (`scg`).
 fn tolerance(method: &str) -> f64 {
     match method {
         "scg" | "varpro" => 1e-5,
@@ -85,11 +85,11 @@ fn apart(ours: &[f64], expected: &[f64]) -> f64 {
 }
 
 #[test]
-fn paths_agree_with_independent_programs() {
+fn iterates_agree_with_independent_programs() {
     let traces = traces();
     for method in Method::all() {
         let name = method.short_name();
-        // Eq. (11) is the paper's own: no package has it, and a test next to it checks its formula.
+        // Eq. (11) is specific to the paper: no package implements it, and a separate test checks its formula.
         let Some(expected) = traces.weights_by_epoch.get(name) else {
             assert_eq!(name, "gdm");
             continue;
@@ -103,9 +103,9 @@ fn paths_agree_with_independent_programs() {
     }
 }
 
-/// The steps that the independent program rejects are rejected, and what follows a rejection is the same.
+/// The steps that the independent program rejects are rejected, and the steps after them agree.
 #[test]
-fn paths_with_rejected_steps_agree_with_independent_programs() {
+fn iterates_with_rejected_steps_agree_with_independent_programs() {
     let traces = traces();
     assert_eq!(traces.rejecting.len(), 2);
     for (name, case) in &traces.rejecting {
@@ -125,7 +125,7 @@ fn paths_with_rejected_steps_agree_with_independent_programs() {
 }
 
 #[test]
-fn the_effective_number_of_parameters_is_that_of_the_dense_hessian() {
+fn the_effective_number_of_parameters_matches_the_dense_hessian() {
     let traces = traces();
     let bayesian = Method::all().into_iter().find(|method| method.short_name() == "br");
     let mut trainer = traces.trainer(bayesian.expect("it is offered"), &traces.start);

@@ -1,4 +1,4 @@
-//! Networks too wide for their equations to be factored.
+//! Networks too wide for their equations to be factorised.
 
 use decoupler_core::{
     machine::MachineMemory,
@@ -54,7 +54,7 @@ fn a_wide_network_learns() {
         trainer.step();
     }
     let reached = trainer.latest().training_mse;
-    // What is recorded is the error of the network itself.
+    // The recorded error is that of the network itself.
     let (inputs, targets) = samples(WIDE, 700);
     let errors = trainer.present().forward(inputs.view()) - targets;
     let found = errors.mapv(|error| error * error).mean().expect("there are samples");
@@ -63,7 +63,7 @@ fn a_wide_network_learns() {
 }
 
 #[test]
-fn a_wide_network_is_resumed_with_the_same_bits() {
+fn a_resumed_wide_network_is_bit_identical() {
     let run = |trainer: &mut Trainer| {
         (0..2).for_each(|_| {
             trainer.step();
@@ -81,7 +81,7 @@ fn a_wide_network_is_resumed_with_the_same_bits() {
 
 /// Its equations would have 2 million rows: 32 TB, and their inverse as much.
 #[test]
-fn only_a_method_that_must_factor_refuses_a_very_wide_network() {
+fn only_methods_that_factorise_refuse_a_very_wide_network() {
     let shape = Shape {
         inputs: 2000,
         hidden: 1000,
@@ -98,7 +98,7 @@ fn only_a_method_that_must_factor_refuses_a_very_wide_network() {
             .contains(&MachineMemory::of_this_machine().to_string()),
         "{refused}"
     );
-    // 23 205 rows, were they written out: 4 GB.
+    // 23 205 rows would take 4 GB.
     let shape = Shape {
         inputs: 220,
         hidden: 105,

@@ -247,7 +247,7 @@ mod tests {
     }
 
     #[test]
-    fn every_precision_quantity_and_size_answers_as_the_network_itself() {
+    fn compiled_networks_match_the_original_for_every_precision_quantity_and_size() {
         for (scale, hidden) in [("10x10_5x30", 12), ("3x4_2x7", 1), ("2x6_3x18", 5), ("2x6_3x18", 29)] {
             for quantity in Quantity::ALL {
                 for scaling in [ScalingChoice::MinMax, ScalingChoice::Whitening] {
@@ -272,7 +272,7 @@ mod tests {
     }
 
     #[test]
-    fn a_frame_gives_the_bits_of_its_rows() {
+    fn frames_are_bit_identical_to_rows() {
         for hidden in [1, 5, 12, 29] {
             let (set, networks) = networks("5x6_3x18", InputChoice::BEST, hidden);
             let mut double = CompiledNetworks::<f64>::new(&networks, 5);

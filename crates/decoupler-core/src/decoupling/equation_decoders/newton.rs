@@ -291,10 +291,10 @@ impl PosteriorDecoder {
                 };
                 Ok(reports.into_iter().zip(scores).map(trial).collect())
             })?;
-        Ok(taken.into_iter().map(|report| self.standing(report)).collect())
+        Ok(taken.into_iter().map(|report| self.status(report)).collect())
     }
 
-    fn standing(&self, report: Option<PosteriorReport>) -> Solution {
+    fn status(&self, report: Option<PosteriorReport>) -> Solution {
         match report {
             Some(report) if report.converged => {
                 if self.is_noisy || report.determined && report.residual < EXPLAINED {

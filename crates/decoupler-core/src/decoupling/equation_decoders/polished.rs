@@ -14,7 +14,7 @@ use crate::{
 };
 
 /// Max ratio of misfit to noise that noise explains.
-const NOISES: f64 = 6.0;
+const MAX_NOISE_RATIO: f64 = 6.0;
 
 /// Improves the answer of another decoder by a few Gauss-Newton steps, with noise and prior if the scene has noise.
 pub struct PolishedDecoder {
@@ -98,10 +98,10 @@ impl PolishedDecoder {
 
 /// Status of an answer to readings with this noise: with a posterior, an answer is reliable if noise explains its
 /// misfit. The residual is independent of the gain, and so is the noise that it is compared with.
-fn standing_beside(noise: &NoiseSource, readings: &[f64], report: PosteriorReport) -> Solution {
+fn status_with_noise(noise: &NoiseSource, readings: &[f64], report: PosteriorReport) -> Solution {
     let variance = |&ohm: &f64| noise.relative_to(ohm).own.powi(2);
     let variance = readings.iter().map(variance).sum::<f64>() / readings.len() as f64;
-    if report.residual <= NOISES * variance.sqrt().max(EXPLAINED) {
+    if report.residual <= MAX_NOISE_RATIO * variance.sqrt().max(EXPLAINED) {
         Solution::Unique
     } else {
         Solution::None
@@ -119,23 +119,23 @@ impl PlainFirst for PolishedDecoder {
         match &mut self.improvement {
             Improvement::Newton(newton) => {
                 let reports = newton.polish_plainly(&row_wires[..count], readings, targets);
-                let mut standings = reports.map(|report| Some(report?.solution));
+                let mut statuses = reports.map(|report| Some(report?.solution));
                 let answers = targets.chunks_exact(self.first.outputs());
-                for (standing, coordinates_mm) in standings.iter_mut().zip(answers) {
-                    *standing = standing.map(|solution| self.twins.unless_twin(solution, coordinates_mm));
+                for (status, coordinates_mm) in statuses.iter_mut().zip(answers) {
+                    *status = status.map(|solution| self.twins.unless_twin(solution, coordinates_mm));
                 }
-                standings
+                statuses
             }
             Improvement::Posterior(posterior, noise) => {
                 let reports = posterior.polish_rows(&row_wires[..count], readings, targets, self.steps);
-                let mut standings = [None; LANES];
+                let mut statuses = [None; LANES];
                 let rows = readings
                     .chunks_exact(readings.len() / count)
                     .zip(reports.into_iter().flatten());
-                for (standing, (readings, report)) in standings.iter_mut().zip(rows) {
-                    *standing = Some(standing_beside(noise, readings, report));
+                for (status, (readings, report)) in statuses.iter_mut().zip(rows) {
+                    *status = Some(status_with_noise(noise, readings, report));
                 }
-                standings
+                statuses
             }
         }
     }
@@ -149,7 +149,7 @@ impl PlainFirst for PolishedDecoder {
             }
             Improvement::Posterior(posterior, noise) => {
                 let report = posterior.polish(row_wire, readings, targets, self.steps)?;
-                Ok(standing_beside(noise, readings, report))
+                Ok(status_with_noise(noise, readings, report))
             }
         }
     }

@@ -31,7 +31,7 @@ pub(super) const EXPLAINED: f64 = 1e-10;
 impl<R> Trial<R> {
     /// Returns `true` if this row-wire is preferred to another: an explained one to one that is not, then the lower
     /// score. NaN is above all other scores.
-    fn is_taken_over(&self, other: Option<&Self>) -> bool {
+    fn is_preferred_to(&self, other: Option<&Self>) -> bool {
         other.is_none_or(|other| {
             (!self.is_explained, self.score) < (!other.is_explained, other.score)
                 || other.score.is_nan() && !self.score.is_nan()
@@ -108,7 +108,7 @@ impl RowSearch {
         for row_wire in self.order(readings_ohm) {
             let trial = solve(row_wire, readings_ohm, &mut self.trial_mm)?;
             let is_explained = trial.is_explained;
-            if trial.is_taken_over(taken.as_ref()) {
+            if trial.is_preferred_to(taken.as_ref()) {
                 taken = Some(trial);
                 coordinates_mm.copy_from_slice(&self.trial_mm);
             }
@@ -150,7 +150,7 @@ impl RowSearch {
             let found = solve(&row_wires, &readings_ohm, &mut trials_mm)?;
             let trials = trials_mm.chunks_exact(outputs).zip(found);
             for (&place, (trial_mm, trial)) in open.iter().zip(trials) {
-                if trial.is_taken_over(taken[place].as_ref()) {
+                if trial.is_preferred_to(taken[place].as_ref()) {
                     taken[place] = Some(trial);
                     coordinates_mm[place * outputs..][..outputs].copy_from_slice(trial_mm);
                 }

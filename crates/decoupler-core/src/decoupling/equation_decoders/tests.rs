@@ -139,7 +139,7 @@ fn polishing_flags_rows_that_mirror_each_other() {
 /// The gain of the snapshot is unknown. With it, exact evidence (importance sampling of the uniform prior, 60 rows)
 /// finds 8 of 10 rows; the residual alone is lowest for the row that suits the gain.
 #[test]
-fn rows_are_found_under_drift_as_without_it() {
+fn rows_are_found_with_drift_as_without() {
     let model = SensorModel::new("10x6_3x18".parse().unwrap());
     let found = |noise: Noise| {
         let scene = Scene {
@@ -176,7 +176,7 @@ fn rows_are_found_under_drift_as_without_it() {
 
 /// In a sensor so high that all rows look alike, rounding decides which of them explain the readings.
 #[test]
-fn the_standing_is_that_of_the_row_taken_and_of_no_other_that_was_tried() {
+fn the_status_is_that_of_the_chosen_row() {
     let mut model = SensorModel::new("10x2_3x30".parse().unwrap());
     model.geometry.height_mm = 1e5;
     let scene = Scene::default();
@@ -205,7 +205,7 @@ fn the_standing_is_that_of_the_row_taken_and_of_no_other_that_was_tried() {
 
 /// Four electrodes for six nodes leave every row undetermined; 18 leave none.
 #[test]
-fn rows_that_the_equations_leave_open_are_answered_by_the_posterior_and_no_others() {
+fn only_undetermined_rows_use_the_posterior() {
     for (array, is_open) in [("2x6_3x4", true), ("2x6_3x18", false)] {
         let model = SensorModel::new(array.parse().unwrap());
         let scene = Scene {
@@ -241,7 +241,7 @@ fn bits(values: &[f64]) -> Vec<u64> {
 /// Rows side by side do not influence each other: neither rows that noise leaves unsolved, nor rows that are given up
 /// among solved ones.
 #[test]
-fn a_frame_gives_the_bits_and_the_standing_of_its_rows() {
+fn frames_are_bit_identical_to_rows_with_the_same_status() {
     for (array, noisy_rows) in [
         ("9x6_3x18", 0..0),
         ("11x4_2x12", 3..5),

@@ -30,7 +30,7 @@ fn worst(scene: &Scene, model: &SensorModel, rules: NewtonRules, snapshots: usiz
 }
 
 #[test]
-fn random_deformations_come_back_on_all_presets() {
+fn random_deformations_are_recovered_on_all_presets() {
     for scale in ArrayScale::PRESETS {
         let model = SensorModel::new(scale);
         let (worst_mm, steps) = worst(&Scene::default(), &model, NewtonRules::default(), 20);
@@ -40,7 +40,7 @@ fn random_deformations_come_back_on_all_presets() {
 }
 
 #[test]
-fn sideways_shifts_of_a_small_array_come_back() {
+fn sideways_shifts_of_a_small_array_are_recovered() {
     let model = SensorModel::new("2x1_3x9".parse().unwrap());
     let scene = Scene {
         movement: Movement::SIDEWAYS,
@@ -51,7 +51,7 @@ fn sideways_shifts_of_a_small_array_come_back() {
 }
 
 #[test]
-fn impossible_readings_are_refused_and_foreign_ones_end_within_the_bounds() {
+fn impossible_readings_are_refused_and_inconsistent_ones_stay_within_the_bounds() {
     let model = SensorModel::new("10x6_3x18".parse().unwrap());
     let mut newton = Newton::new(&model, &Scene::default(), NewtonRules::default());
     let mut coordinates = vec![0.0; 18];
@@ -71,7 +71,7 @@ fn impossible_readings_are_refused_and_foreign_ones_end_within_the_bounds() {
 
 /// Numbers of rows that are right, wrong but flagged, and wrong without a flag; wrong means an unknown that is off by
 /// more than [`LARGEST_ERROR`] of its range.
-fn standings(scene: &Scene, model: &SensorModel, rows: usize) -> [usize; 3] {
+fn counts(scene: &Scene, model: &SensorModel, rows: usize) -> [usize; 3] {
     let set = Dataset::simulate(model, scene, rows, &mut Seed(7).rng(Stream::Test)).unwrap();
     let mut newton = Newton::new(model, scene, NewtonRules::default());
     let mut counts = [0; 3];
@@ -105,14 +105,14 @@ fn hard_pressed_rows_are_solved_or_flagged() {
             largest_compression,
             ..Scene::default()
         };
-        let [right, flagged, wrong] = standings(&scene, &model, 600);
+        let [right, flagged, wrong] = counts(&scene, &model, 600);
         assert_eq!(wrong, 0, "{largest_compression}");
         assert!(flagged <= 6, "{largest_compression}: {flagged} flagged, {right} right");
     }
 }
 
 #[test]
-fn sensors_of_any_size_are_solved_alike() {
+fn sensors_of_any_size_are_solved() {
     for factor in [1e-6, 1e6] {
         let mut model = SensorModel::new("2x4_3x12".parse().unwrap());
         let lengths = &mut model.geometry;
@@ -123,25 +123,25 @@ fn sensors_of_any_size_are_solved_alike() {
         lengths.column_pitch_mm *= factor;
         lengths.column_node_x0_mm *= factor;
         lengths.column_node_pitch_mm *= factor;
-        assert_eq!(standings(&Scene::default(), &model, 100), [100, 0, 0], "{factor}");
+        assert_eq!(counts(&Scene::default(), &model, 100), [100, 0, 0], "{factor}");
     }
 }
 
 #[test]
-fn rows_that_readings_do_not_determine_are_flagged() {
+fn undetermined_rows_are_flagged() {
     // Fewer readings than nodes.
     let few = SensorModel::new("10x6_3x4".parse().unwrap());
-    assert_eq!(standings(&Scene::default(), &few, 50), [0, 50, 0]);
+    assert_eq!(counts(&Scene::default(), &few, 50), [0, 50, 0]);
     // So flat that the readings do not depend on the height; so high that all nodes look alike.
     for height_mm in [1e-6, 1e6] {
         let mut model = SensorModel::new("2x4_3x12".parse().unwrap());
         model.geometry.height_mm = height_mm;
-        assert_eq!(standings(&Scene::default(), &model, 20)[2], 0, "{height_mm}");
+        assert_eq!(counts(&Scene::default(), &model, 20)[2], 0, "{height_mm}");
     }
 }
 
 #[test]
-fn a_row_over_the_middle_of_the_electrodes_does_not_tell_left_from_right() {
+fn a_row_over_the_middle_of_the_electrodes_is_ambiguous() {
     let scene = Scene {
         movement: Movement::SIDEWAYS,
         rows: crate::scene::Rows::One(6),
@@ -150,14 +150,14 @@ fn a_row_over_the_middle_of_the_electrodes_does_not_tell_left_from_right() {
     // Electrodes at x = 11.5 and 16.5, the row at x = 14.
     let mut model = SensorModel::new("10x1_2x9".parse().unwrap());
     model.geometry.column_node_x0_mm = 11.5;
-    let [_, flagged, wrong] = standings(&scene, &model, 40);
+    let [_, flagged, wrong] = counts(&scene, &model, 40);
     assert_eq!(wrong, 0);
     assert!(flagged > 0);
-    let beside = Scene {
+    let off_centre = Scene {
         rows: crate::scene::Rows::One(5),
         ..scene
     };
-    assert_eq!(standings(&beside, &model, 40), [40, 0, 0]);
+    assert_eq!(counts(&off_centre, &model, 40), [40, 0, 0]);
 }
 
 #[test]

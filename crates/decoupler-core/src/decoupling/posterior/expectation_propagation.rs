@@ -17,9 +17,9 @@ pub(super) struct Marginals {
 }
 
 /// Max number of EP sweeps.
-const ROUNDS: usize = 400;
+const MAX_SWEEPS: usize = 400;
 /// Number of sweeps after which the update of a factor is halved, and halved again, to damp oscillations.
-const ROUNDS_UNDAMPED: usize = 20;
+const UNDAMPED_SWEEPS: usize = 20;
 /// Smallest damping factor of an update.
 const SMALLEST_SHARE: f64 = 0.1;
 /// Change of a mean, relative to the range, below which the factors have converged.
@@ -132,9 +132,9 @@ impl WithSimd for Rounds<'_> {
     #[inline(always)]
     fn with_simd<S: Simd>(mut self, _: S) {
         let defects = self.propagation.gaussians.factor();
-        for round in 0..ROUNDS {
-            let share = (0.5_f64.powi((round / ROUNDS_UNDAMPED) as i32)).max(SMALLEST_SHARE);
-            let moved = self.propagation.meet_ranges(Pack::splat(share), defects);
+        for round in 0..MAX_SWEEPS {
+            let share = (0.5_f64.powi((round / UNDAMPED_SWEEPS) as i32)).max(SMALLEST_SHARE);
+            let moved = self.propagation.sweep(Pack::splat(share), defects);
             self.close_lanes(moved, share, round + 1);
             if !self.open.contains(&true) {
                 break;
@@ -146,7 +146,7 @@ impl WithSimd for Rounds<'_> {
 impl Propagation {
     /// One EP sweep over all sites. Returns the largest change of a mean, or NaN if numbers overflow.
     #[inline(always)]
-    fn meet_ranges(&mut self, share: Pack, defects: Pack) -> Pack {
+    fn sweep(&mut self, share: Pack, defects: Pack) -> Pack {
         let Self {
             gaussians,
             of_unknowns,
@@ -157,12 +157,12 @@ impl Propagation {
         let mut largest = defects;
         for (unknown, site) in of_unknowns.iter_mut().enumerate() {
             let marginals = gaussians.marginals(Direction::Unknown(unknown));
-            let (moved, defects) = site.meet_range(gaussians, marginals, share);
+            let (moved, defects) = site.update(gaussians, marginals, share);
             largest = largest.max_or_nan(moved + defects);
         }
         for (site, form) in of_rounded.iter_mut().zip(forms.chunks_exact(n)) {
             let marginals = gaussians.marginals(Direction::Form(form));
-            let (_, defects) = site.meet_range(gaussians, marginals, share);
+            let (_, defects) = site.update(gaussians, marginals, share);
             largest = largest.max_or_nan(defects);
         }
         largest
@@ -180,7 +180,7 @@ impl Rounds<'_> {
             let converged = moved < model.tolerance * share;
             if moved.is_nan() {
                 *open = false;
-            } else if converged || rounds == ROUNDS {
+            } else if converged || rounds == MAX_SWEEPS {
                 *open = false;
                 let sites = self.propagation.of_unknowns.iter().zip(&model.ranges);
                 self.found[lane] = Some(Marginals {

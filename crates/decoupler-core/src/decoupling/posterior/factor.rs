@@ -216,7 +216,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_shifted_factor_is_the_same_function_of_its_place() {
+    fn a_shifted_factor_is_the_shifted_function() {
         let factor = Factor {
             precision: 3.0,
             linear: 1.5,

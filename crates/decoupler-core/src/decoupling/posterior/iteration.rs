@@ -356,7 +356,7 @@ mod tests {
 
     /// Values from scipy.stats.norm.logcdf and logsf.
     #[test]
-    fn probabilities_of_intervals_are_those_of_the_normal_distribution() {
+    fn interval_probabilities_match_the_normal_distribution() {
         for (low, high, expected) in [
             (-1.0, 1.0, -0.381_715_146_3),
             (0.0, f64::INFINITY, -std::f64::consts::LN_2),

@@ -115,8 +115,8 @@ impl Pack {
     #[inline(always)]
     pub(super) fn defects(mut self) -> Self {
         for lane in 0..LANES {
-            let is_sound = (self.0[lane] > 0.0) & (self.0[lane] < f64::INFINITY);
-            self.0[lane] = if is_sound { 0.0 } else { f64::NAN };
+            let is_valid = (self.0[lane] > 0.0) & (self.0[lane] < f64::INFINITY);
+            self.0[lane] = if is_valid { 0.0 } else { f64::NAN };
         }
         self
     }
@@ -272,7 +272,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_number_is_kept_or_replaced_as_it_is_said() {
+    fn nan_is_kept_or_replaced_as_documented() {
         let (one, nan) = (Pack::ONE, Pack::splat(f64::NAN));
         assert_eq!(
             [nan.max(one), nan.min(one), nan.unless_nan(one)].map(|pack| pack.get(0)),
@@ -307,7 +307,7 @@ mod tests {
 
     /// Integers, whose sums are exact in any order.
     #[test]
-    fn products_and_sums_are_those_of_every_lane_for_any_length() {
+    fn products_and_sums_are_exact_in_every_lane_for_any_length() {
         for length in 0..=11 {
             let vector = |seed: usize| -> Vec<Pack> {
                 let entry = |place: usize| pack(|lane| ((7 * place + 5 * lane + seed) % 11) as f64 - 5.0);

@@ -17,7 +17,7 @@ struct Case {
 }
 
 #[test]
-fn medians_are_those_of_the_exact_posterior() {
+fn medians_match_the_exact_posterior() {
     let cases: Vec<Case> = serde_json::from_str(include_str!("../../../tests/fixtures/posterior.json")).unwrap();
     for case in cases {
         let model = SensorModel::new(case.array.parse().unwrap());
@@ -104,7 +104,7 @@ fn no_noise_is_too_small_for_a_posterior() {
 }
 
 #[test]
-fn noise_that_says_nothing_leaves_the_middle() {
+fn overwhelming_noise_gives_the_middle() {
     let additive = |additive_ohm| Noise {
         additive_ohm,
         ..Noise::default()
@@ -119,7 +119,7 @@ fn noise_that_says_nothing_leaves_the_middle() {
 }
 
 #[test]
-fn no_converter_leaves_more_than_the_middle() {
+fn a_coarse_converter_is_never_worse_than_the_middle() {
     let mut last = 0.0;
     for converter_bits in [32, 24, 16, 12, 8, 6, 4, 2, 1].map(Some) {
         let noise = Noise {
@@ -138,7 +138,7 @@ fn no_converter_leaves_more_than_the_middle() {
 
 /// From 1e-3 down to zero, past the rounding of the readings, below which noise has no effect.
 #[test]
-fn noise_passes_into_rounding_without_a_step() {
+fn vanishing_noise_turns_into_rounding_smoothly() {
     let model = SensorModel::new("2x4_2x12".parse().unwrap());
     let set = Dataset::simulate(&model, &Scene::default(), 4, &mut Seed(1).rng(Stream::Test)).unwrap();
     let solved = |noise| {
@@ -173,7 +173,7 @@ fn noise_passes_into_rounding_without_a_step() {
 }
 
 #[test]
-fn limits_side_by_side_are_those_of_each_row_alone() {
+fn limits_side_by_side_match_single_rows() {
     let model = SensorModel::new("7x3_2x9".parse().unwrap());
     for noise in [1e-2, 1e-5, 0.0] {
         let scene = Scene {

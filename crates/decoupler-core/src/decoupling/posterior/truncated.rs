@@ -184,7 +184,7 @@ pub(super) struct Site {
     noise: f64,
     pub(super) factor: Factor<Pack>,
     /// Cavity distribution of the unknown: the product of the equations and all other factors.
-    seen: Factor<Pack>,
+    cavity: Factor<Pack>,
     /// Moments of the cavity distribution truncated to the range.
     moments: Moments,
 }
@@ -196,7 +196,7 @@ impl Site {
             per_width: Pack::ZERO,
             noise,
             factor: Factor::FLAT,
-            seen: Factor::FLAT,
+            cavity: Factor::FLAT,
             moments: Moments {
                 mean: Pack::ZERO,
                 variance: Pack::ZERO,
@@ -231,7 +231,7 @@ impl Site {
     /// `mean` and `variance` are those that `gaussians` returned for the last direction. Returns the change of the
     /// mean within the range, relative to the range, and 0, or NaN if numbers overflow.
     #[inline(always)]
-    pub(super) fn meet_range(
+    pub(super) fn update(
         &mut self,
         gaussians: &mut RowPosteriors,
         (mean, variance): (Pack, Pack),
@@ -239,16 +239,16 @@ impl Site {
     ) -> (Pack, Pack) {
         let before = self.factor;
         let per_variance = Pack::ONE / variance;
-        let seen = Factor {
+        let cavity = Factor {
             precision: per_variance - before.precision,
             linear: mean * per_variance - before.linear,
         };
-        let seen = seen.blurred(self.noise);
-        let moments = Cut::new(seen, &self.ranges).moments();
+        let cavity = cavity.blurred(self.noise);
+        let moments = Cut::new(cavity, &self.ranges).moments();
         let per_variance = Pack::ONE / moments.variance;
         let found = Factor {
-            precision: (per_variance - seen.precision).max(Pack::ZERO),
-            linear: moments.mean * per_variance - seen.linear,
+            precision: (per_variance - cavity.precision).max(Pack::ZERO),
+            linear: moments.mean * per_variance - cavity.linear,
         };
         let found = found.blurred(self.noise);
         let change = Factor {
@@ -260,7 +260,7 @@ impl Site {
             linear: before.linear + change.linear,
         };
         let moved = (moments.mean - self.moments.mean).abs() * self.per_width;
-        (self.seen, self.moments) = (seen, moments);
+        (self.cavity, self.moments) = (cavity, moments);
         let left = gaussians.multiply(mean, variance, change);
         (moved, moments.variance.defects() + left.defects())
     }
@@ -278,7 +278,7 @@ impl Site {
             mean: self.moments.mean.get(lane),
             variance: self.moments.variance.get(lane),
             range,
-            seen: self.seen.get(lane),
+            cavity: self.cavity.get(lane),
             factor: self.factor.get(lane),
         }
     }
@@ -291,7 +291,7 @@ pub(super) struct Marginal {
     pub(super) variance: f64,
     pub(super) range: Range,
     /// Cavity distribution of the unknown, which is truncated to the range.
-    pub(super) seen: Factor,
+    pub(super) cavity: Factor,
     /// Factor that approximates the range.
     pub(super) factor: Factor,
 }
@@ -300,13 +300,13 @@ pub(super) struct Marginal {
 pub(super) fn medians(marginals: &[Marginal]) -> Vec<f64> {
     let mut medians = Vec::with_capacity(marginals.len());
     for some in marginals.chunks(LANES) {
-        let (mut seen, mut ranges, mut means) = (Factor::FLAT, Ranges::NONE, Pack::ZERO);
+        let (mut cavity, mut ranges, mut means) = (Factor::FLAT, Ranges::NONE, Pack::ZERO);
         for (lane, marginal) in some.iter().enumerate() {
-            seen.set(lane, marginal.seen);
+            cavity.set(lane, marginal.cavity);
             ranges.set(lane, marginal.range);
             means.set(lane, marginal.mean);
         }
-        let found = pulp::Arch::new().dispatch(|| Cut::new(seen, &ranges).medians(&ranges, means));
+        let found = pulp::Arch::new().dispatch(|| Cut::new(cavity, &ranges).medians(&ranges, means));
         medians.extend((0..some.len()).map(|lane| found.get(lane)));
     }
     medians
@@ -338,7 +338,7 @@ mod tests {
 
     /// Moments of the uniform, of a whole normal and of an exponential distribution, all in closed form.
     #[test]
-    fn factors_without_a_cut_on_both_sides_have_the_moments_of_their_distributions() {
+    fn moments_match_closed_forms() {
         let factor = |precision, linear| Factor { precision, linear };
         let wide = Range {
             lowest: -1e3,
@@ -368,8 +368,8 @@ mod tests {
     }
 
     #[test]
-    fn half_lies_below_the_median() {
-        // exp(−5 t) from 0 to 1: half of 1 − e⁻⁵ lies below.
+    fn half_of_the_mass_is_below_the_median() {
+        // exp(−5 t) from 0 to 1: half of 1 − e⁻⁵ is below.
         let factor = Factor {
             precision: 0.0,
             linear: -5.0,

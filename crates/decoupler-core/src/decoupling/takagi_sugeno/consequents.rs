@@ -247,7 +247,7 @@ mod tests {
     /// Compares with consequents of many copies of the samples with drawn noise, and the firing strengths of the
     /// samples without noise.
     #[test]
-    fn noise_of_the_inputs_is_answered_as_if_many_noisy_copies_were_given() {
+    fn input_noise_is_equivalent_to_many_noisy_copies() {
         let mut rng = ChaCha8Rng::seed_from_u64(3);
         let x = Array2::from_shape_simple_fn((30, 2), || standard_normal(&mut rng));
         let y = Array2::from_shape_fn((30, 1), |(s, _)| (x[[s, 0]] - 0.4 * x[[s, 1]]).sin());
@@ -273,7 +273,7 @@ mod tests {
     }
 
     #[test]
-    fn firing_strengths_and_consequents_are_those_of_numpy() {
+    fn firing_strengths_and_consequents_match_numpy() {
         let cases = include_str!("../../../tests/fixtures/takagi_sugeno.json");
         let cases: Vec<Case> = serde_json::from_str(cases).unwrap();
         assert_eq!(cases.len(), 4);
@@ -321,7 +321,7 @@ mod tests {
 
     /// Compares with fits to that many copies, and to each output alone.
     #[test]
-    fn weights_are_copies_and_each_output_has_its_penalty() {
+    fn weights_equal_copies_and_each_output_has_its_penalty() {
         let mut rng = ChaCha8Rng::seed_from_u64(4);
         let x = Array2::from_shape_simple_fn((12, 2), || standard_normal(&mut rng));
         let y = Array2::from_shape_fn((12, 2), |(s, t)| (x[[s, t]] - 0.4 * x[[s, 1]]).sin());
@@ -344,7 +344,7 @@ mod tests {
     }
 
     #[test]
-    fn equations_that_overflow_are_an_error_and_no_rules_of_zeros() {
+    fn overflowing_equations_are_an_error() {
         let x = Array2::from_shape_fn((20, 1), |(s, _)| 1e200 * s as f64);
         let y = Array2::from_shape_fn((20, 1), |(s, _)| s as f64);
         let penalty = Penalty {

@@ -262,7 +262,7 @@ mod tests {
     }
 
     #[test]
-    fn the_folded_rules_give_what_the_scaled_ones_do() {
+    fn folded_rules_match_scaled_ones() {
         let (training, test) = sets("10x6_3x18", 600, Rows::All);
         let scaling = ScalingChoice::Whitening;
         let choice = InputChoice {
@@ -314,7 +314,7 @@ mod tests {
     }
 
     #[test]
-    fn extremes_are_fitted_with_finite_answers() {
+    fn extreme_sets_give_finite_answers() {
         let (usual, _) = sets("1x4_2x12", 40, Rows::All);
         let one = usual.select(&[0]);
         let duplicates = usual.select(&[0, 1, 0, 1, 0, 1, 0, 1, 0, 1, 0, 1, 0, 1, 0, 1]);
@@ -353,7 +353,7 @@ mod tests {
     }
 
     #[test]
-    fn more_rules_than_samples_are_as_many_as_samples() {
+    fn the_number_of_rules_is_limited_by_the_samples() {
         let (set, _) = sets("1x4_2x12", 5, Rows::All);
         let x = set.readings();
         let mut rng = Seed(0).rng(Stream::Expectation);
@@ -374,7 +374,7 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_scaled_is_refused() {
+    fn unscalable_sets_are_refused() {
         let (set, _) = sets("1x4_2x12", 5, Rows::All);
         let mut targets = set.targets().to_owned();
         targets[[3, 2]] = f64::NAN;

@@ -62,8 +62,8 @@ pub(super) fn choose(units: &Units, noise: &[f64], rng: &mut impl Rng) -> Choice
     };
     let targets = weighted((&y - &mean).view(), &units.weights);
     let (samples, inputs) = x.dim();
-    let most = MAX_REGRESSORS.min((REGRESSORS_PER_SAMPLE * samples as f64) as usize);
-    let affordable = RULES.into_iter().filter(|rules| rules * (inputs + 1) <= most);
+    let max_regressors = MAX_REGRESSORS.min((REGRESSORS_PER_SAMPLE * samples as f64) as usize);
+    let affordable = RULES.into_iter().filter(|rules| rules * (inputs + 1) <= max_regressors);
     let affordable: Vec<usize> = affordable.collect();
     if inputs == 0 || targets.ncols() == 0 || affordable.len() < 2 {
         return best;
@@ -92,13 +92,13 @@ pub(super) fn choose(units: &Units, noise: &[f64], rng: &mut impl Rng) -> Choice
     // Noise settings that the pilot chose for no output are not tried again.
     let mut noises = [None, Some(noise)].to_vec();
     noises.retain(|noise| penalties.iter().any(|penalty| penalty.is_noisy == noise.is_some()));
-    let mut least = f64::INFINITY;
+    let mut min_error = f64::INFINITY;
     for rules in affordable {
         // A single rule is the linear map, whose penalty is the noise.
         let noises = if rules == 1 { &[Some(noise)] } else { &noises[..] };
         let (error, choice) = validated(rules, components, noises);
-        if error < WORTHWHILE * least {
-            least = error;
+        if error < WORTHWHILE * min_error {
+            min_error = error;
             best = choice;
         }
     }
@@ -293,7 +293,7 @@ mod tests {
     }
 
     #[test]
-    fn coincident_centres_fire_alike() {
+    fn coincident_centres_fire_equally() {
         let mut rng = Seed(0).rng(Stream::Expectation);
         let (centres, distance) = Antecedents::clusters(array![[2.0], [2.0], [2.0]].view(), 1, 2, &mut rng);
         assert_eq!((centres.nrows(), distance), (2, 0.0));

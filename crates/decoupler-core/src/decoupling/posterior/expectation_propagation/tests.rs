@@ -106,7 +106,7 @@ fn an_interval_blurred_by_noise_is_the_difference_of_two_distribution_functions(
 }
 
 #[test]
-fn a_wide_box_leaves_the_gaussian() {
+fn a_wide_box_does_not_change_the_gaussian() {
     // Equations with AᵀA = [400 250; 250 400].
     let (a, b) = (20.0, 12.5);
     let c = (400.0_f64 - b * b).sqrt();
@@ -189,7 +189,7 @@ fn several_correlated_unknowns_agree_with_sampling() {
 /// Models that converge early and late, one whose numbers overflow, and one with initial factors: alone, and in every
 /// lane next to the others.
 #[test]
-fn models_side_by_side_have_the_bits_of_each_alone() {
+fn models_side_by_side_are_bit_identical_to_single_ones() {
     let mut rng = ChaCha8Rng::seed_from_u64(9);
     let n = 3;
     let mut model = |noise: f64, offset: f64| {
@@ -252,8 +252,8 @@ fn models_side_by_side_have_the_bits_of_each_alone() {
     let mut propagation = Propagation::default();
     for turn in 0..LANES {
         let place = |lane: usize| (lane + turn) % models.len();
-        let beside: Vec<_> = (0..LANES).map(|lane| Some(models[place(lane)].clone())).collect();
-        for (lane, found) in propagation.marginals(&beside).iter().enumerate() {
+        let together: Vec<_> = (0..LANES).map(|lane| Some(models[place(lane)].clone())).collect();
+        for (lane, found) in propagation.marginals(&together).iter().enumerate() {
             assert_eq!(of(found), expected[place(lane)], "{turn} {lane}");
         }
     }
