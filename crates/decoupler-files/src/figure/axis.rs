@@ -1,12 +1,12 @@
-//! Round numbers for axes.
+//! Axes of plots, and round numbers for their ticks.
 
 use std::ops::RangeInclusive;
 
 use decoupler_core::text::format_number;
 
-/// Largest number of parts into which ticks divide an axis.
+/// Maximum number of parts into which ticks divide an axis.
 const MAX_PARTS: f64 = 8.0;
-/// Values beyond this have no place: differences between them would overflow.
+/// Values beyond this have no place, because differences between them would overflow.
 const LARGEST: f64 = 1e300;
 
 /// Scale of an axis.
@@ -23,11 +23,11 @@ pub enum AxisScale {
 pub enum TickRule {
     /// Round numbers; on a logarithmic axis decades, and 2 and 5 between them where there is room.
     Round,
-    /// Whole numbers.
+    /// Integers.
     Whole,
     /// Multiples of this number.
     Every(f64),
-    /// The values 0, 1, 2 … by these names.
+    /// The values 0, 1, 2 … with these names.
     Names(Vec<String>),
 }
 
@@ -40,7 +40,7 @@ pub struct PlotAxis {
     pub scale: AxisScale,
     /// Rule that places the ticks.
     pub ticks: TickRule,
-    /// Values that are always in view; where one is the least or the largest, the axis ends there.
+    /// Values that are always in view; if one is the minimum or maximum, the axis ends there.
     pub includes: Vec<f64>,
     /// Values beyond this range are drawn at its ends.
     pub limits: Option<RangeInclusive<f64>>,
@@ -115,7 +115,7 @@ impl PlotAxis {
         (place.abs() < LARGEST).then_some(place)
     }
 
-    /// Returns a value in words: `12`, `0.0123`, the name of a named value.
+    /// Returns a value as text: `12`, `0.0123`, the name of a named value.
     pub fn value_text(&self, value: f64) -> String {
         match &self.ticks {
             TickRule::Names(_) => self.tick_text(value, 1.0),
@@ -124,7 +124,7 @@ impl PlotAxis {
         }
     }
 
-    /// Returns the range of places that holds all `places`, with a little room.
+    /// Returns the range of places that contains all `places`, with a margin.
     pub(crate) fn range(&self, places: impl Iterator<Item = f64>) -> RangeInclusive<f64> {
         let hull = |places: &mut dyn Iterator<Item = f64>| {
             places.fold((f64::MAX, f64::MIN), |(low, high), place| {
@@ -137,7 +137,7 @@ impl PlotAxis {
         if low > high {
             return 0.0..=1.0;
         }
-        // A single value, or values apart by rounding only, still have a range.
+        // A single value, or values that differ only by rounding, still have a range.
         let width = (high - low).max(1e-9 * low.abs().max(high.abs())).max(1e-12);
         let margin = if high > low { 0.05 * width } else { 0.5 };
         let below = if fixed_low == low && high > low { 0.0 } else { margin };
@@ -145,7 +145,7 @@ impl PlotAxis {
         low - below..=high + above
     }
 
-    /// Returns the ticks within a range of places, at least `apart` from each other: the room that a number takes.
+    /// Returns the ticks within a range of places, at least `apart` from each other: the width of a number.
     pub fn ticks(&self, range: &RangeInclusive<f64>, apart: f64) -> Ticks {
         let width = range.end() - range.start();
         if !(width.is_finite() && width > 0.0) {
@@ -165,7 +165,7 @@ impl PlotAxis {
             (TickRule::Whole, _) => multiples_of(step_for(range, parts).max(1.0)),
             (TickRule::Every(step), _) => multiples_of(step * (apart / step).ceil().max(1.0)),
             (TickRule::Names(names), _) => {
-                // The room is that of a number of six characters.
+                // The width is that of a number of six characters.
                 let longest = names.iter().map(|name| name.chars().count()).max().unwrap_or(0);
                 let needed = apart * (longest + 2) as f64 / 6.0;
                 let Ticks { mut places, step } = multiples_of(needed.ceil().max(1.0));
@@ -213,7 +213,7 @@ fn logarithmic_ticks(range: &RangeInclusive<f64>, apart: f64, parts: usize) -> T
 
 fn ticks_within_a_decade(range: &RangeInclusive<f64>, apart: f64) -> Ticks {
     let [low, high] = [range.start(), range.end()].map(|end| 10.0_f64.powf(*end));
-    // The upper end is the more crowded one.
+    // The upper end is more crowded.
     let number = high - 10.0_f64.powf(range.end() - apart);
     let parts = ((high - low) / number).clamp(1.0, MAX_PARTS) as usize;
     let step = step_for(&(low..=high), parts);
@@ -224,9 +224,9 @@ fn ticks_within_a_decade(range: &RangeInclusive<f64>, apart: f64) -> Ticks {
     }
 }
 
-/// The number at a tick of a logarithmic axis, given its decimal logarithm: `0.02`, `5e−4`, `1e80`.
+/// Returns the number at a tick of a logarithmic axis, given its decimal logarithm: `0.02`, `5e−4`, `1e80`.
 fn power_text(log: f64) -> String {
-    // Three digits tell any two ticks apart. The exponent is split off before 10 to its power overflows.
+    // Three digits distinguish any two ticks. The exponent is split off before 10 to its power overflows.
     let decade = (log + 1e-9).floor();
     let short = |text: String| match text.contains('.') {
         true => text.trim_end_matches('0').trim_end_matches('.').to_owned(),
@@ -265,7 +265,7 @@ pub fn step_for(range: &RangeInclusive<f64>, parts: usize) -> f64 {
     }
 }
 
-/// A tick's number, with as many decimals as its step needs and a true minus sign.
+/// Returns the number at a tick, with as many decimals as its step needs and a true minus sign.
 pub fn tick_text(value: f64, step: f64) -> String {
     let decimals = (-(step.log10() + 1e-9).floor()).clamp(0.0, 9.0) as usize;
     let value = if value.abs() < 0.5 * 10_f64.powi(-(decimals as i32)) {
@@ -280,7 +280,7 @@ pub fn tick_text(value: f64, step: f64) -> String {
 mod tests {
     use super::*;
 
-    /// Texts at the ticks of an axis `points` long on which a number takes `number` points.
+    /// Texts at the ticks of an axis of length `points` on which a number is `number` points wide.
     fn texts(axis: &PlotAxis, [low, high]: [f64; 2], points: f64, number: f64) -> Vec<String> {
         let ticks = axis.ticks(&(low..=high), (high - low) * number / points);
         let places = ticks.places.iter();
@@ -300,7 +300,7 @@ mod tests {
     }
 
     #[test]
-    fn ticks_of_a_logarithmic_axis_lie_in_view_and_read_as_numbers() {
+    fn ticks_of_a_logarithmic_axis_are_in_view_and_read_as_numbers() {
         let axis = PlotAxis::logarithmic("");
         let texts = |low, high, points| texts(&axis, [low, high], points, 16.0);
         assert_eq!(texts(-4.2, 0.1, 150.0), ["1e−4", "0.001", "0.01", "0.1", "1"]);
@@ -311,7 +311,7 @@ mod tests {
     }
 
     #[test]
-    fn a_diverged_training_has_numbers_on_its_axis_however_low_the_plot() {
+    fn the_axis_of_a_diverged_training_has_numbers_at_any_height() {
         let axis = PlotAxis::logarithmic("");
         for points in [40.0, 80.0, 120.0, 200.0] {
             for high in [3.0, 20.0, 80.0, 300.0] {
@@ -325,7 +325,7 @@ mod tests {
     }
 
     #[test]
-    fn counts_have_no_ticks_between_whole_numbers() {
+    fn counts_have_no_ticks_between_integers() {
         let axis = PlotAxis::linear("").ticked(TickRule::Whole);
         assert_eq!(texts(&axis, [-0.08, 1.08], 150.0, 16.0), ["0", "1"]);
         assert_eq!(
@@ -335,7 +335,7 @@ mod tests {
     }
 
     #[test]
-    fn names_stand_at_their_values_and_make_room_for_each_other() {
+    fn names_are_at_their_values_and_thinned_where_crowded() {
         let names = ["10×6_3×18", "10×8_4×24", "10×10_5×30"].map(str::to_owned).to_vec();
         let axis = PlotAxis::linear("array").ticked(TickRule::Names(names.clone()));
         assert_eq!(texts(&axis, [-0.5, 2.5], 400.0, 36.0), names);
@@ -344,7 +344,7 @@ mod tests {
     }
 
     #[test]
-    fn an_axis_ends_where_it_is_told_and_has_room_where_it_is_not() {
+    fn an_axis_ends_at_included_extremes_and_has_a_margin_elsewhere() {
         let axis = PlotAxis::linear("").including([0.0]);
         let range = axis.range([1.0, 4.0].into_iter());
         assert_eq!(*range.start(), 0.0);
@@ -354,7 +354,7 @@ mod tests {
     }
 
     #[test]
-    fn values_beyond_the_limits_stand_at_the_ends() {
+    fn values_beyond_the_limits_are_drawn_at_the_ends() {
         let axis = PlotAxis::logarithmic("").limited(0.0..=100.0);
         assert_eq!(
             [1.0, 1e9, f64::INFINITY].map(|value| axis.place(value)),

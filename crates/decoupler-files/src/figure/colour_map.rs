@@ -1,7 +1,7 @@
-//! Colours by value, baked into a table.
+//! Colour maps, baked into tables, and heat maps.
 //!
-//! Curves of this many points that several share a pixel: of each stretch the least and the largest remain, so that no peak
-//! is lost.
+//! Thinning of curves with several points per pixel: the minimum and maximum of each stretch are kept, so no peak is
+//! lost.
 
 use std::{ops::RangeInclusive, sync::OnceLock};
 
@@ -16,24 +16,24 @@ pub type Rgb = [u8; 3];
 
 const ENTRIES: usize = 256;
 
-/// Maps of values that do not diverge, between which the reader can choose. Along each the lightness rises evenly, so that
-/// it is read alike in grey and by colour-blind readers.
+/// Sequential colour maps from which the reader can choose. Their lightness increases evenly, which keeps them readable
+/// in grey and for colour-blind readers.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub enum SequentialMap {
     /// Blue, green, yellow: matplotlib's default.
     #[default]
     Viridis,
-    /// Blue, grey, yellow: alike for all kinds of colour vision (Nuñez, Anderton and Renslow 2018).
+    /// Blue, grey, yellow: looks the same with all kinds of colour vision (Nuñez, Anderton and Renslow 2018).
     Cividis,
     /// Black, purple, orange, pale yellow.
     Inferno,
 }
 
 impl SequentialMap {
-    /// All of them.
+    /// All maps.
     pub const ALL: [Self; 3] = [Self::Viridis, Self::Cividis, Self::Inferno];
 
-    /// Name by which it is known.
+    /// Returns its usual name.
     pub fn name(self) -> &'static str {
         match self {
             Self::Viridis => "Viridis",
@@ -46,7 +46,7 @@ impl SequentialMap {
     pub fn meaning(self) -> &'static str {
         match self {
             Self::Viridis => "From blue over green to yellow, even in lightness.",
-            Self::Cividis => "From blue over grey to yellow: looks nearly alike to readers with any colour vision.",
+            Self::Cividis => "From blue over grey to yellow: looks nearly the same to readers with any colour vision.",
             Self::Inferno => "From black over purple and orange to pale yellow, even in lightness.",
         }
     }
@@ -81,7 +81,7 @@ impl ColourMap {
             .build()
             .expect("five stops make a gradient");
         let mut map = Self::bake(&gradient);
-        // 256 entries have no middle one; give zero its colour exactly, on both sides of it.
+        // With 256 entries there is no middle one; both entries next to zero get its exact colour.
         map.entries[ENTRIES / 2 - 1] = stops[2];
         map.entries[ENTRIES / 2] = stops[2];
         map
@@ -97,34 +97,34 @@ impl ColourMap {
         }
     }
 
-    /// The colour at `position` of 0..=1; beyond, the end colours.
+    /// Returns the colour at `position` in 0..=1; beyond that, the colours of the ends.
     pub fn at(&self, position: f32) -> Rgb {
         // NaN becomes 0 in the conversion.
         self.entries[((position.clamp(0.0, 1.0) * (ENTRIES - 1) as f32 + 0.5) as usize).min(ENTRIES - 1)]
     }
 }
 
-/// Returns `true` for a colour on which black is read better than white.
+/// Returns `true` for a colour on which black is more readable than white.
 pub fn is_light([red, green, blue]: Rgb) -> bool {
     0.299 * f32::from(red) + 0.587 * f32::from(green) + 0.114 * f32::from(blue) > 110.0
 }
 
-/// Values over two axes as colours, with the number in each cell.
+/// A heat map: values over two axes as colours, with the number in each cell.
 #[derive(Clone, Debug, PartialEq)]
 pub struct HeatMap {
     /// Name of the columns' quantity.
     pub x_name: String,
     /// Name of the rows' quantity.
     pub y_name: String,
-    /// Value of each column, in words.
+    /// Value of each column, as text.
     pub columns: Vec<String>,
-    /// Value of each row, in words; the first is at the top.
+    /// Value of each row, as text; the first is at the top.
     pub rows: Vec<String>,
     /// Rows × columns; NaN where there is none.
     pub values: Array2<f64>,
-    /// Words about each cell, rows × columns.
+    /// Note on each cell, rows × columns.
     pub notes: Array2<String>,
-    /// Name of the values, and the scale of the colours.
+    /// Name of the values, and the axis of the colour scale.
     pub value_axis: PlotAxis,
     /// Colours of the values.
     pub colours: SequentialMap,
@@ -141,13 +141,13 @@ impl HeatMap {
     pub fn colour_share(&self, value: f64, range: &RangeInclusive<f64>) -> Option<f64> {
         match self.value_axis.place(value) {
             Some(place) => Some(share(place, range)),
-            // A zero where colours go by the logarithm.
+            // A zero on a logarithmic colour scale.
             None if value.is_finite() => Some(0.0),
             None => None,
         }
     }
 
-    /// Returns the range of places that the colours span: those of the values, and of what the axis includes.
+    /// Returns the range of places that the colours span: those of the values and of the values that the axis includes.
     pub fn range(&self) -> RangeInclusive<f64> {
         let values = self.values.iter().chain(&self.value_axis.includes);
         let places = values.filter_map(|&value| self.value_axis.place(value));
@@ -162,11 +162,11 @@ impl HeatMap {
     }
 }
 
-/// Stretches into which a long curve is divided: more than the widest chart has pixels.
+/// Number of stretches into which a long curve is divided: more than the widest chart has pixels.
 pub(super) const STRETCHES: usize = 2048;
 
-/// Returns the indices of the items at which `of` is least or largest within its stretch, ascending, with both ends; all
-/// indices where there are few. Where a value is missing or not a number, one such item of the stretch remains.
+/// Returns the indices of the items at which `of` has its minimum or maximum within a stretch, ascending, with both
+/// ends; all indices if there are few. One item per stretch is kept whose value is missing or not a finite number.
 pub(super) fn outline<T>(items: &[T], of: impl Fn(&T) -> Option<f64>) -> Vec<usize> {
     if items.len() <= 2 * STRETCHES {
         return (0..items.len()).collect();
@@ -183,7 +183,8 @@ pub(super) fn outline<T>(items: &[T], of: impl Fn(&T) -> Option<f64>) -> Vec<usi
     kept
 }
 
-/// Calls `report` with the places at which `of` is least and largest, and the first without a number.
+/// Calls `report` with the places of the minimum and maximum of `of`, and of the first value that is not a finite
+/// number.
 pub(super) fn extremes<T>(items: &[T], of: impl Fn(&T) -> Option<f64>, mut report: impl FnMut(usize)) {
     let (mut least, mut largest, mut missing) = (None, None, None);
     for (place, item) in items.iter().enumerate() {
@@ -208,7 +209,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn zero_has_the_middle_colour_exactly() {
+    fn zero_has_exactly_the_middle_colour() {
         let stops = [[10, 60, 140], [90, 155, 230], [255; 3], [240, 135, 90], [150, 40, 10]];
         let map = ColourMap::diverging(stops);
         assert_eq!([map.at(-3.0), map.at(0.5), map.at(3.0)], [stops[0], stops[2], stops[4]]);
@@ -272,7 +273,7 @@ mod tests {
     ];
 
     #[test]
-    fn equal_steps_of_value_look_alike_and_grow_lighter_for_every_colour_vision() {
+    fn equal_steps_of_value_look_equal_and_grow_lighter_for_every_colour_vision() {
         const STEPS: usize = 16;
         for map in SequentialMap::ALL {
             for (vision, matrix) in VISIONS.into_iter().enumerate() {
@@ -297,7 +298,7 @@ mod tests {
 
     #[test]
     fn the_maps_are_those_of_their_names() {
-        // The ends that matplotlib tabulates; polynomials are in for its table of cividis.
+        // The end colours of matplotlib's tables; its cividis is approximated by polynomials.
         let ends = |map: SequentialMap| [0.0, 1.0].map(|end| map.colours().at(end));
         let expected = [
             [[68, 1, 84], [253, 231, 37]],

@@ -1,7 +1,7 @@
-//! Figures as values: what a picture says, not how it is drawn.
+//! Figures as values: the contents of a picture, independent of how it is drawn.
 //!
-//! A [`Figure`] is described once by a function that knows the data, such as [`loss_figure`]. The window draws it with its
-//! theme and shows the same words under the pointer; [`crate::export::figures`] draws it as SVG and PNG. Values that are
+//! A [`Figure`] is described once by a function that knows the data, such as [`loss_figure`]. The window draws it with
+//! its theme and shows its texts under the pointer; [`crate::export::figures`] draws it as SVG and PNG. Values that are
 //! not finite are left out.
 
 mod axis;
@@ -65,13 +65,13 @@ impl From<SurfaceFigure> for Figure {
     }
 }
 
-/// Role of a colour. The window resolves it by its theme, print by a palette for white paper; both tell the hues apart
-/// in grey and for most colour-blind readers.
+/// Role of a colour. The window resolves it by its theme, print by a palette for white paper; in both, the hues can be
+/// distinguished in grey and by most colour-blind readers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Hue {
     /// The network's own result.
     Blue,
-    /// A comparison that went wrong or differs most.
+    /// A comparison that failed or differs most.
     Red,
     /// The validation set; a bound.
     Green,
@@ -83,7 +83,7 @@ pub enum Hue {
     Cyan,
     /// References and baselines.
     Grey,
-    /// As strong as text: published values.
+    /// The colour of text: published values.
     Ink,
 }
 
@@ -107,7 +107,7 @@ impl Hue {
 pub enum LineStyle {
     /// A curve.
     Solid,
-    /// A reference, or the lesser of two curves.
+    /// A reference, or the less important of two curves.
     Dashed,
     /// A limit set by the user.
     Dotted,
@@ -204,7 +204,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn colours_tell_decoders_apart() {
+    fn decoders_have_different_colours() {
         for (index, kind) in DecoderKind::ALL.into_iter().enumerate() {
             let others = &DecoderKind::ALL[..index];
             assert!(

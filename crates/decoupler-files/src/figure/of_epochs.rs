@@ -1,6 +1,4 @@
-//! Figures of a training over its epochs.
-//!
-//! The figure of the error against the number of training samples.
+//! Figures of a training over its epochs, and the learning curve over the number of training samples.
 
 use decoupler_core::{
     evaluation::recorded::LearningCurve,
@@ -15,8 +13,8 @@ use super::{
     plot::{LineAt, Plot, PlotFigure, PlotPoint, ReferenceLine, Series},
 };
 
-/// Factor above the error or gradient of the start from which a curve is drawn at the upper edge, so that a diverged
-/// training leaves the rest of its curves readable.
+/// Factor above the initial error or gradient from which a curve is drawn at the upper edge, which keeps the curves of
+/// a diverged training readable.
 const MAX_GROWTH: f64 = 1e3;
 /// Learning rates, dampings and scales beyond these are drawn at the edge.
 const PARAMETERS: std::ops::RangeInclusive<f64> = 1e-20..=1e12;
@@ -28,12 +26,12 @@ type OfEpoch = fn(&EpochRecord) -> Option<f64>;
 
 /// The curve of a quantity over the epochs.
 fn curve(name: impl Into<String>, look: Look, history: &[EpochRecord], of: OfEpoch) -> Series {
-    let outstanding = outline(history, of).into_iter().map(|place| &history[place]);
-    let points = outstanding.filter_map(|epoch| Some([epoch.epoch as f64, of(epoch)?]));
+    let kept = outline(history, of).into_iter().map(|place| &history[place]);
+    let points = kept.filter_map(|epoch| Some([epoch.epoch as f64, of(epoch)?]));
     Series::new(name, look, points)
 }
 
-/// A logarithmic axis on which what grew far beyond its value at the start is drawn at the upper edge.
+/// Limits a logarithmic axis: values far above the initial one are drawn at the upper edge.
 fn bounded(axis: PlotAxis, at_start: Option<f64>) -> PlotAxis {
     let highest = MAX_GROWTH * at_start.unwrap_or(0.0);
     if highest > 0.0 {
@@ -46,7 +44,7 @@ fn bounded(axis: PlotAxis, at_start: Option<f64>) -> PlotAxis {
 /// A line where the method changed, with the short name of the next method.
 fn stage_lines(stages: &[Stage]) -> Vec<ReferenceLine> {
     let changes = stages.iter().skip(1).map(|stage| {
-        // The last weights of the method before are those from which the next one continues.
+        // The next method continues from the last weights of the previous one.
         let changed = stage.first_epoch.saturating_sub(1);
         let name = format!("{} from epoch {changed}", stage.method.name());
         ReferenceLine {
@@ -58,7 +56,7 @@ fn stage_lines(stages: &[Stage]) -> Vec<ReferenceLine> {
 }
 
 /// Training, validation and test error against epoch, the epoch of the best weights, and each change of method. Errors
-/// far above that of the start run along the upper edge.
+/// far above the initial one are drawn at the upper edge.
 pub fn loss_figure(history: &[EpochRecord], stages: &[Stage], best_epoch: usize) -> PlotFigure {
     let curves: [(&str, Hue, OfEpoch); 3] = [
         ("training", Hue::Blue, |epoch| Some(epoch.training_mse)),
@@ -114,7 +112,7 @@ pub fn training_state_figure(history: &[EpochRecord], stages: &[Stage]) -> PlotF
                 curve(parameter, look(Hue::Orange), history, |epoch| Some(epoch.parameter)),
             ),
             plot(
-                // A little more than from 0 to 1, so that no line lies on the frame.
+                // A little more than from 0 to 1: no line lies on the frame.
                 PlotAxis::linear(failures)
                     .including([-0.1, 1.1])
                     .ticked(TickRule::Whole),
@@ -159,7 +157,7 @@ fn parameter_name(stages: &[Stage]) -> &'static str {
     }
 }
 
-/// Validation failures hold from one epoch to the next: `[epoch, failures]` at both ends of each step.
+/// Validation failures are constant from one epoch to the next: returns `[epoch, failures]` at both ends of each step.
 fn failure_steps(history: &[EpochRecord]) -> Vec<[f64; 2]> {
     let mut points: Vec<[f64; 2]> = Vec::new();
     let of = |epoch: &EpochRecord| Some(epoch.validation_failures as f64);
@@ -183,27 +181,26 @@ const QUANTITIES: [fn(&EpochRecord) -> Option<f64>; 6] = [
     |epoch| Some(epoch.validation_failures as f64),
 ];
 
-/// Epochs of a training as far as its curves need them: of each stretch, those at which a quantity is least or largest.
-/// However long the training, it holds a bounded number, and taking an epoch costs the same.
+/// The epochs of a training that its curves need: for each stretch, those at which a quantity has its minimum or
+/// maximum. Memory is bounded for trainings of any length, and adding an epoch takes constant time.
 #[derive(Clone, Debug, Default)]
 pub struct EpochOutline {
-    /// Of all stretches one after the other; the last is still open.
+    /// Epochs of all stretches in order; the last stretch is still open.
     kept: Vec<EpochRecord>,
-    /// Begin of each stretch in `kept`.
+    /// Start of each stretch in `kept`.
     begins: Vec<usize>,
-    /// Number of epochs in a stretch, and of those taken into the open one.
+    /// Number of epochs in a stretch, and in the open one so far.
     stretch: usize,
     open: usize,
 }
 
 impl EpochOutline {
-    /// Nothing taken yet.
     pub fn new() -> Self {
         Self::default()
     }
 
-    /// Takes epochs that follow those taken before; where they do not, as another start has taken the lead, those that
-    /// they replace are forgotten.
+    /// Adds epochs. If they overlap earlier ones, because another start has become the best, the earlier ones are
+    /// dropped.
     pub fn extend(&mut self, epochs: &[EpochRecord]) {
         if let Some(first) = epochs.first() {
             self.forget_from(first.epoch);
@@ -215,7 +212,7 @@ impl EpochOutline {
             self.kept.push(*epoch);
             self.open += 1;
             let from = self.begins.last().copied().unwrap_or(0);
-            // Reduced whenever it has doubled, so that each epoch is looked at a few times only.
+            // Reduced whenever it has doubled, so each epoch is processed only a few times.
             if self.kept.len() - from > 4 * QUANTITIES.len() {
                 self.reduce(from);
             }
@@ -227,7 +224,7 @@ impl EpochOutline {
         &self.kept
     }
 
-    /// Begins another stretch, after joining each two where there are too many.
+    /// Begins a new stretch; if there are too many, merges pairs of them first.
     fn begin(&mut self) {
         if let Some(&from) = self.begins.last() {
             self.reduce(from);
@@ -250,21 +247,18 @@ impl EpochOutline {
         self.open = 0;
     }
 
-    /// Keeps of the last stretch, which begins at `from`, what stands out.
+    /// Reduces the last stretch, which begins at `from`, to its ends and extremes.
     fn reduce(&mut self, from: usize) {
         let last = &self.kept[from..];
-        let mut standing_out = Vec::with_capacity(3 * QUANTITIES.len());
-        // Both ends, so that the curve begins and ends where it did.
-        standing_out.extend([0, last.len().saturating_sub(1)]);
+        let mut extreme = Vec::with_capacity(3 * QUANTITIES.len());
+        // Both ends are kept: the curve begins and ends where it did.
+        extreme.extend([0, last.len().saturating_sub(1)]);
         for of in QUANTITIES {
-            extremes(last, of, |place| standing_out.push(place));
+            extremes(last, of, |place| extreme.push(place));
         }
-        standing_out.sort_unstable();
-        standing_out.dedup();
-        let reduced: Vec<EpochRecord> = standing_out
-            .iter()
-            .filter_map(|&place| last.get(place).copied())
-            .collect();
+        extreme.sort_unstable();
+        extreme.dedup();
+        let reduced: Vec<EpochRecord> = extreme.iter().filter_map(|&place| last.get(place).copied()).collect();
         self.kept.truncate(from);
         self.kept.extend(reduced);
     }
@@ -352,7 +346,7 @@ mod tests {
     }
 
     #[test]
-    fn the_axes_of_a_diverged_training_span_what_can_be_read() {
+    fn the_axes_of_a_diverged_training_stay_readable() {
         let history = [epoch(0, 1.5, 0), epoch(1, 0.5, 0), epoch(2, 1e300, 0)];
         let loss = loss_figure(&history, &[], 1);
         assert!((loss.plots[0].y.place(1e300).unwrap() - 1500_f64.log10()).abs() < 1e-12);
@@ -370,7 +364,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_held_out_has_no_curve_and_no_key() {
+    fn without_held_out_samples_there_is_no_curve_and_no_key() {
         let figure = loss_figure(&[epoch(0, 1.0, 0)], &[], 0);
         let keys: Vec<&str> = figure.keys.iter().map(|key| &*key.name).collect();
         assert_eq!(keys, ["training", "best weights"]);
@@ -378,7 +372,7 @@ mod tests {
     }
 
     #[test]
-    fn failures_rise_upright() {
+    fn failures_rise_in_vertical_steps() {
         let history = [epoch(0, 1.0, 0), epoch(1, 1.0, 1), epoch(2, 1.0, 1), epoch(3, 1.0, 0)];
         let expected = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [2.0, 1.0], [3.0, 1.0], [3.0, 0.0]];
         assert_eq!(failure_steps(&history), expected);
@@ -411,8 +405,8 @@ mod tests {
     fn a_long_training_keeps_its_peaks_within_bounded_memory() {
         let history = history(200_000);
         let mut outline = EpochOutline::new();
-        for news in history.chunks(777) {
-            outline.extend(news);
+        for chunk in history.chunks(777) {
+            outline.extend(chunk);
         }
         let kept = outline.records();
         assert!(kept.len() < 60_000, "{}", kept.len());
@@ -420,7 +414,7 @@ mod tests {
         for peak in [0, 31_337, 71_234, 150_001, 199_999] {
             assert!(kept.iter().any(|record| *record == history[peak]), "epoch {peak}");
         }
-        // Between any two of them nothing stands out of what they span.
+        // Between any two of them, no value is outside the range that they span.
         for (number, stretch) in history.chunks(2048).enumerate() {
             let largest = stretch.iter().map(|record| record.training_mse).fold(0.0, f64::max);
             let near = number.saturating_sub(1) * 2048..(number + 2) * 2048;
@@ -430,7 +424,7 @@ mod tests {
     }
 
     #[test]
-    fn a_short_training_is_kept_whole_and_another_leader_takes_its_place() {
+    fn a_short_training_is_kept_whole_and_replaced_by_a_better_start() {
         let history = history(1000);
         let mut outline = EpochOutline::new();
         outline.extend(&history[..400]);
@@ -446,7 +440,7 @@ mod tests {
     }
 
     #[test]
-    fn the_law_runs_from_the_fewest_samples_to_twice_the_most() {
+    fn the_law_runs_from_the_minimum_to_twice_the_maximum_of_samples() {
         let point = |samples: usize| LearningPoint {
             samples,
             rmse: 4.0 / (samples as f64).sqrt(),

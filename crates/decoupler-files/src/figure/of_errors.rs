@@ -1,6 +1,5 @@
-//! Distribution of the errors of nodes, or of a target of a recording.
-//!
-//! Decoded against actual values, with the line fitted to them.
+//! Distribution of the errors of nodes or of a target of a recording, and decoded against actual values with the fitted
+//! line.
 
 use decoupler_core::{dataset::Dataset, evaluation::Channel, text::format_number};
 use ndarray::Array2;
@@ -13,10 +12,10 @@ use super::{
 
 const BINS: usize = 41;
 
-/// Largest number of samples of a recording looked at in a figure; of a larger test set, evenly spaced ones.
+/// Maximum number of samples of a recording used in a figure; from a larger test set, evenly spaced samples are used.
 const MAX_PAIRS: usize = 20_000;
 
-/// Every this many samples are looked at.
+/// Returns the spacing of the samples that are used.
 fn stride(test: &Dataset) -> usize {
     test.samples().div_ceil(MAX_PAIRS).max(1)
 }
@@ -35,7 +34,7 @@ pub fn pair_sample(test: &Dataset, pair: usize) -> Option<usize> {
     Some(pair * stride(test)).filter(|&sample| sample < test.samples())
 }
 
-/// Bins of a histogram of errors, symmetric about 0: as many on either side of the middle one, which holds no error.
+/// Bins of a histogram of errors, symmetric about 0, with the same number on either side of the middle one.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ErrorBins {
     /// In the unit of the values.
@@ -43,12 +42,12 @@ pub struct ErrorBins {
 }
 
 impl ErrorBins {
-    /// Returns the bins that hold all finite errors of these pairs of actual and decoded values.
+    /// Returns the bins that contain all finite errors of these pairs of actual and decoded values.
     pub fn new(pairs: &[(f64, f64)]) -> Self {
         let errors = pairs.iter().map(|(actual, decoded)| (decoded - actual).abs());
         let largest = errors.filter(|error| error.is_finite()).fold(0.0, f64::max);
         Self {
-            // Without any error every bin is as good.
+            // Without errors, any width will do.
             width: if largest > 0.0 { largest } else { 1.0 } / (BINS / 2) as f64,
         }
     }
@@ -62,7 +61,7 @@ impl ErrorBins {
         (0.0..BINS as f64).contains(&bin).then_some(bin as usize)
     }
 
-    /// Returns the errors that a bin holds, in the unit of the values.
+    /// Returns the range of errors in a bin, in the unit of the values.
     pub fn range(&self, bin: usize) -> [f64; 2] {
         [-0.5, 0.5].map(|half| self.width * (bin as f64 - (BINS / 2) as f64 + half))
     }
@@ -131,8 +130,8 @@ fn histogram(pairs: &[(f64, f64)], chosen: Option<usize>, axis: &str, counted: &
     }
 }
 
-/// Least-squares line through pairs of actual and decoded values, and the range of the actual ones: what a regression figure
-/// takes from all pairs, however many, and so is made once for them.
+/// Least-squares line through pairs of actual and decoded values, and the range of the actual ones. A regression figure
+/// needs both for all pairs, so they are computed once.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RegressionLine {
     /// Smallest and largest finite actual value.
@@ -140,10 +139,10 @@ pub struct RegressionLine {
     fit: Option<Fit>,
 }
 
-/// The line where both sides vary.
+/// The line, if both sides vary.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Fit {
-    /// Pearson's.
+    /// Pearson's correlation coefficient.
     correlation: f64,
     slope: f64,
     /// In the unit of the values.
@@ -163,7 +162,7 @@ impl RegressionLine {
 }
 
 impl Fit {
-    /// `None` where one side does not vary.
+    /// Returns the line, or `None` if one side does not vary.
     fn of(pairs: impl Iterator<Item = (f64, f64)> + Clone) -> Option<Self> {
         let (mut count, mut sum_a, mut sum_d) = (0.0, 0.0, 0.0);
         for (a, d) in pairs.clone() {
@@ -197,8 +196,7 @@ pub fn regression_figure(pairs_mm: &[(f64, f64)]) -> PlotFigure {
 }
 
 /// Decoded against actual values of the target of this name and unit, with the line on which they would be equal and `line`
-/// through all of them. There are this many samples, of which few enough to be seen are asked for their actual and decoded
-/// value.
+/// through all of them. `pair` is called only for the samples that are drawn.
 pub fn target_regression_figure(
     samples: (usize, &dyn Fn(usize) -> (f64, f64)),
     line: &RegressionLine,
@@ -208,8 +206,8 @@ pub fn target_regression_figure(
     regression(samples, line, (name, unit), ["decoded", "samples of the test set"])
 }
 
-/// Actual values of a quantity (its name and unit), and against them what a network makes of the readings, called `answer`,
-/// in pairs of `what`.
+/// Values decoded by a network, called `answer`, against actual values of a quantity (its name and unit), in pairs of
+/// `what`.
 fn regression(
     (count, pair): (usize, &dyn Fn(usize) -> (f64, f64)),
     fitted: &RegressionLine,
@@ -274,7 +272,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_finite_error_is_counted_once_and_zero_stands_in_the_middle() {
+    fn every_finite_error_is_counted_once_and_zero_is_in_the_middle() {
         let pairs = [0.0, 0.0, 1.0, -1.0, 0.5, f64::NAN].map(|error| (4.0, 4.0 + error));
         let bins = ErrorBins::new(&pairs);
         let counts = bins.counts(&pairs);
@@ -286,7 +284,7 @@ mod tests {
     }
 
     #[test]
-    fn a_bar_holds_the_nodes_whose_errors_it_spans() {
+    fn a_bar_contains_the_nodes_whose_errors_it_spans() {
         let pairs: Vec<(f64, f64)> = (0..200).map(|i| (4.0, 4.0 + (f64::from(i) * 0.731).sin())).collect();
         let bins = ErrorBins::new(&pairs);
         let mut held = 0;
@@ -315,7 +313,7 @@ mod tests {
     }
 
     #[test]
-    fn the_histogram_of_a_target_leads_back_to_its_samples() {
+    fn bars_of_a_target_lead_back_to_its_samples() {
         const SAMPLES: usize = 50_000;
         let actual = Array2::from_shape_fn((SAMPLES, 2), |(sample, target)| (sample + target) as f64);
         let test = Dataset::new(actual.clone(), actual.clone(), None, (0..SAMPLES).collect()).unwrap();
@@ -337,7 +335,7 @@ mod tests {
     }
 
     #[test]
-    fn the_fit_finds_a_line_and_none_without_variation() {
+    fn the_fit_finds_a_line_unless_values_are_constant() {
         let fit = |pairs: &[(f64, f64)]| RegressionLine::of(pairs.iter().copied()).fit;
         let line: Vec<_> = (0..9).map(|i| (f64::from(i), 3.0 * f64::from(i) - 1.0)).collect();
         let found = fit(&line).unwrap();
@@ -364,11 +362,11 @@ mod tests {
     }
 
     #[test]
-    fn a_figure_of_a_million_samples_looks_at_few_and_its_line_is_through_all() {
+    fn a_figure_of_a_million_samples_draws_few_and_fits_its_line_to_all() {
         const SAMPLES: usize = 1_000_000;
         let pair = |sample: usize| {
             let actual = (sample as f64 * 0.618_033_988_749_895).fract();
-            // Rare samples that no thinning by a fixed step sees turn the line.
+            // Rare samples, which thinning by a fixed step misses, change the line.
             let decoded = if sample % 1000 == 1 { 1.0 - actual } else { actual };
             (actual, decoded)
         };
@@ -379,7 +377,7 @@ mod tests {
             pair(sample)
         };
         let figure = target_regression_figure((SAMPLES, &counted), &line, "x", None);
-        assert!(asked.get() <= 2001, "{} samples looked at", asked.get());
+        assert!(asked.get() <= 2001, "{} samples used", asked.get());
         assert_eq!(figure.plots[0].series[0].points.len(), asked.get());
         // Least squares: the slope is 1 − 2 · 0.001 for actual values spread evenly whatever the sample.
         let fit = line.fit.unwrap();

@@ -102,7 +102,7 @@ fn along_the_axis(results: &ExperimentResults, summaries: &[CellSummary]) -> Plo
         let points = cells.iter().filter_map(move |(x, cell)| Some([*x, value(cell)?]));
         points.collect::<Vec<_>>()
     };
-    // Values that are no numbers have no line between them.
+    // Categories are not joined by lines.
     let joined = |look: Look| if is_number { look.joined() } else { look };
     let reference = |hue, marker| match is_number {
         true => Look::line(hue, LineStyle::Dashed),
@@ -222,7 +222,7 @@ fn repeats(results: &ExperimentResults, summaries: &[CellSummary]) -> PlotFigure
             |cell| node_figures(cell)[0]?.published,
             |errors| errors.nodes()?.x_percent,
         ),
-        // Y is constant, so its error is of the size of rounding for some and not for others.
+        // Y is constant, so its error may be exactly 0 or of the size of rounding errors.
         (
             PlotAxis::logarithmic("Y error (%)"),
             |cell| node_figures(cell)[1]?.published,
@@ -272,7 +272,7 @@ fn repeats(results: &ExperimentResults, summaries: &[CellSummary]) -> PlotFigure
     }
 }
 
-/// An error of each trial of a cell against its number, from 1 and counted through all seeds: Fig. 5.
+/// Error of each trial of a cell against the number of the trial, counted from 1 through all seeds (Fig. 5).
 fn trial_points(experiment: &Experiment, cell: &CellResults, error: TrialError) -> Vec<[f64; 2]> {
     let repeats = experiment.cross_validation.map_or(1, |validation| validation.repeats);
     let number = |trial: &Trial| {
@@ -295,7 +295,7 @@ fn node_figures(cell: &CellSummary) -> [Option<&Measured>; 2] {
     }
 }
 
-/// Name of what the trials of a cross-validation are counted by.
+/// Returns the name of the trial axis of a cross-validation.
 fn repeat_name(results: &ExperimentResults) -> &'static str {
     match results.experiment.seeds {
         1 => "repeat",
@@ -317,7 +317,7 @@ mod tests {
     };
 
     #[test]
-    fn trials_keep_their_numbers_in_whichever_order_they_finish() {
+    fn trials_keep_their_numbers_in_any_order_of_finishing() {
         let mut experiment = PaperTable::CrossValidation.experiment();
         experiment.base.training.stopping.epochs = 1;
         experiment.base.hidden = 1;
@@ -351,15 +351,15 @@ mod tests {
     fn plots_of(table: PaperTable) -> PlotFigure {
         match experiment_figure(&ExperimentResults::new(table.experiment())) {
             Figure::Plots(figure) => figure,
-            _ => panic!("a table is no heat map"),
+            _ => panic!("a table is not a heat map"),
         }
     }
 
     #[test]
-    fn the_published_figures_stand_before_anything_is_run() {
+    fn published_figures_are_shown_before_any_run() {
         let keys = |figure: &PlotFigure| figure.keys.iter().map(|key| key.name.clone()).collect::<Vec<_>>();
         let hidden = plots_of(PaperTable::HiddenNodes);
-        assert_eq!(keys(&hidden), ["published"], "nothing is known of the rest");
+        assert_eq!(keys(&hidden), ["published"], "there are no other results yet");
         assert_eq!(hidden.plots[0].series[0].points[3], PlotPoint::from([12.0, 2.28]));
         let repeats = plots_of(PaperTable::CrossValidation);
         assert_eq!(keys(&repeats), ["1000 samples", "100 samples", "published"]);

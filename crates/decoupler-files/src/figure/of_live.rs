@@ -1,6 +1,4 @@
-//! The figure of decoded values over time.
-//!
-//! The figure of the readings of a frame.
+//! Figures of decoded values over time, and of the readings of a frame.
 
 use std::sync::Arc;
 
@@ -15,10 +13,10 @@ use super::{
 };
 
 const HUES: [Hue; 6] = [Hue::Blue, Hue::Orange, Hue::Green, Hue::Violet, Hue::Cyan, Hue::Red];
-/// Most targets that have colours and names of their own; of more, all are fine lines.
+/// Maximum number of targets with their own colours and names; more targets are all drawn as fine lines.
 const MAX_NAMES: usize = 2 * HUES.len();
 
-/// Values of all targets over time, `history` being times in seconds with a value for each target: a plot for each unit.
+/// Values of all targets over time, one plot per unit; `history` has times in seconds with a value for each target.
 pub fn targets_over_time_figure(targets: &[Channel], history: &[(f64, Arc<[f64]>)]) -> PlotFigure {
     let mut units: Vec<&Option<String>> = Vec::new();
     for target in targets {
@@ -61,10 +59,10 @@ pub fn targets_over_time_figure(targets: &[Channel], history: &[(f64, Arc<[f64]>
     }
 }
 
-/// Readings of a frame, rows × columns, as what they say about it: their drop below the unloaded state.
+/// Readings of a frame, rows × columns, as their drop below the unloaded state.
 ///
-/// `drops_percent` is 100 (1 − R/R₀), in percent of the unloaded resistance; `rows` are the row-wires read, from 0. Colours
-/// span 0 to `largest_percent`, so that they mean the same from frame to frame; what is beyond has the end's colour.
+/// `drops_percent` is 100 (1 − R/R₀), in percent of the unloaded resistance; `rows` are the row-wires read, from 0.
+/// Colours span 0 to `largest_percent` and are comparable between frames; larger values have the colour of the end.
 pub fn readings_figure(drops_percent: Array2<f64>, rows: &[usize], largest_percent: f64) -> HeatMap {
     let axis = PlotAxis::linear("drop from unloaded (%)").including([0.0, largest_percent]);
     of_wires(drops_percent, rows, axis.limited(0.0..=largest_percent))
@@ -115,7 +113,7 @@ mod tests {
     }
 
     #[test]
-    fn colours_of_readings_mean_the_same_from_frame_to_frame() {
+    fn colours_of_readings_are_comparable_between_frames() {
         let [slight, strong] = [0.4, 30.0].map(|drop| readings_figure(array![[0.0, drop], [-1.0, 2.0]], &[0, 4], 5.0));
         assert_eq!((slight.range(), strong.range()), (0.0..=5.0, 0.0..=5.0));
         assert_eq!(strong.colour_share(30.0, &strong.range()), Some(1.0));
@@ -127,7 +125,7 @@ mod tests {
     }
 
     #[test]
-    fn gains_are_told_by_their_difference_from_one() {
+    fn gains_are_shown_by_their_difference_from_one() {
         let figure = zero_gains_figure(&array![[1.02, 0.99]], &[0]);
         assert!((figure.values[[0, 0]] - 2.0).abs() < 1e-12 && (figure.values[[0, 1]] + 1.0).abs() < 1e-12);
         assert_eq!(figure.range(), figure.values[[0, 1]]..=figure.values[[0, 0]]);

@@ -1,6 +1,5 @@
-//! Figures of targets of any meaning, decoded from recorded readings.
-//!
-//! Surfaces through targets that have positions on the skin.
+//! Figures of targets of any meaning, decoded from recorded readings, and surfaces through targets with positions on
+//! the skin.
 
 use std::{ops::RangeInclusive, sync::Arc};
 
@@ -18,7 +17,7 @@ use super::{
     surface::{Quantity, Surface, ViewMode},
 };
 
-/// Largest number of cells along an axis of a map, except for those that round limits add.
+/// Maximum number of cells along an axis of a map, not counting cells added by rounding its limits.
 const CELLS: usize = 16;
 
 /// Error of a position over the position: root mean square of the distance between the decoded and the actual one, for
@@ -94,7 +93,7 @@ struct Cells {
 }
 
 impl Cells {
-    /// `None` if the values do not vary, or too far for their range to be a number.
+    /// Returns `None` if the values do not vary, or if their range overflows.
     fn of(values: impl Iterator<Item = f64>) -> Option<Self> {
         let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| {
             (low.min(value), high.max(value))
@@ -122,7 +121,7 @@ impl Cells {
     }
 }
 
-/// Targets that have positions, and the surface through them.
+/// Targets with positions, and the surface through them.
 #[derive(Clone, Debug)]
 pub struct TargetSurface {
     map: Arc<SurfaceMap>,
@@ -132,8 +131,8 @@ pub struct TargetSurface {
 }
 
 impl TargetSurface {
-    /// Prepares the surface through the targets with these positions: that of a lattice if they are one, else that of
-    /// scattered nodes.
+    /// Prepares the surface through the targets with these positions: of a lattice if they form one, else of scattered
+    /// nodes.
     ///
     /// # Errors
     /// [`SurfaceError`] if no surface goes through them: see [`SurfaceMap::scattered`].
@@ -170,7 +169,7 @@ impl TargetSurface {
             .map(f64::abs)
             .filter(|error| error.is_finite())
             .fold(0.0, f64::max);
-        // Rounding has no colour of its own.
+        // Rounding errors are not distinguished by colour.
         let largest = largest.max(1e-9 * (range.end() - range.start()));
         let (value, error) = (
             Quantity::Target(self.unit.clone()),
@@ -183,14 +182,14 @@ impl TargetSurface {
         ]
     }
 
-    /// Range of the targets at the nodes, of which `ranges` are the least and largest values.
+    /// Returns the range of the targets at the nodes; `ranges` are the minimum and maximum of each target.
     pub fn range_of(&self, ranges: &[(f64, f64)]) -> RangeInclusive<f64> {
         let of_nodes = || self.nodes.iter().map(|node| ranges[node.target]);
         let low = of_nodes().map(|(low, _)| low).fold(f64::INFINITY, f64::min);
         low..=of_nodes().map(|(_, high)| high).fold(f64::NEG_INFINITY, f64::max)
     }
 
-    /// The values at the nodes, of `of_targets` with one for each target.
+    /// Returns the values at the nodes from `of_targets`, which has one for each target.
     fn values(&self, of_targets: &[f64]) -> impl Iterator<Item = f64> {
         self.nodes.iter().map(|node| of_targets[node.target])
     }
@@ -241,7 +240,7 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_mapped_has_no_map() {
+    fn constant_or_infinite_positions_have_no_map() {
         let varying = array![[0.0, 0.0], [1.0, 1.0]];
         for targets in [array![[1.0, 0.0], [1.0, 2.0]], array![[0.0, f64::NAN], [1.0, 2.0]]] {
             assert!(position_error_map(targets.view(), varying.view(), ["x", "y"], None).is_none());
@@ -250,7 +249,7 @@ mod tests {
         assert!(position_error_map(huge.view(), huge.view(), ["x", "y"], None).is_none());
     }
 
-    /// 2 × 3 targets with others between them, in an order of their own, and a plane over the skin.
+    /// 2 × 3 targets in shuffled order with others between them, and a plane over the skin.
     fn plane() -> (TargetSurface, Vec<f64>) {
         let channel = |unit: &str| Channel {
             name: String::new(),
@@ -297,7 +296,7 @@ mod tests {
     }
 
     #[test]
-    fn the_range_is_that_of_the_targets_with_positions() {
+    fn the_range_covers_the_targets_with_positions() {
         let (surface, _) = plane();
         let mut ranges = vec![(-1.0, 1.0); 8];
         (ranges[3], ranges[6], ranges[0]) = ((-100.0, 100.0), (-3.0, 0.0), (0.0, 2.0));

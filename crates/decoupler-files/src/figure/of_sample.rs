@@ -1,8 +1,4 @@
-//! The figure of all targets of one sample.
-//!
-//! The figure of what the readings of each row determine.
-//!
-//! Figures of decoupled nodes next to the actual ones.
+//! Figures of all targets of one sample, of the singular values of each row, and of decoupled next to actual nodes.
 
 use decoupler_core::{
     dataset::Dataset,
@@ -19,11 +15,11 @@ use super::{
     plot::{LineAt, Plot, PlotFigure, PlotPoint, ReferenceLine, Series},
 };
 
-/// Most targets whose names have room below the axis.
+/// Maximum number of targets whose names fit below the axis.
 const MAX_NAMES: usize = 12;
 
-/// All targets of a sample in their order: actual as squares, decoded as discs. Targets of one unit share its axis; with
-/// several units each is shown in percent of its range, `ranges` being the least and largest value of each.
+/// All targets of a sample in their order: actual as squares, decoded as discs. Targets of one unit share its axis;
+/// with several units, each is shown in percent of its range; `ranges` are the minimum and maximum of each.
 pub fn sample_figure(targets: &[Channel], actual: &[f64], decoded: &[f64], ranges: &[(f64, f64)]) -> PlotFigure {
     let has_one_unit = targets.iter().all(|target| target.unit == targets[0].unit);
     let place = |target: usize, value: f64| {
@@ -35,7 +31,7 @@ pub fn sample_figure(targets: &[Channel], actual: &[f64], decoded: &[f64], range
         }
     };
     let has_names = targets.len() <= MAX_NAMES;
-    // Targets that are not named are counted from 1.
+    // Targets without names are counted from 1.
     let first = if has_names { 0.0 } else { 1.0 };
     let series = |name: &str, look: Look, values: &[f64]| {
         let points = values.iter().enumerate().map(|(target, &value)| {
@@ -86,7 +82,7 @@ pub fn sample_figure(targets: &[Channel], actual: &[f64], decoded: &[f64], range
     }
 }
 
-/// Values below the largest by this factor are rounding.
+/// Values below the largest by this factor are rounding errors.
 const ROUNDING: f64 = 1e-16;
 
 /// Singular values of every row, from the best-seen deformation pattern to the worst. `worst` is the index of the row
@@ -124,7 +120,7 @@ pub fn singular_values_figure(rows: &[Identifiability], worst: usize, hidden_bel
     }
 }
 
-/// Number of the pattern from 1, and its value; without those that are rounding.
+/// Number of each pattern from 1, and its value, without rounding errors.
 fn numbered(row: &Identifiability) -> Vec<[f64; 2]> {
     let values = &row.singular_values_per_mm;
     let least = ROUNDING * values.first().copied().unwrap_or(0.0);
@@ -132,10 +128,10 @@ fn numbered(row: &Identifiability) -> Vec<[f64; 2]> {
     numbered.map(|(number, value)| [number as f64 + 1.0, *value]).collect()
 }
 
-/// Largest number of nodes looked at in a figure; of a larger test set, evenly spaced ones.
+/// Maximum number of nodes used in a figure; from a larger test set, evenly spaced nodes are used.
 const MAX_PAIRS: usize = 20_000;
 
-/// Every this many nodes of a test set are looked at.
+/// Returns the spacing of the nodes of a test set that are used.
 fn stride(test: &Dataset) -> usize {
     (test.targets().len() / 3).div_ceil(MAX_PAIRS).max(1)
 }
@@ -272,7 +268,7 @@ mod tests {
     }
 
     #[test]
-    fn patterns_that_are_not_seen_have_no_place_on_a_logarithmic_axis() {
+    fn patterns_without_effect_are_not_on_a_logarithmic_axis() {
         let model = SensorModel::new("2x6_3x4".parse().unwrap());
         let row = Identifiability::of_row(&model, 0, &[DVec3::ZERO; 6], Axes::Z).unwrap();
         let points = numbered(&row);
@@ -311,7 +307,7 @@ mod tests {
     }
 
     #[test]
-    fn a_lit_node_has_a_halo_at_each_of_its_points() {
+    fn a_highlighted_node_has_a_halo_at_each_of_its_points() {
         let nodes = |z_mm: [f64; 3]| z_mm.map(|z| DVec3::new(1.0, 2.0, z));
         let (actual, decoupled) = (nodes([4.0, 4.5, 5.0]), nodes([4.1, 4.4, 5.0]));
         let figure = node_figure(&actual, Some(&decoupled), None, 3).lighting(|item| item == 1, &[]);

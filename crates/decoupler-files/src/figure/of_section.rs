@@ -20,12 +20,12 @@ use decoupler_core::{
 pub struct SectionNodes<'a> {
     /// Values on the grid of the map, in millimetres.
     pub values_mm: &'a [f64],
-    /// The nodes row by row; of a cut along a row-wire, those on it are shown.
+    /// The nodes row by row; a cut along a row-wire shows those on it.
     pub nodes_mm: &'a [DVec3],
 }
 
 /// Actual and decoupled z along a wire, with the nodes on it. `rows` are the row-wires read, from 0, and `heights_mm` are
-/// always in view. What lies beyond the nodes is marked as extrapolated.
+/// always in view. Sections beyond the nodes are marked as extrapolated.
 pub fn section_figure(
     section: &Section,
     map: &SurfaceMap,
@@ -191,16 +191,16 @@ mod tests {
     }
 
     #[test]
-    fn along_a_column_wire_there_are_curves_only_and_beside_the_nodes_a_reason() {
+    fn a_column_wire_has_curves_only_and_outside_the_nodes_a_reason() {
         let along = figure(SectionLine::ColumnWire(3), 4.0);
         let points = &along.plots[0].series[0].points;
         assert!(points.iter().all(|at| (at.y - (4.0 + 0.05 * at.x - 0.08)).abs() < 1e-9));
         assert_eq!(along.plots[0].series.len(), 2);
         assert_eq!(along.plots[0].x.name, "x along column-wire 4 (mm)");
-        let beside = figure(SectionLine::ColumnWire(11), 12.0);
-        assert!(beside.plots[0].series.is_empty() && beside.keys.is_empty());
+        let outside = figure(SectionLine::ColumnWire(11), 12.0);
+        assert!(outside.plots[0].series.is_empty() && outside.keys.is_empty());
         assert_eq!(
-            beside.notes,
+            outside.notes,
             ["Column-wire 12 lies beyond the nodes: there is no surface above it."]
         );
     }

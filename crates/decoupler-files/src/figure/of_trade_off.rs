@@ -1,6 +1,4 @@
-//! The figure of speed against accuracy.
-//!
-//! A point of the trade-off in words.
+//! The figure of speed against accuracy, and descriptions of its points.
 
 use std::time::Duration;
 
@@ -37,9 +35,9 @@ const ANSWER: Look = Look {
     marker: Some(Marker::Halo),
 };
 
-/// The points at one level of noise, one plot for each cost: colours tell the decoder, discs and diamonds the preset,
-/// hollow marks 32 bits. With the Pareto front, whose points are named, the Bayesian reference, and the answers to the two
-/// questions with their limits.
+/// The points at one level of noise, one plot for each cost: colours show the decoder, discs and diamonds the preset,
+/// and hollow marks 32 bits. Also shows the Pareto front with the names of its points, the Bayesian reference, and the
+/// answers to the two questions with their limits.
 pub fn trade_off_figure(level: &TradeOffLevel, limits: &TradeOffLimits) -> PlotFigure {
     let plots: Vec<Plot> = TradeOffCost::ALL.map(|cost| plot(level, limits, cost)).into();
     let mut keys = Vec::new();
@@ -156,7 +154,7 @@ fn plot(level: &TradeOffLevel, limits: &TradeOffLimits, cost: TradeOffCost) -> P
         plot.lines
             .push(line("Bayesian reference", LineAt::Y(percent), REFERENCE));
     }
-    // The limits are of decoding, and shown where they lie among the points.
+    // The limits apply to decoding and are shown if they are within the range of the points.
     let places: Vec<[f64; 2]> = level
         .points
         .iter()
@@ -182,7 +180,7 @@ fn line(name: &str, at: LineAt, look: Look) -> ReferenceLine {
     ReferenceLine::new(name, at, look.hue, look.line.unwrap_or(LineStyle::Solid))
 }
 
-/// The points that no other beats, joined.
+/// Returns the line through the points that no other point beats.
 fn front(level: &TradeOffLevel, cost: TradeOffCost) -> Vec<[f64; 2]> {
     let chosen = level.points.iter().zip(level.front(cost));
     steps(chosen.filter(|(_, is_chosen)| *is_chosen).map(|(point, _)| {
@@ -191,7 +189,7 @@ fn front(level: &TradeOffLevel, cost: TradeOffCost) -> Vec<[f64; 2]> {
     }))
 }
 
-/// From point to point of a Pareto front, in steps: between them nothing better was measured.
+/// Joins the points of a Pareto front by steps: nothing better was measured between them.
 pub(super) fn steps(places: impl Iterator<Item = [f64; 2]>) -> Vec<[f64; 2]> {
     let mut places: Vec<[f64; 2]> = places
         .filter(|place| place.iter().all(|part| part.is_finite()))
@@ -221,7 +219,7 @@ pub fn point_name(point: &TradeOffPoint) -> String {
     name
 }
 
-/// `Network f32, 12 hidden`, next to a point whose mark tells the preset.
+/// `Network f32, 12 hidden`, next to a point whose mark shows the preset.
 pub fn point_label(point: &TradeOffPoint) -> String {
     let name = point.report.kind.name(point.report.precision).to_owned();
     match point.hidden() {
@@ -239,7 +237,7 @@ pub fn frame_time(microseconds: f64) -> String {
     }
 }
 
-/// A time of training.
+/// Formats a training time.
 pub fn training_time(seconds: f64) -> String {
     Duration::try_from_secs_f64(seconds).map_or_else(|_| format_number(None), format_duration)
 }

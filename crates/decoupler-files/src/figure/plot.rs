@@ -7,9 +7,9 @@ use super::{Hue, Key, LineStyle, Look, Marker, axis::PlotAxis};
 /// A plot of series of points: curves, scatter, bars.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Plot {
-    /// Across.
+    /// Horizontal.
     pub x: PlotAxis,
-    /// Up.
+    /// Vertical.
     pub y: PlotAxis,
     /// Marked stretches of the x axis, behind everything.
     pub spans: Vec<Span>,
@@ -17,7 +17,7 @@ pub struct Plot {
     pub lines: Vec<ReferenceLine>,
     /// Drawn in this order.
     pub series: Vec<Series>,
-    /// Makes a unit as long across as up.
+    /// Gives both axes the same scale.
     pub has_equal_scales: bool,
 }
 
@@ -37,17 +37,17 @@ pub struct Series {
 /// A point of a series.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct PlotPoint {
-    /// Across.
+    /// Horizontal.
     pub x: f64,
-    /// Up.
+    /// Vertical.
     pub y: f64,
     /// Ends of its error bar.
     pub bar: Option<[f64; 2]>,
-    /// Words about the point in place of its coordinates.
+    /// Note shown instead of its coordinates.
     pub note: Option<String>,
-    /// Words next to it, where there is room.
+    /// Label next to it, if there is room.
     pub label: Option<String>,
-    /// Number of what it is for, by which other figures know it too: a node, a bar.
+    /// Index of its item, such as a node or a bar, which other figures share.
     pub item: Option<usize>,
 }
 
@@ -56,7 +56,7 @@ pub struct PlotPoint {
 pub struct Span {
     /// Meaning.
     pub name: String,
-    /// Colour of which it has a tint.
+    /// Colour that is tinted.
     pub hue: Hue,
     /// Its ends.
     pub range: RangeInclusive<f64>,
@@ -65,9 +65,9 @@ pub struct Span {
 /// Position of a reference line.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum LineAt {
-    /// Upright at this value of x.
+    /// Vertical, at this value of x.
     X(f64),
-    /// Level at this value of y.
+    /// Horizontal, at this value of y.
     Y(f64),
 }
 
@@ -82,7 +82,7 @@ pub struct ReferenceLine {
     pub hue: Hue,
     /// Style.
     pub style: LineStyle,
-    /// Words at the upper end of an upright line.
+    /// Label at the upper end of a vertical line.
     pub label: Option<String>,
 }
 
@@ -109,7 +109,7 @@ impl Series {
 }
 
 impl ReferenceLine {
-    /// A line without words of its own.
+    /// A line without a label.
     pub fn new(name: impl Into<String>, at: LineAt, hue: Hue, style: LineStyle) -> Self {
         Self {
             name: name.into(),
@@ -134,12 +134,12 @@ impl Plot {
         }
     }
 
-    /// Returns the place of a point on both axes; `None` if one of them has none for it.
+    /// Returns the place of a point on both axes; `None` if one of the axes has no place for it.
     pub fn place(&self, x: f64, y: f64) -> Option<[f64; 2]> {
         Some([self.x.place(x)?, self.y.place(y)?])
     }
 
-    /// Returns true if words are next to any point.
+    /// Returns true if any point has a label.
     pub fn has_point_labels(&self) -> bool {
         let mut points = self.series.iter().flat_map(|series| &series.points);
         points.any(|point| point.label.is_some())
@@ -151,7 +151,8 @@ impl Plot {
         points.filter_map(|point| Some((point, self.place(point.x, point.y)?)))
     }
 
-    /// Returns the places of the ends of an error bar. What a logarithmic axis has no place for lies below its lower end.
+    /// Returns the places of the ends of an error bar. Values without a place on a logarithmic axis are below its lower
+    /// end.
     pub fn bar_ends(&self, ends: [f64; 2], y_range: &RangeInclusive<f64>) -> [f64; 2] {
         ends.map(|end| self.y.place(end).unwrap_or(*y_range.start()))
     }
@@ -195,7 +196,7 @@ impl Plot {
         [x, y]
     }
 
-    /// Returns the words about a point of a series.
+    /// Returns the text on a point of a series.
     pub fn words(&self, series: &Series, point: &PlotPoint) -> String {
         if let Some(note) = &point.note {
             return note.clone();
@@ -212,7 +213,7 @@ impl Plot {
 /// Room between a mark and its label.
 const GAP: f64 = 5.0;
 
-/// A label to be placed: the point that it is of, and its width and height.
+/// A label to be placed at a point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PointLabel {
     /// Position of the point.
@@ -231,10 +232,11 @@ pub fn along(line: &[DVec2]) -> impl Iterator<Item = DVec2> {
     })
 }
 
-/// Returns the upper left corner of each label next to its point, clear of the other labels and, as far as that is possible,
-/// of `marks`, the places that anything else is drawn at; `None` where there is no room between `low` and `high`, the corners of the plot.
+/// Returns the upper left corner of each label next to its point, clear of the other labels and, if possible, of
+/// `marks`, the places of everything else that is drawn; `None` if there is no room between `low` and `high`, the
+/// corners of the plot.
 ///
-/// The labels take the best of their places in turn, so that earlier ones are seen where points crowd.
+/// Labels are placed in order, each at its best free place, so earlier ones are shown where points are crowded.
 pub fn place_labels(labels: &[PointLabel], marks: &[DVec2], (low, high): (DVec2, DVec2)) -> Vec<Option<DVec2>> {
     let mut placed: Vec<(DVec2, DVec2)> = Vec::new();
     let mut place = |label: &PointLabel| {
@@ -287,7 +289,7 @@ pub struct PlotFigure {
 }
 
 impl PlotFigure {
-    /// Returns the figure with a halo around the points that stand for one of these items, and around `others`.
+    /// Returns the figure with a halo around the points of one of these items, and around `others`.
     #[must_use]
     pub fn lighting(mut self, is_lit: impl Fn(usize) -> bool, others: &[[f64; 2]]) -> Self {
         for plot in &mut self.plots {
@@ -307,10 +309,10 @@ impl PlotFigure {
     }
 }
 
-/// Largest number of dots drawn of one cloud; more would not be seen.
+/// Maximum number of dots drawn for one cloud; more would not be visible.
 const MAX_POINTS: usize = 2000;
 
-/// Places of every this many items, so that at most [`MAX_POINTS`] and the last one remain.
+/// Returns evenly spaced indices, at most [`MAX_POINTS`] and the last one.
 pub(super) fn thinned_places(count: usize) -> impl Iterator<Item = usize> {
     let stride = count.div_ceil(MAX_POINTS).max(1);
     let last = count.checked_sub(1);
@@ -324,7 +326,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn words_about_a_point_say_which_where_and_how_large() {
+    fn the_text_on_a_point_has_its_series_position_and_value() {
         let look = Look::line(Hue::Blue, LineStyle::Solid);
         let mut series = Series::new("test", look, [[12.0, 0.001_234]]);
         let plot = Plot::new(
@@ -375,7 +377,7 @@ mod tests {
     }
 
     #[test]
-    fn labels_lie_in_the_plot_and_clear_of_each_other_and_of_marks() {
+    fn labels_are_in_the_plot_and_clear_of_each_other_and_of_marks() {
         let points = [[10.0, 50.0], [12.0, 54.0], [190.0, 95.0], [198.0, 4.0], [100.0, 50.0]];
         let corners: Vec<DVec2> = placed(&points).into_iter().map(Option::unwrap).collect();
         for (index, &corner) in corners.iter().enumerate() {
@@ -405,7 +407,7 @@ mod tests {
         let marks: Vec<DVec2> = along(&line).collect();
         assert_eq!((marks[0], *marks.last().unwrap()), (line[0], line[1]));
         let corner = place_labels(&[PointLabel { at, size: SIZE }], &marks, FRAME)[0].unwrap();
-        assert!(corner.y > 6.0, "below, for above is no room: {corner}");
+        assert!(corner.y > 6.0, "below, because there is no room above: {corner}");
     }
 
     #[test]

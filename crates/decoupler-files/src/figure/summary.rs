@@ -10,7 +10,7 @@ use super::{
 use decoupler_core::text::{counted, format_number};
 
 impl PlotFigure {
-    /// Returns what the figure shows, in a sentence for each plot, and its notes.
+    /// Describes the figure in one sentence per plot, followed by its notes.
     pub fn summary(&self) -> String {
         let plots = self.plots.iter().map(Plot::summary);
         plots.chain(self.notes.iter().cloned()).collect::<Vec<_>>().join(" ")
@@ -18,7 +18,7 @@ impl PlotFigure {
 }
 
 impl Plot {
-    /// Returns what the plot shows, in a sentence: its axes, the course of each curve, the extent of each cloud of points,
+    /// Describes the plot in a sentence: its axes, the course of each curve, the extent of each cloud of points,
     /// the highest bar.
     pub fn summary(&self) -> String {
         let on_logarithmic = if self.y.scale == AxisScale::Logarithmic {
@@ -44,7 +44,7 @@ impl Plot {
         }
     }
 
-    /// `None` for a series without a point that is drawn.
+    /// Describes a series; `None` if no point of it is drawn.
     fn words_about(&self, series: &Series) -> Option<String> {
         let points: Vec<&PlotPoint> = self.placed(series).map(|(point, _)| point).collect();
         let (first, last) = (points.first()?, points.last()?);
@@ -84,7 +84,7 @@ impl Plot {
 }
 
 impl HeatMap {
-    /// Returns what the map shows, in a sentence: its values, and where they are least and largest.
+    /// Describes the map in a sentence: its values, and the places of their minimum and maximum.
     pub fn summary(&self) -> String {
         let (rows, columns) = self.values.dim();
         let head = format!(
@@ -112,7 +112,7 @@ impl HeatMap {
 }
 
 impl Surface {
-    /// Returns what the surface shows, in words: the range of its nodes, and where it is furthest from rest.
+    /// Describes the surface: the range of its nodes, and the place furthest from rest.
     pub fn summary(&self) -> String {
         let finite = || self.nodes.iter().filter(|node| node.is_finite());
         let lowest = finite().min_by(|one, other| one.z.total_cmp(&other.z));
@@ -159,7 +159,7 @@ mod tests {
     use decoupler_core::surface::SurfaceMap;
 
     #[test]
-    fn a_curve_is_told_by_its_ends_and_what_lies_beyond_them() {
+    fn a_curve_is_described_by_its_ends_and_extremes() {
         let curve = Series::new(
             "training",
             Look::line(Hue::Blue, LineStyle::Solid),
@@ -172,7 +172,7 @@ mod tests {
         );
         let line = |name: &str| ReferenceLine::new(name, LineAt::X(2.0), Hue::Grey, LineStyle::Dashed);
         plot.lines = vec![line("best weights, epoch 2"), line("displayed network")];
-        // A zero has no place on a logarithmic axis, and is not told.
+        // A zero has no place on a logarithmic axis and is left out.
         assert_eq!(
             plot.summary(),
             "mse (scaled) on a logarithmic scale against epoch: training from 1.50 at 0 to 0.250 at 3, lowest 0.0100 at 2, \
@@ -187,7 +187,7 @@ mod tests {
     }
 
     #[test]
-    fn bars_and_clouds_of_points_are_told_by_their_extent() {
+    fn bars_and_clouds_of_points_are_described_by_their_extent() {
         let pairs: Vec<(f64, f64)> = [-0.2, 0.0, 0.0, 0.2].map(|error| (4.0, 4.0 + error)).into();
         let histogram = error_histogram_figure(&pairs, None).summary();
         assert_eq!(
@@ -205,7 +205,7 @@ mod tests {
     }
 
     #[test]
-    fn maps_and_surfaces_tell_where_their_extremes_are() {
+    fn maps_and_surfaces_are_described_by_their_extremes() {
         let map = readings_figure(array![[0.0, 3.0], [f64::NAN, 1.5]], &[0, 4], 4.0);
         assert_eq!(
             map.summary(),

@@ -1,8 +1,4 @@
 //! Axes around a plot, colour bars and legends.
-//!
-//! The scale of colours next to a picture.
-//!
-//! The legend above a figure.
 
 use std::ops::RangeInclusive;
 

@@ -1,6 +1,5 @@
 //! Finished figures as SVG, as PNG, and in an HTML page that follows the reader's dark theme.
-//!
-//! The colours of figures: dark enough for paper.
+//! Colours in print are dark enough for paper.
 
 use std::{
     io,

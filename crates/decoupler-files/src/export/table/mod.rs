@@ -1,6 +1,5 @@
 //! Tables: described once, and written as CSV for other programs or as text for papers and spreadsheets.
-//!
-//! Tables in LaTeX, with the rules of `booktabs` and the numeric columns of `siunitx`.
+//! LaTeX has the rules of `booktabs` and the numeric columns of `siunitx`.
 
 mod text;
 

@@ -1,6 +1,5 @@
-//! The box around a surface in space: back walls, ticks, numbers and names.
-//!
-//! The frame around a surface seen from above: equal scales on both axes.
+//! The box around a surface in space (back walls, ticks, numbers and names), and the frame around a surface seen from
+//! above, with equal scales on both axes.
 
 use std::ops::RangeInclusive;
 
@@ -23,7 +22,8 @@ pub(super) struct BoxAxes<'a> {
 }
 
 impl<'a> BoxAxes<'a> {
-    /// Fits the box and its labels into `card`; `z_range` is what the z axis counts, which the box surpasses a little.
+    /// Fits the box and its labels into `card`; `z_range` is the range of the z axis; the box extends slightly beyond
+    /// it.
     pub(super) fn new(
         measure: &'a dyn Fn(&str) -> Vec2,
         card: Bounds,
@@ -33,8 +33,8 @@ impl<'a> BoxAxes<'a> {
         names: [&str; 3],
     ) -> Self {
         let build = |camera, target| Self::lay_out(measure, plot_box, camera, target, z_range, names);
-        // The labels' room depends on where the box is and the other way round; a few rounds settle it. The last ones
-        // only give more room, for labels come and go with the scale.
+        // The room for labels and the position of the box depend on each other; a few iterations settle both. The last
+        // ones only add room, because labels come and go with the scale.
         let (mut target, mut before, mut after) = (card.grown(-32.0), Vec2::ZERO, Vec2::ZERO);
         for round in 0..6 {
             let axes = build(camera.centred(), target);
@@ -68,7 +68,7 @@ impl<'a> BoxAxes<'a> {
         let projection = Projection::fit(plot_box, camera, target);
         let near = [usize::from(projection.eye.x > 0.0), usize::from(projection.eye.y > 0.0)];
         let back = [1 - near[0], 1 - near[1]];
-        // The z axis is on the left of the two upright edges of the outline.
+        // The z axis is on the left one of the two vertical edges of the outline.
         let outline = [[near[0], back[1]], [back[0], near[1]]];
         let screen_x = |corner: [usize; 2]| projection.point(plot_box.corner_mm(corner[0], corner[1], 0)).x;
         let upright = if screen_x(outline[0]) < screen_x(outline[1]) {
@@ -93,7 +93,7 @@ impl<'a> BoxAxes<'a> {
             let mut edge = Edge::new(&projection, axis, starts[axis], range, &labels);
             for &value in &edge.ticks {
                 let text = tick_text(value, edge.step);
-                if labels.beside(edge.point(&projection, value), edge.away, TICK + GAP, 0.0, &text) {
+                if labels.place_next_to(edge.point(&projection, value), edge.away, TICK + GAP, 0.0, &text) {
                     let reach = edge.away.abs().dot(labels.size(&text));
                     reaches[axis] = reaches[axis].max(reach);
                 }
@@ -103,15 +103,15 @@ impl<'a> BoxAxes<'a> {
             }
             edge
         });
-        // Names come last: they find room beyond the numbers.
+        // Names are placed last, beyond the numbers.
         for edge in edges.iter().filter(|edge| !edge.ticks.is_empty()) {
             if edge.axis == 2 {
                 let top = edge.point(&projection, plot_box.max_mm.z);
-                labels.beside(top, Vec2::NEG_Y, GAP + 1.0, 40.0, names[2]);
+                labels.place_next_to(top, Vec2::NEG_Y, GAP + 1.0, 40.0, names[2]);
             } else {
                 let middle = 0.5 * (plot_box.min_mm[edge.axis] + plot_box.max_mm[edge.axis]);
                 let gap = TICK + 2.0 * GAP + reaches[edge.axis];
-                labels.beside(edge.point(&projection, middle), edge.away, gap, 40.0, names[edge.axis]);
+                labels.place_next_to(edge.point(&projection, middle), edge.away, gap, 40.0, names[edge.axis]);
             }
         }
         Self {
@@ -132,7 +132,8 @@ impl<'a> BoxAxes<'a> {
         };
         let (low, high) = (plot_box.min_mm, plot_box.max_mm);
         let back = plot_box.corner_mm(self.back[0], self.back[1], 0);
-        // A line across the floor and one up a back wall at each tick; of z, one across each wall.
+        // At each tick of x and y, a line across the floor and one up a back wall; at each tick of z, one across each
+        // wall.
         for (axis, edge) in self.edges.iter().enumerate() {
             let other = [[1, 2], [0, 2], [0, 1]][axis];
             for &value in &edge.ticks {
@@ -194,13 +195,13 @@ impl<'a> PlanAxes<'a> {
         let size_mm = max_mm - min_mm;
         let line = labels.size("0").y;
         let width = |value: f64, step: f64| labels.size(&tick_text(value, step)).x;
-        // Numbers and name on the left and below, a little air on the right and above.
+        // Numbers and names on the left and below, a small margin on the right and above.
         let left = TICK + GAP + width(min_mm.y, 0.5).max(width(max_mm.y, 0.5));
         let free = Bounds {
             min: card.min + Vec2::new(left, line + 2.0 * GAP),
             max: card.max - Vec2::new(12.0, TICK + 3.0 * GAP + 2.0 * line),
         };
-        // A card too small for its labels still shows a point.
+        // A card that is too small for its labels still has a visible plot.
         let points_per_mm = (free.size().max(Vec2::ONE).as_dvec2() / size_mm).min_element();
         let step = |width_mm: f64, apart: &dyn Fn(f64) -> f32| {
             let wide_enough = |step: &f64| step * points_per_mm >= f64::from(apart(*step));
@@ -220,17 +221,17 @@ impl<'a> PlanAxes<'a> {
             ticks: [0, 1].map(|axis| multiples(&(min_mm[axis]..=max_mm[axis]), steps[axis])),
         };
         for (anchor, away, text) in plan.marks(steps) {
-            plan.labels.beside(anchor, away, TICK + GAP, 0.0, &text);
+            plan.labels.place_next_to(anchor, away, TICK + GAP, 0.0, &text);
         }
         let frame = plan.frame;
         let below = Vec2::new(frame.middle().x, frame.max.y);
         plan.labels
-            .beside(below, Vec2::Y, TICK + 2.0 * GAP + line, 24.0, names[0]);
-        plan.labels.beside(frame.min, Vec2::NEG_Y, GAP, 24.0, names[1]);
+            .place_next_to(below, Vec2::Y, TICK + 2.0 * GAP + line, 24.0, names[0]);
+        plan.labels.place_next_to(frame.min, Vec2::NEG_Y, GAP, 24.0, names[1]);
         plan
     }
 
-    /// Each tick: the place of it, which way it points, its number.
+    /// Returns the place, direction and number of each tick.
     fn marks(&self, steps: [f64; 2]) -> Vec<(Vec2, Vec2, String)> {
         let x = self.ticks[0].iter().map(|&x| {
             let at = self.point(DVec2::new(x, self.min_mm.y)).x;
@@ -262,7 +263,7 @@ impl<'a> PlanAxes<'a> {
             to,
             ink: Ink::Edge,
         };
-        // Around the outermost cells, not over them.
+        // Drawn around the outermost cells, not over them.
         let Bounds { min, max } = self.frame.grown(0.5);
         let (right_top, left_bottom) = (Vec2::new(max.x, min.y), Vec2::new(min.x, max.y));
         let outline = [
@@ -285,7 +286,7 @@ mod tests {
     use crate::figure::surface::nodes::Text;
 
     #[test]
-    fn labels_neither_overlap_nor_leave_the_card() {
+    fn labels_do_not_overlap_or_leave_the_card() {
         let measure = |text: &str| Vec2::new(6.0 * text.chars().count() as f32, 14.0);
         let card_sizes = [(350.0, 540.0), (480.0, 420.0), (260.0, 240.0), (210.0, 240.0)];
         let boxes = [(10.0, 20.0), (10.0, 6.0), (1.0, 1.0), (40.0, 80.0), (1.0, 40.0)];

@@ -1,8 +1,4 @@
-//! A camera that circles the plot.
-//!
-//! From points on the screen back to millimetres.
-//!
-//! From millimetres to points on the screen.
+//! A camera that orbits the plot, and the projection from millimetres to points on the screen and back.
 
 use glam::{DVec2, DVec3, Mat4, Vec2, Vec3, camera::rh};
 use serde::{Deserialize, Serialize};
@@ -53,13 +49,13 @@ impl OrbitCamera {
         )
     }
 
-    /// Turned as if the plot were dragged by this many points to the right and down.
+    /// Returns the camera turned as if the plot were dragged by this many points to the right and down.
     #[must_use]
     pub fn dragged(self, right: f32, down: f32) -> Self {
         self.turned(right * RADIANS_PER_POINT, down * RADIANS_PER_POINT)
     }
 
-    /// Turned by this many presses of an arrow key.
+    /// Returns the camera turned by this many presses of an arrow key.
     #[must_use]
     pub fn stepped(self, right: f32, down: f32) -> Self {
         self.turned(right * RADIANS_PER_KEY, down * RADIANS_PER_KEY)
@@ -74,19 +70,19 @@ impl OrbitCamera {
         .clamped()
     }
 
-    /// Nearer by this many points of scrolling.
+    /// Returns the camera moved nearer by this many points of scrolling.
     #[must_use]
     pub fn scrolled(self, points: f32) -> Self {
         self.zoomed((points * ZOOM_PER_POINT).exp())
     }
 
-    /// Nearer by this many presses of a key.
+    /// Returns the camera moved nearer by this many presses of a key.
     #[must_use]
     pub fn zoomed_by_keys(self, presses: f32) -> Self {
         self.zoomed(ZOOM_PER_KEY.powf(presses))
     }
 
-    /// Nearer by a factor.
+    /// Returns the camera moved nearer by a factor.
     #[must_use]
     pub fn zoomed(self, factor: f32) -> Self {
         Self {
@@ -96,7 +92,7 @@ impl OrbitCamera {
         .clamped()
     }
 
-    /// Shifted by a part of the card to the right and down.
+    /// Returns the camera shifted by a fraction of the card to the right and down.
     #[must_use]
     pub fn panned(self, right: f32, down: f32) -> Self {
         Self {
@@ -106,7 +102,7 @@ impl OrbitCamera {
         .clamped()
     }
 
-    /// As seen at zoom 1, in the middle of the card.
+    /// Returns the camera at zoom 1, with the plot in the middle of the card.
     #[must_use]
     pub fn centred(self) -> Self {
         Self {
@@ -116,13 +112,13 @@ impl OrbitCamera {
         }
     }
 
-    /// Within the limits, whatever a saved state says.
+    /// Returns the camera moved into its limits, which a saved state may violate.
     #[must_use]
     pub fn clamped(self) -> Self {
         let start = Self::default();
         let finite = |value: f32, otherwise: f32| if value.is_finite() { value } else { otherwise };
         let (turn, yaw) = (std::f32::consts::TAU, finite(self.yaw, start.yaw));
-        // A camera within the limits keeps its bits: being looked at is no change.
+        // A camera within the limits keeps its bits: checking it changes nothing.
         let is_wound = yaw.abs() > 0.5 * turn;
         Self {
             yaw: if is_wound {
@@ -165,7 +161,7 @@ impl<'a> Shade<'a> {
         let unit = |ix: usize, iy: usize| self.units[ix * self.ny + iy];
         let slope_x = unit((ix + 1).min(self.nx - 1), iy) - unit(ix.saturating_sub(1), iy);
         let slope_y = unit(ix, (iy + 1).min(self.ny - 1)) - unit(ix, iy.saturating_sub(1));
-        // NaN falls through `max` as darkness, on points that are not drawn.
+        // NaN becomes 0 in `max`, at points that are not drawn.
         AMBIENT + DIRECT * slope_x.cross(slope_y).normalize_or(Vec3::Z).dot(self.light).max(0.0)
     }
 }
@@ -210,7 +206,7 @@ pub struct AboveSight {
 /// A line of sight, in millimetres.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ray {
-    /// Its begin.
+    /// Its origin.
     pub from_mm: DVec3,
     /// Its direction, of any length.
     pub direction: DVec3,
@@ -219,7 +215,7 @@ pub struct Ray {
 impl Sight {
     pub(super) fn of_projection(projection: &Projection) -> Self {
         let (plot_box, eye) = (&projection.plot_box, projection.eye.as_dvec3());
-        // The camera never looks straight down, so that it has a right-hand side.
+        // The camera never looks straight down, so its right-hand side is defined.
         let forward = -eye.normalize();
         let right = forward.cross(DVec3::Z).normalize();
         let (points, offset) = projection.points_and_offset();
@@ -282,8 +278,8 @@ impl Sight {
         }
     }
 
-    /// Returns the height at which the upright line through `foot_mm` comes nearest to a point on the screen; `None` where
-    /// it is seen end-on, `stroke_mm` of it less than ten points long.
+    /// Returns the height at which the upright line through `foot_mm` comes nearest to a point on the screen; `None` if
+    /// it is seen end-on, with `stroke_mm` of it shorter than ten points.
     pub fn height_mm(&self, foot_mm: DVec3, stroke_mm: f64, at: DVec2) -> Option<f64> {
         const SHORTEST_POINTS: f64 = 10.0;
         let foot = self.point(foot_mm);
@@ -309,7 +305,7 @@ impl Sight {
 }
 
 impl Ray {
-    /// Returns where the ray meets the level `z_mm`; `None` if it never does.
+    /// Returns the place where the ray reaches the level `z_mm`; `None` if it never does.
     pub fn at_level(&self, z_mm: f64) -> Option<DVec3> {
         let share = (z_mm - self.from_mm.z) / self.direction.z;
         let is_straight_down = self.direction.truncate() == DVec2::ZERO;
@@ -322,9 +318,9 @@ impl Ray {
 
 /// Distance of the eye in half diagonals of the box: a mild perspective.
 const EYE_DISTANCE: f32 = 4.0;
-/// The least ratio of the box's horizontal sides; longer arrays are drawn shorter than they are.
+/// Minimum ratio of the box's horizontal sides; longer arrays are drawn shortened.
 const MIN_SIDE: f32 = 0.3;
-/// Angle of view, in radians; what is seen is scaled anyway.
+/// Angle of view, in radians; the view is scaled to fit in any case.
 const VIEW: f32 = 0.5;
 /// Heights of the box in units of its longer horizontal side: within these, the picture gets the shape of its card.
 const HEIGHT: std::ops::RangeInclusive<f32> = 0.4..=1.35;
@@ -342,8 +338,8 @@ pub(super) struct PlotBox {
 }
 
 impl PlotBox {
-    /// A box whose height, at the camera's start, makes the picture as tall as `tall_per_wide` asks: x and y keep
-    /// their proportions, z is exaggerated.
+    /// A box whose height, at the camera's start, gives the picture the ratio of height to width `tall_per_wide`: x and
+    /// y keep their proportions, z is exaggerated.
     pub(super) fn new(min_mm: DVec3, max_mm: DVec3, tall_per_wide: f32) -> Self {
         let size = (max_mm - min_mm).as_vec3();
         let longer = size.x.max(size.y);
@@ -359,7 +355,7 @@ impl PlotBox {
                 middle_mm: 0.5 * (min_mm + max_mm),
             }
         };
-        // The picture's shape grows with the height, so halving finds the one asked for.
+        // The ratio increases with the height, so bisection finds the height.
         let (mut low, mut high) = (*HEIGHT.start(), *HEIGHT.end());
         let unbounded = Bounds {
             min: Vec2::ZERO,
@@ -416,7 +412,7 @@ pub(super) struct Projection {
 }
 
 impl Projection {
-    /// At zoom 1 the eight corners just touch `target`, whatever the angles.
+    /// At zoom 1 the eight corners just touch `target` at any angles.
     pub(super) fn fit(plot_box: PlotBox, camera: OrbitCamera, target: Bounds) -> Self {
         let distance = EYE_DISTANCE * 0.5 * plot_box.sides.length();
         let eye = camera.towards_eye() * distance;
@@ -465,7 +461,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn dragging_there_and_back_changes_nothing() {
+    fn dragging_forth_and_back_changes_nothing() {
         let camera = OrbitCamera::default();
         let back = camera.dragged(40.0, -10.0).dragged(-40.0, 10.0);
         assert!((back.yaw - camera.yaw).abs() < 1e-5 && (back.pitch - camera.pitch).abs() < 1e-5);

@@ -1,13 +1,5 @@
-//! Cells of the surface cut off at the ends of the value axis.
-//!
-//! Lines of equal value within one cell of the grid (marching squares).
-//!
-//! One axis of the box around a surface: the edge that carries its ticks.
-//!
-//! Marks on a plateau, which is drawn at the end of the value axis for what lies beyond: a rim and hatching, so that no one
-//! takes it for a height.
-//!
-//! Cuts through a surface along a wire.
+//! Cuts of a surface: at the ends of the value axis, with the marks (rim and hatching) of a plateau there; along
+//! contour lines (marching squares); and along a wire. Also one axis of the box around a surface, with its ticks.
 
 use std::ops::RangeInclusive;
 
@@ -30,7 +22,7 @@ pub(super) struct CutCorner {
 }
 
 /// Cuts a cell, whose corners go round it, at the levels `low` and `high`: polygons of the two triangles in which it is
-/// drawn, without what lies beyond (Sutherland and Hodgman 1974), or with that moved to the level where `keeps_plateau`.
+/// drawn (Sutherland and Hodgman 1974). Parts beyond a level are left out, or moved to the level if `keeps_plateau`.
 pub(super) fn cut_cell(
     corners: [DVec3; 4],
     low: f64,
@@ -87,8 +79,8 @@ fn cut(polygon: &[CutCorner], excess: impl Fn(DVec3) -> f64) -> Vec<CutCorner> {
     kept
 }
 
-/// Calls `draw` with the ends of each piece of the line `value = level`. An end is given as
-/// `(corner a, corner b, part)`: on the side from a to b, `part` of the way. Corners go round the cell.
+/// Calls `draw` with the ends of each piece of the line `value = level`. An end is given as `(corner a, corner b,
+/// part)`: at the fraction `part` of the side from a to b. Corners go round the cell.
 pub(super) fn cross_cell(values: [f64; 4], level: f64, mut draw: impl FnMut([(usize, usize, f32); 2])) {
     let mut ends = [(0, 0, 0.0); 4];
     let mut found = 0;
@@ -101,7 +93,7 @@ pub(super) fn cross_cell(values: [f64; 4], level: f64, mut draw: impl FnMut([(us
     }
     match found {
         2 => draw([ends[0], ends[1]]),
-        // A saddle: the middle decides which corners belong together.
+        // A saddle: the value in the middle decides which corners are connected.
         4 => {
             let middle_is_low = values.iter().sum::<f64>() < 4.0 * level;
             let first_is_low = values[0] < level;
@@ -122,7 +114,7 @@ pub(super) fn cross_cell(values: [f64; 4], level: f64, mut draw: impl FnMut([(us
 pub(super) const TICK: f32 = 4.0;
 /// Room between a tick and its number, in points.
 pub(super) const GAP: f32 = 3.0;
-/// Axes seen end-on get no ticks.
+/// Axes seen end-on have no ticks.
 pub(super) const SHORTEST_AXIS: f32 = 36.0;
 
 /// One axis as drawn: an edge of the box with its ticks.
@@ -166,7 +158,7 @@ impl Edge {
         if length < SHORTEST_AXIS || width.is_nan() || width <= 0.0 {
             return edge;
         }
-        // The perspective makes the far end of an edge shorter than its average.
+        // In perspective, the far end of an edge is shorter than the average.
         let points_per_mm = 0.8 * f64::from(length) / width;
         edge.step = round_steps(width / 12.0)
             .find(|&step| {
@@ -195,11 +187,11 @@ impl Edge {
     }
 }
 
-/// Lines of the hatching along the longer side of a surface, about.
+/// Approximate number of hatching lines along the longer side of a surface.
 const HATCHES: usize = 22;
 
-/// Calls `mark` with the ends of each piece of the rim and of the hatching in the cell at `(ix, iy)`; nothing where the
-/// cell has no part beyond the axis that is drawn.
+/// Calls `mark` with the ends of each piece of the rim and of the hatching in the cell at `(ix, iy)`; nothing if no
+/// drawn part of the cell is beyond the axis.
 pub(super) fn plateau_marks(field: &Field<'_>, ix: usize, iy: usize, mut mark: impl FnMut([DVec3; 2])) {
     if !field.keeps_plateau(ix, iy) {
         return;
@@ -215,7 +207,7 @@ pub(super) fn plateau_marks(field: &Field<'_>, ix: usize, iy: usize, mut mark: i
         cross_cell(values, end, |ends| {
             mark(ends.map(|(a, b, part)| flat(corners[a].lerp(corners[b], f64::from(part)))));
         });
-        // Along the diagonal of every few cells; those of neighbours meet.
+        // Along the diagonals of every few cells; diagonals of neighbours meet.
         let [a, b, c, d] = corners;
         let points = field.grid.x_mm().len().max(field.grid.y_mm().len());
         if (ix + iy).is_multiple_of((points / HATCHES).max(1)) {
@@ -251,7 +243,7 @@ pub enum SectionLine {
     ColumnWire(usize),
 }
 
-/// Upright plane along a wire.
+/// Vertical plane along a wire.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Section {
     /// The wire.
@@ -272,7 +264,7 @@ impl SectionLine {
 
 impl Section {
     /// Returns the curve in which the plane cuts the surface of these `values` on a grid, linear between its points as the
-    /// surface is drawn; empty if it passes next to the grid.
+    /// surface is drawn; empty if it misses the grid.
     pub fn curve_mm(&self, grid: &Grid, values: &[f64]) -> Vec<DVec3> {
         let (across, along) = match self.line {
             SectionLine::RowWire(_) => (grid.x_mm(), grid.y_mm()),
@@ -286,7 +278,7 @@ impl Section {
             SectionLine::ColumnWire(_) => values[grid.index(along, across)],
         };
         let points = along.iter().enumerate().map(|(index, &at_mm)| {
-            // At a point of the grid a gap next to it does not matter.
+            // At a grid point, a gap next to it does not matter.
             let height = match share {
                 0.0 => value(before, index),
                 _ => (1.0 - share) * value(before, index) + share * value(before + 1, index),
@@ -312,7 +304,8 @@ impl Section {
     }
 }
 
-/// The point of an ascending axis before a place, and the share of the way to the next; `None` next to the axis.
+/// Returns the point of an ascending axis before a place, and the fraction of the way to the next; `None` outside the
+/// axis.
 fn cell(points_mm: &[f64], at_mm: f64) -> Option<(usize, f64)> {
     let after = points_mm.partition_point(|point| *point <= at_mm);
     let before = after.checked_sub(1)?;
@@ -363,19 +356,15 @@ mod tests {
                 .zip(corner.shares)
                 .map(|(corner, share)| *corner * share)
                 .sum();
-            assert!(mixed.distance(place) < 1e-15, "the shares lead to the place");
+            assert!(mixed.distance(place) < 1e-15, "the shares give the place");
         }
-        assert_eq!(
-            cut_cell(corners, 7.0, 9.0, false).count(),
-            0,
-            "nothing is left of what lies below"
-        );
+        assert_eq!(cut_cell(corners, 7.0, 9.0, false).count(), 0, "nothing below is left");
         let whole: f64 = cut_cell(corners, -1.0, 9.0, true).map(|polygon| area(&polygon)).sum();
         assert_eq!(whole, 1.0);
     }
 
     #[test]
-    fn with_its_plateaus_a_cell_is_whole() {
+    fn a_cell_is_complete_with_its_plateaus() {
         let plane = |x: f64, y: f64| DVec3::new(x, y, 4.0 * x + 2.0 * y);
         let corners = [plane(0.0, 0.0), plane(1.0, 0.0), plane(1.0, 1.0), plane(0.0, 1.0)];
         let polygons: Vec<_> = cut_cell(corners, 1.0, 3.0, true).collect();
@@ -475,7 +464,7 @@ mod tests {
     }
 
     #[test]
-    fn the_hatching_lies_on_the_plateau_only() {
+    fn only_the_plateau_is_hatched() {
         let surface = overshot(5.6, ViewMode::ThreeD);
         let field = Field::new(&surface);
         let mut marks = 0;
@@ -494,10 +483,7 @@ mod tests {
         }
         assert!(marks > 20, "{marks}");
         let within = overshot(5.05, ViewMode::ThreeD);
-        assert!(
-            laid_out(&within).note.is_none(),
-            "what the box has room for is no overshoot"
-        );
+        assert!(laid_out(&within).note.is_none(), "within the box there is no overshoot");
     }
 
     /// A plane over 3 × 4 nodes, which every interpolation reproduces.
@@ -535,7 +521,7 @@ mod tests {
     }
 
     #[test]
-    fn beside_the_surface_nothing_is_cut_and_a_gap_beside_a_wire_does_not_matter() {
+    fn nothing_is_cut_outside_the_surface_and_a_gap_next_to_a_wire_does_not_matter() {
         let (map, mut values) = plane();
         let grid = map.grid();
         let outside = Section {

@@ -1,6 +1,4 @@
-//! A surface laid out in a card, ready to be painted.
-//!
-//! Text around a plot, placed so that nothing overlaps.
+//! A surface laid out in a card, ready to be painted, and the placing of labels without overlap.
 
 use decoupler_core::text::counted;
 use glam::{DVec3, Vec2};
@@ -15,7 +13,7 @@ use super::{
 };
 use crate::figure::colour_map::ColourMap;
 
-/// Room that the labels of a box usually take, in points.
+/// Usual size of the labels of a box, in points.
 const LABELS: Vec2 = Vec2::new(72.0, 56.0);
 /// Free edge of a card, in points.
 const EDGE: f32 = 8.0;
@@ -24,7 +22,7 @@ const EDGE: f32 = 8.0;
 pub struct Card<'a> {
     /// The space to fill.
     pub bounds: Bounds,
-    /// Tells the size of a text.
+    /// Returns the size of a text.
     pub measure: &'a dyn Fn(&str) -> Vec2,
     /// The colours of the values.
     pub colours: &'a ColourMap,
@@ -43,7 +41,7 @@ pub struct Drawing {
     pub dots: Dots,
     /// From points on the screen back to millimetres.
     pub sight: Sight,
-    /// Says what lies beyond the axes and how it is drawn.
+    /// Note on parts beyond the axes and how they are drawn.
     pub note: Option<String>,
 }
 
@@ -93,7 +91,7 @@ impl Surface {
     }
 }
 
-/// Says that a part of the surface is drawn at the end of the axis because it lies beyond it, and how many nodes are.
+/// Returns the note on a part of the surface, or this number of nodes, beyond the axis and drawn at its end.
 fn note(has_plateau: bool, nodes: usize) -> Option<String> {
     match (has_plateau, nodes) {
         (false, 0) => None,
@@ -133,7 +131,7 @@ impl Projector<'_> {
 /// Room kept free around every label, in points.
 const CLEARANCE: f32 = 4.0;
 
-/// The labels of one plot, in the order in which they claimed their places.
+/// The labels of one plot, in the order in which they were placed.
 pub(super) struct Labels<'a> {
     measure: &'a dyn Fn(&str) -> Vec2,
     placed: Vec<Text>,
@@ -147,16 +145,16 @@ impl<'a> Labels<'a> {
         }
     }
 
-    /// Size that a text would take.
+    /// Returns the size of a text.
     pub(super) fn size(&self, text: &str) -> Vec2 {
         (self.measure)(text)
     }
 
     /// Puts a text next to `anchor`, in the direction `away` (a unit vector) with `gap` between them. If the place is
-    /// taken it moves on by up to `slide` points, or else stays away. Says whether it was placed.
-    pub(super) fn beside(&mut self, anchor: Vec2, away: Vec2, gap: f32, slide: f32, text: &str) -> bool {
+    /// occupied, moves the text by up to `slide` points. Returns false if there is no room.
+    pub(super) fn place_next_to(&mut self, anchor: Vec2, away: Vec2, gap: f32, slide: f32, text: &str) -> bool {
         let size = self.size(text);
-        // How far the text reaches from its middle towards the anchor.
+        // Distance from the middle of the text to its side near the anchor.
         let reach = 0.5 * away.abs().dot(size);
         let mut slid = 0.0;
         while slid <= slide {
@@ -174,7 +172,7 @@ impl<'a> Labels<'a> {
         false
     }
 
-    /// The rectangle that all labels cover.
+    /// Returns the bounding rectangle of all labels.
     pub(super) fn bounds(&self) -> Bounds {
         let all = self.placed.iter().map(|label| label.bounds);
         all.fold(Bounds::NOTHING, Bounds::union)

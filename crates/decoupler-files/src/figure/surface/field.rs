@@ -1,6 +1,5 @@
-//! The height field as it is drawn: its points, its values, and what the box around it has room for.
-//!
-//! The key to the colours of one or more surfaces.
+//! The height field as it is drawn (points, values, and the range of the box around it), and the colour scale of
+//! surfaces.
 
 use std::{borrow::Cow, ops::RangeInclusive, sync::Arc};
 
@@ -18,17 +17,17 @@ use crate::figure::{
     colour_map::SequentialMap,
 };
 
-/// Room for overshoots of the surface above and below the range, as a part of it.
+/// Room for overshoots of the surface above and below the range, as a fraction of it.
 const HEADROOM: f64 = 0.08;
 
 /// Part of a cell that is drawn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum CellPart {
-    /// Not a bit.
+    /// Nothing.
     Nothing,
-    /// What stays in the box, and between the nodes what is beyond it at its edge.
+    /// The part in the box; between the nodes, parts beyond the box are drawn at its edge.
     Cut,
-    /// All of it at the edge of the box, beyond which it lies.
+    /// All of it at the edge of the box, because it is beyond it.
     Plateau,
     /// All of it.
     Whole,
@@ -42,9 +41,9 @@ pub(super) struct Field<'a> {
     pub(super) values: &'a [f64],
     /// Values at the ends of the colours and of the value axis.
     pub(super) range: RangeInclusive<f64>,
-    /// Values that the box has room for.
+    /// Range of values in the box.
     shown: RangeInclusive<f64>,
-    /// True for a map of colours, which ends between no nodes; heights in space end at the box.
+    /// True for a colour map, which has no holes between nodes; heights in space end at the box.
     is_map: bool,
 }
 
@@ -63,7 +62,7 @@ impl<'a> Field<'a> {
         }
     }
 
-    /// Two corners of the box: the grid, and the values that it has room for.
+    /// Returns two corners of the box: the extent of the grid, and the range of values.
     pub(super) fn box_mm(&self) -> (DVec3, DVec3) {
         let ends = |axis: &[f64]| (axis[0], axis[axis.len() - 1]);
         let ((x0, x1), (y0, y1)) = (ends(self.grid.x_mm()), ends(self.grid.y_mm()));
@@ -95,7 +94,7 @@ impl<'a> Field<'a> {
         corners.map(|(ix, iy)| DVec3::new(x_mm[ix], y_mm[iy], self.values[self.grid.index(ix, iy)]))
     }
 
-    /// Returns how much of a cell is drawn, and where.
+    /// Returns the part of a cell that is drawn, and its place.
     pub(super) fn part(&self, ix: usize, iy: usize) -> CellPart {
         let values = self.corners(ix, iy).map(|corner| self.values[corner]);
         let (low, high) = (*self.shown.start(), *self.shown.end());
@@ -116,13 +115,14 @@ impl<'a> Field<'a> {
         }
     }
 
-    /// Returns true for a cell that is drawn at the edge of the box where it lies beyond it: in space, between the nodes.
-    /// What is extrapolated ends there.
+    /// Returns true for a cell whose parts beyond the box are drawn at its edge: in space, between the nodes.
+    /// Extrapolated cells end there.
     pub(super) fn keeps_plateau(&self, ix: usize, iy: usize) -> bool {
         !self.is_map && self.is_between_nodes(ix, iy)
     }
 
-    /// Returns where a place of the surface is drawn: itself within the box, at its edge on a plateau, else nowhere.
+    /// Returns the position at which a place of the surface is drawn: unchanged within the box, at its edge on a
+    /// plateau, else `None`.
     pub(super) fn drawn_at(&self, place_mm: DVec3) -> Option<DVec3> {
         let within = place_mm.z.clamp(*self.shown.start(), *self.shown.end());
         let spans = |points_mm: &[f64], inside: RangeInclusive<usize>, at: f64| {
@@ -140,13 +140,13 @@ impl<'a> Field<'a> {
         corners.iter().all(|&(ix, iy)| self.map.beyond(ix, iy) == 0.0)
     }
 
-    /// Values that the box has room for.
+    /// Range of values in the box.
     pub(super) fn shown(&self) -> &RangeInclusive<f64> {
         &self.shown
     }
 }
 
-/// A range that can be divided by, whatever was given.
+/// Returns a range of non-zero width for any input.
 fn usable_range(range: &RangeInclusive<f64>) -> RangeInclusive<f64> {
     let (low, high) = (*range.start(), *range.end());
     if !(low.is_finite() && high.is_finite()) {
@@ -183,10 +183,11 @@ pub struct ScaleDrawing {
 }
 
 impl ColourScale {
-    /// Width that the bar takes with its numbers, in points.
+    /// Width of the bar with its numbers, in points.
     pub const WIDTH: f32 = 64.0;
 
-    /// Lays the scale out in `area`; `None` if that or the range is too small. `measure` tells the size of a text.
+    /// Lays the scale out in `area`; `None` if the area or the range is too small. `measure` returns the size of a
+    /// text.
     pub fn lay_out(&self, area: Bounds, measure: &dyn Fn(&str) -> Vec2) -> Option<ScaleDrawing> {
         let (low, high) = (*self.range.start(), *self.range.end());
         let name = self.quantity.axis_name();
@@ -213,10 +214,10 @@ impl ColourScale {
                 to: at + Vec2::new(TICK, 0.0),
                 ink: Ink::Edge,
             });
-            labels.beside(at, Vec2::X, TICK + 3.0, 0.0, &tick_text(value, step));
+            labels.place_next_to(at, Vec2::X, TICK + 3.0, 0.0, &tick_text(value, step));
         }
         let name_at = Vec2::new(area.min.x + 4.0 + 0.5 * measure(&name).x, bar.min.y - 6.0);
-        labels.beside(name_at, Vec2::NEG_Y, 2.0, 8.0, &name);
+        labels.place_next_to(name_at, Vec2::NEG_Y, 2.0, 8.0, &name);
         Some(ScaleDrawing {
             bar,
             lines,
@@ -225,14 +226,14 @@ impl ColourScale {
     }
 }
 
-/// Quantity that a surface shows, and with it its colours.
+/// Quantity that a surface shows, which determines its colours.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub enum Quantity {
     /// Heights.
     Height,
     /// Errors, diverging about zero.
     Error,
-    /// A deformation pattern without a scale of its own, diverging about zero.
+    /// A deformation pattern of arbitrary scale, diverging about zero.
     Pattern,
     /// Change of the readings with each node.
     Sensitivity,
@@ -259,8 +260,8 @@ impl Quantity {
         }
     }
 
-    /// The range from `low` to `high` in words, with the unit; `height` writes heights and errors in millimetres, `number`
-    /// all others.
+    /// Returns the range from `low` to `high` as text, with the unit; `height` writes heights and errors in
+    /// millimetres, `number` all others.
     pub fn range_text(
         &self,
         (low, high): (f64, f64),

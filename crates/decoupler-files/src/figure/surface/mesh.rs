@@ -1,4 +1,4 @@
-//! The height field as one mesh, painted from far to near so that what is near hides what is far.
+//! The height field as one mesh, painted from far to near: near parts hide far ones.
 
 use std::ops::RangeInclusive;
 
@@ -29,7 +29,7 @@ pub struct ContourLine {
     pub to: Vec2,
     /// Black on light colours, white on dark ones.
     pub is_black: bool,
-    /// 1 hides what lies behind it.
+    /// 1 is opaque.
     pub opacity: f32,
 }
 
@@ -44,13 +44,14 @@ pub struct Mesh {
     pieces: Vec<[u32; 4]>,
     /// Number of points along y.
     across: usize,
-    /// Cells by their first corner, or as many more than the grid points as the piece's number, in the order of painting.
+    /// Cells in the order of painting: the index of the first corner, or the number of grid points plus the index of a
+    /// piece.
     cells: Vec<u32>,
     /// Contour lines in the order of painting.
     lines: Vec<ContourLine>,
     /// End of each strip of cells and of its lines.
     strips: Vec<[usize; 2]>,
-    /// True if a part of the surface lies beyond the box and is drawn at its edge.
+    /// True if a part of the surface is beyond the box and drawn at its edge.
     pub(super) has_plateau: bool,
 }
 
@@ -84,7 +85,7 @@ impl Mesh {
                 }
                 strip.push((ix, iy));
             }
-            // Lines lag one strip behind, or the next strip would cover half of their width.
+            // Lines are painted one strip late; the next strip would cover half of their width otherwise.
             mesh.hatch(&lineless, field, stage, is_black);
             mesh.end_strip(&lineless, field, stage, (&levels, &inks));
             lineless = strip;
@@ -94,7 +95,7 @@ impl Mesh {
         mesh
     }
 
-    /// Appends what the box leaves of a cell.
+    /// Appends the part of a cell within the box.
     fn cut(&mut self, ix: usize, iy: usize, field: &Field<'_>, stage: &Projector<'_>) {
         let of_cell = field.corners(ix, iy).map(|corner| self.vertices[corner]);
         let (low, high) = (*field.shown().start(), *field.shown().end());
@@ -115,7 +116,7 @@ impl Mesh {
         }
     }
 
-    /// Appends the marks of what lies beyond the box in `cells`.
+    /// Appends the marks of parts beyond the box in `cells`.
     fn hatch(
         &mut self,
         cells: &[(usize, usize)],
@@ -160,7 +161,7 @@ impl Mesh {
             let opacity = CONTOUR_OPACITY * a.opacity.min(c.opacity);
             let is_cut = field.part(ix, iy) == CellPart::Cut;
             let (places, corners_mm) = ([a.at, b.at, c.at, d.at], field.corners_mm(ix, iy));
-            // A cell that is cut has corners that are not seen where they are.
+            // A cut cell has corners that are not drawn at their places.
             let point = |(a, b, part): (usize, usize, f32)| match is_cut {
                 true => stage.point(corners_mm[a].lerp(corners_mm[b], f64::from(part))),
                 false => places[a].lerp(places[b], part),
@@ -203,8 +204,8 @@ impl Mesh {
     }
 }
 
-/// Values of the contour lines, strictly within the range: a sensor at rest lies at its upper end, where overshoots of a
-/// micrometre would draw lines all over it.
+/// Returns the values of the contour lines, strictly within the range: a sensor at rest is at its upper end, where
+/// overshoots of a micrometre would cover it with lines.
 fn contour_levels(range: &RangeInclusive<f64>) -> Vec<f64> {
     let step = step_for(range, CONTOUR_LEVELS);
     let is_within = |level: &f64| level - range.start() > 1e-3 * step && range.end() - level > 1e-3 * step;
@@ -218,7 +219,7 @@ fn far_to_near(points_mm: &[f64], eye_mm: f64) -> Vec<usize> {
     (0..before).chain((before..cells).rev()).collect()
 }
 
-/// Opacity of the extrapolated margin where it begins; it fades to nothing at its rim.
+/// Opacity at the start of the extrapolated margin; it fades to 0 at the rim.
 const MARGIN_OPACITY: f32 = 0.6;
 
 /// A point of the surface.
@@ -270,7 +271,7 @@ pub(super) fn vertices(field: &Field<'_>, stage: &Projector<'_>, map: &ColourMap
     }
 }
 
-/// A vertex between others, by its share of each.
+/// Interpolates a vertex between others by its share of each.
 pub(super) fn mixed(vertices: &[Vertex; 4], shares: [f64; 4]) -> Vertex {
     let mix = |of: &dyn Fn(&Vertex) -> f32| -> f32 {
         vertices
@@ -298,7 +299,7 @@ mod tests {
         camera::{PlotBox, Projection},
     };
 
-    /// Returns the distance from the eye to a triangle at a place on the screen; `None` next to it.
+    /// Returns the distance from the eye to a triangle at a place on the screen; `None` outside it.
     fn distance_at(place: Vec2, corners: [(Vec2, f32); 3]) -> Option<f32> {
         let [a, b, c] = corners.map(|(at, _)| at);
         let whole = (b - a).perp_dot(c - a);
@@ -314,7 +315,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_near_is_painted_over_what_is_far() {
+    fn near_cells_are_painted_over_far_ones() {
         let places: Vec<f64> = (0..6).map(f64::from).collect();
         let map = Arc::new(SurfaceMap::new(&places, &places).expect("a lattice"));
         let values = map.evaluate(
@@ -353,7 +354,7 @@ mod tests {
             for probe in 0..100 {
                 let place = Vec2::new(20.3 + 39.7 * (probe / 10) as f32, 20.7 + 39.1 * (probe % 10) as f32);
                 let cells = mesh.strips().flat_map(|(cells, _)| cells);
-                // Those cut at the ends of the axis have corners of their own.
+                // Cells cut at the ends of the axis have additional corners.
                 let whole = cells.filter(|cell| (**cell as usize) < field.values.len());
                 let painted = whole.flat_map(|&cell| {
                     let [a, b, c, d] = mesh.corners(cell).map(|corner| corners[corner]);
@@ -372,7 +373,7 @@ mod tests {
     }
 
     #[test]
-    fn contour_lines_lie_between_the_ends_of_the_range() {
+    fn contour_lines_are_between_the_ends_of_the_range() {
         let near = |levels: Vec<f64>, expected: &[f64]| {
             assert_eq!(levels.len(), expected.len(), "{levels:?}");
             let pairs = levels.iter().zip(expected);

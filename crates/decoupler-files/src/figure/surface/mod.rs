@@ -1,14 +1,13 @@
 //! Surfaces in space or from above.
 //!
-//! A [`SurfaceFigure`] is all that a picture of surfaces says. Each [`Surface`] of it lays itself out in a [`Card`] as a
-//! [`Drawing`]: lines, texts, discs and a mesh in the order of painting, with colours by role ([`Ink`]). What is left to
-//! a renderer is to paint them.
+//! A [`SurfaceFigure`] describes a picture of surfaces. Each [`Surface`] of it lays itself out in a [`Card`] as a
+//! [`Drawing`]: lines, texts, discs and a mesh in the order of painting, with colours by role ([`Ink`]). A renderer
+//! only has to paint them.
 //!
-//! `camera` and `projection` say where things lie; `box_axes` and `plan_axes` lay out the frame with its ticks, for which
-//! `labels` finds room; `mesh` is the height field with its contour lines from far to near, `plateau` marks what lies beyond the axes; `nodes` are the dots on it. `sight` leads back from the
-//! screen, and `pick` to the surface; `section` cuts it along a wire.
-//!
-//! Figure of surfaces, described for the renderers.
+//! `camera` maps millimetres to points on the screen and back; `box_axes` lays out the frame with its ticks, and `drawing`
+//! places the labels. `field` is the surface on its grid and `mesh` the same with contour lines, from far to near; `cut`
+//! cuts it at the ends of the value axis and along a wire. `nodes` are the dots on it, and `pick` finds the place on the
+//! surface under a point of the screen.
 
 mod box_axes;
 mod camera;
@@ -75,8 +74,7 @@ impl Surface {
         }
     }
 
-    /// Returns `true` if both look alike. Values count as the same if they are the same in memory, so that this costs
-    /// nothing.
+    /// Returns `true` if both look the same. Values are compared by their address in memory, which is fast.
     pub fn looks_like(&self, other: &Self) -> bool {
         let bits = |surface: &Self| [*surface.range.start(), *surface.range.end()].map(f64::to_bits);
         Arc::ptr_eq(&self.map, &other.map)
@@ -96,14 +94,14 @@ pub struct SurfaceFigure {
     pub camera: OrbitCamera,
     /// Index of the node that is marked on each.
     pub marked_node: Option<usize>,
-    /// Indices of nodes that are lit on each.
+    /// Indices of nodes that are highlighted on each.
     pub lit_nodes: Vec<usize>,
     /// Line along which the surfaces are cut in a figure of their section.
     pub section: Option<Section>,
 }
 
 impl SurfaceFigure {
-    /// Gives surfaces of one quantity one scale, so that colours and heights mean the same.
+    /// Gives surfaces of the same quantity a common scale, which makes colours and heights comparable.
     #[must_use]
     pub fn with_common_scales(mut self) -> Self {
         let scales = self.scales();
@@ -117,7 +115,7 @@ impl SurfaceFigure {
         self
     }
 
-    /// The scales of colours, each once, from left to right.
+    /// Returns the different colour scales, from left to right.
     pub fn scales(&self) -> Vec<ColourScale> {
         let mut scales: Vec<ColourScale> = Vec::new();
         for scale in self.surfaces.iter().map(Surface::scale) {

@@ -1,16 +1,15 @@
-//! The nodes as dots on the surface, and which of them the pointer is on.
-//!
-//! The shapes that a drawing consists of. Lengths are points, y counts downwards.
+//! The nodes as dots on the surface, picking of nodes with the pointer, and the shapes of a drawing. Lengths are
+//! points, y counts downwards.
 
 use decoupler_core::surface::Grid;
 use glam::{DVec3, Vec2};
 
 use super::{drawing::Projector, field::Field};
 
-/// Distance within which the pointer is at a node, in points.
+/// Distance within which the pointer selects a node, in points.
 const REACH: f32 = 10.0;
 const HIDDEN_OPACITY: f32 = 0.1;
-/// More dots than this, nearer to each other than that, are not drawn.
+/// Dots are not drawn if there are more than this and they are closer than that.
 const CROWD: usize = 400;
 const CROWDED: f32 = 10.0;
 
@@ -23,7 +22,7 @@ struct Dot {
     is_beyond: bool,
 }
 
-/// The nodes of a surface as dots. Nodes without a value have none.
+/// The nodes of a surface as dots. Nodes without a value have no dot.
 #[derive(Clone, Debug, Default)]
 pub struct Dots {
     dots: Vec<Option<Dot>>,
@@ -56,7 +55,7 @@ impl Dots {
         self.dots.iter().flatten().filter(|dot| dot.is_beyond).count()
     }
 
-    /// The visible node nearest to `place`, if it is near.
+    /// Returns the visible node nearest to `place`, if it is near.
     pub fn nearest(&self, place: Vec2) -> Option<usize> {
         let visible = |(node, dot): (usize, &Option<Dot>)| {
             let dot = dot.filter(|dot| !dot.is_hidden)?;
@@ -73,7 +72,7 @@ impl Dots {
         self.dots.get(node).copied().flatten().map(|dot| dot.at)
     }
 
-    /// The discs to paint, in this order, with rings around the nodes `lit` and a mark around one node.
+    /// Returns the discs in the order of painting, with rings around the nodes `lit` and a mark around one node.
     pub fn discs<'a>(&'a self, marked: Option<usize>, lit: &'a [usize]) -> impl Iterator<Item = Disc> + 'a {
         let radius = self.radius();
         let drawn = self.dots.iter().flatten().filter(move |_| radius > 0.0);
@@ -116,7 +115,7 @@ impl Dots {
         dots.chain(rings).chain(mark)
     }
 
-    /// Dots shrink when there are many of them, and go when they would cover the surface.
+    /// Dots shrink if there are many of them, and disappear if they would cover the surface.
     fn radius(&self) -> f32 {
         let size = Bounds::of(self.dots.iter().flatten().map(|dot| dot.at)).size();
         let spacing = (size.x * size.y / self.dots.len().max(1) as f32).sqrt();
@@ -128,7 +127,7 @@ impl Dots {
     }
 }
 
-/// Walks from the node towards the eye and looks whether the surface rises above the line of sight.
+/// Walks from the node towards the eye and checks whether the surface rises above the line of sight.
 fn is_hidden(node: DVec3, field: &Field<'_>, stage: &Projector<'_>) -> bool {
     let Projector::Space(projection) = stage else {
         return false;
@@ -151,8 +150,8 @@ fn is_hidden(node: DVec3, field: &Field<'_>, stage: &Projector<'_>) -> bool {
 /// it.
 fn line_of_sight(node: DVec3, sight: DVec3, grid: &Grid) -> impl Iterator<Item = (DVec3, usize)> {
     let (x_mm, y_mm) = (grid.x_mm(), grid.y_mm());
-    // Half a cell of the axis along which cells are crossed faster: however stretched the array, this many steps lead
-    // off the grid as it has points.
+    // Half a cell along the axis on which cells are crossed faster: for arrays of any shape, the number of steps to the
+    // edge is proportional to the number of points.
     let cells = |sight_mm: f64, points_mm: &[f64]| sight_mm.abs() / (points_mm[1] - points_mm[0]);
     let step = 0.5 / cells(sight.x, x_mm).max(cells(sight.y, y_mm)).max(0.5);
     let cell = |points: &[f64], at: f64| {
@@ -173,9 +172,9 @@ pub enum Ink {
     Edge,
     /// Numbers and names of axes.
     Label,
-    /// As strong as text.
+    /// The colour of text.
     Text,
-    /// The ground of the card.
+    /// The background of the card.
     Ground,
     /// A node.
     Node,
@@ -201,9 +200,9 @@ pub struct Line {
 /// A line of text.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Text {
-    /// The room it takes; the text is in its middle.
+    /// The rectangle in whose middle the text is.
     pub bounds: Bounds,
-    /// The words.
+    /// The text.
     pub text: String,
 }
 
@@ -218,7 +217,7 @@ pub struct Disc {
     pub ring: Option<f32>,
     /// Its colour.
     pub ink: Ink,
-    /// 1 hides what lies behind it.
+    /// 1 is opaque.
     pub opacity: f32,
 }
 
@@ -232,7 +231,7 @@ pub struct Bounds {
 }
 
 impl Bounds {
-    /// A rectangle that holds nothing.
+    /// An empty rectangle.
     pub(super) const NOTHING: Self = Self {
         min: Vec2::INFINITY,
         max: Vec2::NEG_INFINITY,
@@ -245,7 +244,7 @@ impl Bounds {
         }
     }
 
-    /// The rectangle that all points span.
+    /// Returns the bounding rectangle of all points.
     pub(super) fn of(points: impl IntoIterator<Item = Vec2>) -> Self {
         points.into_iter().fold(Self::NOTHING, |bounds, point| Self {
             min: bounds.min.min(point),
@@ -298,7 +297,7 @@ mod tests {
     };
 
     #[test]
-    fn looking_along_a_stretched_array_takes_as_few_steps_as_along_a_square_one() {
+    fn a_stretched_array_takes_no_more_steps_than_a_square_one() {
         for (row_pitch_mm, node_pitch_mm) in [(1.0, 2.0), (1e6, 1.0), (1.0, 1e6), (1e-6, 1.0), (1.0, 1e-6)] {
             let nodes = |pitch: f64| -> Vec<f64> { (0..10).map(|node| pitch * f64::from(node)).collect() };
             let map = SurfaceMap::new(&nodes(row_pitch_mm), &nodes(node_pitch_mm)).unwrap();
@@ -330,14 +329,14 @@ mod tests {
         let places = Vec::from_iter((0..4).map(f64::from));
         let map = Arc::new(SurfaceMap::new(&places, &places).unwrap());
         let camera = OrbitCamera::default();
-        let hidden = |beside: f64| {
-            // Level around the node, `beside` everywhere else.
+        let hidden = |elsewhere: f64| {
+            // Level around the node, `elsewhere` at all other places.
             let grid = map.grid();
             let values = grid
                 .x_mm()
                 .iter()
                 .flat_map(|&x| grid.y_mm().iter().map(move |&y| (x, y)));
-            let values = values.map(|(x, y)| if (x - 1.0).hypot(y - 1.0) < 0.2 { 4.2 } else { beside });
+            let values = values.map(|(x, y)| if (x - 1.0).hypot(y - 1.0) < 0.2 { 4.2 } else { elsewhere });
             let surface = Surface {
                 title: String::new(),
                 values: values.collect(),

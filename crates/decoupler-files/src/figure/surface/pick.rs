@@ -8,11 +8,11 @@ use super::{
     field::{CellPart, Field},
 };
 
-/// Part of a triangle by which a ray may miss it, so that none slips through between two.
+/// Tolerance, as a fraction of a triangle, that keeps rays from slipping between two triangles.
 const CRACK: f64 = 1e-9;
 
 impl Surface {
-    /// Returns the place where `ray` first meets the surface as it is drawn; `None` if it misses it.
+    /// Returns the place where `ray` first hits the surface as it is drawn; `None` if it misses it.
     pub fn pick(&self, ray: &Ray) -> Option<DVec3> {
         let field = Field::new(self);
         if field.values.is_empty() {
@@ -48,16 +48,17 @@ impl Surface {
     }
 }
 
-/// The cell of an axis that a place lies in.
+/// Returns the cell of an axis that contains a place.
 fn cell(points_mm: &[f64], at_mm: f64) -> Option<usize> {
     let after = points_mm.partition_point(|point| *point <= at_mm);
     (after > 0 && at_mm <= points_mm[points_mm.len() - 1]).then(|| (after - 1).min(points_mm.len() - 2))
 }
 
-/// Shares of the ray at which, seen from above, it crosses the lines of the grid, in its own units and order; `None` next to the grid.
+/// Parameters of the ray at which, seen from above, it crosses the lines of the grid, in ascending order; `None`
+/// outside the grid.
 fn crossings(field: &Field<'_>, ray: &Ray) -> Option<Vec<f64>> {
     if ray.direction.truncate() == glam::DVec2::ZERO {
-        // Straight down it stays over one cell.
+        // A vertical ray stays over one cell.
         return Some(vec![-1.0, 1.0]);
     }
     let axes = [(field.grid.x_mm(), 0), (field.grid.y_mm(), 1)];
@@ -86,7 +87,7 @@ fn crossings(field: &Field<'_>, ray: &Ray) -> Option<Vec<f64>> {
     Some(crossings)
 }
 
-/// Height of the two triangles of a cell at a place; `None` next to it.
+/// Returns the height of the two triangles of a cell at a place; `None` outside it.
 fn height_at([a, b, c, d]: [DVec3; 4], place: DVec3) -> Option<f64> {
     let along = |from: f64, to: f64, at: f64| (at - from) / (to - from);
     let (x, y) = (along(a.x, c.x, place.x), along(a.y, c.y, place.y));
@@ -99,7 +100,7 @@ fn height_at([a, b, c, d]: [DVec3; 4], place: DVec3) -> Option<f64> {
     is_inside.then_some(height)
 }
 
-/// Share of the ray at which it meets a triangle, in its own units (Möller and Trumbore 1997).
+/// Returns the parameter of the ray at which it hits a triangle (Möller and Trumbore 1997).
 fn share_at(ray: &Ray, [a, b, c]: [DVec3; 3]) -> Option<f64> {
     let (ab, ac, from) = (b - a, c - a, ray.from_mm - a);
     let across = ray.direction.cross(ac);
@@ -168,7 +169,7 @@ mod tests {
         })
     }
 
-    /// The camera's limits let it look along the slopes, but not from below.
+    /// The camera's limits allow views along the slopes, but not from below.
     fn slope(x: f64, y: f64) -> f64 {
         4.5 + 0.02 * (x - 10.0) - 0.03 * (y - 6.0)
     }
@@ -184,7 +185,7 @@ mod tests {
                 let picked = surface.pick(&sight.ray(sight.point(place))).unwrap();
                 assert!(picked.distance(place) < 1e-9, "{picked} for {place}, {camera:?}");
             }
-            // The sight is that of the picture.
+            // The line of sight matches the picture.
             for (node, place) in surface.nodes.iter().enumerate() {
                 let apart = sight.point(*place).as_vec2().distance(dots.position(node).unwrap());
                 assert!(apart < 0.02, "{apart} points at {camera:?}");
@@ -193,8 +194,8 @@ mod tests {
     }
 
     #[test]
-    fn what_is_near_hides_what_is_far() {
-        // A ridge along y: beyond it lies a valley that the eye cannot see into from low above.
+    fn near_parts_hide_far_ones() {
+        // A ridge along y: behind it is a valley that a low eye cannot see into.
         let ridge = surface(ViewMode::ThreeD, |x, _| if x == 10.0 { 5.0 } else { 4.0 });
         let low = OrbitCamera {
             yaw: 0.0,
@@ -217,7 +218,7 @@ mod tests {
     }
 
     #[test]
-    fn gaps_are_no_place() {
+    fn gaps_have_no_place() {
         let mut surface = surface(ViewMode::Top, slope);
         let (sight, _) = sight(&surface, OrbitCamera::default());
         let ray = sight.ray(sight.point(DVec3::new(10.0, 6.0, 4.5)));
@@ -229,7 +230,7 @@ mod tests {
     }
 
     #[test]
-    fn a_level_is_met_where_the_line_of_sight_is_at_that_height() {
+    fn a_level_is_reached_where_the_line_of_sight_has_that_height() {
         for camera in cameras() {
             let (sight, _) = sight(&surface(ViewMode::ThreeD, slope), camera);
             let place = DVec3::new(9.3, 4.4, 4.25);
@@ -259,8 +260,8 @@ mod tests {
                 let at = sight.point(foot.with_z(height_mm));
                 let along = (sight.point(foot.with_z(4.0)) - sight.point(foot)).normalize();
                 // A pointer next to the line counts as on it.
-                for beside in [0.0, 9.0] {
-                    match sight.height_mm(foot, 1.0, at + beside * along.perp()) {
+                for offset in [0.0, 9.0] {
+                    match sight.height_mm(foot, 1.0, at + offset * along.perp()) {
                         Some(found_mm) => {
                             assert!((found_mm - height_mm).abs() < 1e-9, "{found_mm} for {height_mm}");
                             seen += 1;
