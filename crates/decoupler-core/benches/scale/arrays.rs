@@ -11,9 +11,7 @@ const ARRAYS: [&str; 4] = ["10x10_5x30", "32x32_16x96", "64x64_32x192", "100x80_
 
 pub(crate) fn print() {
     println!("\n## A frame of large arrays, known rows, without noise, one thread\n");
-    println!(
-        "Milliseconds; networks with 12 hidden nodes. Newton's arithmetic is that of one evaluation per"
-    );
+    println!("Milliseconds; networks with 12 hidden nodes. Newton's arithmetic is that of one evaluation per");
     println!("step. Memory is the estimate for training 1000 snapshots with preset best.\n");
     println!(
         "| array | nodes | draw | network, 64 bits | 32 bits | Newton | times the arithmetic | steps | unsolved rows | largest error in mm | memory to train |"

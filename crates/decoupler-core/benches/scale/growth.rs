@@ -7,9 +7,7 @@ use crate::{
 
 pub(crate) fn print() {
     println!("\n## Scaling of the time per frame, one thread\n");
-    println!(
-        "Milliseconds, and the exponent of the power law through them. The array has three times as many"
-    );
+    println!("Milliseconds, and the exponent of the power law through them. The array has three times as many");
     println!("column-wires as nodes on a row-wire, and half as many nodes on a column-wire as rows.\n");
     println!("| growing | sizes | what | milliseconds | exponent |\n|---|---|---|---|---:|");
     let rows = [10, 20, 40, 80];

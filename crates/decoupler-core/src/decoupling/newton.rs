@@ -344,7 +344,11 @@ impl Newton {
                     length = length.max((*value - from).abs() / range.width());
                 }
                 let is_finite = linearised.step_mm.iter().all(|step| step.is_finite());
-                let next_residual = if is_finite { problem.evaluate(&next) } else { f64::INFINITY };
+                let next_residual = if is_finite {
+                    problem.evaluate(&next)
+                } else {
+                    f64::INFINITY
+                };
                 // A step this short is within rounding: the misfit cannot decrease further.
                 let short = is_finite && length <= self.rules.tolerance;
                 if next_residual < residual || short || damping > LARGEST_DAMPING {

@@ -84,7 +84,11 @@ impl Units {
             let runs = order.chunk_by(|&one, &next| first[one] == first[next]);
             units.extend(runs.map(<[usize]>::to_vec));
         }
-        if units.len() < Self::MIN_UNITS { singles() } else { units }
+        if units.len() < Self::MIN_UNITS {
+            singles()
+        } else {
+            units
+        }
     }
 
     /// Returns `true` if a channel has nearly as many distinct values as there are `distinct` samples.
@@ -193,10 +197,7 @@ mod tests {
         let new = Array2::from_shape_simple_fn((40, 18), || standard_normal(&mut rng));
         let test = set_of(new, Array2::zeros((40, 1)));
         let once = decode_set(&mut map((0..25).collect()), &test).unwrap();
-        assert!(
-            once.iter().all(|answer| answer.abs() < 3.0),
-            "no overfitting"
-        );
+        assert!(once.iter().all(|answer| answer.abs() < 3.0), "no overfitting");
         for order in [(0..250).map(|s| s / 10).collect(), (0..250).map(|s| s % 25).collect()] {
             let often = decode_set(&mut map(order), &test).unwrap();
             assert!(

@@ -26,7 +26,8 @@ fn trained(method: Method, epochs: usize) -> Trainer {
         epochs,
         ..StoppingRules::default()
     };
-    let mut trainer = Trainer::new(start(), problem(), TrainingSettings { method, stopping }).expect("the training can start");
+    let mut trainer =
+        Trainer::new(start(), problem(), TrainingSettings { method, stopping }).expect("the training can start");
     while trainer.step().is_none() {}
     trainer
 }

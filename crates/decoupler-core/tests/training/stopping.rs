@@ -42,7 +42,10 @@ fn validation_failures_count_epochs_without_a_new_best() {
             .windows(2)
             .any(|pair| pair[1].validation_mse < pair[0].validation_mse && pair[1].validation_failures > 0);
     }
-    assert!(fell_without_a_new_best, "the data do not distinguish this rule from counting increases");
+    assert!(
+        fell_without_a_new_best,
+        "the data do not distinguish this rule from counting increases"
+    );
 }
 
 #[test]
