@@ -157,7 +157,7 @@ pub(super) fn fit_with_prior(
     samples: &[PressedRow],
     tolerance: f64,
 ) -> Result<CalibratedFit, CalibrationError> {
-    /// Max iterations of the noise estimate, and the relative change at which it has converged.
+    /// Maximum iterations of the noise estimate, and the relative change at which it has converged.
     const ROUNDS: usize = 20;
     const SETTLED: f64 = 1e-2;
     let readings: usize = samples.iter().map(|sample| sample.resistances_ohm.len()).sum();

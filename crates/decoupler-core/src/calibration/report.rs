@@ -363,7 +363,7 @@ impl CalibrationWarning {
     fn misfit(model: &SensorModel, references: &Slopes, samples: &[PressedRow], fitted: usize) -> Option<Self> {
         /// Ratio of systematic error to noise from which it is reported.
         const LARGE: f64 = 3.0;
-        /// Min degrees of freedom of the noise estimate: readings minus crossings.
+        /// Minimum degrees of freedom of the noise estimate: readings minus crossings.
         const MIN_DEGREES: usize = 10;
         /// Relative errors explained by rounding.
         const SMALLEST: f64 = 1e-12;

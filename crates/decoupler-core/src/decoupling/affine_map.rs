@@ -141,13 +141,13 @@ impl Decoder for AffineMap {
     }
 }
 
-/// Affine estimate of the compressions of a row-wire's nodes from its readings, with the min expected squared error
+/// Affine estimate of the compressions of a row-wire's nodes from its readings, with the minimum expected squared error
 /// if every node is pressed independently and uniformly over the stroke: a starting point for solving Eq. (2).
 ///
-/// s_k is a sum over nodes. In x from −1 to 1 over the stroke, the contribution of a node is its mean plus `a P₁(x) +
-/// b P₂(x) + c P₃(x)` with Legendre polynomials, whose variances are 1/3, 1/5 and 1/7 and which are uncorrelated.
-/// With A, B and C the coefficients of all nodes (readings × nodes), the estimate is `Aᵀ/3 (A Aᵀ/3 + B Bᵀ/5 + C
-/// Cᵀ/7)⁻¹ (s − s̄)`.
+/// s_k is a sum over nodes. In x from −1 to 1 over the stroke, the contribution of a node is its mean plus
+/// `a P₁(x) + b P₂(x) + c P₃(x)` with Legendre polynomials, whose variances are 1/3, 1/5 and 1/7 and which are
+/// uncorrelated. With A, B and C the coefficients of all nodes (readings × nodes), the estimate is
+/// `Aᵀ/3 (A Aᵀ/3 + B Bᵀ/5 + C Cᵀ/7)⁻¹ (s − s̄)`.
 #[derive(Clone, Debug)]
 pub(super) struct AffineStart {
     middle_mm: f64,

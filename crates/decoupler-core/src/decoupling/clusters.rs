@@ -3,7 +3,7 @@ use rand::{Rng, seq::index};
 
 /// Iterations of Lloyd's algorithm.
 const ROUNDS: usize = 20;
-/// Max number of samples that are clustered: a few per cluster are enough.
+/// Maximum number of samples that are clustered: a few per cluster are enough.
 const MAX_CLUSTERED: usize = 1000;
 
 /// Squared Euclidean distance.

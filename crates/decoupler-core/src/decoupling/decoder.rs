@@ -206,7 +206,7 @@ pub struct SolvedRows {
     pub rows: usize,
     /// Rows whose answer does not explain the readings.
     pub unsolved: usize,
-    /// Rows whose readings other answers explain as well.
+    /// Rows whose readings are explained by other answers as well.
     pub undetermined: usize,
 }
 

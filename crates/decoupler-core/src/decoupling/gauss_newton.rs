@@ -95,7 +95,7 @@ impl LinearisedRow {
         error * self.triangle.largest_inverse_row()
     }
 
-    /// Returns Σ_i |J_ki| of reading `k`, relative to the ranges: the max change of its residual if every unknown
+    /// Returns Σ_i |J_ki| of reading `k`, relative to the ranges: the maximum change of its residual if every unknown
     /// moves by at most 1.
     pub(super) fn reach(&self, k: usize) -> f64 {
         let width = self.free.len() + 1;
@@ -106,7 +106,7 @@ impl LinearisedRow {
     }
 }
 
-/// Returns the position and value of the minimum in `range` of each of `count` functions of one variable: the min
+/// Returns the position and value of the minimum in `range` of each of `count` functions of one variable: the minimum
 /// over a grid with steps of about 1, which finds the deepest of several valleys, refined by golden-section search.
 ///
 /// `of` returns the values of all functions, each at its own position, so that shared work is done once.
@@ -142,7 +142,7 @@ pub(super) fn minima(range: (f64, f64), count: usize, of: impl Fn(&[f64]) -> Vec
 
 /// Golden-section search of one function.
 struct Valley {
-    /// Position and value of the min so far.
+    /// Position and value of the minimum so far.
     best: (f64, f64),
     left: f64,
     right: f64,

@@ -377,12 +377,12 @@ impl Newton {
 /// Stopping rules of the Gauss-Newton method.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct NewtonRules {
-    /// Max number of steps from one start. A step that is rejected and shortened counts as one.
+    /// Maximum number of steps from one start. A step that is rejected and shortened counts as one.
     pub steps: usize,
     /// Step length, relative to the range of the unknown, below which the method has converged. Plain steps also end
     /// if another one could only lower residuals within their rounding.
     pub tolerance: f64,
-    /// Max number of starts; the method restarts if one does not lead to a solution.
+    /// Maximum number of starts; the method restarts if one does not lead to a solution.
     pub starts: usize,
 }
 
@@ -447,8 +447,8 @@ impl Solution {
     }
 }
 
-/// Max rounding error of a residual: of the true resistance and the modelled one (4 units in the last place each), of
-/// the reading and of the residual itself.
+/// Maximum rounding error of a residual: of the true resistance and the modelled one (4 units in the last place each),
+/// of the reading and of the residual itself.
 pub(super) const ROUNDING: f64 = 10.0 * f64::EPSILON;
 /// Largest error of an unknown, relative to its range, of an answer that counts as the solution.
 pub const LARGEST_ERROR: f64 = 1e-6;

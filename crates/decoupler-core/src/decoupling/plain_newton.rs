@@ -25,7 +25,7 @@ pub(super) struct PlainNewton {
     axes: Axes,
     ranges: Vec<Range>,
     wide: Vec<Range>,
-    /// Max length of a last step.
+    /// Maximum length of a last step.
     last_length_mm: f64,
     /// False if plain steps alone never solve a row.
     is_fit: bool,
@@ -64,9 +64,9 @@ enum State {
 
 /// Smallest fraction of a step; a shorter one would lead out of the sensor.
 pub(super) const SHORTEST_SHARE: f64 = 1e-3;
-/// Max memory for the estimates of all row-wires; above it, rows start from the middle, which takes one more step.
+/// Maximum memory for the estimates of all row-wires; above it, rows start from the middle, which takes one more step.
 const LARGEST_STARTS_BYTES: usize = 256 << 20;
-/// Max number of steps; quadratic convergence needs no more.
+/// Maximum number of steps; quadratic convergence needs no more.
 const MAX_STEPS: usize = 12;
 /// Initial steps exempt from the contraction test.
 const EXEMPT_STEPS: usize = 2;

@@ -43,7 +43,7 @@ struct LeftOut {
     of_mean: Vec<f64>,
 }
 
-/// Max number of samples that are left out in turn: evenly spaced ones of a larger set give as good an estimate.
+/// Maximum number of samples that are left out in turn: evenly spaced ones of a larger set give as good an estimate.
 const MAX_LEFT_OUT: usize = 4000;
 
 impl Ridge {
@@ -128,7 +128,7 @@ impl Ridge {
         })
     }
 
-    /// Returns the penalty with the min leave-one-out error for each output; infinite if none is better than the
+    /// Returns the penalty with the minimum leave-one-out error for each output; infinite if none is better than the
     /// mean.
     pub fn best_penalties(&self) -> Vec<f64> {
         let Some(decades) = self.decades() else {
@@ -149,8 +149,8 @@ impl Ridge {
         found.into_iter().zip(&self.left_out.of_mean).map(penalty).collect()
     }
 
-    /// Returns the penalty with the min leave-one-out error of all outputs together; infinite if none is better than
-    /// the mean.
+    /// Returns the penalty with the minimum leave-one-out error of all outputs together; infinite if none is better
+    /// than the mean.
     pub fn common_penalty(&self) -> f64 {
         let Some(decades) = self.decades() else {
             return f64::INFINITY;

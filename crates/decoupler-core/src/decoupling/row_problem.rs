@@ -8,8 +8,8 @@ use crate::{
     sensor::{Axes, RowConductance, SensorModel},
 };
 
-/// Eq. (2) of one row-wire as equations for the displacements that the scene allows: `ρ_k(u) = m_k · s_k(u)/g − 1 =
-/// 0` with m the readings and g/s the model's resistances.
+/// Eq. (2) of one row-wire as equations for the displacements that the scene allows: `ρ_k(u) = m_k · s_k(u)/g − 1 = 0`
+/// with m the readings and g/s the model's resistances.
 ///
 /// For a reading `m = R · (1 + ε)` of a true resistance R, ρ at the true deformation is ε: the residual is
 /// the relative error of the reading, with no approximation. And s is a plain sum over nodes, nearly linear in u.
@@ -228,7 +228,7 @@ pub struct RowProblemDescription {
     pub ranges: Vec<(f64, f64)>,
     /// Range of each unknown that a step may not leave.
     pub wide_ranges: Vec<(f64, f64)>,
-    /// Max number of steps from one start.
+    /// Maximum number of steps from one start.
     pub steps: usize,
     /// Step length, relative to the range of the unknown, below which the iteration ends.
     pub tolerance: f64,

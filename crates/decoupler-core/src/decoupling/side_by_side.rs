@@ -93,7 +93,7 @@ impl WithSimd for Solving<'_> {
             let mut reciprocal = [0.0; LANES];
             for lane in 0..LANES {
                 let left = pivot[lane] / solution[p][lane];
-                // Written so that NaN counts as the min.
+                // Written so that NaN counts as the minimum.
                 min_left[lane] = if left >= min_left[lane] { min_left[lane] } else { left };
                 reciprocal[lane] = 1.0 / pivot[lane].sqrt();
             }

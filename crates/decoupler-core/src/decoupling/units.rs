@@ -29,10 +29,10 @@ pub(super) struct Units {
 }
 
 impl Units {
-    /// Min number of units that are left out in turn: with fewer, the rest represents the set badly, and samples are
-    /// left out one by one.
+    /// Minimum number of units that are left out in turn: with fewer, the rest represents the set badly, and samples
+    /// are left out one by one.
     const MIN_UNITS: usize = 10;
-    /// Min ratio of distinct values of an identifying channel to distinct samples.
+    /// Minimum ratio of distinct values of an identifying channel to distinct samples.
     const IDENTIFYING: f64 = 0.9;
 
     /// Gathers the samples of `training`, whose inputs are `x` (samples × inputs) and outputs `y` (samples × outputs).

@@ -47,7 +47,7 @@ fn distances(model: &SensorModel, row: usize, node: usize, u_mm: DVec3, column: 
     [dx, dy, exact(height_mm) - exact(u_mm.z)]
 }
 
-/// Max rounding error in ulps of the resistances, and of the derivatives of conductance in ulps of their largest
+/// Maximum rounding error in ulps of the resistances, and of the derivatives of conductance in ulps of their largest
 /// possible size Σ|term|.
 fn worst_ulps(model: &SensorModel, row: usize, columns: &[usize], at: &[DVec3]) -> (f64, f64) {
     let mut conductance = RowConductance::new(model, Axes::Xyz);
@@ -84,7 +84,7 @@ fn worst_ulps(model: &SensorModel, row: usize, columns: &[usize], at: &[DVec3]) 
     worst
 }
 
-/// Max rounding error over compressions from none to nearly touching and a few row-wires, for random nodes.
+/// Maximum rounding error over compressions from none to nearly touching and a few row-wires, for random nodes.
 fn worst_of(array: &str, change: impl FnOnce(&mut Geometry), shift: f64) -> (f64, f64) {
     let mut model = SensorModel::new(array.parse().unwrap());
     model.resistivity_ohm_per_mm = 470.0 / 3.0;

@@ -65,7 +65,7 @@ fn with_the_fixtures_settings(mut method: Method) -> Method {
     method
 }
 
-/// Max relative difference from the fixture's weights: rounding, amplified if the problem is stiff (most if the
+/// Maximum relative difference from the fixture's weights: rounding, amplified if the problem is stiff (most if the
 /// output layer follows the hidden layer exactly, `varpro`) or if two gradients 5e-5 apart are subtracted (`scg`).
 fn tolerance(method: &str) -> f64 {
     match method {

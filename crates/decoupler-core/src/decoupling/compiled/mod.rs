@@ -19,8 +19,8 @@ pub use folded_network::Real;
 /// Networks compiled to decode frames fast and without allocation, in double or single precision: the scalings are
 /// folded into the weights, and layers are padded to whole vector registers.
 ///
-/// Inputs are relative to a resistance R₀ in the middle of each channel, subtracted in double precision: `1/R − 1/R₀
-/// = −(R − R₀)/R/R₀`. Single precision therefore loses no accuracy where readings differ little.
+/// Inputs are relative to a resistance R₀ in the middle of each channel, subtracted in double precision:
+/// `1/R − 1/R₀ = −(R − R₀)/R/R₀`. Single precision therefore loses no accuracy where readings differ little.
 ///
 /// Whitening without noise amplifies weak patterns a million times, and large products nearly cancel. Where this
 /// would affect single precision, the sums of the hidden layer are computed in double precision, and the rest in

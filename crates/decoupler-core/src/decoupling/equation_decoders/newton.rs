@@ -51,8 +51,8 @@ impl NewtonDecoder {
     }
 
     /// As [`Self::new`], but `posterior` decodes the rows whose equations have no solution to within
-    /// [`LARGEST_ERROR`]: among all deformations that explain the readings to their rounding, its median has the min
-    /// expected error. `rows` must be among its rows.
+    /// [`LARGEST_ERROR`]: among all deformations that explain the readings to their rounding, its median has the
+    /// minimum expected error. `rows` must be among its rows.
     ///
     /// # Errors
     /// If the sensor has no resistances at rest.

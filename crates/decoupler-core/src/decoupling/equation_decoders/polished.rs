@@ -13,7 +13,7 @@ use crate::{
     sensor::{SensorError, SensorModel},
 };
 
-/// Max ratio of misfit to noise that noise explains.
+/// Maximum ratio of misfit to noise that noise explains.
 const MAX_NOISE_RATIO: f64 = 6.0;
 
 /// Improves the answer of another decoder by a few Gauss-Newton steps, with noise and prior if the scene has noise.

@@ -16,7 +16,7 @@ pub(super) struct Marginals {
     pub(super) converged: bool,
 }
 
-/// Max number of EP sweeps.
+/// Maximum number of EP sweeps.
 const MAX_SWEEPS: usize = 400;
 /// Number of sweeps after which the update of a factor is halved, and halved again, to damp oscillations.
 const UNDAMPED_SWEEPS: usize = 20;

@@ -260,8 +260,9 @@ fn swap(lane: usize, a: &mut Pack, b: &mut Pack) {
     b.set(lane, value);
 }
 
-/// A linear model whose unknowns, and some of whose readings, are known to be in ranges: `p(x) ∝ exp(−½ ‖A x − b‖² +
-/// cᵀ x)` for x within its ranges, times `P(fₖ·x + εₖ in range k)` for each rounded reading, with standard normal ε.
+/// A linear model whose unknowns, and some of whose readings, are known to be in ranges:
+/// `p(x) ∝ exp(−½ ‖A x − b‖² + cᵀ x)` for x within its ranges, times `P(fₖ·x + εₖ in range k)` for each rounded
+/// reading, with standard normal ε.
 ///
 /// Its moments have no closed form in several dimensions. They are approximated by expectation propagation (Minka
 /// 2001; Cunningham, Hennig and Lacoste-Julien 2011 for ranges): each range is replaced by a Gaussian factor that

@@ -268,7 +268,7 @@ pub(super) fn expected_misfits(model: &LinearModel, readings: usize, x: &[Margin
     }
 }
 
-/// Min gain considered.
+/// Minimum gain considered.
 const SMALLEST_GAIN: f64 = 1e-6;
 
 /// `−∂ ln P/∂ ln σ` of the probability of an interval of `half_width` standard deviations on either side of the mean:

@@ -27,7 +27,7 @@ use crate::{
 };
 
 /// Newton's method with noise and prior: iterates the posterior of the linearised equations, truncated to the range
-/// of every unknown, and answers with its median, which has the min expected absolute error.
+/// of every unknown, and answers with its median, which has the minimum expected absolute error.
 ///
 /// With noise, the single best deformation is a poor answer: it is in a corner of the possible ones. The posterior
 /// includes all deformations that explain the readings. Without noise, the rounding of the readings takes its place:
@@ -47,9 +47,9 @@ pub struct Posterior {
     rounds: Vec<usize>,
 }
 
-/// Min prior standard deviation of a pattern, relative to the range.
+/// Minimum prior standard deviation of a pattern, relative to the range.
 const SMALLEST_SPREAD: f64 = 1e-3;
-/// Max number of linearisations. Usually six are enough, since conductance is nearly linear.
+/// Maximum number of linearisations. Usually six are enough, since conductance is nearly linear.
 const STEPS: usize = 60;
 
 impl Posterior {

@@ -59,7 +59,7 @@ impl Pack {
         self
     }
 
-    /// Max of the two; `other` where one is NaN.
+    /// Maximum of the two; `other` where one is NaN.
     #[inline(always)]
     pub(super) fn max(mut self, other: Self) -> Self {
         for lane in 0..LANES {
@@ -72,7 +72,7 @@ impl Pack {
         self
     }
 
-    /// Min of the two; `other` where one is NaN.
+    /// Minimum of the two; `other` where one is NaN.
     #[inline(always)]
     pub(super) fn min(mut self, other: Self) -> Self {
         for lane in 0..LANES {
@@ -121,7 +121,7 @@ impl Pack {
         self
     }
 
-    /// Max of the two; NaN where either is.
+    /// Maximum of the two; NaN where either is.
     #[inline(always)]
     pub(super) fn max_or_nan(mut self, other: Self) -> Self {
         for lane in 0..LANES {

@@ -69,7 +69,7 @@ struct Sample {
 const PRIOR_SAMPLES: usize = 2000;
 /// Number of samples of the first mixture; each further one has half as many again.
 const FIRST_ROUND: usize = 300;
-/// Max number of mixtures.
+/// Maximum number of mixtures.
 const ROUNDS: usize = 7;
 /// Sufficient effective sample size: it increases the expected error of a median by about 0.5 %.
 const SUFFICIENT: f64 = 150.0;
@@ -338,7 +338,7 @@ impl SampledPosterior {
         (at, jacobian)
     }
 
-    /// Components around samples drawn by their weights, with the min curvature of the prior and with the curvature
+    /// Components around samples drawn by their weights, with the minimum curvature of the prior and with the curvature
     /// that proposed best.
     fn around_samples(&mut self, samples: &[Sample], least: f64, rng: &mut impl Rng) -> Vec<Component> {
         let power = tempered(samples, STARTS as f64);
@@ -457,7 +457,7 @@ fn effective_samples(samples: &[Sample], power: f64) -> f64 {
         .sum::<f64>()
 }
 
-/// The max power, up to 1, at which weights have at least `wanted` effective samples.
+/// The maximum power, up to 1, at which weights have at least `wanted` effective samples.
 fn tempered(samples: &[Sample], wanted: f64) -> f64 {
     /// Number of bisections.
     const STEPS: usize = 60;

@@ -296,7 +296,7 @@ pub(super) struct Marginal {
     pub(super) factor: Factor,
 }
 
-/// Medians of the distributions: the answers with the min expected absolute error.
+/// Medians of the distributions: the answers with the minimum expected absolute error.
 pub(super) fn medians(marginals: &[Marginal]) -> Vec<f64> {
     let mut medians = Vec::with_capacity(marginals.len());
     for some in marginals.chunks(LANES) {

@@ -18,12 +18,12 @@ const COMPONENTS: [usize; 2] = [3, 10];
 const RELATIVE_WIDTH: f64 = 4.0;
 /// Penalties in ascending order, relative to the mean of the diagonal of the normal equations.
 const RIDGES: [f64; 5] = [1e-10, 1e-8, 1e-6, 1e-4, 1e-2];
-/// Max number of regressors of a candidate.
+/// Maximum number of regressors of a candidate.
 const MAX_REGRESSORS: usize = 512;
-/// Max ratio of regressors to samples: a fold must leave enough samples for its fit.
+/// Maximum ratio of regressors to samples: a fold must leave enough samples for its fit.
 const REGRESSORS_PER_SAMPLE: f64 = 0.75;
 const FOLDS: usize = 5;
-/// Max number of samples in the cross-validation.
+/// Maximum number of samples in the cross-validation.
 const MAX_VALIDATED: usize = 1000;
 /// A system with more rules must reduce the mean squared error to this fraction, to avoid choosing it by chance.
 const WORTHWHILE: f64 = 0.99;
@@ -35,8 +35,8 @@ pub(super) struct Choice {
     pub penalties: Vec<Penalty>,
 }
 
-/// Returns the antecedents with the min held-out error of all outputs in a k-fold cross-validation over `units`, and
-/// for each output the best penalty, with or without `noise` of the inputs (variances).
+/// Returns the antecedents with the minimum held-out error of all outputs in a k-fold cross-validation over `units`,
+/// and for each output the best penalty, with or without `noise` of the inputs (variances).
 ///
 /// The centres are those of all units; the consequents of each fold do not depend on its targets.
 pub(super) fn choose(units: &Units, noise: &[f64], rng: &mut impl Rng) -> Choice {
