@@ -1,9 +1,8 @@
 """Cross-validates recordings of few, noisy samples next to scikit-learn's ridge. Usage: measured.py PROGRAM FOLDER.
 
-R² is over all samples, each answered by a model that has not seen its fold, and averaged over seeds: 20 samples in random
-folds give another R² with every seed, 0.1 apart (standard deviation), so that the mean of fewer seeds would tell nothing of a
-margin of 0.03. scikit-learn's ridge has standardised inputs and a penalty chosen by its own
-cross-validation.
+R² is over all samples, each predicted by a model fitted without its fold, and averaged over seeds: with 20 samples in random
+folds, R² varies by 0.1 from seed to seed (standard deviation), so the mean of fewer seeds could not resolve a margin of 0.03.
+scikit-learn's ridge has standardised inputs and a penalty chosen by its own cross-validation.
 """
 
 import json
@@ -40,7 +39,7 @@ def cross_validated(path, inputs, targets, seed):
     return json.loads(done.stdout)
 
 
-print(f"{'set':<10} {'target':<7} {'network':>8} {'ridge':>8} {'mean':>8} {'named':>8} {'sklearn':>8}  named the better answer")
+print(f"{'set':<10} {'target':<7} {'network':>8} {'ridge':>8} {'mean':>8} {'named':>8} {'sklearn':>8}  named as better")
 for name, load in [("diabetes", load_diabetes), ("linnerud", load_linnerud)]:
     data = load()
     targets = data.target.reshape(len(data.target), -1)
@@ -53,7 +52,7 @@ for name, load in [("diabetes", load_diabetes), ("linnerud", load_linnerud)]:
     for target in range(targets.shape[1]):
         of = lambda report, row: (report["targets"] if row == "network" else report["baselines"][row])[target]["r2"]
         means = {row: np.mean([of(report, row) for report in reports]) for row in ["network", "ridge", "mean"]}
-        # The answer that the program names: a network that is not worth its weights is said to be no better.
+        # The model that the program names as better; it reports networks that are no better than ridge.
         better = [report["better"][target] for report in reports]
         row_of = {"training mean": "mean"}
         named = np.mean([of(report, row_of.get(row, row)) for report, row in zip(reports, better)])
@@ -63,12 +62,12 @@ for name, load in [("diabetes", load_diabetes), ("linnerud", load_linnerud)]:
             failures.append(f"{name} y{target + 1}: {named:.3f} is below scikit-learn's ridge, {limit[target]:.3f}")
         if means["network"] < limit[target] - MARGIN:
             failures.append(f"{name} y{target + 1}: the network has {means['network']:.3f}, scikit-learn's ridge {limit[target]:.3f}")
-        # Where the readings predict nothing, the network can be better than ridge by chance; then that is said.
+        # If the readings predict nothing, the network can be better than ridge by chance; then a warning says so.
         no_better, nothing = f"no better than ridge for y{target + 1} ", f"do not determine y{target + 1} "
         hardly = f"little better than ridge for y{target + 1} "
         is_said = [any(words in report_said for words in [no_better, hardly, nothing])
                    for report_said in ("\n".join(report["warnings"]) for report in reports)]
         if not all(is_said):
-            failures.append(f"{name} y{target + 1}: {is_said.count(False)} of {SEEDS} seeds do not say that the network is hardly worth its weights")
+            failures.append(f"{name} y{target + 1}: {is_said.count(False)} of {SEEDS} seeds do not warn that the network is no better than ridge")
 if failures:
     sys.exit("failed: " + "; ".join(failures))

@@ -1,8 +1,7 @@
 """Exports networks and other decoders and checks the bundles with the programs that read them. Usage: readers.py PROGRAM FOLDER.
 
-Deviations are relative to the widest range of a coordinate in training, and for own data to the range of each target. The
-truth is golden.csv of each bundle, and for
-more samples the bundle in double precision for NumPy.
+Deviations are relative to the widest range of a coordinate in training or, for a recording, to the range of each target. The
+reference is golden.csv of each bundle and, for more samples, the bundle in double precision for NumPy.
 """
 
 import csv
@@ -21,16 +20,16 @@ NETWORKS = {
     "paper": "--epochs 60",
     "known": "--preset best --noise 1e-3 --samples 2000 --epochs 60",
     "log": "--inputs log --epochs 40",
-    # These magnify rounding errors: in single precision their hidden sums stay in double, and in double precision the
-    # limit is what the program computes and prints.
+    # These amplify rounding errors: in single precision their hidden sums are computed in double precision, and in double
+    # precision the limit is the one that the program computes and prints.
     "long": "--epochs 300",
     "sharp": "--preset best --samples 1000 --epochs 100",
 }
-MAGNIFYING = {"long", "sharp"}
-# Other decoders that leave next to the networks, as "network:decoder". Equations are solved in double precision only.
+AMPLIFYING = {"long", "sharp"}
+# Other decoders that are exported, as "network:decoder". Equations are solved in double precision only.
 LAYERED = ["paper:ridge", "paper:linear", "paper:rbf", "paper:fuzzy", "paper:mean", "known:ridge", "known:rbf", "known:fuzzy"]
 EQUATIONS = ["paper:newton", "paper:polish", "sharp:newton", "sharp:polish"]
-# Trained on a recording of its own: readings of any sign, targets of very different sizes.
+# Trained on a recording: readings of any sign, targets of very different magnitudes.
 OWN = "own"
 LAYERED += [f"{OWN}:{decoder}" for decoder in ["ridge", "rbf", "fuzzy"]]
 LIMITS = {"f64": 1e-12, "f32": 1e-5}
@@ -44,7 +43,7 @@ def limit_of(network, precision, report):
         # The golden readings are in double precision, and rounding them to single precision changes the answers.
         usual += max(report["change_by_rounding_readings"].values())
     if decoder_of(network) == "network":
-        return max(usual, report["limit"]) if network in MAGNIFYING and precision == "f64" else usual
+        return max(usual, report["limit"]) if network in AMPLIFYING and precision == "f64" else usual
     return max(usual, report["limit"])
 
 
@@ -68,7 +67,7 @@ def run(*command, **options):
 
 
 class Refused(RuntimeError):
-    """The network cannot leave in this precision."""
+    """The network cannot be exported in this precision."""
 
 
 def show(network, bundle, reader, deviation, limit, note=""):
@@ -93,7 +92,7 @@ def export(network, form, precision):
 
 
 def golden(folder):
-    """Readings, outputs, and rows if they are arguments."""
+    """Returns readings, outputs, and rows if they are arguments."""
     metadata = json.loads((folder / "metadata.json").read_text())
     with open(folder / "golden.csv") as file:
         lines = list(csv.DictReader(file))
@@ -136,7 +135,7 @@ def check_onnx(network, precision):
     coordinates, outside = session.run([given, "readings_outside"], inputs)
     show(network, f"onnx {precision}", f"onnxruntime {onnxruntime.__version__}", deviation(folder, coordinates, expected), limit)
     assert outside.shape == (len(readings),), outside.shape
-    # What is invalid has no answer.
+    # Invalid readings give NaN.
     bad = {**inputs, taken: inputs[taken].copy()}
     bad[taken][0, 3] = np.nan if decoder_of(network) == "mean" else np.inf if file_of(network) == OWN else -1
     answers = session.run([given], bad)[0]
@@ -144,20 +143,20 @@ def check_onnx(network, precision):
     if rows is not None:
         answers = session.run([given], {**inputs, "row": np.where(rows == 1, 0, rows)})[0]
         assert np.isnan(answers[rows == 1]).all() and not np.isnan(answers[rows != 1]).any()
-    # Graphs of Gaussians and fuzzy rules, on which onnxruntime agrees to rounding, are miscompiled (by 1.3.5 and 1.4.0).
+    # emx-onnx-cgen 1.3.5 and 1.4.0 miscompile graphs of Gaussians and fuzzy rules; onnxruntime agrees on these up to rounding.
     if decoder_of(network) == "network":
         check_onnx_to_c(network, precision, limit, folder, inputs, coordinates)
 
 
 def check_onnx_to_c(network, precision, limit, folder, inputs, coordinates):
-    """C of an independent compiler of the same graph."""
+    """Checks C code that an independent compiler generates from the same graph."""
     if importlib.util.find_spec("emx_onnx_cgen") is None:
         print(f"{network:<12} onnx {precision}     emx-onnx-cgen is not installed: not checked")
         return
     import ctypes
     import onnx
 
-    # The compiler wants one size: the batch of the golden vectors.
+    # The compiler needs a fixed batch size: that of the golden vectors.
     model = onnx.load(folder / f"{stem(network)}.onnx")
     for value in [*model.graph.input, *model.graph.output]:
         value.type.tensor_type.shape.dim[0].dim_value = len(coordinates)
@@ -207,7 +206,7 @@ def check_c(network, precision):
     assert not re.search(r" [dDbBC] ", symbols), f"mutable global data:\n{symbols}"
     assert not re.search(r"malloc|calloc", symbols), symbols
     if precision == "fixed16":
-        # The decoder has no floating point: without a floating-point unit it needs no library for it.
+        # The decoder has no floating-point code, so that it needs no library on processors without a floating-point unit.
         assert not re.search(r"\b(float|double)\b", next(folder.glob("*_decode.c")).read_text())
 
 
@@ -242,7 +241,7 @@ def check_numpy(network, precision):
         module.decode(readings * np.inf if file_of(network) == OWN or decoder_of(network) == "mean" else -readings, *([] if rows is None else [rows]))
     except ValueError:
         return
-    failures.append(f"{network} numpy {precision}: readings that are none are accepted")
+    failures.append(f"{network} numpy {precision}: invalid readings are accepted")
 
 
 def check_json(network):
@@ -254,7 +253,7 @@ def check_json(network):
 
 
 def train_on_own_data():
-    """A recording whose names have what would end a comment or a cell."""
+    """Trains on a recording whose names contain characters that end a comment or a cell."""
     rng = np.random.default_rng(0)
     force, torque = rng.uniform(-2e3, 2e3, 500), rng.uniform(-1e-3, 1e-3, 500)
     readings = [force + 1e5 * torque, 1e4 * torque - force / 500, force * torque, 5 + rng.normal(0, 0.1, 500)]
@@ -271,7 +270,7 @@ def train_on_own_data():
 
 
 def check_layers(network):
-    """All formats of a decoder that consists of layers."""
+    """Checks all formats of a decoder that consists of layers."""
     for precision in ["f64", "f32"]:
         for check, form in [(check_onnx, "onnx"), (check_numpy, "numpy"), (check_c, "c99")]:
             try:

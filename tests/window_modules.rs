@@ -1,4 +1,4 @@
-//! The rooms of the window are in one order, and no view knows another.
+//! The modules of the window depend only on earlier modules, and views do not depend on each other.
 
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
@@ -7,7 +7,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-/// The rooms of `src/window`, each of which uses only those before it.
+/// The modules of `src/window`; each uses only those before it.
 const ORDER: [&str; 12] = [
     "theme",
     "glossary",
@@ -24,27 +24,27 @@ const ORDER: [&str; 12] = [
 ];
 
 #[test]
-fn no_room_of_the_window_uses_one_above_it_and_no_view_another() {
-    let app = Path::new(env!("CARGO_MANIFEST_DIR")).join("src/window");
+fn modules_use_only_earlier_modules_and_views_no_other_view() {
+    let window = Path::new(env!("CARGO_MANIFEST_DIR")).join("src/window");
     let mut faults = Vec::new();
-    for file in sources(&app) {
+    for file in sources(&window) {
         let path: Vec<&str> = file
-            .strip_prefix(&app)
+            .strip_prefix(&window)
             .unwrap()
             .iter()
             .map(|part| part.to_str().unwrap())
             .collect();
-        let Some(room) = place_of(path[0]) else {
-            assert_eq!(path, ["mod.rs"], "the room '{}' has no place in the order", path[0]);
+        let Some(module) = place_of(path[0]) else {
+            assert_eq!(path, ["mod.rs"], "the module '{}' is not in the order", path[0]);
             continue;
         };
         for used in uses(&fs::read_to_string(&file).unwrap(), &path) {
-            let is_above = place_of(&used[0]).is_some_and(|place| place > room);
+            let is_above = place_of(&used[0]).is_some_and(|place| place > module);
             let is_other_view = path[0] == "views"
                 && path.len() > 2
                 && used[0] == "views"
                 && used.get(1).is_some_and(|view| view != path[1]);
-            // The names for users of the library hide where they come from.
+            // Names re-exported for users of the library hide their module.
             let is_hidden = used[0].starts_with(char::is_uppercase);
             if is_above || is_other_view || is_hidden {
                 faults.push(format!("{} uses {}", path.join("/"), used.join("::")));
@@ -54,8 +54,8 @@ fn no_room_of_the_window_uses_one_above_it_and_no_view_another() {
     assert_eq!(faults, Vec::<String>::new());
 }
 
-fn place_of(room: &str) -> Option<usize> {
-    ORDER.iter().position(|place| room.trim_end_matches(".rs") == *place)
+fn place_of(module: &str) -> Option<usize> {
+    ORDER.iter().position(|place| module.trim_end_matches(".rs") == *place)
 }
 
 fn sources(folder: &Path) -> Vec<PathBuf> {
@@ -64,9 +64,9 @@ fn sources(folder: &Path) -> Vec<PathBuf> {
     files.collect()
 }
 
-/// What a file of the window uses of the window, from `src/window` on.
+/// Returns the paths in the window that a file of the window uses, relative to `src/window`.
 fn uses(text: &str, file: &[&str]) -> Vec<Vec<String>> {
-    let mut home: Vec<String> = ["crate", "app"]
+    let mut home: Vec<String> = ["crate", "window"]
         .into_iter()
         .chain(file.iter().copied())
         .map(String::from)
@@ -90,13 +90,13 @@ fn uses(text: &str, file: &[&str]) -> Vec<Vec<String>> {
                 .chain(path.split_off(rise))
                 .collect();
         }
-        let is_ours = path.len() > 2 && path[..2] == ["crate", "app"];
+        let is_ours = path.len() > 2 && path[..2] == ["crate", "window"];
         is_ours.then(|| path.split_off(2))
     });
     absolute.collect()
 }
 
-/// Opens the braces of a `use` tree.
+/// Expands the braces of a `use` tree.
 fn spread(tree: &str, before: &mut Vec<String>, found: &mut Vec<Vec<String>>) {
     let mut depth = 0;
     let parts = tree.split(|letter| {

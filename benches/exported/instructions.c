@@ -1,5 +1,5 @@
-/* Instructions that a decoder in whole numbers takes for a row-wire, counted by qemu-system-arm -icount shift=0, where an
- * instruction takes 1 ns and SysTick of the machine mps2-an386 counts at 25 MHz. It is the whole program: no library. */
+/* Counts the instructions of a fixed-point decoder for a row-wire, in qemu-system-arm -icount shift=0, where an instruction
+ * takes 1 ns and SysTick of the machine mps2-an386 counts at 25 MHz. This is the whole program, without a library. */
 #define JOINED(a, b) a##b
 #define NAME(a, b) JOINED(a, b)
 #include HEADER

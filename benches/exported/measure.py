@@ -1,4 +1,4 @@
-"""Time of a frame of 10 row-wires by exported networks, and size and instructions of the decoder in whole numbers on ARM.
+"""Time per frame of 10 row-wires of exported networks, and size and instructions of the fixed-point decoder on ARM.
 
 Usage: measure.py PROGRAM, where PROGRAM is the release build; needs onnxruntime, gcc, for the sizes arm-none-eabi-gcc, and for
 the instructions qemu-system-arm as well. Prints Markdown tables.
@@ -31,7 +31,7 @@ def run(*command):
 
 
 def frame(home, name):
-    """Readings of one frame in ohm: 10 x 30."""
+    """Returns the readings of one frame in ohm: 10 x 30."""
     run(PROGRAM, "simulate", "--samples", 10, "--seed", 3, "--out", home / f"{name}.csv")
     with open(home / f"{name}.csv") as file:
         lines = list(csv.DictReader(file))
@@ -69,7 +69,7 @@ def time_onnx(folder, readings, precision, takes_row):
 
 
 def arm_size(folder, cpu):
-    """Flash of the decoder with the arithmetic that the processor lacks, static memory, and stack of the decoder."""
+    """Returns flash of the decoder with the arithmetic that the processor lacks, static memory, and stack of the decoder."""
     source, image = next(folder.glob("*_decode.c")), folder / f"{cpu}.elf"
     prefix = source.name.removesuffix("_decode.c")
     call = f"{prefix}_decode({'1, ' if 'int row' in source.read_text() else ''}(const int32_t *)0x20000000, (int32_t *)0x20001000)"
@@ -87,7 +87,7 @@ def arm_size(folder, cpu):
 
 
 def arm_instructions(folder, cpu, optimisation, readings, scale):
-    """Instructions for a row-wire, and the last z_1 in nm, by an emulated processor that takes 1 ns for each of them."""
+    """Returns the instructions for a row-wire, and the last z_1 in nm, on an emulated processor that takes 1 ns for each."""
     source, image = next(folder.glob("*_decode.c")), folder / f"{cpu}{optimisation}.elf"
     rows = ", ".join("{" + ", ".join(str(round(value * scale)) for value in row) + "}" for row in readings)
     sizes = f"#define ROWS {len(readings)}\n#define DECODED 30\n"
@@ -100,9 +100,9 @@ def arm_instructions(folder, cpu, optimisation, readings, scale):
     run("arm-none-eabi-gcc", *flags, *link, "--specs=nosys.specs", HERE / "instructions.c", source, "-o", image)
     machine = ["qemu-system-arm", "-machine", "mps2-an386", "-icount", "shift=0", "-kernel", image]
     quiet = ["-nographic", "-monitor", "none", "-serial", "none", "-semihosting-config", "enable=on,target=native"]
-    # What a program says to its host comes on standard error.
-    said = subprocess.run([str(part) for part in machine + quiet], capture_output=True, text=True, timeout=300).stderr
-    return tuple(map(int, said.split()))
+    # Output of the emulated program to its host is on standard error.
+    output = subprocess.run([str(part) for part in machine + quiet], capture_output=True, text=True, timeout=300).stderr
+    return tuple(map(int, output.split()))
 
 
 with tempfile.TemporaryDirectory() as home:
@@ -134,12 +134,12 @@ with tempfile.TemporaryDirectory() as home:
                         for cpu, optimisation in itertools.product(["m0", "m4"], ["-Os", "-O2"]):
                             counted = arm_instructions(folder, cpu, optimisation, readings, scale)
                             instructions.append((name, f"Cortex-{cpu.upper()}", optimisation, *counted))
-    print("| network | decoder | µs a frame |\n|---|---|---|")
+    print("| network | decoder | µs per frame |\n|---|---|---|")
     for name, decoder, microseconds in times:
         print(f"| {name} | {decoder} | {microseconds:.2f} |")
     print("\n| network | processor | flash, bytes | static RAM, bytes | stack, bytes |\n|---|---|---|---|---|")
     for row in sizes:
         print("| " + " | ".join(map(str, row)) + " |")
-    print("\n| network | processor | compiled with | instructions a row-wire | z_1 of the last row-wire, nm |\n|---|---|---|---|---|")
+    print("\n| network | processor | compiled with | instructions per row-wire | z_1 of the last row-wire, nm |\n|---|---|---|---|---|")
     for row in instructions:
         print("| " + " | ".join(map(str, row)) + " |")

@@ -1,10 +1,10 @@
 """Live decoding over a pseudo-terminal pair.
 
-Usage: follow.py PROGRAM [SECONDS [ROWS]], where PROGRAM is the release build; SECONDS is how long lines come at a steady rate,
-600 unless given; ROWS is the number of row-wires in a line: 10, a whole frame of 300 resistances, unless 1 is given. Trains the
-network of the 10x10_5x30 array with 12 hidden nodes and prints Markdown tables: a steady 1000 lines a second, the same with
-garbage in every tenth line, and as many as the terminal carries, also with a reader of the answers that is slower than the
-program.
+Usage: follow.py PROGRAM [SECONDS [ROWS]], where PROGRAM is the release build; SECONDS is the duration of the steady rate,
+600 by default; ROWS is the number of row-wires in a line: 10, a whole frame of 300 resistances, by default, or 1. Trains the
+network of the 10x10_5x30 array with 12 hidden nodes and prints Markdown tables: a steady 1000 lines per second, the same
+with garbage in every tenth line, and the maximum rate of the terminal, also with a reader of the answers that is slower than
+the program.
 """
 
 import os
@@ -29,15 +29,15 @@ def resident_kib(process):
 
 
 class Decoder:
-    """The program at one end of a pseudo-terminal, and what it answers."""
+    """The program at one end of a pseudo-terminal, and its answers."""
 
-    def __init__(self, network, most_a_second=None):
-        self.most_a_second = most_a_second
+    def __init__(self, network, max_per_second=None):
+        self.max_per_second = max_per_second
         self.master, slave = os.openpty()
         tty.setraw(self.master)
         tty.setraw(slave)
         command = [PROGRAM, "decode", "--network", network, "--follow", "--input", f"{os.ttyname(slave)}:115200"]
-        # A shell lets what it runs in the background ignore interruptions.
+        # A shell makes its background processes ignore interrupts.
         listens = lambda: signal.signal(signal.SIGINT, signal.default_int_handler)
         self.process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, preexec_fn=listens)
         self.answers, self.last = 0, time.monotonic()
@@ -46,7 +46,7 @@ class Decoder:
         threading.Thread(target=self.count, daemon=True).start()
         threading.Thread(target=self.listen, daemon=True).start()
         time.sleep(1.0)
-        # The program may have come in the middle of a line: it leaves out the first.
+        # The program may start to read in the middle of a line, so it skips the first line.
         self.send(b"the end of a line\n")
 
     def count(self):
@@ -54,8 +54,8 @@ class Decoder:
             answers = chunk.count(b"\n")
             self.answers += answers
             self.last = time.monotonic()
-            if self.most_a_second:
-                time.sleep(answers / self.most_a_second)
+            if self.max_per_second:
+                time.sleep(answers / self.max_per_second)
 
     def listen(self):
         for line in self.process.stderr:
@@ -67,7 +67,7 @@ class Decoder:
             view = view[os.write(self.master, view) :]
 
     def settle(self):
-        """Waits until it has answered all that it will."""
+        """Waits until no more answers come."""
         while time.monotonic() - max(self.last, self.begun) < 1.0:
             time.sleep(0.05)
 
@@ -75,7 +75,7 @@ class Decoder:
         self.process.send_signal(signal.SIGINT)
         self.process.wait(20)
         time.sleep(0.2)
-        # The first line of the output has the names.
+        # The first line of the output is the header.
         return self.answers - 1, [line for line in self.warnings if not line.startswith("warning")][-6:]
 
 
@@ -101,8 +101,8 @@ def steady(network, lines, seconds, garbage):
     print(f"<!-- sender at most {1e3 * late:.0f} ms late; {' / '.join(report)} -->", flush=True)
 
 
-def flood(network, lines, seconds, most_a_second):
-    decoder = Decoder(network, most_a_second)
+def flood(network, lines, seconds, max_per_second):
+    decoder = Decoder(network, max_per_second)
     decoder.begun = time.monotonic()
     block = b"".join(lines)
     memory, sent, gaps, before = [], 0, 0.0, decoder.answers
@@ -120,7 +120,7 @@ def flood(network, lines, seconds, most_a_second):
     alone = time.monotonic() - start
     memory.append(resident_kib(decoder.process))
     _, report = decoder.end()
-    name = f"flood, answers taken at {most_a_second} a second" if most_a_second else "flood"
+    name = f"flood, answers taken at {max_per_second} per second" if max_per_second else "flood"
     print(f"| {name} | {seconds:.0f} | {sent} | {sent / seconds:.0f} | {answered / seconds:.0f} | {1e3 * gaps:.0f} | {1e3 * alone:.1f} | {memory[0]} to {memory[-1]} |")
     print(f"<!-- {' / '.join(report)} -->", flush=True)
 
@@ -138,7 +138,7 @@ with tempfile.TemporaryDirectory() as home:
     print("| lines | seconds | sent | bad | answered | lost | resident memory, KiB |\n|---|---|---|---|---|---|---|")
     steady(network, lines, SECONDS, garbage=False)
     steady(network, lines, min(SECONDS, 60.0), garbage=True)
-    print("\n| lines | seconds | sent | sent a second | answered a second | longest gap, ms | one after it, ms | resident memory, KiB |")
+    print("\n| lines | seconds | sent | sent per second | answered per second | longest gap, ms | single line after, ms | resident memory, KiB |")
     print("|---|---|---|---|---|---|---|---|")
     flood(network, lines, min(SECONDS, 30.0), None)
     flood(network, lines, min(SECONDS, 30.0), 2000)

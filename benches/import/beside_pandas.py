@@ -1,4 +1,4 @@
-"""Time and memory of reading a table of 1 000 000 rows and 30 columns, beside pandas. Usage: beside_pandas.py PROGRAM FOLDER.
+"""Time and memory of reading a table of 1 000 000 rows and 30 columns, compared with pandas. Usage: beside_pandas.py PROGRAM FOLDER.
 
 The file of 312 MB is made in FOLDER and removed again.
 """
@@ -16,7 +16,7 @@ PANDAS = f"import pandas; pandas.read_csv({str(PATH)!r})"
 
 
 def measured(command):
-    """Seconds by the clock and of the processor, and the most memory in MB."""
+    """Returns wall-clock and processor time in seconds, and the peak memory in MB."""
     begun = time.monotonic()
     process = subprocess.Popen(command, stdout=subprocess.DEVNULL)
     _, status, usage = os.wait4(process.pid, 0)
@@ -38,6 +38,6 @@ try:
         ours = [PROGRAM, "inspect", "--data", str(PATH), "--json"]
         for name, command in [("inspect", ours), ("pandas", [sys.executable, "-c", PANDAS])]:
             seconds, of_processor, megabytes = measured(command)
-            print(f"{name:<8} {seconds:5.1f} s, {of_processor:4.1f} s of processor, {megabytes:4.0f} MB", flush=True)
+            print(f"{name:<8} {seconds:5.1f} s, {of_processor:4.1f} s of processor time, {megabytes:4.0f} MB", flush=True)
 finally:
     PATH.unlink(missing_ok=True)

@@ -1,20 +1,21 @@
-//! Time of frames by the clock, and on the processor where the system tells it.
+//! Wall-clock time of frames, and processor time if the system reports it.
 
 use std::time::Duration;
 
 /// Time that this thread has spent on a processor (Linux). It is exact after a sleep only.
 pub fn on_processor() -> Option<Duration> {
-    let told = std::fs::read_to_string("/proc/thread-self/schedstat").ok()?;
-    let nanoseconds = told.split_whitespace().next()?.parse().ok()?;
+    let schedstat = std::fs::read_to_string("/proc/thread-self/schedstat").ok()?;
+    let nanoseconds = schedstat.split_whitespace().next()?.parse().ok()?;
     Some(Duration::from_nanos(nanoseconds))
 }
 
 pub fn print_head() {
-    println!("{:<60} {:>23} {:>13}", "ms a frame", "by the clock", "on processor");
+    println!("{:<60} {:>23} {:>13}", "ms per frame", "wall clock", "processor");
     println!("{:<60} {:>7} {:>7} {:>7} {:>13}", "", "p50", "p95", "max", "mean");
 }
 
-/// Prints the quantiles of frames by the clock, with what other threads took away, and their mean without.
+/// Prints the quantiles of the wall-clock times of frames, which include interruptions by other threads, and the mean
+/// of their processor times, which do not.
 pub fn print_row(name: &str, mut wall: Vec<Duration>, processor: Option<Duration>) {
     let frames = wall.len();
     wall.sort_unstable();

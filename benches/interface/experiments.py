@@ -1,10 +1,10 @@
-"""The window while the experiment of Table 1 trains on all cores: time from a movement of the pointer until a button lights
-up, frames a second while a column is drawn wider, time from Cancel until Run is offered again.
+"""The window while the experiment of Table 1 trains on all cores: time from a movement of the pointer until a button is
+highlighted, frames per second while a column is resized, time from Cancel until Run is enabled again.
 
     cargo build --release
     python3 benches/interface/experiments.py target/release/decoupler
 
-What it needs stands in `screen.py`.
+Its requirements are listed in `screen.py`.
 """
 
 import json
@@ -19,10 +19,11 @@ from screen import Window, quantiles, shell
 MOVEMENTS = 60
 FRAMES_S = 10.0
 CANCELS = 10
-# Where the pointer lights up the button Search, and its left, right, top and bottom next to the pointer, in pixels.
+# Position where the pointer highlights the button Search, and an area of it next to the pointer: left, right, top and bottom,
+# in pixels.
 SEARCH = (1334, 42)
-SEARCH_BESIDE = (1300, 1308, 34, 52)
-# Where the edge of the left column is taken, how far it is drawn, and the headings that move with it, in pixels.
+SEARCH_EDGE = (1300, 1308, 34, 52)
+# Position of the edge of the left column, how far it is dragged, and the headings that move with it, in pixels.
 EDGE = (272, 700)
 DRAWN = 120
 HEADINGS = (280, 1000, 90, 130)
@@ -41,22 +42,22 @@ def measure(window):
     shell("xdotool", "key", "ctrl+Return")
     time.sleep(5)
     print(f"pointer to pixel, ms: {quantiles([hover(window) for _ in range(MOVEMENTS)])}")
-    print(f"frames a second while a column is drawn: {frames(window) / FRAMES_S:.0f}")
+    print(f"frames per second while a column is resized: {frames(window) / FRAMES_S:.0f}")
     print(f"Cancel to Run, ms: {quantiles([cancel(window) for _ in range(CANCELS)])}")
     window.save_picture()
 
 
 def hover(window):
-    """Moves the pointer to a button; returns the time until the button lights up."""
+    """Moves the pointer to a button; returns the time until the button is highlighted."""
     window.move((EDGE[0] + 200, EDGE[1]))
     time.sleep(0.2 + 0.1 * random.random())
-    before = window.screen.pixels(SEARCH_BESIDE)
+    before = window.screen.pixels(SEARCH_EDGE)
     window.move(SEARCH)
-    return window.until_changed(SEARCH_BESIDE, before, "The light of the button")
+    return window.until_changed(SEARCH_EDGE, before, "The highlight of the button")
 
 
 def frames(window):
-    """Draws the left column wider and narrower for `FRAMES_S` seconds; returns how often the headings next to it move."""
+    """Resizes the left column for `FRAMES_S` seconds; returns how often the headings next to it move."""
     window.move(EDGE)
     time.sleep(0.5)
     window.press()
@@ -67,7 +68,7 @@ def frames(window):
         after = window.screen.pixels(HEADINGS)
         count += after != before
         before = after
-        # A mouse tells where it is some 200 times a second.
+        # A mouse reports its position about 200 times per second.
         time.sleep(0.005)
     window.move(EDGE)
     time.sleep(0.5)
@@ -76,7 +77,7 @@ def frames(window):
 
 
 def cancel(window):
-    """Presses Cancel; returns the time from its release until Run can be pressed again. Then the experiment runs again."""
+    """Presses Cancel; returns the time from its release until Run is enabled again. Then restarts the experiment."""
     window.move(CANCEL)
     time.sleep(1 + random.random())
     before = window.screen.pixels(RUN)

@@ -1,7 +1,8 @@
-//! Work of the interface thread for each frame of the window, without a GPU: layout and tessellation, at rest, under a
-//! moving pointer and while a network trains; and the first frame. Drawing the triangles is the renderer's and not counted.
+//! Time of the interface thread for each frame of the window, without a GPU: layout and tessellation, at rest, under a
+//! moving pointer and while a network trains; and the first frame. Drawing the triangles is the renderer's work and is
+//! not counted.
 //!
-//! `cargo bench --bench interface`, or with `-- own-data` the recordings alone.
+//! `cargo bench --bench interface`, or with `-- own-data` for the recordings alone.
 
 #![allow(clippy::print_stdout, reason = "a bench prints its table")]
 
@@ -24,7 +25,7 @@ use eframe::egui::{Context, Event, Modifiers, PointerButton, RawInput, Rect, acc
 
 /// Time between two frames of a screen.
 const FRAME: Duration = Duration::from_millis(16);
-/// Frames that each row of the table is measured over.
+/// Number of frames measured for each row of the table.
 const FRAMES: usize = 240;
 
 /// The window as eframe runs it, without a screen.
@@ -34,7 +35,7 @@ struct Bench {
     begun: Instant,
     /// Files dropped on the window in the next frame.
     dropped: Vec<PathBuf>,
-    /// What the last frame says to assistive technology, if that was asked for.
+    /// Output of the last frame for assistive technology, if it was requested.
     nodes: Option<TreeUpdate>,
 }
 
@@ -129,7 +130,7 @@ impl Bench {
 /// 8000 nodes.
 const LARGE: &str = "100x80_40x240";
 
-/// A training that does not end while it is measured.
+/// Returns the settings of a training that does not end while it is measured.
 fn endless(scale: &str) -> SimulatedSettings {
     let mut settings = SimulatedSettings::default();
     if scale == LARGE {
@@ -151,7 +152,7 @@ fn over_the_surfaces(number: usize) -> Vec<Event> {
     ))]
 }
 
-/// Prints the time that the loss chart of a long training takes a frame before it is painted.
+/// Prints the time per frame that the loss chart of a long training takes before it is painted.
 fn long_training() {
     const EPOCHS: usize = 1_000_000;
     let mut outline = EpochOutline::new();
@@ -167,7 +168,7 @@ fn long_training() {
             validation_failures: epoch % 6,
         })
         .collect();
-    epochs.chunks(100).for_each(|news| outline.extend(news));
+    epochs.chunks(100).for_each(|chunk| outline.extend(chunk));
     let mut figures = Vec::new();
     let mut points = 0;
     for _ in 0..FRAMES {
@@ -193,7 +194,7 @@ fn main() {
     let mut bench = Bench::open();
     let first = bench.frame(Vec::new());
     println!(
-        "first frame: {:.1} ms from the start of the program, of these {:.1} ms laid out and tessellated\n",
+        "first frame: {:.1} ms from the start of the program, of which layout and tessellation {:.1} ms\n",
         1e3 * begun.elapsed().as_secs_f64(),
         1e3 * first.as_secs_f64()
     );

@@ -34,7 +34,7 @@ def main():
 
 
 def kept_at_closing(binary):
-    """What the window keeps when it is closed: its settings, as they are at the first start."""
+    """Returns the settings that the window saves when it is closed after the first start."""
     with Window(binary) as window:
         shell("wmctrl", "-c", "Decoupler")
         window.program.wait(10)

@@ -36,7 +36,7 @@ pub(super) fn dropped(path: PathBuf) -> Arc<dyn egui::DroppedFile + Send + Sync>
     Arc::new(Dropped(path))
 }
 
-/// Readings that are nearly linear in a wandering position and force.
+/// Writes readings that are nearly linear in a wandering position and force.
 fn write_recording(path: &Path) -> io::Result<()> {
     let names = (1..=INPUTS).map(|input| format!("u{input} (V)"));
     let mut text: String = names
@@ -63,7 +63,7 @@ fn write_recording(path: &Path) -> io::Result<()> {
 }
 
 impl Bench {
-    /// Draws a frame, and returns what it says to assistive technology.
+    /// Draws a frame, and returns its output for assistive technology.
     fn nodes(&mut self) -> Vec<Node> {
         self.ctx.enable_accesskit();
         self.frame(Vec::new());
@@ -80,7 +80,7 @@ impl Bench {
             .any(|node| contains(node.label()) || contains(node.value()))
     }
 
-    /// Waits until the window says this; returns whether it does.
+    /// Waits until the window contains this text; returns false on a timeout.
     fn wait_for(&mut self, text: &str) -> bool {
         let latest = Instant::now() + PATIENCE;
         while Instant::now() < latest {

@@ -1,12 +1,13 @@
 """Time from a press of the mouse on the actual surface until the decoupled surface changes on the screen, and from a
-movement of the pointer over the surface until the outline of what would press there is drawn. While nothing trains, also the
-processor time of the window's thread for such a movement, which depends less than the others on what else the machine does.
+movement of the pointer over the surface until the outline of the pressing body is drawn there. Without a training, also the
+processor time of the window's thread for such a movement, which depends less on the load of the machine than the other times.
 
     cargo build --release
     python3 benches/interface/press.py target/release/decoupler            # the small network answers, nothing trains
     python3 benches/interface/press.py target/release/decoupler training   # while a network trains
 
-What it needs stands in `screen.py`. A frame is a change of either card; that of the readings' worker or the training counts too.
+Its requirements are listed in `screen.py`. A frame is a change of either card, including changes by the readings' worker or the
+training.
 """
 
 import random
@@ -20,10 +21,10 @@ MOVEMENTS = 120
 COSTED_MOVEMENTS = 300
 # Size of the pointer, in pixels.
 POINTER = 24
-# Left, right, top and bottom of what is watched, in pixels.
+# Left, right, top and bottom of the watched areas, in pixels.
 ACTUAL = (310, 610, 110, 560)
 DECOUPLED = (660, 960, 110, 560)
-# Where the surface is pressed.
+# Positions where the surface is pressed.
 PLACES = [(415, 200), (470, 215), (440, 225), (500, 200)]
 # Changes of both cards within this time are of one frame, which is copied row by row.
 ONE_FRAME_S = 0.004
@@ -35,7 +36,7 @@ def measure(window, trains):
         shell("xdotool", "key", "ctrl+Return")
         time.sleep(6)
     else:
-        print(f"processor time of the window's thread for a movement, ms: {cost(window):.1f}")
+        print(f"processor time of the window's thread per movement, ms: {cost(window):.1f}")
     hovered = [hover(window, PLACES[number % len(PLACES)]) for number in range(MOVEMENTS)]
     print(f"pointer to pixel, ms: {quantiles(hovered)}")
     window.move(PLACES[0])
@@ -57,7 +58,7 @@ def measure(window, trains):
 
 
 def cost(window):
-    """Moves the pointer about the actual surface; returns the mean processor time of the window's thread, in ms."""
+    """Moves the pointer over the actual surface; returns the mean processor time of the window's thread, in ms."""
     begun = window.processor_ms()
     for number in range(COSTED_MOVEMENTS):
         window.move((PLACES[0][0] + 7 * number % 120, PLACES[0][1] + 3 * number % 60))
@@ -66,8 +67,8 @@ def cost(window):
 
 
 def hover(window, place):
-    """Moves the pointer to a place of the actual surface; returns the time until the picture there changes, but for the
-    pointer's own."""
+    """Moves the pointer to a place of the actual surface; returns the time until the picture there changes, apart from the
+    pointer itself."""
     window.move((ACTUAL[0] + 20, ACTUAL[2] - 60))
     time.sleep(0.3 + 0.1 * random.random())
     # Next to the pointer, where the body's outline is drawn.
@@ -94,7 +95,7 @@ def press(window):
             actual, changed = other, now
         if is_answered:
             return now - begun, frames
-    raise SystemExit("The decoupled surface never changed: is the window laid out otherwise?")
+    raise SystemExit("The decoupled surface never changed: has the layout of the window changed?")
 
 
 with Window(sys.argv[1]) as window:

@@ -1,7 +1,7 @@
-"""The window on a screen of its own, driven and watched by `press.py` and `experiments.py`.
+"""A window on its own screen, controlled and watched by `press.py` and `experiments.py`.
 
-Needs Xvfb, openbox, xdotool and python3-xlib. The screen is read from Xvfb's own frame buffer, so that looking costs the
-window nothing.
+Needs Xvfb, openbox, xdotool and python3-xlib. The screen is read from Xvfb's own frame buffer, which does not slow the
+window down.
 """
 
 import mmap
@@ -18,7 +18,7 @@ DISPLAY = ":87"
 
 
 class Window:
-    """The program in a window that fills a screen of its own, with a folder of its own for what it keeps."""
+    """The program in a window that fills its own screen, with its own folder for settings and runs."""
 
     def __init__(self, binary, prepare=lambda folder: None):
         self.scratch = tempfile.TemporaryDirectory()
@@ -79,7 +79,7 @@ class Window:
         time.sleep(0.2)
 
     def processor_ms(self):
-        """Processor time of the program's first thread, which draws the window, since its start."""
+        """Returns the processor time of the program's first thread, which draws the window, since its start."""
         process = self.program.pid
         with open(f"/proc/{process}/task/{process}/schedstat") as file:
             return 1e-6 * int(file.read().split()[0])
@@ -96,15 +96,15 @@ class Window:
         return count
 
     def until_changed(self, area, before, what):
-        """The time until the pixels of an area are no longer those of `before`."""
+        """Returns the time until the pixels of an area differ from `before`."""
         begun = time.perf_counter()
         while time.perf_counter() - begun < 2:
             if self.screen.pixels(area) != before:
                 return time.perf_counter() - begun
-        raise SystemExit(f"{what} never came: is the window laid out otherwise?")
+        raise SystemExit(f"{what} never appeared: has the layout of the window changed?")
 
     def save_picture(self):
-        """Saves the screen in the file that the variable PICTURE names, if there is one."""
+        """Saves the screen to the file that the environment variable PICTURE names, if it is set."""
         if picture := os.environ.get("PICTURE"):
             shell("import", "-window", "root", picture)
 

@@ -1,4 +1,5 @@
-//! Arguments of the terminal: every call ends with a status of ours, and one that fails says why in a line.
+//! Command-line arguments: every call ends with one of our exit statuses, and a failed call prints the reason in one
+//! line.
 
 use std::{path::Path, process::Command};
 
@@ -16,7 +17,7 @@ const CALLS: [&str; 4] = [
      --method scg --set sigma=1e-5 --inputs log --scaling whiten --seed 3",
 ];
 
-/// True if the call is accepted; else it says why.
+/// Returns true if the call is accepted; otherwise checks its error message.
 fn check(arguments: &[String], folder: &Path) -> bool {
     let output = Command::new(env!("CARGO_BIN_EXE_decoupler"))
         .args(arguments)
@@ -63,7 +64,7 @@ fn every_call_ends_with_a_status_and_a_reason() {
             let place = rng.random_range(1..arguments.len());
             let changed = mutated(arguments[place].as_bytes(), rng);
             let changed = String::from_utf8_lossy(&changed).replace('\0', "");
-            // Counts with more digits are work, not trouble.
+            // Counts with more digits only take longer.
             if changed.len() > 6 && changed.bytes().all(|byte| byte.is_ascii_digit()) {
                 return;
             }

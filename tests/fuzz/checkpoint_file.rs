@@ -10,7 +10,7 @@ use crate::{
 };
 
 #[test]
-fn damage_is_noticed_and_impossible_states_are_refused() {
+fn damage_is_detected_and_impossible_states_are_refused() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("run.checkpoint");
     for run in trained() {

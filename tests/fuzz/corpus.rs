@@ -1,9 +1,9 @@
 //! Replaying a corpus of inputs.
 
-/// Feeds `$check` with every file of the corpus of the test it is in: `__fuzz__/<module>__<test>/corpus`.
+/// Calls `$check` with every file in the corpus of the enclosing test: `__fuzz__/<module>__<test>/corpus`.
 ///
-/// Nothing random is added, so the same files give the same result. `cargo bolero test <module>::<test>` (libFuzzer, by
-/// hand) changes them with regard to what code they reach, and adds what it finds.
+/// Nothing random is added, so the same files give the same result. `cargo bolero test <module>::<test>` (libFuzzer,
+/// run by hand) mutates them guided by code coverage, and adds what it finds.
 macro_rules! replay {
     ($check:expr) => {
         let replayed = std::sync::atomic::AtomicUsize::new(0);

@@ -8,14 +8,14 @@ use crate::{
     mutation::{for_each_seed, mutated},
 };
 
-/// Reads `bytes` as a file of this ending, looks at its columns, and makes samples of its first two.
+/// Reads `bytes` as a file with the extension of `path`, checks its columns, and makes samples of the first two.
 fn check(bytes: &[u8], path: &Path) {
     fs::write(path, bytes).unwrap();
-    let mut go_on = |_| ControlFlow::Continue(());
-    let Ok(table) = read_table(path, DialectChoice::default(), &mut go_on) else {
+    let mut watch = |_| ControlFlow::Continue(());
+    let Ok(table) = read_table(path, DialectChoice::default(), &mut watch) else {
         return;
     };
-    // A header that lies does not make memory.
+    // A false header does not allocate memory.
     assert!(table.rows <= 1100 * bytes.len().max(1));
     for column in &table.columns {
         assert_eq!(column.cells.len(), table.rows);
@@ -25,7 +25,7 @@ fn check(bytes: &[u8], path: &Path) {
             assert!(numbers.iter().all(|number| !number.is_infinite()));
         }
     }
-    let (inspection, _) = Inspection::read(path, DialectChoice::default(), None, &mut go_on).unwrap();
+    let (inspection, _) = Inspection::read(path, DialectChoice::default(), None, &mut watch).unwrap();
     for column in &inspection.columns {
         let bars = column.histogram.iter().sum::<usize>();
         assert!(bars == 0 || bars == table.rows - column.missing - column.texts);
@@ -42,7 +42,7 @@ fn check(bytes: &[u8], path: &Path) {
             .collect(),
         ..Recipe::default()
     };
-    if let Ok(recording) = recipe.import(Path::new(""), &mut go_on) {
+    if let Ok(recording) = recipe.import(Path::new(""), &mut watch) {
         let set = &recording.set;
         assert!(
             set.readings()
@@ -87,7 +87,7 @@ fn any_input() {
     let folder = tempfile::tempdir().unwrap();
     let recording = folder.path().join("recording.csv");
     fs::write(&recording, "u,d1,d2\n1,2,3\n4,5,6\n").unwrap();
-    // By its ending, a file that has lost its beginning is still taken for a MAT-file.
+    // With its extension, a file without its beginning is still read as a MAT-file.
     let paths = ["data.csv", "data.mat"].map(|name| folder.path().join(name));
     replay!(|bytes: &[u8]| {
         for path in &paths {

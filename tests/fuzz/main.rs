@@ -1,10 +1,10 @@
-//! Every reader and parser fed with damaged and arbitrary input: nothing panics, hangs or grows without bound, and what
-//! is accepted is what was written, or answers with finite numbers.
+//! Damaged and arbitrary input for every reader and parser: nothing panics, hangs or grows without bound, and accepted
+//! input equals what was written or gives finite numbers.
 //!
-//! Inputs are the files of a corpus, and valid ones changed at random by a seeded generator, so that a failure comes back;
-//! `FUZZ_ROUNDS=1000` in the environment multiplies their number for a campaign by hand. `bolero` replays the corpus. It
-//! draws no inputs of its own here: without a fuzzer they come from a seed of the system, seldom pass the first brace and
-//! never come back. Under `cargo bolero test` the same tests are targets of libFuzzer.
+//! Inputs are the files of a corpus, and valid inputs mutated by a seeded random generator, so failures are
+//! reproducible; `FUZZ_ROUNDS=1000` in the environment multiplies their number for a manual campaign. `bolero` only
+//! replays the corpus: without a fuzzer, its own inputs come from a seed of the system, rarely get past the first brace
+//! and are not reproducible. Under `cargo bolero test` the same tests are libFuzzer targets.
 
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 

@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use rand::{Rng, RngExt, SeedableRng, rngs::ChaCha8Rng};
 
-/// Text that readers have stumbled over.
+/// Text that parsers have failed on.
 const TOKENS: [&str; 30] = [
     "0",
     "-1",
@@ -46,7 +46,7 @@ pub(crate) fn for_each_seed(default: u64, mut check: impl FnMut(&mut ChaCha8Rng)
     }
 }
 
-/// `valid` with one to four random changes.
+/// Returns `valid` with one to four random changes.
 pub(crate) fn mutated(valid: &[u8], rng: &mut impl Rng) -> Vec<u8> {
     let mut bytes = valid.to_vec();
     for _ in 0..rng.random_range(1..=4) {
@@ -89,7 +89,7 @@ fn change(bytes: &mut Vec<u8>, rng: &mut impl Rng) {
     }
 }
 
-/// Replaces a digit by another.
+/// Replaces a digit by another digit.
 fn other_digit(bytes: &mut [u8], rng: &mut impl Rng) {
     let digits: Vec<usize> = (0..bytes.len())
         .filter(|&place| bytes[place].is_ascii_digit())
@@ -99,7 +99,7 @@ fn other_digit(bytes: &mut [u8], rng: &mut impl Rng) {
     }
 }
 
-/// Exchanges two of the parts between separators.
+/// Swaps two of the parts between separators.
 fn swap(bytes: &mut Vec<u8>, separator: u8, rng: &mut impl Rng) {
     let mut parts: Vec<&[u8]> = bytes.split(|&byte| byte == separator).collect();
     let (one, other) = (rng.random_range(0..parts.len()), rng.random_range(0..parts.len()));
@@ -107,7 +107,7 @@ fn swap(bytes: &mut Vec<u8>, separator: u8, rng: &mut impl Rng) {
     *bytes = parts.join(&separator);
 }
 
-/// The number that begins at `place` or later.
+/// Returns the range of the number that begins at `place` or later.
 fn number_at(bytes: &[u8], place: usize) -> Range<usize> {
     let is_part = |byte: &u8| byte.is_ascii_digit() || b"+-.e".contains(byte);
     let begin = place + bytes[place..].iter().position(is_part).unwrap_or(0);

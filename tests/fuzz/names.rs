@@ -1,4 +1,4 @@
-//! Parsers of words: what they accept is printed and read again as the same.
+//! Parsers of names: accepted values are unchanged after printing and parsing.
 
 use std::{fmt::Display, str::FromStr};
 
@@ -36,7 +36,7 @@ fn check_word<T: FromStr<Err: Display> + Display + PartialEq>(text: &str) {
     }
 }
 
-/// Every word is given to every parser.
+/// Every input is given to every parser.
 #[test]
 fn any_input() {
     replay!(|bytes: &[u8]| {

@@ -23,7 +23,7 @@ fn loaded(path: &Path, bytes: &[u8]) -> Option<NetworkFile> {
     }
 }
 
-/// Files as they are on a disk that fails.
+/// Files damaged by a failing disk.
 #[test]
 fn no_damage_changes_a_number() {
     let folder = tempfile::tempdir().unwrap();
@@ -42,9 +42,9 @@ fn no_damage_changes_a_number() {
     }
 }
 
-/// Files made to deceive, or damaged before there were checksums.
+/// Crafted files, or files damaged before there were checksums.
 #[test]
-fn what_is_accepted_answers_in_numbers_or_is_flagged() {
+fn accepted_files_give_finite_answers_or_are_flagged() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("network.json");
     let mut accepted = 0;
@@ -61,7 +61,8 @@ fn what_is_accepted_answers_in_numbers_or_is_flagged() {
     assert!(accepted > 20, "only {accepted} files reach the network");
 }
 
-/// True if the file is accepted; then it answers soundly, and is what it is when saved and loaded again.
+/// Returns true if the file is accepted; then its answers are checked, and it must be unchanged after saving and
+/// loading.
 fn check(path: &Path, bytes: &[u8], rng: &mut impl RngExt) -> bool {
     let Some(file) = loaded(path, bytes) else { return false };
     let Some(simulation) = file.settings.source.simulation() else {
@@ -94,7 +95,7 @@ fn any_input() {
     });
 }
 
-/// An answer is flagged, refused as not finite, or within a stroke of where nodes are.
+/// Checks that an answer is flagged, refused as not finite, or within a stroke of the possible positions of nodes.
 fn check_answer(network: &DecouplingNetwork, readings_ohm: &[f64], height_mm: f64) {
     let readings = ndarray::ArrayView2::from_shape((1, readings_ohm.len()), readings_ohm).unwrap();
     let answer = network.decouple(readings);

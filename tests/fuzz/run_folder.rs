@@ -9,7 +9,7 @@ use crate::{
 };
 
 #[test]
-fn damage_costs_the_damaged_file_only_and_changes_none() {
+fn damage_affects_only_the_damaged_file_and_changes_no_file() {
     let folder = tempfile::tempdir().unwrap();
     let (mut kept, _) = RunFolder::open(folder.path()).unwrap();
     for run in trained() {
@@ -49,7 +49,7 @@ fn damage_costs_the_damaged_file_only_and_changes_none() {
     assert_eq!((found.runs(), problems), (kept.runs(), Vec::new()));
 }
 
-/// As a run, as what is pinned, and as a name.
+/// Reads each input as a run, as the pinned runs, and as a name.
 #[test]
 fn any_input() {
     replay!(|bytes: &[u8]| {

@@ -1,6 +1,6 @@
-//! Checksums for changed files, so that what lies behind the checksum is reached too.
+//! Valid checksums for mutated files, so that the code after the checksum is tested too.
 
-/// The file with the checksum that its contents have; none if it has lost its layout.
+/// Returns the file with a valid checksum; `None` if its layout is damaged.
 pub(crate) fn resealed(file: &[u8]) -> Option<Vec<u8>> {
     let find = |text: &[u8]| file.windows(text.len()).position(|window| window == text);
     let sum = find(b"\"crc32\":\"")? + 9;

@@ -1,4 +1,4 @@
-//! Small trainings whose files are damaged.
+//! Small trainings whose files are mutated.
 
 use decoupler_core::{
     evaluation::{Preset, Run, SimulatedSettings},
@@ -16,7 +16,7 @@ fn small(mut settings: SimulatedSettings) -> Run {
     run
 }
 
-/// A training of the paper's kind, and one with a network for each row and whitened inputs.
+/// Returns a training with the paper's settings, and one with a network for each row and whitened inputs.
 pub(crate) fn trained() -> [Run; 2] {
     let mut starts = Preset::Best.settings();
     starts.inputs = InputChoice::BEST;
