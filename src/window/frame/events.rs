@@ -54,7 +54,6 @@ impl DecouplerWindow {
 
     fn report_written(&mut self, written: Result<String, String>) {
         let notice = match written {
-{ => {
             Ok(message) => {
                 self.typed = None;
                 Notice::Done(message)
