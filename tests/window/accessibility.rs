@@ -1,4 +1,4 @@
-//! What readers of the screen hear, and what hands on the keyboard reach.
+//! Accessibility: names for screen readers, and everything within reach of the keyboard.
 
 use decoupler::window::Phase;
 use eframe::egui::{Event, Key, Modifiers, Rect, Shape, accesskit::Role};
@@ -15,7 +15,7 @@ const VIEWS: [&str; 6] = [
     "Live",
 ];
 
-/// Roles of what can be worked.
+/// Roles of controls.
 const CONTROLS: [Role; 10] = [
     Role::Button,
     Role::CheckBox,
@@ -29,7 +29,7 @@ const CONTROLS: [Role; 10] = [
     Role::SearchInput,
 ];
 
-/// Opens a view once what it shows at first is there.
+/// Opens a view and waits for its initial contents.
 fn show(driver: &mut Driver, view: &str) {
     driver.click_button(view);
     if view == "Identifiability" {
@@ -66,7 +66,7 @@ fn every_control_has_a_name_and_every_number_a_value() {
 }
 
 #[test]
-fn every_picture_is_told_in_a_sentence() {
+fn every_picture_has_a_description() {
     let mut driver = Driver::open();
     driver.configure_small();
     driver.train();
@@ -86,14 +86,14 @@ fn every_picture_is_told_in_a_sentence() {
                 let inner = picture.accesskit_node();
                 let name = inner.label().unwrap_or_default();
                 let sentence = inner.description().or(inner.value()).unwrap_or_default();
-                let is_told = sentence.split_whitespace().count() > 2 || name.split_whitespace().count() > 6;
-                assert!(is_told, "{view} {tab}: “{name}” is told by “{sentence}” only");
+                let is_described = sentence.split_whitespace().count() > 2 || name.split_whitespace().count() > 6;
+                assert!(is_described, "{view} {tab}: “{name}” is described only by “{sentence}”");
             }
         }
     }
 }
 
-/// Name and place of what has the focus.
+/// Name and place of the focused control.
 fn focused(driver: &mut Driver) -> Option<(String, Rect)> {
     let nodes = driver.harness().root().children_recursive();
     let mut focused = nodes.filter(|node| node.accesskit_node().is_focused());
@@ -102,7 +102,7 @@ fn focused(driver: &mut Driver) -> Option<(String, Rect)> {
         .map(|node| (node.accesskit_node().label().unwrap_or_default(), node.rect()))
 }
 
-/// Presses Tab until what is called so has the focus.
+/// Presses Tab until the control of this name has the focus.
 #[track_caller]
 fn tab_to(driver: &mut Driver, name: &str) {
     for _ in 0..200 {
@@ -111,7 +111,7 @@ fn tab_to(driver: &mut Driver, name: &str) {
             return;
         }
     }
-    panic!("Tab never comes to {name}");
+    panic!("Tab never reaches {name}");
 }
 
 fn write(driver: &mut Driver, text: &str) {
@@ -138,7 +138,7 @@ fn a_network_is_configured_and_trained_by_keys_alone() {
     driver.wait("the end of the training", |driver| {
         matches!(driver.state().phase, Phase::Ended(_))
     });
-    // What it found is reached by keys too.
+    // The results are within reach of the keyboard too.
     tab_to(&mut driver, "Regression");
     driver.press(Key::Enter);
     driver.settle();
@@ -151,7 +151,7 @@ fn a_network_is_configured_and_trained_by_keys_alone() {
     assert!(driver.says("7 of 10"));
 }
 
-/// Shapes painted where something is.
+/// Shapes painted within a rectangle.
 fn painted(driver: &mut Driver, place: Rect) -> Vec<Shape> {
     let shapes = driver.harness().output().shapes.iter();
     let there = shapes.filter(|shape| shape.shape.visual_bounding_rect().intersects(place));
@@ -159,7 +159,7 @@ fn painted(driver: &mut Driver, place: Rect) -> Vec<Shape> {
 }
 
 #[test]
-fn the_focus_is_seen_wherever_it_comes() {
+fn the_focus_is_visible_on_every_control() {
     for view in VIEWS {
         let mut driver = Driver::open();
         show(&mut driver, view);
@@ -170,7 +170,7 @@ fn the_focus_is_seen_wherever_it_comes() {
                 driver.press(Key::Tab);
                 continue;
             };
-            // Of what lies out of sight nothing is painted; it is scrolled to.
+            // Controls out of sight are not painted, but scrolled to.
             driver.harness().run_steps(2);
             let place = focused(&mut driver).map_or(place, |(_, place)| place);
             let with_focus = painted(&mut driver, place);
@@ -182,7 +182,7 @@ fn the_focus_is_seen_wherever_it_comes() {
                 unseen.push(name);
             }
         }
-        assert!(unseen.is_empty(), "{view}: the focus is not seen on {unseen:?}");
+        assert!(unseen.is_empty(), "{view}: the focus is not visible on {unseen:?}");
         assert!(seen > 8, "{view}: {seen}");
     }
 }

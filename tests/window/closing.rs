@@ -18,7 +18,7 @@ const SAVE: &str = "Save checkpoints and close…";
 const QUESTION: &str = "Close while work is in progress?";
 const DISCARD: &str = "Discard and close";
 
-/// Whether the window asked for this in the frame drawn last.
+/// Returns true if the window sent this command in the last frame.
 fn asked(driver: &mut Driver, command: &ViewportCommand) -> bool {
     let output = driver.harness().output();
     output.viewport_output[&ViewportId::ROOT].commands.contains(command)
@@ -62,7 +62,7 @@ fn without_an_unfinished_training_the_window_closes_at_once() {
 }
 
 #[test]
-fn an_unfinished_training_is_asked_about_once_and_goes_on_if_the_user_stays() {
+fn an_unfinished_training_is_asked_about_once_and_continues_if_the_user_stays() {
     let mut driver = Driver::open();
     start_endless(&mut driver);
     assert!(!close(&mut driver));
@@ -90,7 +90,7 @@ fn an_unfinished_training_is_asked_about_once_and_goes_on_if_the_user_stays() {
 }
 
 #[test]
-fn a_training_saved_on_closing_resumes_where_it_stood() {
+fn a_training_saved_on_closing_resumes_where_it_stopped() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("kept.checkpoint");
     let mut driver = Driver::open();
@@ -99,7 +99,7 @@ fn a_training_saved_on_closing_resumes_where_it_stood() {
     driver.harness().step();
     driver.click_button(SAVE);
     driver.harness().run_steps(5);
-    // Who gives no path stays.
+    // Cancelling the path keeps the window open.
     driver.click_button("Cancel");
     driver.wait_for_epochs(3);
     assert!(!driver.has(SAVE));
@@ -142,7 +142,7 @@ fn a_checkpoint_that_cannot_be_saved_keeps_the_window_open() {
 }
 
 #[test]
-fn a_training_that_ends_while_it_is_asked_about_moves_no_button_and_closes_nothing() {
+fn a_training_that_ends_during_the_question_moves_no_button_and_does_not_close_the_window() {
     let mut driver = Driver::open();
     start_endless(&mut driver);
     ask(&mut driver);
@@ -190,7 +190,7 @@ fn a_training_on_a_recording_is_saved_at_closing() {
 }
 
 #[test]
-fn an_experiment_and_a_trade_off_are_not_ended_unasked() {
+fn an_experiment_and_a_trade_off_are_not_ended_without_asking() {
     for (view, run, line) in [
         ("Experiments", "▶ Run", "Experiments: Experiment"),
         ("Trade-off", "▶ Measure", "Trade-off: Measurement"),
@@ -207,12 +207,12 @@ fn an_experiment_and_a_trade_off_are_not_ended_unasked() {
         assert!(driver.says("0 of ") && !driver.is_enabled(SAVE));
         driver.click_button("Stay");
         driver.click("■ Cancel");
-        assert!(close(&mut driver), "nothing is under way any more");
+        assert!(close(&mut driver), "nothing is running any more");
     }
 }
 
 #[test]
-fn a_cross_validation_and_findings_are_not_ended_unasked() {
+fn a_cross_validation_and_an_analysis_are_not_ended_without_asking() {
     let (mut driver, _path, _folder) = opened(160);
     driver.limit_epochs("100000");
     driver.click_button("Identifiability");
@@ -239,7 +239,7 @@ fn a_cross_validation_and_findings_are_not_ended_unasked() {
 }
 
 #[test]
-fn a_training_being_prepared_is_not_ended_unasked() {
+fn a_training_being_prepared_is_not_ended_without_asking() {
     let mut driver = Driver::open();
     driver.configure_small();
     driver.window_mut().apply(Effect::Train);
@@ -251,7 +251,7 @@ fn a_training_being_prepared_is_not_ended_unasked() {
 /// A pipe takes no byte until someone reads it.
 #[cfg(unix)]
 #[test]
-fn a_file_under_way_is_finished_before_the_window_closes() {
+fn a_file_being_written_is_finished_before_the_window_closes() {
     let folder = tempfile::tempdir().unwrap();
     let pipe = folder.path().join("pipe");
     let made = std::process::Command::new("mkfifo").arg(&pipe).status();

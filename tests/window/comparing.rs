@@ -1,4 +1,4 @@
-//! Finished trainings kept, compared, and found again after a restart; figures of the paper; pictures for print.
+//! Finished trainings kept, compared, and restored after a restart; figures of the paper; pictures for print.
 
 use std::{fmt::Write as _, fs, path::Path, sync::Arc};
 
@@ -47,7 +47,7 @@ fn wait_for_both(driver: &mut Driver) {
     });
 }
 
-/// Waits until the folder in which runs are kept was read.
+/// Waits until the folder of the kept runs has been read.
 fn wait_for_file(driver: &mut Driver) {
     driver.wait("the folder", |driver| driver.state().runs.path.is_some());
 }
@@ -66,7 +66,7 @@ fn two_runs_are_compared_and_survive_a_restart() {
     let settings = [6, 4].map(|hidden| decoupler_core::evaluation::SimulatedSettings { hidden, ..small() });
     let runs = settings.map(trained);
     let shown = runs.each_ref().map(|run| NetworkFile::from_run(run, None).unwrap());
-    // What is compared is saved as it is in view, by the names of the runs.
+    // The comparison is saved as displayed, with the names of the runs.
     let saved = folder.path().join("compared.svg");
     driver.save("Surfaces, SVG", &saved);
     driver.click("Dismiss");
@@ -108,7 +108,7 @@ fn two_runs_are_compared_and_survive_a_restart() {
     assert_eq!(driver.views().compare.snapshot, 1);
     driver.click_button("Error");
     driver.settle();
-    // Closing the window waits for what is to be written.
+    // Closing the window waits for pending writes.
     drop(driver);
 
     let mut driver = Driver::open_keeping(&path);
@@ -117,7 +117,7 @@ fn two_runs_are_compared_and_survive_a_restart() {
     wait_for_both(&mut driver);
     assert!(driver.has("Six hidden nodes as A") && driver.has(&format!("{SECOND} as B")));
     check(&driver);
-    assert!(driver.comes_to_rest(), "an idle view draws nothing");
+    assert!(driver.becomes_idle(), "an idle view draws nothing");
     driver.click("Use the settings of Six hidden nodes");
     assert_eq!((driver.shown(), driver.state().draft), ("Train", small()));
 }
@@ -128,7 +128,7 @@ fn a_run_is_removed_only_when_that_is_confirmed() {
     let path = folder.path().join(PLACE);
     let mut driver = Driver::open_keeping(&path);
     trained_twice(&mut driver);
-    // What comes with the surfaces moves the list.
+    // The surfaces move the list when they appear.
     wait_for_both(&mut driver);
     driver.click(&format!("Remove {FIRST}"));
     driver.click_button("Keep");
@@ -145,7 +145,7 @@ fn a_run_is_removed_only_when_that_is_confirmed() {
 }
 
 #[test]
-fn a_damaged_run_is_named_and_the_others_are_there() {
+fn a_damaged_run_is_reported_and_the_others_are_loaded() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join(PLACE);
     let mut driver = Driver::open_keeping(&path);
@@ -161,11 +161,11 @@ fn a_damaged_run_is_named_and_the_others_are_there() {
     driver.click("Dismiss");
     driver.click_button("Compare");
     driver.settle();
-    assert!(driver.notice().is_none(), "told once: {:?}", driver.notice());
+    assert!(driver.notice().is_none(), "reported once: {:?}", driver.notice());
     assert!(damaged.exists(), "nothing is lost");
 }
 
-/// Waits until something in the folder holds this text.
+/// Waits until a file in the folder contains this text.
 fn wait_for_text(driver: &mut Driver, folder: &Path, text: &str) {
     let holds = |path: &Path| fs::read_to_string(path).is_ok_and(|found| found.contains(text));
     driver.wait(text, |_| {
@@ -205,11 +205,11 @@ fn two_windows_see_each_others_runs_names_pins_and_removals() {
     first.wait("the removal", |driver| !driver.has("Renamed as A"));
     first.settle();
     assert!(!first.has("Surface of A"));
-    assert!(first.comes_to_rest(), "an idle view draws nothing");
+    assert!(first.becomes_idle(), "an idle view draws nothing");
 }
 
 #[test]
-fn any_number_of_a_kept_run_leaves_room_for_the_next() {
+fn runs_are_numbered_even_after_the_largest_number() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join(PLACE);
     let mut driver = Driver::open_keeping(&path);
@@ -257,7 +257,7 @@ fn figures_of_the_paper_are_one_click() {
 }
 
 #[test]
-fn pictures_in_view_are_saved_as_their_names_end() {
+fn displayed_pictures_are_saved_in_the_format_of_their_extension() {
     const CHART: &str = "Chart, SVG";
     let folder = tempfile::tempdir().unwrap();
     let mut driver = Driver::open();
@@ -289,7 +289,7 @@ fn pictures_in_view_are_saved_as_their_names_end() {
     assert!(png.width() > 2000);
 }
 
-/// The surfaces in view as the window saves them.
+/// The displayed surfaces as saved by the window.
 fn saved_surfaces(driver: &mut Driver) -> String {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("surfaces.svg");
@@ -299,13 +299,13 @@ fn saved_surfaces(driver: &mut Driver) -> String {
     fs::read_to_string(path).unwrap()
 }
 
-/// How often a picture says a text.
+/// Number of occurrences of a text in a picture.
 fn count(svg: &str, text: &str) -> usize {
     svg.matches(&format!(">{text}</text>")).count()
 }
 
 #[test]
-fn saved_surfaces_are_seen_by_the_camera_in_view() {
+fn saved_surfaces_use_the_current_camera() {
     let mut driver = Driver::open();
     driver.configure_small();
     driver.train();
@@ -335,7 +335,7 @@ fn saved_surfaces_are_seen_by_the_camera_in_view() {
 }
 
 #[test]
-fn the_error_card_in_view_is_saved_with_its_own_colours() {
+fn the_displayed_error_card_is_saved_with_its_own_colours() {
     let mut driver = Driver::open();
     driver.configure_small();
     driver.train();
@@ -402,7 +402,7 @@ fn two_runs_of_a_recording_are_compared_target_by_target() {
     );
     drop(driver);
 
-    // Without the file the figures stay, and the reason for which there is no chart is shown.
+    // Without the file the figures stay, and the reason why there is no chart is shown.
     fs::remove_file(&setup.plan().unwrap().import.data).unwrap();
     let mut driver = Driver::open_keeping(&runs);
     wait_for_file(&mut driver);

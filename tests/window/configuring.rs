@@ -14,7 +14,7 @@ use egui_kittest::kittest::{NodeT as _, Queryable as _};
 use crate::driver::{Driver, PATIENCE, small, table_of};
 
 #[test]
-fn it_opens_on_the_papers_array_with_a_surface_and_says_what_to_do() {
+fn the_window_opens_on_the_papers_array_with_a_surface_and_says_what_to_do() {
     let mut driver = Driver::open();
     driver.settle();
     assert_eq!(driver.state().draft, SimulatedSettings::default());
@@ -35,7 +35,7 @@ fn it_opens_on_the_papers_array_with_a_surface_and_says_what_to_do() {
 }
 
 #[test]
-fn what_a_network_has_to_beat_stands_there_before_a_training() {
+fn the_baselines_are_shown_before_a_training() {
     let mut driver = Driver::open();
     let has_baselines =
         |driver: &Driver| matches!(&driver.state().preview, Some(preview) if preview.baselines.is_some());
@@ -62,7 +62,7 @@ fn what_a_network_has_to_beat_stands_there_before_a_training() {
 }
 
 #[test]
-fn rules_of_thumb_are_said_in_plain_words() {
+fn rules_of_thumb_are_shown_in_plain_words() {
     let mut driver = Driver::open();
     assert!(driver.has("Rules of thumb: 5, or 9 to 18"));
     assert!(driver.has("30 inputs, 20 outputs, 632 weights"));
@@ -89,7 +89,7 @@ fn presets_set_the_array_and_its_surface_follows() {
 }
 
 #[test]
-fn any_array_can_be_typed_and_what_is_none_is_explained_and_not_taken() {
+fn any_array_can_be_typed_and_an_invalid_one_is_explained_and_rejected() {
     let mut driver = Driver::open();
     driver.enter("Array scale", "4x5_2x16");
     let scale = driver.state().draft.source.sensor.scale;
@@ -117,7 +117,7 @@ fn any_array_can_be_typed_and_what_is_none_is_explained_and_not_taken() {
         );
         let described = driver.get("Array scale").accesskit_node().description();
         assert!(
-            described.is_some_and(|told| told.contains(reason)),
+            described.is_some_and(|text| text.contains(reason)),
             "it is read out with the field"
         );
     }
@@ -128,7 +128,7 @@ fn any_array_can_be_typed_and_what_is_none_is_explained_and_not_taken() {
 }
 
 #[test]
-fn numbers_are_typed_and_kept_within_what_is_possible() {
+fn typed_numbers_are_kept_within_their_limits() {
     let mut driver = Driver::open();
     for (label, text) in [
         ("Hidden nodes", "17"),
@@ -161,15 +161,15 @@ fn numbers_are_typed_and_kept_within_what_is_possible() {
 
     for (label, text) in [("Hidden nodes", "0"), ("Training samples", "-5"), ("Epochs", "0")] {
         driver.enter(label, text);
-        assert_eq!(driver.state().draft, draft, "{text} {label} are not taken");
+        assert_eq!(driver.state().draft, draft, "{text} {label} are rejected");
     }
     driver.enter("Hidden nodes", "a dozen");
-    assert_eq!(driver.state().draft.hidden, 17, "words are not taken");
+    assert_eq!(driver.state().draft.hidden, 17, "words are rejected");
     driver.settle();
 }
 
 #[test]
-fn a_method_shows_its_own_settings_and_no_others() {
+fn a_method_shows_only_its_own_settings() {
     let mut driver = Driver::open();
     let damping = ["Mu", "Mu decrease", "Mu increase", "Largest mu"];
     let descent = ["Learning rate", "Momentum"];
@@ -232,7 +232,7 @@ fn the_geometry_changes_the_surface_and_the_reset_brings_the_papers_settings_bac
 }
 
 #[test]
-fn changing_the_settings_hides_the_old_results_and_changing_them_back_shows_them_again() {
+fn changing_the_settings_hides_old_results_and_changing_them_back_restores_them() {
     let mut driver = Driver::open();
     driver.configure_small();
     driver.train();
@@ -247,7 +247,7 @@ fn changing_the_settings_hides_the_old_results_and_changing_them_back_shows_them
     assert!(driver.has("Decoupled surface"));
 
     // Faster than the worker draws the other array.
-    assert!(driver.comes_to_rest());
+    assert!(driver.becomes_idle());
     let run = driver.state().run.as_ref().unwrap().simulated().unwrap();
     let mut other = run;
     other.source.sensor.scale = ArrayScale::PRESETS[1];
@@ -264,7 +264,7 @@ fn changing_the_settings_hides_the_old_results_and_changing_them_back_shows_them
 }
 
 #[test]
-fn keys_train_and_walk_the_snapshots() {
+fn keys_start_a_training_and_step_through_the_snapshots() {
     let mut driver = Driver::open();
     driver.configure_small();
     driver.press(Key::PageDown);

@@ -1,4 +1,4 @@
-//! Several starts, checkpoints, and going on with another method.
+//! Several starts, checkpoints, and continuing with another method.
 
 use std::{fs, path::Path, time::Duration};
 
@@ -21,7 +21,7 @@ const SAVE: &str = "Checkpoint, resumable";
 const OPEN: &str = "Type the path of a checkpoint";
 
 /// Types `path` into the form behind `button` and confirms.
-fn give_path(driver: &mut Driver, button: &str, path: &Path) {
+fn enter_path(driver: &mut Driver, button: &str, path: &Path) {
     if button == OPEN {
         driver.open_form(button);
     } else {
@@ -32,7 +32,7 @@ fn give_path(driver: &mut Driver, button: &str, path: &Path) {
 }
 
 fn save(driver: &mut Driver, button: &str, path: &Path) {
-    give_path(driver, button, path);
+    enter_path(driver, button, path);
     let saved = format!("Saved {}", path.display());
     driver.wait("the file", |driver| driver.has(&saved));
     driver.click("Dismiss");
@@ -45,7 +45,7 @@ fn momentum(epochs: usize) -> SimulatedSettings {
     settings
 }
 
-/// Begins a training that continues for as long as one looks.
+/// Begins a training that does not end by itself.
 fn start_endless(driver: &mut Driver) {
     driver.configure_small();
     choose_method(driver, "Momentum, Eq. (11)");
@@ -55,10 +55,10 @@ fn start_endless(driver: &mut Driver) {
     driver.wait_for_epochs(5);
 }
 
-/// Presses Pause and waits until the last epoch under way is shown.
+/// Presses Pause and waits until the last epoch is shown.
 fn pause(driver: &mut Driver) {
     driver.click("⏸ Pause");
-    driver.wait_for_hold();
+    driver.wait_for_last_epoch();
     assert_eq!(driver.state().phase, Phase::Paused);
 }
 
@@ -156,7 +156,7 @@ fn a_training_saved_and_opened_ends_in_the_same_network_file_as_one_never_interr
         driver.click("▶ Train");
         driver.wait_for_epochs(5);
         driver.open_menu();
-        assert!(!driver.is_enabled(SAVE), "a training is held first");
+        assert!(!driver.is_enabled(SAVE), "a training is paused first");
         assert!(driver.says("A training under way cannot be saved"));
         driver.press(eframe::egui::Key::Escape);
         pause(driver);
@@ -164,7 +164,7 @@ fn a_training_saved_and_opened_ends_in_the_same_network_file_as_one_never_interr
         let (held, history) = (driver.epochs(), driver.state().run.as_ref().unwrap().history.clone());
 
         let mut driver = Driver::open();
-        give_path(&mut driver, OPEN, &checkpoint);
+        enter_path(&mut driver, OPEN, &checkpoint);
         driver.wait("the training", |driver| driver.epochs() == held);
         driver.settle();
         assert_eq!(driver.state().phase, Phase::Paused);
@@ -186,7 +186,7 @@ fn a_training_saved_and_opened_ends_in_the_same_network_file_as_one_never_interr
         whole.stop();
         let found = NetworkFile::load(&network).unwrap();
         let mut expected = NetworkFile::from_run(&whole, found.recorded.as_ref()).unwrap();
-        // Only the time it took differs.
+        // Only the wall time differs.
         expected.training.seconds = found.training.seconds;
         assert_eq!(found, expected);
         assert_eq!(found.setup(), *setup);
@@ -208,7 +208,7 @@ fn checkpoints_of_the_terminal_open_in_the_window_and_the_windows_in_the_termina
         .save(&terminal)
         .unwrap();
     let mut driver = Driver::open();
-    give_path(&mut driver, OPEN, &terminal);
+    enter_path(&mut driver, OPEN, &terminal);
     driver.wait("the training", |driver| driver.epochs() == 7);
     assert!(driver.state().draft == settings && driver.has("SPREAD OVER 3 STARTS"));
     save(&mut driver, SAVE, &window);
@@ -223,16 +223,16 @@ fn checkpoints_of_the_terminal_open_in_the_window_and_the_windows_in_the_termina
     assert_eq!(run.starts(), whole.starts());
     // One that has ended opens as ended, and can be given more epochs.
     CheckpointFile::from_run(&run, None).unwrap().save(&terminal).unwrap();
-    give_path(&mut driver, OPEN, &terminal);
+    enter_path(&mut driver, OPEN, &terminal);
     driver.wait("the ended training", |driver| {
         driver.state().phase == Phase::Ended(StopReason::EpochsReached)
     });
     assert!(driver.has("Continue"));
 }
 
-/// Starts run side by side: the time by the clock is saved, and without it there is none to show.
+/// Starts run in parallel: their wall time is saved, and without it no time is shown.
 #[test]
-fn a_checkpoint_shows_the_time_by_the_clock_of_all_starts_or_none() {
+fn a_checkpoint_shows_the_wall_time_of_all_starts_or_none() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("run.checkpoint");
     let mut file = CheckpointFile::from_run(&stepped(SimulatedSettings { starts: 3, ..small() }, 6), None).unwrap();
@@ -240,7 +240,7 @@ fn a_checkpoint_shows_the_time_by_the_clock_of_all_starts_or_none() {
         file.wall_time = saved.map(Duration::from_secs);
         file.save(&path).unwrap();
         let mut driver = Driver::open();
-        give_path(&mut driver, OPEN, &path);
+        enter_path(&mut driver, OPEN, &path);
         driver.wait("the training", |driver| {
             let result = driver.state().run.as_ref().and_then(|run| run.result.as_ref());
             result.is_some_and(|result| result.wall_time == file.wall_time)
@@ -254,7 +254,7 @@ fn a_checkpoint_shows_the_time_by_the_clock_of_all_starts_or_none() {
 }
 
 #[test]
-fn a_checkpoint_that_is_none_or_damaged_is_explained_and_changes_nothing() {
+fn an_invalid_or_damaged_checkpoint_is_explained_and_changes_nothing() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("run.checkpoint");
     let mut driver = Driver::open();
@@ -265,16 +265,16 @@ fn a_checkpoint_that_is_none_or_damaged_is_explained_and_changes_nothing() {
         .unwrap()
         .save(&path)
         .unwrap();
-    let sound = fs::read_to_string(&path).unwrap();
+    let intact = fs::read_to_string(&path).unwrap();
     let cases = [
-        ("is cut off", sound[..sound.len() / 2].to_owned()),
-        ("is damaged", sound.replacen("\"hidden\":6", "\"hidden\":7", 1)),
+        ("is cut off", intact[..intact.len() / 2].to_owned()),
+        ("is damaged", intact.replacen("\"hidden\":6", "\"hidden\":7", 1)),
         ("is not a checkpoint", "epoch,training\n0,1\n".to_owned()),
-        ("has version 99", sound.replacen("\"version\":", "\"version\":99", 1)),
+        ("has version 99", intact.replacen("\"version\":", "\"version\":99", 1)),
     ];
     for (reason, contents) in cases {
         fs::write(&path, &contents).unwrap();
-        give_path(&mut driver, OPEN, &path);
+        enter_path(&mut driver, OPEN, &path);
         driver.wait("the reason", |driver| driver.notice().is_some());
         let expected = CheckpointFile::load(&path).unwrap_err().to_string();
         assert!(expected.contains(reason), "{expected}");
@@ -286,13 +286,13 @@ fn a_checkpoint_that_is_none_or_damaged_is_explained_and_changes_nothing() {
         );
         driver.click("Dismiss");
     }
-    fs::write(&path, &sound).unwrap();
-    give_path(&mut driver, OPEN, &path);
-    driver.wait("the sound one", |driver| driver.state().phase == Phase::Paused);
+    fs::write(&path, &intact).unwrap();
+    enter_path(&mut driver, OPEN, &path);
+    driver.wait("the intact one", |driver| driver.state().phase == Phase::Paused);
 }
 
 #[test]
-fn levenberg_marquardt_goes_on_where_momentum_ended() {
+fn levenberg_marquardt_continues_where_momentum_ended() {
     let mut driver = Driver::open();
     driver.configure_small();
     choose_method(&mut driver, "Momentum, Eq. (11)");
@@ -331,7 +331,7 @@ fn levenberg_marquardt_goes_on_where_momentum_ended() {
 }
 
 #[test]
-fn more_epochs_of_the_same_method_are_those_of_a_longer_training() {
+fn more_epochs_of_the_same_method_give_the_result_of_a_longer_training() {
     for source in BOTH {
         let mut opened = open_small(source);
         opened.change(|settings| settings.training = momentum(15).training);
@@ -349,7 +349,7 @@ fn more_epochs_of_the_same_method_are_those_of_a_longer_training() {
 }
 
 #[test]
-fn a_held_training_can_be_continued_with_another_method_or_resumed_as_it_was() {
+fn a_paused_training_can_be_continued_with_another_method_or_resumed_as_it_was() {
     let mut driver = Driver::open();
     start_endless(&mut driver);
     pause(&mut driver);
@@ -382,9 +382,9 @@ fn a_held_training_can_be_continued_with_another_method_or_resumed_as_it_was() {
 }
 
 #[test]
-fn what_cannot_be_continued_is_not_offered_or_explained() {
+fn continue_is_not_offered_without_a_training_or_after_divergence() {
     let mut driver = Driver::open();
-    assert!(!driver.has("Continue"), "there is nothing to go on from");
+    assert!(!driver.has("Continue"), "there is nothing to continue from");
     driver.configure_small();
     choose_method(&mut driver, "Momentum, Eq. (11)");
     driver.enter("Learning rate", "1e6");
@@ -415,7 +415,7 @@ fn bayesian_regularisation_says_how_many_weights_the_data_determine() {
 }
 
 #[test]
-fn the_spread_and_continue_have_their_place_in_narrow_windows() {
+fn the_spread_and_continue_fit_in_narrow_windows() {
     let mut driver = Driver::open_sized(vec2(960.0, 640.0));
     driver.enter("Starts", "3");
     driver.enter("Epochs", "1");

@@ -32,7 +32,7 @@ fn wait_for_all(driver: &mut Driver) {
     });
 }
 
-/// What does not depend on the clock in the table that is unfolded.
+/// The cells of the unfolded table that do not depend on timing.
 fn table(driver: &Driver) -> Vec<String> {
     let texts = driver.texts();
     let is_cell = |text: &String| NAMES.iter().any(|name| text.starts_with(&format!("{name}, ")));
@@ -43,7 +43,7 @@ fn table(driver: &Driver) -> Vec<String> {
         .collect()
 }
 
-/// The same from the library.
+/// The same cells computed by the library.
 fn table_of(run: &Run) -> Vec<String> {
     let set = DecoderSet::new(&run.settings().simulated().unwrap(), Some(run.network())).unwrap();
     let limit = run
@@ -97,7 +97,7 @@ fn the_decoders_figures_are_the_librarys() {
     );
     driver.settle();
 
-    // The next training is measured by itself, once it has ended.
+    // The next training is measured automatically once it has ended.
     driver.click_button("Known");
     driver.click("Noise on resistance");
     driver.enter("Relative noise", "0.1");
@@ -111,7 +111,7 @@ fn the_decoders_figures_are_the_librarys() {
 }
 
 #[test]
-fn a_training_under_way_is_not_measured_before_it_stands_still() {
+fn a_running_training_is_not_measured_until_it_is_paused() {
     let mut driver = Driver::open();
     driver.configure_small();
     driver.train();

@@ -1,4 +1,4 @@
-//! The window without a display, worked by what is written on it.
+//! The window without a display, operated through its labels.
 
 use std::{
     cell::RefCell,
@@ -22,7 +22,7 @@ use egui_kittest::{
 
 use crate::rasterise::Rasteriser;
 
-/// Time after which something awaited counts as never coming.
+/// Longest time to wait for something.
 pub(crate) const PATIENCE: Duration = Duration::from_secs(60);
 
 /// Parts of the configuration that are folded away at first.
@@ -42,13 +42,13 @@ pub(crate) const SKIP: &str = "Skip the tour";
 /// Label of the button that closes a notice.
 const DISMISS: &str = "Dismiss";
 
-/// Frames until something scrolled to lies still.
+/// Number of frames until scrolling has finished.
 const SCROLLING: usize = 5;
 
-/// Number of frames after which a window that still asks for more never comes to rest.
+/// Number of frames after which a window that still asks for more counts as never idle.
 const MAX_FRAMES: u64 = 100;
 
-/// The window and hands to work it.
+/// The window with simulated input.
 pub(crate) struct Driver {
     harness: Harness<'static, Option<DecouplerWindow>>,
     /// The delay of each frame that the window asked for.
@@ -56,28 +56,28 @@ pub(crate) struct Driver {
 }
 
 impl Driver {
-    /// The window at its usual size.
+    /// Opens the window at its default size.
     pub(crate) fn open() -> Self {
         Self::open_sized(vec2(1440.0, 900.0))
     }
 
-    /// The window of `size` points on the paper's scene, with the first surface drawn and everything unfolded.
+    /// Opens the window of `size` points on the paper's scene, with the first surface drawn and everything unfolded.
     pub(crate) fn open_sized(size: Vec2) -> Self {
         Self::open_as(size, None, |window| window).on_the_papers_scene()
     }
 
-    /// The window of `size` points as it opens for the first time.
+    /// Opens the window of `size` points as for the first time.
     pub(crate) fn open_first(size: Vec2) -> Self {
         Self::open_as(size, None, |window| window)
     }
 
-    /// The window that keeps its runs in a file, on the paper's scene.
+    /// Opens the window on the paper's scene, with its runs kept at `path`.
     pub(crate) fn open_keeping(path: &Path) -> Self {
         let path = path.to_owned();
         Self::open_as(vec2(1440.0, 900.0), None, |window| window.keeping_runs(path)).on_the_papers_scene()
     }
 
-    /// The window that remembers in a file what it shows; the tour has ended.
+    /// Opens the window with its state remembered in a file; the tour has ended.
     pub(crate) fn open_remembering(path: &Path) -> Self {
         let mut driver = Self::open_on_tour(path);
         if driver.has(SKIP) {
@@ -89,7 +89,7 @@ impl Driver {
         driver
     }
 
-    /// The window that remembers in a file what it shows, with the tour unless it remembers its end.
+    /// Opens the window with its state remembered in a file, and with the tour unless that has ended before.
     pub(crate) fn open_on_tour(path: &Path) -> Self {
         let file = WindowFile::read(path.to_owned());
         Self::open_as(vec2(1440.0, 900.0), Some(file), |window| window)
@@ -103,7 +103,7 @@ impl Driver {
         let made: Rc<RefCell<Option<DecouplerWindow>>> = Rc::default();
         let place = Rc::clone(&made);
         let (asks, asked) = channel();
-        // Before the first frame, as the real window does, so that its fonts are there.
+        // Before the first frame, as in the real window, so that its fonts are available.
         let set_up = move |ctx: &Context| {
             // At the end of a test the window outlives the driver.
             ctx.set_request_repaint_callback(move |info| {
@@ -115,7 +115,7 @@ impl Driver {
         let frame = move |ui: &mut Ui, window: &mut Option<DecouplerWindow>| {
             let window = window.get_or_insert_with(|| made.take().unwrap());
             window.take_events();
-            // The harness leaves a margin, which a real window has not.
+            // The harness leaves a margin, which a real window does not have.
             let whole = ui.content_rect();
             let mut root = ui.new_child(UiBuilder::new().max_rect(whole));
             root.set_clip_rect(whole);
@@ -123,7 +123,7 @@ impl Driver {
         };
         let builder = Harness::builder().with_size(size).with_context_setup(set_up);
         let builder = builder.renderer(Rasteriser::default()).with_render_cursor(false);
-        // News from threads that work meanwhile may ask for some frames more.
+        // Events of running threads may ask for some more frames.
         let builder = builder.with_max_steps(MAX_FRAMES);
         let harness = builder.build_ui_state(frame, None);
         let mut driver = Self { harness, asked };
@@ -158,22 +158,22 @@ impl Driver {
         self.harness.run_steps(SCROLLING);
     }
 
-    /// What the window knows.
+    /// Returns the shared state of the window.
     pub(crate) fn state(&self) -> &Shared {
         self.window().shared()
     }
 
-    /// What only one of its views knows.
+    /// Returns the views with their private state.
     pub(crate) fn views(&self) -> &Views {
         self.window().views()
     }
 
-    /// The message shown.
+    /// Returns the displayed notice.
     pub(crate) fn notice(&self) -> Option<&Notice> {
         self.window().notice()
     }
 
-    /// The name of the current view.
+    /// Returns the name of the current view.
     pub(crate) fn shown(&self) -> &'static str {
         self.window().shown()
     }
@@ -182,12 +182,12 @@ impl Driver {
         self.harness.state().as_ref().unwrap()
     }
 
-    /// The window itself, for what no hand could do fast enough.
+    /// Returns the window itself, for actions that no user could do fast enough.
     pub(crate) fn window_mut(&mut self) -> &mut DecouplerWindow {
         self.harness.state_mut().as_mut().unwrap()
     }
 
-    /// The harness, to see and do what has no word here.
+    /// Returns the harness, for everything without a method here.
     pub(crate) fn harness(&mut self) -> &mut Harness<'static, Option<DecouplerWindow>> {
         &mut self.harness
     }
@@ -198,7 +198,7 @@ impl Driver {
         let latest = Instant::now() + PATIENCE;
         loop {
             if holds(self) {
-                // What came with the last frame is drawn by the next.
+                // The results of the last frame are drawn in the next one.
                 self.harness.step();
                 return;
             }
@@ -213,52 +213,52 @@ impl Driver {
         if self.asked.recv_timeout(patience).is_err() {
             panic!("{what} never came; the window shows {:#?}", self.texts());
         }
-        // One frame answers all that was asked before it.
+        // One frame answers all earlier requests.
         self.asked.try_iter().for_each(drop);
         self.harness.step();
     }
 
-    /// Whether the window comes to draw no more frames: it asks for none, at no delay. A thread that has events meanwhile may
-    /// ask for one; a window that does not rest asks in every frame.
-    pub(crate) fn comes_to_rest(&mut self) -> bool {
-        const MAX_NEWS: usize = 20;
+    /// Returns true if the window becomes idle, that is, asks for no more frames. A thread with events may ask for one
+    /// meanwhile; a busy window asks in every frame.
+    pub(crate) fn becomes_idle(&mut self) -> bool {
+        const MAX_EVENTS: usize = 20;
         self.harness.run();
-        (0..MAX_NEWS).any(|_| {
+        (0..MAX_EVENTS).any(|_| {
             self.asked.try_iter().for_each(drop);
             self.harness.step();
             self.asked.try_iter().next().is_none()
         })
     }
 
-    /// Draws frames until the window asks for none. Panics if it asks for ever.
+    /// Draws frames until the window asks for none. Panics if it never stops asking.
     #[track_caller]
     pub(crate) fn settle(&mut self) {
         self.harness.run();
     }
 
-    /// What is labelled so, label and labelled alike.
+    /// Returns the node with this label.
     #[track_caller]
     pub(crate) fn get<'a>(&'a self, label: &'a str) -> Node<'a> {
         self.harness.get_by_label(label)
     }
 
-    /// Whether something is labelled exactly so.
+    /// Returns true if a node has exactly this label.
     pub(crate) fn has(&self, label: &str) -> bool {
         self.harness.query_all_by_label(label).next().is_some()
     }
 
-    /// Whether any text contains this.
+    /// Returns true if any text contains this.
     pub(crate) fn says(&self, text: &str) -> bool {
         self.texts().iter().any(|shown| shown.contains(text))
     }
 
-    /// Whether what is labelled so can be used.
+    /// Returns true if the control with this label is enabled.
     #[track_caller]
     pub(crate) fn is_enabled(&self, label: &str) -> bool {
         !self.get(label).accesskit_node().is_disabled()
     }
 
-    /// Every label and value, as assistive technology reads them.
+    /// Returns every label and value, as read by assistive technology.
     pub(crate) fn texts(&self) -> Vec<String> {
         let nodes = self.harness.root().children_recursive();
         let texts = nodes.flat_map(|node| {
@@ -268,7 +268,7 @@ impl Driver {
         texts.collect()
     }
 
-    /// Label and place of everything that can be worked or read.
+    /// Returns the label and place of every control and text.
     pub(crate) fn places(&self) -> Vec<(String, Rect)> {
         let nodes = self.harness.root().children_recursive();
         let named = nodes.filter_map(|node| {
@@ -280,19 +280,19 @@ impl Driver {
         named.collect()
     }
 
-    /// Clicks what is labelled so, after scrolling to it.
+    /// Clicks the node with this label after scrolling to it.
     #[track_caller]
     pub(crate) fn click(&mut self, label: &str) {
         self.click_by(&By::new().label(label));
     }
 
-    /// Clicks the button that is labelled so, where a text says the same.
+    /// Clicks the button with this label, where a text has the same label.
     #[track_caller]
     pub(crate) fn click_button(&mut self, label: &str) {
         self.click_by(&By::new().role(Role::Button).label(label));
     }
 
-    /// Clicks the leftmost of the buttons that are labelled so, which in the Train view is that of the configuration.
+    /// Clicks the leftmost of the buttons with this label, which in the Train view is the one of the configuration.
     #[track_caller]
     pub(crate) fn click_leftmost_button(&mut self, label: &str) {
         let by = By::new().role(Role::Button).label(label);
@@ -314,8 +314,8 @@ impl Driver {
         self.harness.step();
     }
 
-    /// Clicks the button that asks for a path until the form is there: events from the worker may move it away from
-    /// under the pointer.
+    /// Clicks the button that asks for a path until the form is open: events from the worker may move the button away
+    /// from the pointer.
     #[track_caller]
     pub(crate) fn open_form(&mut self, button: &str) {
         for _ in 0..5 {
@@ -337,8 +337,8 @@ impl Driver {
         }
     }
 
-    /// Asks for the export of this name in the menu, "Error table, CSV", until its form is there: events may move the menu's
-    /// items away from under the pointer.
+    /// Asks for the export of this name in the menu, "Error table, CSV", until its form is open: events may move the items
+    /// of the menu away from the pointer.
     #[track_caller]
     pub(crate) fn export(&mut self, name: &str) {
         for _ in 0..5 {
@@ -355,7 +355,7 @@ impl Driver {
     /// Types `path` into the form of the export of this name and saves; waits for the answer.
     #[track_caller]
     pub(crate) fn save(&mut self, name: &str, path: &Path) {
-        // What is informed of an earlier file is no answer.
+        // A notice about an earlier file is not the answer.
         for _ in 0..5 {
             let buttons = self.harness.query_all_by_label(DISMISS);
             let Some(newest) = buttons.last() else { break };
@@ -369,7 +369,7 @@ impl Driver {
         self.settle();
     }
 
-    /// Types `text` into the field labelled so, in place of what is there, and confirms with Enter.
+    /// Replaces the contents of the field with this label by `text`, and confirms with Enter.
     #[track_caller]
     pub(crate) fn enter(&mut self, label: &str, text: &str) {
         self.type_into(label, text);
@@ -377,7 +377,7 @@ impl Driver {
         self.harness.run_steps(3);
     }
 
-    /// Types `text` into the field labelled so, in place of what is there.
+    /// Replaces the contents of the field with this label by `text`.
     #[track_caller]
     pub(crate) fn type_into(&mut self, label: &str, text: &str) {
         self.get(label).scroll_to_me();
@@ -389,7 +389,7 @@ impl Driver {
         self.harness.run_steps(2);
     }
 
-    /// Clicks what is labelled so with the secondary button.
+    /// Clicks the node with this label with the secondary button.
     #[track_caller]
     pub(crate) fn right_click(&mut self, label: &str) {
         self.get(label).scroll_to_me();
@@ -398,7 +398,7 @@ impl Driver {
         self.harness.run_steps(3);
     }
 
-    /// Clicks the button labelled so. Returns the text that it put on the clipboard.
+    /// Clicks the button with this label. Returns the text that it put on the clipboard.
     #[track_caller]
     pub(crate) fn click_and_copy(&mut self, label: &str) -> Option<String> {
         self.get(label).click();
@@ -425,7 +425,7 @@ impl Driver {
         self.harness.run_steps(2);
     }
 
-    /// Does the action of this name by the list of all actions.
+    /// Runs the action of this name through the list of all actions.
     pub(crate) fn act(&mut self, action: &str) {
         self.press_with(Modifiers::COMMAND, Key::K);
         self.type_into("Action", action);
@@ -433,7 +433,7 @@ impl Driver {
         self.settle();
     }
 
-    /// A small network on the smallest array of the paper, trained in a moment.
+    /// Configures a small network on the smallest array of the paper, which is trained quickly.
     pub(crate) fn configure_small(&mut self) {
         self.click("Paper's scene");
         self.click("10×6");
@@ -470,10 +470,10 @@ impl Driver {
         });
     }
 
-    /// Waits until the training that was held or has ended shows its last epoch: only then is a frame's time measured.
+    /// Waits until the paused or ended training shows its last epoch: the time per frame is measured only then.
     #[track_caller]
-    pub(crate) fn wait_for_hold(&mut self) {
-        self.wait("the hold", |driver| {
+    pub(crate) fn wait_for_last_epoch(&mut self) {
+        self.wait("the last epoch", |driver| {
             let result = driver.state().result();
             result.is_some_and(|result| result.frame_time.is_some())
         });
@@ -486,13 +486,13 @@ impl Driver {
         self.wait("more epochs", |driver| driver.epochs() >= wanted);
     }
 
-    /// Epochs of the current training.
+    /// Returns the epochs of the current training.
     pub(crate) fn epochs(&self) -> usize {
         let latest = self.state().run.as_ref().and_then(|run| run.latest());
         latest.map_or(0, |latest| latest.epoch)
     }
 
-    /// The cells of the error table that is displayed: `network, Z %: 2.28`.
+    /// Returns the cells of the displayed error table: `network, Z %: 2.28`.
     pub(crate) fn table(&self) -> Vec<String> {
         let is_cell = |text: &String| ROWS.iter().any(|row| text.starts_with(&format!("{row}, ")));
         self.texts().into_iter().filter(is_cell).collect()
@@ -501,7 +501,7 @@ impl Driver {
 
 const ROWS: [&str; 5] = ["training mean", "linear map", "network", "reference", "published"];
 
-/// The settings of [`Driver::configure_small`].
+/// Returns the settings of [`Driver::configure_small`].
 pub(crate) fn small() -> SimulatedSettings {
     let mut settings = SimulatedSettings {
         source: Simulation {
@@ -516,14 +516,14 @@ pub(crate) fn small() -> SimulatedSettings {
     settings
 }
 
-/// What the library makes of `settings` by itself, trained to the end.
+/// Returns the run of the library with `settings`, trained to the end.
 pub(crate) fn trained(settings: SimulatedSettings) -> Run {
     let mut run = Run::prepare(settings).unwrap();
     while run.step().is_none() {}
     run
 }
 
-/// The error table that the library gives for `run`, in the window's words.
+/// Returns the error table computed by the library for `run`, formatted as in the window.
 pub(crate) fn table_of(run: &Run) -> Vec<String> {
     let columns = ["Z %", "X %", "Y %", "mm", "stroke %"];
     let table = ErrorTable::of_scores(run.problem(), &run.scores().unwrap(), None);

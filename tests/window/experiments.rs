@@ -1,4 +1,4 @@
-//! The paper's experiments and sweeps, set up, run, cancelled and taken away.
+//! The paper's experiments and sweeps: set up, run, cancelled and exported.
 
 use std::{fs, num::NonZero};
 
@@ -46,7 +46,7 @@ fn run_to_the_end(driver: &mut Driver) {
     });
 }
 
-/// What the library makes of `experiment` by itself.
+/// Runs `experiment` with the library.
 fn by_library(experiment: &Experiment) -> ExperimentResults {
     let mut results = ExperimentResults::new(experiment.clone());
     let record = |finished: decoupler_core::evaluation::experiments::Finished| {
@@ -63,7 +63,7 @@ fn by_library(experiment: &Experiment) -> ExperimentResults {
     results
 }
 
-/// Columns that tell how long something took differ from run to run.
+/// Columns of times differ from run to run.
 const TIMES: [&str; 1] = ["training"];
 
 #[test]
@@ -150,7 +150,7 @@ fn before_it_is_run_a_table_shows_the_published_figures() {
     driver.open_menu();
     assert!(!driver.is_enabled("Figure, SVG") && driver.says("No trial has finished yet"));
     driver.press(eframe::egui::Key::Escape);
-    // What is typed is what would be filled in.
+    // The typed values determine what would be filled in.
     driver.type_into("Hidden nodes", "12, 99");
     assert!(driver.has("99, Z % publ.: –"), "{:#?}", driver.texts());
 }
@@ -179,7 +179,7 @@ fn a_cancelled_experiment_keeps_what_is_finished() {
     assert!((2..800).contains(&done), "{done} trials");
     assert!(driver.says(&format!("Table 1 ended early: {done} of 800 trials")));
     driver.settle();
-    // The other experiments have nothing to show, and this one still has.
+    // The other experiments have nothing to show; this one still does.
     driver.click("Table 3");
     assert!(driver.says("Our figures appear next to"));
     driver.click("Table 1");
@@ -187,7 +187,7 @@ fn a_cancelled_experiment_keeps_what_is_finished() {
 }
 
 #[test]
-fn lists_that_cannot_be_run_say_why_until_mended() {
+fn invalid_lists_say_why_until_they_are_fixed() {
     let mut driver = open();
     for (list, reason) in [
         (
@@ -261,7 +261,7 @@ fn a_sweep_is_shown_as_a_map_and_saved() {
 }
 
 #[test]
-fn the_form_keeps_to_its_panel_in_a_narrow_window() {
+fn the_form_stays_within_its_panel_in_a_narrow_window() {
     let mut driver = Driver::open_sized(vec2(1024.0, 700.0));
     driver.click_button("Experiments");
     for topic in ["Table 1", "Table 2", "Table 3", "Sweep"] {
@@ -277,9 +277,9 @@ fn the_form_keeps_to_its_panel_in_a_narrow_window() {
     }
 }
 
-/// The window writes the sweep, the terminal trains it in two parts, and the window shows what is there after each.
+/// The window writes the sweep, the terminal trains it in two parts, and the window shows the results after each.
 #[test]
-fn a_sweep_of_the_window_is_trained_by_the_terminal_and_seen_to_grow() {
+fn a_sweep_of_the_window_is_trained_by_the_terminal_and_shown_as_it_grows() {
     let home = tempfile::tempdir().unwrap();
     let mut driver = open();
     driver.click("Sweep");
@@ -330,7 +330,7 @@ fn a_sweep_of_the_window_is_trained_by_the_terminal_and_seen_to_grow() {
     driver.wait("the end of the experiment", |driver| {
         driver.views().experiments.running.is_none()
     });
-    assert!(!driver.has("Close folder"), "results are in the place of the folder");
+    assert!(!driver.has("Close folder"), "results replace the folder");
 
     driver.click("Open sweep folder…");
     driver.type_into("File", &home.path().display().to_string());

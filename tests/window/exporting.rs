@@ -49,7 +49,7 @@ fn a_saved_network_gives_the_same_outputs_bit_by_bit() {
 }
 
 #[test]
-fn saved_tables_hold_what_is_shown() {
+fn saved_tables_contain_the_displayed_values() {
     for source in BOTH {
         let Opened {
             mut driver,
@@ -95,7 +95,7 @@ fn saved_tables_hold_what_is_shown() {
 }
 
 #[test]
-fn what_cannot_be_saved_is_explained_and_leaves_nothing() {
+fn a_failed_save_is_explained_and_leaves_no_file() {
     let folder = tempfile::tempdir().unwrap();
     let missing = folder.path().join("none").join("network.json");
     let mut driver = trained_driver();
@@ -152,7 +152,7 @@ fn a_form_is_closed_without_writing() {
 }
 
 #[test]
-fn enter_saves_and_the_suggested_name_tells_runs_apart() {
+fn enter_saves_and_the_suggested_name_distinguishes_runs() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("loss.csv");
     let mut driver = trained_driver();
@@ -168,12 +168,12 @@ fn enter_saves_and_the_suggested_name_tells_runs_apart() {
 }
 
 #[test]
-fn what_worked_closes_by_itself_and_the_window_rests_and_what_failed_stays() {
+fn a_success_notice_closes_by_itself_and_a_failure_stays() {
     let folder = tempfile::tempdir().unwrap();
     let mut driver = Driver::open();
     driver.configure_small();
     driver.train();
-    driver.wait_for_hold();
+    driver.wait_for_last_epoch();
     let missing = folder.path().join("none").join("network.json");
     driver.save(NETWORK, &missing);
     assert!(driver.says("does not exist"));
@@ -185,14 +185,14 @@ fn what_worked_closes_by_itself_and_the_window_rests_and_what_failed_stays() {
     driver.type_into("File", &path.display().to_string());
     driver.click_button("Save");
     driver.wait("the file", |driver| driver.says("Saved "));
-    assert!(!driver.says("does not exist"), "the same has worked now");
+    assert!(!driver.says("does not exist"), "the same action has succeeded now");
     driver.harness().run_steps(60);
     assert_eq!(driver.notice(), None);
-    assert!(driver.comes_to_rest());
+    assert!(driver.becomes_idle());
 }
 
 #[test]
-fn every_network_format_is_exported_read_back_and_with_its_deviation() {
+fn every_network_format_is_exported_and_read_back_with_its_deviation() {
     for source in BOTH {
         let Opened {
             mut driver,
@@ -234,7 +234,7 @@ fn every_network_format_is_exported_read_back_and_with_its_deviation() {
 }
 
 #[test]
-fn tables_are_copied_as_they_are_shown() {
+fn tables_are_copied_as_displayed() {
     for source in BOTH {
         let Opened {
             mut driver,
@@ -272,7 +272,7 @@ fn tables_are_copied_as_they_are_shown() {
 }
 
 #[test]
-fn the_menu_says_of_each_view_why_nothing_can_leave_yet() {
+fn the_menu_says_in_each_view_why_nothing_can_be_exported_yet() {
     let mut driver = Driver::open();
     for (view, name, reason) in [
         ("Train", "Report, HTML", "Nothing is trained yet: press Train first."),
@@ -303,7 +303,7 @@ fn the_menu_says_of_each_view_why_nothing_can_leave_yet() {
 }
 
 #[test]
-fn a_report_holds_the_errors_shown_and_a_kept_run_leaves_too() {
+fn a_report_contains_the_displayed_errors_and_a_kept_run_is_exported_too() {
     let folder = tempfile::tempdir().unwrap();
     let mut driver = trained_driver();
     let report = folder.path().join("report.html");
@@ -329,11 +329,11 @@ fn a_report_holds_the_errors_shown_and_a_kept_run_leaves_too() {
 }
 
 #[test]
-fn export_says_which_network_it_takes_and_offers_the_displayed_epoch() {
+fn export_names_its_network_and_offers_the_displayed_epoch() {
     let folder = tempfile::tempdir().unwrap();
     let [past, best, errors] = ["past.json", "best.json", "errors.csv"].map(|name| folder.path().join(name));
     let mut driver = trained_driver();
-    driver.wait_for_hold();
+    driver.wait_for_last_epoch();
     driver.open_menu();
     let best_epoch = trained(small()).leader().best_epoch();
     let heading = format!("BEST NETWORK, EPOCH {best_epoch}");

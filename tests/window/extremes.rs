@@ -1,4 +1,4 @@
-//! Settings at the edge of what is possible, and beyond.
+//! Settings at their limits, and beyond.
 
 use decoupler::window::{Notice, Phase};
 

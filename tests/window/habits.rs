@@ -1,4 +1,4 @@
-//! What the hands learn: taking changes back, the list of all actions, keys, the size of the interface.
+//! Habits: undo and redo, the list of all actions, keyboard shortcuts, the size of the interface.
 
 use decoupler::window::Phase;
 use eframe::egui::{Key, Modifiers, vec2};
@@ -7,7 +7,7 @@ use crate::{driver::Driver, training::start_endless};
 
 const UNDO: (Modifiers, Key) = (Modifiers::COMMAND, Key::Z);
 
-/// Lets the time pass after which changes count as two.
+/// Waits long enough that the next change counts as a separate one.
 pub(crate) fn pause(driver: &mut Driver) {
     let harness = driver.harness();
     for _ in 0..8 {
@@ -17,7 +17,7 @@ pub(crate) fn pause(driver: &mut Driver) {
 }
 
 #[test]
-fn a_change_of_settings_is_taken_back_and_made_again() {
+fn a_change_of_settings_is_undone_and_redone() {
     let mut driver = Driver::open_first(vec2(1440.0, 900.0));
     pause(&mut driver);
     let before = driver.state().draft;
@@ -36,7 +36,7 @@ fn a_change_of_settings_is_taken_back_and_made_again() {
 }
 
 #[test]
-fn the_settings_of_a_training_that_runs_are_not_taken_back() {
+fn the_settings_of_a_running_training_cannot_be_undone() {
     let mut driver = Driver::open();
     pause(&mut driver);
     driver.configure_small();
@@ -50,7 +50,7 @@ fn the_settings_of_a_training_that_runs_are_not_taken_back() {
 }
 
 #[test]
-fn the_list_of_actions_finds_one_by_a_few_letters_and_does_it() {
+fn the_list_finds_an_action_by_a_few_letters_and_runs_it() {
     let mut driver = Driver::open();
     driver.press_with(Modifiers::COMMAND, Key::K);
     driver.type_into("Action", "show");
@@ -64,7 +64,7 @@ fn the_list_of_actions_finds_one_by_a_few_letters_and_does_it() {
 }
 
 #[test]
-fn the_list_marks_the_next_action_with_an_arrow_and_closes_with_escape() {
+fn an_arrow_selects_the_next_action_and_escape_closes_the_list() {
     let mut driver = Driver::open();
     driver.press_with(Modifiers::COMMAND, Key::K);
     driver.type_into("Action", "show");
@@ -81,7 +81,7 @@ fn the_list_marks_the_next_action_with_an_arrow_and_closes_with_escape() {
 }
 
 #[test]
-fn while_the_list_is_open_keys_do_nothing_else() {
+fn while_the_list_is_open_other_keys_do_nothing() {
     let mut driver = Driver::open();
     driver.press_with(Modifiers::COMMAND, Key::K);
     driver.press_with(Modifiers::COMMAND, Key::Enter);
@@ -89,7 +89,7 @@ fn while_the_list_is_open_keys_do_nothing_else() {
 }
 
 #[test]
-fn every_key_that_is_listed_is_heard() {
+fn every_listed_key_works() {
     let mut driver = Driver::open();
     driver.press(Key::Questionmark);
     assert!(driver.says("Ctrl+K") && driver.says("Next test snapshot") && driver.says("PageDown"));

@@ -1,4 +1,4 @@
-//! What the readings determine at all: figures, warnings, and the way back to the Train view.
+//! The Identifiability view: figures, warnings, and the way back to the Train view.
 
 use std::{fmt::Write as _, fs, ops::ControlFlow, path::Path};
 
@@ -31,7 +31,7 @@ fn open() -> Driver {
     driver
 }
 
-/// Waits for the answer to the question as it is.
+/// Waits for the answer to the current question.
 fn wait_for_the_answer(driver: &mut Driver) {
     driver.wait("the answer", |driver| {
         let shown = &driver.views().identifiability;
@@ -43,7 +43,7 @@ fn analysis(driver: &Driver) -> &Analysis {
     driver.views().identifiability.analysis.as_ref().unwrap()
 }
 
-/// The row with the smallest singular value, all nodes pressed by `compression` of the height, found by the library alone.
+/// Returns the row with the smallest singular value, with all nodes pressed by `compression` of the height, by the library.
 fn worst_row(sensor: &SensorModel, compression: f64) -> Identifiability {
     let axes = decoupler_core::sensor::Axes::Z;
     let pressed = vec![DVec3::Z * compression * sensor.geometry.height_mm; sensor.scale.nodes_per_row()];
@@ -91,7 +91,7 @@ fn the_figures_are_the_librarys_and_follow_the_geometry() {
 }
 
 #[test]
-fn a_slider_asks_anew_and_the_train_view_is_one_click_away() {
+fn a_slider_repeats_the_analysis_and_the_train_view_is_one_click_away() {
     let mut driver = open();
     let before = driver.state().draft;
     driver.get("Node pitch slider").focus();
@@ -106,7 +106,7 @@ fn a_slider_asks_anew_and_the_train_view_is_one_click_away() {
 }
 
 #[test]
-fn rows_that_mirror_each_other_are_told_until_the_row_is_known() {
+fn rows_that_mirror_each_other_are_reported_until_the_row_is_known() {
     let mut driver = Driver::open();
     driver.click("10×6");
     driver.click_button("Identifiability");
@@ -123,7 +123,7 @@ fn rows_that_mirror_each_other_are_told_until_the_row_is_known() {
 }
 
 #[test]
-fn noise_that_hides_everything_is_told_with_what_to_change() {
+fn noise_that_hides_everything_is_reported_with_a_remedy() {
     let mut driver = open();
     driver.enter("Relative noise", "0.001");
     wait_for_the_answer(&mut driver);
@@ -152,7 +152,7 @@ fn sideways_movement_has_a_picture_for_each_axis() {
 }
 
 #[test]
-fn everything_keeps_to_a_narrow_window() {
+fn everything_fits_in_a_narrow_window() {
     let mut driver = Driver::open_sized(vec2(1024.0, 700.0));
     let buttons = ["Trade-off", "Next snapshot"].map(|label| driver.get(label).rect());
     assert!(buttons[0].max.x < buttons[1].min.x, "{buttons:?}");
@@ -170,7 +170,7 @@ fn everything_keeps_to_a_narrow_window() {
 }
 
 #[test]
-fn pattern_and_sensitivity_are_saved_each_with_its_own_colours() {
+fn pattern_and_sensitivity_are_saved_with_their_own_colours() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("identifiability.svg");
     let mut driver = open();
@@ -188,7 +188,7 @@ fn pattern_and_sensitivity_are_saved_each_with_its_own_colours() {
     );
 }
 
-/// A window with a recording, in the view of what its readings determine.
+/// Opens a window with a recording in the Identifiability view.
 fn open_recording() -> Opened {
     let mut opened = open_small(SourceKind::Recording);
     opened.driver.click_button("Identifiability");
@@ -205,7 +205,7 @@ fn analyse_by_ridge(driver: &mut Driver) {
 }
 
 #[test]
-fn what_the_readings_of_a_recording_determine_is_as_the_library_finds() {
+fn the_analysis_of_a_recording_agrees_with_the_library() {
     let Opened {
         mut driver,
         setup,
@@ -280,7 +280,7 @@ fn channels_of_a_recording_without_information_are_named() {
 }
 
 #[test]
-fn a_cross_validation_of_a_recording_has_the_errors_of_the_library() {
+fn a_cross_validation_of_a_recording_agrees_with_the_library() {
     let Opened {
         mut driver,
         setup,

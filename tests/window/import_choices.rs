@@ -1,4 +1,4 @@
-//! Choices of an import stay when a file is added, or the files are read again.
+//! Choices of an import are kept when a file is added or the files are read again.
 
 use std::{fmt::Write as _, fs, path::Path};
 
@@ -22,8 +22,8 @@ fn saved_plan(driver: &mut Driver, folder: &TempDir) -> Plan {
     RecipeFile::load_recording(&path).unwrap()
 }
 
-/// Looks at the files again, with other cells that mean missing.
-fn call_missing(driver: &mut Driver, text: &str) {
+/// Changes the missing-cell markers, which reads the files again.
+fn set_missing(driver: &mut Driver, text: &str) {
     driver.unfold_to("Filter", "Missing cells");
     driver.enter("Missing cells", text);
     driver.wait("the files", |driver| !driver.says("Reading "));
@@ -32,7 +32,7 @@ fn call_missing(driver: &mut Driver, text: &str) {
 }
 
 /// Picks an option of the layout of text.
-fn lay_out(driver: &mut Driver, field: &str, option: &str) {
+fn set_layout(driver: &mut Driver, field: &str, option: &str) {
     driver.unfold_to("Layout of text", field);
     driver.click(field);
     driver.click_button(option);
@@ -75,9 +75,9 @@ fn the_limit_of_a_join_and_units_survive_other_files_missing_cells_and_layouts()
     driver.enter("Limit", "0.0045");
     driver.wait("the limit", |driver| driver.says("within 0.00450"));
 
-    call_missing(&mut driver, "-1");
+    set_missing(&mut driver, "-1");
     driver.wait("the same limit", |driver| driver.says("within 0.00450"));
-    lay_out(&mut driver, "Decimal", "point");
+    set_layout(&mut driver, "Decimal", "point");
     driver.wait("the same limit", |driver| driver.says("within 0.00450"));
     let third = written(&folder, "third.csv", &sensor_and_states(80).1);
     driver.drop_files(&[&third]);
@@ -96,7 +96,7 @@ fn the_limit_of_a_join_and_units_survive_other_files_missing_cells_and_layouts()
 }
 
 #[test]
-fn conditions_name_their_columns_also_where_another_file_comes_first() {
+fn conditions_name_their_columns_even_if_another_file_comes_first() {
     let folder = tempfile::tempdir().unwrap();
     let (sensor, states) = sensor_and_states(80);
     let sensor = written(&folder, "sensor.csv", &sensor);
@@ -127,7 +127,7 @@ fn sessions() -> String {
 }
 
 #[test]
-fn a_split_and_its_shares_survive_where_a_column_is_a_group() {
+fn a_split_and_its_shares_are_kept_if_a_column_is_a_group() {
     let (mut driver, _path, folder) = opened_text(&sessions());
     assert!(driver.says("group, 20 % test"), "{:#?}", driver.texts());
     driver.unfold_to("Samples", "Test share");
@@ -136,8 +136,8 @@ fn a_split_and_its_shares_survive_where_a_column_is_a_group() {
     driver.enter("Validation share", "25");
     driver.settle();
     assert!(driver.says("time, 30 % test"));
-    call_missing(&mut driver, "-1");
-    lay_out(&mut driver, "Separator", "comma");
+    set_missing(&mut driver, "-1");
+    set_layout(&mut driver, "Separator", "comma");
     assert!(driver.says("time, 30 % test"), "{:#?}", driver.texts());
     let division = saved_plan(&mut driver, &folder).division;
     assert_eq!((division.by, division.test_fraction), (SplitBy::Time, 0.3));
@@ -145,17 +145,17 @@ fn a_split_and_its_shares_survive_where_a_column_is_a_group() {
 }
 
 #[test]
-fn the_group_chosen_last_is_the_group_and_a_wrong_layout_forgets_nothing() {
+fn the_last_chosen_group_applies_and_a_wrong_layout_loses_no_choices() {
     let (mut driver, _path, folder) = opened_text(&sessions());
     driver.mean("session", "unused");
     driver.mean("v", "group");
     driver.mean("block", "group");
     driver.mean("u", "unused");
     driver.enter("Unit of force", "mN");
-    // One column of text, of which nothing can be used.
-    lay_out(&mut driver, "Separator", "tab");
+    // A single column of text, which cannot be used.
+    set_layout(&mut driver, "Separator", "tab");
     assert!(!driver.has("Meaning of block"));
-    lay_out(&mut driver, "Separator", "comma");
+    set_layout(&mut driver, "Separator", "comma");
     for (column, expected) in [("session", "unused"), ("block", "group"), ("u", "unused")] {
         assert_eq!(meaning(&driver, column).as_deref(), Some(expected), "{column}");
     }
@@ -178,7 +178,7 @@ fn choose_test_file(driver: &mut Driver, path: &Path) {
 }
 
 #[test]
-fn another_test_file_takes_the_place_of_the_first() {
+fn another_test_file_replaces_the_first() {
     let (mut driver, path, folder) = opened(60);
     let [one, other] =
         [("one.csv", 30), ("other.csv", 20)].map(|(name, rows)| written(&folder, name, &recording(rows)));
@@ -191,16 +191,16 @@ fn another_test_file_takes_the_place_of_the_first() {
         "{:#?}",
         driver.texts()
     );
-    call_missing(&mut driver, "-1");
+    set_missing(&mut driver, "-1");
     assert!(driver.has("Test: 20"));
-    // Samples that are trained on test nothing.
+    // Training samples cannot test anything.
     choose_test_file(&mut driver, &path);
     assert!(driver.says("press.csv is trained on"), "{:#?}", driver.texts());
-    assert!(driver.has("other.csv, for the test"), "what was there stays");
+    assert!(driver.has("other.csv, for the test"), "the previous one stays");
 }
 
 #[test]
-fn each_joined_recording_has_a_test_file_and_no_more_are_taken() {
+fn each_joined_recording_takes_one_test_file_and_no_more() {
     let folder = tempfile::tempdir().unwrap();
     let (sensor, states) = sensor_and_states(80);
     let (short_sensor, short_states) = sensor_and_states(30);
@@ -222,7 +222,7 @@ fn each_joined_recording_has_a_test_file_and_no_more_are_taken() {
 }
 
 #[test]
-fn a_unit_counts_when_its_row_scrolls_out_of_view() {
+fn a_unit_takes_effect_when_its_row_scrolls_out_of_view() {
     let mut text = (1..=120)
         .map(|column| format!("u{column}"))
         .collect::<Vec<_>>()

@@ -1,4 +1,4 @@
-//! Recordings as the source of a training: dropped, imported, trained on, saved, missing and found again.
+//! Recordings as the source of a training: dropped, imported, trained on, saved, missing and relocated.
 
 use std::{fmt::Write as _, fs, path::Path};
 
@@ -22,7 +22,7 @@ fn assert_meanings(driver: &Driver, meanings: &[(&str, &str)]) {
     }
 }
 
-/// Clicks the button that types a path, and gives it this one.
+/// Clicks the button that opens the form for a path, and types this one.
 fn type_path(driver: &mut Driver, button: &str, path: &Path) {
     driver.open_form(button);
     driver.type_into("File", &path.display().to_string());
@@ -31,7 +31,7 @@ fn type_path(driver: &mut Driver, button: &str, path: &Path) {
 }
 
 #[test]
-fn a_dropped_file_is_trained_on_by_one_click_as_by_the_library() {
+fn a_dropped_file_is_trained_on_with_one_click_as_by_the_library() {
     let (mut driver, path, _folder) = opened(120);
     assert_eq!(
         (driver.shown(), driver.state().source),
@@ -52,7 +52,7 @@ fn a_dropped_file_is_trained_on_by_one_click_as_by_the_library() {
     let run = trained(&plan(&path));
     assert_eq!(driver.state().run.as_ref().unwrap().settings(), &settings());
     assert_eq!(driver.state().result().unwrap().errors, run.errors());
-    // The results take the place of the columns, which come back by a button.
+    // The results replace the columns, which a button brings back.
     assert!(!driver.has("Meaning of u1"));
     driver.click_button("Columns…");
     assert!(driver.has("Meaning of u1"));
@@ -102,7 +102,7 @@ fn the_sample_recording_is_trained_on_after_three_clicks() {
 }
 
 #[test]
-fn the_source_chooses_the_form_and_keeps_the_settings_of_the_other() {
+fn the_source_selects_the_form_and_keeps_the_settings_of_the_other() {
     let mut driver = Driver::open();
     driver.enter("Hidden nodes", "9");
     driver.click_button("Recording");
@@ -142,7 +142,7 @@ fn a_network_file_brings_back_its_settings_its_recording_and_its_run() {
     other.wait("the run", |driver| driver.state().runs.workspace.runs.len() == 1);
     assert_eq!(*other.state().runs.workspace.runs[0].file, file);
     assert!(other.has("Hidden nodes") && other.state().settings().hidden == 4);
-    // Once more it is no other run.
+    // Opening it again does not add another run.
     other.drop_files(&[&saved]);
     other.wait("the end", |driver| !driver.says("Reading "));
     other.settle();
@@ -164,7 +164,7 @@ fn a_network_file_brings_back_its_settings_its_recording_and_its_run() {
 }
 
 #[test]
-fn a_recording_that_was_changed_is_said_to_be_another() {
+fn a_changed_recording_is_reported() {
     let (mut driver, path, folder) = opened(60);
     driver.limit_epochs("2");
     driver.train_recording();
@@ -190,7 +190,7 @@ fn a_recording_that_was_changed_is_said_to_be_another() {
         driver.says("changed.csv has changed since the training was saved")
     });
     assert!(resumed.has("press.csv is missing.") && resumed.state().run.is_none());
-    // With the right file it continues where it was; that one lies elsewhere.
+    // With the right file, which is elsewhere, it continues where it stopped.
     let found = written(&folder, "found.csv", &recording(60));
     type_path(&mut resumed, "Type the path of press.csv", &found);
     resumed.wait("the training", |driver| driver.state().result().is_some());
@@ -203,7 +203,7 @@ fn a_recording_that_was_changed_is_said_to_be_another() {
 }
 
 #[test]
-fn a_checkpoint_goes_on_as_if_it_had_never_stopped() {
+fn a_checkpoint_continues_as_if_it_had_never_stopped() {
     let (mut driver, path, folder) = opened(60);
     driver.limit_epochs("3");
     driver.train_recording();
@@ -274,7 +274,7 @@ fn the_recording_is_open_again_at_the_next_start() {
 }
 
 #[test]
-fn undoing_brings_a_meaning_back() {
+fn undo_restores_a_meaning() {
     let (mut driver, _path, _folder) = opened(40);
     driver.settle();
     // Changes within a second count as one.
@@ -338,7 +338,7 @@ fn the_method_decides_what_is_held_out_until_the_user_does() {
 }
 
 #[test]
-fn the_recipe_of_an_array_brings_it_back() {
+fn the_recipe_of_an_array_restores_it() {
     let folder = tempfile::tempdir().unwrap();
     let recipe = folder.path().join("recipe.json");
     let mut driver = Driver::open();
@@ -376,7 +376,7 @@ fn two_files_are_joined_by_time_and_filtered() {
     let sensor = written(&folder, "sensor.csv", &sensor);
     let states = written(&folder, "states.csv", &states);
     let mut driver = Driver::open();
-    // In any order: the readings are found by the name of their file.
+    // In any order: the file with the readings is recognised by its name.
     driver.open_recordings(&[&states, &sensor]);
     let meanings = [
         ("c1", "time"),
@@ -393,7 +393,7 @@ fn two_files_are_joined_by_time_and_filtered() {
     );
     driver.mean("states.c3", "unused");
     driver.unfold_to("Filter", "Only rows with");
-    // The field is not left when what is typed so far cannot be understood.
+    // The field keeps the focus while the text cannot be understood yet.
     driver.type_into("Only rows with", "s");
     driver.settle();
     driver.harness().event(egui::Event::Text("tates.c3 < 3".to_owned()));
@@ -416,7 +416,7 @@ fn two_files_are_joined_by_time_and_filtered() {
 }
 
 #[test]
-fn bad_cells_are_listed_by_line_and_column_and_can_be_called_missing() {
+fn bad_cells_are_listed_by_line_and_column_and_can_be_declared_missing() {
     let folder = tempfile::tempdir().unwrap();
     let path = written(
         &folder,
@@ -432,7 +432,7 @@ fn bad_cells_are_listed_by_line_and_column_and_can_be_called_missing() {
         "{:#?}",
         driver.texts()
     );
-    // A column of which a cell cannot be read is not used unasked.
+    // A column with an unreadable cell is not used by default.
     driver.wait("the samples", |driver| driver.has("Training: 4"));
     driver.mean("v", "input");
     driver.wait("the reason", |driver| driver.says("is not a finite number"));
@@ -445,12 +445,12 @@ fn bad_cells_are_listed_by_line_and_column_and_can_be_called_missing() {
     driver.wait("the rest", |driver| {
         driver.has("Training: 3") && driver.says("v is missing")
     });
-    // The table of columns is opened by another thread than counts the samples.
+    // The columns are read and the samples counted by different threads.
     driver.wait("the missing cell", |driver| driver.has("Missing in v: 1"));
 }
 
 #[test]
-fn a_random_split_is_said_to_be_optimistic() {
+fn a_random_split_is_reported_as_optimistic() {
     let (mut driver, _path, _folder) = opened(40);
     assert!(!driver.says("A random split is optimistic"));
     driver.unfold_to("Samples", "random");
@@ -474,7 +474,7 @@ fn a_column_of_groups_divides_the_samples_by_them() {
     let (mut driver, _path, _folder) = opened_text(&text);
     assert!(driver.says("group, 20 % test"), "{:#?}", driver.texts());
     assert!(driver.has("Training: 40") && driver.has("Test: 10"), "whole sessions");
-    // Another group takes its place, and without one the samples are divided in time.
+    // Another group replaces it, and without one the samples are divided by time.
     driver.mean("u", "group");
     assert_meanings(&driver, &[("session", "unused")]);
     driver.mean("u", "input");
@@ -482,7 +482,7 @@ fn a_column_of_groups_divides_the_samples_by_them() {
 }
 
 #[test]
-fn everything_lies_within_narrow_windows_too() {
+fn everything_fits_in_narrow_windows_too() {
     let folder = tempfile::tempdir().unwrap();
     let path = written(&folder, "press.csv", &recording(40));
     for size in [vec2(1440.0, 900.0), vec2(1024.0, 700.0), vec2(960.0, 640.0)] {

@@ -1,4 +1,4 @@
-//! Frames decoded as they come: from the simulated source, a recording, and a socket.
+//! Frames decoded as they arrive: from the simulated source, a recording, and a socket.
 
 use std::{
     cell::RefCell,
@@ -64,12 +64,12 @@ fn wait_for_frames(driver: &mut Driver, more: u64) {
 }
 
 /// Time and nodes of the displayed frame.
-fn on_show(driver: &Driver) -> Option<(f64, Vec<DVec3>)> {
+fn displayed(driver: &Driver) -> Option<(f64, Vec<DVec3>)> {
     let frame = driver.views().live.shown.frame.as_ref()?;
     Some((frame.time_s, frame.decoupled.nodes_mm.to_vec()))
 }
 
-/// What the library decodes.
+/// The frame decoded by the library.
 fn by_library(file: &NetworkFile, frame_ohm: &[f64]) -> Vec<DVec3> {
     let scale = file.settings.simulated().unwrap().source.sensor.scale;
     let mut decoder = CompiledNetworks::<f64>::new(&file.network, scale.rows());
@@ -87,7 +87,7 @@ fn pick(driver: &mut Driver, list: &str, choice: &str) {
 }
 
 #[test]
-fn without_a_network_one_click_trains_one_and_another_shows_it_live() {
+fn without_a_network_one_click_trains_one_and_another_decodes_live() {
     let mut driver = Driver::open();
     driver.configure_small();
     driver.click_button("Live");
@@ -108,7 +108,7 @@ fn without_a_network_one_click_trains_one_and_another_shows_it_live() {
     wait_for_frames(&mut driver, 3);
 
     let file = network(&driver, 0);
-    let (time_s, nodes) = on_show(&driver).unwrap();
+    let (time_s, nodes) = displayed(&driver).unwrap();
     let scene = Scene {
         noise: Noise::default(),
         ..file.settings.simulated().unwrap().source.scene
@@ -132,14 +132,14 @@ fn without_a_network_one_click_trains_one_and_another_shows_it_live() {
 
     driver.click("■ Stop");
     assert!(
-        driver.comes_to_rest() && driver.has("Live decoupled surface"),
+        driver.becomes_idle() && driver.has("Live decoupled surface"),
         "the last frame stays"
     );
     assert!(driver.says("Stopped after") && driver.is_enabled("▶ Start"));
 }
 
 #[test]
-fn a_broken_wire_is_named_left_out_and_forgotten_once_it_is_mended() {
+fn a_broken_wire_is_reported_left_out_and_cleared_once_it_is_repaired() {
     let folder = tempfile::tempdir().unwrap();
     let mut driver = open(folder.path());
     start(&mut driver);
@@ -161,7 +161,7 @@ fn a_broken_wire_is_named_left_out_and_forgotten_once_it_is_mended() {
 }
 
 #[test]
-fn re_zero_takes_a_drift_away_and_its_gains_are_saved() {
+fn re_zero_removes_a_drift_and_its_gains_are_saved() {
     let folder = tempfile::tempdir().unwrap();
     let mut driver = open(folder.path());
     driver.enter("Frames per second", "0.1");
@@ -179,7 +179,7 @@ fn re_zero_takes_a_drift_away_and_its_gains_are_saved() {
     wait_for_frames(&mut driver, 30);
     driver.click_button("Re-zero");
     driver.wait("the gains", |driver| driver.has("Rows in contact: 0 of 10"));
-    driver.wait("sound readings", |driver| driver.has("Fault: none"));
+    driver.wait("readings without a fault", |driver| driver.has("Fault: none"));
     let zero = driver.views().live.zero.clone().unwrap();
     for (index, gain) in zero.gains.iter().enumerate() {
         let expected = if index % 18 == 2 { 1.05 } else { 1.0 };
@@ -201,7 +201,7 @@ fn re_zero_takes_a_drift_away_and_its_gains_are_saved() {
 fn collect(driver: &mut Driver, what: &str, ends: impl Fn(&Driver) -> bool) -> BTreeMap<u64, Vec<DVec3>> {
     let shown = RefCell::new(BTreeMap::new());
     driver.wait(what, |driver| {
-        if let Some((time_s, nodes)) = on_show(driver) {
+        if let Some((time_s, nodes)) = displayed(driver) {
             shown.borrow_mut().insert(time_s.to_bits(), nodes);
         }
         ends(driver)
@@ -249,7 +249,7 @@ fn a_recording_is_replayed_with_the_same_answers_and_by_any_network() {
         replay.is_some_and(|replay| !replay.is_playing)
     };
     let replayed = collect(&mut driver, "the end of the replay", ended);
-    assert!(driver.comes_to_rest(), "a replay that is paused");
+    assert!(driver.becomes_idle(), "a replay that is paused");
     let file = network(&driver, 1);
     let answers = recording.times_s().iter().enumerate().map(|(frame, time_s)| {
         let frame_ohm: Vec<f64> = recording.frame_ohm(frame).iter().copied().collect();
@@ -262,7 +262,7 @@ fn a_recording_is_replayed_with_the_same_answers_and_by_any_network() {
         assert!(recorded.iter().all(|(time, nodes)| answers[time] == **nodes));
     }
     let check = |driver: &Driver, place: usize| {
-        let (time_s, nodes) = on_show(driver).unwrap();
+        let (time_s, nodes) = displayed(driver).unwrap();
         let frame = recording.frame_at(time_s);
         let frame_ohm: Vec<f64> = recording.frame_ohm(frame).iter().copied().collect();
         assert_eq!(nodes, by_library(&network(driver, place), &frame_ohm));
@@ -322,7 +322,7 @@ fn closing_the_window_while_it_records_ends_at_once_and_loses_no_frame() {
 }
 
 #[test]
-fn a_socket_is_decoded_its_bad_lines_told_and_its_end() {
+fn a_socket_is_decoded_and_its_bad_lines_and_end_are_reported() {
     let folder = tempfile::tempdir().unwrap();
     let mut driver = open(folder.path());
     let file = network(&driver, 0);
@@ -343,7 +343,7 @@ fn a_socket_is_decoded_its_bad_lines_told_and_its_end() {
     driver.enter("Address", &listener.local_addr().unwrap().to_string());
     driver.click("▶ Start");
     let (mut sender, _) = listener.accept().unwrap();
-    // One by one: what waits too long is dropped.
+    // One by one: frames that wait too long are dropped.
     writeln!(sender, "{line}").unwrap();
     driver.wait("a frame", |driver| driver.has("Decoded: 1"));
     writeln!(sender, "#!?").unwrap();
@@ -352,23 +352,21 @@ fn a_socket_is_decoded_its_bad_lines_told_and_its_end() {
     });
     writeln!(sender, "{line}").unwrap();
     driver.wait("both frames", |driver| driver.has("Decoded: 2"));
-    assert_eq!(on_show(&driver).unwrap().1, by_library(&file, &frame_ohm));
+    assert_eq!(displayed(&driver).unwrap().1, by_library(&file, &frame_ohm));
     assert!(!driver.has("Live actual surface"), "no one knows it");
     driver.wait("silence", |driver| driver.has("No frame for two seconds"));
-    assert!(driver.comes_to_rest(), "nothing comes");
+    assert!(driver.becomes_idle(), "nothing comes");
     drop(sender);
     driver.wait("the end", |driver| driver.says("The source has ended."));
     assert!(driver.is_enabled("▶ Start"));
 
     driver.click("▶ Start");
     drop(listener);
-    driver.wait("the end of a source that is gone", |driver| {
-        driver.views().live.running.is_none()
-    });
+    driver.wait("the end of the source", |driver| driver.views().live.running.is_none());
 }
 
 #[test]
-fn everything_keeps_to_a_narrow_window() {
+fn everything_fits_in_a_narrow_window() {
     let folder = tempfile::tempdir().unwrap();
     for size in [vec2(1440.0, 900.0), vec2(1024.0, 700.0), vec2(960.0, 640.0)] {
         let mut driver = open(&folder.path().join(format!("{}", size.x)));

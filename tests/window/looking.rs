@@ -1,4 +1,4 @@
-//! What holds however the window looks: everything within reach, and stillness when nothing happens.
+//! Layout: everything within the window, and no repainting while nothing happens.
 
 use decoupler_core::training::Method;
 use eframe::egui::{Pos2, Rect, Vec2, accesskit::Role, vec2};
@@ -49,7 +49,7 @@ fn narrow_windows_leave_the_surfaces_their_width() {
 }
 
 #[test]
-fn names_stand_clear_of_their_values() {
+fn names_do_not_touch_their_values() {
     for size in SIZES {
         let mut driver = Driver::open_sized(size);
         for method in Method::all() {
@@ -67,7 +67,7 @@ fn names_stand_clear_of_their_values() {
 }
 
 #[test]
-fn the_buttons_that_run_the_training_stand_apart() {
+fn the_buttons_that_run_the_training_are_apart() {
     for size in SIZES {
         let driver = Driver::open_sized(size);
         let labels = ["Previous snapshot", "Test snapshot", "Next snapshot"].into_iter();
@@ -91,7 +91,7 @@ fn the_buttons_that_run_the_training_stand_apart() {
 fn an_idle_window_draws_nothing() {
     let mut driver = Driver::open();
     driver.wait("the last events", |driver| !driver.table().is_empty());
-    assert!(driver.comes_to_rest(), "before a training");
+    assert!(driver.becomes_idle(), "before a training");
     driver.configure_small();
     driver.train();
     driver.wait("the last events", |driver| {
@@ -100,14 +100,14 @@ fn an_idle_window_draws_nothing() {
             .result()
             .is_some_and(|result| result.frame_time.is_some())
     });
-    assert!(driver.comes_to_rest(), "after a training");
+    assert!(driver.becomes_idle(), "after a training");
     driver.click_button("Error");
     driver.click("Regression");
-    assert!(driver.comes_to_rest(), "with another picture");
+    assert!(driver.becomes_idle(), "with another picture");
 }
 
 #[test]
-fn buttons_answer_the_pointer() {
+fn buttons_react_to_the_pointer() {
     let mut driver = Driver::open();
     for theme in ["Light theme", "Dark theme"] {
         for button in ["▶ Train", theme, "Best", "Type the path of a checkpoint"] {

@@ -1,4 +1,4 @@
-//! The window, worked by its labels as a user works it, and compared with the library.
+//! The window, operated through its labels as by a user, and compared with the library.
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 mod accessibility;

@@ -1,4 +1,4 @@
-//! The first minute: what the window opens on, the tour, the glossary, and empty views that fill on a click.
+//! The first minute: the initial scene, the tour, the glossary, and empty views that fill on a click.
 
 use std::path::PathBuf;
 
@@ -63,7 +63,7 @@ fn the_window_opens_on_a_print_and_the_papers_scene_is_one_click_away() {
 }
 
 #[test]
-fn only_the_papers_own_network_is_said_to_take_seconds() {
+fn only_the_papers_own_network_is_announced_to_take_seconds() {
     const SAYS: &str = "The paper's network takes a few seconds";
     let mut driver = Driver::open();
     assert!(driver.says(SAYS));
@@ -77,7 +77,7 @@ fn only_the_papers_own_network_is_said_to_take_seconds() {
 }
 
 #[test]
-fn one_of_a_kind_is_singular() {
+fn nouns_after_one_are_singular() {
     let mut driver = Driver::open();
     driver.enter("Array scale", "1x1_1x1");
     assert!(
@@ -136,7 +136,7 @@ fn the_tour_leads_through_five_steps_and_is_remembered() {
     driver.click_button("Next");
     driver.click_button("Done");
     assert!(!driver.says("Tour, step"));
-    assert!(driver.comes_to_rest());
+    assert!(driver.becomes_idle());
     drop(driver);
     let mut driver = Driver::open_on_tour(&path);
     assert!(!driver.has(SKIP), "it has ended for good");
@@ -159,7 +159,7 @@ fn the_tour_can_be_skipped_and_stays_away() {
 }
 
 #[test]
-fn the_tour_trains_on_a_click_and_lets_the_other_views_be() {
+fn the_tour_trains_on_a_click_and_stays_hidden_in_other_views() {
     let (_folder, path) = file();
     let mut driver = Driver::open_on_tour(&path);
     driver.click_button("Next");
@@ -175,7 +175,7 @@ fn the_tour_trains_on_a_click_and_lets_the_other_views_be() {
 }
 
 #[test]
-fn every_term_stands_in_the_glossary_and_under_the_pointer_in_the_same_words() {
+fn every_term_has_the_same_text_in_the_glossary_and_as_a_tooltip() {
     let mut driver = open_first();
     driver.wait("the baselines", |driver| !driver.table().is_empty());
     let place = driver.get("stroke %").rect().center();
@@ -211,7 +211,11 @@ fn the_list_of_actions_finds_terms_too() {
     driver.type_into("Action", "pareto");
     driver.press(Key::Enter);
     driver.settle();
-    assert!(driver.says("no other is both faster and more accurate"), "{:#?}", driver.texts());
+    assert!(
+        driver.says("no other is both faster and more accurate"),
+        "{:#?}",
+        driver.texts()
+    );
 }
 
 #[test]
@@ -266,7 +270,7 @@ fn compare_opens_on_the_last_two_runs() {
 }
 
 #[test]
-fn the_sample_recording_plays_without_any_training() {
+fn the_sample_recording_is_replayed_without_any_training() {
     let folder = tempfile::tempdir().unwrap();
     let mut driver = Driver::open_keeping(&folder.path().join("runs"));
     driver.click_button("Live");

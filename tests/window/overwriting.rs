@@ -1,4 +1,4 @@
-//! Files that exist, in the form for a path: none is lost unasked.
+//! Existing files in the form for a path: none is overwritten without asking.
 
 use std::{fs, path::Path};
 
@@ -22,12 +22,12 @@ fn ask(driver: &mut Driver, export: &str, path: &Path) {
 }
 
 #[test]
-fn a_file_that_exists_is_replaced_only_if_the_user_says_so() {
+fn an_existing_file_is_replaced_only_if_the_user_confirms() {
     let (mut driver, _path, folder) = opened(40);
     let path = written(&folder, "mine.json", "mine");
     ask(&mut driver, RECIPE, &path);
     driver.wait("the question", |driver| driver.says("mine.json already exists"));
-    // Neither the key that asked nor a second click where it was clicked says yes.
+    // Neither pressing Enter again nor a second click in the same place confirms.
     driver.press(Key::Enter);
     assert!(!driver.has("Save"));
     driver.settle();
@@ -108,7 +108,7 @@ fn a_network_kept_in_the_list_is_not_overwritten() {
 }
 
 #[test]
-fn typing_takes_the_place_of_the_suggested_path() {
+fn typing_replaces_the_suggested_path() {
     let (mut driver, path, folder) = opened(40);
     let target = folder.path().join("typed.json");
     driver.export(RECIPE);

@@ -70,7 +70,7 @@ fn album_of_recording(size: Vec2, is_dark: bool, name: &str, setup: &Setup) {
     let mut album = Album { driver, prefix };
     album.take("1-opened");
     album.driver.train();
-    album.driver.wait_for_hold();
+    album.driver.wait_for_last_epoch();
     album.take("2-trained");
     for tab in [
         "Training state",

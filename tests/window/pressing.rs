@@ -1,4 +1,4 @@
-//! Pressing the actual surface with the pointer, and what every decoder makes of it.
+//! Pressing the actual surface with the pointer, and the answers of all decoders.
 
 use decoupler_core::{dataset::Dataset, ndarray::Array2};
 use decoupler_core::{
@@ -15,7 +15,7 @@ use crate::driver::{Driver, small, trained};
 const ACTUAL: &str = "Actual surface";
 const READINGS: &str = "Readings of the actual surface";
 
-/// A point of the screen over one of the nodes of the middle of the surface, and the node.
+/// Returns a point of the screen over a node in the middle of the surface, and the node.
 fn over_a_node(driver: &mut Driver) -> (Pos2, usize) {
     let card = driver.get(ACTUAL).rect();
     let middle = Rect::from_center_size(card.center(), 0.3 * card.size());
@@ -35,7 +35,7 @@ fn touch(driver: &Driver) -> Touch {
     driver.views().train.press.touch().cloned().unwrap()
 }
 
-/// Presses the button of the mouse there and draws one frame.
+/// Presses the mouse button there and draws one frame.
 fn push(driver: &mut Driver, at: Pos2) {
     driver.harness().drag_at(at);
     driver.harness().step();
@@ -47,8 +47,8 @@ fn move_to(driver: &mut Driver, at: Pos2) {
     driver.harness().step();
 }
 
-/// Readings under the finger, the errors of the network and what its surface says of its heights, by the library's own path: a
-/// set of one snapshot.
+/// Returns the readings under the finger, the errors of the network and the description of its surface, computed by the
+/// library from a set of one snapshot.
 fn expected(run: &Run, touch: &Touch) -> (Array2<f64>, Errors, String) {
     let settings: SimulatedSettings = run.settings().simulated().unwrap();
     let sensor: SensorModel = settings.source.sensor;
@@ -75,7 +75,7 @@ fn expected(run: &Run, touch: &Touch) -> (Array2<f64>, Errors, String) {
     (readings, errors, format!("z {low:.2} to {high:.2} mm"))
 }
 
-/// What the report and the readings say of the touch, in the frame just drawn, is what the library says of it.
+/// Asserts that the report and the readings in the frame just drawn agree with the library about the touch.
 #[track_caller]
 fn says_what_is_pressed(driver: &Driver, run: &Run) {
     let (readings, errors, heights) = expected(run, &touch(driver));
@@ -94,11 +94,11 @@ fn says_what_is_pressed(driver: &Driver, run: &Run) {
 }
 
 #[test]
-fn all_of_the_window_follows_the_finger_in_the_same_frame() {
+fn the_whole_window_follows_the_finger_in_the_same_frame() {
     let mut driver = Driver::open();
     driver.configure_small();
     driver.train();
-    driver.wait_for_hold();
+    driver.wait_for_last_epoch();
     let run = trained(small());
     let before = driver.get(READINGS).value();
     let (at, node) = over_a_node(&mut driver);
@@ -132,7 +132,7 @@ fn all_of_the_window_follows_the_finger_in_the_same_frame() {
     }
     driver.harness().drop_at(at);
     driver.harness().step();
-    // The wheel and the slider set the depth of what stays pressed.
+    // The wheel and the slider set the depth of the touch.
     let depth_mm = touch(&driver).print.unwrap().depth_mm;
     move_to(&mut driver, at);
     driver.harness().event(Event::MouseWheel {
@@ -167,11 +167,11 @@ fn all_of_the_window_follows_the_finger_in_the_same_frame() {
 }
 
 #[test]
-fn the_other_decoders_answer_beside_the_network() {
+fn the_other_decoders_answer_alongside_the_network() {
     let mut driver = Driver::open();
     driver.configure_small();
     driver.train();
-    driver.wait_for_hold();
+    driver.wait_for_last_epoch();
     let (at, _) = over_a_node(&mut driver);
     push(&mut driver, at);
     driver.harness().drop_at(at);
@@ -214,11 +214,11 @@ fn a_newcomer_presses_before_any_training_and_a_small_network_answers() {
     let text = driver.texts().into_iter().find(|text| text.starts_with(start)).unwrap();
     let worst_mm: f64 = text[start.len()..].parse().unwrap();
     assert!(worst_mm < rest_mm, "{text}");
-    assert!(driver.state().run.is_none(), "nothing was trained displayed");
+    assert!(driver.state().run.is_none(), "no training of the user is displayed");
 
-    // One's own network takes over.
+    // The user's own network takes over.
     driver.train();
-    driver.wait_for_hold();
+    driver.wait_for_last_epoch();
     driver.settle();
     says_what_is_pressed(&driver, &trained(small()));
     assert!(!driver.says("A small network answers"));
@@ -231,7 +231,7 @@ fn a_single_node_is_dragged_up_and_down_within_the_stroke() {
     let mut driver = Driver::open();
     driver.configure_small();
     driver.train();
-    driver.wait_for_hold();
+    driver.wait_for_last_epoch();
     let run = trained(small());
     driver.click_button("Node");
     let test = run.test().clone();

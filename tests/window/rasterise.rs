@@ -1,5 +1,5 @@
 //! Draws egui's tessellated output on the CPU, so that pictures of the window can be made and compared on machines
-//! without any graphics driver. Textured triangles with four samples a pixel, blended as egui's own renderers do:
+//! without any graphics driver. Textured triangles with four samples per pixel, blended as egui's own renderers do:
 //! premultiplied, in gamma space. Paint callbacks are not drawn.
 
 use std::collections::HashMap;
@@ -11,7 +11,7 @@ use eframe::egui::{
 use egui_kittest::TestRenderer;
 use image::{Rgba, RgbaImage};
 
-/// Sample places within a pixel, on no line that layouts favour.
+/// Sample positions within a pixel, off the lines that layouts favour.
 const SAMPLES: [[f32; 2]; 4] = [[0.376, 0.124], [0.876, 0.374], [0.124, 0.626], [0.624, 0.876]];
 
 /// A renderer for `egui_kittest::HarnessBuilder::renderer`, or for a [`FullOutput`] at hand.
@@ -75,7 +75,7 @@ impl TestRenderer for Rasteriser {
 
 struct Canvas {
     size: [u32; 2],
-    /// Premultiplied, 0..=255, [`SAMPLES`] a pixel.
+    /// Premultiplied, 0..=255, [`SAMPLES`] per pixel.
     samples: Vec<[f32; 4]>,
 }
 
@@ -125,7 +125,7 @@ impl Canvas {
                 if !covers.contains(&true) {
                     continue;
                 }
-                // One colour a pixel, from its middle, as graphics cards do.
+                // One colour per pixel, from its centre, as on graphics cards.
                 let weights = parts(at([0.5, 0.5]));
                 let mix = |values: [f32; 3]| values[0] * weights[0] + values[1] * weights[1] + values[2] * weights[2];
                 let texel = texture.map_or([255.0; 4], |texture| {
@@ -161,7 +161,7 @@ impl Canvas {
     }
 }
 
-/// The texture between its pixels, linearly.
+/// Samples the texture with linear interpolation between its pixels.
 fn sample(texture: &ColorImage, u: f32, v: f32) -> [f32; 4] {
     let [width, height] = texture.size;
     let place = |part: f32, count: usize| {

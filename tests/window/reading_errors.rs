@@ -1,4 +1,4 @@
-//! Reading errors: what is pointed at lights up everywhere; sections, the nodes in a bar, colours and their scales.
+//! Inspecting errors: the item under the pointer lights up everywhere; sections, the nodes in a bar, colours and scales.
 
 use decoupler::window::BottomTab;
 use decoupler_files::figure::SequentialMap;
@@ -12,7 +12,7 @@ fn trained() -> Driver {
     let mut driver = Driver::open();
     driver.configure_small();
     driver.train();
-    driver.wait_for_hold();
+    driver.wait_for_last_epoch();
     driver.settle();
     driver
 }
@@ -21,7 +21,7 @@ fn lit(driver: &Driver) -> Option<usize> {
     driver.views().train.lights.node
 }
 
-/// The sentence about the picture of this label.
+/// Returns the description of the picture with this label.
 fn description(driver: &mut Driver, role: Role, part: &str) -> String {
     let by = By::new().role(role);
     let nodes = driver.harness().get_all(by);
@@ -81,7 +81,7 @@ fn a_node_pointed_at_in_a_chart_is_lit_on_the_surfaces() {
     let frames = &driver.views().train.drawn.frames;
     let (nodes, count) = (frames.actual.nodes_mm.len(), 60);
     assert_eq!(nodes, count, "10 × 6");
-    // Across the plot at all heights: some points lie under the way, and gaps between them.
+    // Across the plot at all heights: the path crosses some points, and gaps between them.
     let mut found = Vec::new();
     for row in 1..20 {
         let y = plot.top() + plot.height() * row as f32 / 20.0;
@@ -156,7 +156,7 @@ fn a_bar_of_the_histogram_lists_and_lights_its_nodes() {
     driver.settle();
     assert!(!driver.says("Go to"), "nothing is chosen");
     let plot = plot_place(&mut driver, "nodes of the test set against error");
-    // Just above the axis, in the middle of the plot, stand the bars of small errors.
+    // The bars of small errors are just above the axis, in the middle of the plot.
     let at = pos2(plot.left() + 0.56 * plot.width(), plot.bottom() - 40.0);
     driver.harness().drag_at(at);
     driver.harness().drop_at(at);
@@ -248,7 +248,7 @@ fn colours_and_scales_are_chosen_at_the_bar_and_colours_are_remembered() {
 }
 
 #[test]
-fn a_right_click_copies_what_it_points_at() {
+fn a_right_click_copies_the_value_under_the_pointer() {
     let mut driver = trained();
     let cell = driver
         .table()
@@ -262,7 +262,7 @@ fn a_right_click_copies_what_it_points_at() {
     driver.right_click(&cell);
     let table = driver.click_and_copy("Copy error table as Markdown").unwrap();
     assert!(table.starts_with("| ") && table.contains("| network |"), "{table}");
-    // A field has a menu of its own.
+    // A field has its own menu.
     driver.right_click("Hidden nodes");
     assert_eq!(driver.click_and_copy("Copy 6"), Some("6".to_owned()));
     driver.right_click("Hidden nodes");

@@ -1,4 +1,4 @@
-//! Recordings to be dropped on the window, and what the library makes of them.
+//! Recordings to be dropped on the window, and their results from the library.
 
 use std::{
     fmt::Write as _,
@@ -44,14 +44,14 @@ impl Driver {
         self.harness().step();
     }
 
-    /// As [`Self::drop_files`]; waits until the window has tried the import out.
+    /// As [`Self::drop_files`]; waits until the window has checked the import.
     #[track_caller]
     pub(crate) fn open_recordings(&mut self, paths: &[&Path]) {
         self.drop_files(paths);
         self.wait("the samples", |driver| driver.says("Test: "));
     }
 
-    /// Gives a column another meaning by its list.
+    /// Gives a column another meaning through its list.
     #[track_caller]
     pub(crate) fn mean(&mut self, column: &str, meaning: &str) {
         self.click(&format!("Meaning of {column}"));
@@ -110,7 +110,7 @@ pub(crate) fn written(folder: &TempDir, name: &str, text: &str) -> PathBuf {
     path
 }
 
-/// The plan that the window makes of [`recording`].
+/// Returns the plan that the window suggests for [`recording`].
 pub(crate) fn plan(path: &Path) -> Plan {
     let names = |names: &[&str]| names.iter().map(|name| (*name).to_owned()).collect();
     Plan {
@@ -133,7 +133,7 @@ pub(crate) fn settings() -> RunSettings {
     settings
 }
 
-/// What the library makes of the plan with these settings.
+/// Returns the run of the library on the plan with these settings.
 pub(crate) fn trained(plan: &Plan) -> Run {
     let watch = &mut |_| std::ops::ControlFlow::Continue(());
     let sets = plan.sets(Path::new(""), Seed::default(), watch).unwrap();
@@ -142,12 +142,12 @@ pub(crate) fn trained(plan: &Plan) -> Run {
     run
 }
 
-/// A window with [`recording`] open, its file, and the folder of that.
+/// Returns a window with [`recording`] open, its file, and the folder of the file.
 pub(crate) fn opened(rows: usize) -> (Driver, PathBuf, TempDir) {
     opened_text(&recording(rows))
 }
 
-/// As [`opened`], of this text.
+/// As [`opened`], with this text.
 pub(crate) fn opened_text(text: &str) -> (Driver, PathBuf, TempDir) {
     let folder = tempfile::tempdir().unwrap();
     let path = written(&folder, "press.csv", text);

@@ -1,4 +1,4 @@
-//! What the window finds again when it next opens.
+//! The state that the window restores when it next opens.
 
 use std::{fs, path::PathBuf};
 
@@ -9,7 +9,7 @@ use eframe::egui::{Vec2, vec2};
 
 use crate::driver::{Driver, small};
 
-/// A file that does not exist yet, in a folder that vanishes.
+/// Returns a file that does not exist yet, in a temporary folder.
 fn file() -> (tempfile::TempDir, PathBuf) {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("data").join("window.json");
@@ -24,7 +24,7 @@ fn is_a_print(settings: &SimulatedSettings) -> bool {
 }
 
 #[test]
-fn theme_view_and_settings_are_as_they_were_and_nothing_is_trained() {
+fn theme_view_and_settings_are_restored_and_nothing_is_trained() {
     let (_folder, path) = file();
     let mut driver = Driver::open_remembering(&path);
     assert!(is_a_print(&driver.state().draft), "the first start");
@@ -46,7 +46,7 @@ fn theme_view_and_settings_are_as_they_were_and_nothing_is_trained() {
 }
 
 #[test]
-fn a_file_of_another_program_opens_the_usual_window() {
+fn a_file_of_another_program_opens_the_default_window() {
     let (_folder, path) = file();
     fs::create_dir_all(path.parent().unwrap()).unwrap();
     fs::write(&path, r#"{"is_dark": "no", "view": "Rocket", "draft": {"hidden": -1}}"#).unwrap();
@@ -57,7 +57,7 @@ fn a_file_of_another_program_opens_the_usual_window() {
 }
 
 #[test]
-fn a_place_that_cannot_be_written_is_told_once() {
+fn an_unwritable_location_is_reported_once() {
     let (folder, path) = file();
     // A file where the folder should be.
     fs::write(folder.path().join("data"), "").unwrap();
@@ -70,12 +70,12 @@ fn a_place_that_cannot_be_written_is_told_once() {
 }
 
 #[test]
-fn a_window_that_remembers_comes_to_rest() {
+fn a_window_that_remembers_becomes_idle() {
     let (_folder, path) = file();
     drop(Driver::open_remembering(&path));
     let mut driver = Driver::open_remembering(&path);
     driver.wait("the last events", |driver| !driver.table().is_empty());
-    assert!(driver.comes_to_rest());
+    assert!(driver.becomes_idle());
 }
 
 /// Drags the edge of a column by this many points.
@@ -92,14 +92,14 @@ fn drag(driver: &mut Driver, edge: &str, points: f32) {
     harness.step();
 }
 
-/// Place and size of the middle of the view that trains.
+/// Place and size of the middle of the Train view.
 fn middle(driver: &Driver) -> (f32, Vec2) {
     let left = driver.get("Actual surface").rect();
     (left.left(), left.size())
 }
 
 #[test]
-fn columns_are_drawn_wider_and_narrower_and_stay_so() {
+fn dragged_column_widths_are_remembered() {
     const LEFT: &str = "Width of the left column";
     const RIGHT: &str = "Width of the right column";
     let (_folder, path) = file();
@@ -111,7 +111,7 @@ fn columns_are_drawn_wider_and_narrower_and_stay_so() {
     let drawn = edges(&driver);
     assert!((drawn[0] - usual[0] - 40.0).abs() < 5.0, "{usual:?}, {drawn:?}");
     assert!((drawn[1] - usual[1] - 30.0).abs() < 5.0, "{usual:?}, {drawn:?}");
-    assert!(driver.comes_to_rest());
+    assert!(driver.becomes_idle());
     let seen = middle(&driver);
     drop(driver);
 

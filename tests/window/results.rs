@@ -15,26 +15,26 @@ use crate::{
 /// Positions of the taxels of a grid in an order of their own.
 const GRID: &str = "target,x,y\nd6,4,10\nd1,0,0\nd2,0,5\nd4,4,0\nd3,0,10\nd5,4,5\n";
 
-/// What a surface tells assistive technology: the range of its nodes.
+/// The description of a surface for assistive technology: the range of its nodes.
 #[track_caller]
 fn range(driver: &Driver, surface: &str) -> String {
     let label = format!("{surface} surface");
     driver.get(&label).accesskit_node().value().unwrap_or_default()
 }
 
-/// A window in which the recording that `make` writes was trained on.
+/// Returns a window trained on the recording that `make` writes.
 fn trained_on(make: impl Fn(&Path) -> decoupler_files::import::Setup) -> Opened {
     let folder = tempfile::tempdir().unwrap();
     let setup = make(folder.path());
     let mut driver = Driver::open();
     driver.take_recording(&setup);
     driver.train();
-    driver.wait_for_hold();
+    driver.wait_for_last_epoch();
     Opened { driver, setup, folder }
 }
 
 #[test]
-fn a_training_shows_the_errors_of_the_library() {
+fn a_training_shows_the_same_errors_as_the_library() {
     for source in BOTH {
         let Opened {
             mut driver,
@@ -91,7 +91,7 @@ fn targets_with_positions_are_shown_as_surfaces() {
 }
 
 #[test]
-fn scattered_positions_have_surfaces_and_those_on_a_line_say_why_there_are_none() {
+fn scattered_positions_have_surfaces_and_positions_on_a_line_say_why_not() {
     // A hexagon around d6.
     let hexagon = "target,x,y\nd1,5,0\nd2,2.5,4.33\nd3,-2.5,4.33\nd4,-5,0\nd5,-2.5,-4.33\nd6,0,0\n";
     let Opened { mut driver, folder, .. } = trained_on(|folder| skin_with_positions(folder, hexagon));
@@ -111,7 +111,7 @@ fn scattered_positions_have_surfaces_and_those_on_a_line_say_why_there_are_none(
     } = trained_on(|folder| skin_with_positions(folder, oblique));
     assert!(!driver.has("Actual surface"));
     assert!(driver.says("No surface goes through the positions of the targets: all nodes are on one line"));
-    assert!(driver.says("% of the target's range"), "all targets take their place");
+    assert!(driver.says("% of the target's range"), "all targets are shown instead");
 }
 
 #[test]
@@ -212,7 +212,7 @@ fn is_of_error_table(text: &str) -> bool {
 }
 
 #[test]
-fn results_of_a_recording_lie_within_narrow_windows_too() {
+fn results_of_a_recording_fit_in_narrow_windows_too() {
     const SIZES: [Vec2; 3] = [vec2(1440.0, 900.0), vec2(1024.0, 700.0), vec2(960.0, 640.0)];
     for size in SIZES {
         for make in [probe, |folder: &Path| skin_with_positions(folder, GRID)] {

@@ -51,7 +51,7 @@ fn known_rows_train_one_small_network_for_each_row() {
 }
 
 #[test]
-fn one_row_is_all_that_is_drawn() {
+fn with_one_row_only_that_row_is_drawn() {
     let mut driver = Driver::open();
     driver.configure_small();
     driver.click_button("One");
@@ -85,7 +85,7 @@ fn one_row_is_all_that_is_drawn() {
 fn noise_inputs_and_scaling_reach_the_librarys_settings() {
     let mut driver = Driver::open();
     driver.click("Noise on resistance");
-    assert!(!driver.has("Noise in"), "it means nothing without noise");
+    assert!(!driver.has("Noise in"), "it has no effect without noise");
     driver.enter("Relative noise", "0.1");
     driver.enter("Additive noise", "0.25");
     driver.enter("Converter bits", "14");
@@ -127,7 +127,7 @@ fn noise_inputs_and_scaling_reach_the_librarys_settings() {
 }
 
 #[test]
-fn a_training_with_noise_stands_beside_the_limit_that_noise_sets() {
+fn a_training_with_noise_is_compared_with_the_limit_that_noise_sets() {
     let mut driver = Driver::open();
     driver.configure_small();
     driver.click("Noise on resistance");
@@ -151,7 +151,7 @@ fn a_training_with_noise_stands_beside_the_limit_that_noise_sets() {
 }
 
 #[test]
-fn only_the_settings_of_what_is_chosen_are_shown() {
+fn only_the_settings_of_the_current_choices_are_shown() {
     let mut driver = Driver::open();
     let shows = |driver: &Driver, names: &[&str]| {
         for name in [
@@ -212,7 +212,7 @@ fn only_the_settings_of_what_is_chosen_are_shown() {
 }
 
 #[test]
-fn presets_decide_how_readings_are_decoded_and_leave_the_sensor_alone() {
+fn presets_set_how_readings_are_decoded_and_leave_the_sensor_alone() {
     let mut driver = Driver::open();
     driver.click("10×6");
     driver.enter("Hidden nodes", "7");
@@ -242,7 +242,7 @@ fn presets_decide_how_readings_are_decoded_and_leave_the_sensor_alone() {
     driver.enter("Relative noise", "0");
     assert_eq!(driver.state().draft, draft);
 
-    // Who has samples of their own keeps them.
+    // A number of samples set by the user is kept.
     driver.enter("Training samples", "300");
     driver.enter("Relative noise", "0.1");
     assert_eq!(driver.state().draft.source.samples, 300);
@@ -253,7 +253,7 @@ fn presets_decide_how_readings_are_decoded_and_leave_the_sensor_alone() {
 }
 
 #[test]
-fn scenes_that_move_sideways_say_how_badly_conditioned_they_are() {
+fn scenes_that_move_sideways_report_their_condition_number() {
     let mut driver = Driver::open();
     driver.configure_small();
     let condition = |driver: &Driver| {

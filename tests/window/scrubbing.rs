@@ -1,4 +1,4 @@
-//! Past epochs brought back by the slider under the loss curves.
+//! Past epochs selected with the slider under the loss curves.
 
 use eframe::egui::Key;
 
@@ -14,7 +14,7 @@ fn pairs(driver: &Driver) -> Vec<(f64, f64)> {
 }
 
 #[test]
-fn the_network_of_an_epoch_is_that_of_a_training_stopped_there() {
+fn the_network_of_an_epoch_equals_that_of_a_training_stopped_there() {
     for source in BOTH {
         let Opened {
             mut driver,
@@ -80,6 +80,6 @@ fn a_replay_goes_through_the_epochs_and_ends_on_the_latest() {
         driver.wait("the end", |driver| driver.has(&format!("Latest, epoch {last}")));
         driver.settle();
         driver.assert_shows(&network_figures(&run_of(&setup)));
-        assert!(driver.comes_to_rest(), "{source:?}: nothing moves any more");
+        assert!(driver.becomes_idle(), "{source:?}: nothing moves any more");
     }
 }

@@ -1,6 +1,6 @@
-//! The committed look of every view in both themes. What the eye would notice fails a test; the new picture and one of
-//! the differences are left next to the committed one. `UPDATE_SNAPSHOTS=1 cargo test --test window snapshots` takes
-//! what is drawn now for right, after a look at it.
+//! The committed look of every view in both themes. A visible difference fails the test; the new picture and one of the
+//! differences are left next to the committed one. After a review, `UPDATE_SNAPSHOTS=1 cargo test --test window snapshots`
+//! accepts the new pictures.
 //!
 //! Times differ from run to run and from machine to machine: they are covered, wherever they are.
 
@@ -10,8 +10,8 @@ use image::{Rgba, RgbaImage};
 
 use crate::driver::Driver;
 
-/// Whether a text tells a time: "12 ms", "0.8 µs", "3 min 5 s".
-fn tells_a_time(text: &str) -> bool {
+/// Returns true if a text contains a time: "12 ms", "0.8 µs", "3 min 5 s".
+fn contains_a_time(text: &str) -> bool {
     let words: Vec<&str> = text
         .split(|c: char| c.is_whitespace() || "(),;·×".contains(c))
         .collect();
@@ -20,12 +20,12 @@ fn tells_a_time(text: &str) -> bool {
     words.windows(2).any(|pair| is_number(pair[0]) && is_unit(pair[1]))
 }
 
-/// Covers the line in which a time stands, in the left column or right of the middle: the next words move with its length.
+/// Covers the line that contains a time, in the left column or right of the middle: the words after it move with its length.
 fn cover_line(picture: &mut RgbaImage, place: Rect) {
     let width = picture.width();
-    let beside = width * 27 / 100;
-    let columns = if place.right() < beside as f32 {
-        0..beside
+    let column_end = width * 27 / 100;
+    let columns = if place.right() < column_end as f32 {
+        0..column_end
     } else {
         width * 45 / 100..width
     };
@@ -42,7 +42,7 @@ fn compare(driver: &mut Driver, name: &str, results: &mut SnapshotResults) {
     for theme in ["dark", "light"] {
         let mut picture = driver.harness().render().unwrap();
         for (text, place) in driver.places() {
-            if tells_a_time(&text) && place.is_positive() {
+            if contains_a_time(&text) && place.is_positive() {
                 cover_line(&mut picture, place);
             }
         }
@@ -62,7 +62,7 @@ fn looks_as_before(driver: &mut Driver, name: &str) {
     results.unwrap();
 }
 
-/// The window as it opens for the first time.
+/// Opens the window as for the first time.
 fn open_first() -> Driver {
     let mut driver = Driver::open_first(vec2(1024.0, 700.0));
     driver.wait("the baselines", |driver| !driver.table().is_empty());
@@ -141,7 +141,7 @@ fn a_shifted_button_is_a_failure() {
             [20, 20, 24, 255]
         })
     });
-    // Then nothing is.
+    // Without a change nothing fails.
     if std::env::var_os("UPDATE_SNAPSHOTS").is_some() {
         return;
     }

@@ -23,7 +23,7 @@ pub(crate) const BOTH: [SourceKind; 2] = [SourceKind::Array, SourceKind::Recordi
 pub(crate) struct Opened {
     pub(crate) driver: Driver,
     pub(crate) setup: Setup,
-    /// Of the recording, and for what is written.
+    /// Folder of the recording, and for files to be written.
     pub(crate) folder: TempDir,
 }
 
@@ -49,7 +49,7 @@ pub(crate) fn open_small(source: SourceKind) -> Opened {
 pub(crate) fn trained_small(source: SourceKind) -> Opened {
     let mut opened = open_small(source);
     opened.driver.train();
-    opened.driver.wait_for_hold();
+    opened.driver.wait_for_last_epoch();
     opened
 }
 
@@ -73,7 +73,7 @@ pub(crate) fn probe(folder: &Path) -> Setup {
     setup(folder, "probe.csv", &text, &["x", "y"])
 }
 
-/// A recording of two readings of a press on 2 × 3 taxels, and of the force.
+/// A recording of two readings, the presses on 2 × 3 taxels, and the force.
 fn skin(folder: &Path) -> Setup {
     let mut text = "time (s),u1 (V),u2 (V),d1 (mm),d2 (mm),d3 (mm),d4 (mm),d5 (mm),d6 (mm),force (N)\n".to_owned();
     for row in 0..60 {
@@ -89,7 +89,7 @@ fn skin(folder: &Path) -> Setup {
     setup(folder, "skin.csv", &text, &targets)
 }
 
-/// As [`skin`], of which only the force is decoded.
+/// As [`skin`], but only the force is decoded.
 pub(crate) fn force(folder: &Path) -> Setup {
     let skin = skin(folder);
     let mut plan = skin.plan().unwrap().clone();
@@ -125,7 +125,7 @@ fn setup(folder: &Path, name: &str, text: &str, targets: &[&str]) -> Setup {
     Setup::recording(small_settings(), plan)
 }
 
-/// A run of the library by itself, which has begun.
+/// Returns a run of the library that has begun.
 pub(crate) fn begun(setup: &Setup) -> Run {
     let sets = setup.sets(Path::new(""), &|| false, &mut |_| ()).unwrap().unwrap();
     sets.run(setup, &|| false).unwrap().unwrap()
@@ -145,7 +145,7 @@ pub(crate) fn with_epochs(setup: &Setup, epochs: usize) -> Setup {
     setup.with_settings(settings)
 }
 
-/// Figures of the network in the error table, in the window's words: `network, Z %: 2.28`, `x (mm), network, RMSE: 0.01`.
+/// Returns the figures of the network in the error table, formatted as in the window: `network, Z %: 2.28`, `x (mm), network, RMSE: 0.01`.
 pub(crate) fn network_figures(run: &Run) -> Vec<String> {
     let (problem, scores) = (run.problem(), run.scores().unwrap());
     let table = decoupler_core::evaluation::ErrorTable::of_scores(problem, &scores, None);

@@ -1,4 +1,4 @@
-//! The surface plot: reachable by label and keyboard, unharmed by missing values, and worth looking at.
+//! The surface plot: reachable by label and keyboard, robust to missing values, and pleasant to look at.
 
 use std::sync::Arc;
 
@@ -251,7 +251,7 @@ fn gallery() {
     }
 }
 
-/// A skin and what a network might make of it; the error where a node is marked.
+/// A skin and a possible result of a network; its error if a node is marked.
 fn shown(skin: &Skin, marked_node: Option<usize>, camera: OrbitCamera) -> SurfaceFigure {
     let actual = skin.surface("Actual", Quantity::Height, ViewMode::ThreeD);
     let numbered = skin.nodes.iter().enumerate();
@@ -262,7 +262,7 @@ fn shown(skin: &Skin, marked_node: Option<usize>, camera: OrbitCamera) -> Surfac
             .evaluate(&nodes.iter().map(|node| node.z).collect::<Vec<_>>())
             .into()
     };
-    let beside = if marked_node.is_some() {
+    let right = if marked_node.is_some() {
         Surface {
             title: "Error".to_owned(),
             values: values(&errors),
@@ -282,7 +282,7 @@ fn shown(skin: &Skin, marked_node: Option<usize>, camera: OrbitCamera) -> Surfac
         }
     };
     SurfaceFigure {
-        surfaces: vec![actual, beside],
+        surfaces: vec![actual, right],
         camera,
         marked_node,
         ..SurfaceFigure::default()

@@ -1,4 +1,4 @@
-//! Speed against accuracy: measured, asked, loaded, cancelled and taken away.
+//! The Trade-off view: measured, queried, loaded, cancelled and exported.
 
 use std::{fs, path::Path};
 
@@ -40,7 +40,7 @@ fn measure(driver: &mut Driver) {
     });
 }
 
-/// What the library measures by itself.
+/// Returns the points measured by the library.
 fn by_library(plan: &TradeOffPlan, level: &PlannedLevel) -> Vec<TradeOffPoint> {
     let mut points = Vec::new();
     for run in &level.runs {
@@ -53,7 +53,7 @@ fn by_library(plan: &TradeOffPlan, level: &PlannedLevel) -> Vec<TradeOffPoint> {
 }
 
 #[test]
-fn every_point_is_the_librarys_and_both_questions_are_answered() {
+fn every_point_agrees_with_the_library_and_both_questions_are_answered() {
     let mut driver = open();
     let plan = tiny(&mut driver);
     measure(&mut driver);
@@ -155,7 +155,7 @@ fn a_click_on_a_point_loads_its_configuration() {
 }
 
 #[test]
-fn what_is_measured_is_saved_as_table_and_figures() {
+fn measurements_are_saved_as_table_and_figures() {
     let folder = tempfile::tempdir().unwrap();
     let mut driver = open();
     tiny(&mut driver);
@@ -195,7 +195,7 @@ fn what_is_measured_is_saved_as_table_and_figures() {
 }
 
 #[test]
-fn a_measurement_shows_its_points_as_they_come_and_can_be_cancelled() {
+fn a_measurement_shows_its_points_as_they_arrive_and_can_be_cancelled() {
     let mut driver = open();
     tiny(&mut driver);
     let sizes: Vec<String> = (3..40).map(|hidden| hidden.to_string()).collect();
@@ -219,7 +219,7 @@ fn a_measurement_shows_its_points_as_they_come_and_can_be_cancelled() {
     assert!((3..all).contains(&done), "{done} of {all}");
     assert_eq!(outcome.ending, Some(TradeOffEnding::Cut));
     assert!(driver.says(&format!("Ended early: {done} of {all} points")));
-    // The next begins when the processor is free, and has points of its own only.
+    // The next one begins when the processor is free, and shows only its own points.
     driver.type_into("Hidden nodes", "3");
     driver.enter("Maximum epochs", "3");
     measure(&mut driver);
@@ -227,7 +227,7 @@ fn a_measurement_shows_its_points_as_they_come_and_can_be_cancelled() {
 }
 
 #[test]
-fn what_cannot_be_measured_says_why() {
+fn an_invalid_plan_says_why() {
     let mut driver = open();
     driver.type_into("Noise levels", "0, much");
     assert!(driver.says("'much' is not a number"), "{:#?}", driver.texts());
@@ -240,7 +240,7 @@ fn what_cannot_be_measured_says_why() {
 }
 
 #[test]
-fn charts_and_form_keep_to_a_narrow_window() {
+fn charts_and_form_fit_in_a_narrow_window() {
     let mut driver = Driver::open_sized(vec2(1024.0, 700.0));
     driver.click("10×6");
     driver.click_button("Trade-off");
@@ -261,7 +261,7 @@ fn charts_and_form_keep_to_a_narrow_window() {
 }
 
 #[test]
-fn decoders_of_a_recording_are_the_librarys_and_a_point_is_loaded() {
+fn decoders_of_a_recording_agree_with_the_library_and_a_point_is_loaded() {
     let Opened {
         mut driver,
         setup,
@@ -322,7 +322,7 @@ fn decoders_of_a_recording_are_the_librarys_and_a_point_is_loaded() {
     assert_eq!(loaded.source, setup.settings().source);
 }
 
-/// Text of the first row of the table that begins so.
+/// Text of the first row of the table that begins with `name`.
 fn row(driver: &Driver, name: &str) -> String {
     let texts = driver.texts().into_iter();
     let mut rows = texts.filter(|text| text.starts_with(&format!("{name}: ")));

@@ -1,4 +1,4 @@
-//! Training, watched, held, ended and gone wrong.
+//! Training: progress, pausing, ending and failing.
 
 use std::fs;
 
@@ -35,7 +35,7 @@ fn a_training_ends_with_the_librarys_own_numbers() {
 }
 
 #[test]
-fn the_published_errors_stand_below_where_the_paper_has_them() {
+fn published_errors_are_listed_where_the_paper_has_them() {
     let mut driver = Driver::open();
     driver.click("10×6");
     driver.enter("Epochs", "1");
@@ -63,7 +63,7 @@ fn the_published_errors_stand_below_where_the_paper_has_them() {
 }
 
 #[test]
-fn every_picture_of_a_trained_network_can_be_looked_at() {
+fn every_picture_of_a_trained_network_can_be_displayed() {
     let mut driver = Driver::open();
     for tab in TABS {
         driver.click(tab);
@@ -117,7 +117,7 @@ fn every_picture_of_a_trained_network_can_be_looked_at() {
     }
 }
 
-/// A training that continues for as long as one looks.
+/// A training that does not end by itself.
 pub(crate) fn endless() -> SimulatedSettings {
     let mut settings = small();
     settings.training.method = Method::Momentum(MomentumSettings::default());
@@ -135,15 +135,15 @@ pub(crate) fn start_endless(driver: &mut Driver) {
 }
 
 #[test]
-fn a_held_training_stands_still_and_goes_on_as_if_it_had_never_been_held() {
+fn a_paused_training_is_idle_and_resumes_as_if_it_had_never_been_paused() {
     let mut driver = Driver::open();
     start_endless(&mut driver);
     assert!(!driver.is_enabled("▶ Train") && !driver.is_enabled("Hidden nodes"));
     driver.click("⏸ Pause");
     driver.wait("the pause", |driver| driver.has("Paused"));
-    driver.wait_for_hold();
+    driver.wait_for_last_epoch();
     let held = driver.epochs();
-    // What the training thread knows once it has answered what came after Pause.
+    // The state of the training thread once it has answered a request made after Pause.
     let folder = tempfile::tempdir().unwrap();
     let curves = folder.path().join("curves.csv");
     driver.save("Loss curves, CSV", &curves);
@@ -154,7 +154,7 @@ fn a_held_training_stands_still_and_goes_on_as_if_it_had_never_been_held() {
         "a heading, the start, and the epochs"
     );
     driver.click("Dismiss");
-    assert!(driver.comes_to_rest());
+    assert!(driver.becomes_idle());
     assert!(!driver.is_enabled("▶ Train") && driver.is_enabled("■ Stop"));
 
     driver.click("▶ Resume");
@@ -175,7 +175,7 @@ fn a_held_training_stands_still_and_goes_on_as_if_it_had_never_been_held() {
 }
 
 #[test]
-fn keys_hold_resume_and_stop_and_the_next_training_starts_afresh() {
+fn keys_pause_resume_and_stop_and_the_next_training_starts_again() {
     let mut driver = Driver::open();
     start_endless(&mut driver);
     driver.press_with(Modifiers::COMMAND, Key::P);
@@ -193,7 +193,7 @@ fn keys_hold_resume_and_stop_and_the_next_training_starts_afresh() {
 }
 
 #[test]
-fn stop_while_a_training_is_prepared_is_answered_at_once_and_the_one_before_stays() {
+fn stopping_a_training_being_prepared_takes_effect_at_once_and_the_previous_one_stays() {
     let mut driver = Driver::open();
     driver.configure_small();
     for before in [Phase::Idle, Phase::Ended(StopReason::EpochsReached)] {
@@ -214,7 +214,7 @@ fn stop_while_a_training_is_prepared_is_answered_at_once_and_the_one_before_stay
 }
 
 #[test]
-fn the_verdict_names_a_remedy_that_fits_the_end() {
+fn the_verdict_names_a_remedy_for_the_stop_reason() {
     let mut driver = Driver::open();
     driver.configure_small();
     choose_method(&mut driver, "Momentum, Eq. (11)");
@@ -232,7 +232,7 @@ fn the_verdict_names_a_remedy_that_fits_the_end() {
 }
 
 #[test]
-fn nodes_beyond_the_axes_are_said_to_be_drawn_at_their_edge() {
+fn nodes_beyond_the_axes_are_reported_as_drawn_at_the_edge() {
     let mut driver = Driver::open();
     driver.configure_small();
     choose_method(&mut driver, "Momentum, Eq. (11)");
@@ -242,7 +242,7 @@ fn nodes_beyond_the_axes_are_said_to_be_drawn_at_their_edge() {
     let run = driver.state().run.as_ref().unwrap();
     let result = run.result.as_ref().unwrap();
     let nodes = run.test.array().unwrap().frame(result.answers.view(), 0).nodes_mm;
-    // The best network is the one before the first step, which knows nothing yet.
+    // The best network is the untrained one before the first step.
     assert_eq!(result.best_epoch, 0);
     let (low, high) = (4.0 - 0.08, 5.0 + 0.08);
     let is_beyond = |node: &&glam::DVec3| !(7.5..=17.5).contains(&node.x) || !(low..=high).contains(&node.z);
@@ -252,13 +252,13 @@ fn nodes_beyond_the_axes_are_said_to_be_drawn_at_their_edge() {
 }
 
 #[test]
-fn a_training_that_grows_without_bound_says_so_and_shows_no_infinities() {
+fn a_diverging_training_says_so_and_shows_no_infinities() {
     let mut driver = Driver::open();
     driver.configure_small();
     choose_method(&mut driver, "Momentum, Eq. (11)");
     driver.enter("Learning rate", "1e6");
     driver.enter("Epochs", "100000");
-    // With some held out, their rising error would end it before it is infinite.
+    // With validation samples, their rising error would end the training before it becomes infinite.
     driver.enter("Validation samples", "0");
     driver.train();
     assert_eq!(driver.state().phase, Phase::Ended(StopReason::Diverged));

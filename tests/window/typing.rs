@@ -1,4 +1,4 @@
-//! Numbers as they are typed: with units, and refused in place where they cannot be taken.
+//! Typing numbers: with units, and with invalid ones rejected in place.
 
 use decoupler_core::{evaluation::SimulatedSettings, sensor::ArrayScale};
 use eframe::egui::{Event, Key, Modifiers, PointerButton, Pos2, accesskit::Role, vec2};
@@ -7,7 +7,7 @@ use egui_kittest::kittest::{By, NodeT as _, Queryable as _};
 use crate::driver::Driver;
 
 #[test]
-fn values_are_taken_with_their_units() {
+fn values_are_accepted_with_their_units() {
     let mut driver = Driver::open();
     driver.enter("Height", "0.6 cm");
     assert_eq!(driver.state().draft.source.sensor.geometry.height_mm, 6.0);
@@ -22,7 +22,7 @@ fn values_are_taken_with_their_units() {
 }
 
 #[test]
-fn what_cannot_be_taken_is_refused_in_place_and_the_old_value_stays() {
+fn invalid_values_are_rejected_in_place_and_the_old_value_stays() {
     let mut driver = Driver::open();
     let before = driver.state().draft;
     for (field, typed, reason) in [
@@ -52,7 +52,7 @@ fn what_cannot_be_taken_is_refused_in_place_and_the_old_value_stays() {
 }
 
 #[test]
-fn a_notice_above_a_field_does_not_interrupt_who_types_in_it() {
+fn a_notice_above_a_field_does_not_interrupt_typing() {
     let mut driver = Driver::open();
     driver.enter("Array scale", "20×20_5×60");
     driver.click_button("x, y, z");
@@ -70,7 +70,7 @@ fn a_notice_above_a_field_does_not_interrupt_who_types_in_it() {
 }
 
 #[test]
-fn a_reason_is_near_its_field_and_goes_with_escape() {
+fn a_reason_is_next_to_its_field_and_escape_closes_it() {
     let mut driver = Driver::open();
     driver.enter("Hidden nodes", "0");
     let (field, reason) = (
@@ -110,7 +110,7 @@ fn double_click(driver: &mut Driver, at: Pos2) {
     harness.step();
 }
 
-/// Double-clicks a slider, which the first click moves off its usual value.
+/// Double-clicks a slider, which the first click moves off its default value.
 pub(crate) fn double_click_slider(driver: &mut Driver, name: &str) {
     driver.get(name).scroll_to_me();
     driver.harness().run_steps(20);
@@ -119,7 +119,7 @@ pub(crate) fn double_click_slider(driver: &mut Driver, name: &str) {
 }
 
 #[test]
-fn a_double_click_sets_the_usual_value() {
+fn a_double_click_sets_the_default_value() {
     let mut driver = Driver::open();
     driver.enter("Hidden nodes", "33");
     assert_eq!(driver.state().draft.hidden, 33);
@@ -129,11 +129,11 @@ fn a_double_click_sets_the_usual_value() {
 }
 
 #[test]
-fn a_double_click_sets_every_slider_to_its_usual_value() {
+fn a_double_click_sets_every_slider_to_its_default_value() {
     let mut driver = Driver::open();
     driver.configure_small();
     driver.train();
-    driver.wait_for_hold();
+    driver.wait_for_last_epoch();
     double_click_slider(&mut driver, "Hidden nodes slider");
     assert_eq!(driver.state().draft.hidden, 12);
 
