@@ -12,13 +12,13 @@ use decoupler_core::{
 };
 use decoupler_files::export::NetworkFile;
 
-/// A fifteenth of a second is enough for the eye, and keeps the file small.
+/// Enough for smooth motion, and keeps the file small.
 const FRAMES_PER_SECOND: f64 = 15.0;
 const FRAMES: usize = 60;
-/// Lines of the table, and the row-wire that it is of, from 0.
+/// Number of lines of the table, and its row-wire, from 0.
 const LINES: usize = 400;
 const ROW: usize = 2;
-/// Six digits of a reading lose nothing in this noise.
+/// With this noise, six digits of a reading are enough.
 const NOISE: f64 = 2e-5;
 
 fn main() -> Result<(), Box<dyn Error>> {
@@ -75,7 +75,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// To six significant digits.
+/// Rounds to six significant digits.
 fn rounded(value: f64) -> f64 {
     format!("{value:.5e}").parse().unwrap_or(value)
 }

@@ -29,7 +29,7 @@ use decoupler_files::{
     import::{Plan, Recipe, Setup},
 };
 
-/// Of a second at most: a small array, few samples, few epochs.
+/// Settings that train in less than a second: a small array, few samples, few epochs.
 fn small_settings() -> SimulatedSettings {
     let mut base = SimulatedSettings {
         source: Simulation {
@@ -92,7 +92,7 @@ fn run(experiments: &[Experiment], thread_count: usize) -> Vec<ExperimentResults
     results
 }
 
-/// The trials of every cell, without their times.
+/// Returns the trials of every cell, without their times.
 fn timeless(results: &[ExperimentResults]) -> Vec<Vec<Trial>> {
     let cells = results.iter().flat_map(|results| &results.cells);
     let trials = cells.map(|cell| {
@@ -125,7 +125,7 @@ fn results_are_the_same_on_any_number_of_threads() {
 }
 
 #[test]
-fn a_trial_is_the_run_that_its_settings_describe() {
+fn a_trial_equals_the_run_with_its_settings() {
     let experiment = small(Axis::Hidden(vec![2, 4]));
     for cell in &run(std::slice::from_ref(&experiment), 2)[0].cells {
         let mut z_percent = Vec::new();
@@ -154,10 +154,10 @@ fn a_trial_is_the_run_that_its_settings_describe() {
 }
 
 #[test]
-fn cross_validation_decouples_every_sample_by_what_has_not_seen_it() {
+fn cross_validation_decouples_every_sample_with_a_network_that_was_not_trained_on_it() {
     for unit in [FoldUnit::Sample, FoldUnit::Snapshot] {
         let mut experiment = cross_validated(unit);
-        // As many hidden nodes as coordinates vary: nothing is lost in them.
+        // As many hidden nodes as varying coordinates: they lose no information.
         experiment.base.hidden = 6;
         for cell in &run(&[experiment], 2)[0].cells {
             for trial in &cell.trials {
@@ -172,13 +172,13 @@ fn cross_validation_decouples_every_sample_by_what_has_not_seen_it() {
             }
             let [first, second] = [0, 1].map(|repeat| &cell.trials[repeat]);
             assert_eq!(first.seed, second.seed);
-            assert_ne!(first.errors, second.errors, "each repeat deals again");
+            assert_ne!(first.errors, second.errors, "each repeat draws new folds");
         }
     }
 }
 
 #[test]
-fn cancelling_keeps_what_is_finished() {
+fn cancelling_keeps_finished_trials() {
     let experiment = small(Axis::Hidden(vec![2, 3, 4]));
     let trials_after = |asked_at_most: usize| {
         let asked = AtomicUsize::new(0);
@@ -238,7 +238,7 @@ fn cancelling_does_not_wait_for_a_training_to_end() {
 }
 
 #[test]
-fn a_cell_that_cannot_be_trained_says_why_and_the_others_go_on() {
+fn a_cell_that_cannot_be_trained_gives_the_reason_and_the_others_continue() {
     let mut settings = small_settings();
     settings.source.sensor = SensorModel::new("1x32_5x96".parse().unwrap());
     let mut experiment = small(Axis::Hidden(vec![2, 512]));
@@ -271,20 +271,20 @@ fn cells_with_networks_worse_than_the_mean_are_named() {
             .filter(|trial| z_mm(&trial.errors) > z_mm(&trial.baselines.mean))
             .count()
     };
-    assert!(worse(0) > 0, "one epoch of gradient descent teaches little");
-    let told = describe_worse_than_mean(results);
-    assert_eq!(told.len(), (0..2).filter(|&cell| worse(cell) > 0).count());
+    assert!(worse(0) > 0, "one epoch of gradient descent is not enough");
+    let sentences = describe_worse_than_mean(results);
+    assert_eq!(sentences.len(), (0..2).filter(|&cell| worse(cell) > 0).count());
     let beginning = format!(
         "At {}, {} of 3 are worse",
         results.cell_labels(&results.cells[0]).join(", "),
         worse(0)
     );
-    assert!(told[0].starts_with(&beginning), "{told:?}");
+    assert!(sentences[0].starts_with(&beginning), "{sentences:?}");
 }
 
-/// Against the property itself: whatever is trained, and however well, the training error stays above.
+/// Checks the bound by training: the training error always stays above it.
 #[test]
-fn no_training_gets_below_the_bound_of_its_hidden_nodes() {
+fn no_training_error_is_below_the_bound_of_the_hidden_nodes() {
     for seed in 0..4 {
         for hidden in 1..=4 {
             let mut settings = small_settings();
@@ -373,7 +373,7 @@ fn run_on(experiment: &Experiment, samples: &TrialSamples, thread_count: usize) 
 }
 
 #[test]
-fn a_trial_on_a_recording_is_the_run_that_its_settings_and_division_describe() {
+fn a_trial_on_a_recording_equals_the_run_with_its_settings_and_division() {
     let folder = tempfile::tempdir().unwrap();
     let setup = recording(folder.path());
     let method = |name: &str| {
@@ -429,7 +429,7 @@ fn a_trial_on_a_recording_is_the_run_that_its_settings_and_division_describe() {
                 .collect::<Vec<_>>()
         );
     }
-    // The test samples of a split in time are the same for each seed, those of the others are drawn.
+    // A split by time has the same test samples for each seed; other splits are drawn.
     let ridge = |cell: usize| {
         let trials = results.cells[cell].trials.iter();
         trials.map(|trial| trial.baselines.linear.clone()).collect::<Vec<_>>()
@@ -442,7 +442,7 @@ fn a_trial_on_a_recording_is_the_run_that_its_settings_and_division_describe() {
 }
 
 #[test]
-fn an_experiment_on_a_recording_that_is_cancelled_keeps_what_is_finished() {
+fn a_cancelled_experiment_on_a_recording_keeps_finished_trials() {
     let folder = tempfile::tempdir().unwrap();
     let setup = recording(folder.path());
     let experiment = on_recording(&setup, Axis::Hidden(vec![2, 3, 4]), None);
@@ -506,7 +506,7 @@ fn axes_belong_to_their_source() {
 }
 
 #[test]
-fn tables_of_a_recording_have_its_measures_and_the_names_of_its_targets() {
+fn tables_of_a_recording_have_its_error_measures_and_target_names() {
     let folder = tempfile::tempdir().unwrap();
     let setup = recording(folder.path());
     let experiment = on_recording(&setup, Axis::Hidden(vec![2, 4]), None);
@@ -531,7 +531,7 @@ fn tables_of_a_recording_have_its_measures_and_the_names_of_its_targets() {
             "epochs",
             "training"
         ],
-        "two hidden nodes carry two targets: there is no bound"
+        "two hidden nodes can represent two targets: there is no bound"
     );
     assert!(table.rows.iter().all(|row| row.len() == headings.len()));
     assert_eq!(

@@ -1,4 +1,4 @@
-//! Measured samples through the library: trained, cross-validated and tabled without any geometry.
+//! Measured samples in the library: training, cross-validation and tables without any geometry.
 
 use decoupler_core::{
     dataset::{Dataset, FoldUnit, PerRow, Split},
@@ -14,7 +14,7 @@ use decoupler_files::export::{CheckpointFile, NetworkFile};
 use ndarray::{Array2, Axis};
 use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
 
-/// Two targets behind four readings of either sign, of which row-wire `r` sees a multiple; noise of 1e-3.
+/// Two targets measured by four readings of either sign, scaled by a factor for each row-wire `r`; noise of 1e-3.
 fn recording(samples: usize, rows: &[usize], seed: u64) -> Dataset {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let targets = Array2::from_shape_simple_fn((samples, 2), || rng.random_range(-1.0..1.0));
@@ -53,7 +53,7 @@ fn trained(settings: RunSettings, set: &Dataset, first_test: usize) -> Run {
 }
 
 #[test]
-fn a_network_learns_what_a_linear_map_cannot() {
+fn a_network_learns_a_nonlinear_map_that_a_linear_map_cannot() {
     let run = trained(settings(RowModel::Shared), &recording(600, &[0], 0), 500);
     assert!(matches!(run.settings().source, Source::Measured(_)));
     let scores = run.scores().unwrap();
@@ -75,12 +75,12 @@ fn a_network_learns_what_a_linear_map_cannot() {
     }
     let targets = scores.network.targets();
     assert!(targets.iter().all(|target| target.r2.unwrap() > 0.999));
-    assert_eq!(scores.nodes(), None, "there are no nodes to judge");
+    assert_eq!(scores.nodes(), None, "there are no nodes");
     assert_eq!(baselines.reference, None, "there is no model of the sensor");
 }
 
 #[test]
-fn networks_of_known_rows_go_by_the_samples_own_row_wire() {
+fn networks_of_known_rows_use_the_row_wire_of_each_sample() {
     // Rows interleaved, not numbered from 0, and with gaps.
     let set = recording(1200, &[7, 2, 4], 1);
     let [shared, each] = [RowModel::Shared, RowModel::Each].map(|rows| trained(settings(rows), &set, 1050));
@@ -96,7 +96,7 @@ fn networks_of_known_rows_go_by_the_samples_own_row_wire() {
 }
 
 #[test]
-fn the_table_is_measured_on_the_answers() {
+fn the_error_table_is_computed_from_the_answers() {
     let run = trained(settings(RowModel::Each), &recording(400, &[1, 3], 2), 300);
     let answers = run.network().decouple(run.test());
     let expected = TargetErrors::measure(run.test().targets(), answers.view());
@@ -104,8 +104,8 @@ fn the_table_is_measured_on_the_answers() {
 }
 
 #[test]
-fn every_fold_is_answered_by_networks_that_have_not_seen_it() {
-    // A network that had seen its test group would know the offset that only that group has.
+fn every_fold_is_answered_by_networks_not_trained_on_it() {
+    // A network trained on its test group would have learned the offset that only this group has.
     let mut rng = ChaCha8Rng::seed_from_u64(3);
     let offsets: Vec<f64> = (0..20).map(|_| rng.random_range(-1.0..1.0)).collect();
     let readings = Array2::from_shape_fn((400, 20), |(sample, channel)| {
@@ -129,11 +129,11 @@ fn every_fold_is_answered_by_networks_that_have_not_seen_it() {
     };
     let [by_sample, by_group] = [FoldUnit::Sample, FoldUnit::Snapshot].map(r2);
     assert!(by_sample > 0.99, "samples of a test group are trained on: {by_sample}");
-    assert!(by_group < 0.1, "a group never seen cannot be known: {by_group}");
+    assert!(by_group < 0.1, "an unseen group cannot be predicted: {by_group}");
 }
 
 #[test]
-fn every_decoder_of_readings_alone_is_measured_and_the_sensors_are_not() {
+fn every_decoder_without_a_sensor_model_is_measured() {
     let set = recording(600, &[0, 1], 4);
     let mut settings = settings(RowModel::Each);
     settings.inputs = InputChoice {
@@ -158,7 +158,7 @@ fn every_decoder_of_readings_alone_is_measured_and_the_sensors_are_not() {
 }
 
 #[test]
-fn a_measured_training_resumes_with_the_same_bits() {
+fn a_measured_training_resumes_bit_for_bit() {
     let set = recording(300, &[0], 5);
     let whole = trained(settings(RowModel::Shared), &set, 250);
     let (first, test) = split(&set, 250);
@@ -172,7 +172,7 @@ fn a_measured_training_resumes_with_the_same_bits() {
 }
 
 #[test]
-fn sets_that_do_not_belong_together_are_named() {
+fn mismatched_sets_are_named() {
     let set = recording(100, &[0, 1], 6);
     let (training, _) = split(&set, 80);
     let run = |rows, split: &Split, test| {
@@ -220,7 +220,7 @@ fn sets_that_do_not_belong_together_are_named() {
 }
 
 #[test]
-fn a_test_set_that_lacks_a_row_says_which_rows_there_are() {
+fn the_error_on_a_test_set_without_a_row_lists_the_rows() {
     let set = recording(400, &[0, 1], 8);
     let (split, _) = split(&set, 300);
     let test = recording(50, &[1], 9).among_rows(&[0, 1]).unwrap();
@@ -230,7 +230,7 @@ fn a_test_set_that_lacks_a_row_says_which_rows_there_are() {
 }
 
 #[test]
-fn files_refuse_samples_that_nothing_says_where_to_read() {
+fn files_refuse_recorded_samples_without_a_plan() {
     let run = trained(settings(RowModel::Shared), &recording(60, &[0], 10), 50);
     let message = NetworkFile::from_run(&run, None).unwrap_err().to_string();
     assert!(message.contains("give the plan"), "{message}");

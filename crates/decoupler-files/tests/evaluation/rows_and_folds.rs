@@ -1,4 +1,4 @@
-//! Samples know their row-wire, wherever folds and selections put them.
+//! Samples keep their row-wire in all folds and selections.
 
 use decoupler_core::{
     dataset::{Dataset, FoldUnit, Seed, Stream},
@@ -105,7 +105,7 @@ fn a_fold_without_samples_of_a_known_row_is_named() {
 fn cross_validation_by_samples_works_for_one_row_and_for_known_rows() {
     for rows in [Rows::One(2), Rows::Known] {
         let mut settings = small(rows);
-        // Enough that no fold lacks a row.
+        // Enough samples for every fold to have every row.
         settings.source.samples = 240;
         let results = finished(experiment_on(settings, 3, FoldUnit::Sample));
         assert_eq!(results.cells[0].failures, []);
@@ -122,7 +122,7 @@ fn noisy_test(scene: &Scene, model: &SensorModel) -> Dataset {
 }
 
 #[test]
-fn the_reference_takes_each_sample_at_its_own_row_wire() {
+fn the_reference_uses_the_row_wire_of_each_sample() {
     let model = SensorModel::new("4x3_2x9".parse().unwrap());
     let scene = Scene {
         noise: Noise::relative(1e-3),
@@ -134,7 +134,7 @@ fn the_reference_takes_each_sample_at_its_own_row_wire() {
         reference_errors(&model, &scene, set, &mut rng).unwrap().unwrap().z_mm
     };
     let whole = reference(&set);
-    // As a fold assigned by samples would have them: no whole snapshots, and in another order.
+    // As in a fold assigned by samples: incomplete snapshots, in a different order.
     let odd: Vec<usize> = (0..80).filter(|sample| sample % 3 != 0).collect();
     let even: Vec<usize> = (0..80).rev().filter(|sample| sample % 3 == 0).collect();
     let parts = [&odd, &even].map(|part| reference(&set.select(part)) * part.len() as f64);
@@ -172,7 +172,7 @@ fn folds_are_tested_with_the_noise_of_the_test_set() {
     };
     let clean = z_mm(NoisySets::Both, 0.0);
     assert!(z_mm(NoisySets::Test, 0.2) > 1.1 * clean);
-    // Training and testing differ, so that this is neither of the two with noise in both or in none.
+    // Training and test differ, so this equals neither noise in both sets nor noise in none.
     let [both, training] = [NoisySets::Both, NoisySets::Training].map(|sets| z_mm(sets, 0.2));
     assert!(both != training && training != clean, "{both} {training} {clean}");
 }

@@ -1,4 +1,4 @@
-//! Several starts of one run: what they share, which one leads, and that neither threads nor pauses change a bit.
+//! Several starts of one run: shared samples, selection of the best start, and independence of threads and pauses.
 
 use decoupler_core::{
     dataset::Seed,
@@ -32,7 +32,7 @@ fn trained(settings: SimulatedSettings) -> Run {
     run
 }
 
-/// Present and best weights of every start as bits, and its epochs.
+/// Current and best weights of every start as bits, and its epochs.
 fn bits(run: &Run) -> Vec<(Vec<u64>, usize, Option<StopReason>)> {
     let of = |trainer: &StartTrainer| {
         let weights = |row: &Trainer| [row.present().weights(), row.best().weights()].concat();
@@ -59,12 +59,12 @@ fn the_first_start_is_the_run_of_one_start_and_the_others_differ() {
     assert_eq!(
         bits(&trained(settings(2)))[..],
         bits(&four)[..2],
-        "more starts change none"
+        "more starts do not change the first one"
     );
 }
 
 #[test]
-fn the_start_of_lowest_validation_error_leads() {
+fn the_start_with_the_lowest_validation_error_is_best() {
     for validation_samples in [40, 0] {
         let run = trained(SimulatedSettings {
             source: Simulation {
@@ -103,7 +103,7 @@ fn threads_change_no_bit() {
 }
 
 #[test]
-fn neither_pauses_nor_taking_up_saved_states_change_a_bit() {
+fn pauses_and_restored_states_change_no_bit() {
     for method in Method::all() {
         let mut settings = settings(3);
         settings.training.method = method;
@@ -127,7 +127,7 @@ fn neither_pauses_nor_taking_up_saved_states_change_a_bit() {
 }
 
 #[test]
-fn a_run_goes_on_until_every_start_has_ended_or_all_are_stopped() {
+fn a_run_continues_until_every_start_has_ended_or_all_are_stopped() {
     let mut settings = settings(6);
     settings.training.stopping = StoppingRules {
         epochs: 300,
@@ -142,14 +142,18 @@ fn a_run_goes_on_until_every_start_has_ended_or_all_are_stopped() {
     let ended = run.trainers().iter().position(|t| t.stop_reason().is_some()).unwrap();
     let epochs = run.trainers()[ended].latest().epoch;
     assert_eq!(run.step(), None);
-    assert_eq!(run.trainers()[ended].latest().epoch, epochs, "what has ended is paused");
+    assert_eq!(
+        run.trainers()[ended].latest().epoch,
+        epochs,
+        "a start that has ended stays paused"
+    );
     run.stop();
     assert_eq!(run.stop_reason(), Some(StopReason::Stopped));
     assert_ne!(run.trainers()[ended].stop_reason(), Some(StopReason::Stopped));
 }
 
 #[test]
-fn every_start_goes_on_with_another_method_and_keeps_counting() {
+fn every_start_continues_with_another_method_and_keeps_counting() {
     let mut settings = settings(2);
     settings.training.method = Method::all()[8];
     let mut run = Run::prepare(settings).unwrap();

@@ -49,7 +49,7 @@ fn knowing_the_row_makes_small_networks_accurate_and_newton_makes_them_exact() {
     assert_eq!(run.network().values().len(), 3);
     let errors = *run.errors().nodes().unwrap();
     assert!(errors.z_percent.unwrap() < 0.05, "{errors:?}");
-    assert_eq!(errors.x_percent, Some(0.0), "what does not vary is known");
+    assert_eq!(errors.x_percent, Some(0.0), "a constant coordinate has no error");
     let z = |kind, precision| z_percent(&run, kind, precision);
     let network = z(DecoderKind::Network, Precision::Double);
     assert!((network - errors.z_percent.unwrap()).abs() < 1e-6);
@@ -71,7 +71,7 @@ fn knowing_the_row_makes_small_networks_accurate_and_newton_makes_them_exact() {
 }
 
 #[test]
-fn rows_that_are_not_known_are_found_out() {
+fn unknown_rows_are_identified() {
     let mut settings = small();
     settings.source.scene.rows = Rows::All;
     settings.training.stopping.epochs = 20;
@@ -97,7 +97,7 @@ fn rows_that_are_not_known_are_found_out() {
 }
 
 #[test]
-fn one_row_is_all_that_is_drawn_and_modelled() {
+fn with_one_row_only_that_row_is_drawn_and_modelled() {
     let mut settings = small();
     settings.source.scene.rows = Rows::One(2);
     settings.source.samples = 300;
@@ -117,7 +117,7 @@ fn one_row_is_all_that_is_drawn_and_modelled() {
 }
 
 #[test]
-fn known_rows_go_on_from_saved_states_with_the_same_bits() {
+fn known_rows_resume_from_saved_states_bit_for_bit() {
     let mut settings = SimulatedSettings { starts: 2, ..small() };
     settings.training.stopping.epochs = 12;
     settings.training.stopping.max_fail = 1;
@@ -150,8 +150,8 @@ fn known_rows_go_on_from_saved_states_with_the_same_bits() {
     assert!(message.contains("3 of them"), "{message}");
 }
 
-/// With noise no decoder beats the reference, and the one that knows noise and prior comes close to it. Of a smooth field
-/// it knows mean and covariance only.
+/// With noise, no decoder beats the reference, and the decoder that uses noise and prior comes close to it. For a
+/// smooth field it uses only mean and covariance.
 #[test]
 fn with_noise_newton_comes_close_to_the_reference() {
     let mut settings = small();
@@ -180,7 +180,7 @@ fn with_noise_newton_comes_close_to_the_reference() {
 }
 
 #[test]
-fn sideways_movement_is_said_to_be_badly_conditioned() {
+fn sideways_movement_is_reported_as_ill_conditioned() {
     let mut settings = Preset::Best.settings();
     let upright = Outlook::of(&settings.source).unwrap();
     assert!(upright.warnings.is_empty());
@@ -191,7 +191,7 @@ fn sideways_movement_is_said_to_be_badly_conditioned() {
 }
 
 #[test]
-fn a_trade_has_a_point_for_every_choice() {
+fn a_trade_off_has_a_point_for_every_choice() {
     let mut settings = SimulatedSettings {
         source: Simulation {
             samples: 90,

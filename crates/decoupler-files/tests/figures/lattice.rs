@@ -24,7 +24,7 @@ fn heights(count: usize) -> Vec<f64> {
     (0..count).map(|i| 4.5 + 0.5 * (1.7 * i as f64).sin()).collect()
 }
 
-/// The surface at a place by bilinear lookup in the grid's values; exact where the place is a grid point.
+/// Returns the surface at a place by bilinear interpolation of the grid's values; exact at grid points.
 fn at(grid: &Grid, values: &[f64], (x_mm, y_mm): (f64, f64)) -> Option<f64> {
     let ix = grid.x_mm().iter().position(|x| (x - x_mm).abs() < 1e-9)?;
     let iy = grid.y_mm().iter().position(|y| (y - y_mm).abs() < 1e-9)?;
@@ -104,7 +104,7 @@ fn the_order_of_the_wires_does_not_matter() {
 }
 
 #[test]
-fn a_lone_node_gives_a_level_surface() {
+fn a_single_node_gives_a_level_surface() {
     let values = SurfaceMap::new(&[8.0], &[15.5]).unwrap().evaluate(&[4.2]);
     assert!(values.iter().all(|&value| value == 4.2));
 }
@@ -140,7 +140,7 @@ fn assert_planes_are_kept((rows, per_row): (usize, usize), origin_mm: f64, unit_
 }
 
 #[test]
-fn constants_and_planes_are_kept_on_every_array() {
+fn constants_and_planes_are_reproduced_on_every_array() {
     let small = (1..=5).flat_map(|rows| (1..=5).map(move |per_row| (rows, per_row)));
     let lines = [10, 32, 200].into_iter().flat_map(|count| [(1, count), (count, 1)]);
     let large = [
@@ -159,7 +159,7 @@ fn constants_and_planes_are_kept_on_every_array() {
 }
 
 #[test]
-fn constants_and_planes_are_kept_in_every_unit_and_from_every_origin() {
+fn constants_and_planes_are_reproduced_in_every_unit_and_from_every_origin() {
     for array in [(1, 1), (1, 4), (3, 1), (2, 2), (3, 2), (10, 10), (40, 40)] {
         for (origin_mm, unit_mm) in [(0.0, 1e-6), (-3e3, 1e6), (1e6, 1.0), (-1e5, 1e-2)] {
             assert_planes_are_kept(array, origin_mm, unit_mm);
@@ -168,7 +168,7 @@ fn constants_and_planes_are_kept_in_every_unit_and_from_every_origin() {
 }
 
 #[test]
-fn where_nothing_is_pressed_the_surface_stays_level() {
+fn far_from_a_press_the_surface_stays_level() {
     let (x_mm, y_mm) = (lattice(10, 1.0), lattice(10, 2.0));
     let map = SurfaceMap::new(&x_mm, &y_mm).unwrap();
     let mut nodes = vec![5.0; 100];
@@ -205,7 +205,7 @@ fn a_single_row_is_a_cubic_curve_constant_across() {
     }
 }
 
-/// A factor of a million between neighbouring distances leaves a smooth curve no choice but to overshoot by as much.
+/// With a factor of a million between neighbouring distances, any smooth curve overshoots by as much.
 #[test]
 fn nodes_too_uneven_for_a_spline_are_joined_bilinearly() {
     for (x_mm, y_mm) in [
@@ -230,7 +230,7 @@ fn nodes_too_uneven_for_a_spline_are_joined_bilinearly() {
 }
 
 #[test]
-fn places_of_any_size_are_drawn_or_refused() {
+fn coordinates_of_any_magnitude_are_drawn_or_refused() {
     for scale in [f64::MAX, 1e307, 1e200, 1e12, 1e-12, 1e-200, 1e-307, 5e-324] {
         for (x, y) in [(1, 1), (1, 4), (4, 1), (3, 3)] {
             let lattice = |count: i32| -> Vec<f64> { (0..count).map(|i| scale * f64::from(i - 1)).collect() };
@@ -283,7 +283,7 @@ fn a_missing_value_leaves_a_gap_around_its_node() {
 }
 
 #[test]
-fn impossible_places_are_refused() {
+fn invalid_places_are_refused() {
     let refused = |x: &[f64], y: &[f64]| SurfaceMap::new(x, y).unwrap_err();
     assert_eq!(refused(&[], &[1.0]), SurfaceError::NoNodes { axis: Axis::X });
     assert_eq!(

@@ -1,4 +1,4 @@
-//! Figures for print: what is drawn is what was given, on every machine alike.
+//! Figures for print: the drawing matches the data, on every machine.
 
 use decoupler_core::{
     decoupling::{DecoderKind, Precision},
@@ -59,12 +59,12 @@ fn texts(picture: &Picture) -> Vec<String> {
 }
 
 #[test]
-fn points_stand_where_their_values_are() {
+fn points_are_drawn_at_their_values() {
     let picture = plot(
         PlotAxis::linear("up"),
         vec![scatter(Marker::Disc, &[(0.0, 1.0), (1.0, 2.0), (2.0, 4.0)])],
     );
-    // The first disc is the sample in the legend.
+    // The first disc is in the legend.
     let [_, a, b, c] = discs(&picture).try_into().unwrap();
     assert!((b[0] - 0.5 * (a[0] + c[0])).abs() < 0.02, "evenly spaced across");
     assert!(a[1] > b[1] && b[1] > c[1], "larger values are higher");
@@ -77,7 +77,7 @@ fn points_stand_where_their_values_are() {
 }
 
 #[test]
-fn what_has_no_place_is_left_out() {
+fn points_without_a_place_are_left_out() {
     let values = [
         (0.0, 1.0),
         (1.0, f64::NAN),
@@ -90,7 +90,7 @@ fn what_has_no_place_is_left_out() {
     let picture = plot(PlotAxis::logarithmic("up"), series());
     assert_eq!(discs(&picture).len(), 1 + 1);
     assert_eq!(count(&picture, "NaN") + count(&picture, "inf"), 0);
-    // Nothing, one value, and values that differ by rounding only.
+    // No values, one value, and values that differ only by rounding.
     for values in [
         &[][..],
         &[(3.0, 0.2)],
@@ -106,7 +106,7 @@ fn what_has_no_place_is_left_out() {
 }
 
 #[test]
-fn node_plots_have_a_square_and_a_disc_for_each_node_and_bars_on_demand() {
+fn node_plots_have_a_square_and_a_disc_for_each_node_and_optional_bars() {
     let nodes = |z_mm: [f64; 3]| z_mm.map(|z| DVec3::new(0.0, 0.0, z));
     let (actual, decoupled) = (nodes([4.1, 4.5, 4.9]), nodes([4.2, 4.4, 4.9]));
     let draw = |spread_mm| Figure::from(node_figure(&actual, Some(&decoupled), spread_mm, 3)).draw();
@@ -132,19 +132,19 @@ fn node_plots_have_a_square_and_a_disc_for_each_node_and_bars_on_demand() {
 }
 
 #[test]
-fn png_has_300_dots_an_inch_and_text_from_the_programs_own_fonts() {
+fn png_has_300_dots_per_inch_and_text_in_the_programs_fonts() {
     let picture = plot(PlotAxis::linear("up"), vec![scatter(Marker::Square, &[(0.0, 1.0)])]);
     let png = image::load_from_memory(&picture.png().unwrap()).unwrap();
     assert_eq!(f64::from(png.width()), 510.0 / 72.0 * 300.0);
-    assert_eq!(png.get_pixel(0, 0).0, [255; 4], "the ground is white");
-    // The name of the x axis: ink in the lowest strip of the picture, where nothing but text is.
+    assert_eq!(png.get_pixel(0, 0).0, [255; 4], "the background is white");
+    // The name of the x axis: ink in the lowest strip of the picture, which contains only text.
     let strip = (png.height() - 80..png.height()).flat_map(|y| (0..png.width()).map(move |x| (x, y)));
     let ink = strip.filter(|&(x, y)| png.get_pixel(x, y).0[0] < 100).count();
     assert!(ink > 200, "{ink} dark pixels");
 }
 
 #[test]
-fn heat_maps_say_each_value_in_its_cell() {
+fn heat_maps_have_each_value_in_its_cell() {
     let values = Array2::from_shape_vec((2, 2), vec![1.0, 2.5, f64::NAN, 4.0]).unwrap();
     let map = HeatMap {
         x_name: "hidden nodes".to_owned(),
@@ -172,7 +172,7 @@ fn heat_maps_say_each_value_in_its_cell() {
 }
 
 #[test]
-fn colours_of_a_heat_map_go_by_the_logarithm_if_told() {
+fn colours_of_a_heat_map_are_logarithmic_on_request() {
     let map = |values: [f64; 3], value_axis| HeatMap {
         x_name: String::new(),
         y_name: String::new(),
@@ -197,12 +197,12 @@ fn colours_of_a_heat_map_go_by_the_logarithm_if_told() {
     let decades = cells(map([0.001, 0.1, 10.0], PlotAxis::logarithmic("")));
     assert_eq!(even, decades);
     assert_ne!(even, cells(map([0.001, 0.1, 10.0], PlotAxis::linear(""))));
-    // A zero has no logarithm, but is the least there is.
+    // A zero has no logarithm; it is drawn as the minimum.
     assert_eq!(cells(map([0.0, 1.0, 10.0], PlotAxis::logarithmic("")))[0], decades[0]);
 }
 
 #[test]
-fn the_name_of_the_file_tells_the_format() {
+fn the_file_extension_determines_the_format() {
     let folder = tempfile::tempdir().unwrap();
     let picture = plot(PlotAxis::linear("up"), Vec::new());
     for (name, format) in [("a.svg", PictureFormat::Svg), ("b.PNG", PictureFormat::Png)] {
@@ -219,7 +219,7 @@ fn the_name_of_the_file_tells_the_format() {
 }
 
 #[test]
-fn the_trade_off_tells_32_from_64_bits_and_hollow_marks_mean_nothing_else() {
+fn hollow_marks_of_the_trade_off_mean_32_bits_and_nothing_else() {
     let mut points = Vec::new();
     for preset in Preset::ALL {
         let mut settings = preset.settings();
@@ -245,7 +245,7 @@ fn the_trade_off_tells_32_from_64_bits_and_hollow_marks_mean_nothing_else() {
     };
     let (hollow, filled) = (is_single(true), is_single(false));
     assert_eq!((hollow, filled), (2, 4));
-    // Limits out of reach: no answers, whose rings would be hollow too.
+    // Unreachable limits: no answers, whose rings would be hollow too.
     let limits = TradeOffLimits {
         percent: 0.0,
         microseconds: 0.0,

@@ -1,4 +1,4 @@
-//! Surfaces through nodes that are no lattice, against an independent implementation and at the extremes.
+//! Surfaces through nodes that do not form a lattice, against an independent implementation and at the extremes.
 
 use decoupler_core::surface::{Interpolation, SurfaceError, SurfaceMap};
 
@@ -23,7 +23,7 @@ fn hexagonal(rows: i32, pitch_mm: f64) -> Vec<[f64; 2]> {
     (0..rows).flat_map(row).collect()
 }
 
-/// Index of the grid point nearest to a place, and how far it is.
+/// Returns the index of the grid point nearest to a place, and its distance.
 fn nearest(map: &SurfaceMap, [x_mm, y_mm]: [f64; 2]) -> (usize, f64) {
     let near = |points: &[f64], at: f64| {
         let distances = points.iter().map(|point| (point - at).abs()).enumerate();
@@ -56,7 +56,7 @@ fn agrees_with_splines_of_fifty_digits() {
 }
 
 #[test]
-fn planes_are_kept_in_every_unit_and_from_every_origin() {
+fn planes_are_reproduced_in_every_unit_and_from_every_origin() {
     for (unit, origin) in [(1.0, 0.0), (1e-6, 0.0), (1e9, 0.0), (1.0, 1e5)] {
         let places = Vec::from_iter(hexagonal(6, unit).iter().map(|[x, y]| [x + origin, y - origin]));
         let map = SurfaceMap::scattered(&places).unwrap();
@@ -79,7 +79,7 @@ fn planes_are_kept_in_every_unit_and_from_every_origin() {
 }
 
 #[test]
-fn the_surface_ends_half_a_pitch_beyond_the_hull_and_leaves_out_what_is_far_from_every_node() {
+fn the_surface_ends_half_a_pitch_beyond_the_hull_and_far_from_every_node() {
     // A ring of radius 10 with a node every 30°, whose neighbours are 5.18 apart.
     let at = |radius: f64, degrees: f64| [radius * degrees.to_radians().cos(), radius * degrees.to_radians().sin()];
     let ring = Vec::from_iter((0..12).map(|node| at(10.0, 30.0 * f64::from(node))));
@@ -93,7 +93,7 @@ fn the_surface_ends_half_a_pitch_beyond_the_hull_and_leaves_out_what_is_far_from
     }
     assert!(
         values.iter().all(|value| value.is_nan() || *value == 3.0),
-        "level where all are"
+        "level through equal nodes"
     );
 
     let hexagonal = hexagonal(5, 2.0);
@@ -110,7 +110,7 @@ fn the_surface_ends_half_a_pitch_beyond_the_hull_and_leaves_out_what_is_far_from
 }
 
 #[test]
-fn what_no_surface_goes_through_is_refused() {
+fn nodes_without_a_surface_are_refused() {
     let refused = |places: &[[f64; 2]]| SurfaceMap::scattered(places).unwrap_err();
     assert!(matches!(refused(&[]), SurfaceError::NoNodes { .. }));
     assert!(matches!(

@@ -1,4 +1,4 @@
-//! Surfaces as a figure: where things lie, in which colours, and what print says of them.
+//! Figures of surfaces: positions, colours, and texts in print.
 
 use std::sync::Arc;
 
@@ -83,13 +83,13 @@ fn lay_out(surface: &Surface, camera: OrbitCamera) -> Drawing {
     )
 }
 
-/// How often a picture says a text.
+/// Returns the number of times that a picture contains a text.
 fn says(picture: &Picture, text: &str) -> usize {
     picture.svg().matches(&format!(">{text}</text>")).count()
 }
 
 #[test]
-fn contour_lines_of_a_slope_lie_where_it_has_their_heights() {
+fn contour_lines_of_a_slope_are_at_their_heights() {
     // 4.05 + 0.3 x reaches 4.1, 4.2 … at x = (level − 4.05) / 0.3, whatever y.
     let slope = from_above(surface("", Quantity::Height, |x, _| 4.05 + 0.3 * x));
     let drawing = lay_out(&slope, OrbitCamera::default());
@@ -106,11 +106,11 @@ fn contour_lines_of_a_slope_lie_where_it_has_their_heights() {
             }
         }
     }
-    // The line at 4.0 would lie in the margin; heights are cut at the ends of the scale.
+    // The line at 4.0 would be in the margin; heights are cut at the ends of the scale.
     assert!(seen[1..].iter().all(|ends| *ends > 20), "{seen:?}");
 }
 
-/// A slope leaves the axes, which have room for 3.92 to 5.08 mm, in the margin on both sides: at x = (level − 4.05) / 0.32.
+/// A slope leaves the range of the axes, 3.92 to 5.08 mm, in the margin on both sides: at x = (level − 4.05) / 0.32.
 #[test]
 fn a_steep_surface_ends_along_the_ends_of_the_axis() {
     let slope = |mode| Surface {
@@ -143,7 +143,7 @@ fn a_steep_surface_ends_along_the_ends_of_the_axis() {
     let expected = (high - low) * 5.0;
     assert!((area / points_per_mm.powi(2) / expected - 1.0).abs() < 1e-3, "{area}");
 
-    // In space the same edges lie on the ceiling and on the floor of the box.
+    // In space, the same edges are on the top and the floor of the box.
     let drawing = lay_out(&slope(ViewMode::ThreeD), OrbitCamera::default());
     for (x_mm, z_mm) in [(low, 3.92), (high, 5.08)] {
         for y_mm in [0.3, 2.0, 3.7] {
@@ -158,7 +158,8 @@ fn a_steep_surface_ends_along_the_ends_of_the_axis() {
     }
 }
 
-/// The spline rises above the axis around a node: in space that is a plateau at the axis, which is told and marked.
+/// The spline rises above the axis around a node: in space, this is a plateau at the end of the axis, with marks and a
+/// note.
 #[test]
 fn beyond_the_axis_a_surface_is_a_marked_plateau_and_a_map_has_no_holes() {
     let peak = |mode| Surface {
@@ -176,7 +177,7 @@ fn beyond_the_axis_a_surface_is_a_marked_plateau_and_a_map_has_no_holes() {
         let drawing = lay_out(&surface, OrbitCamera::default());
         let grid = surface.map.grid();
         let cells = drawing.mesh.strips().flat_map(|(cells, _)| cells);
-        // Corners beyond the grid are those of cut cells.
+        // Corners beyond the grid belong to cut cells.
         let corners = cells
             .flat_map(|cell| drawing.mesh.corners(*cell))
             .filter(|corner| surface.values.get(*corner).is_some_and(|height| *height > 5.08 + 1e-12));
@@ -208,7 +209,7 @@ fn from_above_x_runs_to_the_right_and_y_upwards_at_one_scale() {
 }
 
 #[test]
-fn the_camera_turns_what_is_in_space_and_nothing_else() {
+fn the_camera_turns_only_surfaces_in_space() {
     let turned = OrbitCamera::default().dragged(60.0, 20.0);
     let lines = |surface: &Surface, camera| -> Vec<Line> { lay_out(surface, camera).lines };
     for (surface, is_turned) in [(dent(""), true), (from_above(dent("")), false)] {
@@ -268,7 +269,7 @@ fn fills(picture: &Picture) -> Vec<String> {
 }
 
 #[test]
-fn a_height_has_one_colour_on_every_card_and_no_error_is_white() {
+fn a_height_has_one_colour_on_every_card_and_zero_error_is_white() {
     let level = |z: f64| from_above(surface("", Quantity::Height, |_, _| z));
     let drawn = |surfaces| fills(&draw(&figure(surfaces)));
     let [alone, both] = [vec![level(4.5)], vec![level(4.5), level(4.5)]].map(drawn);
@@ -285,7 +286,7 @@ fn a_height_has_one_colour_on_every_card_and_no_error_is_white() {
 }
 
 #[test]
-fn lit_nodes_the_section_and_the_chosen_colours_are_in_print() {
+fn highlighted_nodes_the_section_and_the_chosen_colours_are_printed() {
     let figure = |change: &dyn Fn(&mut SurfaceFigure)| {
         let mut figure = figure(vec![from_above(dent("Actual"))]);
         change(&mut figure);
@@ -324,7 +325,7 @@ fn the_marked_node_is_marked_in_print() {
 }
 
 #[test]
-fn nodes_beyond_the_axes_are_named() {
+fn nodes_beyond_the_axes_are_reported() {
     let mut surface = from_above(dent("Actual"));
     Arc::make_mut(&mut surface.nodes)[0].x = -7.0;
     let picture = draw(&figure(vec![surface]));
@@ -332,7 +333,7 @@ fn nodes_beyond_the_axes_are_named() {
 }
 
 #[test]
-fn odd_surfaces_are_drawn() {
+fn unusual_surfaces_are_drawn() {
     let mut gaps = dent("Actual");
     Arc::make_mut(&mut gaps.values)[5000] = f64::NAN;
     Arc::make_mut(&mut gaps.nodes)[3].z = f64::NAN;

@@ -1,4 +1,4 @@
-//! The checkpoint file: what is read continues with the same bits, and whatever happens to the file is noticed.
+//! The checkpoint file: a run read back continues bit for bit, and any damage to the file is detected.
 
 use std::{fs, path::PathBuf, time::Duration};
 
@@ -54,7 +54,7 @@ fn saved(epochs: usize) -> (TempDir, PathBuf, Vec<u8>) {
     (folder, path, bytes)
 }
 
-/// The message of a file of these bytes, which must be refused in one line that names it.
+/// Returns the message on a file of these bytes, which must be refused in one line that names the file.
 fn refusal(bytes: &[u8]) -> String {
     let (_folder, path) = place();
     fs::write(&path, bytes).unwrap();
@@ -67,7 +67,7 @@ fn refusal(bytes: &[u8]) -> String {
 }
 
 #[test]
-fn a_run_from_a_file_goes_on_with_the_same_bits() {
+fn a_run_from_a_file_continues_bit_for_bit() {
     let (_folder, path) = place();
     for method in Method::all() {
         let whole = stepped(settings(method), 9);
@@ -84,12 +84,12 @@ fn a_run_from_a_file_goes_on_with_the_same_bits() {
     }
 }
 
-/// Starts run side by side, so their times do not add up to the time by the clock.
+/// Starts run in parallel, so the wall time is not the sum of their times.
 #[test]
-fn the_time_by_the_clock_is_that_of_all_sessions_or_unknown() {
+fn the_wall_time_is_that_of_all_sessions_or_unknown() {
     let (_folder, path) = place();
     let hour = Some(Duration::from_secs(3600));
-    // A training alone knows its time.
+    // A single start determines the wall time.
     let cases = [(3, hour), (3, None), (1, hour), (1, None), (3, Some(Duration::MAX))];
     for (starts, saved) in cases {
         let run = stepped(
@@ -116,9 +116,9 @@ fn the_time_by_the_clock_is_that_of_all_sessions_or_unknown() {
     }
 }
 
-/// Divergence leaves numbers that are not finite; the checkpoint holds them, and another method can go on.
+/// Divergence leaves numbers that are not finite; the checkpoint stores them, and another method can continue.
 #[test]
-fn a_training_that_diverged_can_be_saved_and_goes_on_with_another_method() {
+fn a_diverged_training_can_be_saved_and_continued_with_another_method() {
     let (_folder, path) = place();
     let mut diverging = Method::all()[8];
     *diverging.settings()[0].value = 1e3;
@@ -144,7 +144,7 @@ fn a_training_that_diverged_can_be_saved_and_goes_on_with_another_method() {
 }
 
 #[test]
-fn a_file_cut_off_anywhere_is_noticed() {
+fn a_file_cut_off_anywhere_is_detected() {
     let (_folder, _, bytes) = saved(3);
     let content = bytes.trim_ascii_end().len();
     for length in (0..content).step_by(37).chain(content - 40..content) {
@@ -155,7 +155,7 @@ fn a_file_cut_off_anywhere_is_noticed() {
 }
 
 #[test]
-fn a_flipped_bit_anywhere_is_noticed_or_harmless() {
+fn a_flipped_bit_anywhere_is_detected_or_harmless() {
     let (_folder, path, bytes) = saved(2);
     let whole = CheckpointFile::load(&path).unwrap();
     for place in (0..bytes.len()).step_by(41) {
@@ -164,7 +164,7 @@ fn a_flipped_bit_anywhere_is_noticed_or_harmless() {
             flipped[place] ^= 1 << bit;
             fs::write(&path, &flipped).unwrap();
             if let Ok(read) = CheckpointFile::load(&path) {
-                // What wrote it may be any text.
+                // The name of the program may be any text.
                 assert_eq!(
                     (read.settings, read.starts),
                     (whole.settings, whole.starts.clone()),
@@ -178,7 +178,7 @@ fn a_flipped_bit_anywhere_is_noticed_or_harmless() {
 }
 
 #[test]
-fn one_other_digit_of_a_weight_is_noticed() {
+fn a_changed_digit_of_a_weight_is_detected() {
     let (_folder, _, bytes) = saved(3);
     let text = String::from_utf8(bytes).unwrap();
     let start = text.find("\"best_weights\":[").unwrap();
@@ -219,12 +219,12 @@ fn other_files_and_versions_are_named() {
             "version 7",
         ),
         (
-            "no version of ours",
+            "an unknown version",
             text.replacen("\"version\":4", "\"version\":0", 1),
             "has version 0",
         ),
         (
-            "something lost within",
+            "a part missing in the middle",
             text.replacen("\"run\":{", "\"run\":", 1),
             "is damaged",
         ),
@@ -243,9 +243,9 @@ fn other_files_and_versions_are_named() {
     assert!(matches!(CheckpointFile::load(&path), Err(DocumentError::Read { .. })));
 }
 
-/// Files that are what their checksum says, but impossible.
+/// Files with a correct checksum but invalid contents.
 #[test]
-fn impossible_contents_are_refused() {
+fn invalid_contents_are_refused() {
     type Edit = fn(&mut CheckpointFile);
     let run = stepped(settings(Method::default()), 2);
     let (_folder, path) = place();

@@ -1,4 +1,4 @@
-//! Files of ours: what is written comes back with the same bits, and damage is named.
+//! Files of the program: contents are read back bit for bit, and damage is reported.
 
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 

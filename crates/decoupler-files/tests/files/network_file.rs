@@ -1,4 +1,4 @@
-//! The network file: what is read answers with the same bits as what was written, and damage is named.
+//! The network file: a network read back answers bit for bit as before, and damage is reported.
 
 use std::{fs, path::PathBuf};
 
@@ -38,7 +38,7 @@ fn place() -> (TempDir, PathBuf) {
 }
 
 #[test]
-fn what_is_read_is_what_was_written_bit_by_bit() {
+fn networks_round_trip_bit_for_bit() {
     let (_folder, path) = place();
     let file = trained();
     file.save(&path).unwrap();
@@ -86,7 +86,7 @@ fn infinite_errors_of_an_epoch_are_kept_and_infinite_results_are_refused() {
     assert_eq!(fs::read(&path).unwrap(), before, "the old file stays");
 }
 
-/// The file with the checksum that its contents have.
+/// Returns the file with the correct checksum of its contents.
 fn resealed(text: &str) -> String {
     let (heading, run) = text.split_once("\"run\":").unwrap();
     let run = run.trim_end().strip_suffix('}').unwrap();
@@ -95,9 +95,9 @@ fn resealed(text: &str) -> String {
     format!("{before}\"crc32\":\"{crc32:08x}{}\"run\":{run}}}\n", &after[8..])
 }
 
-/// Contents that are what their checksum says, but impossible.
+/// Contents with a correct checksum that are invalid.
 #[test]
-fn impossible_contents_are_named() {
+fn invalid_contents_are_named() {
     let (_folder, path) = place();
     trained().save(&path).unwrap();
     let text = fs::read_to_string(&path).unwrap();
@@ -124,7 +124,7 @@ fn impossible_contents_are_named() {
             "unknown field `nodes`",
         ),
         (
-            "a weight too few",
+            "one weight missing",
             replaced(&format!("{first_weight},"), "\"hidden_layer\":["),
             "hidden layer has 94 weights, but 95",
         ),
@@ -175,7 +175,7 @@ fn impossible_contents_are_named() {
         ),
         ("no figure", replaced(&worst, "\"worst_mm\":null"), "line 1 column"),
         (
-            "an epoch too few",
+            "one epoch missing",
             replaced("\"epoch\":[0,1,", "\"epoch\":[0,"),
             "entries, but epoch has",
         ),

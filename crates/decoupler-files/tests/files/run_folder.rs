@@ -1,5 +1,5 @@
-//! The run list: it comes back as it was, programs that share it see each other's changes, and what is damaged is named
-//! and never lost.
+//! The run list: it is read back unchanged, programs that share it see each other's changes, and damaged files are
+//! reported and never lost.
 
 use std::{collections::BTreeMap, fs, path::Path, sync::Arc, thread};
 
@@ -24,7 +24,7 @@ fn trained(hidden: usize) -> Arc<NetworkFile> {
     Arc::new(NetworkFile::from_run(&run, None).unwrap())
 }
 
-/// Opens a folder in which nothing is damaged.
+/// Opens a folder without damaged files.
 fn open(path: &Path) -> RunFolder {
     let (folder, problems) = RunFolder::open(path).unwrap();
     assert!(problems.is_empty(), "{problems:?}");
@@ -65,7 +65,7 @@ fn run_path(folder: &Path, run: &KeptRun) -> std::path::PathBuf {
 }
 
 #[test]
-fn what_was_kept_comes_back_the_same() {
+fn runs_are_read_back_unchanged() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("data").join("runs");
     assert_eq!(*open(&path).runs(), KeptRuns::default());
@@ -103,7 +103,7 @@ fn a_change_writes_one_small_file() {
 }
 
 #[test]
-fn two_programs_see_what_the_other_does() {
+fn two_programs_see_each_others_changes() {
     let folder = tempfile::tempdir().unwrap();
     let [mut first, mut second] = [(); 2].map(|()| open(folder.path()));
     let agree = |first: &mut RunFolder, second: &mut RunFolder| {
@@ -123,7 +123,7 @@ fn two_programs_see_what_the_other_does() {
         (vec!["one", "two"], [Some(b), Some(a)])
     );
     second.remove(b).unwrap();
-    // One that still shows it renames it; it stays removed.
+    // A program that still shows the run renames it; it stays removed.
     first.rename(b, "gone").unwrap();
     agree(&mut first, &mut second);
     assert_eq!(
@@ -134,7 +134,7 @@ fn two_programs_see_what_the_other_does() {
 }
 
 #[test]
-fn many_programs_that_write_at_once_lose_nothing() {
+fn programs_that_write_at_the_same_time_lose_nothing() {
     let folder = tempfile::tempdir().unwrap();
     let file = trained(2);
     thread::scope(|scope| {
@@ -172,14 +172,14 @@ fn a_damaged_run_is_named_and_left_alone() {
         let before = contents(folder.path());
         let (mut found, problems) = RunFolder::open(folder.path()).unwrap();
         assert_eq!(&found.runs().runs[..], std::slice::from_ref(first));
-        assert_eq!(found.runs().pinned, [None, None], "what is not there is not pinned");
+        assert_eq!(found.runs().pinned, [None, None], "a missing run is not pinned");
         let [problem] = &problems[..] else {
             panic!("{problems:?}")
         };
         assert!(problem.contains(&path.display().to_string()), "{problem}");
-        assert!(found.look().is_empty(), "told once");
-        assert_eq!(contents(folder.path()), before, "left to the letter");
-        // Put right, it is there again, with its name and place.
+        assert!(found.look().is_empty(), "reported once");
+        assert_eq!(contents(folder.path()), before, "left unchanged");
+        // Once repaired, it is listed again with its name and place.
         fs::write(&path, &whole).unwrap();
         found.look();
         assert_eq!(found.runs(), kept.runs());
@@ -187,7 +187,7 @@ fn a_damaged_run_is_named_and_left_alone() {
 }
 
 #[test]
-fn damaged_names_and_pins_cost_no_run() {
+fn damaged_names_and_pins_lose_no_run() {
     let folder = tempfile::tempdir().unwrap();
     let kept = two(folder.path());
     let id = kept.runs().runs[1].id;
@@ -212,7 +212,7 @@ fn damaged_names_and_pins_cost_no_run() {
 }
 
 #[test]
-fn other_files_are_left_alone_and_any_number_leaves_room_for_the_next() {
+fn other_files_are_left_alone_and_any_run_number_has_a_successor() {
     let folder = tempfile::tempdir().unwrap();
     let mut kept = open(folder.path());
     kept.keep(trained(2)).unwrap();
@@ -236,7 +236,7 @@ fn other_files_are_left_alone_and_any_number_leaves_room_for_the_next() {
 }
 
 #[test]
-fn what_cannot_be_written_lasts_as_long_as_the_program() {
+fn runs_that_cannot_be_written_last_until_the_program_ends() {
     let mut kept = RunFolder::default();
     for hidden in [2, 2] {
         kept.keep(trained(hidden)).unwrap();

@@ -1,4 +1,4 @@
-//! Recordings and what is next to them, from files to samples and networks.
+//! Recordings and the files next to them, from files to samples and networks.
 
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 

@@ -1,4 +1,4 @@
-//! Networks and checkpoints of recordings, the recordings they name, and recipes.
+//! Networks and checkpoints of recordings, the recordings named in them, and recipes.
 
 use std::{
     fs,
@@ -48,7 +48,7 @@ fn settings() -> RunSettings {
     let mut settings = RunSettings::from(Measured { rows: RowModel::Shared });
     settings.hidden = 5;
     settings.training.stopping.epochs = 30;
-    // The correlation of neighbouring errors is measured on the way.
+    // This also measures the correlation of neighbouring errors.
     let mut measured_at = settings.training.method.settings();
     let setting = measured_at
         .iter_mut()
@@ -82,7 +82,7 @@ fn paused(folder: &Path) -> (CheckpointFile, NetworkFile) {
     (paused, NetworkFile::from_run(&run, sets.recorded()).unwrap())
 }
 
-/// Two folders next to each other in one: for recordings, and for files that name them.
+/// Two sibling folders: one for recordings, and one for files that name them.
 fn folders(root: &Path) -> [PathBuf; 2] {
     ["recordings", "networks"].map(|name| {
         let folder = root.join(name);
@@ -126,7 +126,7 @@ fn networks_of_recordings_are_saved_with_the_names_of_their_channels() {
 }
 
 #[test]
-fn the_cure_of_a_network_worse_than_ridge_is_not_the_method_that_it_was_trained_by() {
+fn advice_on_a_network_worse_than_ridge_is_not_its_own_method() {
     let folder = tempfile::tempdir().unwrap();
     let mut file = trained(folder.path());
     let ridge = file.scores.baselines.linear.targets()[0];
@@ -163,7 +163,7 @@ fn the_cure_of_a_network_worse_than_ridge_is_not_the_method_that_it_was_trained_
 }
 
 #[test]
-fn a_checkpoint_of_a_recording_resumes_with_the_same_bits_or_says_that_the_recording_has_changed() {
+fn a_checkpoint_of_a_recording_resumes_bit_for_bit_or_reports_a_changed_recording() {
     let folder = tempfile::tempdir().unwrap();
     let (checkpoint, whole) = paused(folder.path());
     let path = folder.path().join("run.checkpoint");
@@ -173,7 +173,7 @@ fn a_checkpoint_of_a_recording_resumes_with_the_same_bits_or_says_that_the_recor
     let mut resumed = read.clone().resume().unwrap();
     while resumed.step().is_none() {}
     assert_eq!(resumed.network(), whole.network);
-    // Another digit of a sample.
+    // A changed digit of a sample.
     let data = folder.path().join("data.csv");
     fs::write(&data, fs::read_to_string(&data).unwrap().replacen("0.", "0.0", 1)).unwrap();
     let error = whole.test_set().err().unwrap();
@@ -184,7 +184,7 @@ fn a_checkpoint_of_a_recording_resumes_with_the_same_bits_or_says_that_the_recor
 }
 
 #[test]
-fn files_and_their_recording_move_together() {
+fn files_can_be_moved_together_with_their_recording() {
     let root = tempfile::tempdir().unwrap();
     let [recordings, networks] = folders(&root.path().join("here"));
     let (checkpoint, whole) = paused(&recordings);
@@ -352,7 +352,7 @@ fn a_recipe_repeats_the_import_from_another_folder() {
 }
 
 #[test]
-fn a_recipe_of_an_array_says_what_differs_from_the_papers() {
+fn a_recipe_of_an_array_has_only_differences_from_the_papers_array() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("array.json");
     let written = |source: &str| {

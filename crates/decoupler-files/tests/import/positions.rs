@@ -1,4 +1,4 @@
-//! Positions of targets on the skin: read from their file, matched to the targets, and refused with line and cause.
+//! Positions of targets on the skin: reading their file, matching them to the targets, and errors with line and cause.
 
 use std::{fs, ops::ControlFlow, path::Path};
 
@@ -55,13 +55,13 @@ fn positions_are_matched_to_their_targets_in_any_order_and_layout() {
         assert_eq!((lattice.x_mm(), lattice.y_mm()), (&[0.0, 2.5][..], &[-1.0, 0.0][..]));
         assert_eq!(lattice.places(), [3, 1, 2, 0]);
     }
-    // A force alone is of one unit too.
+    // A force alone also has one unit.
     let alone = imported(&folder, "target,x,y\nforce,1,2\n").unwrap().positions;
     assert_eq!(alone, [at(4, 1.0, 2.0)]);
 }
 
 #[test]
-fn a_file_that_cannot_be_used_is_refused_with_line_and_cause() {
+fn invalid_files_are_refused_with_line_and_cause() {
     let folder = recording();
     let cases = [
         ("target,x\nd1,0\n", "no column 'y'"),
@@ -147,7 +147,7 @@ fn a_recipe_keeps_the_file_relative_to_its_folder() {
 }
 
 #[test]
-fn files_of_positions_are_told_from_recordings() {
+fn files_of_positions_are_distinguished_from_recordings() {
     let folder = recording();
     let holds = |name: &str, text: &str| {
         let path = folder.path().join(name);

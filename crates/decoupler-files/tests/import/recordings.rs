@@ -1,4 +1,4 @@
-//! Files of recordings become samples: what is read is what the files say, and what is left out is said.
+//! Files of recordings become samples: values are read exactly, and omitted rows are reported.
 
 use std::{fs, ops::ControlFlow, path::Path};
 
@@ -86,7 +86,7 @@ fn every_layout_of_one_table_gives_the_same_numbers() {
 }
 
 #[test]
-fn what_the_user_says_of_the_layout_holds() {
+fn the_layout_given_by_the_user_is_used() {
     let folder = folder(&[("data.csv", "note; of 2\n1,5\n2,5\n")]);
     let path = folder.path().join("data.csv");
     let choice = DialectChoice {
@@ -121,7 +121,7 @@ fn numbers_are_read_to_the_last_bit() {
 }
 
 #[test]
-fn arrays_of_numpy_and_matlab_are_those_that_were_saved() {
+fn arrays_of_numpy_and_matlab_are_read_as_saved() {
     let fixtures = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures/import");
     let read = |name: &str| read(&fixtures.join(name));
     let expected: Vec<Vec<f64>> = (0..3)
@@ -158,7 +158,7 @@ fn arrays_of_numpy_and_matlab_are_those_that_were_saved() {
 }
 
 #[test]
-fn cells_that_are_no_numbers_are_named_and_never_guessed() {
+fn cells_that_are_not_numbers_are_named_and_never_guessed() {
     let folder = folder(&[("data.csv", "t,x,y\n0,1,2\n1,1.2.3,2\n2,,2\n3,1,n/a\n4,5,6\n")]);
     let error = import(&recipe("x", "t"), &folder).unwrap_err();
     assert!(
@@ -183,7 +183,7 @@ fn cells_that_are_no_numbers_are_named_and_never_guessed() {
 }
 
 #[test]
-fn a_number_may_mean_missing_in_one_column_only() {
+fn a_number_can_mean_missing_in_one_column_only() {
     let folder = folder(&[("data.csv", "a,b\n-1,1\n2,-1.0\n3,3\n")]);
     let mut wanted = recipe("a", "b");
     wanted.missing = vec!["b=-1".parse().unwrap()];
@@ -203,7 +203,7 @@ fn a_number_may_mean_missing_in_one_column_only() {
 }
 
 #[test]
-fn rows_of_other_lengths_are_counted() {
+fn rows_of_different_lengths_are_counted() {
     let folder = folder(&[("data.csv", "1,2,3\n1,2,3\n4,5\n6,7,8,9\n1,2,3,\n1,2,3\n")]);
     let recording = import(&recipe("c1 c2", "c3"), &folder).unwrap();
     assert_eq!((recording.set.samples(), recording.rows), (4, 6));
@@ -217,7 +217,7 @@ fn rows_of_other_lengths_are_counted() {
         [("more cells than the 3 columns", 1, 4), ("c3 is missing", 1, 3)]
     );
     assert_eq!(recording.warnings.len(), 2, "{:?}", recording.warnings);
-    // The cells that are there can be used.
+    // The existing cells can be used.
     assert_eq!(import(&recipe("c1", "c2"), &folder).unwrap().set.samples(), 5);
 }
 
@@ -252,14 +252,14 @@ fn two_recordings_are_joined_by_the_nearest_time() {
         reasons[1].starts_with("no row of 'states.csv' within 0.5"),
         "{reasons:?}"
     );
-    // Without times rows belong together by their order, if there are as many.
+    // Without times, rows are joined in order if their numbers are equal.
     wanted.time = None;
     let error = import(&wanted, &folder).unwrap_err();
     assert!(error.contains("it has 4 rows and the other file 5"), "{error}");
 }
 
 #[test]
-fn samples_stand_in_the_order_of_their_times() {
+fn samples_are_in_the_order_of_their_times() {
     let folder = folder(&[("data.csv", "t,x,y\n3,30,1\n1,10,1\n2,20,1\n")]);
     let mut wanted = recipe("x", "y");
     wanted.time = Some("t".into());
@@ -308,7 +308,7 @@ fn columns_have_names_ranges_units_and_one_meaning() {
 }
 
 #[test]
-fn no_row_left_is_an_error_that_counts_the_reasons() {
+fn having_no_rows_left_is_an_error_with_counted_reasons() {
     let folder = folder(&[("data.csv", "1,2\n3,\n")]);
     let mut wanted = recipe("c1", "c2");
     wanted.conditions = vec!["c1>2".parse().unwrap()];
@@ -320,7 +320,7 @@ fn no_row_left_is_an_error_that_counts_the_reasons() {
 }
 
 #[test]
-fn reading_is_cancelled_from_outside() {
+fn reading_can_be_cancelled() {
     let folder = folder(&[("data.csv", &"1,2\n".repeat(1_000_000))]);
     let mut reports = 0;
     let cancelled = read_table(
@@ -341,7 +341,7 @@ fn reading_is_cancelled_from_outside() {
 }
 
 #[test]
-fn an_inspection_tells_of_each_column() {
+fn an_inspection_describes_each_column() {
     let folder = folder(&[(
         "data.csv",
         "time (s),a,b,c,d,e\n0,1.5,1,7,1,x\n1,,2,7,2,y\n2,2.5,3,7,3,z\n3,3,4,7,4,\n30,4,5,7,5,w\n",

@@ -1,4 +1,4 @@
-//! The files in `assets/samples` are what they are said to be.
+//! The files in `assets/samples` have the contents described in their documentation.
 
 use std::{fs::File, io::BufReader, path::PathBuf};
 
@@ -54,7 +54,7 @@ fn the_network_decodes_the_recording() {
 
 /// Eq. (2) gives the readings of every line for the depths in the same line.
 #[test]
-fn the_table_holds_readings_of_its_own_deformation() {
+fn the_table_contains_the_readings_of_its_deformation() {
     let file = NetworkFile::load(&sample("network.json")).unwrap();
     let sensor = file.settings.source.simulation().unwrap().sensor;
     let mut table = csv::Reader::from_path(sample("simulated_row.csv")).unwrap();

@@ -1,11 +1,11 @@
-//! Guesses of what files and columns are for.
+//! Guesses of the meanings of files and columns.
 
 use std::{fs, ops::ControlFlow, path::Path};
 
 use decoupler_core::dataset::SplitBy;
 use decoupler_files::import::{Joined, Meaning, Missing, Plan, Recipe, suggested_plan};
 
-/// What is guessed of files with these names and contents.
+/// Returns the guess for files with these names and contents.
 fn guessed(files: &[(&str, &str)]) -> Plan {
     let folder = tempfile::tempdir().unwrap();
     for (name, text) in files {
@@ -29,7 +29,7 @@ fn guessed(files: &[(&str, &str)]) -> Plan {
     )
 }
 
-/// Rows of these columns, each a function of the row.
+/// Returns rows of these columns, each a function of the row.
 fn table(header: Option<&str>, rows: usize, columns: &[fn(usize) -> f64]) -> String {
     let mut text = header.map_or(String::new(), |header| format!("{header}\n"));
     for row in 0..rows {
@@ -49,8 +49,13 @@ fn columns_are_guessed_from_names_units_and_numbers() {
     let three: &[fn(usize) -> f64] = &[VARYING, OTHER, THIRD];
     for (sentence, header, inputs, targets) in [
         ("names of targets", "r1,r2,force", "r1 r2", "force"),
-        ("units of what is pressed", "a (V),b (mm),c (N)", "a", "b c"),
-        ("units of sensors win over names", "a,load (mV),z", "a load", "z"),
+        ("units of displacement and force", "a (V),b (mm),c (N)", "a", "b c"),
+        (
+            "units of sensors take precedence over names",
+            "a,load (mV),z",
+            "a load",
+            "z",
+        ),
         ("coordinates with numbers are channels", "x1,y1,x", "x1 y1", "x"),
         (
             "words within names",
@@ -59,12 +64,12 @@ fn columns_are_guessed_from_names_units_and_numbers() {
             "probe_depth",
         ),
         (
-            "a sensor's own position is no target",
+            "a sensor's own position is not a target",
             "sensor_x,sensor_y,x",
             "sensor_x sensor_y",
             "x",
         ),
-        ("no name speaks: the last column", "a,b,c", "a b", "c"),
+        ("no name matches: the last column", "a,b,c", "a b", "c"),
         ("no header: the last column", "", "c1 c2", "c3"),
         ("all look like targets: the last column", "x,y,z", "x y", "z"),
     ] {
@@ -77,7 +82,7 @@ fn columns_are_guessed_from_names_units_and_numbers() {
 }
 
 #[test]
-fn what_tells_nothing_is_not_used_and_time_group_and_row_wire_are_found() {
+fn constant_columns_are_not_used_and_time_group_and_row_wire_are_found() {
     let columns: &[fn(usize) -> f64] = &[
         CLOCK,
         |row| (row / 10) as f64,
@@ -97,11 +102,15 @@ fn what_tells_nothing_is_not_used_and_time_group_and_row_wire_are_found() {
     assert_eq!(import.time.as_deref(), Some("time"));
     assert_eq!(import.group.as_deref(), Some("session"));
     assert_eq!(import.row_wire.as_deref(), Some("row_wire"));
-    assert_eq!(plan.division.by, SplitBy::Group, "groups divide the samples honestly");
+    assert_eq!(
+        plan.division.by,
+        SplitBy::Group,
+        "groups split the samples without leakage"
+    );
 }
 
 #[test]
-fn a_column_that_always_grows_is_a_time_only_if_its_name_does_not_speak_against_it() {
+fn an_increasing_column_is_a_time_unless_its_name_says_otherwise() {
     let columns: &[fn(usize) -> f64] = &[CLOCK, VARYING, OTHER];
     for (header, time, inputs) in [
         (Some("u,v,force"), None, &["u", "v"][..]),
@@ -162,7 +171,7 @@ fn files_without_a_common_time_are_joined_row_by_row_and_test_files_found() {
 }
 
 #[test]
-fn a_recipe_is_looked_at_with_its_own_meanings_and_missing_cells() {
+fn a_recipe_is_inspected_with_its_own_meanings_and_missing_cells() {
     let folder = tempfile::tempdir().unwrap();
     fs::write(folder.path().join("a.csv"), "t,u,v,g\n1,5,-1,p\n2,6,7,p\n3,7,8,q\n").unwrap();
     fs::write(folder.path().join("b.csv"), "t,f\n1,-1\n2,3\n3,4\n").unwrap();
@@ -193,7 +202,7 @@ fn a_recipe_is_looked_at_with_its_own_meanings_and_missing_cells() {
         (files[1].full_name(1).as_str(), files[0].full_name(1).as_str()),
         ("b.f", "u")
     );
-    // A column that is not there is named.
+    // A missing column is named.
     let wrong = Recipe {
         targets: vec!["b.force".to_owned()],
         ..recipe

@@ -1,4 +1,4 @@
-//! Recordings of their own for the test.
+//! Separate recordings for testing.
 
 use std::{fs, ops::ControlFlow};
 
@@ -6,7 +6,7 @@ use decoupler_core::dataset::Seed;
 use decoupler_files::import::{Plan, Recipe, TestFiles};
 
 #[test]
-fn rows_that_are_trained_on_do_not_test() {
+fn training_rows_are_refused_as_test_rows() {
     let folder = tempfile::tempdir().unwrap();
     let rows: String = (0..40).map(|row| format!("{row},{}\n", 2 * row)).collect();
     for name in ["train.csv", "test.csv"] {
@@ -33,6 +33,9 @@ fn rows_that_are_trained_on_do_not_test() {
     assert_eq!(tested("test.csv"), Ok(40));
     for same in ["train.csv", "sub/../train.csv"] {
         let reason = tested(same).unwrap_err();
-        assert!(reason.contains("is trained on, so it cannot be a test file"), "{reason}");
+        assert!(
+            reason.contains("is trained on, so it cannot be a test file"),
+            "{reason}"
+        );
     }
 }

@@ -54,7 +54,7 @@ proptest! {
     #![proptest_config(cases(64))]
 
     #[test]
-    fn samples_are_read_as_they_were_written(set in sets(), most in 1..25_usize) {
+    fn samples_round_trip(set in sets(), most in 1..25_usize) {
         let mut file = Vec::new();
         write_samples_header("3x2_2x6".parse().unwrap(), false, &mut file).unwrap();
         write_samples(&set, None, 1, &mut file).unwrap();
@@ -72,7 +72,7 @@ proptest! {
     }
 
     #[test]
-    fn networks_are_read_with_the_bits_that_were_written(
+    fn networks_round_trip_bit_for_bit(
         weights in prop::collection::vec(
             prop::num::f64::NORMAL | prop::num::f64::SUBNORMAL | prop::num::f64::ZERO,
             TRAINED.network.at(0).mlp().weights().len(),
@@ -91,9 +91,9 @@ proptest! {
         prop_assert_eq!(bits(read.network.at(0).mlp().weights()), bits(&weights));
     }
 
-    /// A training written at any epoch and read again continues as one that was never interrupted.
+    /// A training that is written at any epoch and read back continues as if it had not been interrupted.
     #[test]
-    fn trainings_are_read_with_the_bits_that_were_written(
+    fn trainings_round_trip_bit_for_bit(
         method in prop::sample::select(Method::all().to_vec()),
         before in 0..6_usize,
         after in 0..6_usize,
@@ -119,7 +119,7 @@ proptest! {
     }
 
     #[test]
-    fn run_lists_are_read_as_they_were_written(
+    fn run_lists_round_trip(
         names in prop::collection::vec("\\PC{0,20}", 0..4),
         pinned in prop::sample::select(vec![None, Some(0_usize), Some(1)]),
     ) {

@@ -5,7 +5,7 @@ mod files;
 
 use proptest::test_runner::{Config, RngSeed};
 
-/// This many cases of a property, the same in every run; hence nothing needs to be written down after a failure.
+/// Number of cases of a property. They are the same in every run, so failures need no record.
 fn cases(count: u32) -> Config {
     Config {
         cases: count,

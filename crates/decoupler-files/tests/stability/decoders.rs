@@ -1,4 +1,4 @@
-//! Decoders and the reference in every situation, judged by the truth of the simulation.
+//! Decoders and the reference in every situation, compared with the ground truth of the simulation.
 
 use decoupler_core::{
     dataset::Dataset,
@@ -14,12 +14,12 @@ use crate::{
 };
 
 const ROOM: &str = "decoder";
-/// Factor that chance may put on an error that is the mean's, on a test set of this many nodes.
+/// Returns the factor by which an error equal to the mean's may vary by chance, on a test set of this many nodes.
 fn by_chance(nodes: usize) -> f64 {
     1.1 + 2.0 / (nodes as f64).sqrt()
 }
 
-/// Mean |decoded z − z|, summed here.
+/// Returns mean |decoded z − z|, computed independently.
 fn z_mm(test: &Dataset, answers: &Array2<f64>) -> f64 {
     let pairs = answers
         .indexed_iter()
@@ -29,11 +29,11 @@ fn z_mm(test: &Dataset, answers: &Array2<f64>) -> f64 {
     errors.iter().sum::<f64>() / errors.len() as f64
 }
 
-/// Error, as a factor on the mean's, up to which a warning of the scene explains it: readings that tell little leave a
+/// Maximum error, as a multiple of the mean's, that a warning about the scene explains: uninformative readings leave a
 /// decoder near the mean, not far beyond it.
 const EXPLAINED: f64 = 3.0;
 
-/// The remark next to a decoder's figures, if the program makes one that explains an error of this many times the mean's.
+/// Returns the program's remark on a decoder that explains an error of this many times the mean's, if there is one.
 fn remark(report: &DecoderReport, times: f64, defect: Option<&RunDefect>, outlook: Option<&Outlook>) -> Option<String> {
     if let Some(remark) = report.remarks.first() {
         return Some(remark.to_string());
@@ -103,13 +103,13 @@ fn judge_decoder(seen: &Measured, settings: &SimulatedSettings, kind: DecoderKin
     }
     if !agree(found, errors.z_mm, 1e-9) {
         return wrong(format!(
-            "{kind}: the error is {found:e} mm, told is {:e} mm",
+            "{kind}: the error is {found:e} mm, the reported error is {:e} mm",
             errors.z_mm
         ));
     }
     if found > by_chance(answers.len() / 3) * seen.mean_mm {
         return or_flagged(format!(
-            "{kind}: {times:.1e} times the error of the mean, and nothing says so"
+            "{kind}: {times:.1e} times the error of the mean, without a remark"
         ));
     }
     let scene = settings.source.scene;
@@ -118,21 +118,21 @@ fn judge_decoder(seen: &Measured, settings: &SimulatedSettings, kind: DecoderKin
     if is_exact && errors.worst_mm > 1e-4 * stroke_mm {
         let share = errors.worst_mm / stroke_mm;
         return or_flagged(format!(
-            "{kind}: a row is off by {share:.1e} of the stroke without noise, and nothing says so"
+            "{kind}: a row is off by {share:.1e} of the stroke without noise, without a remark"
         ));
     }
     Verdict::Right
 }
 
-/// The reference is no worse than the mean, no one beats it, and it claims no certainty that no one has.
+/// The reference is no worse than the mean, no decoder beats it, and its certainty is justified.
 fn judge_reference(seen: &Measured, settings: &SimulatedSettings) -> Verdict {
     let scene = settings.source.scene;
-    let told = seen.run.baselines().and_then(|baselines| baselines.nodes()?.reference);
+    let reference = seen.run.baselines().and_then(|baselines| baselines.nodes()?.reference);
     let unseen = seen
         .outlook
         .as_ref()
         .is_some_and(|outlook| outlook.worst_row.condition().is_infinite());
-    let Some(reference) = told else {
+    let Some(reference) = reference else {
         let note = seen.run.baselines().and_then(ReferenceNote::of);
         return note.map_or_else(|| wrong("there is no reference, and no reason"), |note| flagged(&note));
     };
@@ -156,15 +156,15 @@ fn judge_reference(seen: &Measured, settings: &SimulatedSettings) -> Verdict {
     if unseen && is_independent && limit_mm < 1e-9 * stroke_mm {
         return wrong("the reference claims certainty about deformations that no reading determines");
     }
-    // A gain common to all readings is found from them.
+    // A gain common to all readings can be estimated from them.
     let beside_drift = Noise {
         drift: 0.0,
         ..scene.noise
     };
     if !beside_drift.in_test().is_none() && limit_mm == 0.0 {
-        return wrong("the reference claims certainty in spite of noise");
+        return wrong("the reference claims certainty despite noise");
     }
-    // Every node's depth is uniform, so all that is known before is a quarter of the stroke on average.
+    // Every node's depth is uniform, so the mean absolute error without readings is a quarter of the stroke.
     let noise = scene.noise;
     let hides_all = noise.additive_ohm > 1e4 * situations::resistance_ohm(&settings.source.sensor);
     if hides_all && noise.in_test() == noise && is_independent && !(0.2..0.3).contains(&(limit_mm / stroke_mm)) {
@@ -176,12 +176,12 @@ fn judge_reference(seen: &Measured, settings: &SimulatedSettings) -> Verdict {
     Verdict::Right
 }
 
-/// No decoder that knows the row and the range of every node does better than the reference.
+/// No decoder that is given the row and the range of every node beats the reference.
 fn judge_limit(seen: &Measured, settings: &SimulatedSettings) -> Verdict {
     let scene = settings.source.scene;
     let nodes = seen.run.test().samples() * settings.source.sensor.scale.nodes_per_row();
-    let told = seen.run.baselines().and_then(|baselines| baselines.nodes()?.reference);
-    let Some(reference) = told.filter(|_| scene.loading == Loading::RandomNodes && nodes >= 300) else {
+    let reference = seen.run.baselines().and_then(|baselines| baselines.nodes()?.reference);
+    let Some(reference) = reference.filter(|_| scene.loading == Loading::RandomNodes && nodes >= 300) else {
         return Verdict::Right;
     };
     for kind in DecoderKind::ALL {
@@ -191,9 +191,7 @@ fn judge_limit(seen: &Measured, settings: &SimulatedSettings) -> Verdict {
         let z_mm = report.errors.nodes().map_or(f64::NAN, |errors| errors.z_mm);
         if z_mm < 0.85 * reference.z_mm {
             let share = z_mm / reference.z_mm;
-            return wrong(format!(
-                "{kind} has {share:.2} times the reference, which calls itself the limit"
-            ));
+            return wrong(format!("{kind} has {share:.2} times the reference, which is the limit"));
         }
     }
     Verdict::Right

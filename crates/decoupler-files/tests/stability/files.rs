@@ -1,4 +1,4 @@
-//! Files: damaged networks and checkpoints, tables of readings that are none.
+//! Files: damaged networks and checkpoints, valid and invalid tables of readings.
 
 use std::{fmt::Display, fs, path::Path};
 
@@ -60,13 +60,13 @@ const DAMAGES: [(&str, Damage); 5] = [
     }),
 ];
 
-/// A network that is read answers as the one that was written.
+/// A network that is read back answers as the written one.
 fn judge_network(damage: Damage, place: f64) -> Verdict {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("network.json");
     let run = trained();
     let mut file = NetworkFile::from_run(&run, None).unwrap();
-    // Places in the file are the same however long it took.
+    // Times are removed to keep the places in the file the same.
     file.training.seconds = 0.0;
     file.save(&path).unwrap();
     rewrite(&path, damage, place);
@@ -74,7 +74,7 @@ fn judge_network(damage: Damage, place: f64) -> Verdict {
         Err(error) => refused_in(folder.path(), &error),
         Ok(read) => {
             if read.network.decouple(run.test()) != run.decouple_test() {
-                wrong("a damaged network is read and answers otherwise")
+                wrong("a damaged network is read and answers differently")
             } else if read.settings != small().into() || read.scores.network != run.errors() {
                 wrong("a damaged network is read with other settings or errors")
             } else {
@@ -84,7 +84,7 @@ fn judge_network(damage: Damage, place: f64) -> Verdict {
     }
 }
 
-/// A training that is read continues as the one that was saved.
+/// A training that is read back continues as the saved one.
 fn judge_checkpoint(damage: Damage, place: f64) -> Verdict {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("run.checkpoint");
@@ -106,13 +106,13 @@ fn judge_checkpoint(damage: Damage, place: f64) -> Verdict {
             if resumed.decouple_test() == run.decouple_test() {
                 Verdict::Right
             } else {
-                wrong("a damaged training is read and continues otherwise")
+                wrong("a damaged training is read and continues differently")
             }
         }
     }
 }
 
-/// A refusal in which the temporary folder has no name.
+/// Returns the refusal without the name of the temporary folder.
 fn refused_in(folder: &Path, error: &impl Display) -> Verdict {
     refused(&error.to_string().replace(&folder.display().to_string(), ""))
 }
@@ -123,7 +123,7 @@ fn rewrite(path: &Path, damage: Damage, place: f64) {
     fs::write(path, bytes).unwrap();
 }
 
-/// A table of three resistances a line, and what it holds; nothing where it must be refused.
+/// Judges a table of three resistances per line, given its values, or `None` if it must be refused.
 fn judge_table(text: &str, expected: Option<&[[f64; 3]]>) -> Verdict {
     let read = || {
         let mut reader = ResistanceReader::new(text.as_bytes(), 3)?;
@@ -135,13 +135,13 @@ fn judge_table(text: &str, expected: Option<&[[f64; 3]]>) -> Verdict {
     };
     match (read(), expected) {
         (Err(error), None) => refused(&error),
-        (Err(error), Some(_)) => wrong(format!("a sound table is refused: {error}")),
+        (Err(error), Some(_)) => wrong(format!("a valid table is refused: {error}")),
         (Ok(values), Some(expected)) if values == expected.concat() => Verdict::Right,
         (Ok(values), _) => wrong(format!("the table is read as {values:?}")),
     }
 }
 
-/// What is tried, the text, and the lines that it holds; none where it must be refused.
+/// Description, text, and expected lines; `None` if it must be refused.
 type Text = (&'static str, String, Option<Vec<[f64; 3]>>);
 
 fn tables() -> Vec<Text> {
@@ -178,12 +178,16 @@ fn tables() -> Vec<Text> {
         ("a value too many", "1,2,3\n1,2,3,4\n".to_owned(), None),
         ("semicolons", "1;2;3\n".to_owned(), None),
         ("a line break within quotes", "1,2,\"3\n\"\n".to_owned(), None),
-        ("bytes of no text", "1,2,\0\n".to_owned(), None),
+        ("bytes that are not text", "1,2,\0\n".to_owned(), None),
     ];
     for value in [
         "0", "-1", "NaN", "inf", "-inf", "1e309", "1e-400", "", "one", "0x10", "1,5",
     ] {
-        tables.push(("a value that is no resistance", format!("1,2,3\n1,2,{value}\n"), None));
+        tables.push((
+            "a value that is not a resistance",
+            format!("1,2,3\n1,2,{value}\n"),
+            None,
+        ));
     }
     tables
 }
@@ -203,8 +207,8 @@ pub(crate) fn jobs() -> Vec<Job> {
         }
     }
     for (sentence, text, expected) in tables() {
-        let told = format!("{sentence}: {text:?}");
-        jobs.push(Job::one(ROOM, "tables of readings", told, move || {
+        let case = format!("{sentence}: {text:?}");
+        jobs.push(Job::one(ROOM, "tables of readings", case, move || {
             judge_table(&text, expected.as_deref())
         }));
     }

@@ -1,11 +1,11 @@
-//! What a cell is, and when a message has a cause and a cure.
+//! Cells and their verdicts, and the check that a message has a cause and a cure.
 
 use std::{
     fmt::Display,
     panic::{AssertUnwindSafe, catch_unwind},
 };
 
-/// The judgement of one cell.
+/// The verdict on one cell.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Verdict {
     /// It agrees with an independent truth, or stays within a computed bound.
@@ -14,7 +14,7 @@ pub(crate) enum Verdict {
     Refused(String),
     /// There is a result, and a remark with cause and cure.
     Flagged(String),
-    /// Plausible and wrong; or a panic, a number that is none, or a message without a cure.
+    /// Plausible but wrong; or a panic, a NaN, or a message without a cure.
     Wrong(String),
 }
 
@@ -26,17 +26,17 @@ pub(crate) struct Cell {
     pub(crate) verdict: Verdict,
 }
 
-/// Something to run, which gives one or several cells.
+/// A job that produces one or several cells.
 pub(crate) struct Job {
     room: &'static str,
     extreme: &'static str,
-    /// What is tried.
+    /// Description.
     sentence: String,
     run: Box<dyn Fn() -> Vec<(String, Verdict)> + Send + Sync>,
 }
 
 impl Job {
-    /// A job with several cells, each with what it looks at.
+    /// A job with several cells, each with the name of its subject.
     pub(crate) fn new(
         room: &'static str,
         extreme: &'static str,
@@ -86,7 +86,7 @@ impl Job {
     }
 }
 
-/// A refusal, if its message says what to change.
+/// Returns a refusal if its message says what to change.
 pub(crate) fn refused(error: &impl Display) -> Verdict {
     match defect_of(&error.to_string()) {
         None => Verdict::Refused(error.to_string()),
@@ -94,7 +94,7 @@ pub(crate) fn refused(error: &impl Display) -> Verdict {
     }
 }
 
-/// A remark, if its message says what to change.
+/// Returns a remark if its message says what to change.
 pub(crate) fn flagged(remark: &impl Display) -> Verdict {
     match defect_of(&remark.to_string()) {
         None => Verdict::Flagged(remark.to_string()),
@@ -106,7 +106,7 @@ pub(crate) fn wrong(what: impl Into<String>) -> Verdict {
     Verdict::Wrong(what.into())
 }
 
-/// What a message lacks: it names no cure, or is not for people.
+/// Returns the defect of a message: it names no cure, or is not written for users.
 fn defect_of(message: &str) -> Option<&'static str> {
     const CURES: &[&str] = &[
         "give", "must", "use ", "take", "lower", "raise", "set ", "draw", "train", "make", "check", "choose", "write",
@@ -118,12 +118,12 @@ fn defect_of(message: &str) -> Option<&'static str> {
         return Some("no cure");
     }
     if words.contains("os error") || message.len() > 600 {
-        return Some("no plain words");
+        return Some("not plain language");
     }
     None
 }
 
-/// True if two numbers agree to this share of the larger one.
+/// Returns true if the difference of two numbers is at most this fraction of the larger one.
 pub(crate) fn agree(a: f64, b: f64, share: f64) -> bool {
     a == b || (a - b).abs() <= share * a.abs().max(b.abs())
 }

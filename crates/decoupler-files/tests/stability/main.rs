@@ -1,6 +1,6 @@
-//! The stability matrix: every method, decoder, scene, surface and file at its extremes, judged without the code that is
-//! judged. A cell is *right* (it agrees with an independent truth, or stays within a bound that is computed), *refused*
-//! or *flagged* (with cause and cure), and never plausible and wrong.
+//! The stability matrix: every method, decoder, scene, surface and file at its extremes, judged independently of the
+//! code under test. A cell is *right* (it agrees with an independent truth, or stays within a bound that is computed),
+//! *refused* or *flagged* (with cause and cure), and never plausible but wrong.
 //!
 //! `cargo test --release --test stability -- --nocapture` prints the whole table; without `--release` every eleventh job
 //! is run.
@@ -23,7 +23,7 @@ use judge::Job;
 use rayon::prelude::*;
 use table::Table;
 
-/// One job of this many is run.
+/// One in this many jobs is run.
 const STRIDE: usize = if cfg!(debug_assertions) { 11 } else { 1 };
 
 #[test]
@@ -41,7 +41,7 @@ fn every_cell_is_right_refused_or_flagged() {
         .into_iter()
         .flat_map(|jobs| jobs.into_iter().step_by(STRIDE))
         .collect();
-    // A panic is a wrong cell; its message is in the table.
+    // A panic counts as a wrong cell; its message is in the table.
     std::panic::set_hook(Box::new(|_| {}));
     let cells = jobs.par_iter().flat_map_iter(Job::cells).collect();
     let _ = std::panic::take_hook();
@@ -50,6 +50,6 @@ fn every_cell_is_right_refused_or_flagged() {
     assert_eq!(
         table.wrong(),
         0,
-        "cells are plausible and wrong: the table above names them"
+        "cells are plausible but wrong: the table above names them"
     );
 }

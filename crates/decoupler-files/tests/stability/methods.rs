@@ -16,7 +16,7 @@ struct Task {
     inputs: Array2<f64>,
     targets: Array2<f64>,
     hidden: usize,
-    /// Factor on the weights of the start.
+    /// Factor applied to the initial weights.
     start: f64,
     has_validation: bool,
 }
@@ -57,7 +57,7 @@ impl Task {
         )
     }
 
-    /// Validation is the last third of the samples, where there is one.
+    /// The validation set, if there is one, is the last third of the samples.
     fn training_samples(&self) -> usize {
         let samples = self.inputs.nrows();
         if self.has_validation && samples > 2 {
@@ -82,7 +82,7 @@ impl Task {
         }
     }
 
-    /// The error that decides which weights are best, worked out here node by node.
+    /// Returns the error that determines the best weights, computed independently node by node.
     fn deciding_mse(&self, weights: &[f64]) -> f64 {
         let Shape {
             inputs,
@@ -109,8 +109,8 @@ impl Task {
     }
 }
 
-/// Trains and judges: the error told is the error found here, the best weights of all epochs are kept, the reason given
-/// holds, and a network that stayed at its start is flagged.
+/// Trains and judges: the reported error is correct, the best weights of all epochs are kept, the reason for stopping
+/// holds, and a network that stayed at its initial weights is flagged.
 fn judge(task: &Task, settings: TrainingSettings) -> Verdict {
     let mut trainer = match Trainer::new(task.start(), task.problem(), settings) {
         Ok(trainer) => trainer,
@@ -122,7 +122,7 @@ fn judge(task: &Task, settings: TrainingSettings) -> Verdict {
     if let Some(record) = history.iter().skip(1).find(|record| {
         !(is_number(record.training_mse) && is_number(record.gradient_norm) && is_number(record.parameter))
     }) {
-        return wrong(format!("epoch {} of the history is not a number", record.epoch));
+        return wrong(format!("epoch {} of the history is NaN", record.epoch));
     }
     let weights = trainer.best().weights();
     if !weights.iter().all(|weight| weight.is_finite()) {
@@ -130,7 +130,8 @@ fn judge(task: &Task, settings: TrainingSettings) -> Verdict {
     }
     let deciding =
         |record: &decoupler_core::training::EpochRecord| record.validation_mse.unwrap_or(record.training_mse);
-    // With nothing held out, the latest weights have the best of what Bayesian regularisation minimises: not the training error.
+    // Without held-out samples, the latest weights minimise the objective of Bayesian regularisation, not the training
+    // error.
     let is_latest_best = matches!(settings.method, Method::BayesianRegularization(_))
         && history.iter().all(|record| record.validation_mse.is_none());
     let lowest = match history.last().filter(|_| is_latest_best) {
@@ -140,7 +141,10 @@ fn judge(task: &Task, settings: TrainingSettings) -> Verdict {
     let (best, start) = (task.deciding_mse(weights), task.deciding_mse(task.start().weights()));
     let defect = TrainingDefect::of(&trainer);
     if best.is_finite() && !(agree(best, trainer.best_mse(), 1e-6) || (best - trainer.best_mse()).abs() < 1e-22) {
-        return wrong(format!("the error is {best:e}, told is {:e}", trainer.best_mse()));
+        return wrong(format!(
+            "the error is {best:e}, the reported error is {:e}",
+            trainer.best_mse()
+        ));
     }
     if !agree(lowest, trainer.best_mse(), 0.0) {
         return wrong("the best weights were not kept");
@@ -154,12 +158,12 @@ fn judge(task: &Task, settings: TrainingSettings) -> Verdict {
         _ => true,
     };
     if !holds {
-        return wrong(format!("it ended for another reason than told: {reason}"));
+        return wrong(format!("the reported reason for stopping does not hold: {reason}"));
     }
     match defect {
         Some(defect) => flagged(&defect),
         None if start > 0.0 && best >= 0.99 * start => wrong(format!(
-            "the network is its random start, and nothing says so: {reason}"
+            "the network has its random initial weights, without a remark: {reason}"
         )),
         None => Verdict::Right,
     }
@@ -307,7 +311,7 @@ pub(crate) fn jobs() -> Vec<Job> {
                 },
             ),
             (
-                "the largest smallest gradient",
+                "the largest minimum gradient",
                 StoppingRules {
                     min_gradient: f64::MAX,
                     ..usual

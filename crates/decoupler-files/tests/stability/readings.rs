@@ -1,4 +1,4 @@
-//! Readings that no sensor gives: every decoder refuses them, or says that they are outside what it knows.
+//! Readings that no sensor gives: every decoder refuses them, or reports that they are outside its training range.
 
 use decoupler_core::{
     decoupling::{Decoder, DecoderKind},
@@ -13,7 +13,7 @@ use crate::{
 
 const ROOM: &str = "reading";
 
-/// The remark that the program makes on a row of readings, if it makes one.
+/// Returns the program's remark on a row of readings, if there is one.
 fn remark(run: &Run, readings_ohm: &[f64]) -> Option<String> {
     let network = run.network();
     let inputs = network.at(0).inputs();
@@ -44,9 +44,9 @@ fn judge(noise: Noise, changed: impl Fn(f64) -> f64, is_all: bool) -> Vec<(Strin
             let mut answer = vec![f64::NAN; decoder.outputs()];
             let verdict = match decoder.decode_row(0, &readings, &mut answer) {
                 Err(error) => refused(&error),
-                // It answers the same whatever it reads.
+                // Its answer does not depend on the readings.
                 Ok(()) if kind == DecoderKind::Mean => Verdict::Right,
-                Ok(()) if !is_resistance => wrong(format!("{kind} answers readings that are no resistances")),
+                Ok(()) if !is_resistance => wrong(format!("{kind} answers readings that are not resistances")),
                 Ok(()) => match remark(&run, &readings) {
                     Some(remark) => flagged(&remark),
                     None => {
@@ -54,7 +54,7 @@ fn judge(noise: Noise, changed: impl Fn(f64) -> f64, is_all: bool) -> Vec<(Strin
                         let is_plausible = z_mm.clone().all(|z| (0.0..=geometry.height_mm).contains(z));
                         let how = if is_plausible { "plausibly" } else { "beyond the sensor" };
                         wrong(format!(
-                            "{kind} answers {how}, and nothing says that no such reading was in its training"
+                            "{kind} answers {how}, without a remark that no such reading was in its training"
                         ))
                     }
                 },
@@ -67,16 +67,16 @@ fn judge(noise: Noise, changed: impl Fn(f64) -> f64, is_all: bool) -> Vec<(Strin
 
 pub(crate) fn jobs() -> Vec<Job> {
     let mut jobs = Vec::new();
-    for (told, noise) in [("no noise", Noise::default()), ("noise 1e-3", Noise::relative(1e-3))] {
+    for (noise_name, noise) in [("no noise", Noise::default()), ("noise 1e-3", Noise::relative(1e-3))] {
         for (which, is_all) in [("one reading", false), ("all readings", true)] {
             for value in [0.0, -0.0, -1.0, -1e300, f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
-                let sentence = format!("{which} of {value}, {told}");
+                let sentence = format!("{which} of {value}, {noise_name}");
                 jobs.push(Job::new(ROOM, "no resistance", sentence, move || {
                     judge(noise, |_| value, is_all)
                 }));
             }
             for factor in [1e-305, 1e-150, 1e-12, 1e-3, 0.1, 10.0, 1e3, 1e12, 1e150, 1e300] {
-                let sentence = format!("{which} times {factor:e}, {told}");
+                let sentence = format!("{which} times {factor:e}, {noise_name}");
                 jobs.push(Job::new(ROOM, "far from the training", sentence, move || {
                     judge(noise, |ohm| factor * ohm, is_all)
                 }));

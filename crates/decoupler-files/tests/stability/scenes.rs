@@ -1,4 +1,4 @@
-//! Samples drawn: deformations within the stroke, readings with the noise that was asked for.
+//! Drawn samples: deformations within the stroke, readings with the requested noise.
 
 use decoupler_core::{
     dataset::{Dataset, Seed},
@@ -56,7 +56,7 @@ fn judge_finite(set: &Dataset) -> Verdict {
     if set.readings().iter().all(|&ohm| ohm > 0.0 && ohm.is_finite()) {
         Verdict::Right
     } else {
-        wrong("a reading is no resistance")
+        wrong("a reading is not a resistance")
     }
 }
 
@@ -71,15 +71,15 @@ fn judge_stroke(set: &Dataset, settings: &SimulatedSettings) -> Verdict {
     }
     values.sort_by(f64::total_cmp);
     values.dedup();
-    // What rounding makes one coordinate cannot be told apart by anyone.
+    // Coordinates that rounding makes equal cannot be distinguished.
     if values.len() == 1 && set.samples() > 10 && stroke > 1e-12 * height {
         return wrong("no node ever moves");
     }
     Verdict::Right
 }
 
-/// The spread of the readings about the truth against the formula of the documentation, where noise is small enough not
-/// to be truncated; positive and not fixed to the truth where it is large.
+/// Checks the spread of the readings about the truth against the documented formula if the noise is small enough not to
+/// be truncated; larger noise must give positive readings that are not a fixed fraction of the truth.
 fn judge_noise(truth: &Dataset, noisy: &Dataset, noise: Noise, model: &SensorModel) -> Verdict {
     let pairs = || {
         truth
@@ -101,7 +101,7 @@ fn judge_noise(truth: &Dataset, noisy: &Dataset, noise: Noise, model: &SensorMod
     if floor > 0 {
         let share = floor as f64 / pairs().count() as f64;
         return wrong(format!(
-            "{:.0} % of the readings are a millionth of the truth, which tells it",
+            "{:.0} % of the readings are a millionth of the truth, which reveals it",
             100.0 * share
         ));
     }
@@ -128,7 +128,8 @@ fn judge_noise(truth: &Dataset, noisy: &Dataset, noise: Noise, model: &SensorMod
     let count = pairs().count() as f64;
     let typical = (expected / count).sqrt();
     let reading = pairs().map(|(truth, _)| truth).sum::<f64>() / count;
-    // Drift is one value a snapshot; below rounding nothing can be said, and above a third of a reading it is truncated.
+    // Drift is one value per snapshot; below rounding it cannot be checked, and above a third of a reading it is
+    // truncated.
     let drawn = if noise.drift > 0.0 {
         truth.snapshots().len() as f64
     } else {
@@ -142,11 +143,11 @@ fn judge_noise(truth: &Dataset, noisy: &Dataset, noise: Noise, model: &SensorMod
     if (ratio - 1.0).abs() < by_chance + 0.01 {
         Verdict::Right
     } else {
-        wrong(format!("the noise is {ratio:.3} times what was asked for"))
+        wrong(format!("the noise is {ratio:.3} times the requested noise"))
     }
 }
 
-/// The same seed gives the same bits, another one others.
+/// The same seed gives the same bits, a different seed different ones.
 fn judge_seeds(settings: &SimulatedSettings) -> Verdict {
     let draw = |seed: u64| {
         let mut settings = *settings;
@@ -156,7 +157,7 @@ fn judge_seeds(settings: &SimulatedSettings) -> Verdict {
     match (draw(7), draw(7), draw(8)) {
         (Ok(one), Ok(same), Ok(other)) => {
             if one.readings() != same.readings() {
-                wrong("the same seed gives other readings")
+                wrong("the same seed gives different readings")
             } else if one.targets() == other.targets() && one.samples() > 10 {
                 wrong("another seed gives the same deformations")
             } else {

@@ -8,10 +8,10 @@ use decoupler_core::{
 use crate::judge::{Job, Verdict, refused, wrong};
 
 const ROOM: &str = "sensor";
-/// Largest relative error of a resistance: some hundred roundings.
+/// Maximum relative error of a resistance: about a hundred roundings.
 const TOLERANCE: f64 = 1e-13;
 
-/// Eq. (2) from differences of coordinates that never meet the origin.
+/// Eq. (2), computed from differences of coordinates that do not involve the origin.
 fn resistances_ohm(model: &SensorModel, row: usize, pressed_mm: &[f64]) -> Vec<f64> {
     let (scale, geometry) = (model.scale, model.geometry);
     let apart_x = geometry.row_x0_mm - geometry.column_node_x0_mm;
@@ -42,22 +42,22 @@ fn judge(model: &SensorModel, compression: f64) -> Verdict {
     let displacements_mm: Vec<DVec3> = pressed_mm.iter().map(|&z| DVec3::new(0.0, 0.0, z)).collect();
     let mut worst = 0.0_f64;
     for row in [0, model.scale.rows() / 2, model.scale.rows() - 1] {
-        let told = match model.row_resistances(row, &displacements_mm) {
-            Ok(told) => told,
+        let modelled = match model.row_resistances(row, &displacements_mm) {
+            Ok(modelled) => modelled,
             Err(error) => return refused(&error),
         };
-        for (told, expected) in told.iter().zip(resistances_ohm(model, row, &pressed_mm)) {
-            worst = worst.max((told / expected - 1.0).abs());
+        for (modelled, expected) in modelled.iter().zip(resistances_ohm(model, row, &pressed_mm)) {
+            worst = worst.max((modelled / expected - 1.0).abs());
         }
     }
     if worst <= TOLERANCE {
         Verdict::Right
     } else {
-        wrong(format!("a resistance is off by {worst:.1e} of itself"))
+        wrong(format!("a resistance has a relative error of {worst:.1e}"))
     }
 }
 
-/// Every length of the geometry times `factor`.
+/// Returns the geometry with every length multiplied by `factor`.
 pub(crate) fn in_other_units(geometry: Geometry, factor: f64) -> Geometry {
     Geometry {
         height_mm: factor * geometry.height_mm,

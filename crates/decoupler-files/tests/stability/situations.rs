@@ -12,7 +12,7 @@ use crate::sensors::in_other_units;
 
 pub(crate) type Situation = (&'static str, String, SimulatedSettings);
 
-/// A small array with a few nodes more than the smallest, all of whose deformations can be seen.
+/// A small array, slightly larger than the smallest, whose readings determine all deformations.
 pub(crate) fn ordinary() -> SimulatedSettings {
     SimulatedSettings {
         source: Simulation {
@@ -47,7 +47,7 @@ fn changed(change: impl FnOnce(&mut SimulatedSettings)) -> SimulatedSettings {
     settings
 }
 
-/// The resistance of the ordinary array at rest, in ohm, about which noise in ohm is chosen.
+/// Resistance of the ordinary array at rest, in ohm, which sets the scale of noise in ohm.
 pub(crate) fn resistance_ohm(model: &SensorModel) -> f64 {
     let rest = vec![decoupler_core::glam::DVec3::ZERO; model.scale.nodes_per_row()];
     model.row_resistances(0, &rest).unwrap()[0]
@@ -278,7 +278,7 @@ fn inputs() -> Vec<Situation> {
     found
 }
 
-/// Every situation.
+/// Returns every situation.
 pub(crate) fn all() -> Vec<Situation> {
     let noisy = |rows: Rows| {
         noises().into_iter().map(move |(extreme, sentence, noise)| {

@@ -45,7 +45,7 @@ fn judge(x_mm: &[f64], y_mm: &[f64], value: impl Fn(f64, f64) -> f64, share: f64
     }
 }
 
-/// Every node's own value is met at the grid points nearest to it, as far as the slope between neighbours allows.
+/// The grid points nearest to each node have its value, to within the slope between neighbours.
 fn judge_press(x_mm: &[f64], y_mm: &[f64]) -> Verdict {
     let map = match SurfaceMap::new(x_mm, y_mm) {
         Ok(map) => map,
@@ -125,7 +125,7 @@ pub(crate) fn jobs() -> Vec<Job> {
                 }));
             }
             let plane = (x_mm.clone(), y_mm.clone());
-            // Across a single row or column nothing says how a plane slopes.
+            // Across a single row or column, the slope of a plane is undetermined.
             let slope_x = if rows > 1 { 0.3 / unit } else { 0.0 };
             let slope_y = if nodes > 1 { -0.1 / unit } else { 0.0 };
             let value = move |x: f64, y: f64| 5.0 + slope_x * (x - origin) + slope_y * (y + origin);
@@ -154,8 +154,8 @@ pub(crate) fn jobs() -> Vec<Job> {
         ("two rows at one place", vec![1.0, 1.0], vec![1.0, 2.0]),
         ("rows 1e-300 mm apart", vec![0.0, 1e-300], vec![1.0, 2.0]),
         ("rows 1e300 mm apart", vec![0.0, 1e300], vec![1.0, 2.0]),
-        ("a row nowhere", vec![f64::NAN, 1.0], vec![1.0, 2.0]),
-        ("rows in no order", vec![3.0, 1.0, 2.0], vec![1.0, 2.0]),
+        ("a row at NaN", vec![f64::NAN, 1.0], vec![1.0, 2.0]),
+        ("unsorted rows", vec![3.0, 1.0, 2.0], vec![1.0, 2.0]),
     ];
     for (sentence, x_mm, y_mm) in odd {
         jobs.push(Job::one(ROOM, "odd places", sentence, move || {

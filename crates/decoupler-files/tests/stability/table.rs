@@ -28,7 +28,7 @@ impl Table {
         counts
     }
 
-    /// Reasons with their digits left out: how often each occurred, and the first cell of each.
+    /// Reasons without their digits: the count and the first cell of each.
     fn reasons(&self) -> BTreeMap<(usize, &str, String), (usize, String)> {
         let mut reasons = BTreeMap::new();
         for cell in &self.cells {
@@ -53,7 +53,7 @@ fn column(verdict: &Verdict) -> usize {
     }
 }
 
-/// The text with `#` in place of every number.
+/// Returns the text with `#` in place of every number.
 fn without_numbers(text: &str) -> String {
     let mut plain = String::new();
     let mut in_number = false;
@@ -93,7 +93,7 @@ impl fmt::Display for Table {
         for (kind, title) in [(1, "Refused"), (2, "Flagged"), (3, "WRONG")] {
             writeln!(f, "\n{title}, by reason (first cell of each)")?;
             for ((_, room, reason), (count, first)) in self.reasons().into_iter().filter(|((of, ..), _)| *of == kind) {
-                // The wrong ones are named with their numbers.
+                // Wrong cells are listed with their numbers.
                 let text = if kind == 3 { first } else { reason };
                 writeln!(f, "{count:>6}  {room}: {}", text.chars().take(260).collect::<String>())?;
             }
