@@ -1,4 +1,5 @@
-/* Measures the time per frame of 10 row-wires of a decoder in C. BUNDLE is the prefix of its names, READING the type of a reading. */
+/* Measures the time per frame of 10 row-wires of a decoder in C. BUNDLE is the prefix of its names, READING the type
+ * of a reading. */
 #define JOINED(a, b) a##b
 #define NAME(a, b) JOINED(a, b)
 #define _POSIX_C_SOURCE 199309L

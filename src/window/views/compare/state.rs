@@ -275,7 +275,7 @@ pub fn run_list_ui(ui: &mut Ui, shared: &Shared, removing: &mut Option<u64>, eff
         for (position, run) in runs.workspace.runs.iter().enumerate().rev() {
             ui.add_space(space(2));
             ui.separator();
-            ui.push_id(run.id, |ui| run_ui(ui, shared, (position, run), removing, effects));
+            ui.push_id(run.id, |ui| run_ui(ui, shared, position, run, removing, effects));
         }
         ui.add_space(space(2));
         match &runs.path {
@@ -288,7 +288,8 @@ pub fn run_list_ui(ui: &mut Ui, shared: &Shared, removing: &mut Option<u64>, eff
 fn run_ui(
     ui: &mut Ui,
     shared: &Shared,
-    (position, run): (usize, &KeptRun),
+    position: usize,
+    run: &KeptRun,
     removing: &mut Option<u64>,
     effects: &mut Vec<Effect>,
 ) {

@@ -137,7 +137,7 @@ fn fields_ui(ui: &mut Ui, topic: Topic, form: &mut Form, shared: &Shared) {
     let hint = "Largest number of epochs per training. The paper does not state its own.";
     let epochs = &mut template.base.training.stopping.epochs;
     count_ui(ui, "Epochs", hint, epochs, 1..=StoppingRules::MAX_EPOCHS);
-    let hint = "Number of trainings from different random weights; the one with the lowest validation error counts.";
+    let hint = "Number of trainings from different random weights; the one with the lowest validation error is kept.";
     count_ui(ui, "Starts", hint, &mut template.base.starts, 1..=MAX_STARTS);
 }
 
@@ -212,8 +212,8 @@ fn base_ui(ui: &mut Ui, form: &mut Form, shared: &Shared) {
     let button = ui.add_enabled(is_other, Button::new("Use the settings of the Train view"));
     let button = button
         .on_hover_text(
-            "Copies the source of the samples, the network and the training settings from the Train view. The axes follow \
-             from the source.",
+            "Copies the source of the samples, the network and the training settings from the Train view. The source \
+             determines the available axes.",
         )
         .on_disabled_hover_text(match &setup {
             Ok(_) => "These are the settings of the Train view",

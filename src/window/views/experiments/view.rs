@@ -113,12 +113,12 @@ impl View for ExperimentsView {
         let height = results_card_height(ui, outcome, whole.width()).min((0.53 * whole.height()).round());
         let (upper, lower) = whole.split_top_bottom_at_y(whole.top() + height);
         card_ui(ui, upper, |ui| {
-            results_card_ui(ui, (self.topic, outcome), &mut look, shared, effects);
+            results_card_ui(ui, self.topic, outcome, &mut look, shared, effects);
         });
         let lower = lower.with_min_y(lower.min.y + gap);
         let (left, right) = lower.split_left_right_at_x(lower.left() + (0.6 * lower.width()).round());
         card_ui(ui, left, |ui| {
-            picture_ui(ui, (self.topic, outcome), &mut look, shared, effects);
+            picture_ui(ui, self.topic, outcome, &mut look, shared, effects);
         });
         let mut is_wanted = false;
         card_ui(ui, right.with_min_x(right.min.x + gap), |ui| {
@@ -158,7 +158,8 @@ fn hint(experiments: &ExperimentsView) -> Option<&'static str> {
 
 fn picture_ui(
     ui: &mut Ui,
-    (topic, outcome): (Topic, &Outcome),
+    topic: Topic,
+    outcome: &Outcome,
     look: &mut ExperimentLook,
     shared: &Shared,
     effects: &mut Vec<Effect>,
@@ -166,7 +167,7 @@ fn picture_ui(
     match &outcome.figure {
         Figure::HeatMap(map) => {
             let map = (**map).clone().coloured(shared.look.colours);
-            sweep_ui(ui, (outcome, &map), look, shared, effects);
+            sweep_ui(ui, outcome, &map, look, shared, effects);
         }
         Figure::Plots(plots) => {
             legend_ui(ui, &plots.keys);
@@ -180,7 +181,8 @@ fn picture_ui(
 /// The map of a sweep. A click marks a cell, a double click opens it in the Train view.
 pub fn sweep_ui(
     ui: &mut Ui,
-    (outcome, map): (&Outcome, &HeatMap),
+    outcome: &Outcome,
+    map: &HeatMap,
     look: &mut ExperimentLook,
     shared: &Shared,
     effects: &mut Vec<Effect>,
@@ -250,7 +252,8 @@ const MARGINS: f32 = 24.0;
 /// Shows the title, the conditions and the table.
 pub fn results_card_ui(
     ui: &mut Ui,
-    (topic, outcome): (Topic, &Outcome),
+    topic: Topic,
+    outcome: &Outcome,
     look: &mut ExperimentLook,
     shared: &Shared,
     effects: &mut Vec<Effect>,

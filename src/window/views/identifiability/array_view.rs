@@ -56,7 +56,7 @@ pub(super) fn identifiability_ui(
         let left = upper.left() + (width + gap) * card as f32;
         let card = Rect::from_min_size([left, upper.top()].into(), Vec2::new(width, upper.height()));
         card_ui(ui, card, |ui| {
-            let slot = surface_ui(ui, (surface, label), shared.look, analysis, &mut pointed, effects);
+            let slot = surface_ui(ui, surface, label, shared.look, analysis, &mut pointed, effects);
             colour_scale_ui(ui, slot, &surface.scale(), &figure.note(), shared.look, effects);
         });
     }
@@ -127,7 +127,8 @@ pub(super) fn identifiability_figure(
 /// its colour scale.
 fn surface_ui(
     ui: &mut Ui,
-    (surface, label): (&Surface, &str),
+    surface: &Surface,
+    label: &str,
     look: Look,
     analysis: &Analysis,
     (axis, node): &mut (usize, Option<usize>),

@@ -156,7 +156,8 @@ impl SourceForm {
     pub fn form_ui(
         &mut self,
         ui: &mut Ui,
-        (settings, has_sensor): (Option<&SimulatedSettings>, bool),
+        settings: Option<&SimulatedSettings>,
+        has_sensor: bool,
         is_running: bool,
         effects: &mut Vec<Effect>,
     ) {
@@ -278,7 +279,7 @@ pub fn form_ui(ui: &mut Ui, view: &mut LiveView, shared: &Shared, effects: &mut 
         let motion = view.source.motion;
         let has_sensor = view.has_sensor(shared);
         view.source
-            .form_ui(ui, (settings.as_ref(), has_sensor), view.running.is_some(), effects);
+            .form_ui(ui, settings.as_ref(), has_sensor, view.running.is_some(), effects);
         if view.source.motion != motion {
             view.command(Command::Move(view.source.motion));
         }

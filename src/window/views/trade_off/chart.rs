@@ -24,7 +24,8 @@ const REACH: f32 = 7.0;
 /// can be loaded; a right-click opens the formats in which its decoder can be exported from `source`.
 pub fn charts_ui(
     ui: &mut Ui,
-    (level, figure): (&TradeOffLevel, &PlotFigure),
+    level: &TradeOffLevel,
+    figure: &PlotFigure,
     marked: &mut Option<usize>,
     can_load: bool,
     source: impl Fn(usize) -> Option<DecoderSource>,
@@ -41,7 +42,7 @@ pub fn charts_ui(
                 ui.painter().circle_stroke(at, 8.0, ring);
             }
             let id = ui.scope_id().with((cost, number));
-            let response = point_ui(ui, (point, is_marked, can_load), cost, at, id);
+            let response = point_ui(ui, point, is_marked, can_load, cost, at, id);
             if response.clicked() {
                 *marked = Some(number);
                 wish = can_load.then_some(PointWish::Load(number));
@@ -61,7 +62,9 @@ pub fn charts_ui(
 /// Shows the name and the figures of a point under the pointer.
 fn point_ui(
     ui: &mut Ui,
-    (point, is_marked, can_load): (&TradeOffPoint, bool, bool),
+    point: &TradeOffPoint,
+    is_marked: bool,
+    can_load: bool,
     cost: TradeOffCost,
     at: Pos2,
     id: Id,

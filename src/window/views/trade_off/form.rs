@@ -344,7 +344,7 @@ pub fn choices_ui(
     answer_ui(ui, &mut look.marked, level, "Most accurate", most_accurate, none);
     section_heading_ui(ui, "Marked point");
     match look.marked.and_then(|marked| Some((marked, level.points.get(marked)?))) {
-        Some((marked, point)) => marked_ui(ui, (marked, point), can_load, source(marked).as_ref()),
+        Some((marked, point)) => marked_ui(ui, marked, point, can_load, source(marked).as_ref()),
         None => {
             dim_ui(
                 ui,
@@ -391,7 +391,8 @@ fn answer_ui(
 
 fn marked_ui(
     ui: &mut Ui,
-    (number, point): (usize, &TradeOffPoint),
+    number: usize,
+    point: &TradeOffPoint,
     can_load: bool,
     source: Option<&DecoderSource>,
 ) -> Option<PointWish> {

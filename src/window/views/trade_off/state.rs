@@ -42,7 +42,7 @@ pub struct TradeOffView {
     pub(super) job: Job<TradeOffEvent>,
 }
 
-/// What the user wants to do with a point.
+/// Action on a point that the user has chosen.
 #[derive(Debug)]
 pub(super) enum PointWish {
     /// Load its configuration into the Train view.

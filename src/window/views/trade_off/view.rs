@@ -155,7 +155,7 @@ fn trade_ui(ui: &mut Ui, trade: &mut TradeOffView, shared: &Shared, effects: &mu
         }
         let figure = trade_off_figure(level, &look.limits);
         legend_ui(ui, &figure.keys);
-        asked = charts_ui(ui, (level, &figure), &mut look.marked, can_load, source);
+        asked = charts_ui(ui, level, &figure, &mut look.marked, can_load, source);
     });
     let choices_width = (0.4 * lower.width()).clamp(space(76), space(105));
     let (left, right) = lower.split_left_right_at_x(lower.right() - choices_width);

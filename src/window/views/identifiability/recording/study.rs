@@ -217,7 +217,7 @@ pub fn work(setup: Setup, task: &Task, choice: FoldsChoice, report: &Report<Stud
     }
     let recording = recording.map_err(|error| error.to_string())?;
     match task {
-        Task::Findings(model) => find(setup, &plan, recording, (*model, choice.folds), report),
+        Task::Findings(model) => find(setup, &plan, recording, *model, choice.folds, report),
         Task::CrossValidation => validate(setup, &plan, &recording, choice, report),
     }
 }
@@ -226,7 +226,8 @@ fn find(
     setup: Setup,
     plan: &Plan,
     recording: Recording,
-    (model, folds): (Option<FittedModel>, usize),
+    model: Option<FittedModel>,
+    folds: usize,
     report: &Report<StudyEvent>,
 ) -> Result<(), String> {
     let begun = Instant::now();

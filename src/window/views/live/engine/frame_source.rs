@@ -59,7 +59,8 @@ impl LivePlan {
 impl FrameSource {
     /// Opens the source of `plan`; `None` if it is no longer wanted.
     pub(super) fn open(
-        (plan, settings): (&LivePlan, &SimulatedSettings),
+        plan: &LivePlan,
+        settings: &SimulatedSettings,
         read: &[usize],
         tally: &mut Tally,
         is_wanted: &dyn Fn() -> bool,

@@ -45,7 +45,7 @@ impl Session {
     ) -> Result<Option<Self>, String> {
         let decoding = Decoding::new(plan.network.clone(), &plan.scene(settings), plan.zero.clone())?;
         let mut tally = Tally::new(Instant::now());
-        let source = FrameSource::open((&plan, settings), &decoding.rows, &mut tally, is_wanted)?;
+        let source = FrameSource::open(&plan, settings, &decoding.rows, &mut tally, is_wanted)?;
         Ok(source.map(|source| Self {
             plan,
             source,
