@@ -90,7 +90,7 @@ fn the_report_names_files_deviations_and_bounds_with_their_units() {
         (
             "c99",
             "fixed16",
-            vec!["out_c99_fixed16_decode.c", "bit-exact model", "Proven bound", " mm"],
+            vec!["out_c99_fixed16_decode.c", "bit-exact fixed-point model", "Proven bound", " mm"],
         ),
         (
             "matlab",
