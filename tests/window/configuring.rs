@@ -1,4 +1,4 @@
-//! Choosing what to train.
+//! Configuring the next training.
 
 use std::time::Instant;
 

@@ -337,7 +337,11 @@ fn export_names_its_network_and_offers_the_displayed_epoch() {
     driver.open_menu();
     let best_epoch = trained(small()).leader().best_epoch();
     let heading = format!("BEST NETWORK, EPOCH {best_epoch}");
-    assert!(driver.has(&heading) && !driver.says("ON SHOW"), "{:#?}", driver.texts());
+    assert!(
+        driver.has(&heading) && !driver.says("DISPLAYED NETWORK"),
+        "{:#?}",
+        driver.texts()
+    );
     driver.press(Key::Escape);
 
     driver.get("Epoch of the displayed network").focus();

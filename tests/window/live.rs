@@ -353,7 +353,7 @@ fn a_socket_is_decoded_and_its_bad_lines_and_end_are_reported() {
     writeln!(sender, "{line}").unwrap();
     driver.wait("both frames", |driver| driver.has("Decoded: 2"));
     assert_eq!(displayed(&driver).unwrap().1, by_library(&file, &frame_ohm));
-    assert!(!driver.has("Live actual surface"), "no one knows it");
+    assert!(!driver.has("Live actual surface"), "the actual surface is unknown");
     driver.wait("silence", |driver| driver.has("No frame for two seconds"));
     assert!(driver.becomes_idle(), "nothing comes");
     drop(sender);

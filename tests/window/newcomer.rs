@@ -16,14 +16,14 @@ fn open_first() -> Driver {
     Driver::open_first(vec2(1440.0, 900.0))
 }
 
-/// A file that does not exist yet, in a folder that vanishes.
+/// Returns a file that does not exist yet, in a temporary folder.
 fn file() -> (tempfile::TempDir, PathBuf) {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("window.json");
     (folder, path)
 }
 
-/// The figures of the baselines that the library gives for `settings` are those of the displayed table.
+/// Asserts that the displayed table contains the baselines computed by the library for `settings`.
 #[track_caller]
 fn shows_the_baselines_of(driver: &Driver, settings: SimulatedSettings) {
     let run = Run::prepare(settings).unwrap();

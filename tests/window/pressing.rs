@@ -77,7 +77,7 @@ fn expected(run: &Run, touch: &Touch) -> (Array2<f64>, Errors, String) {
 
 /// Asserts that the report and the readings in the frame just drawn agree with the library about the touch.
 #[track_caller]
-fn says_what_is_pressed(driver: &Driver, run: &Run) {
+fn assert_shows_touch(driver: &Driver, run: &Run) {
     let (readings, errors, heights) = expected(run, &touch(driver));
     assert_eq!(driver.get("Decoupled surface").value(), Some(heights));
     let mean = format!("Network, mean mm: {}", format_number(errors.z_mm));
@@ -115,7 +115,7 @@ fn the_whole_window_follows_the_finger_in_the_same_frame() {
         print.place_mm
     );
     assert_eq!(print.depth_mm, 0.8);
-    says_what_is_pressed(&driver, &run);
+    assert_shows_touch(&driver, &run);
     assert_ne!(driver.get(READINGS).value(), before);
     let heights = driver.get(ACTUAL).value().unwrap();
     assert!(
@@ -128,7 +128,7 @@ fn the_whole_window_follows_the_finger_in_the_same_frame() {
         let before = touch(&driver);
         move_to(&mut driver, at + away);
         assert_ne!(touch(&driver), before);
-        says_what_is_pressed(&driver, &run);
+        assert_shows_touch(&driver, &run);
     }
     driver.harness().drop_at(at);
     driver.harness().step();
@@ -145,7 +145,7 @@ fn the_whole_window_follows_the_finger_in_the_same_frame() {
     driver.harness().run_steps(3);
     let lifted_mm = touch(&driver).print.unwrap().depth_mm;
     assert!(lifted_mm < depth_mm - 0.05, "{lifted_mm} of {depth_mm}");
-    says_what_is_pressed(&driver, &run);
+    assert_shows_touch(&driver, &run);
     driver.enter("Depth", "99");
     assert!(
         driver.has("99 mm is too large: at most 1 mm."),
@@ -158,7 +158,7 @@ fn the_whole_window_follows_the_finger_in_the_same_frame() {
     );
     driver.enter("Depth", "1000 um");
     assert_eq!(touch(&driver).print.unwrap().depth_mm, 1.0);
-    says_what_is_pressed(&driver, &run);
+    assert_shows_touch(&driver, &run);
 
     driver.press(Key::Escape);
     assert!(!driver.views().train.press.is_pressing());
@@ -220,7 +220,7 @@ fn a_newcomer_presses_before_any_training_and_a_small_network_answers() {
     driver.train();
     driver.wait_for_last_epoch();
     driver.settle();
-    says_what_is_pressed(&driver, &trained(small()));
+    assert_shows_touch(&driver, &trained(small()));
     assert!(!driver.says("A small network answers"));
     driver.click("Back to the test set");
     assert!(!driver.says("Network, mean mm: "));
@@ -261,7 +261,7 @@ fn a_single_node_is_dragged_up_and_down_within_the_stroke() {
         };
         assert_eq!(others(&now), others(&before));
         assert_eq!(others(&now).len(), 59);
-        says_what_is_pressed(&driver, &run);
+        assert_shows_touch(&driver, &run);
         before = now;
     }
     driver.harness().drop_at(at);

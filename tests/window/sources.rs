@@ -1,4 +1,4 @@
-//! The same small training on a simulated array and on a recording, for tests of what the Train view does for both.
+//! The same small training on a simulated array and on a recording, for tests of what both have in common in the Train view.
 
 use std::{fmt::Write as _, fs, path::Path, sync::Arc};
 

@@ -212,7 +212,7 @@ fn a_measurement_shows_its_points_as_they_arrive_and_can_be_cancelled() {
     driver.click("■ Cancel");
     assert!(
         driver.views().trade_off.running.is_none(),
-        "no one waits for what is in hand"
+        "cancelling does not wait for the current point"
     );
     let outcome = driver.views().trade_off.outcome.as_ref().unwrap();
     let (done, all) = outcome.points();

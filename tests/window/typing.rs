@@ -57,7 +57,7 @@ fn a_notice_above_a_field_does_not_interrupt_typing() {
     driver.enter("Array scale", "20×20_5×60");
     driver.click_button("x, y, z");
     driver.type_into("Training samples", "300");
-    // The notes on this scene come above the field while it is being typed in.
+    // The notes on this scene appear above the field during typing.
     driver.wait("the scene's outlook", |driver| {
         let (preview, draft) = (driver.state().preview.as_ref(), &driver.state().draft.source);
         preview.is_some_and(|preview| {

@@ -167,8 +167,8 @@ impl DecouplerWindow {
         self.saving = Some(Saving::new(task, path));
     }
 
-    /// Accepts the path typed in the form, after a check whether a file exists there. A file to be read and a folder are
-    /// not checked.
+    /// Accepts the path typed in the form, after checking for a file there. Files to be read and folders are not
+    /// checked.
     pub(super) fn take_typed(&mut self, path: PathBuf) {
         let Some(task) = self.saving.as_ref().map(|saving| saving.task.clone()) else {
             return;
@@ -181,20 +181,20 @@ impl DecouplerWindow {
         let found = self.files.paths().any(|other| other == path).then_some(Found::File);
         let used = self.files_in_use(&task);
         if let Some(saving) = &mut self.saving {
-            saving.wait_for_look();
+            saving.wait_for_check();
             match found {
                 Some(found) => {
                     saving.take(&path, found);
                 }
-                None => self.looks.start(path, used),
+                None => self.path_checks.start(path, used),
             }
         }
         self.ctx.request_repaint();
     }
 
     /// Takes the results of checking typed paths.
-    pub(super) fn take_looks(&mut self) {
-        while let Some((path, found)) = self.looks.next_found() {
+    pub(super) fn take_path_checks(&mut self) {
+        while let Some((path, found)) = self.path_checks.next_checked() {
             if self.saving.as_mut().is_some_and(|saving| saving.take(&path, found)) {
                 self.take_path(path);
             }
@@ -275,7 +275,7 @@ impl DecouplerWindow {
         if run.is_some_and(|run| is_of_test_set(run, &draft)) {
             self.shared.preview = None;
         } else if !have_same_sets(&before, &draft) {
-            self.ask_for_what_is_missing();
+            self.request_preview();
         }
     }
 
@@ -285,7 +285,7 @@ impl DecouplerWindow {
         self.notices.settle(Matter::Settings);
         if source == SourceKind::Array {
             self.configure(self.shared.draft);
-            self.ask_for_what_is_missing();
+            self.request_preview();
         }
     }
 
@@ -310,7 +310,7 @@ impl DecouplerWindow {
     }
 
     /// Requests the test set and baselines shown before a training, unless they are known.
-    pub(super) fn ask_for_what_is_missing(&mut self) {
+    pub(super) fn request_preview(&mut self) {
         let shared = &self.shared;
         let draft = shared.draft;
         match (&shared.preview, &shared.run) {

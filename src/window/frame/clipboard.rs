@@ -29,7 +29,7 @@ pub(super) enum Content {
 
 type Put = dyn Fn(Content) -> Result<(), String> + Send + Sync;
 
-/// Place to which things are copied.
+/// Destination of copies.
 #[derive(Clone)]
 pub(super) enum Clipboard {
     /// The system's clipboard, which reports whether copying succeeded.

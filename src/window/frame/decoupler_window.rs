@@ -6,7 +6,7 @@ use super::{
     actions::{Overlay, Undoing},
     clipboard::{Clipboard, Copying, copy_menu_ui},
     closing::Closing,
-    files::{Dialogs, Files, PathLooks},
+    files::{Dialogs, Files, PathChecks},
     notices::{self, Notices, notice_ui},
     remembered::{Memory, Remembered, WindowFile},
     save_form::{self, Saving, save_form_ui},
@@ -35,7 +35,7 @@ pub struct DecouplerWindow {
     pub(super) saving: Option<Saving>,
     /// The path last typed, offered again for the same file.
     pub(super) typed: Option<Saving>,
-    pub(super) looks: PathLooks,
+    pub(super) path_checks: PathChecks,
     /// The checkpoint that the training of the Train view was opened from.
     pub(super) opened: Option<PathBuf>,
     pub(super) worker: Worker,
@@ -86,7 +86,7 @@ impl DecouplerWindow {
             notices: Notices::default(),
             saving: None,
             typed: None,
-            looks: PathLooks::new(Arc::clone(&wake)),
+            path_checks: PathChecks::new(Arc::clone(&wake)),
             opened: None,
             worker: Worker::start(Arc::clone(&wake)),
             previews: Job::new("preview", Arc::clone(&wake)),
@@ -125,7 +125,7 @@ impl DecouplerWindow {
         if let Some(place) = window.place_of(window.remembered.view.as_deref()) {
             window.show(place);
         }
-        window.ask_for_what_is_missing();
+        window.request_preview();
         window
     }
 

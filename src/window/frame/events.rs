@@ -33,7 +33,7 @@ impl DecouplerWindow {
                 Answer::Cancelled => {}
             }
         }
-        self.take_looks();
+        self.take_path_checks();
         let mut effects = Vec::new();
         let mut working = Vec::new();
         for view in self.views.all() {
@@ -49,7 +49,7 @@ impl DecouplerWindow {
     fn refuse(&mut self, matter: Matter, reason: String) {
         self.shared.phase = self.shared.phase_at_rest();
         self.notices.fail(matter, reason);
-        self.ask_for_what_is_missing();
+        self.request_preview();
     }
 
     fn report_written(&mut self, written: Result<String, String>) {
@@ -81,7 +81,7 @@ impl DecouplerWindow {
                     test,
                     baselines: None,
                 });
-                self.ask_for_what_is_missing();
+                self.request_preview();
             }
             PreviewEvent::Drawn(_, Err(error)) => self.notices.fail(Matter::Preview, error),
             PreviewEvent::Compared(settings, baselines) => {

@@ -271,12 +271,12 @@ pub(super) enum Found {
 }
 
 /// Paths that are being checked.
-pub(super) struct PathLooks {
+pub(super) struct PathChecks {
     wake: Wake,
     under_way: Vec<(PathBuf, Job<Found>)>,
 }
 
-impl PathLooks {
+impl PathChecks {
     /// None yet. `wake` is called when a path has been checked.
     pub(super) fn new(wake: Wake) -> Self {
         Self {
@@ -291,14 +291,14 @@ impl PathLooks {
         let mut job = Job::prompt("path", Arc::clone(&self.wake));
         let checked = path.clone();
         job.start(
-            move |_| look(&checked, &used),
+            move |_| check_path(&checked, &used),
             |found| found.unwrap_or_else(|error| Found::InUse(error.to_string())),
         );
         self.under_way.push((path, job));
     }
 
     /// Returns the next path that has been checked, with the result.
-    pub(super) fn next_found(&mut self) -> Option<(PathBuf, Found)> {
+    pub(super) fn next_checked(&mut self) -> Option<(PathBuf, Found)> {
         let mut jobs = self.under_way.iter().enumerate();
         let (number, found) = jobs.find_map(|(number, (_, job))| Some((number, job.next_event()?)))?;
         let (path, _) = self.under_way.remove(number);
@@ -306,7 +306,7 @@ impl PathLooks {
     }
 }
 
-fn look(path: &Path, used: &[FileInUse]) -> Found {
+fn check_path(path: &Path, used: &[FileInUse]) -> Found {
     match refuse_in_use(path, used) {
         Err(reason) => Found::InUse(reason),
         // A folder is not a file that could be lost, and a pipe or a device is meant to be written to.
@@ -437,7 +437,7 @@ mod tests {
     }
 
     #[test]
-    fn what_a_drop_does_depends_on_the_file_and_on_what_is_open() {
+    fn the_effect_of_a_drop_depends_on_the_file_and_on_the_open_files() {
         for (name, is_busy, has_recording, beginning) in [
             ("press.csv", false, false, "Drop to open as a recording"),
             ("press.csv", false, true, "Drop to add"),

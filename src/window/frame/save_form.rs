@@ -20,18 +20,18 @@ pub struct Saving {
     pub task: FileTask,
     /// The path typed so far.
     pub path: String,
-    stage: PathEntry,
+    stage: Stage,
 }
 
 /// State of the path entry.
 #[derive(Clone, Debug, PartialEq, Eq)]
-enum PathEntry {
+enum Stage {
     /// The form has just opened.
     Opening,
     /// The path is being typed.
     Typing,
     /// The path is being checked.
-    Looking,
+    Checking,
     /// Another file exists there, and the user is asked whether to replace it.
     Asking,
     /// Nothing may be saved there, with the reason.
@@ -54,7 +54,7 @@ impl Saving {
         Self {
             task,
             path,
-            stage: PathEntry::Opening,
+            stage: Stage::Opening,
         }
     }
 
@@ -64,20 +64,20 @@ impl Saving {
     }
 
     /// Waits for the check of the path.
-    pub(super) fn wait_for_look(&mut self) {
-        self.stage = PathEntry::Looking;
+    pub(super) fn wait_for_check(&mut self) {
+        self.stage = Stage::Checking;
     }
 
     /// Takes the result of checking a path; returns true if the file can be written there without a question.
     pub(super) fn take(&mut self, path: &Path, found: Found) -> bool {
         // Another path may have been typed since.
-        if self.stage != PathEntry::Looking || self.path() != path {
+        if self.stage != Stage::Checking || self.path() != path {
             return false;
         }
         match found {
             Found::Nothing => return true,
-            Found::File => self.stage = PathEntry::Asking,
-            Found::InUse(reason) => self.stage = PathEntry::Refused(reason),
+            Found::File => self.stage = Stage::Asking,
+            Found::InUse(reason) => self.stage = Stage::Refused(reason),
         }
         false
     }
@@ -98,7 +98,7 @@ pub fn save_form_ui(ui: &mut Ui, saving: &mut Saving) -> Option<Reply> {
         let has_entered = path_ui(ui, saving);
         ui.add_space(space(3));
         reply = match &saving.stage {
-            PathEntry::Asking => question_ui(ui, saving),
+            Stage::Asking => question_ui(ui, saving),
             _ => buttons_ui(ui, saving, has_entered),
         };
     });
@@ -119,18 +119,18 @@ fn path_ui(ui: &mut Ui, saving: &mut Saving) -> bool {
     if ui.memory(|memory| memory.focused().is_none()) {
         edit.request_focus();
     }
-    if saving.stage == PathEntry::Opening {
+    if saving.stage == Stage::Opening {
         select_all(ui.ctx(), id, &saving.path);
-        saving.stage = PathEntry::Typing;
+        saving.stage = Stage::Typing;
     }
     if edit.changed() {
-        saving.stage = PathEntry::Typing;
+        saving.stage = Stage::Typing;
     }
     match &saving.stage {
-        PathEntry::Refused(reason) => {
+        Stage::Refused(reason) => {
             note_ui(ui, &format!("{reason}."));
         }
-        PathEntry::Asking => {
+        Stage::Asking => {
             let name = saving.path();
             let name = name.file_name().unwrap_or(name.as_os_str()).to_string_lossy();
             note_ui(
@@ -138,10 +138,10 @@ fn path_ui(ui: &mut Ui, saving: &mut Saving) -> bool {
                 &format!("{name} already exists. Replacing it deletes its contents."),
             );
         }
-        PathEntry::Looking => {
+        Stage::Checking => {
             dim_ui(ui, "Checking whether a file of this name exists…");
         }
-        PathEntry::Opening | PathEntry::Typing => {}
+        Stage::Opening | Stage::Typing => {}
     }
     has_entered
 }
@@ -157,7 +157,7 @@ fn select_all(ctx: &Context, id: Id, path: &str) {
 fn buttons_ui(ui: &mut Ui, saving: &Saving, has_entered: bool) -> Option<Reply> {
     let mut reply = None;
     ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
-        let may_go = !saving.path.trim().is_empty() && saving.stage == PathEntry::Typing;
+        let may_go = !saving.path.trim().is_empty() && saving.stage == Stage::Typing;
         let is_clicked = ui.add_enabled(may_go, primary_button(saving.task.verb())).clicked();
         if is_clicked || (has_entered && may_go) {
             reply = Some(Reply::Path(saving.path()));

@@ -262,7 +262,7 @@ pub struct FileTask {
     pub words: FileWords,
     /// Suggested name.
     pub suggestion: String,
-    /// Whether the file is read or written, and its contents.
+    /// Task: reading or writing the file, with its contents.
     pub purpose: Purpose,
 }
 

@@ -181,7 +181,7 @@ pub fn target_choice_ui(ui: &mut Ui, name: &str, id: &str, targets: &[Channel], 
 
 /// Width of the sample of a colour map, in points.
 const SAMPLE: f32 = space(16);
-/// Pieces of which it consists.
+/// Number of pieces of the sample.
 const PIECES: usize = 32;
 
 /// The colour scale in `slot`. A click opens its options: the colour map, and whether the scale is locked. `note` is shown

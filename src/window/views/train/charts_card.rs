@@ -171,7 +171,7 @@ pub fn readings_of_view_ui(ui: &mut Ui, view: &mut TrainView, shared: &Shared) {
 impl TrainView {
     /// Offers each chart, and the steps through sections and bars.
     pub(super) fn offer_charts(&mut self, offers: &mut Offers<'_>, shared: &Shared) {
-        // Readings have a card of their own where there is room.
+        // The readings have their own card if there is room.
         for (tab, name) in BottomTab::offered(shared, false) {
             if offers.offer(format!("Chart: {name}"), tab != self.tab) {
                 self.tab = tab;
@@ -356,7 +356,7 @@ pub enum BottomTab {
     Nodes,
     /// A section through the surfaces of the snapshot.
     Section,
-    /// Readings of the snapshot, where there is no room for a card of their own.
+    /// Readings of the snapshot, if there is no room for their own card.
     Readings,
 }
 

@@ -35,7 +35,7 @@ enum MeasuringEvent {
 #[derive(Debug)]
 pub struct DecoderMeasuring {
     job: Job<MeasuringEvent>,
-    /// The training whose networks are measured, and how many epochs had been run.
+    /// The training whose networks are measured, and its number of epochs at that time.
     of: Option<(RunId, usize)>,
 }
 

@@ -183,7 +183,7 @@ fn actual_card_ui(
         );
         ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
             view_mode_ui(ui, shared.look, effects);
-            // Only what has a sensor model can be pressed.
+            // Only sources with a sensor model can be pressed.
             if shared.source == SourceKind::Array {
                 let picked = explained_options_ui(ui, "Pointer on the surface", &HANDS, view.press.hand, false);
                 view.press.hand = picked.unwrap_or(view.press.hand);

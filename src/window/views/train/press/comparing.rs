@@ -22,7 +22,7 @@ pub(super) struct Compared {
     pub(super) kind: DecoderKind,
     /// Its latest answer or why it has none; `None` before the first.
     pub(super) answer: Option<Result<PressedAnswer, String>>,
-    /// True if that is the answer to what is pressed now.
+    /// True if that is the answer to the current touch.
     pub(super) is_present: bool,
 }
 
@@ -69,7 +69,7 @@ impl Comparing {
         &self.rows
     }
 
-    /// Takes events, and asks the decoders for what is pressed now.
+    /// Takes events, and asks the decoders about the current touch.
     pub(super) fn follow(&mut self, shown: Option<&Shown>) {
         self.take_events();
         let Some(shown) = shown else { return };

@@ -217,7 +217,7 @@ const PIECES: usize = 64;
 const DASH: [f32; 2] = [4.0, 3.0];
 
 impl PressState {
-    /// Draws where the finger touches the surface: around what is pressed, otherwise under the pointer.
+    /// Draws where the finger touches the surface: at the touch, otherwise under the pointer.
     pub fn outline_ui(&self, painter: &Painter, palette: &Palette, pointer: Option<Pos2>, stroke_mm: f64) {
         let Some(target) = self.target.as_ref().filter(|_| self.hand == Hand::Press) else {
             return;

@@ -177,7 +177,7 @@ fn answers_ui(ui: &mut Ui, shown: &Shown, compared: &[Compared]) {
     let mut rows: Vec<TableRow<'_>> = of_network.into_iter().collect();
     rows.extend(compared.iter().map(|compared| {
         let (cells, mean_mm) = cells_of(compared.answer.as_ref());
-        // Answers to what was pressed a moment ago are pale.
+        // Answers to an earlier touch are pale.
         let colour = if compared.is_present { palette.text } else { palette.dim };
         row(compared.kind, cells, mean_mm, colour)
     }));

@@ -133,7 +133,7 @@ impl Draft {
         self
     }
 
-    /// Gives a column a meaning; another column that had it gives it up where only one can have it.
+    /// Gives a column a meaning; if only one column can have it, the previous one loses it.
     pub(super) fn choose(&mut self, file: usize, column: usize, meaning: Meaning) {
         let had_group = self.has(Meaning::Group);
         for path in self.give(file, column, meaning) {

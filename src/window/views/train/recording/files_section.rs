@@ -34,7 +34,7 @@ pub(super) const FILES: FileWords = FileWords {
 enum OpenFile {
     /// A recording by its number: the first, or one that is joined to it.
     Recording(usize),
-    /// A file for the test, by the recording in whose place it is read.
+    /// A file for the test, by the recording that it replaces.
     Test(PathBuf),
     /// Positions of targets.
     Positions,

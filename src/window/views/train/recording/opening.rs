@@ -66,7 +66,7 @@ pub(super) enum Opened {
     Simulation(Box<Simulation>),
     /// Import of a plan.
     Import(Box<Draft>, Box<Reopened>),
-    /// Import of a plan of which files are missing.
+    /// Import of a plan with missing files.
     Missing(Box<Reopened>),
     /// A network, and its import or the reason why there is none; `None` for a simulated array.
     Network(Box<NetworkFile>, Option<Result<Box<Opened>, String>>),
