@@ -74,7 +74,7 @@ fn change(bytes: &mut Vec<u8>, rng: &mut impl Rng) {
             let part = bytes[place..end].to_vec();
             bytes.splice(place..place, part);
         }
-        5 => other_digit(bytes, rng),
+        5 => replace_digit(bytes, rng),
         6 => swap(bytes, b'\n', rng),
         7 => swap(bytes, b',', rng),
         8 => {
@@ -90,7 +90,7 @@ fn change(bytes: &mut Vec<u8>, rng: &mut impl Rng) {
 }
 
 /// Replaces a digit by another digit.
-fn other_digit(bytes: &mut [u8], rng: &mut impl Rng) {
+fn replace_digit(bytes: &mut [u8], rng: &mut impl Rng) {
     let digits: Vec<usize> = (0..bytes.len())
         .filter(|&place| bytes[place].is_ascii_digit())
         .collect();

@@ -9,7 +9,7 @@ use decoupler_files::{
 use eframe::egui::{Button, Id, RichText, TextEdit, Ui, WidgetInfo, accesskit::Role};
 use ndarray::Array2;
 
-use super::view::unlike_paper;
+use super::view::differences_from_paper;
 use crate::window::{
     job::{Job, Wake},
     shared::{Effect, PLACES, Phase, RightCard, RunList, Shared},
@@ -383,7 +383,7 @@ fn conditions(file: &NetworkFile) -> String {
         settings.training.method.short_name(),
         settings.seed
     );
-    for words in simulated.iter().flat_map(unlike_paper) {
+    for words in simulated.iter().flat_map(differences_from_paper) {
         text += &format!(", {words}");
     }
     text

@@ -307,20 +307,20 @@ pub(super) fn compare_exports<'a>(view: &'a CompareView, shared: &'a Shared) -> 
 }
 
 /// Describes the differences between a run and the paper's scene and inputs; empty if there are none.
-pub fn unlike_paper(settings: &SimulatedSettings) -> Vec<String> {
+pub fn differences_from_paper(settings: &SimulatedSettings) -> Vec<String> {
     let paper = SimulatedSettings::default();
     let (scene, of_paper) = (&settings.source.scene, &paper.source.scene);
     let words = [
-        (scene.rows != of_paper.rows).then(|| rows_words(scene.rows)),
-        (scene.movement != of_paper.movement).then(|| movement_words(scene.movement)),
-        (scene.loading != of_paper.loading).then(|| loading_words(scene)),
-        (!scene.noise.is_none()).then(|| format!("noise {}", noise_words(&scene.noise))),
-        (settings.inputs != paper.inputs).then(|| inputs_words(settings.inputs)),
+        (scene.rows != of_paper.rows).then(|| describe_rows(scene.rows)),
+        (scene.movement != of_paper.movement).then(|| describe_movement(scene.movement)),
+        (scene.loading != of_paper.loading).then(|| describe_loading(scene)),
+        (!scene.noise.is_none()).then(|| format!("noise {}", describe_noise(&scene.noise))),
+        (settings.inputs != paper.inputs).then(|| describe_inputs(settings.inputs)),
     ];
     words.into_iter().flatten().collect()
 }
 
-pub fn rows_words(rows: Rows) -> String {
+pub fn describe_rows(rows: Rows) -> String {
     match rows {
         Rows::All => "all rows".to_owned(),
         Rows::Known => "known rows".to_owned(),
@@ -328,14 +328,14 @@ pub fn rows_words(rows: Rows) -> String {
     }
 }
 
-pub fn movement_words(movement: Movement) -> String {
+pub fn describe_movement(movement: Movement) -> String {
     match movement {
         Movement::Z => "z".to_owned(),
         Movement::Xyz { .. } => "x, y, z".to_owned(),
     }
 }
 
-pub fn loading_words(scene: &Scene) -> String {
+pub fn describe_loading(scene: &Scene) -> String {
     match scene.loading {
         Loading::RandomNodes => "random nodes".to_owned(),
         Loading::SmoothField { correlation_length_mm } => {
@@ -345,7 +345,7 @@ pub fn loading_words(scene: &Scene) -> String {
     }
 }
 
-pub fn noise_words(noise: &Noise) -> String {
+pub fn describe_noise(noise: &Noise) -> String {
     if noise.is_none() {
         return "none".to_owned();
     }
@@ -363,7 +363,7 @@ pub fn noise_words(noise: &Noise) -> String {
     parts.into_iter().flatten().collect::<Vec<_>>().join(", ")
 }
 
-pub fn inputs_words(inputs: InputChoice) -> String {
+pub fn describe_inputs(inputs: InputChoice) -> String {
     let quantity = match inputs.quantity {
         Quantity::Resistance => "resistance",
         Quantity::Conductance => "conductance",
@@ -420,14 +420,14 @@ const FIGURES: [(&str, FigureOf); 20] = [
         Some(format_number(run.file.scores.baselines.mean.percent()))
     }),
     ("source", |run| Some(run.file.source_name())),
-    ("split", |run| Some(split_words(&run.file.recorded.as_ref()?.plan))),
-    ("rows", |run| of_array(run, |array| rows_words(array.scene.rows))),
+    ("split", |run| Some(describe_split(&run.file.recorded.as_ref()?.plan))),
+    ("rows", |run| of_array(run, |array| describe_rows(array.scene.rows))),
     ("axes", |run| {
-        of_array(run, |array| movement_words(array.scene.movement))
+        of_array(run, |array| describe_movement(array.scene.movement))
     }),
-    ("loading", |run| of_array(run, |array| loading_words(&array.scene))),
-    ("noise", |run| of_array(run, |array| noise_words(&array.scene.noise))),
-    ("inputs", |run| Some(inputs_words(run.file.settings.inputs))),
+    ("loading", |run| of_array(run, |array| describe_loading(&array.scene))),
+    ("noise", |run| of_array(run, |array| describe_noise(&array.scene.noise))),
+    ("inputs", |run| Some(describe_inputs(run.file.settings.inputs))),
     ("hidden nodes", |run| Some(run.file.settings.hidden.to_string())),
     ("method", |run| {
         Some(run.file.settings.training.method.short_name().to_owned())
@@ -497,7 +497,7 @@ fn are_other_samples(runs: &RunList) -> bool {
     }
 }
 
-fn split_words(plan: &Plan) -> String {
+fn describe_split(plan: &Plan) -> String {
     match plan.test {
         Some(_) => "test file".to_owned(),
         None => plan.division.by.to_string(),
@@ -535,7 +535,7 @@ mod tests {
 
     #[test]
     fn only_differences_from_the_paper_are_listed() {
-        assert!(unlike_paper(&SimulatedSettings::default()).is_empty());
+        assert!(differences_from_paper(&SimulatedSettings::default()).is_empty());
         let mut best = Preset::Best.settings_in(Noise {
             relative: 1e-3,
             converter_bits: Some(12),
@@ -543,10 +543,10 @@ mod tests {
             ..Noise::default()
         });
         let words = ["known rows", "noise 0.001, 12 bits, in test", "conductance, whitened"];
-        assert_eq!(unlike_paper(&best), words);
+        assert_eq!(differences_from_paper(&best), words);
         best = SimulatedSettings::default();
         best.source.scene.rows = Rows::One(2);
         best.source.scene.loading = Loading::Indenter(Indenter::all()[1]);
-        assert_eq!(unlike_paper(&best), ["row 3 alone", "flat punch"]);
+        assert_eq!(differences_from_paper(&best), ["row 3 alone", "flat punch"]);
     }
 }

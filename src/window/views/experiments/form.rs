@@ -94,7 +94,7 @@ impl Form {
     }
 
     /// Adapts the settings of training methods to a recording, if the base is one.
-    fn suited(&self, axis: Axis) -> Axis {
+    fn adapted(&self, axis: Axis) -> Axis {
         let Axis::Method(mut methods) = axis else { return axis };
         if self.plan.is_some() {
             let recorded = Method::recorded_regularization();
@@ -111,7 +111,7 @@ impl Form {
     pub fn experiment(&self) -> Result<Experiment, FormError> {
         let mut axes = Vec::new();
         for axis in &self.axes {
-            axes.push(self.suited(axis.parse()?));
+            axes.push(self.adapted(axis.parse()?));
         }
         let cells = axes
             .iter()

@@ -50,13 +50,13 @@ pub fn form_ui(ui: &mut Ui, experiments: &mut ExperimentsView, shared: &Shared, 
         if let Some(topic) = segmented_ui(ui, "Experiment", &options, experiments.topic, true) {
             experiments.choose(topic);
         }
-        dim_ui(ui, what_it_does(experiments.topic));
+        dim_ui(ui, description(experiments.topic));
         let mut form = experiments.form().clone();
         let is_idle = experiments.running.is_none();
         ui.add_enabled_ui(is_idle, |ui| fields_ui(ui, experiments.topic, &mut form, shared));
         match experiments.checked() {
             Ok(trials) => {
-                dim_ui(ui, &size_in_words(&form, *trials));
+                dim_ui(ui, &describe_size(&form, *trials));
             }
             Err(problem) => {
                 ui.add_space(space(1));
@@ -88,7 +88,7 @@ pub fn form_ui(ui: &mut Ui, experiments: &mut ExperimentsView, shared: &Shared, 
     });
 }
 
-fn what_it_does(topic: Topic) -> &'static str {
+fn description(topic: Topic) -> &'static str {
     match topic {
         Topic::Table(PaperTable::HiddenNodes) => {
             "Errors of networks with different numbers of hidden nodes on the paper's array."
@@ -101,7 +101,7 @@ fn what_it_does(topic: Topic) -> &'static str {
     }
 }
 
-fn size_in_words(form: &Form, trials: usize) -> String {
+fn describe_size(form: &Form, trials: usize) -> String {
     let folds = form.template.cross_validation.map_or(1, |validation| validation.folds);
     let networks = trials.saturating_mul(folds).saturating_mul(form.template.base.starts);
     let epochs = counted(form.template.base.training.stopping.epochs, "epoch");

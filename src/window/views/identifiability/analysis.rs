@@ -224,11 +224,11 @@ mod tests {
             let pressed = vec![DVec3::Z * 0.5; 10];
             let alone = Identifiability::of_row(&question.sensor, row, &pressed, found.rows[row].axes).unwrap();
             assert_eq!(alone.singular_values_per_mm, found.rows[row].singular_values_per_mm);
-            let (least, worst) = (
+            let (smallest, worst) = (
                 alone.singular_values_per_mm[9],
                 found.worst_row().singular_values_per_mm[9],
             );
-            assert!(worst <= least);
+            assert!(worst <= smallest);
             let shown = &found.sensitivities[0].nodes_mm[10 * row..10 * row + 10];
             assert!(shown.iter().zip(&alone.sensitivity_per_mm).all(|(a, b)| a.z == b.z));
         }

@@ -211,10 +211,10 @@ fn scene_ui(ui: &mut Ui, question: &mut Question) {
     let hint = "Compression of all nodes at which the sensor is analysed, in percent of the height, up to the largest \
                 of the scene.";
     let mut percent = 100.0 * question.compression;
-    let most = 100.0 * scene.largest_compression;
-    let usual = 0.5 * most;
-    quantity_ui(ui, "Compression", hint, &mut percent, usually(usual, 0.0..=most), "%");
-    stepped_slider_ui(ui, "Compression", &mut percent, usual, 0.0..=most, 0.5);
+    let max = 100.0 * scene.largest_compression;
+    let usual = 0.5 * max;
+    quantity_ui(ui, "Compression", hint, &mut percent, usually(usual, 0.0..=max), "%");
+    stepped_slider_ui(ui, "Compression", &mut percent, usual, 0.0..=max, 0.5);
     // Only if it was changed: converting to percent and back may round it.
     if percent != 100.0 * question.compression {
         question.compression = percent / 100.0;

@@ -372,7 +372,7 @@ impl FaultForm {
             self.kind = kind;
         }
         let Some(kind) = self.kind else { return };
-        let (name, hint) = kind.wire_words();
+        let (name, hint) = kind.wire_field();
         let last = kind.wires(scale).max(1);
         self.wire = self.wire.clamp(1, last);
         count_ui(ui, name, hint, &mut self.wire, 1..=last);
@@ -459,7 +459,7 @@ impl FaultKind {
         }
     }
 
-    fn wire_words(self) -> (&'static str, &'static str) {
+    fn wire_field(self) -> (&'static str, &'static str) {
         match self {
             Self::BrokenRow => ("Row-wire", "Number of the broken row-wire."),
             Self::ShortedRows => ("First row-wire", "It touches the next one."),

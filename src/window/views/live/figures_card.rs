@@ -157,7 +157,7 @@ fn zero_ui(ui: &mut Ui, view: &mut LiveView, effects: &mut Vec<Effect>) {
         return;
     };
     let hint = "Smallest and largest gain: reading in the unloaded state over the resistance of the model at rest.";
-    fact_ui(ui, "Gains", hint, &gains_in_words(&zero));
+    fact_ui(ui, "Gains", hint, &format_gains(&zero));
     let hint =
         "Rows in contact during the re-zero: only the gains of their columns were taken, so that the contact is kept.";
     let touched = zero.in_contact.iter().filter(|touched| **touched).count();
@@ -183,7 +183,7 @@ fn zero_ui(ui: &mut Ui, view: &mut LiveView, effects: &mut Vec<Effect>) {
     });
 }
 
-fn gains_in_words(zero: &ZeroGains) -> String {
+fn format_gains(zero: &ZeroGains) -> String {
     let (low, high) = (zero.gains.iter()).fold((f64::MAX, f64::MIN), |(low, high), &gain| {
         (low.min(gain), high.max(gain))
     });

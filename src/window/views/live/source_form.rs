@@ -416,7 +416,7 @@ impl NetworkChoice {
                     soon as another one is chosen.";
         combo.response.labelled_by(label.id).on_hover_text(hint);
         if let Some((_, network)) = self.network(runs) {
-            let (array, error) = in_words(network);
+            let (array, error) = describe_network(network);
             dim_ui(ui, &array);
             dim_ui(ui, &error);
         }
@@ -436,7 +436,7 @@ impl NetworkChoice {
 }
 
 /// Describes a network in two lines: its array and rows, and its error.
-fn in_words(file: &NetworkFile) -> (String, String) {
+fn describe_network(file: &NetworkFile) -> (String, String) {
     let rows = file
         .settings
         .simulated()

@@ -85,16 +85,16 @@ pub enum TradeOffFormError {
         example: &'static str,
     },
     /// A number out of its range.
-    #[error("{what}: {value} is not possible, give from {least} to {most}")]
+    #[error("{what}: {value} is not possible, give from {min} to {max}")]
     Range {
         /// The list.
         what: &'static str,
         /// Text that was typed.
         value: String,
         /// The minimum.
-        least: String,
+        min: String,
         /// The maximum.
-        most: String,
+        max: String,
     },
     /// An empty list.
     #[error("{what}: there are no values; write a list such as {example}")]
@@ -295,8 +295,8 @@ where
             return Err(TradeOffFormError::Range {
                 what,
                 value: word.to_owned(),
-                least: possible.start().to_string(),
-                most: possible.end().to_string(),
+                min: possible.start().to_string(),
+                max: possible.end().to_string(),
             });
         }
         if !values.contains(&value) {

@@ -238,7 +238,7 @@ fn find(
     if let Some(findings) = found.map_err(|error| error.to_string())? {
         report.send(StudyEvent::Found(Box::new(RecordingFindings {
             setup,
-            folds: folds_in_words(folds, plan.division.by),
+            folds: describe_folds(folds, plan.division.by),
             samples: recording.set.samples(),
             inputs: recording.inputs,
             targets: recording.targets,
@@ -286,7 +286,7 @@ fn validate(
         remarks.extend(comparison.as_ref().map(|comparison| comparison.sentence(target, name)));
     }
     report.send(StudyEvent::Validated(Box::new(FoldsResult {
-        folds: folds_in_words(folds, by),
+        folds: describe_folds(folds, by),
         samples: set.samples(),
         table: ErrorTable::of_scores(&recording.problem(), &validated.scores(set), None),
         remarks,
@@ -295,6 +295,6 @@ fn validate(
     Ok(())
 }
 
-fn folds_in_words(folds: usize, by: SplitBy) -> String {
+fn describe_folds(folds: usize, by: SplitBy) -> String {
     format!("{folds} folds by {by}")
 }

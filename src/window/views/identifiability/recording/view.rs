@@ -481,24 +481,21 @@ fn cost(study: &RecordingStudy, setup: &Setup, shared: &Shared) -> String {
         || setup.plan().map_or(0, |plan| plan.import.inputs.len()),
         |found| found.inputs.len(),
     );
-    let most = Findings::max_trainings(channels, folds);
-    let least = match study.model {
-        Some(_) => most,
+    let max = Findings::max_trainings(channels, folds);
+    let min = match study.model {
+        Some(_) => max,
         // Ridge may turn out to be as good.
         None => 2 * folds,
     };
-    let range = if least == most {
-        format!("up to {most}")
+    let range = if min == max {
+        format!("up to {max}")
     } else {
-        format!("{least} to {most}")
+        format!("{min} to {max}")
     };
     let last = shared.result().and_then(|result| result.wall_time);
     let time = last.map_or_else(String::new, |last| {
-        let [least, most] = [least, most].map(|count| format_duration(last.saturating_mul(count as u32)));
-        format!(
-            "; the last training took {}, so {least} to {most}",
-            format_duration(last)
-        )
+        let [min, max] = [min, max].map(|count| format_duration(last.saturating_mul(count as u32)));
+        format!("; the last training took {}, so {min} to {max}", format_duration(last))
     });
     format!("The analysis takes {range} trainings with {folds} folds{time}.")
 }

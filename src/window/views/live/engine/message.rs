@@ -65,7 +65,7 @@ pub enum SourcePlan {
 impl SourcePlan {
     /// Returns the source according to the file at its path: a named pipe or a device cannot be rewound, and is a
     /// stream. Accesses the file system, which may be slow.
-    pub(super) fn looked_up(self) -> Self {
+    pub(super) fn resolved(self) -> Self {
         match self {
             Self::Replay { path, .. } if path.exists() && !path.is_file() && !path.is_dir() => {
                 Self::Stream(Source::File(path))

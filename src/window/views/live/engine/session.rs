@@ -327,7 +327,7 @@ pub(super) trait LiveSession {
 /// If decoding cannot begin or continue, with the reason.
 pub fn run(plan: LivePlan, commands: &Receiver<Command>, report: &Report<LiveEvent>) -> Result<(), String> {
     let send = |event| report.send(event);
-    let source = plan.source.looked_up();
+    let source = plan.source.resolved();
     send(LiveEvent::Source(source.clone()));
     let plan = LivePlan { source, ..plan };
     let is_wanted = || !report.is_cancelled();

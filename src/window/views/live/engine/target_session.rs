@@ -96,9 +96,9 @@ impl TargetSession {
             self.history.clear();
         }
         self.history.push_back((arrived.time_s, self.answer.as_slice().into()));
-        let most = (MAX_VALUES / self.answer.len().max(1)).max(2);
+        let max_length = (MAX_VALUES / self.answer.len().max(1)).max(2);
         let is_old = |(time_s, _): &(f64, Arc<[f64]>)| *time_s < arrived.time_s - HISTORY_S;
-        while self.history.len() > most || self.history.front().is_some_and(is_old) {
+        while self.history.len() > max_length || self.history.front().is_some_and(is_old) {
             self.history.pop_front();
         }
         self.tally.good(arrived.read_at, Instant::now(), None);
