@@ -57,8 +57,8 @@ impl WriteError {
     }
 }
 
-/// A file that is written under a temporary name next to its target and then renamed over it, so that no one
-/// ever sees half of it. Dropped before [`Self::commit`], it leaves nothing.
+/// A file that is written under a temporary name next to its target and then renamed over it: readers never see a
+/// partial file. Dropped before [`Self::commit`], it leaves nothing.
 #[derive(Debug)]
 pub struct AtomicFile {
     path: PathBuf,
@@ -67,7 +67,7 @@ pub struct AtomicFile {
 
 #[derive(Debug)]
 enum Sink {
-    /// Becomes the file at this target.
+    /// A temporary file that will be renamed to this target.
     Temporary(Unfinished, PathBuf),
     /// A pipe or device, which cannot be replaced by renaming.
     Through(File),
@@ -234,7 +234,7 @@ pub fn atomic_write(path: &Path, write: impl FnOnce(&mut dyn Write) -> io::Resul
     file.commit()
 }
 
-/// Checks that `path` can be written, before the work whose result goes there. Leaves no trace.
+/// Checks that `path` can be written, before the work that produces its contents. Leaves no trace.
 ///
 /// # Errors
 /// The path cannot be written.

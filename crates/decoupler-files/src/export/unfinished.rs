@@ -12,8 +12,8 @@ use tempfile::{NamedTempFile, PersistError};
 const PREFIX: &str = ".decoupler-";
 const SUFFIX: &str = ".part";
 
-/// Paths of all unfinished files and folders. A program that exits from another thread drops nothing, so [`exit_leaving_nothing`]
-/// removes these.
+/// Paths of all unfinished files and folders. A program that exits from another thread drops nothing, so
+/// [`exit_leaving_nothing`] removes these.
 static ALL: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
 
 fn all() -> MutexGuard<'static, BTreeSet<PathBuf>> {

@@ -145,7 +145,7 @@ impl PlotAxis {
         low - below..=high + above
     }
 
-    /// Returns the ticks within a range of places, at least `apart` from each other: the width of a number.
+    /// Returns the ticks within a range of places, separated by at least `apart`, the width of a number.
     pub fn ticks(&self, range: &RangeInclusive<f64>, apart: f64) -> Ticks {
         let width = range.end() - range.start();
         if !(width.is_finite() && width > 0.0) {

@@ -112,7 +112,7 @@ pub fn training_state_figure(history: &[EpochRecord], stages: &[Stage]) -> PlotF
                 curve(parameter, look(Hue::Orange), history, |epoch| Some(epoch.parameter)),
             ),
             plot(
-                // A little more than from 0 to 1: no line lies on the frame.
+                // A little more than from 0 to 1: lines do not coincide with the frame.
                 PlotAxis::linear(failures)
                     .including([-0.1, 1.1])
                     .ticked(TickRule::Whole),

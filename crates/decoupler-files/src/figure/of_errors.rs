@@ -379,7 +379,7 @@ mod tests {
         let figure = target_regression_figure((SAMPLES, &counted), &line, "x", None);
         assert!(asked.get() <= 2001, "{} samples used", asked.get());
         assert_eq!(figure.plots[0].series[0].points.len(), asked.get());
-        // Least squares: the slope is 1 − 2 · 0.001 for actual values spread evenly whatever the sample.
+        // Least squares: the slope is 1 − 2 · 0.001 for actual values that are independent of the sample.
         let fit = line.fit.unwrap();
         assert!((fit.slope - 0.998).abs() < 2e-5, "{fit:?}");
     }

@@ -222,7 +222,7 @@ pub struct PointLabel {
     pub size: DVec2,
 }
 
-/// Returns places along a line, for labels to keep clear of.
+/// Returns places along a line, which labels should avoid.
 pub fn along(line: &[DVec2]) -> impl Iterator<Item = DVec2> {
     const STEP: f64 = 4.0;
     line.windows(2).flat_map(|ends| {

@@ -1,4 +1,4 @@
-//! Figures in a sentence or two, for readers who cannot see them.
+//! Short descriptions of figures for screen readers.
 
 use super::{
     LineStyle,

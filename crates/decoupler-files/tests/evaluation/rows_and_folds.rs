@@ -66,7 +66,7 @@ fn finished(experiment: Experiment) -> ExperimentResults {
 
 #[test]
 fn folds_are_counted_by_the_rows_read() {
-    // 24 samples of one row-wire are 24 snapshots; of four row-wires they are 6.
+    // 24 samples of one row-wire are 24 snapshots; 24 samples of four row-wires are 6.
     let cases = [
         (
             "single samples of one row-wire",

@@ -90,7 +90,7 @@ fn says(picture: &Picture, text: &str) -> usize {
 
 #[test]
 fn contour_lines_of_a_slope_are_at_their_heights() {
-    // 4.05 + 0.3 x reaches 4.1, 4.2 … at x = (level − 4.05) / 0.3, whatever y.
+    // 4.05 + 0.3 x reaches 4.1, 4.2 … at x = (level − 4.05) / 0.3 for any y.
     let slope = from_above(surface("", Quantity::Height, |x, _| 4.05 + 0.3 * x));
     let drawing = lay_out(&slope, OrbitCamera::default());
     let x_at = |node: usize| drawing.dots.position(node).unwrap().x;

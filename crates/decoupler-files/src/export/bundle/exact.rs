@@ -261,7 +261,7 @@ impl Twofold {
     pub(super) fn ln(self) -> Self {
         let near = libm::log(self.high);
         let excess = self * (-Self::from(near)).exp() - Self::from(1.0);
-        // ln(1 + e) = e − e²/2 + …, and |e| is some 1e-16.
+        // ln(1 + e) = e − e²/2 + …, and |e| is about 1e-16.
         Self::from(near) + excess - excess * excess * Self::from(0.5)
     }
 
@@ -292,7 +292,7 @@ impl Twofold {
         }
     }
 
-    /// Hyperbolic tangent, with the error of one in double precision (some 1e-16).
+    /// Hyperbolic tangent, with the error of double precision (about 1e-16).
     pub(super) fn tanh(self) -> Self {
         let near = libm::tanh(self.high);
         let slope = (1.0 - near) * (1.0 + near);

@@ -108,7 +108,7 @@ impl<'a> ExportedDecoder<'a> {
         &self.fitted.reading_ranges
     }
 
-    /// Smallest and largest target in training, likewise.
+    /// Ranges of the targets in training: one for all row-wires, or one for each if the row is an argument.
     pub(super) fn target_extremes(&self) -> &[Vec<(f64, f64)>] {
         &self.fitted.target_extremes
     }
@@ -285,7 +285,7 @@ pub(super) struct FittedDecoder {
     pub(super) description: Description,
     /// Ranges of the readings in training: one for all row-wires, or one for each if the row is an argument.
     pub(super) reading_ranges: Vec<Option<ReadingRange>>,
-    /// Smallest and largest target in training, likewise.
+    /// Ranges of the targets in training: one for all row-wires, or one for each if the row is an argument.
     pub(super) target_extremes: Vec<Vec<(f64, f64)>>,
     /// Errors on the test samples.
     pub(super) errors: TestErrors,

@@ -144,7 +144,7 @@ pub(super) fn comment(text: &str) -> String {
         .replace("??", "? ?")
 }
 
-/// Lines of at most 100 characters with these words.
+/// Breaks the words into lines of at most 100 characters.
 pub(super) fn wrapped(text: &str) -> Vec<String> {
     const WIDTH: usize = 100;
     let mut lines: Vec<String> = Vec::new();

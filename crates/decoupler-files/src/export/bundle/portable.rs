@@ -33,7 +33,7 @@ pub(super) struct Portable {
     pub(super) channels: usize,
     /// Number of outputs, 3·M2 of an array.
     pub(super) outputs: usize,
-    /// One for all row-wires, or one for each, from the first, all of one shape.
+    /// One map for all row-wires, or one for each in ascending order, all of the same shape.
     pub(super) maps: Vec<FoldedMap>,
     /// Iteration on the equations of the sensor that begins at the answers of the maps.
     pub(super) equations: Option<RowProblemDescription>,
@@ -306,7 +306,7 @@ fn joined(first: &AffineLayer<Twofold>, second: &AffineLayer<Twofold>) -> Affine
     AffineLayer { weights, biases }
 }
 
-/// Number of values that are peculiar to a layer: its outputs, Gaussians or rules; 0 of one that has no tables.
+/// Number of a layer's outputs, Gaussians or rules; 0 for a layer without tables.
 fn own_width(layer: &Layer<Twofold>) -> usize {
     match layer {
         Layer::Affine(affine) => affine.outputs(),

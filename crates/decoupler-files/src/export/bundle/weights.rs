@@ -243,7 +243,7 @@ fn read_weights(text: &str, portable: &Portable) -> Result<Weights, String> {
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Table {
     pub(super) name: String,
-    /// Sizes of the table of one map, one or two of them.
+    /// Shape of the table of one map, with one or two dimensions.
     pub(super) shape: Vec<usize>,
     pub(super) digits: Digits,
     /// Map by map, each row by row.

@@ -144,7 +144,7 @@ impl Picture {
     }
 }
 
-/// The program's own fonts and no others.
+/// Only the program's own fonts.
 fn fonts() -> Arc<usvg::fontdb::Database> {
     static FONTS: OnceLock<Arc<usvg::fontdb::Database>> = OnceLock::new();
     let load = || {

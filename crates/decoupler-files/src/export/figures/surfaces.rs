@@ -1,4 +1,4 @@
-//! Surfaces in print: what the figure lays out, written as SVG.
+//! Surfaces in print: the layout of the figure, written as SVG.
 
 use std::sync::OnceLock;
 

@@ -244,7 +244,7 @@ impl Command {
         let is_usual = method.short_name() == usual_method.short_name();
         let usual_settings = usual_method.settings();
         for (place, setting) in method.settings().into_iter().enumerate() {
-            // The default method of recordings has settings of its own.
+            // The default method of recordings has different settings.
             let usual = if is_usual {
                 *usual_settings[place].value
             } else {

@@ -34,7 +34,7 @@ pub struct RunReport<'a> {
     pub file: &'a NetworkFile,
     /// Defect of its training, if there is one.
     pub defect: Option<&'a RunDefect>,
-    /// Other decoders on its test set, as far as they were measured.
+    /// Other decoders that were measured on its test set.
     pub decoders: &'a [DecoderReport],
     /// Its test set: [`Run::test`](decoupler_core::evaluation::Run::test), or [`NetworkFile::test_set`], which draws or reads it again.
     pub test: &'a Dataset,

@@ -1,4 +1,4 @@
-//! The report of a run: one HTML file that needs nothing else, for any browser and for print.
+//! The report of a run: one self-contained HTML file, for any browser and for print.
 
 mod command;
 mod contents;

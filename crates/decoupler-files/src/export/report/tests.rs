@@ -252,7 +252,7 @@ fn the_command_of_a_recording_names_files_columns_and_division() {
         "decoupler train --data press.csv --join 'my states.csv' --join-time t2 --join-limit 0.5 --inputs c2..c5 --targets \
          force --time t --group session --where 't>0' --missing -1 --split group --hidden 12"
     );
-    // The default method has settings of its own for recordings; with other methods, a part of the samples is held out
+    // The default method has different settings for recordings; with other methods, a part of the samples is held out
     // for validation.
     let mut other = settings;
     other.training.method = Method::default();

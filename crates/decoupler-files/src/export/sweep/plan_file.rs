@@ -249,7 +249,7 @@ pub fn train_options(settings: &RunSettings, decoders: &[DecoderKind]) -> TrialO
 }
 
 /// Options that a recording adds: names and checksums of its files, meanings of their columns, and the division of its samples.
-/// The folders of the files are left out, so that a trial is the same wherever they are.
+/// The folders of the files are left out: a trial is the same wherever they are.
 pub fn recording_options(plan: &Plan, crc32: &[String]) -> TrialOptions {
     let named = plan.named();
     let mut import = serde_json::to_value(&named.import).unwrap_or_default();

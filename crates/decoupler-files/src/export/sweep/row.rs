@@ -357,7 +357,7 @@ impl MergedSweep {
         let mut by_result: BTreeMap<String, Found> = BTreeMap::new();
         for found in same {
             let kept = by_result.entry(found.row.compared()).or_insert_with(|| found.clone());
-            // Of several program versions, the latest is kept, whatever the order of the folders.
+            // Of several program versions, the latest is kept, in any order of the folders.
             if (&found.row.program, &found.path) > (&kept.row.program, &kept.path) {
                 *kept = found;
             }

@@ -122,7 +122,7 @@ impl<'a> BoxAxes<'a> {
         }
     }
 
-    /// Everything that lies behind the surface.
+    /// Returns everything behind the surface.
     pub(super) fn lines(&self) -> Vec<Line> {
         let plot_box = self.projection.plot_box;
         let mut lines = Vec::new();

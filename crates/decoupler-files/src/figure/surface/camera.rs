@@ -278,8 +278,8 @@ impl Sight {
         }
     }
 
-    /// Returns the height at which the upright line through `foot_mm` comes nearest to a point on the screen; `None` if
-    /// it is seen end-on, with `stroke_mm` of it shorter than ten points.
+    /// Returns the height at which the vertical line through `foot_mm` comes nearest to a point on the screen; `None`
+    /// if it is seen end-on, with `stroke_mm` of it shorter than ten points.
     pub fn height_mm(&self, foot_mm: DVec3, stroke_mm: f64, at: DVec2) -> Option<f64> {
         const SHORTEST_POINTS: f64 = 10.0;
         let foot = self.point(foot_mm);

@@ -291,8 +291,8 @@ impl Section {
         points.collect()
     }
 
-    /// Returns the curve on the screen, along the surface as it is drawn: in pieces where it has gaps or ends at the box of
-    /// the axes.
+    /// Returns the curve on the screen, along the surface as it is drawn: in several pieces if it has gaps or is
+    /// clipped at the box of the axes.
     pub fn pieces(&self, surface: &Surface, sight: &Sight) -> Vec<Vec<DVec2>> {
         let field = Field::new(surface);
         let curve = self.curve_mm(field.grid, field.values);
@@ -309,7 +309,7 @@ impl Section {
 fn cell(points_mm: &[f64], at_mm: f64) -> Option<(usize, f64)> {
     let after = points_mm.partition_point(|point| *point <= at_mm);
     let before = after.checked_sub(1)?;
-    // A wire through the nodes lies on a point of the grid except for rounding.
+    // A wire through the nodes is at a grid point, up to rounding.
     let pitch = points_mm.get(1)? - points_mm[0];
     if let Some(near) = [before, after].into_iter().find(|&near| {
         let point = points_mm.get(near);
@@ -402,7 +402,7 @@ mod tests {
         assert_eq!(pieces([0.1, 1.0, 0.1, 1.0])[0][0].0, 3);
     }
 
-    /// A flat sheet 5 high over 6 × 6 nodes, of which the middle overshoots to `top`.
+    /// A flat sheet at height 5 over 6 × 6 nodes, whose middle overshoots to `top`.
     fn overshot(top: f64, mode: ViewMode) -> Surface {
         let places: Vec<f64> = (0..6).map(f64::from).collect();
         let map = Arc::new(SurfaceMap::new(&places, &places).expect("a lattice"));

@@ -18,7 +18,7 @@ const CROWDED: f32 = 10.0;
 struct Dot {
     at: Vec2,
     is_hidden: bool,
-    /// True if it lies beyond the axes and is drawn at their edge.
+    /// True if it is beyond the axes and drawn at their edge.
     is_beyond: bool,
 }
 

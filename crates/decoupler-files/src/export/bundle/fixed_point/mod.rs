@@ -177,7 +177,7 @@ const OUTPUT_UNITS: f64 = 1e7;
 const LARGEST_OUTPUT: f64 = (1_u32 << 24) as f64;
 
 impl Units {
-    /// Units of the readings. Those of an array share one, with a name of its own.
+    /// Units of the readings. The readings of an array share one unit, which has a name.
     ///
     /// # Errors
     /// Resistances of an array are beyond all of these units.

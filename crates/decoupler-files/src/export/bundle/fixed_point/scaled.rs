@@ -16,7 +16,7 @@ pub(super) struct ScaledRow {
 const MAX_BITS: i32 = 20;
 
 impl ScaledRow {
-    /// Scales `weights` so that the largest takes `width` bits with its sign. `fewest` limits the power of two.
+    /// Scales `weights` to give the largest one `width` bits with its sign. `fewest` limits the power of two.
     ///
     /// `None` for a weight that is too large even with the fewest bits.
     pub(super) fn of(weights: &[f64], width: u32, fewest: i32) -> Option<Self> {

@@ -40,7 +40,7 @@ fn write_array(array: &NamedArray) -> Vec<u8> {
         Digits::Double => "<f8",
     };
     let sizes: Vec<_> = array.shape.iter().map(usize::to_string).collect();
-    // A tuple of one has a comma after it.
+    // A tuple of one element ends with a comma.
     let comma = if sizes.len() == 1 { "," } else { "" };
     let mut header = format!(
         "{{'descr': '{descr}', 'fortran_order': False, 'shape': ({}{comma}), }}",
