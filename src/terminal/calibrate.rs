@@ -17,16 +17,17 @@ use decoupler_files::export::{SensorFile, check_writable, format_number};
 
 /// Fit geometry and resistivity of a sensor to frames of known presses
 ///
-/// A line of the file is a row-wire at one moment: its number (--row-wire), its resistances (--inputs), and how far its nodes
-/// are pressed (--depths, or --targets for all coordinates); --group names the column of frames. Parameters that the frames
-/// do not determine keep their nominal values, and are named; the others have simultaneous 95 % intervals. train --sensor
-/// takes what --out writes, and fine-tune continues its network on the frames.
+/// A line of the file is a row-wire at one moment: its number (--row-wire), its resistances (--inputs), and the depths of
+/// its nodes (--depths, or --targets for all coordinates); --group names the column of frames. Parameters that the frames
+/// do not determine are listed and keep their nominal values; the others have simultaneous 95 % confidence intervals. Use
+/// the file of --out with train --sensor, and then fine-tune the network on the frames.
 #[derive(Args)]
 pub(super) struct Calibrate {
-    /// Array scale M1xM2_M3xM4, whose nominal geometry is the start: rows x nodes on each, nodes on each column x columns
+    /// Array scale M1xM2_M3xM4, whose nominal geometry is the initial value: rows x nodes on each, nodes on each column x
+    /// columns
     #[arg(long, value_name = "SCALE", default_value = "10x10_5x30", conflicts_with = "sensor")]
     array: ArrayScale,
-    /// Nominal sensor model from a file that --out wrote, instead of --array
+    /// Nominal sensor model from a file written by --out, instead of --array
     #[arg(long, value_name = "FILE")]
     sensor: Option<PathBuf>,
     #[command(flatten)]
@@ -58,11 +59,11 @@ struct Parameter {
     unit: &'static str,
     nominal: f64,
     value: f64,
-    /// Half of the interval; absent where the frames do not determine the parameter.
+    /// Half-width of the interval; absent if the frames do not determine the parameter.
     half_width: Option<f64>,
 }
 
-/// A parameter by its words.
+/// A parameter, serialised by its name.
 struct SensorParameterName(SensorParameter);
 
 impl Serialize for SensorParameterName {

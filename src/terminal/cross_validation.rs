@@ -1,4 +1,4 @@
-//! Errors on every sample by cross-validation, and how optimistic random test samples are.
+//! Errors on every sample by cross-validation, and the optimism of random test samples.
 
 use std::{
     collections::BTreeMap,
@@ -45,7 +45,7 @@ struct Report<'a> {
     seed: u64,
     targets: Vec<Target<'a>>,
     baselines: BTreeMap<&'static str, Vec<Target<'a>>>,
-    /// Of mean, ridge and network the one with the lowest error, target by target.
+    /// Decoder with the lowest error for each target: mean, ridge or network.
     better: Vec<&'static str>,
     warnings: Vec<String>,
 }
@@ -90,8 +90,8 @@ impl Train {
         end
     }
 
-    /// Trains again on a split by group (by time without groups) if the test samples are random ones of a recording, and
-    /// returns how optimistic these are, target by target. Ctrl-C ends only this comparison.
+    /// Measures how optimistic random test samples of a recording are for each target, by training again on a split by
+    /// group (by time without groups). Ctrl-C ends only this comparison.
     pub(super) fn optimism(&self, run: &Run, sets: &SetupSets) -> Result<Vec<String>, Failure> {
         let Some(recordings) = &sets.recordings else {
             return Ok(Vec::new());
@@ -114,7 +114,7 @@ impl Train {
             Ok(honest) => honest,
             Err(error) => {
                 return Ok(vec![format!(
-                    "a random split is optimistic when neighbouring rows are similar, and by how much is not known here: \
+                    "a random split is optimistic when neighbouring rows are similar, but it cannot be measured by how much: \
                      split by {by}, {error}"
                 )]);
             }
@@ -122,7 +122,7 @@ impl Train {
         let bar = progress_bar(
             self.json,
             settings.training.stopping.epochs,
-            "{bar:30} second training, to compare",
+            "{bar:30} second training for comparison",
         );
         while !graceful.is_end_requested() && honest.step().is_none() {
             bar.inc(1);
@@ -131,7 +131,7 @@ impl Train {
         if honest.stop_reason().is_none() {
             return Err(Failure::InterruptedComparison { by });
         }
-        let scores = [&honest, run].map(|run| run.scores().expect("the run of no fold has baselines"));
+        let scores = [&honest, run].map(|run| run.scores().expect("a run without folds has baselines"));
         Ok(sentences(
             &SplitComparison::of(by, scores),
             &recordings.training.targets,
@@ -148,7 +148,7 @@ fn announce_comparison(by: SplitBy) {
     );
 }
 
-/// Returns for each target how optimistic random test samples are.
+/// Describes for each target how optimistic random test samples are.
 fn sentences(comparison: &SplitComparison, targets: &[Channel]) -> Vec<String> {
     let targets = targets.iter().enumerate();
     targets
@@ -156,7 +156,7 @@ fn sentences(comparison: &SplitComparison, targets: &[Channel]) -> Vec<String> {
         .collect()
 }
 
-/// Name of the answer with the lowest error for each target.
+/// Name of the decoder with the lowest error for each target.
 fn better(problem: &Problem, scores: &Scores) -> Vec<&'static str> {
     let answers = [
         ("mean", &scores.baselines.mean),
@@ -173,7 +173,7 @@ fn better(problem: &Problem, scores: &Scores) -> Vec<&'static str> {
     (0..problem.targets.len()).map(best).collect()
 }
 
-/// Prints the report of a cross-validation; `optimism` is what random folds hide.
+/// Prints the report of a cross-validation; `optimism` has the warnings about random folds.
 fn print_folds(
     plan: &Plan,
     recording: &Recording,
@@ -196,7 +196,7 @@ fn print_folds(
     let fallbacks = channels.iter().zip(&better).filter(|(_, better)| **better != NETWORK);
     warnings.extend(fallbacks.map(|(channel, better)| {
         format!(
-            "the better answer for {} is the {better}: its held-out error is the lowest",
+            "for {}, the {better} is better than the network: its held-out error is lower",
             channel.name
         )
     }));
@@ -227,7 +227,7 @@ fn print_folds(
         write_files(&report.files, report.rows, report.dropped, out)?;
         writeln!(
             out,
-            "{} samples, each tested by a network that has not seen its fold: {} folds by {}\n",
+            "{} samples, each tested by a network trained without its fold: {} folds by {}\n",
             report.samples, report.folds, report.split
         )?;
         let table = ErrorTable::of_scores(&problem, &scores, None);

@@ -1,6 +1,4 @@
-//! Frames of known presses, in the terminal.
-//!
-//! Columns of decoded targets, for an array and for a recording.
+//! Decoding of files, and frames of known presses, in the terminal.
 
 use std::{
     io::{self, Write, stderr},
@@ -36,13 +34,13 @@ use super::{
 /// Decouple the resistances of a CSV file with a saved network
 ///
 /// The input has columns named r_1, r_2, … (one for each column-wire, in ohm), in any order and among others, or exactly
-/// as many unnamed columns. Each line is one row-wire. For networks of known rows a column named row has its
-/// number from 1; without one, lines are whole snapshots from the first row to the last. The output has a line x_1, y_1, z_1, x_2, … in mm for
-/// each line of the input, then readings_outside, the number of its readings that are outside the range seen in training
-/// by more than a tenth of that, and coordinates_outside, the number of coordinates that are outside by more than all of
-/// it; a warning names such lines. With --follow, frames are decoded as they come, from standard input, a serial port or
-/// a socket too. The network of a recording (train --data) reads columns of the names of its inputs (or as many without
-/// names), from CSV, .npy, .npz or .mat, and gives its targets under their names.
+/// as many unnamed columns. Each line is one row-wire. For networks of known rows, a column named row has the row number
+/// from 1; without it, lines form whole snapshots from the first row to the last. For each line, the output has x_1, y_1,
+/// z_1, x_2, … in mm; readings_outside, the number of readings outside the training range by more than a tenth of the
+/// range; and coordinates_outside, the number of coordinates outside by more than the whole range. A warning lists such
+/// lines. With --follow, frames are decoded as they arrive, also from standard input, a serial port or a socket. The
+/// network of a recording (train --data) reads columns named like its inputs (or as many unnamed columns) from CSV, .npy,
+/// .npz or .mat, and writes its targets under their names.
 #[derive(Args)]
 pub(super) struct Decode {
     /// Network saved by train --out or by the window
@@ -51,7 +49,7 @@ pub(super) struct Decode {
     /// CSV file of resistances in ohm; with --follow also -, the default, DEVICE:BAUD or tcp:HOST:PORT
     #[arg(long, value_name = "FILE", required_unless_present = "follow")]
     input: Option<PathBuf>,
-    /// CSV file of coordinates in mm, to be written
+    /// CSV file to write, with coordinates in mm
     #[arg(long, value_name = "FILE", required_unless_present = "follow")]
     output: Option<PathBuf>,
     #[command(flatten)]
@@ -76,7 +74,7 @@ impl Decode {
         }
     }
 
-    /// Checks that writing the output destroys no input.
+    /// Checks that the output does not overwrite an input.
     fn check_output(&self, input: &Path, output: &Path) -> Result<(), Failure> {
         for (name, path) in [("input", input), ("network", &self.network)] {
             if is_same(path, output) {
@@ -116,8 +114,8 @@ fn decode_file(file: &NetworkFile, input: &Path, output: &Path) -> Result<(), Fa
     Ok(())
 }
 
-/// Decodes each line with the network of its row, one network for all rows of an array in one matrix product. Answers that do
-/// not exist are NaN.
+/// Decodes each line with the network of its row; a single network for all rows of an array uses one matrix product.
+/// Invalid answers are NaN.
 fn decoded(file: &NetworkFile, compiled: &mut CompiledNetworks<f64>, readings: &Readings) -> Array2<f64> {
     let Readings {
         values, row_indices, ..
@@ -148,23 +146,23 @@ fn decoded(file: &NetworkFile, compiled: &mut CompiledNetworks<f64>, readings: &
     answers
 }
 
-// Readings of a real sensor with what pressed it.
+// Readings of a real sensor with known presses.
 #[derive(Args)]
 pub(super) struct FrameArguments {
     #[command(flatten)]
     import: ImportArguments,
-    /// Columns of the resistances of a row-wire in ohm, one for each column-wire
+    /// Columns with the resistances of a row-wire in ohm, one per column-wire
     #[arg(long, value_name = "COLUMNS", value_delimiter = ',')]
     inputs: Vec<String>,
-    /// Columns of how far each node of the row-wire is pressed down, in mm; instead of --targets, which are then the
-    /// coordinates of its nodes (x, y, z of each) where the nominal sensor has them
+    /// Columns with the depth of each node of the row-wire in mm, as an alternative to --targets with the coordinates of
+    /// its nodes (x, y, z of each) in the frame of the nominal sensor
     #[arg(long, value_name = "COLUMNS", value_delimiter = ',', conflicts_with = "targets")]
     depths: Vec<String>,
 }
 
 impl FrameArguments {
-    /// Reads the frames of presses within `limits`: a sample is a row-wire, its targets are the coordinates of its nodes as
-    /// `sensor` places them.
+    /// Reads the frames of presses within `limits`: a sample is a row-wire, and its targets are the coordinates of its
+    /// nodes in the frame of `sensor`.
     pub(super) fn read(&self, sensor: &SensorModel, limits: PressLimits, is_json: bool) -> Result<Dataset, Failure> {
         let has_depths = !self.depths.is_empty();
         let plan = if has_depths {
@@ -220,7 +218,7 @@ impl FrameArguments {
     }
 }
 
-/// Returns `set`, whose targets are how far each node is pressed, with the coordinates of the nodes instead.
+/// Replaces the targets of `set`, the depths of the nodes, by the coordinates of the nodes.
 fn coordinates_of_depths(set: Dataset, row_wires: &[usize], sensor: &SensorModel) -> Dataset {
     let outputs = sensor.scale.coordinates_per_row();
     let coordinates = Array2::from_shape_fn((set.samples(), outputs), |(sample, output)| {
@@ -229,7 +227,7 @@ fn coordinates_of_depths(set: Dataset, row_wires: &[usize], sensor: &SensorModel
         sensor.displaced_mm(row_wires[sample], node, pressed)[axis]
     });
     let (readings, groups) = (set.readings().to_owned(), set.groups().to_vec());
-    Dataset::new(readings, coordinates, Some(row_wires), groups).expect("the parts are those of a set")
+    Dataset::new(readings, coordinates, Some(row_wires), groups).expect("the parts come from a valid set")
 }
 
 /// Number of row-wires that the network of `file` reads; 1 for a recording whose row-wires share a network.
@@ -243,7 +241,7 @@ pub(super) fn rows_read(file: &NetworkFile) -> Result<usize, Failure> {
     }
 }
 
-/// Writes the names of the targets of `rows` row-wires, and of the columns that count what is outside the training range.
+/// Writes the header: the targets of `rows` row-wires, and the counts of values outside the training range.
 pub(super) fn write_heading(problem: &Problem, rows: usize, out: &mut dyn Write) -> io::Result<()> {
     if problem.has_nodes {
         return write_decoded_header(rows * problem.targets.len() / 3, out);
@@ -255,7 +253,7 @@ pub(super) fn write_heading(problem: &Problem, rows: usize, out: &mut dyn Write)
     writer.flush()
 }
 
-/// Lines that are listed one by one; a damaged file may have thousands.
+/// Maximum number of lines listed individually; a damaged file may have thousands.
 const MAX_LISTED: usize = 10;
 
 /// Lines with readings or targets outside the range seen in training, where a network extrapolates.
@@ -266,9 +264,9 @@ pub(super) struct OutsideTraining<'a> {
     listed: Vec<String>,
 }
 
-/// Readings and targets of one line that are outside.
+/// Readings and targets of one line outside the training range.
 pub(super) struct LineOutside {
-    /// Number of readings; `None` if their range in training is not known.
+    /// Number of readings; `None` if their training range is unknown.
     pub(super) readings: Option<usize>,
     /// Number of targets.
     pub(super) targets: usize,
@@ -284,7 +282,7 @@ impl<'a> OutsideTraining<'a> {
         }
     }
 
-    /// Counts what of a line is outside.
+    /// Counts the readings and targets of a line outside the training range.
     pub(super) fn count(
         &mut self,
         network: &DecouplingNetwork,
@@ -358,8 +356,8 @@ fn described(channel: &Channel, value: f64, (low, high): (f64, f64)) -> String {
 
 /// Continue the training of a network on frames of known presses of the real sensor
 ///
-/// The frames are given as for calibrate. A fifth of them, whole frames at random, is not trained on and measures the error
-/// before and after; a fifth of the others selects the weights with the lowest error, which may be those of the network given.
+/// The frames are given as for calibrate. A random fifth of the frames is held out to measure the error before and after;
+/// a fifth of the others selects the weights with the lowest error, which may be those of the given network.
 #[derive(Args)]
 pub(super) struct FineTune {
     /// Network saved by train --sensor
@@ -387,7 +385,7 @@ struct Report {
     /// Mean error of z on the test frames, in mm.
     z_mm_before: f64,
     z_mm_after: f64,
-    /// The same on the simulated test set of the network, in mm.
+    /// Mean error of z on the simulated test set of the network, in mm.
     simulated_z_mm_before: f64,
     simulated_z_mm_after: f64,
 }
@@ -438,7 +436,7 @@ impl FineTune {
             simulated_z_mm_before: file.scores.network.nodes().map_or(f64::NAN, |errors| errors.z_mm),
             simulated_z_mm_after: errors(&simulated, &tuned).z_mm,
         };
-        // Its errors stay those on the simulated test set, where the baselines are listed.
+        // The errors in the file remain those on the simulated test set, to which the baselines refer.
         file.scores.network = TestErrors::Nodes(errors(&simulated, &tuned));
         file.network = tuned;
         file.save(&self.out)?;
@@ -467,7 +465,7 @@ impl FineTune {
             if report.z_mm_after >= report.z_mm_before {
                 writeln!(
                     out,
-                    "Warning: the frames did not lower the error on the test frames: keep the network as it was, or give more \
+                    "Warning: the frames did not lower the error on the test frames: keep the original network, or give more \
                      frames"
                 )?;
             }

@@ -1,4 +1,4 @@
-//! Errors of an answer in JSON: of the nodes of an array, or of each target of a recording.
+//! Errors of a decoder in JSON: of the nodes of an array, or of each target of a recording.
 
 use std::io::{self, Write};
 
@@ -13,9 +13,9 @@ use serde::Serialize;
 #[derive(Serialize)]
 #[serde(untagged)]
 pub(super) enum ErrorsReport<'a> {
-    /// On the nodes of an array.
+    /// Errors of the nodes of an array.
     Nodes { z_percent: Option<f64>, z_mm: f64 },
-    /// Target by target.
+    /// Errors of each target.
     Targets {
         /// Mean absolute error in percent of the range, averaged over the targets.
         percent_of_range: Option<f64>,
@@ -31,7 +31,7 @@ pub(super) struct Target<'a> {
     rmse: f64,
     mae: f64,
     r2: Option<f64>,
-    /// 95 % confidence interval of R², of the network.
+    /// 95 % confidence interval of R² of the network.
     #[serde(skip_serializing_if = "Option::is_none")]
     r2_interval: Option<[f64; 2]>,
     worst: f64,
@@ -53,8 +53,8 @@ impl<'a> ErrorsReport<'a> {
     }
 }
 
-/// Returns the errors of the targets `channels`; `determined` are the coefficients of determination with their intervals, if they were
-/// measured.
+/// Returns the errors of the targets `channels`; `determined` are the coefficients of determination with their intervals,
+/// if they were measured.
 pub(super) fn targets<'a>(
     channels: &'a [Channel],
     errors: &TestErrors,
@@ -80,8 +80,8 @@ pub(super) fn targets<'a>(
 /// Width of the plot in characters.
 const WIDTH: usize = 64;
 
-/// Writes the spread of the results of several starts: a table, and a box plot of the error on the test set, called
-/// `error_name`, above a strip of the starts.
+/// Writes the spread of the results of several starts: a table, and a box plot of the test error, called `error_name`,
+/// above a strip plot of the starts.
 pub(super) fn write_starts(starts: &[StartRecord], error_name: &str, out: &mut dyn Write) -> io::Result<()> {
     let Some(best) = best_start(starts) else { return Ok(()) };
     let held_out = starts.iter().all(|start| start.validation_mse.is_some());
@@ -128,7 +128,7 @@ pub(super) fn write_starts(starts: &[StartRecord], error_name: &str, out: &mut d
     }
 }
 
-/// A box plot and the strip below it.
+/// A box plot and the strip plot below it.
 fn plot(spread: &Spread, values: &[f64], kept: f64) -> [String; 2] {
     let column = |value: f64| {
         let share = (value - spread.smallest) / (spread.largest - spread.smallest);
@@ -166,7 +166,7 @@ mod tests {
     }
 
     #[test]
-    fn the_plot_shows_quartiles_and_the_start_that_is_kept() {
+    fn the_plot_shows_quartiles_and_the_kept_start() {
         let starts = [start(3.0, 1.0), start(1.0, 2.0), start(2.0, 4.15), start(5.0, 7.3)];
         let mut text = Vec::new();
         write_starts(&starts, "test Z %", &mut text).unwrap();
@@ -186,7 +186,7 @@ mod tests {
     }
 
     #[test]
-    fn starts_that_all_end_alike_need_no_plot() {
+    fn equal_starts_have_no_plot() {
         let mut text = Vec::new();
         write_starts(&[start(1.0, 2.0); 3], "test Z %", &mut text).unwrap();
         assert_eq!(String::from_utf8(text).unwrap().lines().count(), 4);

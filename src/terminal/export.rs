@@ -13,24 +13,23 @@ use serde::Serialize;
 
 use super::{failure::Failure, samples::sets};
 
-/// Write a decoder for other programs, and verify what was written
+/// Write a decoder for other programs, and verify it
 ///
-/// The exported decoder of a simulated array takes the resistances of one row-wire in ohm (r_1, r_2, …, one for each column-wire) and gives
-/// the coordinates of its nodes in mm (x_1, y_1, z_1, x_2, …), as decode does; scaling, conductances or logarithms, and
-/// constant coordinates are part of it. The decoder of a recording (train --data) takes its inputs and gives its targets, in their
-/// units. Decoders of known rows leave as one, which also takes the number of the row-wire,
-/// from 1.
+/// The exported decoder of a simulated array takes the resistances of one row-wire in ohm (r_1, r_2, …, one per
+/// column-wire) and returns the coordinates of its nodes in mm (x_1, y_1, z_1, x_2, …), as decode does; it includes
+/// scaling, conversion to conductances or logarithms, and constant coordinates. The decoder of a recording (train --data)
+/// takes its inputs and returns its targets in their units. Decoders of known rows are exported as one, which also takes
+/// the number of the row-wire from 1.
 ///
-/// Decoders other than the network are fitted again: to the training samples of the network file, which are drawn again from
-/// its settings or imported again from its recording.
+/// Decoders other than the network are fitted to the training samples of the network file, which are drawn again from its
+/// settings or imported again from its recording.
 ///
-/// What was written is read back, evaluated, and compared with the decoder on readings of its scene and on the extremes of
-/// its training range: the largest deviation is shown, relative to the widest range of a coordinate in training. A bundle
+/// The bundle is read back, evaluated, and compared with the decoder on readings of its scene and at the limits of its
+/// training range: the largest deviation is reported, relative to the widest training range of a coordinate. A bundle
 /// that deviates by more than 1e-12 (f64) or 1e-5 (f32), or in fixed16 by more than its proven bound, is not written,
-/// unless the decoder itself magnifies rounding errors further, which is then reported. A bundle in f32 also takes its
-/// readings in single precision: the change by rounding them to it is reported too, and a bundle that it changes by more
-/// than 1 % is not written. The bundle is a folder (for json a file) with golden vectors and a README.txt that shows how to
-/// call it.
+/// unless the decoder itself amplifies rounding errors further, which is then reported. A bundle in f32 also takes its
+/// readings in single precision: the effect of rounding the readings is reported too, and if it exceeds 1 % the bundle is
+/// not written. The bundle is a folder (for json a file) with golden vectors and a README.txt that shows how to call it.
 #[derive(Args)]
 pub(super) struct Export {
     /// Network saved by train --out or by the window
@@ -40,11 +39,11 @@ pub(super) struct Export {
     decoder: BundleDecoder,
     #[arg(long, value_name = "FORMAT", help = BundleFormat::help())]
     format: BundleFormat,
-    /// Numbers in which it decodes. f64: double precision; f32: single precision (onnx, c99, numpy); fixed16: whole numbers
-    /// with 16-bit weights (networks, c99), which reads whole numbers of nano-, micro- or milliohm and gives nanometres
+    /// Arithmetic of the decoder. f64: double precision; f32: single precision (onnx, c99, numpy); fixed16: integers with
+    /// 16-bit weights (networks, c99), which takes integers in nano-, micro- or milliohm and returns nanometres
     #[arg(long, value_name = "f64|f32|fixed16", default_value_t)]
     precision: BundlePrecision,
-    /// Folder to be made (for json the file), which must not exist or be an empty folder
+    /// Folder to create (for json the file), which must not exist or must be an empty folder
     #[arg(long, value_name = "PATH")]
     out: PathBuf,
     /// Print one JSON object instead of text
@@ -86,19 +85,19 @@ struct Report<'a> {
     verified_vectors: usize,
     golden_vectors: usize,
     checks: Vec<Check>,
-    /// Largest of all checks; like these relative to `output_range_mm`, or for a recording to the range of each target.
+    /// Maximum of all checks, relative to `output_range_mm`, or for a recording to the range of each target.
     deviation: f64,
     limit: f64,
-    /// Of `f32`: by rounding the readings alone.
+    /// Change by rounding only the readings, for `f32`.
     #[serde(skip_serializing_if = "Option::is_none")]
     change_by_rounding_readings: Option<Rounding>,
     #[serde(skip_serializing_if = "Option::is_none")]
     output_range_mm: Option<f64>,
     deviation_of_decode: f64,
-    /// In mm, of any coordinate of an array.
+    /// Error bound for all coordinates of an array, in mm.
     #[serde(skip_serializing_if = "Option::is_none")]
     error_bound_mm: Option<f64>,
-    /// Of each target of a recording, in its unit.
+    /// Error bound of each target of a recording, in its unit.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     error_bounds: Vec<Bound<'a>>,
     remarks: &'a [String],
@@ -121,7 +120,7 @@ struct Bound<'a> {
 struct Check {
     evaluator: &'static str,
     deviation: f64,
-    /// Without the rounding of the readings.
+    /// Excludes the rounding of the readings.
     deviation_of_arithmetic: f64,
 }
 
@@ -170,7 +169,7 @@ pub(super) fn print_json(report: &BundleReport) -> Result<(), Failure> {
     writeln!(stdout).map_err(Failure::Output)
 }
 
-/// Prints what was written, and how far it is from the network.
+/// Prints the files, and the deviations from the network.
 pub(super) fn print_text(report: &BundleReport) -> Result<(), Failure> {
     let (inputs, relative) = match report.output_range_mm {
         Some(range) => (

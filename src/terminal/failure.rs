@@ -23,7 +23,7 @@ use thiserror::Error;
 
 use super::interruption;
 
-/// Reasons for which a command fails.
+/// Reason why a command failed.
 #[derive(Debug, Error)]
 pub(super) enum Failure {
     #[error("{0}")]
@@ -52,7 +52,7 @@ pub(super) enum Failure {
     Import(#[from] ImportError),
     #[error(transparent)]
     Setup(SetupError),
-    #[error("'{}': its recording '{}' is missing; give --data FILE, where it is now", .checkpoint.display(), .recording.display())]
+    #[error("'{}': its recording '{}' is missing; give its new path with --data FILE", .checkpoint.display(), .recording.display())]
     MissingRecording { checkpoint: PathBuf, recording: PathBuf },
     #[error("'{}' is the network of a recording: {reason}", .path.display())]
     NoArray { path: PathBuf, reason: &'static str },
@@ -89,7 +89,7 @@ pub(super) enum Failure {
     },
     #[error(transparent)]
     Source(SourceError),
-    #[error("cannot start to read: {}", system_cause(.0))]
+    #[error("cannot start reading: {}", system_cause(.0))]
     Reader(io::Error),
     #[error("{input} is lost: {}; connect it again", system_cause(.source))]
     Lost { input: Source, source: io::Error },
@@ -105,7 +105,7 @@ pub(super) enum Failure {
     NothingDecoded { input: Source, reason: String },
     #[error(transparent)]
     Sensor(SensorError),
-    #[error("cannot make the folder '{}': {}", .path.display(), system_cause(.source))]
+    #[error("cannot create the folder '{}': {}", .path.display(), system_cause(.source))]
     MakeFolder { path: PathBuf, source: io::Error },
     #[error(transparent)]
     Write(#[from] WriteError),
@@ -134,10 +134,10 @@ pub(super) enum Failure {
     NoAnswer { path: PathBuf, line: u64 },
 }
 
-/// A training that Ctrl-C has stopped.
+/// A training stopped by Ctrl-C.
 #[derive(Debug)]
 pub(super) struct Interruption {
-    /// Last epoch that was completed.
+    /// Last completed epoch.
     pub(super) epoch: usize,
     /// Command that resumes the training.
     pub(super) resume: Option<String>,
@@ -154,8 +154,8 @@ impl fmt::Display for Interruption {
 }
 
 fn joined(errors: &[PictureError]) -> String {
-    let told: Vec<_> = errors.iter().map(ToString::to_string).collect();
-    told.join("; ")
+    let messages: Vec<_> = errors.iter().map(ToString::to_string).collect();
+    messages.join("; ")
 }
 
 impl From<SettingError> for Failure {
@@ -183,10 +183,10 @@ impl From<ExperimentError> for Failure {
     }
 }
 
-/// The cure of an import in arguments.
+/// The cure of an import error in terms of arguments.
 fn in_arguments(cure: &Cure) -> String {
     match cure {
-        Cure::CallMissing(text) => format!("correct it, or say that it means missing with --missing \"{text}\""),
+        Cure::CallMissing(text) => format!("correct it, or declare it as missing with --missing \"{text}\""),
         Cure::NameTimes => "name the columns of their times with --time and --join-time".to_owned(),
         Cure::NameJoinedTime => "name it with --join-time".to_owned(),
         Cure::GiveLimit => "give the limit with --join-limit".to_owned(),
@@ -212,7 +212,7 @@ impl Failure {
                 | ImportError::Condition { .. }
                 | ImportError::Division(_),
             ) => 2,
-            Self::Run(error) if comes_of_arguments(error) => 2,
+            Self::Run(error) if is_argument_error(error) => 2,
             Self::Simulation(SimulationError::Count(_) | SimulationError::Scene(_)) => 2,
             Self::Interrupted(_)
             | Self::InterruptedComparison { .. }
@@ -223,7 +223,7 @@ impl Failure {
         }
     }
 
-    /// Returns true if the reader of the output has closed it, which is no failure.
+    /// Returns `true` if the reader of the output has closed it, which is not a failure.
     pub(super) fn is_broken_pipe(&self) -> bool {
         match self {
             Self::Output(error) | Self::Write(WriteError::Io { source: error, .. }) => {
@@ -234,8 +234,8 @@ impl Failure {
     }
 }
 
-/// Returns true for arguments that are each possible, but not together: other arguments are the cure.
-fn comes_of_arguments(error: &RunError) -> bool {
+/// Returns `true` for arguments that are valid individually but not together.
+fn is_argument_error(error: &RunError) -> bool {
     matches!(
         error,
         RunError::Count(_)
@@ -249,7 +249,7 @@ fn comes_of_arguments(error: &RunError) -> bool {
     )
 }
 
-/// Most trials of a sweep. Every program that works on one reads all of them.
+/// Maximum number of trials of a sweep. Every program that works on a sweep reads all of them.
 pub(super) const MAX_TRIALS: usize = 100_000;
 
 /// Errors of a specification.
@@ -258,7 +258,7 @@ pub(super) enum SpecificationError {
     #[error("cannot read '{}': {}", .path.display(), system_cause(.source))]
     Read { path: PathBuf, source: io::Error },
     #[error(
-        "'{}' is no specification: {message}; write {{\"train\": {{OPTION: VALUE, ...}}, \"axes\": {{OPTION: [VALUE, ...], \
+        "'{}' is not a specification: {message}; write {{\"train\": {{OPTION: VALUE, ...}}, \"axes\": {{OPTION: [VALUE, ...], \
          ...}}}} with the options of decoupler train",
         .path.display()
     )]

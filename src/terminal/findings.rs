@@ -1,4 +1,4 @@
-//! Findings on a recording, in the terminal.
+//! Analysis of a recording in the terminal.
 
 use std::io::{self, Write};
 
@@ -34,17 +34,17 @@ use super::{
     seed,
 };
 
-// Models that are fitted to measure how well the readings determine the targets.
+// Models fitted to measure how well the readings determine the targets.
 #[derive(Args)]
 pub(super) struct StudyArguments {
-    /// Columns that the sensor gives; with --targets, how well they determine the targets is measured and printed
+    /// Columns of the sensor readings; with --targets, measure how well they determine the targets
     #[arg(long, value_name = "COLUMNS", value_delimiter = ',')]
     pub(super) inputs: Vec<String>,
     /// Hidden nodes of the networks [default: 12]
     #[arg(long, value_name = "N", value_parser = count(1..=LARGEST_HIDDEN))]
     hidden: Option<usize>,
-    /// What is fitted without each channel and to fewer samples; with ridge, no network is trained [default: the network
-    /// where it is better]
+    /// Model fitted without each channel and to fewer samples; with ridge, no network is trained [default: network where
+    /// it is better]
     #[arg(long, value_name = "ridge|network", value_parser = model())]
     model: Option<FittedModel>,
     /// Seed of all random numbers [default: 0]
@@ -65,7 +65,7 @@ impl StudyArguments {
         !self.inputs.is_empty() || self.hidden.is_some() || self.model.is_some() || self.seed.is_some()
     }
 
-    /// Measures how well the readings of a recording determine its targets, and prints it.
+    /// Measures and prints how well the readings of a recording determine its targets.
     pub(super) fn run(&self, import: &ImportArguments, is_json: bool) -> Result<(), Failure> {
         const FOLDS: usize = 5;
         let plan = import.plan(&self.inputs)?;
@@ -104,7 +104,7 @@ pub(super) struct Report<'a> {
     folds: usize,
     hidden: usize,
     seed: u64,
-    /// Model behind the worth of the channels and the learning curves.
+    /// Model used for channel importances and learning curves.
     model: &'static str,
     targets: Vec<Target<'a>>,
     channels: Vec<Worth<'a>>,
@@ -115,20 +115,20 @@ pub(super) struct Report<'a> {
 struct Target<'a> {
     name: &'a str,
     unit: Option<&'a str>,
-    /// Of the better of network and ridge.
+    /// R² of the better of network and ridge.
     r2: Option<Figure>,
     better: Option<&'static str>,
-    /// determined, weakly determined or not determined.
+    /// `determined`, `weakly determined` or `not determined`.
     standing: Option<&'static str>,
     sentence: String,
     r2_network: Option<Figure>,
     r2_ridge: Option<Figure>,
-    /// RMSE of the network in proportion to that of ridge.
+    /// RMSE of the network relative to that of ridge.
     network_to_ridge: Option<Figure>,
     /// RMSE of the network and of ridge with honest and with random folds.
     splits: Option<Splits>,
     learning_curve: Vec<Point>,
-    /// RMSE with twice the samples in proportion to that with all.
+    /// RMSE with twice the samples relative to that with all samples.
     with_twice_the_samples: Option<Figure>,
     outlook: String,
 }
@@ -158,7 +158,7 @@ struct Point {
     largest: f64,
 }
 
-/// Growth of the error of each target without a channel.
+/// Increase of the error of each target without a channel.
 #[derive(Serialize)]
 struct Worth<'a> {
     name: &'a str,
@@ -230,7 +230,7 @@ impl<'a> Report<'a> {
             write_files(&self.files, self.rows, self.dropped, out)?;
             writeln!(
                 out,
-                "{} samples, {} folds by {}; intervals of 95 % from stretches or groups of samples\n",
+                "{} samples, {} folds by {}; 95 % confidence intervals from blocks or groups of samples\n",
                 self.samples, self.folds, self.split
             )?;
             self.write_targets(out)?;
@@ -287,7 +287,7 @@ impl<'a> Report<'a> {
         }
         writeln!(
             out,
-            "Error (RMSE) without a channel, in proportion to that with all of them (fits: {})",
+            "Error (RMSE) without a channel, relative to the error with all channels (model: {})",
             self.model
         )?;
         let row = |channel: &Worth<'_>| {
@@ -311,7 +311,7 @@ impl<'a> Report<'a> {
         };
         writeln!(
             out,
-            "Test error (RMSE) by the number of training samples (fits: {})",
+            "Test error (RMSE) by number of training samples (model: {})",
             self.model
         )?;
         let row = |(index, point): (usize, &Point)| {

@@ -1,4 +1,4 @@
-//! Lines as they come, parsed for the network that decodes them.
+//! Live decoding: lines are parsed and decoded as they arrive.
 
 use std::{
     fmt,
@@ -33,32 +33,32 @@ use super::{
     number,
 };
 
-// Decoding of frames as they come.
+// Decoding of live frames.
 #[derive(Args)]
 pub(super) struct Follow {
-    /// Decode frames as they come, each answer written to standard output at once
+    /// Decode frames as they arrive, writing each answer to standard output at once
     ///
-    /// --input is then - for standard input, a file or pipe, a serial port as DEVICE:BAUD, or tcp:HOST:PORT. A line is a
-    /// row-wire as without --follow, also with the number of the row before the resistances, or a whole snapshot, row by
-    /// row. From a file or pipe every line is decoded; from a port or socket the latest, once a line has waited for 0.1 s.
-    /// Bad lines are counted and reported.
+    /// --input is then - for standard input, a file or pipe, a serial port as DEVICE:BAUD, or tcp:HOST:PORT. A line has
+    /// the resistances of one row-wire as without --follow, optionally after its row number, or of a whole snapshot, row
+    /// by row. From a file or pipe every line is decoded; from a port or socket, older lines are dropped once a line has
+    /// waited for 0.1 s. Bad lines are counted and reported.
     #[arg(long, conflicts_with = "output")]
     pub(super) follow: bool,
-    /// With --follow: form of the answers [default: csv]
+    /// With --follow: output format [default: csv]
     #[arg(long, value_name = "csv|jsonl", hide_possible_values = true)]
     format: Option<Form>,
     /// With --follow: report rate and latency on standard error every N seconds; always at the end, and on SIGUSR1
     #[arg(long, value_name = "SECONDS", value_parser = number)]
     report: Option<f64>,
-    /// With --follow: relative noise of the readings (standard deviation) by which faults are judged [default: that of the
-    /// network's scene]
+    /// With --follow: relative noise of the readings (standard deviation) assumed in fault detection [default: that of
+    /// the network's scene]
     #[arg(long, value_name = "REL", value_parser = number)]
     noise: Option<f64>,
 }
 
-/// Longest wait for a line between looks at requests for a report and for the end.
+/// Timeout of waiting for a line, after which requests for a report and to stop are checked.
 const WAIT: Duration = Duration::from_millis(100);
-/// Shortest time between checks for faults of frames from a device, so that they cost no frame.
+/// Minimum time between fault checks of frames from a device, so that no frame is dropped because of them.
 const BETWEEN_CHECKS: Duration = Duration::from_millis(10);
 
 impl Follow {
@@ -75,8 +75,8 @@ impl Follow {
         }
     }
 
-    /// Gives every line of `source` to `take`, until it ends or fails, or until Ctrl-C; of a device, `kept` lines are kept at
-    /// first. Reports as asked, on SIGUSR1, and at the end.
+    /// Passes every line of `source` to `take`, until the source ends or fails, or until Ctrl-C. For a device, `kept`
+    /// lines are kept initially. Reports at the requested interval, on SIGUSR1, and at the end.
     fn follow(
         &self,
         source: Source,
@@ -84,7 +84,7 @@ impl Follow {
         mut take: impl FnMut(Line<'_>, &mut Report) -> Result<Kept, Failure>,
     ) -> Result<(), Failure> {
         let asked = Arc::new(AtomicBool::new(false));
-        // Without the signal there are still reports every so often and at the end.
+        // Without the signal there are still reports at intervals and at the end.
         #[cfg(unix)]
         let _ = signal_hook::flag::register(signal_hook::consts::SIGUSR1, Arc::clone(&asked));
         let opened = source.open().map_err(Failure::Source)?;
@@ -96,7 +96,7 @@ impl Follow {
         let every = self.report.map(Duration::from_secs_f64);
         let end = loop {
             if asked.swap(false, Ordering::SeqCst) || every.is_some_and(|every| report.is_due(every)) {
-                report.tell(lines.dropped());
+                report.print(lines.dropped());
             }
             if graceful.is_end_requested() {
                 break Err(Failure::InterruptedFollow);
@@ -116,11 +116,11 @@ impl Follow {
                 Err(failure) => break Err(failure),
             }
         };
-        report.tell(lines.dropped());
+        report.print(lines.dropped());
         end
     }
 
-    /// The source that `input` names, after a check of the other arguments.
+    /// Source named by `input`, after a check of the other arguments.
     fn source(&self, input: &Path) -> Result<Source, Failure> {
         let input = input
             .to_str()
@@ -136,7 +136,8 @@ impl Follow {
     pub(super) fn run(&self, input: &Path, file: &NetworkFile) -> Result<(), Failure> {
         let simulated = file.settings.simulated();
         if simulated.is_none() && self.noise.is_some() {
-            let reason = "the network of a recording has no model of a sensor to judge its faults; leave it out";
+            let reason =
+                "fault detection needs a sensor model, which the network of a recording does not have; leave it out";
             return Err(wrong("--noise", reason));
         }
         let source = self.source(input)?;
@@ -171,7 +172,7 @@ impl Follow {
                 Ok(true) => report.good(read_at.elapsed()),
                 Ok(false) => {
                     report.bad(&format_args!(
-                        "line {number}: readings so far from the training range that the network has no answer"
+                        "line {number}: the readings are so far outside the training range that the network's output is not a finite number"
                     ));
                     return Ok(Kept::AsBefore);
                 }
@@ -190,11 +191,11 @@ impl Follow {
     }
 }
 
-/// Lines of a device that are kept while others come.
+/// Lines of a device that are kept when older ones are dropped.
 enum Kept {
-    /// As many as before.
+    /// The same number as before.
     AsBefore,
-    /// Only the latest.
+    /// Only the latest line.
     Latest,
 }
 
@@ -213,7 +214,7 @@ fn wrong(argument: &str, reason: impl std::fmt::Display) -> Failure {
 pub(super) enum Parser {
     /// Resistances, row by row or in whole snapshots.
     Array(Box<LineParser>),
-    /// Columns under the names of the inputs.
+    /// Columns named like the inputs.
     Columns(Box<InputLines>),
 }
 
@@ -224,7 +225,7 @@ pub(super) enum ParseError {
 }
 
 impl Parser {
-    /// Prepares to read lines for the network of `file`. `is_complete` is true if no line of the input is lost.
+    /// Prepares to parse lines for the network of `file`. `is_complete` is true if no line of the input is lost.
     pub(super) fn new(file: &NetworkFile, is_complete: bool) -> Result<Self, Failure> {
         Ok(match file.settings.source.simulation() {
             Some(simulation) => {
@@ -258,7 +259,7 @@ impl Parser {
 }
 
 impl ParseError {
-    /// Returns true if the later lines cannot be decoded either.
+    /// Returns `true` if later lines cannot be decoded either.
     pub(super) fn is_final(&self) -> bool {
         match self {
             Self::Array(error) => error.is_final(),
@@ -266,7 +267,7 @@ impl ParseError {
         }
     }
 
-    /// The failure of a program that stops at this error in the lines of `input`.
+    /// Converts the error, at which the program stops, into a failure in the lines of `input`.
     pub(super) fn failure(self, input: Source) -> Failure {
         match self {
             Self::Array(error) => Failure::Line(input, error),
@@ -284,11 +285,11 @@ impl fmt::Display for ParseError {
     }
 }
 
-/// Looks for faults in the frames that lines make up, and reports them.
+/// Checks the frames composed of the lines for faults, and reports them.
 pub(super) struct Faults {
     watch: Option<Watch>,
-    /// `true` once it was informed that lines do not say their row-wire.
-    is_told: bool,
+    /// True once it was reported that lines without a row number are not checked.
+    is_reported: bool,
 }
 
 struct Watch {
@@ -296,7 +297,7 @@ struct Watch {
     left_out: LeftOutDecoder,
     /// Latest readings of every row read: rows × M4.
     frame_ohm: Vec<f64>,
-    /// Rows of which readings came since the last check.
+    /// True for rows with readings since the last check.
     is_new: Vec<bool>,
     columns: usize,
 }
@@ -312,17 +313,19 @@ impl Faults {
         }
         let scale = sensor.scale;
         let reason = if scene.noise.in_test().is_none() {
-            Some("the network was trained without noise to judge them by; give --noise REL")
+            Some(
+                "fault detection needs the noise of the readings, and the network was trained without noise; give --noise REL",
+            )
         } else if !FaultMonitor::is_affordable(scale, &scene) {
-            Some("the array is too large for it")
+            Some("the array is too large")
         } else {
             None
         };
         if let Some(reason) = reason {
-            tell(&format!("faults of wires are not looked for: {reason}"));
+            warn(&format!("wires are not checked for faults: {reason}"));
             return Ok(Self {
                 watch: None,
-                is_told: true,
+                is_reported: true,
             });
         }
         let rows = scene.rows.read(scale.rows()).map_err(SimulationError::from)?;
@@ -334,25 +337,25 @@ impl Faults {
                 is_new: vec![false; rows.len()],
                 columns: scale.columns(),
             }),
-            is_told: false,
+            is_reported: false,
         })
     }
 
-    /// Looks for nothing, where there is no model of the sensor.
+    /// Checks nothing, for networks without a sensor model.
     pub(super) fn none() -> Self {
         Self {
             watch: None,
-            is_told: true,
+            is_reported: true,
         }
     }
 
-    /// The decoder that leaves out the wires of a named fault, if there is one, with the latest readings of every row read.
+    /// Decoder that leaves out the wires of the reported fault, if any, with the latest readings of every row read.
     pub(super) fn left_out(&mut self) -> Option<(&mut LeftOutDecoder, &[f64])> {
         let watch = self.watch.as_mut()?;
         Some((&mut watch.left_out, &watch.frame_ohm))
     }
 
-    /// Takes the readings of a line; returns `true` if all rows have come since the last check.
+    /// Stores the readings of a line; returns `true` if all rows have new readings since the last check.
     pub(super) fn take(&mut self, line: u64, parsed: ParsedLine<'_>) -> bool {
         let Some(watch) = &mut self.watch else { return false };
         match parsed {
@@ -367,11 +370,11 @@ impl Faults {
                 watch.frame_ohm.copy_from_slice(readings_ohm);
                 watch.is_new.fill(true);
             }
-            ParsedLine::Row { row_index: None, .. } if !self.is_told => {
-                self.is_told = true;
-                tell(&format!(
-                    "line {line}: faults of wires are not looked for in lines that do not say their row-wire; name a \
-                     column row, or send whole snapshots in one line"
+            ParsedLine::Row { row_index: None, .. } if !self.is_reported => {
+                self.is_reported = true;
+                warn(&format!(
+                    "line {line}: wires are not checked for faults, because the line has no row number; add a column named \
+                     row, or send whole snapshots in one line"
                 ));
             }
             ParsedLine::Row { .. } | ParsedLine::NoReadings => {}
@@ -379,22 +382,22 @@ impl Faults {
         watch.is_new.iter().all(|is_new| *is_new)
     }
 
-    /// Checks the latest readings, and tells what they have made known.
+    /// Checks the latest readings, and reports changes.
     pub(super) fn check(&mut self, line: u64) {
         let Some(watch) = &mut self.watch else { return };
         watch.is_new.fill(false);
         match watch.monitor.check(&watch.frame_ohm) {
             Some(FaultEvent::Named(fault)) => {
-                tell(&format!(
-                    "line {line}: {fault}; left out from here on, by Gauss-Newton steps on the other readings"
+                warn(&format!(
+                    "line {line}: {fault}; left out from here on; its row is decoded from the other readings by the Gauss-Newton method"
                 ));
             }
-            Some(FaultEvent::Unexplained) => tell(&format!(
-                "line {line}: the readings contradict Eq. (2), and no fault of a single wire explains them: the answers may \
+            Some(FaultEvent::Unexplained) => warn(&format!(
+                "line {line}: the readings contradict Eq. (2), and no single-wire fault explains them: the answers may \
                  be wrong; check the wiring, the geometry and the order of the rows"
             )),
             Some(FaultEvent::Recovered) => {
-                tell(&format!(
+                warn(&format!(
                     "line {line}: the readings agree with Eq. (2) again; all wires are used"
                 ));
             }
@@ -404,7 +407,7 @@ impl Faults {
     }
 }
 
-fn tell(message: &str) {
+fn warn(message: &str) {
     // There is no one to report to if this fails.
     let _ = writeln!(stderr(), "warning: {message}");
 }

@@ -18,23 +18,23 @@ use super::{
     failure::Failure,
 };
 
-/// Counts of what came, and messages on standard error.
+/// Counts of decoded and bad lines, and messages on standard error.
 pub(super) struct Report {
     source: Source,
     begin: Instant,
     last: Instant,
     latencies: Latencies,
     bad: u64,
-    /// Reason of the first bad line.
+    /// Error in the first bad line.
     first_bad: Option<String>,
-    /// Bad lines that were not told.
-    untold: u64,
-    last_told: Instant,
+    /// Number of bad lines since the last message.
+    unreported: u64,
+    last_reported: Instant,
 }
 
-/// Bad lines that are told one by one; after them at most one a second.
-const TOLD: u64 = 10;
-const BETWEEN_TOLD: Duration = Duration::from_secs(1);
+/// Number of bad lines that are reported individually; after them at most one per second.
+const MAX_REPORTED: u64 = 10;
+const REPORT_INTERVAL: Duration = Duration::from_secs(1);
 
 impl Report {
     pub(super) fn new(source: Source) -> Self {
@@ -46,8 +46,8 @@ impl Report {
             latencies: Latencies::default(),
             bad: 0,
             first_bad: None,
-            untold: 0,
-            last_told: now,
+            unreported: 0,
+            last_reported: now,
         }
     }
 
@@ -55,42 +55,42 @@ impl Report {
         &self.source
     }
 
-    /// Counts an answer that was flushed so long after its line was read.
+    /// Counts an answer and its latency, from reading the line to flushing the answer.
     pub(super) fn good(&mut self, latency: Duration) {
         self.latencies.add(latency);
     }
 
-    /// Counts a bad line and reports it, unless many were told.
+    /// Counts a bad line and reports it, unless there are too many.
     pub(super) fn bad(&mut self, reason: &dyn Display) {
         self.bad += 1;
         self.first_bad.get_or_insert_with(|| reason.to_string());
-        if self.bad > TOLD && self.last_told.elapsed() < BETWEEN_TOLD {
-            self.untold += 1;
+        if self.bad > MAX_REPORTED && self.last_reported.elapsed() < REPORT_INTERVAL {
+            self.unreported += 1;
             return;
         }
-        self.last_told = Instant::now();
+        self.last_reported = Instant::now();
         let mut stderr = stderr().lock();
         // There is no one to report to if writing fails.
-        let _ = match self.untold {
+        let _ = match self.unreported {
             0 => writeln!(stderr, "warning: {reason}"),
-            untold => writeln!(
+            unreported => writeln!(
                 stderr,
-                "warning: {reason} ({untold} other bad lines since the last message)"
+                "warning: {reason} ({unreported} other bad lines since the last message)"
             ),
         };
-        self.untold = 0;
+        self.unreported = 0;
         if let Source::Serial { baud, .. } = self.source
-            && self.bad == TOLD
+            && self.bad == MAX_REPORTED
             && self.latencies.count() == 0
         {
             let _ = writeln!(
                 stderr,
-                "warning: none of the first {TOLD} lines is a frame: is {baud} the baud rate at which the device sends?"
+                "warning: none of the first {MAX_REPORTED} lines is a frame: does the device send at {baud} baud?"
             );
         }
     }
 
-    /// Returns `true` once every so often.
+    /// Returns `true` once per interval.
     pub(super) fn is_due(&mut self, every: Duration) -> bool {
         let is_due = self.last.elapsed() >= every;
         if is_due {
@@ -102,7 +102,7 @@ impl Report {
     /// Result at the end of the source.
     ///
     /// # Errors
-    /// If not one line was decoded.
+    /// If no line was decoded.
     pub(super) fn end(&self) -> Result<(), Failure> {
         if self.latencies.count() > 0 {
             return Ok(());
@@ -114,29 +114,29 @@ impl Report {
         })
     }
 
-    /// Tells the counts and latencies so far.
-    pub(super) fn tell(&self, dropped: u64) {
+    /// Prints the counts and latencies so far.
+    pub(super) fn print(&self, dropped: u64) {
         let (decoded, seconds) = (self.latencies.count(), self.begin.elapsed().as_secs_f64());
         let (rate, bad, latencies) = (decoded as f64 / seconds.max(1e-9), self.bad, &self.latencies);
         // There is no one to report to if this fails.
         let _ = writeln!(
             stderr(),
-            "{decoded} lines decoded in {seconds:.1} s ({rate:.0} a second), {bad} bad, {dropped} dropped; {latencies}"
+            "{decoded} lines decoded in {seconds:.1} s ({rate:.0} per second), {bad} bad, {dropped} dropped; {latencies}"
         );
     }
 }
 
-/// Form of the answers.
+/// Output format.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
 pub(super) enum Form {
-    /// Lines of CSV in the columns of decode.
+    /// CSV with the columns of `decode`.
     #[default]
     Csv,
-    /// One JSON object a line.
+    /// One JSON object per line.
     Jsonl,
 }
 
-/// Decodes lines and writes their answers to standard output; as CSV, or of an array, without allocation in steady state.
+/// Decodes lines and writes their answers to standard output; without allocation in steady state for CSV or an array.
 pub(super) struct Answers<'a> {
     file: &'a NetworkFile,
     compiled: CompiledNetworks<f64>,
@@ -168,7 +168,8 @@ impl<'a> Answers<'a> {
         self.rows
     }
 
-    /// Decodes a line, by `left_out` and the latest readings of every row read if they are given, and writes and flushes the answer. Returns `false` if there is none.
+    /// Decodes a line, using `left_out` with the latest readings of every row read if given, and writes and flushes the
+    /// answer. Returns `false` if there is none.
     pub(super) fn write(
         &mut self,
         line: u64,
@@ -187,7 +188,7 @@ impl<'a> Answers<'a> {
         let channels = self.compiled.channels();
         let rows = readings.len() / channels;
         let answer = &mut self.answer[..rows * outputs];
-        // A wire can be left out of a row that is known only.
+        // A wire can be left out only if the row is known.
         let fault = left_out
             .as_ref()
             .and_then(|(left_out, _)| left_out.fault())

@@ -11,28 +11,28 @@ use decoupler_files::{
     },
 };
 
-// Layout of files of text, where it should not be found.
+// Layout of text files, if it should not be detected.
 #[derive(Args)]
-#[command(next_help_heading = "Files of text")]
+#[command(next_help_heading = "Text files")]
 pub(super) struct DialectArguments {
-    /// Separator of the cells [default: found]
+    /// Separator of the cells [default: detected]
     #[arg(long, value_name = "comma|semicolon|tab|bar|space")]
     separator: Option<Separator>,
-    /// Decimal separator [default: found]
+    /// Decimal separator [default: detected]
     #[arg(long, value_name = "point|comma")]
     decimal: Option<Decimal>,
-    /// yes if the first row has the names of the columns [default: found]
+    /// Whether the first row has the names of the columns [default: detected]
     #[arg(long, value_name = "yes|no", value_parser = yes_or_no)]
     header: Option<bool>,
-    /// Encoding [default: found]
+    /// Encoding [default: detected]
     #[arg(long, value_name = "utf-8|latin-1|utf-16le|utf-16be")]
     encoding: Option<Encoding>,
-    /// Lines before the table, which are skipped [default: 0]
+    /// Number of lines to skip before the table [default: 0]
     #[arg(long, value_name = "N")]
     skip_lines: Option<usize>,
 }
 
-// A recording: files, meanings of their columns, and the split.
+// A recording: files, roles of their columns, and the split.
 #[derive(Args)]
 #[command(next_help_heading = "Recording")]
 pub(super) struct ImportArguments {
@@ -42,32 +42,32 @@ pub(super) struct ImportArguments {
     /// columns, separated by commas.
     #[arg(long, value_name = "FILE", conflicts_with = "recipe")]
     pub(super) data: Option<PathBuf>,
-    /// Join this file: by time (nearest row), or row by row without --time; its columns get its stem in front, as in
+    /// Join this file: by time (nearest row), or row by row without --time; its columns are prefixed with its stem, as in
     /// states.c2; may be repeated
     #[arg(long, value_name = "FILE", requires = "data")]
     join: Vec<PathBuf>,
-    /// Column of the times of a joined file, without its stem; once, or once for each --join [default: as --time]
+    /// Time column of a joined file, without its stem; once, or once for each --join [default: as --time]
     #[arg(long, value_name = "COLUMN", requires = "join")]
     join_time: Vec<String>,
-    /// Largest time between a row and its partner [default: half the median interval of the joined file]
+    /// Maximum time between matched rows [default: half the median interval of the joined file]
     #[arg(long, value_name = "TIME", requires = "join", value_parser = positive)]
     join_limit: Option<f64>,
     /// Columns to be predicted from the inputs
     #[arg(long, value_name = "COLUMNS", value_delimiter = ',', requires = "data")]
     targets: Vec<String>,
-    /// Column of the times
+    /// Time column
     #[arg(long, value_name = "COLUMN", requires = "data")]
     pub(super) time: Option<String>,
-    /// Column whose equal values belong together, such as one press or session
+    /// Column that groups samples with equal values, such as one press or session
     #[arg(long, value_name = "COLUMN", requires = "data")]
     group: Option<String>,
-    /// Column of the number of the row-wire, from 1
+    /// Column with the row number from 1
     #[arg(long, value_name = "COLUMN", requires = "data")]
     row_wire: Option<String>,
-    /// Use only rows that meet this, for example "c4<145.1 and c5!=0"; may be repeated
+    /// Use only rows that meet this condition, for example "c4<145.1 and c5!=0"; may be repeated
     #[arg(long = "where", value_name = "CONDITION", requires = "data")]
     conditions: Vec<Condition>,
-    /// A number or text that means missing, in all columns or in one, such as -1 or states.c5=-1; may be repeated
+    /// Number or text that marks a missing value, in all columns or in one, such as -1 or states.c5=-1; may be repeated
     #[arg(long, value_name = "[COLUMN=]VALUE", requires = "data")]
     missing: Vec<Missing>,
     /// Unit of a column, such as states.c2=mm; may be repeated [default: from a header such as "x (mm)"]
@@ -76,29 +76,29 @@ pub(super) struct ImportArguments {
     /// Positions of the targets on the skin, for surfaces in the window: a table with the columns target,x,y (mm)
     #[arg(long, value_name = "FILE", requires = "data")]
     positions: Option<PathBuf>,
-    /// Use the simulated array or the recording that --save-recipe wrote
+    /// Use the simulated array or the recording of this recipe, written by --save-recipe
     #[arg(long, value_name = "FILE")]
     recipe: Option<PathBuf>,
-    /// Write a file (JSON) by which --recipe repeats this array, or this recording and its split
+    /// Write a recipe (JSON), with which --recipe uses this array, or this recording and its split, again
     #[arg(long, value_name = "FILE")]
     save_recipe: Option<PathBuf>,
-    /// Samples of the test: the last in time, whole groups, or random ones [default: group with --group, else time]
+    /// Test samples: the last in time, whole groups, or random ones [default: group with --group, else time]
     #[arg(long, value_name = "time|group|random")]
     split: Option<SplitBy>,
     /// Share of the samples for the test [default: 0.2]
     #[arg(long, value_name = "SHARE", value_parser = share, conflicts_with = "test_data")]
     test_fraction: Option<f64>,
-    /// Share of the other samples that selects the best weights and ends the training; 0 for none [default: 0 with --method
-    /// br, the default; else 0.2]
+    /// Share of the other samples that selects the best weights and ends the training; 0 for none [default: 0 with
+    /// --method br, the default; else 0.2]
     #[arg(long, value_name = "SHARE", value_parser = share)]
     validation_fraction: Option<f64>,
     /// File of the test samples, with the columns of --data
     #[arg(long, value_name = "FILE")]
     test_data: Option<PathBuf>,
-    /// File joined to --test-data, in the place of that of --join; may be repeated
+    /// File joined to --test-data, corresponding to --join; may be repeated
     #[arg(long, value_name = "FILE", requires = "test_data")]
     test_join: Vec<PathBuf>,
-    /// Test on every sample by cross-validation with this many folds, made as by --split
+    /// Test on every sample by cross-validation with this many folds, divided by --split
     #[arg(long, value_name = "K", conflicts_with_all = ["test_fraction", "test_data"])]
     pub(super) folds: Option<usize>,
     #[command(flatten)]
@@ -159,15 +159,15 @@ impl ImportArguments {
         self.data.is_some() || self.recipe.is_some()
     }
 
-    /// Returns `true` if columns have meanings, so that there are samples.
-    pub(super) fn has_meanings(&self) -> bool {
+    /// Returns `true` if columns have roles, so that there are samples.
+    pub(super) fn has_roles(&self) -> bool {
         !self.targets.is_empty() || self.recipe.is_some()
     }
 
-    /// The file, where nothing is asked of its columns.
+    /// The file, if no columns are selected.
     ///
     /// # Errors
-    /// There is none, or an argument needs targets.
+    /// If there is no file, or an argument needs targets.
     pub(super) fn only_file(&self) -> Result<&Path, Failure> {
         let given = [
             (!self.join.is_empty(), "--join"),
@@ -191,12 +191,12 @@ impl ImportArguments {
             .ok_or_else(|| Failure::Arguments(message.to_owned()))
     }
 
-    /// Returns `true` if the share for validation is given, in an argument or a recipe.
+    /// Returns `true` if the validation share is given in an argument or a recipe.
     pub(super) fn holds_out(&self) -> bool {
         self.validation_fraction.is_some() || self.recipe.is_some()
     }
 
-    /// Refuses arguments that have no meaning without a recording.
+    /// Refuses arguments that need a recording.
     pub(super) fn check_unused(&self) -> Result<(), Failure> {
         let given = [
             (self.split.is_some(), "--split"),
@@ -209,8 +209,8 @@ impl ImportArguments {
         refuse(&given, |argument| format!("{argument} needs --data or --recipe"))
     }
 
-    /// Refuses arguments that differ from the `saved` plan of a training that is resumed. Names of files are not compared: they
-    /// may be [elsewhere](Self::relocated) now.
+    /// Refuses arguments that differ from the `saved` plan of a training that is resumed. File names are not compared:
+    /// files may have been [moved](Self::relocated).
     pub(super) fn check_resumed(&self, saved: &Plan) -> Result<(), Failure> {
         let (division, import) = (&saved.division, &saved.import);
         check_same("split", self.split, division.by)?;
@@ -242,14 +242,15 @@ impl ImportArguments {
         ];
         refuse(&given, |argument| {
             format!(
-                "{argument}: the checkpoint has the columns and the division of the recording; leave it out to resume, or start \
+                "{argument}: the checkpoint contains the columns and the split of the recording; leave it out to resume, or start \
                  a new training with another --checkpoint"
             )
         })
     }
 
-    /// Returns the origin of the samples of a checkpoint with its files where the arguments name them. A file is recognised by
-    /// its name; one of another name takes the place of the argument. Files that are still missing may be in the same folder.
+    /// Returns the origin of the samples of a checkpoint with the file paths from the arguments. A file is recognised by
+    /// its name; a file with another name is matched by its argument. Files that are still missing are searched for in
+    /// the same folder.
     pub(super) fn relocated(&self, saved: &Recorded) -> Result<Recorded, Failure> {
         let mut found = saved.clone();
         for (argument, given, place) in self.files(&saved.plan) {
@@ -277,7 +278,7 @@ impl ImportArguments {
         Ok(found)
     }
 
-    /// Files given, with their arguments and the files of `saved` in their places.
+    /// Given files, with their arguments and the corresponding files of `saved`.
     fn files<'a>(&'a self, saved: &'a Plan) -> Vec<(&'static str, &'a PathBuf, Option<&'a PathBuf>)> {
         let (import, test) = (&saved.import, saved.test.as_ref());
         let joined = |place| import.join.get(place).map(|joined: &Joined| &joined.file);
@@ -307,7 +308,7 @@ impl ImportArguments {
         Ok(None)
     }
 
-    /// The source of the samples: a recording, or the simulated array of a recipe; `None` for the array of the arguments.
+    /// Source of the samples: a recording, or the simulated array of a recipe; `None` for the array of the arguments.
     pub(super) fn source(&self, inputs: &[String]) -> Result<Option<RecipeSource>, Failure> {
         if let Some(path) = &self.recipe
             && let simulated @ RecipeSource::Simulated(_) = RecipeFile::load(path)?
@@ -322,12 +323,12 @@ impl ImportArguments {
         Ok(None)
     }
 
-    /// The plan that the arguments describe, with paths relative to the working folder; `inputs` are the columns read.
+    /// The plan described by the arguments, with paths relative to the working folder; `inputs` are the columns read.
     pub(super) fn plan(&self, inputs: &[String]) -> Result<Plan, Failure> {
         self.plan_of(inputs, &self.targets)
     }
 
-    /// As [`Self::plan`], with these columns as the targets.
+    /// Like [`Self::plan`], with these columns as the targets.
     pub(super) fn plan_of(&self, inputs: &[String], targets: &[String]) -> Result<Plan, Failure> {
         let plan = match &self.recipe {
             Some(path) => {
@@ -370,7 +371,7 @@ impl ImportArguments {
             });
         }
         if plan.division.by == SplitBy::Group && plan.import.group.is_none() {
-            let message = "--split group: say which column is the group with --group";
+            let message = "--split group: give the group column with --group";
             return Err(Failure::Arguments(message.to_owned()));
         }
         Ok(plan)
@@ -409,12 +410,12 @@ impl ImportArguments {
         })
     }
 
-    /// The recipe that is repeated.
+    /// The recipe to use.
     pub(super) fn recipe(&self) -> Option<&Path> {
         self.recipe.as_deref()
     }
 
-    /// Writes a recipe of `source`, if that is asked for.
+    /// Writes a recipe of `source`, if requested.
     pub(super) fn save_recipe(&self, source: impl Into<RecipeSource>) -> Result<(), Failure> {
         match &self.save_recipe {
             Some(path) => Ok(RecipeFile::save(source, path)?),

@@ -1,4 +1,4 @@
-//! Files of a recording as they were found, and the division of their samples.
+//! Inspection of the files of a recording, and the division of their samples.
 
 use std::{
     io::{self, Write},
@@ -31,10 +31,11 @@ use super::{
 
 /// List the columns of a recording, and measure how well its readings determine targets
 ///
-/// Reads CSV, .npy, .npz and .mat. Each column has its name, unit, kind, range, number of missing cells and a histogram over
-/// its range. The names are those that train --data takes. With --inputs and --targets (or --recipe), and with the arguments
-/// of train --data, it measures on held-out samples how well the readings determine each target, how optimistic a random split
-/// would be, what each channel is worth and what more samples would bring, with confidence intervals.
+/// Reads CSV, .npy, .npz and .mat. Each column has its name, unit, kind, range, number of missing cells and a histogram
+/// over its range. The names are those that train --data takes. With --inputs and --targets (or --recipe), and with the
+/// arguments of train --data, it measures on held-out samples how well the readings determine each target, how optimistic
+/// a random split would be, how much each channel contributes and how much more samples would help, with confidence
+/// intervals.
 #[derive(Args)]
 pub(super) struct Inspect {
     #[command(flatten)]
@@ -57,7 +58,7 @@ struct Report<'a> {
 
 impl Inspect {
     pub(super) fn run(self) -> Result<(), Failure> {
-        if self.study.are_given() || self.import.has_meanings() {
+        if self.study.are_given() || self.import.has_roles() {
             return self.study.run(&self.import, self.json);
         }
         let data = self.import.only_file()?;
@@ -93,7 +94,7 @@ impl Inspect {
     }
 }
 
-/// The table of the columns of a file.
+/// Table of the columns of a file.
 fn columns_table(columns: &[ColumnSummary]) -> Table {
     let row = |column: &ColumnSummary| -> Vec<Cell> {
         let kind = match column.kind {
@@ -131,7 +132,7 @@ fn columns_table(columns: &[ColumnSummary]) -> Table {
     }
 }
 
-/// A number as short as it can be within 13 characters.
+/// Formats a number as briefly as possible in at most 13 characters.
 fn plain(number: f64) -> String {
     let short = format!("{number}");
     if short.len() <= 13 {
@@ -144,13 +145,17 @@ fn plain(number: f64) -> String {
 fn bars(histogram: &[usize]) -> String {
     const HEIGHTS: [char; 9] = [' ', '▁', '▂', '▃', '▄', '▅', '▆', '▇', '█'];
     let most = histogram.iter().copied().max().unwrap_or(0).max(1);
-    // What is there at all is seen.
+    // A nonzero count is always visible.
     let height = |&count: &usize| (count * (HEIGHTS.len() - 1)).div_ceil(most);
     histogram.iter().map(|count| HEIGHTS[height(count)]).collect()
 }
 
 fn write_time(time: &TimeSummary, out: &mut impl Write) -> io::Result<()> {
-    let guessed = if time.is_guessed { " (taken for the time)" } else { "" };
+    let guessed = if time.is_guessed {
+        " (assumed to be the time)"
+    } else {
+        ""
+    };
     write!(out, "\nTime {}{guessed}: ", time.column)?;
     match time.median_interval {
         Some(median) => write!(
@@ -159,7 +164,7 @@ fn write_time(time: &TimeSummary, out: &mut impl Write) -> io::Result<()> {
             format_number(median),
             time.gaps
         )?,
-        None => write!(out, "no two times differ")?,
+        None => write!(out, "all times are equal")?,
     }
     if let (Some(longest), Some(line)) = (time.longest, time.longest_after_line) {
         write!(out, ", the longest {} after line {line}", format_number(longest))?;
@@ -170,7 +175,7 @@ fn write_time(time: &TimeSummary, out: &mut impl Write) -> io::Result<()> {
     writeln!(out)
 }
 
-/// Everything known of the samples of a recording.
+/// Samples of a recording.
 #[derive(Serialize)]
 pub(super) struct RecordingReport {
     files: Vec<FileFound>,
@@ -178,9 +183,9 @@ pub(super) struct RecordingReport {
     /// Rule of the split: time, group, random or file.
     split: String,
     test_fraction: f64,
-    /// Number of rows of the files, dropped ones included.
+    /// Number of rows of the files, including dropped ones.
     rows: usize,
-    /// Number of samples that the training fits.
+    /// Number of training samples.
     samples: usize,
     validation_samples: usize,
     test_samples: usize,
@@ -200,7 +205,7 @@ struct Position {
     y_mm: f64,
 }
 
-/// A file as it was found.
+/// A file with its detected format.
 #[derive(Serialize)]
 pub(super) struct FileFound {
     path: PathBuf,

@@ -27,7 +27,7 @@ static REQUESTED: AtomicBool = AtomicBool::new(false);
 /// Installs the Ctrl-C handler: it ends the program without leaving temporary files, at once unless a [`Graceful`] part
 /// is running.
 pub(super) fn install() {
-    // Where interruptions are ignored, as by a script that runs us in the background, they stay so.
+    // If interruptions are ignored, for example in a background job of a script, they remain ignored.
     let _ = ctrlc::try_set_handler(|| {
         // There is no one to report to if writing fails.
         if GRACEFUL.load(Ordering::SeqCst) && !REQUESTED.swap(true, Ordering::SeqCst) {
@@ -39,7 +39,7 @@ pub(super) fn install() {
     });
 }
 
-/// Guard: while it lives, the first Ctrl-C only requests an end; the second one ends the program at once.
+/// Guard: while it exists, the first Ctrl-C only requests the end; the second ends the program at once.
 pub(super) struct Graceful(());
 
 impl Graceful {
@@ -59,7 +59,7 @@ impl Drop for Graceful {
     }
 }
 
-/// Saving takes at most one part in this many of the time.
+/// Reciprocal of the largest share of the time spent on saving.
 const LARGEST_SHARE: u32 = 20;
 
 #[derive(Args)]
@@ -79,7 +79,7 @@ pub(super) struct CheckpointArguments {
     checkpoint_interval: f64,
 }
 
-/// Refuses an argument that differs from what the checkpoint has. Every argument that a checkpoint fixes goes through here.
+/// Refuses an argument that differs from the checkpoint. Used for every argument that a checkpoint fixes.
 pub(super) fn check_same<T: fmt::Display>(
     argument: &str,
     given: Option<T>,
@@ -102,7 +102,7 @@ fn seconds(text: &str) -> Result<f64, String> {
     seconds.ok_or_else(|| format!("give a number of seconds from 0 to {LONGEST}"))
 }
 
-/// The file in which a training is saved, and when it is next saved.
+/// File in which a training is saved, and time of the next save.
 pub(super) struct Checkpointing {
     path: PathBuf,
     interval: Duration,
@@ -113,7 +113,7 @@ pub(super) struct Checkpointing {
 }
 
 impl CheckpointArguments {
-    /// The checkpoints asked for; `recorded` is the origin of recorded samples.
+    /// The requested checkpoints; `recorded` is the origin of recorded samples.
     pub(super) fn checkpointing(&self, recorded: Option<&Recorded>) -> Option<Checkpointing> {
         Some(Checkpointing {
             path: self.checkpoint.clone()?,
@@ -138,7 +138,7 @@ impl CheckpointArguments {
 }
 
 impl Checkpointing {
-    /// Saves in `path` every `interval`, for the first time after one; `recorded` is the origin of recorded samples.
+    /// Saves to `path` every `interval`, first after one interval; `recorded` is the origin of recorded samples.
     pub(super) fn every(interval: Duration, path: PathBuf, recorded: Option<&Recorded>) -> Self {
         Self {
             path,
@@ -149,7 +149,7 @@ impl Checkpointing {
         }
     }
 
-    /// Saves `run` if it is due. A failure is reported once and the next attempt is made as usual: training continues.
+    /// Saves `run` if due. A failure is only reported, and training continues until the next attempt.
     pub(super) fn save_if_due(&mut self, run: &Run) {
         let begun = Instant::now();
         if begun < self.next {

@@ -1,10 +1,10 @@
-//! The work in a terminal: `decoupler train`, `inspect`, `decode`, `export`, `calibrate`, `fine-tune`, `simulate`,
+//! The command line: `decoupler train`, `inspect`, `decode`, `export`, `calibrate`, `fine-tune`, `simulate`,
 //! `reproduce`, `trade` and `sweep`.
 //!
-//! A command ends with status 0 when its work is done, 1 when it failed, 2 when its arguments were wrong; the last two
-//! with one line on standard error. Ctrl-C ends it with status 130; `train` first saves what it has.
+//! A command ends with status 0 on success, 1 on failure, and 2 for invalid arguments; the last two with one line on
+//! standard error. Ctrl-C ends it with status 130; `train` first saves its results.
 //!
-//! Parsers of values that several commands take.
+//! Parsers of values used by several commands.
 
 mod calibrate;
 mod cross_validation;
@@ -79,12 +79,12 @@ enum Command {
     Sweep(Box<Sweep>),
 }
 
-/// Runs the command that `arguments` (the program's name first) name, and returns the exit status. Without a command
-/// it opens `window`.
+/// Runs the command in `arguments` (program name first), and returns the exit status. Without a command it opens
+/// `window`.
 pub fn run<A: Into<OsString> + Clone>(arguments: impl IntoIterator<Item = A>, window: Window) -> ExitCode {
     let done = match Arguments::try_parse_from(arguments) {
         Ok(arguments) => arguments.run(window),
-        // Help and version are no errors; a reader that has gone away needs neither.
+        // Help and version are not errors; a closed output needs neither.
         Err(message) if matches!(message.kind(), ErrorKind::DisplayHelp | ErrorKind::DisplayVersion) => {
             message.print().map_err(Failure::Output)
         }
@@ -127,14 +127,14 @@ impl Arguments {
             Some(Command::Sweep(sweep)) => sweep.run(),
             None => {
                 window().map_err(Failure::Window)?;
-                // A file that took too long to be written is not left half-written.
+                // A file that takes too long to write is not left incomplete.
                 exit_leaving_nothing(0)
             }
         }
     }
 }
 
-/// Returns a parser of whole numbers in `allowed`.
+/// Returns a parser of integers in `allowed`.
 pub(super) fn count(allowed: RangeInclusive<usize>) -> impl Fn(&str) -> Result<usize, String> + Clone {
     move |text| {
         let count = text.parse().ok().filter(|count| allowed.contains(count));
@@ -157,23 +157,23 @@ pub(super) fn seed(text: &str) -> Result<u64, String> {
         .map_err(|_| format!("give a whole number from 0 to {}", u64::MAX))
 }
 
-/// The parser's message in one line, without its usage text.
+/// Returns the parser's message on one line, without the usage text.
 pub(super) fn one_line(error: &clap::Error) -> String {
     let text = error.render().to_string();
     let paragraphs = text.split("\n\n").map(|paragraph| {
         let lines: Vec<_> = paragraph.lines().map(str::trim).collect();
         lines.join(" ")
     });
-    let said = paragraphs.filter(|paragraph| {
+    let messages = paragraphs.filter(|paragraph| {
         let aside = ["Usage:", "For more information"];
         !paragraph.is_empty() && !aside.iter().any(|start| paragraph.starts_with(start))
     });
-    let line = said.collect::<Vec<_>>().join("; ");
+    let line = messages.collect::<Vec<_>>().join("; ");
     let line = line.strip_prefix("error: ").unwrap_or(&line);
     line.split(' ').map(shortened).collect::<Vec<_>>().join(" ")
 }
 
-/// A word as given, unless it is too long to be read.
+/// Returns a word, truncated if it is too long.
 fn shortened(word: &str) -> Cow<'_, str> {
     const LONGEST: usize = 200;
     const BEGINNING: usize = 40;
@@ -191,7 +191,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn endless_values_are_cut_in_messages() {
+    fn long_values_are_truncated_in_messages() {
         let long = "1".repeat(5000);
         let error = Arguments::try_parse_from(["decoupler", "simulate", "--array", &long]);
         let line = one_line(&error.err().unwrap());
@@ -199,12 +199,12 @@ mod tests {
     }
 
     #[test]
-    fn the_commands_are_declared_without_contradiction() {
+    fn the_commands_are_consistent() {
         Arguments::command().debug_assert();
     }
 
     #[test]
-    fn whatever_is_wrong_takes_one_line() {
+    fn every_error_takes_one_line() {
         let cases = [
             ("train --hiden 3", "unexpected argument '--hiden' found"),
             ("train --hidden 0", "'0' for '--hidden"),

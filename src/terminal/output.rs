@@ -1,4 +1,4 @@
-//! Readings of a file for a network, line by line, with the network of each line.
+//! Output of the terminal, and readings of a file for a network, line by line.
 
 use std::{
     fs::File,
@@ -31,12 +31,12 @@ pub(super) fn print_object(object: &impl Serialize) -> Result<(), Failure> {
     })
 }
 
-/// Prints what `write` writes on standard output.
+/// Prints the output of `write` on standard output.
 pub(super) fn print(write: impl FnOnce(&mut io::StdoutLock) -> io::Result<()>) -> Result<(), Failure> {
     write(&mut stdout().lock()).map_err(Failure::Output)
 }
 
-/// A progress bar of `steps`, drawn by this template; hidden next to JSON and where standard error is no terminal.
+/// Progress bar of `steps` with this template; hidden with JSON output and if standard error is not a terminal.
 pub(super) fn progress_bar(is_hidden: bool, steps: usize, template: &str) -> ProgressBar {
     if is_hidden {
         return ProgressBar::hidden();
@@ -47,10 +47,10 @@ pub(super) fn progress_bar(is_hidden: bool, steps: usize, template: &str) -> Pro
     bar
 }
 
-/// Number of lines decoded and written together, so that memory does not grow with the file.
+/// Number of lines decoded and written together, which limits memory for large files.
 const BLOCK: usize = 1024;
 
-/// Readings of some lines.
+/// Readings of a block of lines.
 pub(super) struct Readings {
     /// Lines × inputs of the network.
     pub(super) values: Array2<f64>,
@@ -73,7 +73,7 @@ pub(super) fn read(
     }
 }
 
-/// Reads the columns of the names of the inputs, or as many columns as there are inputs, from a file of any format.
+/// Reads the columns named like the inputs, or as many unnamed columns as there are inputs, from a file of any format.
 fn read_columns(file: &NetworkFile, recipe: &Recipe, input: &Path) -> Result<Readings, Failure> {
     let has_rows = file.network.only().is_none();
     let table = with_bar(true, |watch| {
@@ -111,7 +111,7 @@ fn read_columns(file: &NetworkFile, recipe: &Recipe, input: &Path) -> Result<Rea
     })
 }
 
-/// Reads CSV of the resistances of an array. Lines that do not contain the number of their row-wire are whole snapshots.
+/// Reads a CSV file of the resistances of an array. Lines without a row number form whole snapshots.
 fn read_resistances(
     file: &NetworkFile,
     Simulation { sensor, scene, .. }: &Simulation,
@@ -133,7 +133,7 @@ fn read_resistances(
         RowModel::Shared => reader,
         RowModel::Each => reader.with_row_wires(scale.rows()),
     };
-    // The turn of each line's row-wire, where the file does not have it.
+    // The row-wire of each line by its position, if the file has no row numbers.
     let mut turns = (0..read.len()).cycle();
     let mut lines_in_turn = 0;
     let mut is_empty = true;

@@ -41,9 +41,9 @@ use super::{
 
 /// Reproduce the paper's tables next to the published figures
 ///
-/// Runs every cell with several seeds on all cores and prints the published error next to the median, least and largest
-/// of ours, the baselines, and which of the paper's claims hold in this run. Ctrl-C ends it and prints what is
-/// finished.
+/// Runs every cell with several seeds on all cores and prints the published error next to the median, minimum and
+/// maximum of ours, the baselines, and which of the paper's claims hold in this run. Ctrl-C stops it and prints the
+/// finished tables.
 #[derive(Args)]
 #[command(allow_negative_numbers = true)]
 pub(super) struct Reproduce {
@@ -66,17 +66,17 @@ pub(super) struct Reproduce {
     /// Array scales of Table 3 [default: 10x6_3x18,10x8_4x24,10x10_5x30]
     #[arg(long, value_name = "LIST", value_delimiter = ',')]
     arrays: Vec<ArrayScale>,
-    /// Unit of the folds of Table 2: single samples, as in the paper, or whole snapshots, so that no training sample
-    /// is from the same moment as a test sample
+    /// Unit of the folds of Table 2: single samples, as in the paper, or whole snapshots, which keeps training and test
+    /// samples of the same moment apart
     #[arg(long, value_enum, default_value = "sample")]
     folds: Unit,
     /// Number of folds of Table 2
     #[arg(long, value_name = "N", default_value_t = 10, value_parser = count(2..=1000))]
     k: usize,
-    /// Shuffles of the samples of Table 2 into new folds, for each seed
+    /// Number of times the samples of Table 2 are shuffled into new folds for each seed
     #[arg(long, value_name = "N", default_value_t = 10, value_parser = count(1..=1000))]
     repeats: usize,
-    /// Folder for each table as CSV and Markdown and its figure as SVG and PNG; created if missing
+    /// Folder for the tables as CSV and Markdown and their figures as SVG and PNG; created if missing
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Print one JSON object instead of text and progress
@@ -156,7 +156,7 @@ impl Reproduce {
                 results,
             })
             .collect();
-        // Whatever fails here, the figures are printed.
+        // The figures are printed even if something fails here.
         let folder = self.out.iter();
         let written = folder.flat_map(|folder| reproduced.iter().flat_map(|table| write_files(folder, table)));
         let unwritten: Vec<PictureError> = written.filter_map(Result::err).collect();
@@ -223,7 +223,7 @@ fn files(folder: &Path, table: PaperTable) -> [PathBuf; 5] {
     .map(|name| folder.join(name))
 }
 
-/// Creates the folder and checks that every file can be written, before the work begins.
+/// Creates the folder and checks that every file can be written, before training starts.
 fn prepare_folder(folder: &Path, tables: &[PaperTable]) -> Result<(), Failure> {
     fs::create_dir_all(folder).map_err(|source| Failure::MakeFolder {
         path: folder.to_owned(),
@@ -233,7 +233,7 @@ fn prepare_folder(folder: &Path, tables: &[PaperTable]) -> Result<(), Failure> {
     Ok(paths.into_iter().try_for_each(|path| check_writable(&path))?)
 }
 
-/// Writes every file of a table, whatever becomes of the others.
+/// Writes every file of a table, even if others fail.
 fn write_files(folder: &Path, reproduced: &Reproduced) -> [Result<(), PictureError>; 5] {
     let Reproduced {
         table,
@@ -309,7 +309,7 @@ struct CellReport {
 }
 
 impl CellReport {
-    /// `None` for a recording, which no table of the paper has.
+    /// `None` for a recording, which does not occur in the paper's tables.
     fn of(summary: CellSummary) -> Option<Self> {
         let SummaryErrors::Nodes {
             x_percent,

@@ -1,4 +1,4 @@
-//! Samples of a run: drawn after an announcement of the work, or read with a progress bar.
+//! Samples of a run: drawn after an estimate of the work is printed, or read with a progress bar.
 
 use std::{
     io::{BufWriter, Write, stderr, stdout},
@@ -30,7 +30,7 @@ pub(super) fn sets(setup: &Setup, is_json: bool) -> Result<SetupSets, Failure> {
     Ok(sets?)
 }
 
-/// Calls `read`, which reads or draws the samples of `setup` and which nothing cancels, with a progress bar if it reads files.
+/// Calls `read`, which reads or draws the samples of `setup` without cancellation, with a progress bar if it reads files.
 pub(super) fn following<T>(
     setup: &Setup,
     is_json: bool,
@@ -56,7 +56,7 @@ pub(super) fn with_bar<T>(is_hidden: bool, import: impl FnOnce(&mut dyn FnMut(Pr
     result
 }
 
-/// Folder to which the paths of a plan from arguments are relative.
+/// Folder to which the paths of a plan from the arguments are relative.
 pub(super) fn working_folder() -> &'static Path {
     Path::new("")
 }
@@ -64,7 +64,7 @@ pub(super) fn working_folder() -> &'static Path {
 /// Reports on standard error how much memory and time a large simulated run will take.
 ///
 /// # Errors
-/// If the array lacks a row of the scene, or the machine the memory.
+/// If the array lacks a row of the scene, or the machine has too little memory.
 pub(super) fn announce(settings: &RunSettings) -> Result<(), RunError> {
     match settings.simulated() {
         Some(settings) => announce_workload(&Workload::of(&settings)?),
@@ -75,7 +75,7 @@ pub(super) fn announce(settings: &RunSettings) -> Result<(), RunError> {
 /// Reports on standard error how much memory and time a large workload will take.
 ///
 /// # Errors
-/// If the machine lacks the memory.
+/// If the machine has too little memory.
 pub(super) fn announce_workload(workload: &Workload) -> Result<(), RunError> {
     workload.check_memory()?;
     if workload.is_large() {
@@ -85,16 +85,16 @@ pub(super) fn announce_workload(workload: &Workload) -> Result<(), RunError> {
     Ok(())
 }
 
-/// Largest number of snapshots drawn and written together, so that memory does not grow with the number of samples.
+/// Maximum number of snapshots drawn and written together, which limits memory for many samples.
 const BLOCK: usize = 64;
-/// Memory for them where one of a large array takes much.
+/// Memory limit for these snapshots, for large arrays.
 const BLOCK_BYTES: usize = 64 << 20;
 
 /// Draw samples of an array and write them as CSV
 ///
-/// A line is one row-wire at one moment: snapshot and row counted from 1, its resistances r_1, r_2, … in ohm, and
-/// x_1, y_1, z_1, x_2, … of its nodes in mm. Samples come as whole snapshots of all rows. With the seed and array of
-/// a training they are its test samples. With --decoder, one of them, the coordinates that it decodes follow as
+/// A line is one row-wire at one moment: snapshot and row counted from 1, resistances r_1, r_2, … in ohm, and
+/// coordinates x_1, y_1, z_1, x_2, … of its nodes in mm. Samples are whole snapshots of all rows. With the seed and array
+/// of a training they are its test samples. With --decoder, the coordinates decoded by this decoder follow as
 /// decoded_x_1, …; networks are first trained with the settings of the preset.
 #[derive(Args)]
 #[command(allow_negative_numbers = true)]
@@ -108,9 +108,9 @@ pub(super) struct Simulate {
     /// Seed of all random numbers
     #[arg(long, default_value_t = 0, value_parser = seed)]
     seed: u64,
-    /// Fault of a wire or of the electronics, as it shows in the readings: open-row:ROW or open-column:COLUMN (broken at
-    /// the connector, or with @NODE before that node), short-rows:ROW-ROW, short-columns:COLUMN-COLUMN, gain:COLUMN=REL (an
-    /// amplifier's error), stuck:COLUMN=low|high (a converter at an end of its range)
+    /// Fault of a wire or of the electronics to simulate: open-row:ROW or open-column:COLUMN (broken at the connector, or
+    /// with @NODE before that node), short-rows:ROW-ROW, short-columns:COLUMN-COLUMN, gain:COLUMN=REL (gain error of an
+    /// amplifier), stuck:COLUMN=low|high (a converter at an end of its range)
     #[arg(long, value_name = "FAULT")]
     fault: Option<Fault>,
     #[command(flatten)]
@@ -177,7 +177,7 @@ impl Simulate {
         Ok(())
     }
 
-    /// The given decoder, with its networks trained; none if none is given.
+    /// The given decoder with trained networks; none if none is given.
     fn decoder(&self, settings: &SimulatedSettings) -> Result<Option<Box<dyn Decoder>>, Failure> {
         self.scene.check_one_noise()?;
         let kind = match self.scene.decoder[..] {

@@ -8,7 +8,7 @@ use decoupler_core::{
     scene::{Loading, Movement, Noise, NoisySets, RowModel, Rows},
 };
 
-// Rows, movement, loading and noise of the scene, and its decoders. Arguments that are not given have the value of the
+// Rows, movement, loading and noise of the scene, and its decoders. Arguments that are not given have the values of the
 // preset.
 #[derive(Args)]
 pub(super) struct SceneArguments {
@@ -61,12 +61,12 @@ fn noisy_sets(text: &str) -> Result<NoisySets, String> {
 }
 
 impl SceneArguments {
-    /// The settings of the preset with the scene and inputs given, at the first noise given.
+    /// Settings of the preset with the given scene and inputs, at the first given noise.
     pub(super) fn settings(&self) -> Result<SimulatedSettings, Failure> {
         self.settings_at(self.preset.unwrap_or_default(), self.noise.first().copied())
     }
 
-    /// The settings of the preset on this simulated array, with the scene and inputs given.
+    /// Settings of the preset on this simulated array, with the given scene and inputs.
     pub(super) fn settings_on(&self, source: Simulation) -> Result<SimulatedSettings, Failure> {
         let settings = SimulatedSettings {
             source,
@@ -75,7 +75,7 @@ impl SceneArguments {
         self.applied(settings, self.noise.first().copied())
     }
 
-    /// The settings of this preset with the scene and inputs given, at this relative noise.
+    /// Settings of this preset with the given scene and inputs, at this relative noise.
     pub(super) fn settings_at(
         &self,
         preset: Preset,
@@ -85,7 +85,7 @@ impl SceneArguments {
         self.applied(preset.settings_in(noise), relative_noise)
     }
 
-    /// Checks that at most one noise is given, for commands that do not take several.
+    /// Checks that at most one noise is given, for commands that take only one.
     pub(super) fn check_one_noise(&self) -> Result<(), Failure> {
         if self.noise.len() > 1 {
             let message = "--noise: give one number here; trade takes several";
@@ -112,19 +112,19 @@ impl SceneArguments {
         }
     }
 
-    /// Columns that a network of a recording reads.
+    /// Columns read by the network of a recording.
     pub(super) fn columns(&self) -> &[String] {
         &self.inputs
     }
 
-    /// Default settings for a recording, with the row model and scaling given.
+    /// Default settings for a recording, with the given row model and scaling.
     ///
     /// # Errors
-    /// Names the first argument given that is for a simulated array only.
+    /// Names the first given argument that is only for a simulated array.
     pub(super) fn recorded(&self, has_row_wires: bool) -> Result<RunSettings, Failure> {
         let refuse = |argument: &str, reason: &str| Err(Failure::Arguments(format!("{argument}: {reason}")));
-        let scene = "a recording (--data) has no scene to be drawn from; leave it out";
-        let noise = "a recording (--data) has noise of its own; leave it out";
+        let scene = "a recording (--data) has no scene; leave it out";
+        let noise = "a recording (--data) has its own noise; leave it out";
         let given = [
             (self.preset.is_some(), "--preset", scene),
             (self.axes.is_some(), "--axes", scene),
@@ -159,7 +159,7 @@ impl SceneArguments {
         Ok(settings)
     }
 
-    /// Refuses another row model or scaling than `saved`, the settings of a run on a recording.
+    /// Refuses a row model or scaling that differs from `saved`, the settings of a run on a recording.
     pub(super) fn check_resumed(&self, saved: &RunSettings) -> Result<(), Failure> {
         let rows = match saved.source.row_model() {
             RowModel::Shared => Rows::All,
@@ -169,15 +169,15 @@ impl SceneArguments {
         check_same("scaling", self.scaling, saved.inputs.scaling)
     }
 
-    /// `present` with the given parts of the noise.
-    fn noise(&self, present: Noise, relative: Option<f64>) -> Noise {
+    /// `current` with the given parts of the noise.
+    fn noise(&self, current: Noise, relative: Option<f64>) -> Noise {
         let bits = self.adc_bits.and_then(|bits| u8::try_from(bits).ok());
         Noise {
-            relative: relative.unwrap_or(present.relative),
-            additive_ohm: self.noise_ohm.unwrap_or(present.additive_ohm),
-            converter_bits: bits.or(present.converter_bits),
-            drift: self.drift.unwrap_or(present.drift),
-            sets: self.noise_in.unwrap_or(present.sets),
+            relative: relative.unwrap_or(current.relative),
+            additive_ohm: self.noise_ohm.unwrap_or(current.additive_ohm),
+            converter_bits: bits.or(current.converter_bits),
+            drift: self.drift.unwrap_or(current.drift),
+            sets: self.noise_in.unwrap_or(current.sets),
         }
     }
 

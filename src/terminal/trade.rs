@@ -1,4 +1,4 @@
-//! The command that trains the network of a point of the trade-off again.
+//! The command that retrains the network of a point of the trade-off.
 
 use clap::Args;
 use decoupler_core::{
@@ -31,8 +31,8 @@ use super::{
 /// Measure speed against accuracy of every decoder
 ///
 /// Trains networks of both presets with several numbers of hidden nodes, at several levels of noise, and prints for each
-/// decoder its error, its time for a frame (median of many, one thread) and its training time, with the choices that no
-/// other beats, and the command for each choice asked for. With --data it does so on the samples of a recording, for the
+/// decoder its error, its time per frame (median of many, one thread) and its training time, marks the Pareto-optimal
+/// choices, and prints the command for each requested choice. With --data it uses the samples of a recording and the
 /// decoders that need no model of the sensor.
 #[derive(Args)]
 #[command(allow_negative_numbers = true)]
@@ -47,7 +47,7 @@ pub(super) struct Trade {
     /// Hidden nodes of the networks
     #[arg(long, value_name = "LIST", value_delimiter = ',', default_value = "6,12", value_parser = count(1..=LARGEST_HIDDEN))]
     hidden: Vec<usize>,
-    /// Training methods of the networks, of a recording [default: br]; a simulated array has those of its presets
+    /// Training methods of the networks for a recording [default: br]; a simulated array uses those of its presets
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = method())]
     method: Vec<Method>,
     /// Maximum number of epochs [default: those of the preset; 300 for a recording]
@@ -62,10 +62,11 @@ pub(super) struct Trade {
     /// Seed of all random numbers
     #[arg(long, default_value_t = 0, value_parser = seed)]
     seed: u64,
-    /// Also print the fastest decoder whose error is at most this many percent: of z, or of the ranges of a recording's targets
+    /// Also print the fastest decoder whose error is at most this many percent: of z, or of the ranges of a recording's
+    /// targets
     #[arg(long, value_name = "PERCENT", value_parser = number)]
     under_percent: Option<f64>,
-    /// Also print the most accurate decoder that takes at most this many microseconds for a frame
+    /// Also print the most accurate decoder that takes at most this many microseconds per frame
     #[arg(long, value_name = "US", value_parser = number)]
     under_us: Option<f64>,
     /// Print one JSON object instead of text and progress
@@ -75,7 +76,7 @@ pub(super) struct Trade {
 
 /// A network to be measured with the decoders that need one, or all decoders.
 struct Case {
-    /// Relative noise, if it is simulated.
+    /// Relative noise of a simulated array.
     noise: Option<f64>,
     preset: Option<Preset>,
     setup: Setup,
@@ -83,7 +84,7 @@ struct Case {
 }
 
 impl Case {
-    /// Name among all cases.
+    /// Name of the case.
     fn name(&self) -> String {
         match (self.noise, self.preset) {
             (Some(noise), Some(preset)) => format!("noise {noise}, preset {preset}"),
@@ -162,7 +163,7 @@ impl Trade {
         }
     }
 
-    /// What is to be measured: both presets at every level of noise, or a recording with every method.
+    /// Cases to measure: both presets at every level of noise, or a recording with every method.
     fn cases(&self) -> Result<Vec<Case>, Failure> {
         if self.import.folds.is_some() {
             let message = "--folds: the decoders are measured on the test samples; leave it out";
@@ -192,7 +193,7 @@ impl Trade {
         for &noise in &noises {
             for &preset in &presets {
                 let settings = self.settings(preset, noise)?;
-                // Noise hardly changes the work.
+                // The work is nearly independent of the noise.
                 if noise == noises[0] {
                     announce_workload(&Workload::of_trade_off(&settings, &self.hidden, &decoders)?)?;
                 }
@@ -261,14 +262,14 @@ impl Trade {
     }
 }
 
-/// Divides recordings that were read before by another plan.
+/// Divides recordings that have already been read by another plan.
 fn divided(recordings: &Recordings, plan: &Plan, seed: Seed) -> Result<RunSets, Failure> {
     let (split, test) = plan.divide(&recordings.training, recordings.test.as_ref(), seed)?;
     Ok(RunSets::new(split, test).described(recordings.training.problem()))
 }
 
-/// Measures every case, up to the first that fails. Returns the levels that have points, and whether all cases were measured to
-/// their end.
+/// Measures all cases, up to the first failure. Returns the levels with points, and whether all cases were measured
+/// completely.
 fn measure_levels(
     cases: &[Case],
     mut measure: impl FnMut(&Case, &mut MeasuredLevel) -> Result<bool, Failure>,
@@ -290,7 +291,7 @@ fn measure_levels(
                 end = Ok(false);
                 break;
             }
-            // Nothing is lost that would need words.
+            // Nothing is lost, so no message is needed.
             Err(cause) if levels.is_empty() => return (levels, Err(cause)),
             Err(cause) => {
                 let (place, cause) = (case.name(), Box::new(cause));
@@ -313,7 +314,7 @@ pub(super) fn command(point: &TradeOffPoint, plan: Option<&Plan>, import: &Impor
 
 fn on_array(point: &TradeOffPoint, settings: &SimulatedSettings) -> String {
     let preset = point.preset.unwrap_or_default();
-    // As `train` would begin: with this noise the preset has these samples and epochs, without the noise itself.
+    // The defaults of `train` with this noise: its number of samples and epochs, but not the noise itself.
     let mut of_preset = preset.settings_in(settings.source.scene.noise);
     of_preset.source.scene = preset.settings().source.scene;
     let array = settings.source.sensor.scale.to_string().replace('×', "x");
@@ -362,7 +363,7 @@ mod tests {
     use crate::terminal::samples::sets;
 
     #[test]
-    fn what_was_measured_before_a_failure_is_kept_and_the_failure_names_its_place() {
+    fn results_before_a_failure_are_kept_and_the_failure_names_its_case() {
         let mut settings = SimulatedSettings::default();
         settings.source.sensor.scale = "1x1_1x3".parse().unwrap();
         (settings.source.samples, settings.source.test_samples) = (8, 4);

@@ -23,7 +23,7 @@ use decoupler_files::{
     import::Recordings,
 };
 
-/// Limits for which the best decoder is to be found.
+/// Limits for choosing the best decoder.
 #[derive(Clone, Copy)]
 pub(super) struct Limits {
     pub(super) percent: Option<f64>,
@@ -51,16 +51,16 @@ pub(super) struct RecordedSource {
     warnings: Vec<String>,
 }
 
-/// Points of a level with what they were trained on.
+/// Points of a level with their training data.
 pub(super) struct MeasuredLevel {
     pub(super) level: TradeOffLevel,
-    /// Of each point.
+    /// Training of each point.
     pub(super) trainings: Vec<PointTraining>,
-    /// Decoders that cannot be used with these samples, and why.
+    /// Decoders that cannot be used with these samples, with the reason.
     pub(super) refused: Vec<String>,
 }
 
-/// Training behind a point.
+/// Training of a point.
 pub(super) struct PointTraining {
     /// Numbers of training and validation samples.
     pub(super) samples: [usize; 2],
@@ -68,8 +68,8 @@ pub(super) struct PointTraining {
     pub(super) command: Option<String>,
 }
 
-/// Legend of the marks behind the lines of the table.
-const FRONTS: &str = "* no other decodes as fast with as little error; + no other is trained as fast with as little error\n\
+/// Legend of the marks at the end of the lines of the table.
+const FRONTS: &str = "* no other decoder is both faster and more accurate; + no other is both trained faster and more accurate\n\
                       Training time is the sum over all rows and starts.";
 
 /// The object printed by `trade --json`.
@@ -97,7 +97,7 @@ struct LevelReport<'a> {
     points: Vec<PointReport<'a>>,
     fastest_under: Option<Choice>,
     most_accurate_under: Option<Choice>,
-    /// Decoders of an array that cannot be used, and why.
+    /// Decoders of an array that cannot be used, with the reason.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     refused: Vec<String>,
 }
@@ -113,20 +113,20 @@ struct PointReport<'a> {
     source: PointSource,
     frame_us: f64,
     training_s: f64,
-    /// Remarks on the figures, with cause and cure.
+    /// Remarks on the figures, with cause and remedy.
     remarks: Vec<String>,
     on_decoding_front: bool,
     on_training_front: bool,
     command: Option<&'a str>,
 }
 
-/// Figures that only one kind of source has.
+/// Figures that depend on the kind of source.
 #[derive(Serialize)]
 #[serde(untagged)]
 enum PointSource {
     Array {
         preset: Option<String>,
-        /// Root mean square of m/R − 1; none if the decoded deformation has no resistance.
+        /// Root mean square of m/R − 1; none if the decoded deformation has no valid resistance.
         residual: Option<f64>,
         reference_z_percent: Option<f64>,
         reference_z_mm: Option<f64>,
@@ -178,13 +178,13 @@ impl MeasuredLevel {
         }
     }
 
-    /// For each point, true if it is on the Pareto front of decoding time and on that of training time.
+    /// For each point, whether it is on the Pareto fronts of decoding time and of training time.
     fn fronts(&self) -> Vec<(bool, bool)> {
         let decoding = self.level.front(TradeOffCost::Decoding).into_iter();
         decoding.zip(self.level.front(TradeOffCost::Training)).collect()
     }
 
-    /// The fastest and the most accurate point within `limits`, for those given.
+    /// The fastest and the most accurate point within the given `limits`.
     fn choices(&self, limits: Limits) -> [Option<Choice>; 2] {
         let points = &self.level.points;
         let choice = |limit: Option<f64>, choose: fn(&[TradeOffPoint], f64) -> Option<&TradeOffPoint>| {
@@ -256,7 +256,7 @@ impl MeasuredLevel {
         }
     }
 
-    /// The table of the points, fastest first, with marks of those on the Pareto fronts.
+    /// Table of the points, fastest first, with marks for those on the Pareto fronts.
     fn table(&self) -> Table {
         let mut table = trade_off_summary(&self.level);
         let mut points = Vec::from_iter(self.level.points.iter().zip(self.fronts()));
@@ -347,7 +347,7 @@ impl TradeOff {
         match &self.source {
             TradeSource::Array(array) => writeln!(
                 out,
-                "{array}: time for a frame (one thread) and training time against the error of z"
+                "{array}: time per frame (one thread) and training time against the error of z"
             )?,
             TradeSource::Recording(recording) => {
                 recording.report.write(out)?;

@@ -30,11 +30,11 @@ use decoupler_files::{
 
 /// Train a network and print its errors
 ///
-/// Draws samples of the array, trains, and compares the network on its test samples with the mean of the training
-/// set, with the best linear map, with other decoders, with the least error possible in the scene (the reference), and
-/// with the published figures where there are any. With --data it trains on the samples of a recording, and compares the
-/// network with the mean, with ridge regression and with other decoders, target by target. Ctrl-C stops after the epoch,
-/// keeps the best network so far, and ends with status 130; a second Ctrl-C ends at once.
+/// Draws samples of the array, trains, and compares the network on its test samples with the mean of the training set,
+/// with the best linear map, with other decoders, with the minimum error achievable in the scene (the reference), and
+/// with the published figures, if any. With --data it trains on the samples of a recording, and compares the network with
+/// the mean, with ridge regression and with other decoders, target by target. Ctrl-C stops after the epoch, keeps the
+/// best network so far, and ends with status 130; a second Ctrl-C ends at once.
 #[derive(Args)]
 #[command(allow_negative_numbers = true)]
 pub(super) struct Train {
@@ -44,10 +44,10 @@ pub(super) struct Train {
     pub(super) import: ImportArguments,
     #[command(flatten)]
     pub(super) checkpoint: CheckpointArguments,
-    /// Sensor model written by calibrate, in the place of --array
+    /// Sensor model written by calibrate, instead of --array
     #[arg(long, value_name = "FILE", conflicts_with_all = ["array", "resume", "data", "recipe"])]
     sensor: Option<PathBuf>,
-    /// File for the network, to be opened in the window or given to decode
+    /// File for the network, for use in the window or with decode
     #[arg(long, value_name = "FILE")]
     pub(super) out: Option<PathBuf>,
     /// File for a report with errors, figures, settings and the command that repeats the run, as one HTML page
@@ -78,7 +78,7 @@ impl Train {
         };
         let mut end = self.train(&mut run, self.checkpoint.checkpointing(sets.recorded()));
         let file = NetworkFile::from_run(&run, sets.recorded())?;
-        // Whatever fails now, the figures are printed.
+        // The figures are printed even if something fails from here on.
         let saved = self.out.as_ref().map_or(Ok(()), |path| file.save(path));
         let (mut decoders, mut optimism, mut measured) = (Vec::new(), Vec::new(), Ok(()));
         if !matches!(end, Err(Failure::Interrupted(_))) {
@@ -126,7 +126,7 @@ impl Train {
         }
     }
 
-    /// Decoders to measure: those given, by default all of a simulated array and none of a recording.
+    /// Decoders to measure: those given, by default all for a simulated array and none for a recording.
     fn decoders(&self, run: &Run) -> Vec<DecoderKind> {
         match run.settings().source {
             Source::Simulated(_) => self.training.scene.decoders(),
@@ -134,7 +134,7 @@ impl Train {
         }
     }
 
-    /// Checks that every file has a path of its own that can be written.
+    /// Checks that every file has a distinct path that can be written.
     fn check_paths(&self) -> Result<(), Failure> {
         let files = [
             ("--out", &self.out),
@@ -161,7 +161,7 @@ impl Train {
         match saved.plan() {
             Some(plan) => self.import.check_resumed(plan)?,
             None if self.import.is_given() => {
-                let message = "--data: the checkpoint is of a simulated array; leave it out to resume";
+                let message = "--data: the checkpoint belongs to a simulated array; leave it out to resume";
                 return Err(Failure::Arguments(message.to_owned()));
             }
             None => {
@@ -194,7 +194,7 @@ impl Train {
         Ok((run, sets))
     }
 
-    /// Gives a resumed run the method and stopping rules asked for, where they differ from those `saved`.
+    /// Applies the requested method and stopping rules to a resumed run, where they differ from those `saved`.
     fn continue_run(&self, run: &mut Run, saved: TrainingSettings, training: TrainingSettings) -> Result<(), Failure> {
         run.set_stopping(training.stopping)?;
         if training.method != saved.method {
@@ -218,7 +218,7 @@ impl Train {
             "{bar:30} epoch {pos} of {len}, {msg}, at most {eta} left",
         );
         bar.set_position(furthest(run) as u64);
-        // The time left is reckoned from the epochs of this session only.
+        // The remaining time is estimated from the epochs of this session only.
         bar.reset_eta();
         let graceful = Graceful::begin();
         let mut checkpointing = checkpointing;

@@ -32,13 +32,13 @@ use decoupler_files::{
     import::SetupSets,
 };
 
-/// A trained network and what was measured of it.
+/// A trained network and its measured errors.
 pub(super) struct Trained<'a> {
     pub(super) run: &'a Run,
     pub(super) file: &'a NetworkFile,
     pub(super) sets: &'a SetupSets,
     pub(super) decoders: &'a [DecoderReport],
-    /// Sentences on how optimistic random test samples are.
+    /// Warnings about how optimistic random test samples are.
     pub(super) optimism: &'a [String],
 }
 
@@ -57,12 +57,12 @@ struct Report<'a> {
     networks: usize,
     weights: usize,
     warnings: Vec<String>,
-    /// Other decoders; absent for a recording if none was asked for.
+    /// Other decoders; absent for a recording if none was requested.
     #[serde(skip_serializing_if = "Option::is_none")]
     decoders: Option<BTreeMap<String, Decoder<'a>>>,
 }
 
-/// Figures that only one kind of source has, or has in another form.
+/// Figures that depend on the kind of source.
 #[derive(Serialize)]
 #[serde(untagged)]
 enum SourceReport<'a> {
@@ -88,7 +88,7 @@ struct ArrayReport<'a> {
     unknowns: usize,
     equations: usize,
     condition: Option<f64>,
-    /// Remarks on the errors above, with cause and cure.
+    /// Remarks on the errors above, with cause and remedy.
     remarks: Vec<String>,
     reference: Option<Reference>,
 }
@@ -107,10 +107,10 @@ struct Decoder<'a> {
     #[serde(flatten)]
     errors: ErrorsReport<'a>,
     frame_us: f64,
-    /// Root mean square of m/R − 1; none if the decoded deformation has no resistance.
+    /// Root mean square of m/R − 1; none if the decoded deformation has no valid resistance.
     residual: Option<f64>,
     fit_seconds: f64,
-    /// Remarks on the errors, with cause and cure.
+    /// Remarks on the errors, with cause and remedy.
     remarks: Vec<String>,
     /// None for decoders that do not solve the equations of the sensor.
     solved: Option<Solved>,

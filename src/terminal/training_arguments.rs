@@ -13,7 +13,7 @@ use decoupler_core::{
 };
 use decoupler_files::{export::RecipeSource, import::Setup};
 
-// The run to train. Arguments that are not given have their default or the checkpoint's value.
+// Settings of the run. Arguments that are not given have their default or the value in the checkpoint.
 #[derive(Args)]
 pub(super) struct TrainingArguments {
     #[command(flatten)]
@@ -64,7 +64,7 @@ impl TrainingArguments {
         self.settings_on(None)
     }
 
-    /// Settings of a new run on this simulated array, by default that of the preset, with the arguments given.
+    /// Settings of a new run with the given arguments on this simulated array, by default that of the preset.
     fn settings_on(&self, simulation: Option<Simulation>) -> Result<SimulatedSettings, Failure> {
         self.scene.check_one_noise()?;
         let default = match simulation {
@@ -88,8 +88,8 @@ impl TrainingArguments {
         })
     }
 
-    /// Setup of a new run on samples of `source`, or else of the array that the arguments describe. `holds_out` is true if the
-    /// share of a recording for validation is stated; otherwise the method determines it.
+    /// Setup of a new run on samples of `source`, or of the array described by the arguments. `holds_out` is true if the
+    /// validation share of a recording is given; otherwise the method determines it.
     pub(super) fn setup(&self, source: Option<RecipeSource>, holds_out: bool) -> Result<Setup, Failure> {
         let mut plan = match source {
             None => return Ok(self.settings()?.into()),
@@ -115,10 +115,10 @@ impl TrainingArguments {
         })
     }
 
-    /// Default settings with the row model and scaling given.
+    /// Default settings with the given row model and scaling.
     ///
     /// # Errors
-    /// Names the first argument given that is for a simulated array only.
+    /// Names the first given argument that is only for a simulated array.
     fn recorded_source(&self, has_row_wires: bool) -> Result<RunSettings, Failure> {
         let settings = self.scene.recorded(has_row_wires)?;
         refuse_with_recordings([
@@ -130,7 +130,7 @@ impl TrainingArguments {
         Ok(settings)
     }
 
-    /// The sensor, if an array scale is given.
+    /// Sensor, if an array scale is given.
     pub(super) fn sensor(&self) -> Option<SensorModel> {
         self.array.map(SensorModel::new)
     }
@@ -138,7 +138,7 @@ impl TrainingArguments {
     /// Training settings with which the run of the setup `saved` is resumed.
     ///
     /// # Errors
-    /// Names the first argument given that differs.
+    /// Names the first given argument that differs.
     pub(super) fn resumed(&self, saved: &Setup) -> Result<TrainingSettings, Failure> {
         let settings = saved.settings();
         match (&settings.source, saved.plan()) {
@@ -146,7 +146,7 @@ impl TrainingArguments {
                 let simulated = saved.simulated().expect("the source is simulated");
                 if let Some(what) = self.scene.difference(&simulated)? {
                     return Err(Failure::Arguments(format!(
-                        "the checkpoint has another choice of {what}: leave it out to resume, or start a new training \
+                        "the checkpoint has a different value of {what}: leave it out to resume, or start a new training \
                          with another --checkpoint"
                     )));
                 }
@@ -174,11 +174,11 @@ impl TrainingArguments {
         self.training(settings.training)
     }
 
-    /// The given method and stopping rules; those not given are as in `present`.
-    pub(super) fn training(&self, present: TrainingSettings) -> Result<TrainingSettings, Failure> {
+    /// The given method and stopping rules; those not given are as in `current`.
+    pub(super) fn training(&self, current: TrainingSettings) -> Result<TrainingSettings, Failure> {
         // The current settings of the method are those that suit the samples.
-        let same = |method: &Method| method.short_name() == present.method.short_name();
-        let mut method = self.method.filter(|method| !same(method)).unwrap_or(present.method);
+        let same = |method: &Method| method.short_name() == current.method.short_name();
+        let mut method = self.method.filter(|method| !same(method)).unwrap_or(current.method);
         for (name, value) in &self.set {
             let short_name = method.short_name();
             let mut settings = method.settings();
@@ -192,7 +192,7 @@ impl TrainingArguments {
                 }
             }
         }
-        let rules = present.stopping;
+        let rules = current.stopping;
         let training = TrainingSettings {
             method,
             stopping: StoppingRules {
@@ -207,8 +207,8 @@ impl TrainingArguments {
     }
 }
 
-/// Refuses arguments of a simulated array next to a recording, given in this order: array, training, test and validation
-/// samples.
+/// Refuses arguments for a simulated array together with a recording, in this order: array, training, test and
+/// validation samples.
 pub(super) fn refuse_with_recordings(are_given: [bool; 4]) -> Result<(), Failure> {
     let arguments = [
         ("--array", "a recording (--data) has no array; leave it out"),
@@ -278,13 +278,13 @@ mod tests {
     }
 
     #[test]
-    fn the_defaults_in_the_help_are_those_of_the_library() {
+    fn the_defaults_in_the_help_match_the_library() {
         assert_eq!(parsed("train").settings().unwrap(), SimulatedSettings::default());
-        let told = "train --preset paper --rows all --axes z --loading random --inputs resistance --scaling minmax \
+        let line = "train --preset paper --rows all --axes z --loading random --inputs resistance --scaling minmax \
                     --noise 0 --noise-in both --array 10x10_5x30 --hidden 12 --starts 1 --method lm --epochs 1000 \
                     --goal 0 --max-fail 6 --min-gradient 1e-7 --samples 1000 --test-samples 100 --validation-samples \
                     200 --seed 0";
-        assert_eq!(parsed(told).settings().unwrap(), SimulatedSettings::default());
+        assert_eq!(parsed(line).settings().unwrap(), SimulatedSettings::default());
     }
 
     #[test]
@@ -292,7 +292,7 @@ mod tests {
         let recorded = |line: &str| parsed(line).recorded(false).unwrap();
         let default = RunSettings::from(Measured { rows: RowModel::Shared });
         assert_eq!(recorded("train"), default);
-        // Naming the default method keeps what suits recordings.
+        // Naming the default method keeps its settings for recordings.
         assert_eq!(recorded("train --method br"), default);
         let given = recorded(
             "train --method br --set correlation-epoch=0 --set groups-of-weights=1 --epochs 7 --starts 2 --hidden 3 --seed 4",

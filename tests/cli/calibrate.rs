@@ -1,4 +1,4 @@
-//! A real sensor in the terminal: calibrated, trained on its calibrated model, fine-tuned on its frames.
+//! A real sensor in the terminal: calibration, training on the calibrated model, and fine-tuning on its frames.
 
 use std::{fmt::Write as _, fs, path::Path};
 
@@ -13,7 +13,7 @@ use crate::{printed::json, terminal::decoupler};
 const ARRAY: &str = "4x4_3x12";
 const FRAMES: &str = "--data frames.csv --inputs r_1..r_12 --depths d_1..d_4 --row-wire row --group frame";
 
-/// Writes frames of a sensor that is not quite as drawn; only how far its nodes are pressed is told.
+/// Writes frames of a sensor that differs from the nominal one, with the depths of its nodes as the only known targets.
 fn record(folder: &Path) -> SensorModel {
     let nominal = SensorModel::new(ARRAY.parse().unwrap());
     let mut real = nominal;
@@ -52,7 +52,7 @@ fn record(folder: &Path) -> SensorModel {
 }
 
 #[test]
-fn a_real_sensor_is_calibrated_trained_for_and_tuned_to() {
+fn a_real_sensor_is_calibrated_and_a_network_trained_and_fine_tuned() {
     let folder = tempfile::tempdir().unwrap();
     let real = record(folder.path());
     let path = folder.path();
@@ -60,7 +60,7 @@ fn a_real_sensor_is_calibrated_trained_for_and_tuned_to() {
         &format!("calibrate --array {ARRAY} {FRAMES} --out sensor.json --json"),
         path,
     );
-    let told = |name: &str| {
+    let fitted = |name: &str| {
         let parameters = report["parameters"].as_array().unwrap();
         let found = parameters.iter().find(|parameter| parameter["name"] == name).unwrap();
         (found["value"].as_f64().unwrap(), found["half_width"].as_f64().unwrap())
@@ -70,7 +70,7 @@ fn a_real_sensor_is_calibrated_trained_for_and_tuned_to() {
         ("node pitch", real.geometry.node_pitch_mm),
         ("x of the first column node", real.geometry.column_node_x0_mm),
     ] {
-        let (value, half_width) = told(name);
+        let (value, half_width) = fitted(name);
         assert!(
             (value - truth).abs() <= half_width && half_width < 0.03 * truth,
             "{name}: {value} ± {half_width}"
@@ -145,9 +145,9 @@ fn frames_that_do_not_fit_the_array_are_refused() {
     );
 }
 
-/// Line 6 of the file has a value that no press and no reading has; both commands check by the same rules.
+/// Line 6 of the file has an impossible value; both commands apply the same checks.
 #[test]
-fn readings_and_depths_that_cannot_be_are_refused_with_their_line() {
+fn impossible_readings_and_depths_are_refused_with_their_line() {
     let folder = tempfile::tempdir().unwrap();
     record(folder.path());
     let path = folder.path();
@@ -158,7 +158,7 @@ fn readings_and_depths_that_cannot_be_are_refused_with_their_line() {
         path,
     );
     assert!(trained.status.success(), "{}", String::from_utf8_lossy(&trained.stderr));
-    let sound = fs::read_to_string(path.join("frames.csv")).unwrap();
+    let valid = fs::read_to_string(path.join("frames.csv")).unwrap();
     // Columns are frame, row, r_1 to r_12 and d_1 to d_4.
     for (column, value, cause) in [
         (3, "-5", "column 2: the reading -5 is not a resistance"),
@@ -172,7 +172,7 @@ fn readings_and_depths_that_cannot_be_are_refused_with_their_line() {
             "node 2: it is pressed down by 1.7 mm, but only 0 to 1 mm is possible",
         ),
     ] {
-        let spoilt = sound.lines().enumerate().map(|(line, text)| {
+        let damaged = valid.lines().enumerate().map(|(line, text)| {
             let mut cells: Vec<&str> = text.split(',').collect();
             if line == 5 {
                 cells[column] = value;
@@ -183,7 +183,7 @@ fn readings_and_depths_that_cannot_be_are_refused_with_their_line() {
         let calibrated = format!("calibrate --array {ARRAY} {FRAMES}");
         let tuned = format!("fine-tune --network net.json {FRAMES} --epochs 1 --out tuned.json");
         for command in [&calibrated, &tuned] {
-            // Without a scene, nodes may go down as far as there is room.
+            // Without a scene, depths are limited only by the height.
             if value == "1.7" && command == &calibrated {
                 continue;
             }
@@ -200,7 +200,7 @@ fn readings_and_depths_that_cannot_be_are_refused_with_their_line() {
 }
 
 #[test]
-fn a_wrong_array_scale_is_warned_of() {
+fn a_wrong_array_scale_causes_a_warning() {
     let folder = tempfile::tempdir().unwrap();
     record(folder.path());
     let output = decoupler(&format!("calibrate --array 4x4_4x12 {FRAMES}"), folder.path());

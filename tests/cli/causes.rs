@@ -1,4 +1,4 @@
-//! What fails in the terminal says what, where, and how to repair it; wrong arguments end with status 2.
+//! Failures in the terminal state what, where, and the remedy; invalid arguments end with status 2.
 
 use std::fs;
 
@@ -18,7 +18,7 @@ fn refused(arguments: &str) -> (String, i32) {
 }
 
 #[test]
-fn arguments_that_contradict_each_other_end_with_status_2_and_the_numbers_given() {
+fn contradictory_arguments_end_with_status_2_and_the_given_numbers() {
     let cases = [
         ("train --rows 11", "row 11 does not exist: the array has rows 1 to 10"),
         (
@@ -44,7 +44,7 @@ fn arguments_that_contradict_each_other_end_with_status_2_and_the_numbers_given(
     for (arguments, words) in cases {
         let (text, status) = refused(arguments);
         assert_eq!(status, 2, "{arguments}: {text}");
-        // A large run tells first what it takes, if the machine has the memory for it.
+        // For a large run an estimate is printed first, if the machine has enough memory.
         let message = text.lines().last().unwrap();
         assert!(message.contains(words), "{arguments}: {text}");
         assert!(text.lines().count() <= 2 && message.len() < 300, "{arguments}: {text}");
@@ -52,7 +52,7 @@ fn arguments_that_contradict_each_other_end_with_status_2_and_the_numbers_given(
 }
 
 #[test]
-fn a_file_that_the_system_refuses_is_told_in_plain_words_with_a_cure() {
+fn system_errors_of_files_are_explained_with_a_remedy() {
     let folder = tempfile::tempdir().unwrap();
     let at = |name: &str| folder.path().join(name).display().to_string();
     fs::create_dir(at("folder")).unwrap();
@@ -94,9 +94,9 @@ fn a_file_that_the_system_refuses_is_told_in_plain_words_with_a_cure() {
     }
 }
 
-/// Warnings of the training in text and in JSON are the same, and name the method's own settings.
+/// Warnings of the training are the same in text and JSON, and name the settings of the method.
 #[test]
-fn a_network_that_is_its_random_start_is_flagged_with_cause_and_cure() {
+fn an_untrained_network_is_reported_with_cause_and_remedy() {
     let folder = tempfile::tempdir().unwrap();
     let cases = [
         (
@@ -147,7 +147,7 @@ fn a_network_that_is_its_random_start_is_flagged_with_cause_and_cure() {
             "{warnings:?}"
         );
     }
-    let sound = String::from_utf8(
+    let ordinary = String::from_utf8(
         decoupler(
             &format!("{SMALL} --epochs 30 --validation-samples 0").replace("--epochs 3 ", ""),
             folder.path(),
@@ -155,5 +155,5 @@ fn a_network_that_is_its_random_start_is_flagged_with_cause_and_cure() {
         .stdout,
     )
     .unwrap();
-    assert!(!sound.contains("random start"), "{sound}");
+    assert!(!ordinary.contains("random start"), "{ordinary}");
 }

@@ -1,4 +1,4 @@
-//! The program in the terminal, run as its users run it.
+//! Basic commands, run as a program.
 
 use std::{fs, path::Path};
 
@@ -39,9 +39,9 @@ fn train_json(arguments: &str, folder: &Path) -> Value {
     serde_json::from_str(&text).unwrap()
 }
 
-/// The paper's main experiment: its Table 1 within the spread of seeds, and better with more epochs.
+/// The paper's main experiment: Table 1 within the spread of seeds, and smaller errors with more epochs.
 #[test]
-fn the_papers_errors_come_back() {
+fn the_papers_errors_are_reproduced() {
     let cases = [
         ("as in Table 1", "--hidden 12 --method lm --epochs 60", 1.4..2.6),
         ("with more epochs", "--hidden 12 --method lm --epochs 300", 0.0..1.2),
@@ -72,7 +72,7 @@ fn the_papers_errors_come_back() {
 }
 
 #[test]
-fn wrong_arguments_end_with_status_2() {
+fn invalid_arguments_end_with_status_2() {
     let folder = tempfile::tempdir().unwrap();
     let cases = [
         ("train --hidden 0", "from 1 to 512"),
@@ -130,7 +130,7 @@ fn an_unwritable_file_is_refused_before_training_and_leaves_nothing() {
         ("fixed.json", "read-only"),
     ];
     for (path, expected) in cases {
-        // This many epochs that training first would be noticed.
+        // So many epochs that training before the check would be noticed.
         let text = failure(&format!("train --epochs 1000000 --out {path}"), folder.path(), 1);
         assert!(text.contains(expected), "{text}");
         assert!(failure(&format!("simulate --out {path}"), folder.path(), 1).contains(expected));
@@ -167,7 +167,7 @@ fn a_seed_gives_the_same_network_and_settings_matter() {
 }
 
 #[test]
-fn the_table_has_every_row_and_says_why_it_ended() {
+fn the_table_has_every_row_and_the_reason_for_the_end() {
     let folder = tempfile::tempdir().unwrap();
     let text = success("train --array 10x6_3x18 --epochs 2", folder.path());
     for words in [
@@ -184,7 +184,8 @@ fn the_table_has_every_row_and_says_why_it_ended() {
     assert!(!success(&format!("train {SMALL}"), folder.path()).contains("published"));
 }
 
-/// Simulated samples, decoded by a saved network, score what the training said: its seed gives its test samples.
+/// Simulated samples, decoded by a saved network, have the errors reported by the training: the seed gives its test
+/// samples.
 #[test]
 fn simulate_and_decode_agree_with_the_library() {
     let folder = tempfile::tempdir().unwrap();
@@ -268,10 +269,10 @@ fn files_that_cannot_be_decoded_leave_nothing() {
     assert!(failure(damaged, folder, 1).contains("not a network file"));
 }
 
-/// `decoupler simulate | head -1` ends without a word.
+/// `decoupler simulate | head -1` ends silently.
 #[cfg(unix)]
 #[test]
-fn a_reader_that_goes_away_is_no_failure() {
+fn a_closed_output_is_not_a_failure() {
     use std::process::{Command, Stdio};
     let mut command = Command::new(env!("CARGO_BIN_EXE_decoupler"));
     command.args(["simulate", "--samples", "10000"]);

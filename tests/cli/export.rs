@@ -1,4 +1,4 @@
-//! `decoupler export` as its users run it.
+//! `decoupler export`, run as a program.
 
 use std::{fs, path::Path};
 
@@ -31,9 +31,9 @@ fn failure(arguments: &str, folder: &Path, status: i32) -> String {
     message
 }
 
-/// The golden vectors of an exported network, decoded by `decode`, give its golden coordinates.
+/// `decode` of the golden readings of an exported network gives the golden coordinates.
 #[test]
-fn an_exported_network_is_that_of_decode() {
+fn an_exported_network_agrees_with_decode() {
     let folder = trained("--rows known --noise 1e-3");
     let output = decoupler(
         "export --network n.json --format onnx --out bundle --json",
@@ -90,7 +90,12 @@ fn the_report_names_files_deviations_and_bounds_with_their_units() {
         (
             "c99",
             "fixed16",
-            vec!["out_c99_fixed16_decode.c", "bit-exact fixed-point model", "Proven bound", " mm"],
+            vec![
+                "out_c99_fixed16_decode.c",
+                "bit-exact fixed-point model",
+                "Proven bound",
+                " mm",
+            ],
         ),
         (
             "matlab",
@@ -118,7 +123,7 @@ fn the_report_names_files_deviations_and_bounds_with_their_units() {
 }
 
 #[test]
-fn what_is_wrong_takes_one_line_and_leaves_nothing() {
+fn errors_take_one_line_and_leave_no_files() {
     let folder = trained("");
     fs::create_dir(folder.path().join("full")).unwrap();
     fs::write(folder.path().join("full/kept"), "").unwrap();
@@ -140,7 +145,7 @@ fn what_is_wrong_takes_one_line_and_leaves_nothing() {
 }
 
 #[test]
-fn help_tells_formats_precisions_and_units() {
+fn help_lists_formats_precisions_and_units() {
     let output = decoupler("export --help", Path::new("."));
     let text = String::from_utf8(output.stdout).unwrap();
     for expected in ["ohm", "mm", "opset 13", "fixed16", "1e-12", "README.txt", "nanometres"] {
@@ -149,9 +154,9 @@ fn help_tells_formats_precisions_and_units() {
 }
 
 #[cfg(unix)]
-/// Each decoder is fitted again to the samples of the network, deterministically.
+/// Each decoder is fitted to the samples of the network deterministically.
 #[test]
-fn other_decoders_leave_beside_the_network_or_say_why_not() {
+fn other_decoders_are_exported_or_refused_with_a_reason() {
     let folder = trained("--rows known --noise 1e-3");
     let path = folder.path();
     let exported = |decoder: &str, out: &str| {
@@ -194,7 +199,7 @@ fn other_decoders_leave_beside_the_network_or_say_why_not() {
 }
 
 #[test]
-fn the_folder_of_an_export_that_was_killed_is_removed_by_the_next_and_no_other() {
+fn only_the_folder_of_a_killed_export_is_removed_by_the_next() {
     let folder = trained("");
     let path = |name: &str| folder.path().join(name);
     for name in [

@@ -1,5 +1,5 @@
-//! Files in the terminal: what is read has limits, what is written destroys nothing else, and numbers that are none are
-//! refused or explained.
+//! Files in the terminal: input is limited in size, output does not overwrite other files, and values that are not finite
+//! are refused or explained.
 
 use std::{
     fs::{self, File},
@@ -83,7 +83,7 @@ fn an_input_is_never_overwritten_by_the_output() {
 
 #[cfg(target_os = "linux")]
 #[test]
-fn what_never_ends_is_refused_at_a_stated_limit() {
+fn endless_input_is_refused_at_a_stated_limit() {
     let folder = trained("");
     let mut line = vec![b'1'; 3 << 20];
     fs::write(folder.path().join("line.csv"), &line).unwrap();
@@ -112,7 +112,7 @@ fn what_never_ends_is_refused_at_a_stated_limit() {
         let message = failure(&format!("train --checkpoint {endless} --resume"), folder.path(), 1);
         assert!(message.contains("is not a checkpoint"), "{endless}: {message}");
     }
-    // A file that begins as ours and has no end takes no more room on the disk than its beginning.
+    // A sparse file that begins like a valid one: it needs little space on disk.
     let mut file = File::create(folder.path().join("endless.json")).unwrap();
     file.write_all(b"{\"format\":\"decoupler network\",\"program\":\"")
         .unwrap();
@@ -127,7 +127,7 @@ fn what_never_ends_is_refused_at_a_stated_limit() {
 
 #[cfg(target_os = "linux")]
 #[test]
-fn figures_are_printed_even_where_the_network_cannot_be_saved() {
+fn figures_are_printed_even_if_the_network_cannot_be_saved() {
     let folder = tempfile::tempdir().unwrap();
     for json in ["", "--json"] {
         let arguments = format!("train {SMALL} --decoder mean --out /dev/full {json}");
@@ -163,7 +163,7 @@ fn a_link_to_a_missing_file_stays_and_its_target_is_written() {
 }
 
 #[test]
-fn what_a_killed_program_left_is_removed_by_the_next_and_nothing_else() {
+fn only_files_left_by_a_killed_program_are_removed_by_the_next() {
     let folder = tempfile::tempdir().unwrap();
     let path = |name: &str| folder.path().join(name);
     let at_work = File::create(path(".decoupler-atwork.part")).unwrap();
@@ -200,7 +200,7 @@ fn readings_outside_the_training_range_are_flagged_by_line() {
             );
             let (message, decoded) = (text(&output.stderr), fs::read_to_string(path("out.csv")));
             if !output.status.success() {
-                // So far that the network has no answer.
+                // So far outside that the output of the network is not finite.
                 assert_eq!(output.status.code(), Some(1), "{scene}: {message}");
                 return (message, None);
             }
@@ -218,7 +218,7 @@ fn readings_outside_the_training_range_are_flagged_by_line() {
             let lines = decoded.lines().skip(1);
             lines.map(|line| line.rsplit(',').nth(1).unwrap().to_owned()).collect()
         };
-        // Readings of the same scene are ordinary.
+        // Readings of the same scene are within the range.
         let (message, decoded) = decode("readings.csv");
         assert_eq!(message, "", "{scene}");
         assert!(flags(&decoded.unwrap()).iter().all(|flag| flag == "0"), "{scene}");
@@ -261,7 +261,7 @@ fn readings_outside_the_training_range_are_flagged_by_line() {
 }
 
 #[test]
-fn noise_beyond_all_numbers_is_refused() {
+fn infinite_noise_is_refused() {
     let folder = tempfile::tempdir().unwrap();
     for arguments in [
         "simulate --array 2x2_2x6 --samples 40 --noise-ohm 1e308 --out out.csv".to_owned(),
@@ -277,7 +277,7 @@ fn noise_beyond_all_numbers_is_refused() {
 }
 
 #[test]
-fn figures_that_single_precision_has_not_are_explained() {
+fn overflow_in_single_precision_is_explained() {
     let folder = tempfile::tempdir().unwrap();
     let arguments = format!("train {SMALL} --noise-ohm 1e39 --decoder network");
     let output = decoupler(&arguments, folder.path());
@@ -300,7 +300,7 @@ fn figures_that_single_precision_has_not_are_explained() {
 }
 
 #[test]
-fn a_report_is_written_beside_json_with_the_same_figures_and_shares_no_path() {
+fn a_report_with_json_has_the_same_figures_and_needs_its_own_path() {
     let folder = tempfile::tempdir().unwrap();
     let arguments = format!("train {SMALL} --seed 3 --decoder ridge --json --report r.html");
     let output = decoupler(&arguments, folder.path());

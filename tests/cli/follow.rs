@@ -1,4 +1,4 @@
-//! `decode --follow` as a robot runs it: over pipes, a pseudo-terminal and a socket.
+//! `decode --follow` over pipes, a pseudo-terminal and a socket.
 
 use std::{
     fs,
@@ -15,7 +15,7 @@ use crate::terminal::decoupler;
 
 const SMALL: &str = "--array 2x2_2x6 --samples 400 --validation-samples 0 --test-samples 10 --hidden 3 --epochs 5";
 
-/// A folder with a network, `n.json`, readings of 20 snapshots, `readings.csv`, and what `decode` makes of them,
+/// A folder with a network, `n.json`, readings of 20 snapshots, `readings.csv`, and the output of `decode` for them,
 /// `decoded.csv`.
 fn trained(scene: &str) -> TempDir {
     let folder = tempfile::tempdir().unwrap();
@@ -34,7 +34,7 @@ fn read(folder: &TempDir, name: &str) -> String {
     fs::read_to_string(folder.path().join(name)).unwrap()
 }
 
-/// Compares two tables. The compiled network rounds otherwise than `decode`, which computes in blocks.
+/// Compares two tables. The compiled network rounds differently from `decode`, which computes in blocks.
 fn assert_same<'a>(found: impl IntoIterator<Item = &'a str>, expected: impl IntoIterator<Item = &'a str>) {
     let (found, expected): (Vec<&str>, Vec<&str>) = (found.into_iter().collect(), expected.into_iter().collect());
     assert_eq!(found.len(), expected.len());
@@ -60,7 +60,7 @@ fn spawn(arguments: &str, folder: &Path) -> Child {
     command.spawn().unwrap()
 }
 
-/// The rows of `readings.csv` as a device sends them: number of the row, then resistances.
+/// The rows of `readings.csv` as a device sends them: row number, then resistances.
 fn device_lines(folder: &TempDir) -> Vec<String> {
     let readings = read(folder, "readings.csv");
     let fields = |line: &str| line.split(',').map(str::to_owned).collect::<Vec<_>>();
@@ -69,7 +69,7 @@ fn device_lines(folder: &TempDir) -> Vec<String> {
 }
 
 #[test]
-fn a_file_or_pipe_gives_what_decode_gives() {
+fn a_file_or_pipe_is_decoded_as_by_decode() {
     let folder = trained("--rows known");
     let expected = read(&folder, "decoded.csv");
     let output = decoupler("decode --network n.json --follow --input readings.csv", folder.path());
@@ -79,11 +79,8 @@ fn a_file_or_pipe_gives_what_decode_gives() {
         report.contains("40 lines decoded") && report.contains("0 bad, 0 dropped; latency p50"),
         "{report}"
     );
-    assert!(
-        report.contains("trained without noise to judge them by; give --noise"),
-        "{report}"
-    );
-    // Without names, in turn; the numbers of rows are not needed.
+    assert!(report.contains("trained without noise; give --noise"), "{report}");
+    // Without names, in order; row numbers are not needed.
     let lines = device_lines(&folder);
     let plain = lines.iter().map(|line| line.split_once(',').unwrap().1.to_owned());
     let mut child = spawn("decode --network n.json --follow", folder.path());
@@ -98,7 +95,7 @@ fn a_file_or_pipe_gives_what_decode_gives() {
 }
 
 #[test]
-fn whole_snapshots_and_json_are_possible() {
+fn whole_snapshots_and_json_are_supported() {
     let folder = trained("--rows known");
     let lines = device_lines(&folder);
     let snapshot = |pair: &[String]| {
@@ -135,7 +132,7 @@ fn whole_snapshots_and_json_are_possible() {
 }
 
 #[test]
-fn garbage_is_counted_told_and_stepped_over() {
+fn garbage_is_counted_reported_and_skipped() {
     let folder = trained("--rows known");
     let mut lines = device_lines(&folder);
     let garbage = [
@@ -199,7 +196,7 @@ fn a_fault_is_named_and_left_out() {
     );
 }
 
-/// A running program with its ends of the pipes.
+/// A running program with the pipes to it.
 struct Running {
     child: Child,
     input: ChildStdin,
@@ -236,7 +233,7 @@ impl Running {
 }
 
 #[test]
-fn answers_come_at_once_and_signals_are_answered() {
+fn answers_are_immediate_and_signals_are_handled() {
     let folder = trained("--rows known");
     let expected = read(&folder, "decoded.csv");
     let mut expected = expected.lines();
@@ -264,7 +261,7 @@ fn answers_come_at_once_and_signals_are_answered() {
 }
 
 #[test]
-fn a_reader_that_goes_away_ends_it_quietly() {
+fn a_closed_output_ends_the_program_silently() {
     let folder = trained("--rows known");
     let lines = device_lines(&folder).concat();
     let Running {
@@ -273,7 +270,7 @@ fn a_reader_that_goes_away_ends_it_quietly() {
         output,
     } = Running::new("decode --network n.json --follow", &folder);
     drop(output);
-    // The program ends when it finds out.
+    // The program ends when it notices.
     while input.write_all(lines.as_bytes()).is_ok() {}
     let mut report = String::new();
     child.stderr.take().unwrap().read_to_string(&mut report).unwrap();
@@ -285,7 +282,7 @@ fn a_serial_device_is_read_from_a_line_end_on() {
     let folder = trained("--rows known");
     let (mut device, port) = TTYPort::pair().unwrap();
     let name = port.name().unwrap();
-    // Without anybody at its other end a device cannot be written to.
+    // A device whose other end is closed cannot be written to.
     let _held = fs::File::open(&name).unwrap();
     drop(port);
     let mut running = Running::new(
@@ -309,7 +306,7 @@ fn a_serial_device_is_read_from_a_line_end_on() {
 }
 
 #[test]
-fn a_socket_is_read_until_it_closes_and_says_which_row() {
+fn a_socket_is_read_until_it_closes_and_sends_row_numbers() {
     let folder = trained("--rows known");
     let listener = TcpListener::bind("127.0.0.1:0").unwrap();
     let address = listener.local_addr().unwrap();
@@ -322,7 +319,7 @@ fn a_socket_is_read_until_it_closes_and_says_which_row() {
     assert!(stream.write_all(lines[0].as_bytes()).is_ok());
     assert_same([running.line().as_str()], expected.next());
     for line in &lines[1..] {
-        // Each answer is awaited, so that none is late.
+        // The test waits for each answer, so that no line is dropped.
         assert_same([running.line().as_str()], expected.next());
         stream.write_all(line.as_bytes()).unwrap();
     }
@@ -331,7 +328,7 @@ fn a_socket_is_read_until_it_closes_and_says_which_row() {
     assert_eq!(running.line(), "");
     assert!(running.child.wait().unwrap().success());
     assert!(running.stderr().contains("40 lines decoded"));
-    // Without the number, no one knows which row a device begins with.
+    // Without the row number, the row with which a device begins is unknown.
     let mut running = Running::new(&arguments, &folder);
     let (mut stream, _) = listener.accept().unwrap();
     stream
@@ -339,7 +336,7 @@ fn a_socket_is_read_until_it_closes_and_says_which_row() {
         .unwrap();
     assert_eq!(running.child.wait().unwrap().code(), Some(1));
     let message = running.stderr();
-    assert!(message.contains("line 1: it does not say its row-wire"), "{message}");
+    assert!(message.contains("line 1: it has no row number"), "{message}");
 }
 
 #[test]
@@ -377,7 +374,7 @@ fn a_header_without_a_resistance_and_a_stream_without_a_frame_end_with_an_error(
 }
 
 #[test]
-fn sources_that_do_not_open_are_explained_in_one_line() {
+fn sources_that_cannot_be_opened_are_explained_in_one_line() {
     let folder = trained("");
     for (input, status, words) in [
         ("/dev/no-such-tty:9600", 1, "there is no device '/dev/no-such-tty'"),

@@ -1,4 +1,4 @@
-//! Own data in the terminal: inspected, trained on, resumed and decoded, and what belongs to a simulated sensor refused.
+//! Recordings in the terminal: inspection, training, resuming and decoding; options of a simulated sensor are refused.
 
 use std::{
     fs,
@@ -16,7 +16,7 @@ use crate::{printed::json, terminal::decoupler};
 const TRAIN: &str = "train --data sensor.csv --join states.csv --time c1 --inputs c2..c4 --targets states.c2,states.c3 \
                      --where states.c4<3 --unit states.c2=mm --hidden 6 --starts 1 --epochs 60";
 
-/// Two recordings with clocks 2 ms apart: three readings, and two positions and a height behind them.
+/// Two recordings with clocks 2 ms apart: three readings, and the two positions and the height that determine them.
 fn recordings() -> TempDir {
     let folder = tempfile::tempdir().unwrap();
     let mut rng = ChaCha8Rng::seed_from_u64(2);
@@ -45,7 +45,7 @@ fn failure(arguments: &str, folder: &Path, status: i32) -> String {
 }
 
 #[test]
-fn a_network_is_trained_on_joined_files_and_judged_target_by_target() {
+fn a_network_is_trained_on_joined_files_and_evaluated_for_each_target() {
     let folder = recordings();
     let report = json(
         &format!("{TRAIN} --split time --test-fraction 0.2 --json"),
@@ -155,7 +155,7 @@ fn a_checkpoint_resumes_unless_its_samples_have_changed() {
 }
 
 #[test]
-fn a_decoder_is_not_fitted_to_other_samples_than_the_run_had() {
+fn a_decoder_is_not_fitted_to_samples_that_have_changed() {
     let folder = recordings();
     json(&format!("{TRAIN} --out n.json --json"), folder.path());
     let export = "export --network n.json --decoder ridge --format numpy --json --out";
@@ -171,7 +171,7 @@ fn a_decoder_is_not_fitted_to_other_samples_than_the_run_had() {
 }
 
 #[test]
-fn files_of_a_checkpoint_that_have_moved_are_found_by_the_name_given() {
+fn moved_files_of_a_checkpoint_are_found_by_the_given_name() {
     let folder = recordings();
     let path = |name: &str| folder.path().join(name);
     fs::create_dir_all(path("moved/again")).unwrap();
@@ -201,7 +201,7 @@ fn files_of_a_checkpoint_that_have_moved_are_found_by_the_name_given() {
     // The joined file is in the same folder.
     let resumed = json(&format!("{resume} --data moved/again/sensor.csv --json"), folder.path());
     assert_eq!(resumed["epochs"], 8);
-    // By another name it takes the place of the argument.
+    // A file with another name is matched by its argument.
     fs::rename(path("moved/again/sensor.csv"), path("renamed.csv")).unwrap();
     let renamed = format!("{resume} --data renamed.csv --join moved/again/states.csv");
     json(
@@ -223,7 +223,7 @@ fn files_of_a_checkpoint_that_have_moved_are_found_by_the_name_given() {
 }
 
 #[test]
-fn other_decoders_are_measured_on_a_recording_if_they_are_asked_for() {
+fn other_decoders_are_measured_on_a_recording_if_requested() {
     let folder = recordings();
     let report = json(&format!("{TRAIN} --json"), folder.path());
     assert_eq!(report.get("decoders"), None);
@@ -245,7 +245,7 @@ fn other_decoders_are_measured_on_a_recording_if_they_are_asked_for() {
 }
 
 #[test]
-fn the_network_of_a_recording_decodes_files_and_lines_under_its_names() {
+fn the_network_of_a_recording_decodes_files_and_lines_by_column_names() {
     let folder = recordings();
     json(&format!("{TRAIN} --out n.json --json"), folder.path());
     let output = decoupler(
@@ -302,7 +302,7 @@ fn the_network_of_a_recording_decodes_files_and_lines_under_its_names() {
     assert!(message.contains("--follow"), "{message}");
 }
 
-/// A network of the inputs x1 and x2, `n.json`; y = x1 - 2 x2.
+/// A network with the inputs x1 and x2, `n.json`; y = x1 - 2 x2.
 fn with_two_inputs() -> TempDir {
     let folder = tempfile::tempdir().unwrap();
     let value = |k: u32, by: u32| f64::from(k * by % 101) / 50.0 - 1.0;
@@ -379,7 +379,7 @@ fn columns_are_matched_by_name_in_files_and_streams() {
             assert!(output.stdout.is_empty());
         }
     }
-    // Names may come again, in another order.
+    // The header may be repeated, in another order.
     write("x1,x2\n0.5,-0.1\nx2,x1\n0.4,-0.3\n0.4,0.9\n");
     let followed = answers(&String::from_utf8(follow().stdout).unwrap());
     assert!(
@@ -392,7 +392,7 @@ fn columns_are_matched_by_name_in_files_and_streams() {
 }
 
 #[test]
-fn what_belongs_to_a_simulated_sensor_is_refused_with_a_reason() {
+fn options_of_a_simulated_sensor_are_refused_with_a_reason() {
     let folder = recordings();
     for (arguments, cause) in [
         ("--array 2x2_2x6", "--array: a recording (--data) has no array"),
@@ -443,7 +443,7 @@ fn an_inspection_prints_layout_columns_and_times() {
 }
 
 #[test]
-fn positions_of_targets_are_told_kept_in_the_recipe_and_refused_by_line() {
+fn positions_of_targets_are_reported_kept_in_the_recipe_and_checked_by_line() {
     let folder = recordings();
     let positions = |text: &str| fs::write(folder.path().join("taxels.csv"), text).unwrap();
     positions("target,x,y\nstates.c2,0,0\nstates.c3,4,0\n");

@@ -1,4 +1,4 @@
-//! The program in the terminal, run as its users run it.
+//! The command line, run as a program.
 
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 

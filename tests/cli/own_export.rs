@@ -1,4 +1,4 @@
-//! Networks of recordings, exported in the terminal under the names and units of their columns.
+//! Networks of recordings, exported in the terminal with the names and units of their columns.
 
 use std::{fs, path::Path};
 
@@ -8,8 +8,8 @@ use tempfile::TempDir;
 
 use crate::terminal::decoupler;
 
-/// A folder with a recording and its network `n.json`: readings of any sign, targets of sizes that differ by 1e6, and names
-/// that would end a comment or a cell.
+/// A folder with a recording and its network `n.json`: readings of both signs, targets whose scales differ by 1e6, and
+/// names with characters that end a comment or a cell.
 fn trained(rows: &str) -> TempDir {
     let folder = tempfile::tempdir().unwrap();
     let mut rng = ChaCha8Rng::seed_from_u64(4);
@@ -54,7 +54,7 @@ fn columns(path: &Path, names: &[&str]) -> Vec<Vec<f64>> {
 }
 
 #[test]
-fn golden_vectors_in_the_users_units_are_those_of_decode() {
+fn golden_vectors_in_the_users_units_agree_with_decode() {
     let folder = trained("");
     let report = export("--format onnx --out bundle", folder.path());
     assert!(report["deviation"].as_f64().unwrap() <= report["limit"].as_f64().unwrap());
@@ -68,7 +68,7 @@ fn golden_vectors_in_the_users_units_are_those_of_decode() {
     let golden = columns(&golden, &["force", "torque"]);
     let decoded = columns(&folder.path().join("decoded.csv"), &["force (N)", "torque (N·m)"]);
     assert!(golden.len() >= 7 && golden.len() == decoded.len());
-    // Each target is told to the last digits of its own range.
+    // Each target is accurate to the last digits of its range.
     for (golden, decoded) in golden.iter().zip(&decoded) {
         assert!((golden[0] - decoded[0]).abs() < 4e-9 && (golden[1] - decoded[1]).abs() < 2e-15);
     }
@@ -88,7 +88,7 @@ fn golden_vectors_in_the_users_units_are_those_of_decode() {
 }
 
 #[test]
-fn every_format_is_verified_and_says_names_units_and_rows() {
+fn every_format_is_verified_and_documents_names_units_and_rows() {
     let folder = trained("--rows known");
     let path = folder.path();
     for (format, precision, file) in [
@@ -151,10 +151,10 @@ fn other_decoders_of_a_recording_keep_names_units_and_rows() {
     );
 }
 
-/// The golden vectors, rounded to the units that the header defines, are answered within the bound of each target by the
-/// program's own model, and where there is a compiler by the compiled source.
+/// For the golden vectors, rounded to the units in the header, the answers of the program's model and, if there is a
+/// compiler, of the compiled source are within the bound of each target.
 #[test]
-fn whole_numbers_have_units_of_their_own_for_each_column() {
+fn integers_have_separate_units_for_each_column() {
     for rows in ["", "--rows known"] {
         let folder = trained(rows);
         let report = export("--format c99 --precision fixed16 --out whole", folder.path());
@@ -195,9 +195,9 @@ fn whole_numbers_have_units_of_their_own_for_each_column() {
     }
 }
 
-/// Readings that vary by a billionth of their size lose everything when they are rounded to single precision.
+/// Readings that vary by a billionth of their size lose all information when rounded to single precision.
 #[test]
-fn offsets_that_single_precision_cannot_hold_are_refused_with_cause_and_cure() {
+fn offsets_too_large_for_single_precision_are_refused_with_cause_and_remedy() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path();
     let mut rng = ChaCha8Rng::seed_from_u64(4);
@@ -245,7 +245,7 @@ fn offsets_that_single_precision_cannot_hold_are_refused_with_cause_and_cure() {
             let report: Value = serde_json::from_slice(&output.stdout).unwrap();
             let change = &report["change_by_rounding_readings"]["largest"];
             assert_eq!(change.is_null(), precision == "f64", "{report}");
-            // 1e-3 of a size of 1 has some 14 bits.
+            // 1e-3 of a size of 1 leaves about 14 bits.
             if let Some(change) = change.as_f64() {
                 let wanted = if range == 1.0 { 0.0..1e-6 } else { 1e-6..1e-4 };
                 assert!(wanted.contains(&change), "{offset} {range}: {report}");

@@ -1,5 +1,5 @@
-//! The trade-off of a recording in the terminal: every decoder measured on the test samples, and what belongs to a simulated
-//! sensor refused.
+//! The trade-off of a recording in the terminal: all decoders are measured on the test samples; options of a simulated
+//! sensor are refused.
 
 use std::{fs, path::Path};
 
@@ -11,7 +11,7 @@ use crate::{printed::success, terminal::decoupler};
 
 const DATA: &str = "--data skin.csv --inputs c1..c3 --targets c4,c5 --unit c4=mm --unit c5=N";
 
-/// Three readings of a position and a force: no affine map tells the position, and neither the force.
+/// Three readings of a position and a force, neither of which is an affine function of the readings.
 fn recording() -> TempDir {
     let folder = tempfile::tempdir().unwrap();
     let mut rng = ChaCha8Rng::seed_from_u64(5);
@@ -72,13 +72,13 @@ fn each_decoder_has_its_errors_times_and_place_on_the_fronts() {
             (point["hidden"].is_u64(), point["method"].is_string()),
             (is_network, is_network)
         );
-        // Levenberg-Marquardt holds a fifth of the other samples out.
+        // Levenberg-Marquardt holds out a fifth of the other samples.
         let held_out = if point["method"] == "lm" { 32 } else { 0 };
         assert_eq!(
             (&point["samples"], &point["validation_samples"]),
             (&(160 - held_out).into(), &held_out.into())
         );
-        // No other is faster with as little error: written out again.
+        // Independent test of Pareto optimality.
         for (front, cost) in [("on_decoding_front", "frame_us"), ("on_training_front", "training_s")] {
             let of = |point: &Value| (number(point, cost), number(point, "percent_of_range"));
             let (own_cost, own_error) = of(point);
@@ -122,10 +122,10 @@ fn the_command_of_a_point_trains_its_network() {
         assert!(warnings.contains("random test samples are optimistic"), "{warnings}");
         let point = &report["points"][0];
         let command = point["command"].as_str().unwrap().strip_prefix("decoupler ").unwrap();
-        // The shell takes the quotes away.
+        // The shell removes the quotes.
         let trained = json(&command.replace('\'', ""), folder.path());
         let [of_train, of_point] = [&trained, point].map(|from| from["targets"][1]["rmse"].as_f64().unwrap());
-        // The trade-off times compiled networks, which round otherwise.
+        // The trade-off measures compiled networks, which round differently.
         assert!(
             (of_train / of_point - 1.0).abs() < 1e-9,
             "{command}: {of_train} {of_point}"
@@ -135,7 +135,7 @@ fn the_command_of_a_point_trains_its_network() {
 }
 
 #[test]
-fn the_table_tells_the_errors_of_each_target_in_its_unit() {
+fn the_table_lists_the_errors_of_each_target_in_its_unit() {
     let folder = recording();
     let text = success(
         &format!("trade {DATA} --hidden 2 --epochs 5 --decoder ridge,network --under-us 1e9"),
@@ -155,7 +155,7 @@ fn the_table_tells_the_errors_of_each_target_in_its_unit() {
 }
 
 #[test]
-fn what_belongs_to_a_simulated_sensor_is_refused_and_the_other_way_round() {
+fn options_of_a_simulated_sensor_are_refused_and_vice_versa() {
     let folder = recording();
     let own = |argument: &str| format!("trade {DATA} {argument}");
     let cases = [

@@ -1,4 +1,4 @@
-//! What the program prints when it succeeds.
+//! Output of successful calls.
 
 use std::path::Path;
 
@@ -6,7 +6,7 @@ use serde_json::Value;
 
 use crate::terminal::decoupler;
 
-/// Standard output of a call that must succeed; it may warn.
+/// Standard output of a call that must succeed, possibly with warnings.
 pub(crate) fn success(arguments: &str, folder: &Path) -> String {
     let output = decoupler(arguments, folder);
     let message = String::from_utf8_lossy(&output.stderr).into_owned();
@@ -14,7 +14,7 @@ pub(crate) fn success(arguments: &str, folder: &Path) -> String {
     String::from_utf8(output.stdout).unwrap()
 }
 
-/// As `success`, of a call that prints JSON.
+/// Like `success`, for a call that prints JSON.
 pub(crate) fn json(arguments: &str, folder: &Path) -> Value {
     serde_json::from_str(&success(arguments, folder)).unwrap()
 }

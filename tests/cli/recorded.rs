@@ -1,4 +1,4 @@
-//! What a recording tells, in the terminal.
+//! Analysis of a recording in the terminal.
 
 use std::{
     fs,
@@ -12,7 +12,7 @@ use tempfile::TempDir;
 
 use crate::{printed::json, terminal::decoupler};
 
-/// A recording of four readings, of which d repeats a and e is constant: they tell x, and nothing of y, which is noise.
+/// A recording of four readings, where d repeats a and e is constant: they determine x, but not y, which is noise.
 fn recording() -> TempDir {
     let folder = tempfile::tempdir().unwrap();
     let mut rng = ChaCha8Rng::seed_from_u64(5);
@@ -36,7 +36,7 @@ fn each_target_and_channel_is_judged_with_an_interval() {
         (&target(0)["standing"], &target(0)["unit"]),
         (&"determined".into(), &"mm".into())
     );
-    // Of x, the readings miss 0.05²/3 of (1 + 0.3² + 0.05²)/3.
+    // The readings do not explain 0.05²/3 of the variance of x, (1 + 0.3² + 0.05²)/3.
     let r2 = &target(0)["r2"];
     let expected = 1.0 - 0.0025 / 1.0925;
     let value = r2["value"].as_f64().unwrap();
@@ -83,7 +83,7 @@ fn networks_are_compared_with_ridge_and_with_a_random_split() {
     let folder = recording();
     let arguments = "inspect --data r.csv --inputs a,b,d,e --targets x --hidden 2 --folds 2 --json";
     let report = json(arguments, folder.path());
-    // x is linear: a network is worth no more.
+    // x is linear: a network is no better.
     assert_eq!(report["model"], "ridge", "{report}");
     let target = &report["targets"][0];
     for figure in ["r2_network", "r2_ridge", "network_to_ridge"] {
@@ -103,10 +103,10 @@ fn networks_are_compared_with_ridge_and_with_a_random_split() {
 }
 
 #[test]
-fn a_random_split_says_by_how_much_it_flatters() {
+fn the_optimism_of_a_random_split_is_reported() {
     let folder = tempfile::tempdir().unwrap();
     let mut rng = ChaCha8Rng::seed_from_u64(6);
-    // A target that drifts with the time, which the reading determines only as long as it does not go on.
+    // A target that drifts with time, so that it cannot be predicted beyond the training samples.
     let lines = (0..200).map(|frame| {
         let time = f64::from(frame) / 20.0;
         format!("{time},{}\n", (1.3 * time).sin() + 0.02 * rng.random_range(-1.0..1.0))
@@ -128,8 +128,8 @@ fn a_random_split_says_by_how_much_it_flatters() {
     }
 }
 
-/// Ten presses, whose readings name the press and nothing of the target, which differs from press to press; rows in a random
-/// order.
+/// Ten presses in random order, whose readings identify the press but do not determine the target, which differs between
+/// presses.
 fn presses() -> TempDir {
     let folder = tempfile::tempdir().unwrap();
     let mut rng = ChaCha8Rng::seed_from_u64(8);
@@ -149,7 +149,7 @@ fn presses() -> TempDir {
 const PRESSES: &str = "--data r.csv --inputs a,b --targets y --group press --hidden 8";
 
 #[test]
-fn a_random_split_is_compared_with_groups_where_there_are_any() {
+fn a_random_split_is_compared_with_groups_if_there_are_any() {
     let folder = presses();
     for split in ["--split random", "--split random --folds 5"] {
         let report = json(&format!("train {PRESSES} {split} --epochs 60 --json"), folder.path());
@@ -179,15 +179,15 @@ fn a_random_split_is_compared_with_groups_where_there_are_any() {
 }
 
 #[test]
-fn groups_are_kept_together_unless_another_split_is_asked_for() {
+fn groups_are_kept_together_unless_another_split_is_requested() {
     let report = json(&format!("train {PRESSES} --epochs 5 --json"), presses().path());
     assert_eq!(report["split"], "group");
 }
 
-/// Ctrl-C during the training that is only compared with keeps the network and its figures.
+/// Ctrl-C during the comparison keeps the network and its figures.
 #[cfg(target_os = "linux")]
 #[test]
-fn an_interrupted_comparison_leaves_the_training_as_it_is() {
+fn an_interrupted_comparison_keeps_the_training() {
     let folder = presses();
     let arguments = format!(
         "train {PRESSES} --split random --method gdm --epochs 30000 --max-fail 1000000 --min-gradient 0 --out n.json --json"
@@ -214,7 +214,8 @@ fn an_interrupted_comparison_leaves_the_training_as_it_is() {
     assert!(folder.path().join("n.json").is_file());
 }
 
-/// A switch that predicts the state with 10 % flips, recorded without and with each row written twice: R² is (1 − 2·0.1)² = 0.64.
+/// A switch that predicts the state with 10 % flips, recorded without and with each row written twice: R² is (1 − 2·0.1)²
+/// = 0.64.
 #[test]
 fn repeated_readings_keep_their_frequency() {
     let folder = tempfile::tempdir().unwrap();
@@ -250,7 +251,7 @@ fn repeated_readings_keep_their_frequency() {
 }
 
 #[test]
-fn what_needs_targets_is_refused_without_them() {
+fn options_that_need_targets_are_refused_without_them() {
     let folder = recording();
     for (arguments, cause) in [
         (

@@ -8,7 +8,7 @@ use serde_json::Value;
 use crate::terminal::decoupler;
 
 #[test]
-fn the_terminal_prints_every_cell_beside_the_published_figures() {
+fn the_terminal_prints_every_cell_next_to_the_published_figures() {
     let folder = tempfile::tempdir().unwrap();
     let arguments = "reproduce --seeds 2 --epochs 3 --starts 1 --k 3 --repeats 2 --hidden 6,7 --out tables/new --json";
     let output = decoupler(arguments, folder.path());
@@ -62,7 +62,7 @@ fn the_terminal_prints_every_cell_beside_the_published_figures() {
 }
 
 #[test]
-fn smaller_arrays_are_decoupled_better_which_one_seed_does_not_decide() {
+fn smaller_arrays_are_decoupled_better_but_one_seed_is_inconclusive() {
     let folder = tempfile::tempdir().unwrap();
     let output = decoupler(
         "reproduce --table 3 --seeds 1 --epochs 60 --starts 1 --json",
@@ -85,7 +85,7 @@ fn smaller_arrays_are_decoupled_better_which_one_seed_does_not_decide() {
 }
 
 #[test]
-fn what_cannot_be_reproduced_is_refused_in_a_line() {
+fn invalid_reproductions_are_refused_in_one_line() {
     let folder = tempfile::tempdir().unwrap();
     fs::write(folder.path().join("file"), "").unwrap();
     let cases = [
@@ -94,7 +94,7 @@ fn what_cannot_be_reproduced_is_refused_in_a_line() {
         ("--arrays 10x6", 2, "not an array scale"),
         ("--seeds 0", 2, "from 1"),
         ("--k 11 --folds snapshot", 2, "11 folds of 10 snapshots"),
-        ("--out file", 1, "cannot make the folder 'file'"),
+        ("--out file", 1, "cannot create the folder 'file'"),
     ];
     for (arguments, status, expected) in cases {
         let output = decoupler(&format!("reproduce {arguments}"), folder.path());
@@ -110,7 +110,7 @@ fn what_cannot_be_reproduced_is_refused_in_a_line() {
 
 #[cfg(target_os = "linux")]
 #[test]
-fn a_file_that_cannot_be_written_costs_neither_the_report_nor_the_other_files() {
+fn a_file_that_cannot_be_written_affects_neither_the_report_nor_the_other_files() {
     let folder = tempfile::tempdir().unwrap();
     std::os::unix::fs::symlink("/dev/full", folder.path().join("table_1.csv")).unwrap();
     let arguments = "reproduce --table 1 --seeds 1 --epochs 2 --starts 1 --hidden 6 --out .";

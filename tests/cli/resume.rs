@@ -1,4 +1,4 @@
-//! Trainings in the terminal that are killed, interrupted, resumed, and continued with another method.
+//! Trainings in the terminal: killed, interrupted, resumed, and continued with another method.
 
 use std::{
     fs,
@@ -15,11 +15,11 @@ use tempfile::TempDir;
 
 use crate::folders::names;
 
-/// Two starts, and the number of epochs to follow.
+/// Two starts; the number of epochs is appended.
 const LONG: &str =
     "--array 10x6_3x18 --samples 300 --hidden 8 --starts 2 --seed 2 --max-fail 1000000 --min-gradient 0 --epochs";
 const SHORT: &str = "--array 10x6_3x18 --samples 100 --hidden 4 --seed 5 --epochs 10";
-/// The same without a number of epochs.
+/// The same settings; the number of epochs is appended.
 const UNTIL: &str = "--array 10x6_3x18 --samples 100 --hidden 4 --seed 5 --epochs";
 
 fn command(arguments: &str, folder: &Path) -> Command {
@@ -28,7 +28,7 @@ fn command(arguments: &str, folder: &Path) -> Command {
     command
 }
 
-/// The same heeding Ctrl-C, also where the tests run in the background, which begins with ignoring it.
+/// Like `command`, with Ctrl-C enabled even if the tests run in the background, where it is ignored by default.
 #[cfg(target_os = "linux")]
 fn interruptible(arguments: &str, folder: &Path) -> Command {
     let mut command = Command::new("env");
@@ -56,7 +56,7 @@ fn failure(arguments: &str, folder: &Path, status: i32) -> String {
     text
 }
 
-/// The network file without its time, the only thing that may differ.
+/// The network file without its times, which may differ.
 fn network(path: &Path) -> NetworkFile {
     let mut file = NetworkFile::load(path).unwrap();
     file.training.seconds = 0.0;
@@ -71,7 +71,7 @@ fn wait_until(what: &str, mut holds: impl FnMut() -> bool) {
     }
 }
 
-/// Starts a training and waits until its checkpoint is some epochs along.
+/// Starts a training and waits until its checkpoint contains a few epochs.
 fn begun(mut command: Command, folder: &Path) -> Child {
     let checkpoint = folder.join("run.checkpoint");
     let child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
@@ -86,7 +86,7 @@ fn begun(mut command: Command, folder: &Path) -> Child {
 }
 
 #[test]
-fn a_killed_training_goes_on_with_the_same_bits() {
+fn a_killed_training_is_resumed_bit_for_bit() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
     let arguments =
@@ -115,7 +115,7 @@ fn interrupt(child: &Child) {
 
 #[cfg(target_os = "linux")]
 #[test]
-fn an_interrupted_training_keeps_what_it_has_and_says_how_to_go_on() {
+fn an_interrupted_training_saves_its_results_and_prints_how_to_resume() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
     let arguments =
@@ -123,9 +123,9 @@ fn an_interrupted_training_keeps_what_it_has_and_says_how_to_go_on() {
     let child = begun(interruptible(&arguments, folder), folder);
     interrupt(&child);
     let output = child.wait_with_output().unwrap();
-    let told = String::from_utf8(output.stderr).unwrap();
-    assert_eq!(output.status.code(), Some(130), "{told}");
-    let last = told.lines().last().unwrap();
+    let message = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(130), "{message}");
+    let last = message.lines().last().unwrap();
     let (epoch, resume) = last
         .strip_prefix("interrupted after epoch ")
         .unwrap()
@@ -138,7 +138,7 @@ fn an_interrupted_training_keeps_what_it_has_and_says_how_to_go_on() {
     let checkpoint = CheckpointFile::load(&folder.join("run.checkpoint")).unwrap();
     assert_eq!(checkpoint.starts[0].history().len(), part.training.history.len());
     assert_eq!(names(folder), ["part.json", "run.checkpoint"]);
-    // What it said, but not quite as far.
+    // The printed command, with fewer epochs.
     let resume = resume.strip_prefix(" to resume: decoupler ").unwrap();
     let epochs = part.training.history.len() + 30;
     success(&format!("{resume} --epochs {epochs}"), folder);
@@ -148,7 +148,7 @@ fn an_interrupted_training_keeps_what_it_has_and_says_how_to_go_on() {
 
 #[cfg(target_os = "linux")]
 #[test]
-fn an_interrupted_training_without_a_checkpoint_says_what_would_have_kept_it() {
+fn an_interrupted_training_without_a_checkpoint_suggests_one() {
     let folder = tempfile::tempdir().unwrap();
     let interrupted_after = |seconds| {
         let arguments = "train --epochs 1000000 --max-fail 1000000 --min-gradient 0 --out n.json";
@@ -163,19 +163,22 @@ fn an_interrupted_training_without_a_checkpoint_says_what_would_have_kept_it() {
             output.stdout,
         )
     };
-    // Before the first epoch there is nothing to keep, and it ends at once; then it is given more time.
+    // Before the first epoch there is nothing to save and the program ends at once; then more time is allowed.
     let mut outputs = [1, 5, 20].into_iter().map(interrupted_after);
-    let (status, told, printed) = outputs.find(|(_, told, _)| told.contains("after epoch")).unwrap();
-    assert_eq!(status, Some(130), "{told}");
-    assert!(told.contains("use --checkpoint FILE to be able to resume"), "{told}");
+    let (status, message, printed) = outputs.find(|(_, message, _)| message.contains("after epoch")).unwrap();
+    assert_eq!(status, Some(130), "{message}");
+    assert!(
+        message.contains("use --checkpoint FILE to be able to resume"),
+        "{message}"
+    );
     assert!(String::from_utf8(printed).unwrap().contains("stopped by you"));
     assert!(NetworkFile::load(&folder.path().join("n.json")).is_ok());
 }
 
-/// An input that never comes, so that the output is begun and not ended.
+/// A pipe without data as the input, so that the output remains incomplete.
 #[cfg(target_os = "linux")]
 #[test]
-fn an_interrupted_decoding_leaves_nothing() {
+fn an_interrupted_decoding_leaves_no_files() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
     success(&format!("train {SHORT} --out network.json"), folder);
@@ -209,7 +212,7 @@ fn checkpoint_of(arguments: &str) -> TempDir {
 const RESUME: &str = "train --checkpoint run.checkpoint --resume";
 
 #[test]
-fn more_epochs_and_another_method_go_on_from_the_present_weights() {
+fn more_epochs_and_another_method_continue_from_the_current_weights() {
     let folder = checkpoint_of(&format!("{SHORT} --method gdm"));
     let folder = folder.path();
     let before = CheckpointFile::load(&folder.join("run.checkpoint"))
@@ -238,7 +241,7 @@ fn more_epochs_and_another_method_go_on_from_the_present_weights() {
     assert_eq!(file.training.history.len(), 26);
     assert_eq!(file.training.history[..11], *before.leader().history());
     assert!(file.training.history[25].training_mse < 0.5 * file.training.history[20].training_mse);
-    // The same line again finds all done and changes nothing.
+    // The same command again changes nothing.
     success(&line, folder);
     assert_eq!(network(&folder.join("network.json")), file);
     let refused = failure(&format!("{RESUME} --method scg"), folder, 2);
@@ -250,7 +253,7 @@ fn more_epochs_and_another_method_go_on_from_the_present_weights() {
 }
 
 #[test]
-fn what_contradicts_the_checkpoint_is_refused_and_what_repeats_it_is_not() {
+fn arguments_that_contradict_the_checkpoint_are_refused() {
     let folder = checkpoint_of(SHORT);
     let folder = folder.path();
     let bytes = fs::read(folder.join("run.checkpoint")).unwrap();
@@ -269,8 +272,8 @@ fn what_contradicts_the_checkpoint_is_refused_and_what_repeats_it_is_not() {
         let text = failure(&format!("{RESUME} {arguments}"), folder, 2);
         assert!(text.contains(expected), "{arguments}: {text}");
     }
-    let begin_anew = failure(&format!("train {SHORT} --checkpoint run.checkpoint"), folder, 2);
-    assert!(begin_anew.contains("exists: add --resume"), "{begin_anew}");
+    let restart = failure(&format!("train {SHORT} --checkpoint run.checkpoint"), folder, 2);
+    assert!(restart.contains("exists: add --resume"), "{restart}");
     assert!(failure("train --resume", folder, 2).contains("--checkpoint <FILE>"));
     assert!(failure("train --checkpoint none --resume", folder, 1).contains("cannot read 'none'"));
     assert_eq!(
@@ -284,9 +287,9 @@ fn what_contradicts_the_checkpoint_is_refused_and_what_repeats_it_is_not() {
     assert_eq!(names(folder), ["run.checkpoint"]);
 }
 
-/// The same settings give the same network, whether the terminal or the library trains, on any number of threads.
+/// The same settings give the same network in the terminal and the library, on any number of threads.
 #[test]
-fn threads_and_the_terminal_change_no_bit() {
+fn threads_and_the_terminal_give_identical_networks() {
     let folder = tempfile::tempdir().unwrap();
     let arguments = format!("train {SHORT} --starts 3 --out");
     for threads in 1..=3 {

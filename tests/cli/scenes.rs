@@ -51,9 +51,9 @@ fn training_reports_decoders_reference_and_size_of_the_scene() {
     assert!(log["reference"]["z_mm"].as_f64().unwrap() < 1e-10);
 }
 
-/// Twelve readings determine four nodes to rounding, in proportion to which other errors say nothing; three leave them open.
+/// Twelve readings determine four nodes up to rounding, so that error ratios are meaningless; three readings do not.
 #[test]
-fn ratios_are_to_a_reference_that_is_more_than_rounding() {
+fn ratios_need_a_reference_above_rounding() {
     let folder = tempfile::tempdir().unwrap();
     let ratio = |array: &str| {
         let call = format!("train {SMALL} --array {array} --preset best --epochs 1 --decoder newton");
@@ -75,7 +75,7 @@ fn ratios_are_to_a_reference_that_is_more_than_rounding() {
 }
 
 #[test]
-fn what_was_simulated_is_decoded_row_by_row() {
+fn simulated_samples_are_decoded_row_by_row() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path();
     success(
@@ -101,7 +101,7 @@ fn what_was_simulated_is_decoded_row_by_row() {
         }
     }
     success("decode --network net.json --input all.csv --output in_order.csv", path);
-    // The same readings without the column of row-wires, and in another order with it.
+    // The same readings without the row column, and in another order with it.
     let without: Vec<String> = all.iter().map(|line| line[2..14].join(",")).collect();
     fs::write(path.join("without.csv"), without.join("\n")).unwrap();
     success(
@@ -132,7 +132,7 @@ fn what_was_simulated_is_decoded_row_by_row() {
 }
 
 #[test]
-fn a_trade_is_told_in_text_and_json() {
+fn a_trade_off_is_reported_in_text_and_json() {
     let folder = tempfile::tempdir().unwrap();
     let arguments = "trade --array 2x3_2x9 --hidden 2,3 --epochs 5 --samples 60 --test-samples 20 --noise 0,1e-2 \
                      --under-percent 1e-6 --under-us 1e9";
@@ -140,7 +140,8 @@ fn a_trade_is_told_in_text_and_json() {
     let levels = report["levels"].as_array().unwrap();
     assert_eq!(levels.len(), 2);
     for level in levels {
-        // Two presets, each with five decoders without a network and twice network, its single precision, and polish.
+        // Two presets, each with five decoders without a network, and for two networks: network, single precision and
+        // polish.
         let points = level["points"].as_array().unwrap();
         assert_eq!(points.len(), 2 * (5 + 2 * 3));
         assert!(points.iter().any(|point| point["on_decoding_front"] == true));
@@ -163,9 +164,9 @@ fn a_trade_is_told_in_text_and_json() {
     );
 }
 
-/// With noise that the training lacks, some points are worse than the mean, and each of them says so.
+/// With noise only in the test, some points are worse than the mean, and each of them has a remark.
 #[test]
-fn a_point_of_a_trade_worse_than_the_mean_says_so() {
+fn a_point_worse_than_the_mean_has_a_remark() {
     let folder = tempfile::tempdir().unwrap();
     let arguments = "trade --array 2x3_2x9 --hidden 2 --epochs 30 --samples 40 --test-samples 20 --noise 3e-1 --noise-in test \
                      --preset paper --decoder mean,ridge,network";
@@ -187,7 +188,7 @@ fn a_point_of_a_trade_worse_than_the_mean_says_so() {
 }
 
 #[test]
-fn what_is_wrong_is_named() {
+fn errors_are_named() {
     let folder = tempfile::tempdir().unwrap();
     let cases = [
         ("train --preset worst", "paper or best"),

@@ -32,22 +32,22 @@ use crate::terminal::{
     seed,
 };
 
-/// Train every combination of options, on one machine or on many
+/// Train every combination of options, on one or many machines
 ///
 /// A specification names the options of train that all trials share and those that vary:
 ///
 ///   {"train": {"array": "10x6_3x18"}, "axes": {"hidden": [6, 8, 10], "seed": [0, 1, 2]}}
 ///
 /// trains nine networks. A specification of a recording has the options --data, --inputs, --targets, … or --recipe in
-/// "train", with paths relative to its folder, or the recipe itself in "recording". Without a specification the same is given
-/// as arguments, with values separated by commas:
+/// "train", with paths relative to its folder, or the recipe itself in "recording". Without a specification, give the
+/// same as arguments, with values separated by commas:
 ///
 ///   decoupler sweep --data press.csv --inputs c1..c4 --targets fz --hidden 4,8,12 --method lm,br --seeds 3 --out results
 ///
-/// It keeps what train --json prints of each trial in a file of the folder. Running it again trains only
-/// what is missing, and any number of programs may fill one folder together. Ctrl-C and SIGTERM save the trainings at
-/// work, which are resumed with bit-identical results. The same trial gives the same bits on machines with the same vector
-/// instructions; on others the last digits may differ.
+/// The output of train --json for each trial is saved as a file in the folder. Running the command again trains only
+/// missing trials, and any number of programs can fill one folder together. Ctrl-C and SIGTERM save the trainings in
+/// progress, which are resumed with bit-identical results. A trial gives bit-identical results on machines with the same
+/// vector instructions; on others the last digits may differ.
 #[derive(Args)]
 pub(in crate::terminal) struct Sweep {
     /// Specification of the trials, as JSON
@@ -60,10 +60,10 @@ pub(in crate::terminal) struct Sweep {
     spec: Option<PathBuf>,
     #[command(flatten)]
     given: SweepArguments,
-    /// Folder for the results, created if missing; with --merge the table, as CSV or JSON by the ending
+    /// Folder for the results, created if missing; with --merge the table, as CSV or JSON depending on the file extension
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
-    /// Train only part I of N parts that together have every trial once
+    /// Train only part I of N parts, which together contain every trial once
     #[arg(long, value_name = "I/N", conflicts_with_all = ["merge", "engine"])]
     shard: Option<Shard>,
     /// Number of trials trained at the same time, each on one thread [default: number of cores]
@@ -78,10 +78,10 @@ pub(in crate::terminal) struct Sweep {
         conflicts_with = "merge"
     )]
     engine: Option<Engine>,
-    /// Number of jobs in the script [default: one for each trial, at most 1000]
+    /// Number of jobs in the script [default: one per trial, at most 1000]
     #[arg(long, value_name = "N", value_parser = count(1..=MAX_JOBS), requires = "engine")]
     jobs: Option<usize>,
-    /// Write one table of all trials in these folders, and name those that are missing or conflict
+    /// Write one table of all trials in these folders, and list missing and conflicting trials
     #[arg(long, value_name = "DIR", num_args = 1..)]
     merge: Vec<PathBuf>,
     /// Print one JSON object instead of text and progress
@@ -156,7 +156,7 @@ impl Sweep {
             print(|output| {
                 writeln!(
                     output,
-                    "{of_shard} trials: {present} were there, {trained} trained, {failed} failed, in {time}"
+                    "{of_shard} trials: {present} already done, {trained} trained, {failed} failed, in {time}"
                 )
             })?;
         }
@@ -233,7 +233,7 @@ impl Stop {
         let terminated = Arc::new(AtomicBool::new(false));
         #[cfg(unix)]
         {
-            // Without it SIGTERM ends the program at once, which loses no more than the time since the last checkpoint.
+            // Without it SIGTERM ends the program at once, which loses only the time since the last checkpoint.
             let _ = signal_hook::flag::register(signal_hook::consts::SIGTERM, Arc::clone(&terminated));
         }
         Self {
@@ -243,7 +243,7 @@ impl Stop {
         }
     }
 
-    /// Has every thread stop because one of them cannot go on.
+    /// Stops every thread because one of them cannot continue.
     pub(super) fn fail(&self) {
         self.failed.store(true, Ordering::Relaxed);
     }
@@ -252,7 +252,7 @@ impl Stop {
         self.failed.load(Ordering::Relaxed) || self.signal_status().is_some()
     }
 
-    /// Exit status for the signal that has come, if one has.
+    /// Exit status for the received signal, if any.
     pub(super) fn signal_status(&self) -> Option<u8> {
         if self.terminated.load(Ordering::Relaxed) {
             return Some(TERMINATED);
@@ -261,20 +261,20 @@ impl Stop {
     }
 }
 
-/// The right to train a trial, held by a lock that the system releases however the program ends.
+/// The right to train a trial, held by a lock that the system releases in any case when the program ends.
 pub(super) struct Claim {
     path: PathBuf,
-    /// Locked as long as it is open.
+    /// Locked while it is open.
     _file: File,
 }
 
 /// State of a trial for a program that would train it.
 pub(super) enum Claimed {
-    /// To be trained here and now.
+    /// Claimed for this program.
     Ours(Claim),
-    /// Another program is at it.
+    /// Another program is training it.
     Theirs,
-    /// Its result is there.
+    /// It already has a result.
     Done,
 }
 
@@ -284,7 +284,7 @@ impl Claim {
         let result = Trial::path(folder, id);
         let path = folder.join(format!("{id}.claim"));
         if result.exists() {
-            // A program that was killed just then has left its claim next to the result; one that still runs holds it.
+            // A program killed at that moment left its claim next to the result; a running program still holds the lock.
             if let Ok(file) = File::options().write(true).open(&path)
                 && file.try_lock().is_ok()
             {
@@ -297,12 +297,12 @@ impl Claim {
         let file = file.map_err(|source| WriteError::io(&path, source))?;
         match file.try_lock() {
             Err(TryLockError::WouldBlock) => return Ok(Claimed::Theirs),
-            // Some file systems have no locks: two programs may train a trial there, and the first to finish counts.
+            // Some file systems have no locks: two programs may then train the same trial, and the first result is kept.
             Ok(()) | Err(TryLockError::Error(_)) => {}
         }
         let claim = Self { path, _file: file };
-        // Its last holder may have finished it before the lock was free. The file is removed only when the result is
-        // there, so no one can hold another lock of the same name and find no result.
+        // The last holder may have finished the trial before releasing the lock. The file is removed only after the
+        // result exists, so no program can hold another lock of the same name and find no result.
         if result.exists() {
             claim.finish();
             return Ok(Claimed::Done);
@@ -310,16 +310,16 @@ impl Claim {
         Ok(Claimed::Ours(claim))
     }
 
-    /// File in which the unfinished training is saved.
+    /// File of the checkpoint of the unfinished training.
     pub(super) fn checkpoint(&self) -> PathBuf {
         self.path.with_extension("checkpoint")
     }
 
-    /// Ends the claim on a trial whose result is there, and leaves nothing but the result.
+    /// Ends the claim on a finished trial and removes all files but the result.
     pub(super) fn finish(self) {
         for path in [self.checkpoint(), self.path] {
             match fs::remove_file(path) {
-                // What stays does no harm.
+                // A remaining file does no harm.
                 Ok(()) | Err(_) => {}
             }
         }
@@ -351,7 +351,7 @@ pub(super) struct SweepArguments {
     import: ImportArguments,
 }
 
-// Values of the options that vary.
+// Values of the varied options.
 #[derive(Args)]
 #[group(id = "axes", multiple = true, conflicts_with_all = ["spec", "merge"])]
 struct AxisArguments {
@@ -379,7 +379,7 @@ struct AxisArguments {
 }
 
 impl SweepArguments {
-    /// Trials of the arguments.
+    /// Trials described by the arguments.
     pub(super) fn trials(&self) -> Result<Trials, Failure> {
         let recording = self.import.given(&self.inputs)?;
         let holds_out = self.import.holds_out();
@@ -406,10 +406,10 @@ impl SweepArguments {
     }
 }
 
-/// Every n-th trial, from the i-th on: one of n parts that together have every trial once.
+/// Every n-th trial, from the i-th on: one of n parts, which together contain every trial once.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Shard {
-    /// From 0.
+    /// Counted from 0.
     index: usize,
     count: usize,
 }
@@ -448,7 +448,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn shards_of_any_number_have_every_trial_once() {
+    fn shards_contain_every_trial_once() {
         for trials in [0, 1, 7, 24] {
             for count in 1..=30 {
                 let shards = (1..=count).map(|index| format!("{index}/{count}").parse::<Shard>().unwrap());

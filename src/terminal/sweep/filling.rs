@@ -24,13 +24,13 @@ use crate::terminal::failure::Failure;
 use decoupler_core::evaluation::experiments::ExperimentError;
 use decoupler_files::export::WriteError;
 
-/// Time between two looks at a trial that another program trains.
+/// Interval of checking a trial that another program trains.
 const PATIENCE: Duration = Duration::from_millis(200);
 
 /// Numbers of trials in a folder after a call of [`fill`].
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Filled {
-    /// Results that were there, or that other programs have added.
+    /// Existing results, and those added by other programs.
     pub(super) present: usize,
     pub(super) trained: usize,
     pub(super) failed: usize,
@@ -39,17 +39,17 @@ pub(super) struct Filled {
 enum Event {
     Present,
     Trained,
-    /// A trial that cannot be trained, by position, and why.
+    /// A trial that cannot be trained, by position, with the reason.
     Failed(usize, String),
-    /// Nothing can be written any more.
+    /// Results cannot be written.
     Ended(WriteError),
 }
 
-/// Adds to `folder` what is missing of the trials at `positions`, and waits for those that other programs train: if such
-/// a program ends without a result, the trial is trained here. Each trial is trained on a thread of its own.
+/// Trains the missing trials at `positions` into `folder`, and waits for those that other programs train: if such a
+/// program ends without a result, the trial is trained here. Each trial is trained on a separate thread.
 ///
 /// # Errors
-/// Results cannot be written. A trial that cannot be trained is told on standard error, and the others go on.
+/// If results cannot be written. A trial that cannot be trained is reported on standard error, and the others continue.
 pub(super) fn fill(
     folder: &Path,
     trials: &Trials,
@@ -70,7 +70,7 @@ pub(super) fn fill(
     let worker = Worker {
         folder,
         trials,
-        beside: threads,
+        parallel: threads,
         queue: &Mutex::new(Queue {
             new: positions.into(),
             others: VecDeque::new(),
@@ -92,9 +92,12 @@ pub(super) fn fill(
                 Event::Trained => filled.trained += 1,
                 Event::Failed(position, failure) => {
                     filled.failed += 1;
-                    let told = format!("warning: {}: {failure}; the others go on", trials.describe(position));
+                    let message = format!(
+                        "warning: {}: {failure}; the other trials continue",
+                        trials.describe(position)
+                    );
                     // There is no one to report to if this fails.
-                    bar.suspend(|| drop(writeln!(stderr(), "{told}")));
+                    bar.suspend(|| drop(writeln!(stderr(), "{message}")));
                 }
                 Event::Ended(failure) => {
                     stop.fail();
@@ -105,7 +108,7 @@ pub(super) fn fill(
             bar.inc(1);
         }
         for worker in workers {
-            // The scope itself would panic without the reason.
+            // The panic of the scope itself would not contain the reason.
             worker.join().unwrap_or_else(|panic| resume_unwind(panic));
         }
     });
@@ -115,21 +118,21 @@ pub(super) fn fill(
 /// Positions of trials that are neither done nor trained here.
 struct Queue {
     new: VecDeque<usize>,
-    /// Those that other programs train.
+    /// Trials that other programs train.
     others: VecDeque<usize>,
 }
 
 struct Worker<'a> {
     folder: &'a Path,
     trials: &'a Trials,
-    /// Number of trials at the same time.
-    beside: usize,
+    /// Number of trials trained at the same time.
+    parallel: usize,
     queue: &'a Mutex<Queue>,
     stop: &'a Stop,
 }
 
 impl Worker<'_> {
-    /// Trains until nothing is left.
+    /// Trains until no trial is left.
     fn work(&self, events: &Sender<Event>) {
         let mut options = TrainOptions::new();
         while !self.stop.is_requested() {
@@ -149,14 +152,14 @@ impl Worker<'_> {
         }
     }
 
-    /// A position to look at, and whether another program was at it.
+    /// The next position, and whether another program was training it.
     fn next(&self) -> Option<(usize, bool)> {
         let mut queue = self.queue.lock().unwrap_or_else(PoisonError::into_inner);
         let new = queue.new.pop_front().map(|position| (position, false));
         new.or_else(|| Some((queue.others.pop_front()?, true)))
     }
 
-    /// Trains the trial at `position` unless that is done or being done. Returns none if it is not done yet.
+    /// Trains the trial at `position` unless it is finished or being trained. Returns none if it is not finished yet.
     fn attempt(&self, position: usize, options: &mut TrainOptions) -> Option<Event> {
         let claim = match Claim::take(self.folder, self.trials.plan().trials[position]) {
             Ok(Claimed::Ours(claim)) => claim,
@@ -169,7 +172,7 @@ impl Worker<'_> {
             Err(error) => return Some(Event::Ended(error)),
         };
         let trained = self.trials.get(position, options).map_err(Failure::from);
-        let trained = trained.and_then(|trial| train(&trial, &claim, self.beside, || self.stop.is_requested()));
+        let trained = trained.and_then(|trial| train(&trial, &claim, self.parallel, || self.stop.is_requested()));
         let trial = match trained {
             Ok(trial) => trial?,
             Err(failure) => return Some(Event::Failed(position, failure.to_string())),

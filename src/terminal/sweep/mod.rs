@@ -1,6 +1,6 @@
-//! `decoupler sweep`: trains every combination of options. A trial is determined by its options and the program, its file
-//! is named by their hash and written whole or not at all, and anyone who trains it holds a lock: so any number of programs,
-//! on any machines that see the folder, may fill it together, end at any moment and be started again.
+//! `decoupler sweep`: trains every combination of options. A trial is determined by its options and the program. Its file
+//! is named by their hash and written atomically, and the program that trains it holds a lock. Therefore any number of
+//! programs, on any machines with access to the folder, can fill it together, stop at any moment and be started again.
 
 mod command;
 mod filling;

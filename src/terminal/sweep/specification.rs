@@ -24,21 +24,21 @@ use crate::terminal::{
     training_arguments::TrainingArguments,
 };
 
-/// Largest file of a specification, in bytes.
+/// Maximum size of a specification file in bytes.
 const LARGEST_BYTES: u64 = 1 << 24;
 
-/// Options of `train` that all trials share, and those that vary.
+/// Options of `train` shared by all trials, and varied options.
 pub(super) struct Specification {
     path: PathBuf,
     /// Arguments of all trials.
     pub(super) shared: Vec<String>,
     /// Axes in the order of the file.
     pub(super) axes: Vec<Axis>,
-    /// Recording that all trials share; its paths are absolute.
+    /// Recording shared by all trials; its paths are absolute.
     pub(super) recording: Option<Plan>,
 }
 
-/// An option and the values that it takes.
+/// A varied option and its values.
 pub(super) struct Axis {
     pub(super) option: String,
     pub(super) values: Vec<AxisValue>,
@@ -62,7 +62,7 @@ struct Layout {
 }
 
 impl Specification {
-    /// Reads the file at `path` and checks each option and value by itself.
+    /// Reads the file at `path` and checks each option and value separately.
     pub(super) fn read(path: &Path, train: &mut TrainOptions) -> Result<Self, SpecificationError> {
         let text = read_text(path).map_err(|source| SpecificationError::Read {
             path: path.to_owned(),
@@ -84,7 +84,7 @@ impl Specification {
         }
         for (option, values) in &layout.axes.0 {
             if layout.train.0.iter().any(|(other, _)| other == option) {
-                let message = "it is in train as well; leave it out of one of the two".to_owned();
+                let message = "it is also in train; remove it from one of the two".to_owned();
                 return Err(specification.error(format!("axes.{option}"), message));
             }
             let axis = specification.axis(option, values, train)?;
@@ -94,7 +94,7 @@ impl Specification {
         Ok(specification)
     }
 
-    /// Specification from the arguments of the terminal: each axis has values separated by commas.
+    /// Specification from command-line arguments: each axis has values separated by commas.
     pub(super) fn of_arguments(
         recording: Option<Plan>,
         shared: Vec<String>,
@@ -119,7 +119,7 @@ impl Specification {
 
     fn axis(&self, option: &str, values: &Value, train: &mut TrainOptions) -> Result<Axis, SpecificationError> {
         let Some(values) = values.as_array().filter(|values| !values.is_empty()) else {
-            let message = format!("{values} is no list of values; write [VALUE, ...]");
+            let message = format!("{values} is not a list of values; write [VALUE, ...]");
             return Err(self.error(format!("axes.{option}"), message));
         };
         let values = values.iter().enumerate().map(|(index, value)| {
@@ -150,7 +150,7 @@ impl Specification {
         };
         let words = train.words(option, value);
         let accepted = words.and_then(|words| {
-            if train.stands_alone(option) {
+            if train.is_independent(option) {
                 train.parse(&words)?;
             }
             Ok(words)
@@ -193,7 +193,7 @@ fn folder(path: &Path) -> &Path {
     path.parent().unwrap_or(Path::new(""))
 }
 
-/// Paths of a value, relative to `folder`.
+/// Prefixes the paths of a value with `folder`.
 fn located(value: &Value, folder: &Path) -> Value {
     match value {
         Value::String(path) => Value::from(folder.join(path).to_string_lossy()),
@@ -206,12 +206,14 @@ fn read_text(path: &Path) -> io::Result<String> {
     let mut text = String::new();
     File::open(path)?.take(LARGEST_BYTES + 1).read_to_string(&mut text)?;
     if text.len() as u64 > LARGEST_BYTES {
-        return Err(io::Error::other("it is larger than 16 MiB, which no specification is"));
+        return Err(io::Error::other(
+            "it is larger than 16 MiB, the limit for a specification",
+        ));
     }
     Ok(text)
 }
 
-/// Entries of a JSON object in their order. A key that is there twice is an error instead of being overwritten.
+/// Entries of a JSON object in their order. A duplicate key is an error.
 #[derive(Default)]
 pub(super) struct UniqueKeys(pub(super) Vec<(String, Value)>);
 
@@ -234,7 +236,7 @@ impl<'de> Visitor<'de> for Entries {
         let mut entries: Vec<(String, Value)> = Vec::new();
         while let Some((key, value)) = map.next_entry::<String, Value>()? {
             if entries.iter().any(|(other, _)| *other == key) {
-                return Err(A::Error::custom(format_args!("{key} is there twice; leave one out")));
+                return Err(A::Error::custom(format_args!("{key} is given twice; remove one")));
             }
             entries.push((key, value));
         }
@@ -283,7 +285,7 @@ impl TrialArguments {
         self.training.setup(source, holds_out)
     }
 
-    /// Decoders to measure: those given, by default all of a simulated array and none of a recording.
+    /// Decoders to measure: those given, by default all for a simulated array and none for a recording.
     pub(super) fn decoders(&self, setup: &Setup) -> Vec<DecoderKind> {
         match setup.plan() {
             None => self.training.scene.decoders(),
@@ -292,7 +294,7 @@ impl TrialArguments {
     }
 }
 
-/// The parser of the options of `train` that determine its result.
+/// Parser of the options of `train` that determine its result.
 pub(super) struct TrainOptions(Command);
 
 impl TrainOptions {
@@ -301,15 +303,15 @@ impl TrainOptions {
         Self(ImportArguments::augment_args(TrainingArguments::augment_args(command)))
     }
 
-    /// Writes an option with the value from a specification as arguments of the terminal. Each is one word, so that no
-    /// value can be taken for an option.
+    /// Converts an option and its value from a specification to command-line arguments. Each is one word, so that no
+    /// value can be mistaken for an option.
     ///
     /// # Errors
-    /// A message about an unknown option, or a value that is neither a number, a text nor a list of them.
+    /// If the option is unknown, or the value is not a number, a text or a list of them.
     pub(super) fn words(&self, option: &str, value: &Value) -> Result<Vec<String>, String> {
         let mut arguments = self.0.get_arguments();
         if OF_ONE_RUN.contains(&option) {
-            return Err("a sweep keeps its results and checkpoints itself; leave this option out".to_owned());
+            return Err("a sweep manages its results and checkpoints itself; leave this option out".to_owned());
         }
         let Some(argument) = arguments.find(|argument| argument.get_long() == Some(option)) else {
             return Err(self.unknown());
@@ -326,11 +328,9 @@ impl TrainOptions {
         match value {
             Value::Array(values) if is_repeated && !values.is_empty() => values.iter().map(word).collect(),
             Value::Array(values) if is_repeated || values.is_empty() => {
-                Err("an empty list says nothing; leave the option out".to_owned())
+                Err("the list is empty; leave the option out".to_owned())
             }
-            Value::Array(_) => Err(format!(
-                "{option} takes one value; several are an axis: move it to \"axes\""
-            )),
+            Value::Array(_) => Err(format!("{option} takes one value; to vary it, move it to \"axes\"")),
             value => Ok(vec![word(value)?]),
         }
     }
@@ -345,8 +345,8 @@ impl TrainOptions {
         format!("train has no such option; it has {}", names.join(", "))
     }
 
-    /// Returns `true` if the option can be understood without others.
-    pub(super) fn stands_alone(&self, option: &str) -> bool {
+    /// Returns `true` if the option does not depend on others.
+    pub(super) fn is_independent(&self, option: &str) -> bool {
         let of_import = ImportArguments::augment_args(Command::new("import"));
         let is_division = ["split", "test-fraction", "validation-fraction"].contains(&option);
         let mut names = of_import.get_arguments().filter_map(|argument| argument.get_long());
@@ -358,10 +358,10 @@ impl TrainOptions {
         PATHS.contains(&option)
     }
 
-    /// Parses arguments of [`Self::words`] as `train` does.
+    /// Parses arguments made by [`Self::words`] as `train` does.
     ///
     /// # Errors
-    /// The message of `train` in one line.
+    /// The message of `train` on one line.
     pub(super) fn parse<'a>(&mut self, words: impl IntoIterator<Item = &'a String>) -> Result<TrialArguments, String> {
         let line = std::iter::once("train").chain(words.into_iter().map(String::as_str));
         let mut matches = self
@@ -393,9 +393,9 @@ mod tests {
         train.parse(&words).unwrap().training
     }
 
-    /// Every option of `train`, so that none can be forgotten here when `train` has a new one.
+    /// Covers every option of `train`, so that a new option cannot be forgotten here.
     #[test]
-    fn every_option_is_written_out_and_read_back() {
+    fn every_option_survives_a_round_trip() {
         let cases = [
             ("preset", "best", ""),
             ("rows", "3", ""),

@@ -32,11 +32,11 @@ use crate::terminal::{
     train_report::Trained,
 };
 
-/// All trials of a specification, each of which `train` accepts and none of which is there twice.
+/// All trials of a specification, without duplicates, each accepted by `train`.
 pub(super) struct Trials {
     specification: Specification,
     plan: SweepPlan,
-    /// CRC-32 of the files of recordings, as hexadecimal digits.
+    /// CRC-32 of the files of recordings in hexadecimal.
     checksums: Mutex<HashMap<PathBuf, String>>,
 }
 
@@ -159,7 +159,7 @@ impl Trials {
         &self.plan
     }
 
-    /// Number of a trial, from 1, and what is special about it.
+    /// Number of a trial, from 1, with its values of the varied options.
     pub(super) fn describe(&self, position: usize) -> String {
         format!("trial {} ({})", position + 1, self.plan.describe(position))
     }
@@ -169,21 +169,21 @@ impl Trials {
     }
 }
 
-/// Time between two checkpoints of a trial: what a killed program loses at most.
+/// Time between two checkpoints of a trial: the most that a killed program loses.
 const CHECKPOINT_INTERVAL: Duration = Duration::from_secs(10);
 
-/// Trains the trial of `claim` and measures it as `train` does, next to this many others. Returns none if it was stopped,
-/// with a checkpoint from which it is resumed with the same bits.
+/// Trains the trial of `claim` and measures it as `train` does, with `parallel` trials at the same time. Returns none if
+/// it was stopped, with a checkpoint from which it is resumed with bit-identical results.
 pub(super) fn train(
     trial: &PlannedTrial,
     claim: &Claim,
-    beside: usize,
+    parallel: usize,
     is_stopped: impl Fn() -> bool,
 ) -> Result<Option<Trial>, Failure> {
     let begun = Instant::now();
     if let Some(settings) = trial.setup.simulated() {
         let mut workload = Workload::of(&settings)?;
-        workload.bytes = workload.bytes.saturating_mul(beside as u64);
+        workload.bytes = workload.bytes.saturating_mul(parallel as u64);
         workload.check_memory()?;
     }
     let (mut run, sets, before) = match resumed(trial, claim) {
@@ -198,7 +198,7 @@ pub(super) fn train(
     let mut read = files.iter().zip(&trial.crc32);
     if let Some((changed, _)) = read.find(|(read, planned)| read.crc32 != **planned) {
         let message = format!(
-            "'{}' has changed since the sweep began; begin it again",
+            "'{}' has changed since the sweep was started; start it again",
             changed.path.display()
         );
         return Err(Failure::Arguments(message));
@@ -230,7 +230,7 @@ pub(super) fn train(
     Ok(Some(Trial::new(trial.options.clone(), report, seconds)))
 }
 
-/// Makes reports on a recording the same on all machines: times are named apart, and files have names but no folders.
+/// Makes reports on a recording identical on all machines: times have distinct names, and files have no folders.
 fn make_comparable(report: &mut Value) {
     let Value::Object(fields) = report else { return };
     if let Some(seconds) = fields.remove("seconds") {
@@ -245,8 +245,8 @@ fn make_comparable(report: &mut Value) {
     }
 }
 
-/// The run saved in the checkpoint of `claim`, with the time that it had taken. A checkpoint that is damaged or does not
-/// belong to the trial is no worse than none.
+/// The run saved in the checkpoint of `claim`, with its training time so far. A checkpoint that is damaged or does not
+/// belong to the trial is ignored.
 fn resumed(trial: &PlannedTrial, claim: &Claim) -> Option<(Run, SetupSets, Duration)> {
     let file = CheckpointFile::load(&claim.checkpoint()).ok()?;
     if file.settings != *trial.setup.settings() {
@@ -257,7 +257,7 @@ fn resumed(trial: &PlannedTrial, claim: &Claim) -> Option<(Run, SetupSets, Durat
     Some((run, sets, before))
 }
 
-/// Programs that distribute jobs over machines.
+/// Programs that distribute jobs among machines.
 #[derive(Clone, Copy, ValueEnum)]
 pub(super) enum Engine {
     Slurm,
@@ -267,10 +267,10 @@ pub(super) enum Engine {
 }
 
 impl Engine {
-    /// Most jobs of a script unless asked for: Slurm's own limit on arrays, in its default configuration.
+    /// Default maximum number of jobs of a script: Slurm's limit on arrays in its default configuration.
     pub(super) const MAX_JOBS: usize = 1000;
 
-    /// Script that has this engine train the trials of `specification` in this many jobs, each of one thread.
+    /// Script with which this engine trains the trials of `specification` in this many jobs, each on one thread.
     pub(super) fn script(
         self,
         specification: &Path,
@@ -278,7 +278,7 @@ impl Engine {
         trials: usize,
         jobs: usize,
     ) -> Result<String, Failure> {
-        let program = env::current_exe().map_err(|_| refused("the program's own path is not known".to_owned()))?;
+        let program = env::current_exe().map_err(|_| refused("the path of this program is not known".to_owned()))?;
         let command = format!(
             "{} sweep --spec {} --out {} --threads 1 --shard",
             absolute(&program)?,
@@ -293,7 +293,7 @@ impl Engine {
     }
 }
 
-/// The full path in quotes: a job may begin in another folder.
+/// Quoted absolute path: a job may start in another folder.
 fn absolute(path: &Path) -> Result<String, Failure> {
     let full = path::absolute(path).ok().filter(|full| full.to_str().is_some());
     let full = full.ok_or_else(|| refused(format!("the path '{}' cannot be written in a script", path.display())))?;
@@ -389,7 +389,7 @@ mod tests {
 
     use super::*;
 
-    /// The trials of a specification that the window writes are those that the window runs.
+    /// The trials of a specification written by the window are those that the window runs.
     #[test]
     fn an_experiment_of_the_window_is_specified_trial_by_trial() {
         let mut template = PaperTable::HiddenNodes.experiment();
@@ -436,7 +436,7 @@ mod tests {
     }
 
     #[test]
-    fn experiments_that_the_terminal_cannot_sweep_say_why() {
+    fn experiments_without_a_specification_give_a_reason() {
         let folds = sweep_specification(&PaperTable::CrossValidation.experiment(), None);
         assert!(folds.unwrap_err().to_string().contains("no cross-validation"));
         let mut squeezed = PaperTable::HiddenNodes.experiment();

@@ -1,4 +1,4 @@
-//! Runs the program as the tests need it.
+//! Runs the program for the tests.
 
 use std::{
     collections::BTreeSet,
@@ -29,7 +29,7 @@ pub(crate) fn success(arguments: &str, folder: &Path) -> String {
     String::from_utf8(output.stdout).unwrap()
 }
 
-/// What a call that must end with `status` and one line prints on standard output and standard error.
+/// Standard output and standard error of a call that must end with `status` and one line.
 pub(crate) fn failure(arguments: &str, folder: &Path, status: i32) -> (String, String) {
     let output = run(arguments, folder);
     let text = String::from_utf8(output.stderr).unwrap();
@@ -90,7 +90,7 @@ pub(crate) fn fill(more: &str, folder: &Path) -> Value {
     serde_json::from_str(&success(&format!("sweep --spec sweep.json --json {more}"), folder)).unwrap()
 }
 
-/// The merged table without the times, which alone may differ.
+/// The merged table without the times, which may differ.
 pub(crate) fn merged(folders: &str, folder: &Path) -> Value {
     success(&format!("sweep --merge {folders} --out merged.json"), folder);
     let mut table: Value = serde_json::from_slice(&fs::read(folder.join("merged.json")).unwrap()).unwrap();

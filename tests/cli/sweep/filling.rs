@@ -5,7 +5,7 @@ use serde_json::{Value, json};
 use super::driver::{fill, folder_with, merged, results, six, success};
 
 #[test]
-fn shards_give_what_one_program_gives_and_what_train_prints() {
+fn shards_give_the_results_of_one_program_and_of_train() {
     let folder = folder_with(&six());
     let folder = folder.path();
     assert_eq!(fill("--out whole", folder)["trained"], 6);
@@ -49,7 +49,7 @@ fn shards_give_what_one_program_gives_and_what_train_prints() {
 }
 
 #[test]
-fn running_again_trains_only_what_is_missing() {
+fn running_again_trains_only_missing_trials() {
     let folder = folder_with(&six());
     let folder = folder.path();
     fill("--out runs", folder);
@@ -70,7 +70,7 @@ fn running_again_trains_only_what_is_missing() {
     assert_eq!(merged("runs", folder)["trials"].as_array().unwrap().len(), 9);
 }
 
-/// Removes what `train --json` says of times.
+/// Removes the times from the output of `train --json`.
 fn without_times(mut report: Value) -> Value {
     report.as_object_mut().unwrap().remove("epoch_ms");
     for decoder in report["decoders"].as_object_mut().unwrap().values_mut() {

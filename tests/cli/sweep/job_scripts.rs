@@ -4,9 +4,9 @@ use serde_json::json;
 
 use super::driver::{fill, merged, names, six, spawn, success, wait_until};
 
-/// The scripts as the engines run them, without the engines: `.ci/engines` has those.
+/// Runs the scripts as the engines do, without the engines, which are tested in `.ci/engines`.
 #[test]
-fn job_scripts_train_every_trial_and_ask_for_another_run_when_their_time_is_over() {
+fn job_scripts_train_every_trial_and_requeue_when_their_time_is_over() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path().join("it's a folder");
     fs::create_dir(&folder).unwrap();
@@ -32,7 +32,7 @@ fn job_scripts_train_every_trial_and_ask_for_another_run_when_their_time_is_over
                 .output()
                 .unwrap();
             assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-            assert!(String::from_utf8_lossy(&output.stdout).starts_with("3 trials: 0 were there, 3 trained"));
+            assert!(String::from_utf8_lossy(&output.stdout).starts_with("3 trials: 0 already done, 3 trained"));
         }
         assert_eq!(merged(engine, &folder), merged("whole", &folder), "{engine}");
     }
@@ -42,7 +42,7 @@ fn job_scripts_train_every_trial_and_ask_for_another_run_when_their_time_is_over
         "{script}"
     );
 
-    // A minute before the time of the job is over.
+    // One minute before the time limit of the job.
     let long = json!({
         "train": {"max-fail": 1_000_000, "min-gradient": 0, "epochs": 1_000_000},
         "axes": {},
@@ -60,7 +60,7 @@ fn job_scripts_train_every_trial_and_ask_for_another_run_when_their_time_is_over
     let child = spawn(&mut bash);
     let long = folder.join("long");
     let is_begun = || names(&long).iter().any(|name| name.ends_with(".claim"));
-    wait_until("the trial is begun", || long.is_dir() && is_begun());
+    wait_until("the trial has started", || long.is_dir() && is_begun());
     let kill = format!("kill -USR1 {}", child.id());
     assert!(Command::new("sh").args(["-c", &kill]).status().unwrap().success());
     let output = child.wait_with_output().unwrap();

@@ -5,7 +5,7 @@ use serde_json::Value;
 use super::driver::{failure, fill, folder_with, merged, six};
 
 #[test]
-fn merging_names_what_is_missing_and_what_conflicts() {
+fn merging_lists_missing_and_conflicting_trials() {
     let folder = folder_with(&six());
     let folder = folder.path();
     fill("--out runs", folder);
@@ -18,10 +18,14 @@ fn merging_names_what_is_missing_and_what_conflicts() {
     };
     fs::remove_file(folder.join("runs").join(id(3, 7))).unwrap();
     fs::remove_file(folder.join("others").join(id(10, 0))).unwrap();
-    assert_eq!(merged("runs others", folder), whole, "each has what the other lacks");
-    let (said, told) = failure("sweep --merge runs --out table.csv", folder, 1);
-    assert!(said.contains("missing: trial 2 (hidden 3, seed 7)\n"), "{said}");
-    assert!(told.contains("1 missing, 0 conflicting"), "{told}");
+    assert_eq!(
+        merged("runs others", folder),
+        whole,
+        "the folders complement each other"
+    );
+    let (output, message) = failure("sweep --merge runs --out table.csv", folder, 1);
+    assert!(output.contains("missing: trial 2 (hidden 3, seed 7)\n"), "{output}");
+    assert!(message.contains("1 missing, 0 conflicting"), "{message}");
     assert_eq!(fs::read_to_string(folder.join("table.csv")).unwrap().lines().count(), 6);
 
     // Another result for the same options.
@@ -35,15 +39,15 @@ fn merging_names_what_is_missing_and_what_conflicts() {
     assert!(heading.contains(&old), "the checksum is the usual CRC-32");
     let heading = heading.replace(&old, &format!("{:08x}", crc32(changed.as_bytes())));
     fs::write(&path, format!("{heading}\"run\":{changed}}}\n")).unwrap();
-    let (said, told) = failure("sweep --merge runs others --out table.json", folder, 1);
-    let line = said.lines().find(|line| line.starts_with("conflicting: ")).unwrap();
+    let (output, message) = failure("sweep --merge runs others --out table.json", folder, 1);
+    let line = output.lines().find(|line| line.starts_with("conflicting: ")).unwrap();
     assert!(
         line.contains(&id(4, 0)) && line.contains("runs") && line.contains("others"),
-        "{said}"
+        "{output}"
     );
-    assert!(told.contains("0 missing, 1 conflicting"), "{told}");
+    assert!(message.contains("0 missing, 1 conflicting"), "{message}");
     let table: Value = serde_json::from_slice(&fs::read(folder.join("table.json")).unwrap()).unwrap();
-    assert_eq!(table["trials"].as_array().unwrap().len(), 5, "neither result is taken");
+    assert_eq!(table["trials"].as_array().unwrap().len(), 5, "neither result is used");
 
     // A digit changed without its checksum, and a result under another name.
     fs::write(&path, text.replace("\"weights\":", "\"weights\":1")).unwrap();
@@ -52,12 +56,15 @@ fn merging_names_what_is_missing_and_what_conflicts() {
         folder.join("others").join(id(10, 0)),
     )
     .unwrap();
-    let (said, told) = failure("sweep --merge others --out table.csv", folder, 1);
+    let (output, message) = failure("sweep --merge others --out table.csv", folder, 1);
     assert!(
-        said.contains("checksum") && said.contains("its name belongs to another trial"),
-        "{said}"
+        output.contains("checksum") && output.contains("its name belongs to another trial"),
+        "{output}"
     );
-    assert!(told.contains("2 missing, 0 conflicting, 2 files unreadable"), "{told}");
+    assert!(
+        message.contains("2 missing, 0 conflicting, 2 files unreadable"),
+        "{message}"
+    );
 }
 
 /// CRC-32 of ISO 3309, bit by bit.
@@ -73,7 +80,7 @@ fn crc32(bytes: &[u8]) -> u32 {
 }
 
 #[test]
-fn a_wrong_merge_is_refused() {
+fn an_invalid_merge_is_refused() {
     let folder = folder_with(&six());
     let folder = folder.path();
     fs::create_dir(folder.join("empty")).unwrap();
@@ -90,9 +97,9 @@ fn a_wrong_merge_is_refused() {
         ("--out runs", 2, "--spec"),
         ("--spec sweep.json --out runs --shard 3/2", 2, "I/N"),
         ("--spec sweep.json --out runs --jobs 2", 2, "--engine"),
-        ("--spec sweep.json --out sweep.json", 1, "cannot make the folder"),
+        ("--spec sweep.json --out sweep.json", 1, "cannot create the folder"),
     ] {
-        let (_, told) = failure(&format!("sweep {arguments}"), folder, status);
-        assert!(told.contains(expected), "{arguments}: {told}");
+        let (_, message) = failure(&format!("sweep {arguments}"), folder, status);
+        assert!(message.contains(expected), "{arguments}: {message}");
     }
 }

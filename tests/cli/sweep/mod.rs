@@ -1,4 +1,4 @@
-//! Sweeps in the terminal: divided, repeated, killed, by several programs at once, and merged.
+//! Sweeps in the terminal: divided, repeated, killed, run by several programs at once, and merged.
 
 mod driver;
 mod filling;

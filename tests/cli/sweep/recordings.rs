@@ -31,14 +31,14 @@ fn trials(table: &Value) -> Vec<&str> {
     trials.map(|trial| trial["trial"].as_str().unwrap()).collect()
 }
 
-/// Number of trials that both tables have.
+/// Number of trials in both tables.
 fn shared(one: &Value, other: &Value) -> usize {
     let others = trials(other);
     trials(one).into_iter().filter(|trial| others.contains(trial)).count()
 }
 
 #[test]
-fn parts_of_a_sweep_trained_in_other_places_merge_to_the_table_of_one_process() {
+fn parts_of_a_sweep_from_different_folders_merge_to_the_table_of_one_process() {
     let folder = folder_with(&eight());
     let folder = folder.path();
     write_recording(&folder.join("press.csv"));
@@ -53,7 +53,7 @@ fn parts_of_a_sweep_trained_in_other_places_merge_to_the_table_of_one_process() 
     }
     fill("--out second --shard 2/2", &elsewhere);
     assert_eq!(merged("first elsewhere/second", folder), whole);
-    // No file names the folder of the recording.
+    // No file contains the folder of the recording.
     let place = folder.to_str().unwrap();
     for name in names(&folder.join("whole")) {
         let text = fs::read_to_string(folder.join("whole").join(&name)).unwrap();
@@ -68,7 +68,7 @@ fn parts_of_a_sweep_trained_in_other_places_merge_to_the_table_of_one_process() 
 }
 
 #[test]
-fn a_trial_is_what_train_prints() {
+fn a_trial_has_the_output_of_train() {
     let folder = folder_with(&eight());
     let folder = folder.path();
     write_recording(&folder.join("press.csv"));
@@ -85,7 +85,7 @@ fn a_trial_is_what_train_prints() {
             assert_eq!(trial["result"][field], printed[field], "{field}, {options}");
         }
         assert!(options["crc32"].is_array() && options["data"] == "press.csv");
-        // Bayesian regularisation holds nothing out, as in train.
+        // Bayesian regularisation holds out no samples, as in train.
         let held_out = if method == "br" { 0.0 } else { 0.2 };
         assert_eq!(options["validation-fraction"], held_out);
     }
@@ -127,7 +127,7 @@ fn arguments_a_recipe_and_a_recording_in_the_specification_are_the_same_trials()
 }
 
 #[test]
-fn wrong_sweeps_of_recordings_are_refused() {
+fn invalid_sweeps_of_recordings_are_refused() {
     let folder = folder_with(&eight());
     let folder = folder.path();
     let (_, message) = failure("sweep --spec sweep.json --out runs", folder, 2);
@@ -135,8 +135,8 @@ fn wrong_sweeps_of_recordings_are_refused() {
     write_recording(&folder.join("press.csv"));
     let cases = [
         ("array", json!("10x6_3x18"), "a recording (--data) has no array"),
-        ("folds", json!(3), "a sweep keeps its results"),
-        ("split", json!("group"), "say which column is the group"),
+        ("folds", json!(3), "a sweep manages its results"),
+        ("split", json!("group"), "give the group column with --group"),
     ];
     for (option, value, expected) in cases {
         let mut specification = eight();

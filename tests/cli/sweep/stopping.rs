@@ -9,7 +9,7 @@ use tempfile::TempDir;
 use super::driver::{command, fill, folder_with, merged, names, results, six, spawn, wait_until};
 
 #[test]
-fn a_killed_sweep_loses_nothing_that_was_finished() {
+fn a_killed_sweep_keeps_finished_trials() {
     let folder = folder_with(&six());
     let folder = folder.path();
     let runs = folder.join("runs");
@@ -21,7 +21,7 @@ fn a_killed_sweep_loses_nothing_that_was_finished() {
     let again = fill("--out runs --threads 2", folder);
     assert_eq!(again["present"], before.len());
     assert_eq!(again["trained"], 6 - before.len());
-    assert!(results(&runs).is_superset(&before), "what was there is not touched");
+    assert!(results(&runs).is_superset(&before), "existing results are not changed");
     assert!(
         names(&runs).iter().all(|name| name.ends_with(".json")),
         "{:?}",
@@ -32,7 +32,7 @@ fn a_killed_sweep_loses_nothing_that_was_finished() {
 }
 
 #[test]
-fn what_a_program_leaves_that_is_killed_after_its_result_is_cleared() {
+fn leftovers_of_a_program_killed_after_its_result_are_removed() {
     let folder = folder_with(&six());
     let folder = folder.path();
     let runs = folder.join("runs");
@@ -47,7 +47,7 @@ fn what_a_program_leaves_that_is_killed_after_its_result_is_cleared() {
 }
 
 #[test]
-fn two_programs_fill_one_folder_together() {
+fn two_programs_fill_one_folder() {
     let folder = folder_with(&six());
     let folder = folder.path();
     let start = || {
@@ -67,12 +67,12 @@ fn two_programs_fill_one_folder_together() {
             .map(|report| report[field].as_u64().unwrap())
             .sum::<u64>()
     };
-    assert_eq!((sum("trained"), sum("present")), (6, 6), "nothing twice");
+    assert_eq!((sum("trained"), sum("present")), (6, 6), "no trial is trained twice");
     assert_eq!(names(&folder.join("runs")).len(), 7, "six results and the plan");
 }
 
-/// The test stands for the other program: it holds the lock of the first trial that is missing. Once a later one is there,
-/// the program has passed it.
+/// The test acts as the other program: it holds the lock of the first missing trial. Once a later result exists, the
+/// program has skipped it.
 #[test]
 fn a_trial_of_a_program_that_ends_without_a_result_is_taken_over() {
     let folder = folder_with(&json!({
@@ -95,7 +95,7 @@ fn a_trial_of_a_program_that_ends_without_a_result_is_taken_over() {
         folder,
     ));
     wait_until("the second trial", || result(&second).exists());
-    assert!(!result(&first).exists(), "the lock counts");
+    assert!(!result(&first).exists(), "the lock is respected");
     assert!(child.try_wait().unwrap().is_none(), "it waits");
     drop(other);
     let report: Value = serde_json::from_slice(&child.wait_with_output().unwrap().stdout).unwrap();
@@ -103,7 +103,7 @@ fn a_trial_of_a_program_that_ends_without_a_result_is_taken_over() {
     assert_eq!(merged("runs", folder), trials);
 }
 
-/// A trial of this many epochs that is stopped after its beginning: its folder, the exit status, and what it said.
+/// Stops a trial of this many epochs after its start; returns its folder, the exit status and standard error.
 #[cfg(target_os = "linux")]
 fn stopped_by(signal: &str, epochs: usize) -> (TempDir, i32, String) {
     let folder = folder_with(&json!({
@@ -119,25 +119,25 @@ fn stopped_by(signal: &str, epochs: usize) -> (TempDir, i32, String) {
     let child = spawn(&mut command);
     let runs = folder.path().join("runs");
     let is_begun = || names(&runs).iter().any(|name| name.ends_with(".claim"));
-    wait_until("the trial is begun", || runs.is_dir() && is_begun());
+    wait_until("the trial has started", || runs.is_dir() && is_begun());
     let kill = format!("kill -{signal} {}", child.id());
     assert!(Command::new("sh").args(["-c", &kill]).status().unwrap().success());
     let output = child.wait_with_output().unwrap();
-    let told = String::from_utf8(output.stderr).unwrap();
-    (folder, output.status.code().unwrap(), told)
+    let message = String::from_utf8(output.stderr).unwrap();
+    (folder, output.status.code().unwrap(), message)
 }
 
 #[cfg(target_os = "linux")]
 #[test]
-fn an_interrupted_trial_is_resumed_with_the_same_bits() {
+fn an_interrupted_trial_is_resumed_bit_for_bit() {
     for (signal, status) in [("INT", 130), ("TERM", 143)] {
-        // A busy machine may send the signal late.
+        // A busy machine may deliver the signal late.
         let attempts = [1000, 10_000, 100_000].into_iter();
         let mut attempts = attempts.map(|epochs| (epochs, stopped_by(signal, epochs)));
-        let (epochs, (folder, ended, told)) = attempts.find(|(_, (_, ended, _))| *ended != 0).unwrap();
+        let (epochs, (folder, ended, message)) = attempts.find(|(_, (_, ended, _))| *ended != 0).unwrap();
         let folder = folder.path();
-        assert_eq!(ended, status, "{told}");
-        let last = told.lines().last().unwrap();
+        assert_eq!(ended, status, "{message}");
+        let last = message.lines().last().unwrap();
         assert_eq!(
             last,
             "interrupted after 0 of 1 trials; the same command trains the rest"

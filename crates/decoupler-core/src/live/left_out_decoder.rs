@@ -67,8 +67,8 @@ impl LeftOutDecoder {
         })
     }
 
-    /// Sets a row of `coordinates_mm` (rows × 3·M2) to the mean depth of its neighbours in the same frame. Returns `false`
-    /// if it has no neighbours.
+    /// Sets a row of `coordinates_mm` (rows × 3·M2) to the mean depth of its neighbours in the same frame. Returns
+    /// `false` if it has no neighbours.
     fn interpolate(&self, row_index: usize, coordinates_mm: &mut [f64]) -> bool {
         let (nodes, row) = (self.model.scale.nodes_per_row(), self.rows[row_index]);
         let is_neighbour = |&index: &usize| self.rows[index].abs_diff(row) == 1;
@@ -159,8 +159,8 @@ impl Decoder for LeftOutDecoder {
         Ok(())
     }
 
-    /// Decodes a frame. Unlike with other decoders, this is more accurate for faulty rows than [`Self::decode_row`], which
-    /// has no access to the neighbouring rows.
+    /// Decodes a frame. Unlike with other decoders, this is more accurate for faulty rows than [`Self::decode_row`],
+    /// which has no access to the neighbouring rows.
     fn decode(&mut self, frame: &[f64], targets: &mut [f64]) -> Result<(), DecodeError> {
         let (channels, outputs) = (self.channels(), self.outputs());
         assert_eq!(

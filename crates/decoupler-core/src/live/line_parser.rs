@@ -12,9 +12,9 @@ use crate::{
 /// Parses frames from successive CSV lines, without allocation in steady state.
 ///
 /// A line has the resistances of one row-wire: in columns named as for `decode`, possibly among others; as M4 unnamed
-/// columns; or as M4 + 1 unnamed columns, the first being the number of the row-wire. Or it has those of a whole snapshot:
-/// rows × M4 unnamed columns, row by row. The first line of readings determines the layout; a header may be repeated, for
-/// example when a device restarts.
+/// columns; or as M4 + 1 unnamed columns, the first being the number of the row-wire. Or it has those of a whole
+/// snapshot: rows × M4 unnamed columns, row by row. The first line of readings determines the layout; a header may be
+/// repeated, for example when a device restarts.
 #[derive(Debug)]
 pub struct LineParser {
     scale: ArrayScale,

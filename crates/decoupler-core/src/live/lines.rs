@@ -82,8 +82,8 @@ impl Lines {
     /// Maximum length of a line in bytes, including its line break: 1 MiB, as for any file of readings.
     pub const LONGEST: usize = LONGEST_ROW as usize;
 
-    /// Starts reading `source`. With `skips_first` its first line is skipped unless it is empty or begins with a letter or
-    /// a quote, like a header: reading from a device may begin in the middle of a line.
+    /// Starts reading `source`. With `skips_first` its first line is skipped unless it is empty or begins with a letter
+    /// or a quote, like a header: reading from a device may begin in the middle of a line.
     ///
     /// # Errors
     /// If the operating system cannot create a thread.

@@ -1,9 +1,9 @@
 //! Live frames: sources, line-by-line decoding, re-zeroing, recording, and fault diagnosis from the residual.
 //!
-//! A [`Source`] provides bytes, [`Lines`] splits them into lines, and [`LineParser`] parses the readings. [`FaultMonitor`]
-//! checks whether Eq. (2) explains them and identifies the faulty wire; [`LeftOutDecoder`] decodes without it.
-//! [`Simulated`] needs no hardware. [`ReZero`] estimates the unloaded state from recent frames, and [`Recorder`] saves
-//! frames for replay.
+//! A [`Source`] provides bytes, [`Lines`] splits them into lines, and [`LineParser`] parses the readings.
+//! [`FaultMonitor`] checks whether Eq. (2) explains them and identifies the faulty wire; [`LeftOutDecoder`] decodes
+//! without it. [`Simulated`] needs no hardware. [`ReZero`] estimates the unloaded state from recent frames, and
+//! [`Recorder`] saves frames for replay.
 
 mod faults;
 mod left_out_decoder;

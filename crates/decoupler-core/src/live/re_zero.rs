@@ -7,9 +7,10 @@ use crate::scene::NoiseSource;
 /// Estimates the unloaded state from recent frames, without erasing a sustained contact.
 ///
 /// Each channel's gain is the ratio of its median reading over the frames to its resistance at rest. Amplifiers and
-/// temperature affect whole columns and the whole array; a contact lowers the readings of a few rows. The logarithms of the
-/// ratios are therefore decomposed by median polish (Tukey, "Exploratory Data Analysis", 1977) into a common part, column
-/// parts, row parts and residuals. A contact on fewer than half of the rows does not affect the common and column parts.
+/// temperature affect whole columns and the whole array; a contact lowers the readings of a few rows. The logarithms of
+/// the ratios are therefore decomposed by median polish (Tukey, "Exploratory Data Analysis", 1977) into a common part,
+/// column parts, row parts and residuals. A contact on fewer than half of the rows does not affect the common and column
+/// parts.
 ///
 /// A row is in contact if its part plus its mean residual is below zero by more than [`ReZero::DEVIATIONS`] standard
 /// deviations, estimated from the other rows or from the noise. It is also in contact if its readings, corrected for the
@@ -286,7 +287,8 @@ impl ZeroGains {
             .for_each(|(ohm, gain)| *ohm /= gain);
     }
 
-    /// Returns `true` if there are gains for this many rows and columns, all finite and above 0: they may come from a file.
+    /// Returns `true` if there are gains for this many rows and columns, all finite and above 0: they may come from a
+    /// file.
     pub fn is_sound(&self, rows: usize, columns: usize) -> bool {
         let is_gain = |gain: &f64| *gain > 0.0 && gain.is_finite();
         self.columns == columns

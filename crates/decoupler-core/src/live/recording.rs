@@ -9,9 +9,9 @@ use thiserror::Error;
 
 use crate::text::{CsvFields, ReadError, ResistanceColumns};
 
-/// Writes frames with their times as CSV: one line per row-wire, with columns `time_s`, `row` (from 1) and `r_1` to `r_M4`
-/// in ohm. `decode` reads these files too. Every frame is flushed, so that the file ends with a complete line even if the
-/// program is terminated.
+/// Writes frames with their times as CSV: one line per row-wire, with columns `time_s`, `row` (from 1) and `r_1` to
+/// `r_M4` in ohm. `decode` reads these files too. Every frame is flushed, so that the file ends with a complete line even
+/// if the program is terminated.
 #[derive(Debug)]
 pub struct Recorder<W: Write> {
     /// Lines of one frame, written together.
@@ -97,8 +97,8 @@ pub enum RecordingError {
 }
 
 impl Recording {
-    /// Reads a file written by [`Recorder`] for these row-wires of an array with `array_rows` row-wires. An incomplete last
-    /// frame is ignored.
+    /// Reads a file written by [`Recorder`] for these row-wires of an array with `array_rows` row-wires. An incomplete
+    /// last frame is ignored.
     ///
     /// # Errors
     /// If the file cannot be read, is malformed, or has no complete frame.
@@ -235,8 +235,8 @@ impl Latencies {
         self.largest
     }
 
-    /// Returns the quantile of the latencies for a `share` of the frames from 0 to 1, rounded up by at most 2.2 % and to at
-    /// least one microsecond; `None` without frames.
+    /// Returns the quantile of the latencies for a `share` of the frames from 0 to 1, rounded up by at most 2.2 % and to
+    /// at least one microsecond; `None` without frames.
     pub fn quantile(&self, share: f64) -> Option<Duration> {
         let rank = ((self.count as f64 * share).ceil() as u64).clamp(1, self.count.max(1));
         let mut below = 0;

@@ -263,8 +263,8 @@ pub enum SimulatedError {
 }
 
 impl Simulated {
-    /// Prepares frames of `model` with the rows, stroke and noise of `scene`, and its indenter, or a ball if it has another
-    /// loading.
+    /// Prepares frames of `model` with the rows, stroke and noise of `scene`, and its indenter, or a ball if it has
+    /// another loading.
     ///
     /// # Errors
     /// If the scene or the rate is invalid, or the array has no resistance at rest.

@@ -7,10 +7,10 @@ use crate::sensor::{ArrayScale, Axes, RowConductance, SensorError, SensorModel, 
 
 /// A fault of the wires or of the electronics.
 ///
-/// The readout drives one row-wire, grounds the others, and measures the current of each column-wire at virtual ground, so
-/// that a reading depends only on the nodes between its two wires. Wires are connected at their first node. Beyond a break
-/// a wire floats, and its nodes carry no current into an amplifier. Two touching wires share the drive or the measured
-/// current equally: both read 2/(1/R + 1/R′).
+/// The readout drives one row-wire, grounds the others, and measures the current of each column-wire at virtual ground,
+/// so that a reading depends only on the nodes between its two wires. Wires are connected at their first node. Beyond a
+/// break a wire floats, and its nodes carry no current into an amplifier. Two touching wires share the drive or the
+/// measured current equally: both read 2/(1/R + 1/R′).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Fault {
     /// A row-wire is broken before node `before_node`, counted from 0; at its connector if this is 0.
@@ -222,8 +222,8 @@ impl FaultySensor {
         })
     }
 
-    /// Applies faults of wires and amplifiers to the resistances of one snapshot (rows `read`, row by row), which belong to
-    /// `deformation`.
+    /// Applies faults of wires and amplifiers to the resistances of one snapshot (rows `read`, row by row), which belong
+    /// to `deformation`.
     pub fn before_noise(&self, read: &[usize], deformation: &Deformation, resistances_ohm: &mut [f64]) {
         let scale = self.model.scale;
         let (columns, full_scale_ohm) = (scale.columns(), self.range_ohm.1);

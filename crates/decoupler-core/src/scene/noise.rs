@@ -10,9 +10,9 @@ use crate::sensor::{SensorError, SensorModel};
 
 /// Noise of the readings: Gaussian noise and the rounding of the converter.
 ///
-/// reading = round(R · (1 + drift · η) · (1 + relative · ε₁) + additive · ε₂), with ε₁ and ε₂ drawn for each resistance and
-/// η once per snapshot. The Gaussians are truncated to possible readings: η is redrawn until the gain is above 0, and ε₁ and
-/// ε₂ until the sum is above 0 and finite. With noise up to a tenth of the reading this practically never happens.
+/// reading = round(R · (1 + drift · η) · (1 + relative · ε₁) + additive · ε₂), with ε₁ and ε₂ drawn for each resistance
+/// and η once per snapshot. The Gaussians are truncated to possible readings: η is redrawn until the gain is above 0, and
+/// ε₁ and ε₂ until the sum is above 0 and finite. With noise up to a tenth of the reading this practically never happens.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Noise {

@@ -103,8 +103,8 @@ impl NoiseSource {
 
 /// Draws until a value is above 0 and finite.
 fn positive(mut draw: impl FnMut() -> f64) -> f64 {
-    /// At least half of the draws are positive; at the largest noise, where sums overflow, a third is accepted. All fail for
-    /// fewer than one in 10⁴⁵ readings.
+    /// At least half of the draws are positive; at the largest noise, where sums overflow, a third is accepted. All fail
+    /// for fewer than one in 10⁴⁵ readings.
     const MAX_DRAWS: usize = 256;
     let mut value = draw();
     for _ in 1..MAX_DRAWS {
@@ -276,7 +276,8 @@ mod tests {
             assert!((readings[1] / readings[0] - 2.0).abs() < 1e-12);
             gains.push(readings[0] / 10.0);
         }
-        // The mean of a normal distribution with mean and standard deviation 1, truncated to values above 0, is 1 + φ(1)/Φ(1).
+        // The mean of a normal distribution with mean and standard deviation 1, truncated to values above 0, is 1 +
+        // φ(1)/Φ(1).
         let (mean, _) = spread(&gains);
         assert!((mean - 1.2876).abs() < 0.06, "{mean}");
         assert!(

@@ -58,9 +58,9 @@ impl RowConductance {
         self.evaluate_by::<Divided>(model, row, displacements_mm, model.scale.nodes_per_column());
     }
 
-    /// Evaluates sums and derivatives with a broken row-wire or broken column-wires. Only the first nodes contribute: those
-    /// displaced by `displacements_mm` (up to M2), and the first `electrodes` (up to M3) of every column-wire. Derivatives
-    /// by other nodes are left unchanged.
+    /// Evaluates sums and derivatives with a broken row-wire or broken column-wires. Only the first nodes contribute:
+    /// those displaced by `displacements_mm` (up to M2), and the first `electrodes` (up to M3) of every column-wire.
+    /// Derivatives by other nodes are left unchanged.
     ///
     /// # Panics
     /// If there are more displacements or electrodes than nodes.
@@ -69,8 +69,8 @@ impl RowConductance {
         self.evaluate_by::<Divided>(model, row, displacements_mm, electrodes);
     }
 
-    /// Evaluates like [`Self::evaluate`] with [refined](Refined) reciprocal roots: in half the time, with errors of a few more
-    /// units in the last place. Distances must be [within reach](Self::is_within_reach).
+    /// Evaluates like [`Self::evaluate`] with [refined](Refined) reciprocal roots: in half the time, with errors of a few
+    /// more units in the last place. Distances must be [within reach](Self::is_within_reach).
     pub(crate) fn evaluate_refined(&mut self, model: &SensorModel, row: usize, displacements_mm: &[DVec3]) {
         assert_eq!(displacements_mm.len(), model.scale.nodes_per_row());
         self.evaluate_by::<Refined>(model, row, displacements_mm, model.scale.nodes_per_column());
@@ -81,7 +81,8 @@ impl RowConductance {
         self.evaluate_sums_by::<Divided>(model, row, displacements_mm);
     }
 
-    /// Evaluates only the sums, bit-identical to [`Self::evaluate_refined`]; derivatives remain those of the last evaluation.
+    /// Evaluates only the sums, bit-identical to [`Self::evaluate_refined`]; derivatives remain those of the last
+    /// evaluation.
     pub(crate) fn evaluate_sums_refined(&mut self, model: &SensorModel, row: usize, displacements_mm: &[DVec3]) {
         self.evaluate_sums_by::<Refined>(model, row, displacements_mm);
     }
@@ -166,8 +167,8 @@ const ELECTRODES: usize = 8;
 /// (M2), into `sums` (M4); and its derivatives by the displacements along no axis (`AXES` = 0), z (1) or x, y and z (3)
 /// into `derivatives` (M2 × `AXES` × M4, in 1/mm²).
 ///
-/// If a wire is broken, the sum is over the nodes before the break: the first nodes of the row-wire, if fewer displacements
-/// are given, and the first `electrodes` of every column-wire.
+/// If a wire is broken, the sum is over the nodes before the break: the first nodes of the row-wire, if fewer
+/// displacements are given, and the first `electrodes` of every column-wire.
 ///
 /// With d² = dx² + dy² + z²: ∂(1/d)/∂ux = −dx/d³, ∂(1/d)/∂uy = −dy/d³ and, with uz positive downwards, ∂(1/d)/∂uz = z/d³.
 ///

@@ -128,8 +128,8 @@ impl Geometry {
         DVec3::new(self.row_x_mm(row), self.node_y_mm(scale, node), self.height_mm)
     }
 
-    /// Returns the position of node `node` on row-wire `row` displaced by `displacement_mm`, whose z is positive downwards
-    /// (compression).
+    /// Returns the position of node `node` on row-wire `row` displaced by `displacement_mm`, whose z is positive
+    /// downwards (compression).
     pub fn displaced_mm(&self, scale: ArrayScale, row: usize, node: usize, displacement_mm: DVec3) -> DVec3 {
         let rest = self.row_node_mm(scale, row, node);
         DVec3::new(
@@ -312,8 +312,8 @@ impl SplitLength {
     }
 }
 
-/// Returns a + b, rounded, and the rounding error, which is exactly representable (Knuth, The Art of Computer Programming,
-/// vol. 2, section 4.2.2).
+/// Returns a + b, rounded, and the rounding error, which is exactly representable (Knuth, The Art of Computer
+/// Programming, vol. 2, section 4.2.2).
 #[inline(always)]
 pub(super) fn two_sum(a: f64, b: f64) -> (f64, f64) {
     let sum = a + b;

@@ -1,5 +1,5 @@
-//! The sensor: number and positions of wires and nodes, and the resistances for a deformation. Displacements and positions
-//! are [`DVec3`], the double-precision vector of the crate `glam`.
+//! The sensor: number and positions of wires and nodes, and the resistances for a deformation. Displacements and
+//! positions are [`DVec3`], the double-precision vector of the crate `glam`.
 
 mod array_scale;
 mod conductance;

@@ -94,8 +94,8 @@ impl SensorModel {
         DVec3::new(apart.x, apart.y, -apart.z)
     }
 
-    /// Computes the resistances of row-wire `row` whose nodes are displaced by `displacements_mm` (M2), and writes them to
-    /// `resistances_ohm` (M4), by Eq. (2):
+    /// Computes the resistances of row-wire `row` whose nodes are displaced by `displacements_mm` (M2), and writes them
+    /// to `resistances_ohm` (M4), by Eq. (2):
     ///
     /// `1/R_lk = Σ_i Σ_j 1 / (g · |p_li + u_li − q_kj|)`
     ///
@@ -144,8 +144,8 @@ impl SensorModel {
         Ok(resistances_ohm)
     }
 
-    /// Returns the analytic derivatives ∂R_lk/∂u_li of row-wire `row` in ohm per millimetre: M4 × M2 × 3, the last axis being
-    /// ux, uy, uz (uz downwards).
+    /// Returns the analytic derivatives ∂R_lk/∂u_li of row-wire `row` in ohm per millimetre: M4 × M2 × 3, the last axis
+    /// being ux, uy, uz (uz downwards).
     ///
     /// With s = Σ 1/d and R = g/s, ∂R/∂u = −(R/s) ∂s/∂u.
     ///
@@ -179,9 +179,9 @@ impl RelativeNoise {
         libm::hypot(self.own, self.common)
     }
 
-    /// Returns the factor for the mean of `readings` by which readings with a common error can be weighted like independent
-    /// ones: own / √(own² + readings · common²), from the eigenvalues of the covariance own² I + common² 1 1ᵀ. The independent
-    /// error of exact readings is the rounding of double precision.
+    /// Returns the factor for the mean of `readings` by which readings with a common error can be weighted like
+    /// independent ones: own / √(own² + readings · common²), from the eigenvalues of the covariance own² I + common² 1
+    /// 1ᵀ. The independent error of exact readings is the rounding of double precision.
     pub(crate) fn weight_of_mean(self, readings: usize) -> f64 {
         if self.common == 0.0 {
             return 1.0;

@@ -65,8 +65,8 @@ impl Grid {
         self.x.beyond(ix).max(self.y.beyond(iy))
     }
 
-    /// Returns `true` if a point is within the bounding rectangle of the nodes; outside, the surface is extrapolated. For a
-    /// single row or column, which has no extent, the strip that represents it counts as inside.
+    /// Returns `true` if a point is within the bounding rectangle of the nodes; outside, the surface is extrapolated. For
+    /// a single row or column, which has no extent, the strip that represents it counts as inside.
     pub fn is_inside(&self, ix: usize, iy: usize) -> bool {
         self.inside_x().contains(&ix) && self.inside_y().contains(&iy)
     }
@@ -92,8 +92,8 @@ impl GridAxis {
 
     /// Divides every interval of the ascending `nodes_mm` into equal steps, for about `target` points in all.
     ///
-    /// `lone_margin_mm` is the margin around a single coordinate, which has no pitch; it is increased if it would be lost in
-    /// the rounding of the coordinate.
+    /// `lone_margin_mm` is the margin around a single coordinate, which has no pitch; it is increased if it would be lost
+    /// in the rounding of the coordinate.
     pub(super) fn through(nodes_mm: &[f64], target: usize, lone_margin_mm: f64) -> Self {
         // Very long axes are thinned: more lines than pixels are not visible.
         let stride = nodes_mm.len().div_ceil(target.max(2));
@@ -141,8 +141,8 @@ impl GridAxis {
         }
     }
 
-    /// Divides the interval between the outermost nodes into equal steps, and extends it by `margin_mm` at both ends, with
-    /// about `target` steps in all.
+    /// Divides the interval between the outermost nodes into equal steps, and extends it by `margin_mm` at both ends,
+    /// with about `target` steps in all.
     pub(super) fn spanning(first_mm: f64, last_mm: f64, target: usize, margin_mm: f64) -> Self {
         let extent_mm = last_mm - first_mm;
         let share = extent_mm / (extent_mm + 2.0 * margin_mm);
@@ -167,8 +167,8 @@ fn along(from: f64, to: f64, step: usize, steps: usize) -> f64 {
 /// Largest coordinate for which differences and products with the number of points do not overflow.
 const LARGEST_MM: f64 = 1e300;
 
-/// Minimum distance between nodes relative to their largest coordinate: about a thousand roundings, so that points between
-/// them are distinct in double precision.
+/// Minimum distance between nodes relative to their largest coordinate: about a thousand roundings, so that points
+/// between them are distinct in double precision.
 pub(super) const CLOSEST_RELATIVE: f64 = 1e-12;
 
 /// Checks that there are coordinates, all of them finite.
@@ -295,9 +295,9 @@ pub struct Lattice {
 const SPREAD: f64 = 0.1;
 
 impl Lattice {
-    /// Finds the lattice whose nodes are these points (x, y), in millimetres. Coordinates along a line may differ by up to
-    /// a tenth of the distance of the nearest neighbours; their mean is used. `None` if the points do not form a lattice:
-    /// scattered, rotated, or with gaps.
+    /// Finds the lattice whose nodes are these points (x, y), in millimetres. Coordinates along a line may differ by up
+    /// to a tenth of the distance of the nearest neighbours; their mean is used. `None` if the points do not form a
+    /// lattice: scattered, rotated, or with gaps.
     pub fn of(places_mm: &[[f64; 2]]) -> Option<Self> {
         if places_mm
             .iter()
@@ -338,8 +338,8 @@ impl Lattice {
         &self.y_mm
     }
 
-    /// Returns the index of the point at each node, in the order of the values of a [`SurfaceMap`](super::SurfaceMap): all y
-    /// of the first x, then those of the next.
+    /// Returns the index of the point at each node, in the order of the values of a [`SurfaceMap`](super::SurfaceMap):
+    /// all y of the first x, then those of the next.
     pub fn places(&self) -> &[usize] {
         &self.places
     }

@@ -7,8 +7,8 @@
 //! The natural cubic spline through nodes on a line, the curve of least bending energy.
 //!
 //! Between neighbours at a distance h it is `s = a z_i + b z_{i+1} + h²/6 ((a³ − a) m_i + (b³ − b) m_{i+1})`, where b is
-//! the fraction of the way from i to i + 1 and a = 1 − b. Its second derivatives m vanish at both ends and, for the slope to be
-//! continuous, satisfy
+//! the fraction of the way from i to i + 1 and a = 1 − b. Its second derivatives m vanish at both ends and, for the slope
+//! to be continuous, satisfy
 //!
 //! ```text
 //! h_{i−1} m_{i−1} + 2 (h_{i−1} + h_i) m_i + h_i m_{i+1} = 6 ((z_{i+1} − z_i)/h_i − (z_i − z_{i−1})/h_{i−1})
@@ -37,13 +37,14 @@ const GRID_POINTS: usize = 110;
 /// Interpolation between the nodes. Each kind reproduces constants and planes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Interpolation {
-    /// The biharmonic spline with a plane (Duchon 1977). MATLAB's `griddata(…, 'v4')`, used for the paper's figures, has no
-    /// plane, so that its surfaces sag between nodes of equal height and depend on the unit of length.
+    /// The biharmonic spline with a plane (Duchon 1977). MATLAB's `griddata(…, 'v4')`, used for the paper's figures, has
+    /// no plane, so that its surfaces sag between nodes of equal height and depend on the unit of length.
     ThinPlateSpline,
     /// A natural cubic spline along a single row or column of nodes, constant across it; level for a single node.
     CubicSpline,
-    /// Bilinear between neighbours, continued with the same slope beyond the outermost nodes. Used for more than a thousand
-    /// nodes, and for nodes so unevenly spaced that a spline would overshoot a thousandfold or be lost in rounding errors.
+    /// Bilinear between neighbours, continued with the same slope beyond the outermost nodes. Used for more than a
+    /// thousand nodes, and for nodes so unevenly spaced that a spline would overshoot a thousandfold or be lost in
+    /// rounding errors.
     Bilinear,
 }
 
@@ -116,9 +117,9 @@ impl SurfaceMap {
         })
     }
 
-    /// Prepares the thin-plate spline through nodes at these points (x, y), in millimetres, which need not form a lattice. It
-    /// has gaps (NaN) outside their convex hull, except for a margin of half the mean distance between neighbours, and at
-    /// points far from every node.
+    /// Prepares the thin-plate spline through nodes at these points (x, y), in millimetres, which need not form a
+    /// lattice. It has gaps (NaN) outside their convex hull, except for a margin of half the mean distance between
+    /// neighbours, and at points far from every node.
     ///
     /// # Errors
     /// [`SurfaceError`] if there are no nodes, or more than a thousand, a coordinate is not finite, two nodes coincide or
@@ -145,8 +146,8 @@ impl SurfaceMap {
         &self.grid
     }
 
-    /// Returns the distance of a grid point from the nodes as a fraction of the margin: 0 within their bounding rectangle or,
-    /// for scattered nodes, their convex hull; 1 where the surface ends, and where scattered nodes have none.
+    /// Returns the distance of a grid point from the nodes as a fraction of the margin: 0 within their bounding rectangle
+    /// or, for scattered nodes, their convex hull; 1 where the surface ends, and where scattered nodes have none.
     pub fn beyond(&self, ix: usize, iy: usize) -> f64 {
         match &self.spline {
             Some(Spline::Scattered(scattered)) => scattered.beyond(self.grid.index(ix, iy)),
@@ -304,7 +305,8 @@ pub enum SurfaceError {
         /// Value found, in millimetres.
         value_mm: f64,
     },
-    /// Two coordinates coincide, so that the surface would have two heights, or are too close to place points between them.
+    /// Two coordinates coincide, so that the surface would have two heights, or are too close to place points between
+    /// them.
     #[error("{axis} coordinates {first} and {second} coincide at {value_mm:?} mm; nodes need distinct positions")]
     Duplicate {
         /// Axis of the invalid coordinates.
@@ -342,8 +344,8 @@ pub enum SurfaceError {
     Uneven,
 }
 
-/// Position of a grid line relative to two lattice lines: `(1 − weight) · lower + weight · upper`. Beyond the outermost line the
-/// weight is below 0 or above 1.
+/// Position of a grid line relative to two lattice lines: `(1 − weight) · lower + weight · upper`. Beyond the outermost
+/// line the weight is below 0 or above 1.
 #[derive(Clone, Copy, Debug)]
 struct Between {
     lower: usize,
@@ -360,8 +362,8 @@ pub(super) struct Bilinear {
 }
 
 impl Bilinear {
-    /// Creates the weights. Each axis has the ascending node coordinates, their indices in the caller's order, and the grid
-    /// coordinates.
+    /// Creates the weights. Each axis has the ascending node coordinates, their indices in the caller's order, and the
+    /// grid coordinates.
     pub(super) fn new(x: (&[f64], &[usize], &[f64]), y: (&[f64], &[usize], &[f64])) -> Self {
         Self {
             x: betweens(x.0, x.1, x.2),

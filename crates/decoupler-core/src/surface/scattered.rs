@@ -14,8 +14,8 @@
 //!
 //! MATLAB's `griddata(…, 'v4')`, used for the paper's figures, is the biharmonic spline without the plane (D. T.
 //! Sandwell, "Biharmonic spline interpolation of GEOS-3 and SEASAT altimeter data", Geophysical Research Letters 14(2),
-//! 1987, 139-142; φ(r) = r² (ln r − 1)). It sags between nodes of equal height, bends towards 0 beyond them, and depends on the
-//! unit of length. With the plane, constants and planes are reproduced; and since a multiple of r² in φ adds only
+//! 1987, 139-142; φ(r) = r² (ln r − 1)). It sags between nodes of equal height, bends towards 0 beyond them, and depends
+//! on the unit of length. With the plane, constants and planes are reproduced; and since a multiple of r² in φ adds only
 //! a constant under the two conditions on w, neither Sandwell's −1 nor the unit makes a difference.
 //!
 //! Only z varies from frame to frame, and it enters linearly: z(points) = W z. With P an orthonormal basis of the affine
@@ -142,8 +142,8 @@ fn distances_of_neighbours(places: &[DVec2]) -> Result<Vec<f64>, SurfaceError> {
 struct Hull(Vec<DVec2>);
 
 impl Hull {
-    /// Computes the hull by monotone chains (A. M. Andrew, "Another efficient algorithm for convex hulls in two dimensions", 1979);
-    /// `None` if the points are on one line.
+    /// Computes the hull by monotone chains (A. M. Andrew, "Another efficient algorithm for convex hulls in two
+    /// dimensions", 1979); `None` if the points are on one line.
     fn of(places: &[DVec2]) -> Option<Self> {
         let mut sorted = places.to_vec();
         sorted.sort_by(|one, other| one.x.total_cmp(&other.x).then(one.y.total_cmp(&other.y)));
@@ -278,8 +278,8 @@ impl LocalCoordinates {
     }
 }
 
-/// Affine functions that are orthonormal on the nodes: a constant, the deviation from the mean of x, and the deviation from
-/// the mean of y after regression on x.
+/// Affine functions that are orthonormal on the nodes: a constant, the deviation from the mean of x, and the deviation
+/// from the mean of y after regression on x.
 struct AffineBasis {
     constant: f64,
     mean: Place,

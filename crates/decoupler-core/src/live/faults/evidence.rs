@@ -34,8 +34,8 @@ pub(super) struct Explained {
 /// Compares all single-wire faults by their evidence in the same frames.
 ///
 /// A fault of a row-wire does not affect the other rows. A fault of a column-wire is judged by the prediction from the
-/// other columns: R̂ of the fit without it, with its variance τ². For an unknown cause, readings are distributed uniformly
-/// within [`WIDTH`].
+/// other columns: R̂ of the fit without it, with its variance τ². For an unknown cause, readings are distributed
+/// uniformly within [`WIDTH`].
 pub(super) struct Evidence<'a> {
     /// Fit of one row-wire, and of two touching row-wires.
     pub(super) one: &'a mut RowFit,
@@ -254,8 +254,8 @@ impl Evidence<'_> {
 /// Predictions of one or two columns from fits of all lines without them.
 struct ColumnLeftOut {
     rest: RowFitReport,
-    /// Predictions for the first column left out, intact and then broken before each node from 1 on, for every line. `None`
-    /// if the reading is beyond the range of the converter, hence certain.
+    /// Predictions for the first column left out, intact and then broken before each node from 1 on, for every line.
+    /// `None` if the reading is beyond the range of the converter, hence certain.
     predicted: Vec<Vec<Option<Predicted>>>,
     /// Mean conductance of both columns as ln R̂, with its variance excluding noise, for every line.
     shared: Vec<(f64, f64)>,

@@ -14,14 +14,15 @@ use crate::{
 /// Checks whether Eq. (2) explains the frames, and identifies the faulty wire if it does not.
 ///
 /// A frame is suspicious if no deformation explains its readings: if the minimum χ² of all rows under weak priors exceeds
-/// a limit that a normal frame exceeds with a probability of at most 10⁻³. At the true deformation, χ² is that of the noise,
-/// with as many degrees of freedom as readings, and the minimum is never larger. When [`FaultMonitor::PERSISTENCE`]
-/// consecutive frames are suspicious, all single-wire faults are compared by their evidence. The most probable fault is
-/// reported if its probability is at least [`FaultMonitor::SURE`] and it explains these frames by the same measure.
+/// a limit that a normal frame exceeds with a probability of at most 10⁻³. At the true deformation, χ² is that of the
+/// noise, with as many degrees of freedom as readings, and the minimum is never larger. When
+/// [`FaultMonitor::PERSISTENCE`] consecutive frames are suspicious, all single-wire faults are compared by their
+/// evidence. The most probable fault is reported if its probability is at least [`FaultMonitor::SURE`] and it explains
+/// these frames by the same measure.
 ///
-/// The readings of two touching wires may also be explained by some deformation. A short is therefore also reported if the
-/// readings of two wires remain equal while the array is pressed in different ways, which is improbable for wires that do
-/// not touch. It is reported until the readings differ in [`FaultMonitor::PERSISTENCE`] consecutive frames.
+/// The readings of two touching wires may also be explained by some deformation. A short is therefore also reported if
+/// the readings of two wires remain equal while the array is pressed in different ways, which is improbable for wires
+/// that do not touch. It is reported until the readings differ in [`FaultMonitor::PERSISTENCE`] consecutive frames.
 ///
 /// Checking a normal frame does not allocate.
 #[derive(Clone, Debug)]
@@ -131,8 +132,8 @@ impl FaultMonitor {
         self.check_zeroed(frame_ohm, frame_ohm)
     }
 
-    /// Checks a frame divided by the gains of the unloaded state; `raw_ohm` is the frame before the division. The gains may
-    /// hide a short of two row-wires that was present when they were estimated.
+    /// Checks a frame divided by the gains of the unloaded state; `raw_ohm` is the frame before the division. The gains
+    /// may hide a short of two row-wires that was present when they were estimated.
     ///
     /// # Panics
     /// If a frame has the wrong length.
@@ -394,8 +395,8 @@ mod tests {
             if is_explained { fitted.chi_squared } else { 0.0 }
         });
         let largest = largest.fold(0.0, f64::max);
-        // The χ² distribution with 3 degrees of freedom exceeds 16.266 with a probability of 10⁻³, and the prior's χ² of an
-        // unknown at the end of its range is 0.25.
+        // The χ² distribution with 3 degrees of freedom exceeds 16.266 with a probability of 10⁻³, and the prior's χ² of
+        // an unknown at the end of its range is 0.25.
         assert!((15.0..17.0).contains(&largest), "{largest}");
     }
 

@@ -11,8 +11,8 @@ use crate::{
 
 /// Most probable deformation of a row-wire, or of two touching row-wires, given their readings, and its evidence.
 ///
-/// With the misfit y_k = ln m_k − ln R_k(u) of reading m_k, relative noise of standard deviation σ_k, and a Gaussian prior
-/// with mean μ and precision P, it minimises
+/// With the misfit y_k = ln m_k − ln R_k(u) of reading m_k, relative noise of standard deviation σ_k, and a Gaussian
+/// prior with mean μ and precision P, it minimises
 ///
 /// `χ²(u) = Σ_k y_k²/σ_k² + (u − μ)ᵀ P (u − μ)`
 ///
@@ -184,7 +184,8 @@ impl RowFit {
         let (n, columns) = (self.ranges.len(), self.model.scale.columns());
         self.slopes.fill(0.0);
         self.log_ohm.fill(0.0);
-        // First the sums s of all rows and their slopes, then the logarithms of the resistances g/s̄, where s̄ is the mean.
+        // First the sums s of all rows and their slopes, then the logarithms of the resistances g/s̄, where s̄ is the
+        // mean.
         for (place, &(row, _)) in view.rows.iter().enumerate() {
             let unknowns = &self.unknowns[place * n..(place + 1) * n];
             for (displacement, values) in self
@@ -301,8 +302,8 @@ impl RowFit {
         }
     }
 
-    /// Takes the step, halved until χ² is below `chi_squared`, and returns the new χ²; `None` leaves the unknowns unchanged.
-    /// No node leaves its range by more than the width of the range, or comes close to a column-wire.
+    /// Takes the step, halved until χ² is below `chi_squared`, and returns the new χ²; `None` leaves the unknowns
+    /// unchanged. No node leaves its range by more than the width of the range, or comes close to a column-wire.
     fn take_step(&mut self, view: RowReadings<'_>, chi_squared: f64) -> Option<f64> {
         let (n, moving) = (self.ranges.len(), view.rows.len() * self.ranges.len());
         self.trial.copy_from_slice(&self.unknowns);
@@ -334,8 +335,8 @@ impl RowFit {
         None
     }
 
-    /// Writes the coordinates in mm (3·M2) of the nodes of a row-wire, the `place`-th of the fit, clamped to the ranges of
-    /// the scene.
+    /// Writes the coordinates in mm (3·M2) of the nodes of a row-wire, the `place`-th of the fit, clamped to the ranges
+    /// of the scene.
     pub(in crate::live) fn coordinates(&self, row: usize, place: usize, coordinates_mm: &mut [f64]) {
         let n = self.ranges.len();
         let unknowns = self.unknowns[place * n..(place + 1) * n].chunks_exact(self.axes.len());
@@ -351,8 +352,8 @@ impl RowFit {
     }
 }
 
-/// Cholesky factor L Lᵀ of a small symmetric positive definite matrix, with storage that is reused. Up to order 16, typical
-/// of row-wires, it is faster than the factorisation of faer, which is optimised for large matrices.
+/// Cholesky factor L Lᵀ of a small symmetric positive definite matrix, with storage that is reused. Up to order 16,
+/// typical of row-wires, it is faster than the factorisation of faer, which is optimised for large matrices.
 #[derive(Clone, Debug)]
 pub(super) struct Cholesky {
     order: usize,
@@ -438,8 +439,8 @@ impl RowFit {
         slopes.iter_mut().zip(of_column).for_each(|(to, slope)| *to = *slope);
     }
 
-    /// Returns ln R of a column that is broken before node `electrodes`, and writes its slopes as [`Self::slopes_of`] does,
-    /// after a fit of one row-wire.
+    /// Returns ln R of a column that is broken before node `electrodes`, and writes its slopes as [`Self::slopes_of`]
+    /// does, after a fit of one row-wire.
     pub(super) fn broken_column(
         &mut self,
         (row, column, electrodes): (usize, usize, usize),

@@ -10,20 +10,20 @@ use crate::{
 /// Detects neighbouring wires that touch: their readings remain equal while the array is pressed in different ways.
 ///
 /// Eq. (2) explains equal readings of two row-wires by some deformation, so that χ² of a single frame says little. But it
-/// is improbable that each of several presses happens to be such a deformation. Readings of two wires are *equal* if
-/// Q = Σ_k (ln m_k − ln m′_k)²/2σ_k² is below the value that touching wires exceed with a probability of [`EXCEEDED`],
-/// where σ is the relative noise of a reading without the common gain error of a snapshot, which cancels.
-/// Wires that do not touch have equal readings with probability q in a frame that presses them. This is estimated by draws
-/// from the scene, with and without noise, and the larger value is used: readings may have less noise than assumed.
-/// Every frame in which they are unequal adds ln(EXCEEDED/(1 − q)) to the evidence for a short, and every *new
-/// press* with equal readings adds ln(1/q). A press is new if its mean readings differ from those at rest and from all
-/// presses counted before by at least half of the typical difference in the scene. Thus a sustained contact, an array with
-/// symmetric rows at rest, or a slow movement counts only once. The sum is kept at or above 0, as in a cumulative sum test
-/// (Page, "Continuous inspection schemes", Biometrika 41, 1954): for presses that are independent given the scene, the mean
-/// number of presses between false alarms exceeds e^[`LIMIT`].
+/// is improbable that each of several presses happens to be such a deformation. Readings of two wires are *equal* if Q =
+/// Σ_k (ln m_k − ln m′_k)²/2σ_k² is below the value that touching wires exceed with a probability of [`EXCEEDED`], where
+/// σ is the relative noise of a reading without the common gain error of a snapshot, which cancels. Wires that do not
+/// touch have equal readings with probability q in a frame that presses them. This is estimated by draws from the scene,
+/// with and without noise, and the larger value is used: readings may have less noise than assumed. Every frame in which
+/// they are unequal adds ln(EXCEEDED/(1 − q)) to the evidence for a short, and every *new press* with equal readings adds
+/// ln(1/q). A press is new if its mean readings differ from those at rest and from all presses counted before by at least
+/// half of the typical difference in the scene. Thus a sustained contact, an array with symmetric rows at rest, or a slow
+/// movement counts only once. The sum is kept at or above 0, as in a cumulative sum test (Page, "Continuous inspection
+/// schemes", Biometrika 41, 1954): for presses that are independent given the scene, the mean number of presses between
+/// false alarms exceeds e^[`LIMIT`].
 ///
-/// Wires that are mirror images of each other in the array have equal readings whenever they are pressed alike, for example
-/// by a bar across both or on the line between them. In scenes with an indenter, they are not judged.
+/// Wires that are mirror images of each other in the array have equal readings whenever they are pressed alike, for
+/// example by a bar across both or on the line between them. In scenes with an indenter, they are not judged.
 #[derive(Clone, Debug)]
 pub(super) struct Shorts {
     pairs: Vec<Pair>,
@@ -173,8 +173,8 @@ impl Shorts {
     }
 
     /// Adds a frame: `raw_ohm` as received, and `frame_ohm` divided by the gains of the unloaded state. Rows share the
-    /// amplifiers of the columns, so their raw readings are compared; columns have separate amplifiers, so their corrected
-    /// readings are compared.
+    /// amplifiers of the columns, so their raw readings are compared; columns have separate amplifiers, so their
+    /// corrected readings are compared.
     pub(super) fn observe(&mut self, raw_ohm: &[f64], frame_ohm: &[f64]) {
         let mut pairs = std::mem::take(&mut self.pairs);
         for pair in &mut pairs {

@@ -10,10 +10,10 @@ use crate::{
 
 /// A rigid body pressed onto the surface: position, depth, size, direction and tilt are drawn for each snapshot.
 ///
-/// The surface follows the body under it; around it, the surface is that of a sheet under tension on an elastic foundation
-/// (Pasternak 1954) with decay length λ = `spread_mm`: exp(−distance/λ) next to a cylinder or an edge, which are long in
-/// one direction, and the axisymmetric K₀(r/λ)/K₀(a/λ) around the contact radius a of a ball or a punch. A ball or a
-/// cylinder touches the sheet up to where its slope equals that of the free surface, so that there is no kink.
+/// The surface follows the body under it; around it, the surface is that of a sheet under tension on an elastic
+/// foundation (Pasternak 1954) with decay length λ = `spread_mm`: exp(−distance/λ) next to a cylinder or an edge, which
+/// are long in one direction, and the axisymmetric K₀(r/λ)/K₀(a/λ) around the contact radius a of a ball or a punch. A
+/// ball or a cylinder touches the sheet up to where its slope equals that of the free surface, so that there is no kink.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Indenter {

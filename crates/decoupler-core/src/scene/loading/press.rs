@@ -52,8 +52,8 @@ enum Face {
 }
 
 impl Press {
-    /// Presses `body` to a depth of `depth_mm` at `place`, inclined by `slope` along `direction`, on a surface of decay length
-    /// `spread_mm`.
+    /// Presses `body` to a depth of `depth_mm` at `place`, inclined by `slope` along `direction`, on a surface of decay
+    /// length `spread_mm`.
     pub(super) fn new(body: Body, place: DVec2, depth_mm: f64, direction: DVec2, slope: f64, spread_mm: f64) -> Self {
         let face = match body {
             Body::Sphere(radius_mm) => Face::Sphere {
@@ -108,8 +108,8 @@ impl Press {
         }
     }
 
-    /// Depth at `distance` from the axis of a cylinder: the parabola depth − distance²/(2 radius) up to the distance a where
-    /// its slope equals that of the free surface, a/radius = depth(a)/spread, and the free surface beyond.
+    /// Depth at `distance` from the axis of a cylinder: the parabola depth − distance²/(2 radius) up to the distance a
+    /// where its slope equals that of the free surface, a/radius = depth(a)/spread, and the free surface beyond.
     fn cylinder(&self, depth_mm: f64, radius: f64, distance: f64) -> f64 {
         if depth_mm <= 0.0 {
             return 0.0;
@@ -157,8 +157,9 @@ impl RoundContact {
         }
     }
 
-    /// Creates the contact of a ball of radius `ball_mm` pressed `depth_mm` deep, whose face is depth − r²/(2·ball). It ends
-    /// where the slopes of face and free surface are equal, a/ball = w(a)/λ · K₁(a/λ)/K₀(a/λ), so that there is no kink.
+    /// Creates the contact of a ball of radius `ball_mm` pressed `depth_mm` deep, whose face is depth − r²/(2·ball). It
+    /// ends where the slopes of face and free surface are equal, a/ball = w(a)/λ · K₁(a/λ)/K₀(a/λ), so that there is no
+    /// kink.
     pub(super) fn of_ball(ball_mm: f64, depth_mm: f64, decay_length_mm: f64) -> Self {
         Self::new(contact_radius_mm(ball_mm, depth_mm, decay_length_mm), decay_length_mm)
     }
@@ -179,8 +180,8 @@ impl RoundContact {
 ///
 /// `y² + 2 L y q(y/L) = 1`, whose left side increases with y from 0.
 ///
-/// Because q is between 0 and 1, y is between √(1 + L²) − L (the solution for a cylinder) and 1. Solved by Newton's method
-/// with q′ = q² + q/x − 1, and by bisection where a step would leave the bracket.
+/// Because q is between 0 and 1, y is between √(1 + L²) − L (the solution for a cylinder) and 1. Solved by Newton's
+/// method with q′ = q² + q/x − 1, and by bisection where a step would leave the bracket.
 fn contact_radius_mm(ball_mm: f64, depth_mm: f64, decay_length_mm: f64) -> f64 {
     /// Newton's method converges in 3 to 6 iterations; bisection alone would need 60.
     const ROUNDS: usize = 100;

@@ -231,8 +231,8 @@ impl SmoothField {
         }
     }
 
-    /// Returns a square root of the covariance of the nodes of one row-wire, row by row, and its number of columns. Patterns
-    /// whose standard deviation is below 1e-9 are left out.
+    /// Returns a square root of the covariance of the nodes of one row-wire, row by row, and its number of columns.
+    /// Patterns whose standard deviation is below 1e-9 are left out.
     pub(super) fn root_of_row(&self) -> (Vec<f64>, usize) {
         const SMALLEST_DEVIATION: f64 = 1e-9;
         let root = &self.along_y;
