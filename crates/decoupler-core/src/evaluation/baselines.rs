@@ -9,8 +9,8 @@ use crate::{
     sensor::ArrayScale,
 };
 
-/// Errors of the baselines, listed next to those of the network in every error table. `E` is [`Errors`] where the targets
-/// are known to be nodes.
+/// Errors of the baselines, listed next to those of the network in every error table. `E` is [`Errors`] where the
+/// targets are known to be nodes.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Baselines<E = TestErrors> {
@@ -19,10 +19,10 @@ pub struct Baselines<E = TestErrors> {
     /// Errors of the best affine map on the readings, one for each row-wire where rows are known; ridge regression for
     /// recordings.
     pub linear: E,
-    /// Errors of the Bayesian reference, the limit set by the noise and by the distribution of the loading:
+    /// Errors of the Bayesian reference, the limit due to the noise and to the distribution of the loading:
     /// [`reference_errors`](super::reference_errors). Recordings have none.
     pub reference: Option<E>,
-    /// Reason for which there is no reference, if one was sought.
+    /// Reason why there is no reference, if one was attempted.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub no_reference: Option<NoReference>,
 }
@@ -67,9 +67,10 @@ impl Scores {
     }
 }
 
-/// Fits the baselines: the training mean and an affine map on the readings, of each row-wire where networks know theirs.
-/// For simulated samples of unknown row-wires, or of one, the map is that of least squares; samples of each of
-/// several row-wires can be fewer than its readings, and measured ones too few or too alike, so theirs is ridge regression.
+/// Fits the baselines: the training mean and an affine map on the readings, one for each row-wire if networks know the
+/// row. The map is the least-squares solution for simulated samples of unknown row-wires or of a single one. Otherwise
+/// it is ridge regression, since a row-wire can have fewer samples than readings, and measured samples can be too few
+/// or too similar.
 pub(super) fn fit_baselines(
     training: &Dataset,
     settings: &RunSettings,
@@ -112,7 +113,7 @@ pub fn published_errors() -> Vec<PublishedErrors> {
     let text = include_str!("../../../../assets/published_errors.csv");
     let rows = csv::Reader::from_reader(text.as_bytes()).into_deserialize();
     rows.collect::<Result<_, _>>()
-        .expect("the file is part of the program and a test reads it")
+        .expect("the embedded file is valid, which a test checks")
 }
 
 impl PublishedErrors {
@@ -149,7 +150,7 @@ mod tests {
     };
 
     #[test]
-    fn the_linear_map_is_told_the_row_where_the_network_is() {
+    fn the_linear_map_knows_the_row_if_the_network_does() {
         let errors = |rows, samples| {
             let mut settings = SimulatedSettings::default();
             settings.source = Simulation {
@@ -176,15 +177,15 @@ mod tests {
         let (_, shared) = errors(Rows::All, 1000);
         assert!(shared.x_percent.unwrap() > 0.1);
         let (_, known) = errors(Rows::Known, 1000);
-        assert!(known.x_percent.unwrap() < 1e-9, "the row says x: {known:?}");
+        assert!(known.x_percent.unwrap() < 1e-9, "the row determines x: {known:?}");
         assert!(known.z_mm < 0.3 * shared.z_mm, "{known:?} {shared:?}");
-        // Fewer samples of a row than it has readings.
+        // Each row has fewer samples than readings.
         let (mean, few) = errors(Rows::Known, 100);
         assert!(few.z_mm < 0.9 * mean.z_mm, "{few:?} {mean:?}");
     }
 
     #[test]
-    fn the_tables_are_found_by_configuration() {
+    fn published_errors_are_found_by_configuration() {
         assert_eq!(published_errors().len(), 11);
         let array = ArrayScale::default();
         assert_eq!(PublishedErrors::of(array, 12, 1000).unwrap().z_percent, 2.28);

@@ -10,11 +10,11 @@ use crate::{
     decoupling::decode_set,
 };
 
-/// A k-fold cross-validation, repeated with the samples reshuffled; [`CrossValidated::on_folds`] takes other folds.
+/// k-fold cross-validation, repeated with the samples reshuffled; [`CrossValidated::on_folds`] accepts other folds.
 ///
 /// Each fold in turn is the test set and the fold after it the validation set, which selects the best weights and ends
-/// the training; the others are the training set. With two folds there is no validation set, nor for measured samples
-/// where the method [needs none](crate::training::Method::needs_validation).
+/// the training; the others are the training set. There is no validation set with two folds, or for measured samples
+/// if the method [needs none](crate::training::Method::needs_validation).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct CrossValidation {
@@ -37,7 +37,7 @@ impl Default for CrossValidation {
     }
 }
 
-/// Held-out answers for every sample of a set, each by models fitted without it: samples × outputs.
+/// Held-out answers for every sample of a set, by models fitted without it: samples × outputs.
 #[derive(Clone, Debug)]
 pub struct CrossValidated {
     /// Folds of the cross-validation.
@@ -48,7 +48,7 @@ pub struct CrossValidated {
     pub mean: Array2<f64>,
     /// Answers of the linear maps.
     pub linear: Array2<f64>,
-    /// The fold after the test fold is held out for validation.
+    /// `true` if the fold after the test fold is held out for validation.
     holds_out: bool,
     /// Epochs and time of the trainings.
     pub effort: Effort,
@@ -59,9 +59,9 @@ pub struct CrossValidated {
 pub struct Effort {
     /// Number of epochs, over all starts and folds.
     pub epochs: usize,
-    /// Time spent on them.
+    /// Total time of the epochs.
     pub seconds: f64,
-    /// Time of the fastest epoch, the one least disturbed by other work on the machine.
+    /// Time of the fastest epoch, which is least affected by other load on the machine.
     pub min_epoch_seconds: f64,
 }
 
@@ -81,7 +81,8 @@ impl CrossValidation {
         self.run_with_tested(settings, (set, set), repeat, is_cancelled)
     }
 
-    /// As [`Self::run`], on folds of `set` tested by the same samples of `tested`, whose readings may have other noise.
+    /// As [`Self::run`], on folds of `set`, tested on the same samples of `tested`, whose readings may have other
+    /// noise.
     pub(super) fn run_with_tested(
         &self,
         settings: &RunSettings,
@@ -96,8 +97,8 @@ impl CrossValidation {
 }
 
 impl CrossValidated {
-    /// Cross-validates on `folds` of `set`; each fold has its own seed, derived from that of `settings`. Returns `None` if
-    /// cancelled.
+    /// Cross-validates on `folds` of `set`; each fold has its own seed, derived from that of `settings`. Returns `None`
+    /// if cancelled.
     ///
     /// # Errors
     /// If the settings are invalid.
@@ -110,7 +111,7 @@ impl CrossValidated {
         Self::of_sets(settings, (set, set), folds, is_cancelled)
     }
 
-    /// Trains on folds of `set` and tests by the same samples of `tested`.
+    /// Trains on folds of `set` and tests on the same samples of `tested`.
     fn of_sets(
         settings: &RunSettings,
         (set, tested): (&Dataset, &Dataset),
@@ -157,7 +158,7 @@ impl CrossValidated {
     /// Returns the errors of each target over all samples of `set`, the set that was cross-validated.
     ///
     /// # Panics
-    /// If the set has another shape.
+    /// If the set has a different shape.
     pub fn scores(&self, set: &Dataset) -> Scores {
         let errors = |answers: &Array2<f64>| TestErrors::of_targets(set, answers.view());
         Scores {
@@ -210,8 +211,8 @@ impl Effort {
     }
 }
 
-/// Returns the training and validation sets for test fold `fold`: the fold after it is the validation set, if one is held
-/// out.
+/// Returns the training and validation sets for test fold `fold`: the fold after it is the validation set, if one is
+/// held out.
 fn split(set: &Dataset, folds: &Folds, fold: usize, holds_out: bool) -> Split {
     let chooses = (fold + 1) % folds.count();
     if folds.count() < 3 || !holds_out {

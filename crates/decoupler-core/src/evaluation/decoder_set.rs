@@ -23,14 +23,14 @@ pub struct DecoderReport {
     pub precision: Precision,
     /// Errors on the test set.
     pub errors: TestErrors,
-    /// Root mean square of m/R − 1 over the readings m of the test set, with R the resistances at the decoded
-    /// coordinates; it needs no ground truth. `None` without a model of the sensor.
+    /// Root mean square of m/R − 1 over the readings m of the test set, where R are the resistances at the decoded
+    /// coordinates. It needs no ground truth. `None` without a model of the sensor.
     pub residual: Option<f64>,
-    /// Rows that decoders that solve the equations of the sensor have solved.
+    /// Numbers of rows solved, for decoders that solve the equations of the sensor.
     pub solved: SolvedRows,
     /// Computing time.
     pub cost: DecoderCost,
-    /// Remarks on the errors, with cause and cure.
+    /// Remarks on the errors, with cause and remedy.
     pub remarks: Vec<Remark>,
 }
 
@@ -39,7 +39,7 @@ pub struct DecoderReport {
 pub struct DecoderCost {
     /// Median time to decode a frame on one thread, in microseconds.
     pub frame_us: f64,
-    /// Time to fit the decoder to the training set in seconds, without the training of the network.
+    /// Time to fit the decoder to the training set in seconds, without training the network.
     pub fit_seconds: f64,
 }
 
@@ -61,8 +61,7 @@ pub struct DecoderSet {
 }
 
 impl DecoderSet {
-    /// Draws the training set of `settings`. `networks` are those trained
-    /// with these settings.
+    /// Draws the training set of `settings`. `networks` must have been trained with these settings.
     ///
     /// # Errors
     /// If the settings are invalid.
@@ -158,7 +157,7 @@ impl DecoderSet {
         }))
     }
 
-    /// Answers of the training mean to `test`.
+    /// Returns the answers of the training mean to `test`.
     fn mean_answers(&self, test: &Dataset) -> Result<Array2<f64>, RunError> {
         let mean = self.decoder(DecoderKind::Mean, Precision::Double)?;
         Ok(decode_set(
@@ -167,7 +166,7 @@ impl DecoderSet {
         )?)
     }
 
-    /// Training samples of each fit, and readings of each sample.
+    /// Returns the number of training samples of each fit, and the number of readings of each sample.
     fn size_of_fits(&self) -> (usize, usize) {
         let fits = match self.settings.source.row_model() {
             RowModel::Shared => 1,
@@ -176,7 +175,7 @@ impl DecoderSet {
         (self.training.samples() / fits, self.training.channels())
     }
 
-    /// Fits a decoder and returns its answers to `test`, their standing, and its computing time.
+    /// Fits a decoder and returns its answers to `test`, the numbers of rows solved, and its computing time.
     fn answer(
         &self,
         kind: DecoderKind,
@@ -195,7 +194,8 @@ impl DecoderSet {
     }
 }
 
-/// Root mean square of m/R − 1 over all readings m of `test`, with R the resistances of `answers` (samples × 3·M2, mm).
+/// Returns the root mean square of m/R − 1 over all readings m of `test`, where R are the resistances of `answers`
+/// (samples × 3·M2, mm).
 fn rms_residual(sensor: &SensorModel, test: &Dataset, answers: &Array2<f64>) -> f64 {
     let mut squares = 0.0;
     for (sample, answer) in answers.rows().into_iter().enumerate() {
@@ -210,7 +210,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn decoders_are_named_and_found() {
+    fn decoders_are_found_by_name() {
         for kind in DecoderKind::ALL {
             assert_eq!(kind.to_string().parse(), Ok(kind));
         }

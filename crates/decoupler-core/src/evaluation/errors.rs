@@ -4,15 +4,16 @@ use serde::{Deserialize, Serialize};
 use super::Source;
 use crate::dataset::Dataset;
 
-/// Errors of decoupled coordinates on the nodes of a test set.
+/// Errors of decoupled coordinates of the nodes in a test set.
 ///
 /// The paper's errors (AveZerr, AveXerr and AveYerr) are the mean over samples and nodes of |decoupled − true| / |true|
-/// in percent of the **coordinate**. That denominator is optimistic, because a node is never lower than 80 % of the height,
-/// so the error is also given in millimetres and in percent of full scale.
+/// in percent of the **coordinate**. That denominator is optimistic, because a node is never lower than 80 % of the
+/// height, so the error is also given in millimetres and in percent of full scale.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Errors {
-    /// AveZerr, in percent of the coordinate. `None` if a true z is 0, where it is undefined; likewise below.
+    /// AveZerr, in percent of the coordinate. `None` if a true z is 0, where it is undefined; the same holds for x and
+    /// y.
     pub z_percent: Option<f64>,
     /// AveXerr, in percent of the coordinate.
     pub x_percent: Option<f64>,
@@ -82,15 +83,15 @@ impl Errors {
         }
     }
 
-    /// Returns the mean |decoupled z − z| in proportion to that of the Bayesian `reference`; `None` where that is nothing
-    /// but [rounding](Self::is_rounding).
+    /// Returns the ratio of the mean |decoupled z − z| to that of the Bayesian `reference`; `None` if the reference is
+    /// only [rounding](Self::is_rounding).
     pub fn times(&self, reference: &Self) -> Option<f64> {
         (!reference.is_rounding()).then(|| self.z_mm / reference.z_mm)
     }
 
-    /// Returns `true` if errors of z are at most 1e-9 of the stroke, a hundredth of an atom for a stroke of a millimetre: a
-    /// Bayesian reference that small says that the readings determine the deformation to their rounding, and other errors
-    /// in proportion to it say nothing.
+    /// Returns `true` if errors of z are at most 1e-9 of the stroke, a hundredth of an atom for a stroke of a
+    /// millimetre. A Bayesian reference that small means that the readings determine the deformation up to rounding;
+    /// ratios to it are meaningless.
     pub fn is_rounding(&self) -> bool {
         self.z_full_scale_percent <= 1e-7
     }
@@ -107,7 +108,8 @@ pub enum TestErrors {
 }
 
 impl TestErrors {
-    /// Measures `answers` (samples × targets, in the units of the targets) to `test`, whose samples are of `source`.
+    /// Measures the errors of `answers` (samples × targets, in the units of the targets) on `test`, whose samples are
+    /// from `source`.
     ///
     /// # Panics
     /// If the shapes differ.
@@ -118,7 +120,7 @@ impl TestErrors {
         }
     }
 
-    /// Measures `answers` (samples × targets) to `test` target by target.
+    /// Measures the errors of `answers` (samples × targets) on `test`, target by target.
     ///
     /// # Panics
     /// If the shapes differ.
@@ -126,7 +128,7 @@ impl TestErrors {
         Self::Targets(TargetErrors::measure(test.targets(), answers))
     }
 
-    /// Errors on the nodes, if the targets are nodes of an array.
+    /// Returns the errors on the nodes, if the targets are nodes of an array.
     pub fn nodes(&self) -> Option<&Errors> {
         match self {
             Self::Nodes(errors) => Some(errors),
@@ -134,7 +136,7 @@ impl TestErrors {
         }
     }
 
-    /// Errors of each target; empty if the targets are nodes of an array.
+    /// Returns the errors of each target; empty if the targets are nodes of an array.
     pub fn targets(&self) -> &[TargetErrors] {
         match self {
             Self::Nodes(_) => &[],
@@ -142,8 +144,9 @@ impl TestErrors {
         }
     }
 
-    /// Error in percent, by which decoders are ranked: AveZerr for nodes, else the mean absolute error in percent of
-    /// the range, averaged over the targets that vary. `None` if an error is not finite or no target varies.
+    /// Returns the error in percent by which decoders are ranked: AveZerr for nodes, otherwise the mean absolute error
+    /// in percent of the range, averaged over the targets that vary. `None` if an error is not finite or no target
+    /// varies.
     pub fn percent(&self) -> Option<f64> {
         match self {
             Self::Nodes(errors) => errors.z_percent,
@@ -157,7 +160,7 @@ impl TestErrors {
         }
     }
 
-    /// Returns the error in proportion to that of the Bayesian `reference`: [`Errors::times`].
+    /// Returns the ratio of the error to that of the Bayesian `reference`: [`Errors::times`].
     pub fn times(&self, reference: &Self) -> Option<f64> {
         self.nodes()?.times(reference.nodes()?)
     }
@@ -203,12 +206,12 @@ pub struct TargetErrors {
     pub rmse: f64,
     /// Mean absolute error.
     pub mae: f64,
-    /// Coefficient of determination R²: 1 for exact answers, 0 for always answering the mean of these very targets,
-    /// negative for worse. `None` if the target is constant, where it is undefined.
+    /// Coefficient of determination R²: 1 for exact answers, 0 for always answering the mean of these targets, negative
+    /// for worse answers. `None` if the target is constant, where R² is undefined.
     pub r2: Option<f64>,
     /// Largest absolute error; NaN if an answer is NaN.
     pub worst: f64,
-    /// Index of the sample with the largest error, among those measured.
+    /// Index of the sample with the largest error.
     pub worst_sample: usize,
     /// [`Self::mae`] in percent of the range of the target. `None` if the target is constant.
     pub percent_of_range: Option<f64>,
@@ -225,9 +228,9 @@ impl TargetErrors {
         pairs.map(|(targets, answers)| Self::of_one(targets, answers)).collect()
     }
 
-    /// Returns the errors over targets in one unit: the root of the mean squared error, the mean absolute error, the mean R²
-    /// (uniform average), the largest error and the mean of the errors in percent of the range. R² and percent are over the
-    /// targets that vary. `None` without targets.
+    /// Returns the errors over all targets, which must share a unit: the root of the mean squared error, the mean
+    /// absolute error, the mean R² (uniform average), the largest error and the mean of the errors in percent of the
+    /// range. R² and percent are averages over the targets that vary. `None` without targets.
     pub fn over_all(targets: &[Self]) -> Option<Self> {
         let worst = targets.iter().max_by(|one, other| one.worst.total_cmp(&other.worst))?;
         let mean = |values: &mut dyn Iterator<Item = f64>| {
@@ -313,8 +316,8 @@ impl Spread {
     }
 }
 
-/// Root mean square of decoupled z − z for each node over the snapshots of `truth`, in millimetres, row by row (M1·M2
-/// values). `decoupled_mm` has the shape of its coordinates.
+/// Returns the root mean square of decoupled z − z for each node over the snapshots of `truth`, in millimetres, row by
+/// row (M1·M2 values). `decoupled_mm` has the shape of the targets of `truth`.
 ///
 /// # Panics
 /// If the shapes differ.
@@ -348,7 +351,7 @@ mod tests {
     }
 
     #[test]
-    fn one_wrong_node_counts_as_the_definitions_say() {
+    fn errors_of_one_wrong_node_follow_the_definitions() {
         let truth = truth(&SensorModel::new("10x6_3x18".parse().unwrap()));
         let mut decoupled = truth.targets().to_owned();
         decoupled[[13, 2 * 3 + 2]] += 0.3;
@@ -373,7 +376,7 @@ mod tests {
     }
 
     #[test]
-    fn an_answer_of_nan_is_the_worst() {
+    fn a_nan_answer_has_the_largest_error() {
         let truth = truth(&SensorModel::new("10x6_3x18".parse().unwrap()));
         let mut decoupled = truth.targets().mapv(|value| value + 0.1);
         decoupled[[13, 8]] = f64::NAN;
@@ -384,7 +387,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_is_measured_in_units_of_rounding() {
+    fn there_is_no_ratio_to_a_reference_of_rounding() {
         let truth = truth(&SensorModel::new("10x6_3x18".parse().unwrap()));
         let off = |by_mm: f64| Errors::measure(&truth, &truth.targets().mapv(|value| value + by_mm), 1.0);
         for rounding_mm in [0.0, 1e-13, 1e-10] {
@@ -395,7 +398,7 @@ mod tests {
     }
 
     #[test]
-    fn a_coordinate_of_zero_leaves_no_percentage() {
+    fn a_coordinate_of_zero_has_no_percentage() {
         let mut model = SensorModel::new("10x6_3x18".parse().unwrap());
         model.geometry.row_x0_mm = 0.0;
         let truth = truth(&model);
@@ -405,12 +408,12 @@ mod tests {
     }
 
     #[test]
-    fn errors_are_those_of_scikit_learn() {
+    fn errors_agree_with_scikit_learn() {
         // sklearn.metrics: mean_squared_error, mean_absolute_error, r2_score, max_error of these columns.
         let targets = array![[3.0, 1.0], [-0.5, 1.0], [2.0, 1.0], [7.0, 1.0]];
         let answers = array![[2.5, 1.5], [0.0, 1.0], [2.0, 1.0], [8.0, 0.0]];
         let [varying, constant] = TargetErrors::measure(targets.view(), answers.view())[..] else {
-            panic!("one for each target")
+            panic!("there must be one entry for each target")
         };
         assert!((varying.rmse - 0.375_f64.sqrt()).abs() < 1e-15);
         assert!((varying.mae - 0.5).abs() < 1e-15);
@@ -424,7 +427,7 @@ mod tests {
     }
 
     #[test]
-    fn a_target_of_nan_is_the_worst() {
+    fn a_nan_answer_to_a_target_has_the_largest_error() {
         let targets = array![[1.0], [2.0], [6.0]];
         let answers = array![[0.0], [f64::NAN], [9.0]];
         let errors = TargetErrors::measure(targets.view(), answers.view())[0];
@@ -440,7 +443,7 @@ mod tests {
     }
 
     #[test]
-    fn figures_are_numbers_or_missing_whatever_the_size_of_the_targets() {
+    fn figures_are_finite_or_missing_for_targets_of_any_size() {
         for size in [0.0, 1e-300, 1e-160, 1e160, 1e308] {
             let targets = array![[size], [-size], [0.0]];
             for answer in [0.0, size] {
@@ -453,7 +456,7 @@ mod tests {
     }
 
     #[test]
-    fn quartiles_are_those_of_definition_7() {
+    fn quartiles_follow_definition_7() {
         // R: quantile(c(1, 2, 4, 8, 16, 32), type = 7)
         let spread = Spread::of([32.0, 1.0, f64::NAN, 4.0, 16.0, 8.0, 2.0]).unwrap();
         let expected = Spread {
@@ -467,14 +470,14 @@ mod tests {
     }
 
     #[test]
-    fn one_value_is_all_of_its_spread_and_none_has_none() {
+    fn a_single_value_is_its_own_spread_and_no_values_have_none() {
         let spread = Spread::of([3.0]).unwrap();
         assert_eq!((spread.smallest, spread.median, spread.largest), (3.0, 3.0, 3.0));
         assert_eq!(Spread::of([f64::INFINITY]), None);
     }
 
     #[test]
-    fn each_node_has_the_spread_of_its_own_errors() {
+    fn the_rms_of_each_node_is_over_its_own_errors() {
         let model = SensorModel::new("4x3_2x9".parse().unwrap());
         let truth = Dataset::simulate(&model, &Scene::default(), 8, &mut Seed(0).rng(Stream::Test)).unwrap();
         let mut decoupled = truth.targets().to_owned();

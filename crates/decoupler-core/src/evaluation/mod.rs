@@ -3,7 +3,7 @@
 //!
 //! A [`Run`] goes from [`RunSettings`] to trained networks and error tables; [`CrossValidation`] tests on every sample;
 //! [`measure_trade_off`] compares speed with accuracy; [`experiments`] repeats runs over a grid of settings;
-//! [`recorded`] says what the recorded readings determine.
+//! [`recorded`] measures how well recorded readings determine the targets.
 
 mod baselines;
 mod cross_validation;

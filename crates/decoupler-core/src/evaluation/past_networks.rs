@@ -3,48 +3,48 @@ use std::{sync::Arc, time::Duration};
 use super::Run;
 use crate::network::{DecouplingNetwork, Mlp, Networks};
 
-/// Networks of past epochs: what a run stopped at each of them would have kept, its best by then.
+/// Best networks at past epochs: the networks that a run stopped at each epoch would have returned.
 ///
-/// There are at most [`Self::MAX`], whose weights take at most [`Self::MAX_BYTES`]; beyond that every second of them
-/// is dropped, so that those of every 2ᵏ-th epoch stay. The latest is always there.
+/// At most [`Self::MAX`] are kept, whose weights take at most [`Self::MAX_BYTES`]; beyond that every second one is
+/// dropped, so that those of every 2ᵏ-th epoch remain. The latest is always kept.
 #[derive(Clone, Debug, Default)]
 pub struct PastNetworks {
-    /// k: the epochs kept are multiples of 2ᵏ, except for the latest.
+    /// k: the epochs kept are multiples of 2ᵏ, except the latest.
     halvings: u32,
     /// In the order of their epochs.
     kept: Vec<Arc<Past>>,
-    /// Memory of their weights, each counted once.
+    /// Memory of the weights, with shared weights counted once.
     bytes: usize,
 }
 
-/// The network that a run stopped at an epoch would have kept.
+/// Network that a run stopped at an epoch would have returned.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PastNetwork {
-    /// The epoch.
+    /// Epoch at which the run is assumed to stop.
     pub epoch: usize,
-    /// The epoch that it is of: that of the lowest error by then.
+    /// Epoch of these weights: the best so far.
     pub best_epoch: usize,
-    /// Index of the start that led then.
+    /// Index of the start that was the leader at that epoch.
     pub start: usize,
-    /// Training time of that start by then, summed over all rows.
+    /// Training time of that start up to that epoch, summed over all rows.
     pub elapsed: Duration,
-    /// The network, or that of each row-wire.
+    /// The shared network, or the network of each row-wire.
     pub networks: Networks,
 }
 
-/// The weights of a past epoch.
+/// Weights of a past epoch.
 #[derive(Debug)]
 struct Past {
     epoch: usize,
     best_epoch: usize,
     start: usize,
     elapsed: Duration,
-    /// Weights of each row-wire's network, or of the one for all. Networks that stayed the best share them.
+    /// Weights of the network of each row-wire, or of the shared network. Networks that remained the best share them.
     weights: Vec<Arc<[f64]>>,
 }
 
 impl Past {
-    /// Memory of the weights that it does not share with the network before.
+    /// Memory of the weights not shared with the previous network.
     fn bytes_after(&self, before: Option<&Arc<Self>>) -> usize {
         let of_row = |(row, weights): (usize, &Arc<[f64]>)| {
             let shared = before.and_then(|before| before.weights.get(row));
@@ -56,18 +56,18 @@ impl Past {
 }
 
 impl PastNetworks {
-    /// Largest memory of the weights: 64 MiB.
+    /// Maximum memory of the weights: 64 MiB.
     pub const MAX_BYTES: usize = 64 << 20;
 
-    /// Largest number of networks: a slider has not as many points.
+    /// Maximum number of networks: more than a slider has points.
     pub const MAX: usize = 4096;
 
-    /// Takes the current state of `run`, once after each of its steps.
+    /// Records the current state of `run`; to be called after each step.
     pub fn record(&mut self, run: &Run) {
         self.record_within(run, Self::MAX_BYTES, Self::MAX);
     }
 
-    fn record_within(&mut self, run: &Run, max_bytes: usize, most: usize) {
+    fn record_within(&mut self, run: &Run, max_bytes: usize, max_count: usize) {
         let leader = run.leader();
         let epoch = run
             .trainers()
@@ -75,7 +75,7 @@ impl PastNetworks {
             .map(|start| start.latest().epoch)
             .max()
             .unwrap_or(0);
-        // What is not the latest any more stays only if it is one of every 2ᵏ-th.
+        // A network that is no longer the latest is kept only at a multiple of 2ᵏ.
         let latest = self.kept.last().cloned();
         let stays = |latest: &&Past| latest.epoch < epoch && latest.epoch.is_multiple_of(self.stride());
         if let Some(latest) = latest.as_deref().filter(|latest| !stays(latest)) {
@@ -96,7 +96,7 @@ impl PastNetworks {
         };
         self.bytes += past.bytes_after(self.kept.last());
         self.kept.push(Arc::new(past));
-        while (self.bytes > max_bytes || self.kept.len() > most) && self.kept.len() > 1 {
+        while (self.bytes > max_bytes || self.kept.len() > max_count) && self.kept.len() > 1 {
             if self.kept.len() == 2 {
                 self.kept.remove(0);
             } else {
@@ -113,23 +113,24 @@ impl PastNetworks {
         }
     }
 
-    /// The epochs whose networks are there, in ascending order.
+    /// Returns the epochs whose networks are kept, in ascending order.
     pub fn epochs(&self) -> impl ExactSizeIterator<Item = usize> + DoubleEndedIterator + '_ {
         self.kept.iter().map(|past| past.epoch)
     }
 
-    /// Number of epochs between two networks, except for the latest.
+    /// Number of epochs between consecutive networks, except the latest.
     pub fn stride(&self) -> usize {
         1 << self.halvings
     }
 
-    /// The epoch at or before this one whose network is there; the first if there is none before.
+    /// Returns the last epoch at or before `epoch` whose network is kept, or the first epoch if there is none.
     pub fn nearest(&self, epoch: usize) -> Option<usize> {
         let after = self.kept.partition_point(|past| past.epoch <= epoch);
         self.kept.get(after.saturating_sub(1)).map(|past| past.epoch)
     }
 
-    /// The network at this epoch, if it is kept; `present` are those of the same run at any time.
+    /// Returns the network at this epoch, if it is kept. `present` are the networks of the same run at any epoch, which
+    /// provide the scalings.
     pub fn at(&self, epoch: usize, present: &Networks) -> Option<PastNetwork> {
         let place = self.kept.binary_search_by_key(&epoch, |past| past.epoch).ok()?;
         let past = &self.kept[place];
@@ -168,26 +169,26 @@ mod tests {
         settings
     }
 
-    /// Trains to the end, recording; calls `each` after every epoch.
+    /// Trains to the end and records every epoch; calls `each` after it.
     fn record(
         settings: SimulatedSettings,
-        [max_bytes, most]: [usize; 2],
+        [max_bytes, max_count]: [usize; 2],
         mut each: impl FnMut(&PastNetworks, usize),
     ) -> (Run, PastNetworks) {
         let (mut run, mut past) = (Run::prepare(settings).unwrap(), PastNetworks::default());
-        past.record_within(&run, max_bytes, most);
+        past.record_within(&run, max_bytes, max_count);
         let mut epoch = 0;
         while run.stop_reason().is_none() {
             run.step();
             epoch += 1;
-            past.record_within(&run, max_bytes, most);
+            past.record_within(&run, max_bytes, max_count);
             each(&past, epoch);
         }
         (run, past)
     }
 
     #[test]
-    fn the_network_of_an_epoch_is_that_of_a_training_stopped_there() {
+    fn the_network_of_an_epoch_equals_that_of_a_training_stopped_there() {
         let mut several = settings();
         several.starts = 3;
         let mut known = settings();
@@ -210,7 +211,7 @@ mod tests {
     }
 
     #[test]
-    fn memory_stays_within_its_bound_and_every_second_to_the_k_th_epoch_is_kept() {
+    fn memory_is_limited_and_multiples_of_a_power_of_two_are_kept() {
         let mut settings = settings();
         settings.training.method = Method::all()
             .into_iter()
@@ -218,7 +219,7 @@ mod tests {
             .unwrap();
         let weights = Run::prepare(settings).unwrap().leader().weights();
         let max_bytes = 10 * 8 * weights;
-        // Either bound keeps about ten.
+        // Both bounds keep about ten.
         for bounds in [[max_bytes, usize::MAX], [usize::MAX, 10]] {
             let (_, past) = record(settings, bounds, |past, epoch| {
                 assert!(past.bytes <= bounds[0] && past.kept.len() <= bounds[1], "at {epoch}");
@@ -240,7 +241,7 @@ mod tests {
     }
 
     #[test]
-    fn a_network_too_large_for_the_bound_is_still_there_itself() {
+    fn a_single_network_is_kept_even_if_it_exceeds_the_bound() {
         let (run, past) = record(settings(), [1, usize::MAX], |past, epoch| {
             assert_eq!(past.epochs().collect::<Vec<_>>(), [epoch]);
         });

@@ -86,9 +86,9 @@ impl Run {
         sets: RunSets,
         is_cancelled: &dyn Fn() -> bool,
     ) -> Result<Option<Self>, RunError> {
-        let resumed = Self::with_baselines(settings, sets, is_cancelled, |tasks| take_up(settings, states, tasks))?;
+        let resumed = Self::with_baselines(settings, sets, is_cancelled, |tasks| resume(settings, states, tasks))?;
         Ok(resumed.map(|mut run| {
-            // Trainings side by side do not know how long they took together.
+            // The total wall time of parallel trainings is not known.
             run.wall_time = match &run.starts[..] {
                 [only] if only.rows().len() == 1 => Some(only.elapsed()),
                 _ => None,
@@ -97,7 +97,7 @@ impl Run {
         }))
     }
 
-    /// Prepares a run whose trainings are those of `begin`; `None` once `is_cancelled`.
+    /// Prepares a run with the trainings of `begin`; `None` once `is_cancelled`.
     fn with_baselines(
         settings: RunSettings,
         sets: RunSets,
@@ -141,7 +141,7 @@ impl Run {
         }))
     }
 
-    /// Prepares a run whose networks are all that is asked of it: without baselines and reference, such as that of a fold.
+    /// Prepares a run of networks only, without baselines and reference, such as the run of a fold.
     pub(super) fn of_networks_on_sets(settings: RunSettings, split: Split, test: Dataset) -> Result<Self, RunError> {
         settings.check_network()?;
         check_sets(&settings, &split, &test)?;
@@ -151,7 +151,7 @@ impl Run {
         }))
     }
 
-    /// As [`Self::with_baselines`], without baselines and reference, on settings and sets that were checked.
+    /// As [`Self::with_baselines`], without baselines and reference, for settings and sets that were checked.
     fn of_networks(
         settings: RunSettings,
         RunSets { split, test, problem }: RunSets,
@@ -159,7 +159,7 @@ impl Run {
         begin: impl FnOnce(&[Task]) -> Result<Vec<StartTrainer>, RunError>,
     ) -> Result<Option<Self>, RunError> {
         let tasks = tasks(&settings, &split, &test)?;
-        // The tasks hold the samples scaled; large sets need not be held twice.
+        // The tasks hold the scaled samples; large sets need not be held twice.
         drop(split);
         let first = tasks.at(0);
         let samples = first.problem.training.samples();
@@ -183,12 +183,12 @@ impl Run {
     }
 }
 
-/// The run of a preparation that nothing cancels.
+/// Returns the run of a preparation that cannot be cancelled.
 fn whole(prepared: Result<Option<Run>, RunError>) -> Result<Run, RunError> {
     Ok(prepared?.expect("nothing cancels it"))
 }
 
-/// Trainings from random initialisations.
+/// Begins trainings from random initialisations.
 fn begin(settings: RunSettings, tasks: &[Task]) -> Result<Vec<StartTrainer>, RunError> {
     let starts = (0..settings.starts).into_par_iter().map(|number| {
         let mut rng = settings.seed.start_rng(number);
@@ -204,8 +204,8 @@ fn begin(settings: RunSettings, tasks: &[Task]) -> Result<Vec<StartTrainer>, Run
     starts.collect()
 }
 
-/// Trainings as they stood.
-fn take_up(settings: RunSettings, states: Vec<TrainerState>, tasks: &[Task]) -> Result<Vec<StartTrainer>, RunError> {
+/// Resumes trainings from their saved states.
+fn resume(settings: RunSettings, states: Vec<TrainerState>, tasks: &[Task]) -> Result<Vec<StartTrainer>, RunError> {
     let networks = tasks.len();
     check_states(&states, settings.starts * networks)?;
     let trainers = states.into_par_iter().enumerate().map(|(number, state)| {
@@ -240,7 +240,7 @@ fn check_states(states: &[TrainerState], expected: usize) -> Result<(), RunError
     }
 }
 
-/// The errors of the Bayesian reference on `test`, or the reason for which there are none.
+/// Returns the errors of the Bayesian reference on `test`, or the reason why there are none.
 pub(super) fn reference(settings: &SimulatedSettings, test: &Dataset) -> Result<Result<Errors, NoReference>, RunError> {
     let SimulatedSettings { source, seed, .. } = settings;
     let mut rng = seed.rng(Stream::Expectation);
@@ -308,7 +308,7 @@ pub(super) fn tasks(settings: &RunSettings, split: &Split, test: &Dataset) -> Re
     }
 }
 
-/// The noise that readings have and the training set lacks.
+/// Returns the noise of the readings that the training set lacks.
 pub(super) fn unseen_noise(source: &Source) -> Result<NoiseSource, RunError> {
     match source {
         Source::Simulated(Simulation { sensor, scene, .. }) if scene.noise.sets == NoisySets::Test => {
@@ -325,18 +325,18 @@ mod tests {
     use super::*;
     use crate::{evaluation::SimulatedSettings, network::InputChoice, scene::Noise};
 
-    /// A run of few samples, cancelled at this look at the token; and how often the token was looked at.
-    fn cancelled_at(look: usize, prepare: &dyn Fn(&dyn Fn() -> bool) -> Option<Run>) -> (Option<Run>, usize) {
-        let looks = Cell::new(0);
+    /// Returns a run of few samples, cancelled at poll number `poll` of the token, from 0, and the number of polls.
+    fn cancelled_at(poll: usize, prepare: &dyn Fn(&dyn Fn() -> bool) -> Option<Run>) -> (Option<Run>, usize) {
+        let polls = Cell::new(0);
         let run = prepare(&|| {
-            looks.set(looks.get() + 1);
-            looks.get() > look
+            polls.set(polls.get() + 1);
+            polls.get() > poll
         });
-        (run, looks.get())
+        (run, polls.get())
     }
 
     #[test]
-    fn a_preparation_ends_at_the_next_part_once_it_is_cancelled() {
+    fn a_cancelled_preparation_ends_at_the_next_part() {
         let mut settings = SimulatedSettings::default();
         settings.source.sensor.scale = "4x4_2x12".parse().unwrap();
         (settings.hidden, settings.source.samples, settings.source.test_samples) = (3, 40, 8);
@@ -350,10 +350,10 @@ mod tests {
         for prepare in [&begun as &dyn Fn(&dyn Fn() -> bool) -> Option<Run>, &resumed] {
             let (run, parts) = cancelled_at(usize::MAX, prepare);
             assert_eq!(run.map(|run| run.decouple_test()).as_ref(), Some(&answers_mm));
-            assert!(parts >= 4, "looked at only {parts} times");
+            assert!(parts >= 4, "polled only {parts} times");
             for part in 0..parts {
-                let (run, looks) = cancelled_at(part, prepare);
-                assert!(run.is_none() && looks == part + 1, "part {part}: {looks} looks");
+                let (run, polls) = cancelled_at(part, prepare);
+                assert!(run.is_none() && polls == part + 1, "part {part}: {polls} polls");
             }
         }
     }
@@ -374,7 +374,7 @@ mod tests {
     }
 
     #[test]
-    fn whitening_allows_for_every_kind_of_noise_that_the_training_set_lacks() {
+    fn whitening_accounts_for_every_kind_of_noise_that_the_training_set_lacks() {
         let clean = inputs(Noise::default());
         let noises = [
             Noise::relative(1e-2),

@@ -18,26 +18,26 @@ use crate::{
     training::{Examples, Problem, Trainer, TrainingSettings},
 };
 
-/// A sensor touched by hand: where its nodes are and what its wires read, without noise.
+/// Sensor touched with the pointer: positions of its nodes and readings of its wires, without noise.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Pressed {
-    /// Rows read × 3·M2.
+    /// Coordinates of the nodes: rows read × 3·M2.
     coordinates_mm: Vec<f64>,
-    /// Rows read × M4, by Eq. (2).
+    /// Readings by Eq. (2): rows read × M4.
     readings_ohm: Array2<f64>,
 }
 
 /// Answer of a decoder to the readings of a touched sensor.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PressedAnswer {
-    /// Rows read × 3·M2.
+    /// Decoded coordinates: rows read × 3·M2.
     pub coordinates_mm: Vec<f64>,
     /// Mean |decoupled z − z| of the nodes.
     pub mean_mm: f64,
     /// Largest |decoupled z − z|.
     pub worst_mm: f64,
-    /// Time to decode the frame: the shortest of several, as whatever else the machine does only adds to it. `None` if the
-    /// frame was decoded too few times, because no one waited or it takes long.
+    /// Time to decode the frame: the shortest of several, since other load on the machine can only increase it. `None`
+    /// if the frame was decoded too few times, because the answer became stale or decoding is slow.
     pub time: Option<Duration>,
 }
 
@@ -45,7 +45,7 @@ impl Pressed {
     /// Touches `sensor`, of which `rows` are read and whose nodes can travel `stroke_mm`.
     ///
     /// # Errors
-    /// A resistance that is not a positive finite number.
+    /// If a resistance is not a positive finite number.
     pub fn new(sensor: &SensorModel, rows: &[usize], touch: &Touch, stroke_mm: f64) -> Result<Self, SensorError> {
         let deformation = touch.deformation(sensor, stroke_mm);
         let mut readings_ohm = Array2::zeros((rows.len(), sensor.scale.columns()));
@@ -64,43 +64,43 @@ impl Pressed {
         })
     }
 
-    /// Pairs of nodes that [`Self::new`] goes through, each a nanosecond or two.
+    /// Number of pairs of nodes that [`Self::new`] evaluates, at one or two nanoseconds each.
     pub fn node_pairs(sensor: &SensorModel, rows: &[usize]) -> f64 {
         rows.len() as f64 * node_pairs_per_row(sensor)
     }
 
-    /// Positions of the nodes of the rows read, row by row.
+    /// Returns the positions of the nodes of the rows read, row by row.
     pub fn nodes_mm(&self) -> impl Iterator<Item = DVec3> + '_ {
         self.coordinates_mm.chunks_exact(3).map(DVec3::from_slice)
     }
 
-    /// Resistances: rows read × M4.
+    /// Returns the resistances: rows read × M4.
     pub fn readings_ohm(&self) -> &Array2<f64> {
         &self.readings_ohm
     }
 
-    /// Decodes the readings; `None` once `is_stale` says that no one waits for the answer any more.
+    /// Decodes the readings; returns `None` once `is_stale`, that is, when the answer is no longer needed.
     ///
     /// # Errors
-    /// A reading that cannot be decoded.
+    /// If a reading cannot be decoded.
     ///
     /// # Panics
-    /// If the decoder is of other rows.
+    /// If the decoder was fitted to other rows.
     pub fn answer(
         &self,
         decoder: &mut dyn Decoder,
         is_stale: &dyn Fn() -> bool,
     ) -> Result<Option<PressedAnswer>, DecodeError> {
-        /// Times from which the shortest is taken.
+        /// Number of timed repeats, of which the shortest counts.
         const TIMES: RangeInclusive<usize> = 3..=5;
-        /// Longest time that is spent on them.
+        /// Maximum time spent on the repeats.
         const LONGEST: Duration = Duration::from_millis(30);
         let mut coordinates_mm = vec![0.0; self.coordinates_mm.len()];
         let Some(first) = self.decode(decoder, &mut coordinates_mm, is_stale)? else {
             return Ok(None);
         };
         let (mut shortest, mut spent, mut times) = (first, first, 1);
-        // Into a place of their own: what is left half-way is no answer.
+        // Repeats have a separate buffer: an interrupted one must not change the answer.
         let mut again_mm = coordinates_mm.clone();
         while times < *TIMES.end() && spent < LONGEST {
             let Some(time) = self.decode(decoder, &mut again_mm, is_stale)? else {
@@ -111,7 +111,7 @@ impl Pressed {
         let errors = coordinates_mm.iter().zip(&self.coordinates_mm).skip(2).step_by(3);
         let errors = errors.map(|(decoded, actual)| (decoded - actual).abs());
         let (total_mm, worst_mm, nodes) = errors.fold((0.0, 0.0_f64, 0), |(total, worst, nodes), error| {
-            // NaN stays: an answer that is not a number has no error that is one.
+            // Keeps NaN: the error of a NaN answer is NaN.
             (
                 total + error,
                 if error > worst || error.is_nan() { error } else { worst },
@@ -126,7 +126,7 @@ impl Pressed {
         }))
     }
 
-    /// Decodes row by row, so that slow decoders can be left; returns the time.
+    /// Decodes row by row, so that slow decoders can be interrupted; returns the time.
     fn decode(
         &self,
         decoder: &mut dyn Decoder,
@@ -149,20 +149,21 @@ impl Pressed {
 }
 
 impl PressedAnswer {
-    /// Decoded positions of the nodes, row by row.
+    /// Returns the decoded positions of the nodes, row by row.
     pub fn nodes_mm(&self) -> impl Iterator<Item = DVec3> + '_ {
         self.coordinates_mm.chunks_exact(3).map(DVec3::from_slice)
     }
 }
 
-/// Returns the samples of `set` as readings of known deformations, for [`Calibration::fit`](crate::calibration::Calibration::fit).
-/// Its targets are the absolute coordinates of the row's nodes in millimetres, as `sensor` places its nodes at rest.
+/// Returns the samples of `set` as readings of known deformations, for
+/// [`Calibration::fit`](crate::calibration::Calibration::fit). The targets must be the absolute coordinates of the
+/// row's nodes in millimetres, with the rest positions of `sensor`.
 ///
 /// # Errors
-/// If the samples do not know their row-wire.
+/// If the samples have no row-wires.
 ///
 /// # Panics
-/// If the targets are not 3·M2, or a row-wire is not one of the array.
+/// If there are not 3·M2 targets, or the array lacks a row-wire.
 pub fn pressed_rows(set: &Dataset, sensor: &SensorModel) -> Result<Vec<PressedRow>, RunError> {
     let pressed = |sample: usize| {
         let row = set.row_wire(sample).ok_or(RunError::NoRowWires)?;
@@ -176,15 +177,15 @@ pub fn pressed_rows(set: &Dataset, sensor: &SensorModel) -> Result<Vec<PressedRo
     (0..set.samples()).map(pressed).collect()
 }
 
-/// Returns `set` with its targets, coordinates in millimetres as `from` places its nodes at rest, replaced by those that
-/// the same displacements give in `to`: so that a network trained on one model of a sensor can be judged by, or trained
-/// on, samples described by another.
+/// Returns `set` with its targets converted from model `from` to model `to` of the sensor. Targets are coordinates in
+/// millimetres; displacements stay the same, and rest positions change. A network trained on one model can thus be
+/// tested or trained on samples described by another.
 ///
 /// # Errors
-/// If the samples do not know their row-wire.
+/// If the samples have no row-wires.
 ///
 /// # Panics
-/// If the targets are not 3·M2, or a row-wire is not one of both arrays.
+/// If there are not 3·M2 targets, or one of the arrays lacks a row-wire.
 pub fn rebased(set: &Dataset, from: &SensorModel, to: &SensorModel) -> Result<Dataset, RunError> {
     let rows = (0..set.samples()).map(|sample| set.row_wire(sample));
     let rows: Vec<usize> = rows.collect::<Option<_>>().ok_or(RunError::NoRowWires)?;
@@ -212,8 +213,8 @@ fn displacements_mm(set: &Dataset, sample: usize, row: usize, sensor: &SensorMod
     targets.chunks_exact(3).enumerate().map(position).collect()
 }
 
-/// Displacements for which a network of this simulated scene is made: samples of others are no presses, or ask for answers
-/// that it was never trained to give.
+/// Returns the range of displacements for which a network of this simulated scene is trained. Samples outside are not
+/// presses, or require answers that the network was not trained for.
 pub fn press_limits(simulation: &Simulation) -> PressLimits {
     PressLimits {
         largest_depth_mm: simulation.stroke_mm(),
@@ -221,9 +222,9 @@ pub fn press_limits(simulation: &Simulation) -> PressLimits {
     }
 }
 
-/// Continues the training of `networks` on other samples, such as the frames of the real sensor after a training on its
-/// calibrated model; returns `None` if cancelled. Scalings stay as they are. The weights of the lowest validation error
-/// are returned, which may be those given: with a validation set, fine-tuning cannot make it worse.
+/// Continues the training of `networks` on other samples, such as frames of the real sensor after training on its
+/// calibrated model; returns `None` if cancelled. Scalings do not change. The weights with the lowest validation error
+/// are returned, possibly the initial ones: with a validation set, fine-tuning cannot increase the validation error.
 ///
 /// # Errors
 /// If the samples do not have the channels, targets or rows of the networks, or a setting is out of range.
@@ -293,7 +294,7 @@ mod tests {
     }
 
     #[test]
-    fn newton_finds_the_nodes_where_the_hand_put_them() {
+    fn newton_finds_the_touched_positions_of_the_nodes() {
         let (sensor, rows) = (sensor(), Vec::from_iter(0..10));
         let pressed = Pressed::new(&sensor, &rows, &touch(), 1.0).unwrap();
         let moved = pressed.nodes_mm().nth(8 * 6 + 1).unwrap();
@@ -307,7 +308,7 @@ mod tests {
         assert!(pressed.answer(&mut newton, &|| true).unwrap().is_none());
     }
 
-    /// Takes a while for the first frames, as on a machine that does something else.
+    /// Decoder that is slow for the first frames, as on a busy machine.
     #[derive(Debug)]
     struct Hampered {
         frames: usize,
@@ -337,7 +338,7 @@ mod tests {
     }
 
     #[test]
-    fn a_time_is_the_shortest_of_several_and_one_alone_is_none() {
+    fn the_time_is_the_shortest_of_several_and_a_single_one_is_not_reported() {
         let pressed = Pressed::new(&sensor(), &[3], &touch(), 1.0).unwrap();
         let time = |slow, stale_after: usize| {
             let mut decoder = Hampered { frames: 0, slow };
@@ -349,14 +350,14 @@ mod tests {
         let never = usize::MAX;
         assert!(time(1, never).unwrap().is_some_and(|time| time < Hampered::WHILE / 2));
         assert!(time(9, never).unwrap().is_some_and(|time| time >= Hampered::WHILE));
-        // It is answered, and left before there are enough times.
+        // Answered, but interrupted before there are enough times.
         assert_eq!(time(0, 2), Some(None));
         assert_eq!(time(0, 0), None);
     }
 
-    /// The test set's own measure, on a set of this one snapshot.
+    /// Compares with [`Errors`] of a test set of this single snapshot.
     #[test]
-    fn errors_are_those_of_a_test_set_of_one_snapshot() {
+    fn errors_agree_with_a_test_set_of_one_snapshot() {
         let mut settings = SimulatedSettings::default();
         settings.source.sensor = sensor();
         settings.source.samples = 100;
@@ -379,7 +380,7 @@ mod tests {
     }
 
     #[test]
-    fn an_untouched_sensor_reads_what_it_reads_at_rest() {
+    fn an_untouched_sensor_has_its_readings_at_rest() {
         let sensor = sensor();
         let pressed = Pressed::new(&sensor, &[3], &Touch::default(), 1.0).unwrap();
         let at_rest = sensor.row_resistances(3, &[DVec3::ZERO; 6]).unwrap();

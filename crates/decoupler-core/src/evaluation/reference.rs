@@ -13,14 +13,14 @@ use crate::{
     sensor::{SensorError, SensorModel},
 };
 
-/// Reasons for which a test set has no Bayesian reference.
+/// Reason why a test set has no Bayesian reference.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 #[non_exhaustive]
 pub enum NoReference {
     /// The posterior of a row did not converge.
     NotConverged,
-    /// The rounding of the readings decides which part stays unknown, and no more is known of it than the order of magnitude.
+    /// The error is determined by the rounding of the readings, which is known only in order of magnitude.
     Rounding,
     /// The posterior could not be sampled well enough.
     Sampling,
@@ -28,31 +28,34 @@ pub enum NoReference {
     TooLarge,
 }
 
-/// Factor by which the rounding of readings may be finer than the posterior takes it to be.
+/// Factor by which the rounding of readings may be finer than the posterior assumes.
 const FINER_ROUNDING: f64 = 4.0;
-/// Share of the reference that may depend on that factor.
-const OWED_TO_ROUNDING: f64 = 0.05;
-/// Relative noise next to which no rounding of readings counts.
-const SMALLEST_BESIDE_ROUNDING: f64 = 1e-13;
-/// Number of samples, spread over the test set, on which that is tried.
-const TRIED_SAMPLES: usize = 100;
+/// Maximum share of the reference that may depend on that factor.
+const MAX_DUE_TO_ROUNDING: f64 = 0.05;
+/// Relative noise above which the rounding of readings is negligible.
+const MIN_NOISE_ABOVE_ROUNDING: f64 = 1e-13;
+/// Number of samples, spread over the test set, on which the effect of rounding is tested.
+const ROUNDING_SAMPLES: usize = 100;
 
-/// Errors of the Bayesian reference on a test set whose readings have the scene's noise: the limit that physics sets to
-/// decoders of the row's own readings.
+/// Returns the errors of the Bayesian reference on a test set whose readings have the scene's noise: the physical limit
+/// for decoders of the row's own readings.
 ///
-/// The posterior of each row under the prior that the scene draws from has medians, which are the answers with the least
-/// expected absolute error: no decoder of the same readings does better on average. Each row is judged by its own readings
-/// and taken as known, even in scenes whose decoders do not know the row; those cannot quite reach it.
+/// The prior is the distribution from which the scene draws. The medians of the posterior of each row are the answers
+/// with the minimum expected absolute error: no decoder of the same readings is better on average. Each row is decoded
+/// from its own readings and assumed to be known, even in scenes whose decoders do not know the row; such decoders
+/// cannot quite reach the reference.
 ///
-/// The prior of random nodes is uniform, cut at 0 and at the stroke. Eq. (2) is linearised at the true deformation, and
-/// expectation propagation finds the medians; a decoder that has to find where to linearise can come close. Other loadings
-/// have priors of any shape, such as few parameters of a press, and posteriors with several modes and curved valleys:
-/// theirs are sampled without linearisation (`SampledPosterior`). There is no reference if the samples are too few to be
-/// trusted, or if the true deformations do not look like samples of their posteriors, as they must.
+/// The prior of random nodes is uniform between 0 and the stroke. Eq. (2) is linearised at the true deformation, and
+/// expectation propagation finds the medians; a decoder that has to find the point of linearisation can come close.
+/// Other loadings have priors of any shape, such as few parameters of a press, and posteriors with several modes and
+/// curved valleys, which are sampled without linearisation (`SampledPosterior`). There is no reference if there are too
+/// few effective samples, or if the true deformations are not distributed like samples of their posteriors, as they
+/// must be.
 ///
-/// Without noise the rounding of the readings takes its place. It hides much of what is badly seen; elsewhere the errors
-/// are 0 or next to it, for simulated readings are rounded as the model at the truth is ([`Errors::times`]). Between the
-/// two the errors depend on how finely the readings are rounded: there is no reference then. `rng` draws the samples.
+/// Without noise, the rounding of the readings acts as noise. It dominates for poorly determined deformations; for
+/// others the errors are 0 or nearly 0, since simulated readings are rounded in the same way as the model at the true
+/// deformation ([`Errors::times`]). Between these cases the errors depend on how finely the readings are rounded, and
+/// there is no reference. `rng` draws the samples.
 ///
 /// # Errors
 /// If the sensor has no resistances at rest.
@@ -71,12 +74,12 @@ pub fn reference_errors(
             .map(|medians_mm| Errors::measure(test, &medians_mm, scene.stroke_mm(&model.geometry))));
     }
     let linearised = linearised_errors(model, scene, test, rng)?;
-    // Without noise other loadings have a limit only where readings determine everything, whatever the prior.
+    // Without noise, other loadings have a limit only if the readings determine everything, regardless of the prior.
     let is_limit = |errors: &Errors| scene.loading == Loading::RandomNodes || errors.is_rounding();
     Ok(linearised.and_then(|errors| Some(errors).filter(is_limit).ok_or(NoReference::Rounding)))
 }
 
-/// Errors of the medians of posteriors linearised at the truth.
+/// Returns the errors of the medians of posteriors linearised at the true deformation.
 fn linearised_errors(
     model: &SensorModel,
     scene: &Scene,
@@ -91,13 +94,13 @@ fn linearised_errors(
         return Ok(Err(NoReference::NotConverged));
     };
     let errors = measured(test, &limits);
-    if !errors.is_rounding() && scene.noise.in_test().relative < SMALLEST_BESIDE_ROUNDING {
-        let every = test.samples().div_ceil(TRIED_SAMPLES).max(1);
+    if !errors.is_rounding() && scene.noise.in_test().relative < MIN_NOISE_ABOVE_ROUNDING {
+        let every = test.samples().div_ceil(ROUNDING_SAMPLES).max(1);
         let tried: Vec<usize> = (0..test.samples()).step_by(every).collect();
         let some = test.select(&tried);
         let z_mm = measured(&some, &limits.select(Axis(0), &tried)).z_mm;
         let finer = limits_mm(&mut posterior.rounded_finer(FINER_ROUNDING), &some);
-        let is_same = |finer: Array2<f64>| measured(&some, &finer).z_mm >= (1.0 - OWED_TO_ROUNDING) * z_mm;
+        let is_same = |finer: Array2<f64>| measured(&some, &finer).z_mm >= (1.0 - MAX_DUE_TO_ROUNDING) * z_mm;
         if !finer.is_some_and(is_same) {
             return Ok(Err(NoReference::Rounding));
         }
@@ -105,9 +108,10 @@ fn linearised_errors(
     Ok(Ok(errors))
 }
 
-/// The answers of the posterior that knows where to linearise (samples × 3·M2); `None` if that of any row did not converge.
+/// Returns the medians of the posteriors linearised at the true deformation (samples × 3·M2); `None` if that of any row
+/// did not converge.
 fn limits_mm(posterior: &mut Posterior, test: &Dataset) -> Option<Array2<f64>> {
-    /// Samples whose posteriors are found at once.
+    /// Number of samples whose posteriors are computed at once.
     const BLOCK: usize = 64;
     let rows = test.row_wires_read().expect("samples of a scene know their row-wire");
     let mut limits_mm = Array2::zeros(test.targets().dim());
@@ -131,7 +135,8 @@ fn limits_mm(posterior: &mut Posterior, test: &Dataset) -> Option<Array2<f64>> {
     Some(limits_mm)
 }
 
-/// Medians of the posteriors of all samples (samples × 3·M2), by importance sampling from the scene's own prior.
+/// Returns the medians of the posteriors of all samples (samples × 3·M2), by importance sampling from the scene's
+/// prior.
 fn sampled_medians_mm(
     model: &SensorModel,
     scene: &Scene,
@@ -171,7 +176,7 @@ fn sampled_medians_mm(
             let pairs = found.coordinates_mm.iter().zip(test.sample_targets(sample));
             let error_mm: f64 = pairs.map(|(median, truth)| (median - truth).abs()).sum();
             total_mm += error_mm;
-            owed_mm += error_mm * OWED_TO_SAMPLING / found.effective_samples;
+            owed_mm += error_mm * SAMPLING_ERROR / found.effective_samples;
             ranks.push(found.rank_of_truth);
             medians_mm
                 .row_mut(sample)
@@ -180,8 +185,8 @@ fn sampled_medians_mm(
                 .for_each(|(to, from)| *to = from);
         }
     }
-    // Written so that NaN is refused.
-    let is_trusted = owed_mm <= MAX_OWED_TO_SAMPLING * total_mm && are_uniform(&mut ranks);
+    // Written so that NaN is rejected.
+    let is_trusted = owed_mm <= MAX_DUE_TO_SAMPLING * total_mm && are_uniform(&mut ranks);
     Ok(if is_trusted {
         Ok(medians_mm)
     } else {
@@ -189,16 +194,17 @@ fn sampled_medians_mm(
     })
 }
 
-/// Share by which a median of n independent samples has a larger expected error than the true one, times n: half the
-/// variance of a normal median π/2n times the density at it, over the mean absolute deviation (√(2/π) each), is π/4n.
-const OWED_TO_SAMPLING: f64 = std::f64::consts::FRAC_PI_4;
-/// Share of the reference that may be owed to the number of samples.
-const MAX_OWED_TO_SAMPLING: f64 = 0.02;
-/// Pairs of nodes up to which posteriors are sampled: some minutes of one core.
+/// Relative increase of the expected error of a median of n independent samples over that of the true median, times n.
+/// For a normal distribution it is half the variance π/2n of the median times the density at it, divided by the mean
+/// absolute deviation (both √(2/π)): π/4n.
+const SAMPLING_ERROR: f64 = std::f64::consts::FRAC_PI_4;
+/// Maximum share of the reference due to the finite number of samples.
+const MAX_DUE_TO_SAMPLING: f64 = 0.02;
+/// Maximum number of pairs of nodes for which posteriors are sampled: a few minutes on one core.
 const MAX_NODE_PAIRS: f64 = 1e11;
 
-/// Returns false if values cannot come from the uniform distribution from 0 to 1 (Kolmogorov and Smirnov): it does so
-/// wrongly once in 100 000 sets.
+/// Tests whether values are from the uniform distribution on 0 to 1 (Kolmogorov-Smirnov test); uniform values are
+/// rejected once in 100 000 sets.
 fn are_uniform(values: &mut [f64]) -> bool {
     const LARGEST_DISTANCE: f64 = 2.5;
     values.sort_by(f64::total_cmp);
@@ -209,18 +215,18 @@ fn are_uniform(values: &mut [f64]) -> bool {
     values.iter().all(|value| value.is_finite()) && largest * count.sqrt() <= LARGEST_DISTANCE
 }
 
-/// Reasons for which the Bayesian reference of an error table is no bound for decoders.
+/// Reason why the Bayesian reference of an error table is not a bound for decoders.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum ReferenceNote {
-    /// There is none.
+    /// There is no reference.
     Missing(NoReference),
-    /// Its error is above that of the training mean.
+    /// The error of the reference is above that of the training mean.
     AboveMean,
 }
 
 impl ReferenceNote {
-    /// The note on the reference of these baselines; `None` if it is a bound.
+    /// Returns the note on the reference of these baselines; `None` if it is a bound.
     pub fn of(baselines: &Baselines) -> Option<Self> {
         match &baselines.reference {
             None => baselines.no_reference.map(Self::Missing),
@@ -245,21 +251,21 @@ impl fmt::Display for ReferenceNote {
                  nodes move along z only."
             }
             Self::Missing(NoReference::Rounding) => {
-                "There is no Bayesian reference: the deformation shows in the last digits of the readings only, so that their \
-                 rounding decides what can be known. Raise the compression or the height, or let nodes move along z only; \
-                 with noise of 1e-12 or more there is one."
+                "There is no Bayesian reference: the deformation affects only the last digits of the readings, so that their \
+                 rounding determines the error. Raise the compression or the height, let nodes move along z only, or add \
+                 noise of 1e-12 or more."
             }
             Self::Missing(NoReference::Sampling) => {
                 "There is no Bayesian reference: too few of the deformations sampled from the loading explain the readings \
                  to estimate their posterior. Raise the noise, or let nodes move along z only."
             }
             Self::Missing(NoReference::TooLarge) => {
-                "There is no Bayesian reference: sampling the posteriors of that many or such large rows would take many \
-                 minutes. Lower the number of test samples, or the size of the array."
+                "There is no Bayesian reference: sampling the posteriors of this many rows of this size would take \
+                 many minutes. Lower the number of test samples, or the size of the array."
             }
             Self::AboveMean => {
-                "The Bayesian reference is no bound here, for it is above the training mean: the readings determine next \
-                 to nothing, and both differ by chance. Lower the noise, or draw more test samples."
+                "The Bayesian reference is not a bound here, since it is above the training mean: the readings determine \
+                 almost nothing, and the two differ by chance. Lower the noise, or draw more test samples."
             }
         })
     }
@@ -295,12 +301,12 @@ mod tests {
     }
 
     #[test]
-    fn no_limit_is_told_where_only_rounding_sets_it() {
+    fn there_is_no_limit_where_only_rounding_determines_it() {
         let model = SensorModel::new("2x6_3x18".parse().unwrap());
         assert_eq!(errors(&model, 0.0, Movement::SIDEWAYS, 10), Err(NoReference::Rounding));
         let sharp = errors(&model, 0.0, Movement::Z, 10).unwrap().z_mm;
         assert!(sharp < 1e-10, "{sharp}");
-        // Six unknowns and four readings: whatever the rounding, a plane of deformations stays unknown.
+        // Six unknowns and four readings: regardless of rounding, a plane of deformations is undetermined.
         let blind = SensorModel::new("2x6_3x4".parse().unwrap());
         let [without, with] = [0.0, 1e-8].map(|noise| errors(&blind, noise, Movement::Z, 10).unwrap().z_mm);
         assert!(
@@ -309,8 +315,8 @@ mod tests {
         );
     }
 
-    /// Changes of the readings near their rounding, in the two ways in which they come: decoders that know nothing of the
-    /// rounding fall below what the posterior takes for the limit.
+    /// Changes of the readings close to their rounding, from a small height or a small compression: decoders that
+    /// ignore rounding have smaller errors than the posterior predicts.
     #[test]
     fn strokes_near_rounding_have_no_limit() {
         let model = SensorModel::new("4x3_2x9".parse().unwrap());
@@ -327,14 +333,15 @@ mod tests {
         }
     }
 
-    /// One node: the posterior is normal with standard deviation ε/s while that is small against the stroke; when it is
-    /// large, readings determine nothing, and the middle of the stroke is off by a quarter of it.
+    /// For one node the posterior is normal with standard deviation ε/s while that is small compared with the stroke.
+    /// When it is large, readings determine nothing, and the mean error of answering half the stroke is a quarter of
+    /// the stroke.
     #[test]
-    fn one_node_has_the_closed_form_at_both_ends() {
+    fn one_node_agrees_with_the_closed_form_in_both_limits() {
         let mut model = SensorModel::new("1x1_1x4".parse().unwrap());
         model.geometry.column_node_x0_mm = model.geometry.row_x0_mm;
         let noise = 1e-4;
-        // With R = g·d the derivative of ln R is z/d², here averaged over where the node may be.
+        // With R = g·d the derivative of ln R is z/d², here averaged over the possible positions of the node.
         let mut expected = 0.0;
         for step in 0..1000 {
             let z = 4.0 + (f64::from(step) + 0.5) / 1000.0;
@@ -355,7 +362,7 @@ mod tests {
         assert!(errors.is_sorted(), "{errors:?}");
     }
 
-    /// Median of values with weights.
+    /// Returns the weighted median of (value, weight) pairs.
     fn weighted_median(mut pairs: Vec<(f64, f64)>) -> f64 {
         pairs.sort_by(|one, other| one.0.total_cmp(&other.0));
         let total: f64 = pairs.iter().map(|(_, weight)| weight).sum();
@@ -367,9 +374,9 @@ mod tests {
         middle.unwrap().0
     }
 
-    /// Errors of the medians of 20 000 deformations drawn by the scene itself, weighed by the density of the readings as
-    /// the documentation of [`Noise`] defines it; the gain, if it drifts, is integrated by the midpoint rule.
-    fn by_plain_weighing(model: &SensorModel, scene: &Scene, test: &Dataset) -> f64 {
+    /// Returns the errors of the weighted medians of 20 000 deformations drawn from the scene. Weights are the
+    /// likelihood of the readings as documented for [`Noise`]; a drifting gain is integrated by the midpoint rule.
+    fn by_prior_sampling(model: &SensorModel, scene: &Scene, test: &Dataset) -> f64 {
         let sampler = scene.sampler(model);
         let mut rng = Seed(77).rng(Stream::Expectation);
         let draws: Vec<_> = (0..20_000).map(|_| sampler.draw(&mut rng)).collect();
@@ -425,10 +432,10 @@ mod tests {
         Errors::measure(test, &answers, scene.stroke_mm(&model.geometry)).z_mm
     }
 
-    /// With mean and covariance of the loading alone the reference of a ball would be twice as large. A tilted edge lifts
-    /// off, which leaves nodes at exactly 0.
+    /// With only the mean and covariance of the loading, the reference of a ball would be twice as large. A tilted edge
+    /// lifts off, which leaves nodes at exactly 0.
     #[test]
-    fn loadings_of_any_shape_have_the_reference_of_plain_sampling() {
+    fn references_of_all_loadings_agree_with_prior_sampling() {
         let model = SensorModel::new("2x3_2x9".parse().unwrap());
         let noises = [
             Noise::relative(5e-3),
@@ -452,14 +459,15 @@ mod tests {
                 .unwrap();
             let mut rng = Seed(5).rng(Stream::Expectation);
             let found = reference_errors(&model, &scene, &test, &mut rng).unwrap().unwrap().z_mm;
-            let expected = by_plain_weighing(&model, &scene, &test);
+            let expected = by_prior_sampling(&model, &scene, &test);
             assert!((found / expected - 1.0).abs() < 0.04, "{loading}: {found} {expected}");
         }
     }
 
-    /// One node of a smooth field is uniform, as a random node is: sampling and linearisation meet at all noises.
+    /// The depth of a single node of a smooth field is uniform, like that of a random node, so sampling and
+    /// linearisation agree at all noise levels.
     #[test]
-    fn sampling_agrees_with_linearisation_where_both_hold() {
+    fn sampling_agrees_with_linearisation_where_both_are_valid() {
         let model = SensorModel::new("1x1_1x4".parse().unwrap());
         for noise in [0.3, 1e-2, 1e-3, 1e-5, 1e-8] {
             let random = Scene {
@@ -486,7 +494,7 @@ mod tests {
     }
 
     #[test]
-    fn a_test_set_that_its_posteriors_do_not_explain_has_no_reference() {
+    fn a_test_set_inconsistent_with_its_posteriors_has_no_reference() {
         let mut uniform: Vec<f64> = (0..100).map(|k| (f64::from(k) + 0.5) / 100.0).collect();
         assert!(are_uniform(&mut uniform));
         assert!(!are_uniform(&mut [0.99; 20]) && !are_uniform(&mut [f64::NAN; 20]));
@@ -507,7 +515,7 @@ mod tests {
     }
 
     #[test]
-    fn a_reference_above_the_mean_is_no_bound() {
+    fn a_reference_above_the_mean_is_not_a_bound() {
         let model = SensorModel::new("2x2_2x6".parse().unwrap());
         let set = Dataset::simulate(&model, &Scene::default(), 4, &mut Seed(0).rng(Stream::Test)).unwrap();
         let off = |by_mm: f64| {

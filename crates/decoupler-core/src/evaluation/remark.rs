@@ -10,16 +10,16 @@ use crate::{
     training::{Method, StopReason},
 };
 
-/// Remark on a decoder's result that is not to be trusted, with cause and cure. Printed next to its errors.
+/// Remark on an unreliable result of a decoder, with cause and remedy. Printed next to its errors.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Remark {
-    /// Always answering the mean of the training set would be nearer to the truth.
+    /// Always answering the mean of the training set would be more accurate.
     WorseThanMean {
         /// Name of the coordinate or target.
         target: String,
-        /// Mean absolute error in proportion to that of the mean; `None` where the mean is exact, as where a coordinate is
-        /// the same in all samples.
+        /// Ratio of the mean absolute error to that of the mean; `None` if the mean is exact, for instance if a
+        /// coordinate is the same in all samples.
         times: Option<f64>,
         /// Most likely cause.
         cause: Cause,
@@ -38,23 +38,23 @@ pub enum Cause {
     UnseenNoise,
     /// The training set is small.
     FewSamples {
-        /// Training samples of each fit.
+        /// Number of training samples of each fit.
         samples: usize,
-        /// Readings per sample.
+        /// Number of readings per sample.
         readings: usize,
     },
-    /// The network has not learned what other samples have in common with those of the training set.
+    /// The network is under- or overfitted.
     Training,
-    /// The way the training of the network ended.
+    /// The training of the network ended too early or got stuck.
     End {
-        /// Reason why it ended.
+        /// Reason why the training ended.
         reason: StopReason,
-        /// Its method.
+        /// Method of the training.
         method: Method,
     },
     /// The noise of the readings.
     Noise,
-    /// Nothing known: the decoder does not suit these data.
+    /// Unknown: the decoder does not suit these data.
     Unknown,
 }
 
@@ -95,11 +95,13 @@ impl fmt::Display for Cause {
                 write!(f, "{samples} for {readings} are too few; give more samples")
             }
             Self::Training => f.write_str(
-                "the network is under- or overfitted; train it for more epochs, with other \
-                 hidden nodes, or on more samples",
+                "the network is under- or overfitted; train it for more epochs, with a \
+                 different number of hidden nodes, or on more samples",
             ),
             Self::End { reason, method } => f.write_str(&reason.remedy(method)),
-            Self::Noise => f.write_str("the noise of the readings hides it; reduce the noise, or give more samples"),
+            Self::Noise => {
+                f.write_str("the noise of the readings is too large; reduce the noise, or give more samples")
+            }
             Self::Unknown => {
                 f.write_str("this decoder does not suit these data; use another one, or give more samples")
             }
@@ -108,7 +110,8 @@ impl fmt::Display for Cause {
 }
 
 impl Cause {
-    /// Finds the most likely cause for a decoder fitted with `settings` to `samples` training samples of `readings` each.
+    /// Finds the most likely cause for a decoder fitted with `settings` to `samples` training samples of `readings`
+    /// each.
     fn of(kind: DecoderKind, settings: &RunSettings, samples: usize, readings: usize) -> Self {
         /// Samples per reading below which more samples would help most.
         const FEW: usize = 4;
@@ -137,13 +140,13 @@ struct Pair {
     target: String,
     error: f64,
     of_mean: f64,
-    /// Largest error that is nothing but rounding.
+    /// Largest error that counts as rounding.
     rounding: f64,
 }
 
 impl Pair {
     fn of_nodes(errors: &Errors, mean: &Errors) -> Vec<Self> {
-        /// Errors in percent that are nothing but rounding.
+        /// Largest error in percent that counts as rounding.
         const ROUNDING: f64 = 1e-9;
         let percent = |target: &str, error: Option<f64>, of_mean: Option<f64>| {
             Some(Self {
@@ -163,7 +166,7 @@ impl Pair {
     }
 
     fn of_targets(errors: &[TargetErrors], mean: &[TargetErrors]) -> Vec<Self> {
-        // Nothing can be judged of a target that is constant in the test samples.
+        // A target that is constant in the test samples cannot be judged.
         let pairs = errors.iter().zip(mean).enumerate();
         let judged = pairs.filter(|(_, (errors, _))| errors.r2.is_some());
         let pair = |(index, (errors, mean)): (usize, (&TargetErrors, &TargetErrors))| Self {
@@ -175,13 +178,13 @@ impl Pair {
         judged.map(pair).collect()
     }
 
-    /// True if the error exceeds that of the mean by what three decimals of their ratio show. An error that is not a number is
-    /// [`Remark::Missing`]'s matter.
+    /// Returns `true` if the error exceeds that of the mean by enough to show in three decimals of their ratio. NaN is
+    /// reported as [`Remark::Missing`] instead.
     fn is_worse(&self) -> bool {
         self.error > 1.0005 * self.of_mean + self.rounding
     }
 
-    /// Error in proportion to that of the mean; `None` where that is nothing but rounding.
+    /// Returns the ratio of the error to that of the mean; `None` if the error of the mean is only rounding.
     fn times(&self) -> Option<f64> {
         let times = (self.of_mean > self.rounding).then(|| self.error / self.of_mean);
         times.filter(|times| times.is_finite())
@@ -189,8 +192,8 @@ impl Pair {
 }
 
 impl Remark {
-    /// Remarks on the errors of a decoder of this kind, fitted with `settings` to `samples` training samples of `readings`
-    /// each, compared with those of the mean.
+    /// Returns the remarks on the errors of a decoder of this kind, fitted with `settings` to `samples` training
+    /// samples of `readings` each, compared with the errors of the mean.
     pub(super) fn on(
         kind: DecoderKind,
         (errors, mean): (&TestErrors, &TestErrors),
@@ -213,8 +216,8 @@ impl Remark {
         worse.collect()
     }
 
-    /// Names how the training of the network ended as the cause, unless it could not know of the noise.
-    fn tell_end(&mut self, reason: Option<StopReason>, method: Method) {
+    /// Sets the reason for the end of the training as the cause, unless the cause is noise that the training set lacks.
+    fn attribute_to_end(&mut self, reason: Option<StopReason>, method: Method) {
         if let (Self::WorseThanMean { cause, .. }, Some(reason)) = (self, reason)
             && *cause != Cause::UnseenNoise
         {
@@ -223,8 +226,8 @@ impl Remark {
     }
 }
 
-/// Remarks on the rows of an error table by their names: on the network, whose training ended for `reason`, and on the
-/// linear map.
+/// Returns the remarks on the rows of an error table, with the names of the rows: on the network, whose training ended
+/// for `reason`, and on the linear map.
 pub fn error_remarks(
     settings: &SimulatedSettings,
     Scores { network, baselines }: &Scores,
@@ -243,7 +246,7 @@ pub fn error_remarks(
     let of_row = |(name, kind, errors)| {
         let mut remarks = Remark::on(kind, (errors, &baselines.mean), &settings, (samples, readings));
         for remark in remarks.iter_mut().filter(|_| kind == DecoderKind::Network) {
-            remark.tell_end(reason, method);
+            remark.attribute_to_end(reason, method);
         }
         remarks.extend(MissingFigures::of(Precision::Double, errors, None).map(Remark::Missing));
         remarks.into_iter().map(move |remark| (name, remark))
@@ -251,17 +254,17 @@ pub fn error_remarks(
     rows.into_iter().flat_map(of_row).collect()
 }
 
-/// Reasons for which a decoder has no figures, or no residual.
+/// Reason why a decoder has no figures, or no residual.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
 #[non_exhaustive]
 pub enum MissingFigures {
-    /// Readings or answers beyond the numbers of single precision.
+    /// Readings or answers exceed the range of single precision.
     #[error(
         "no figures, since readings or answers exceed single precision (3.4e38): decode in double precision, or lower \
          the noise"
     )]
     SinglePrecision,
-    /// Answers beyond all numbers.
+    /// Answers overflow.
     #[error("no figures, since its answers overflow: lower the noise")]
     Overflow,
     /// The sensor has no resistance at the answers.
@@ -270,8 +273,8 @@ pub enum MissingFigures {
 }
 
 impl MissingFigures {
-    /// Returns the reason for which figures are missing, given the errors of a decoder and the residual of its answers, if
-    /// there is a model of the sensor; `None` if none is.
+    /// Returns the reason why figures are missing, given the errors of a decoder and the residual of its answers, if
+    /// there is a model of the sensor; `None` if none are missing.
     pub(super) fn of(precision: Precision, errors: &TestErrors, residual: Option<f64>) -> Option<Self> {
         let is_complete = match errors {
             TestErrors::Nodes(errors) => errors.z_mm.is_finite() && errors.worst_mm.is_finite(),
@@ -313,7 +316,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_worse_than_the_mean_is_said_with_cause_and_cure_and_nothing_else() {
+    fn only_errors_worse_than_the_mean_are_reported_with_cause_and_remedy() {
         let none = Noise::default();
         for good in [
             errors(0.2, Some(5.0)),
@@ -339,11 +342,11 @@ mod tests {
             (DecoderKind::RadialBasis, Noise::relative(1e-2), 500, "reduce the noise"),
             (DecoderKind::RadialBasis, none, 500, "use another one"),
         ];
-        for (kind, noise, samples, cure) in cases {
+        for (kind, noise, samples, remedy) in cases {
             let remarks = remarks(kind, noise, samples, &bad);
             assert_eq!(remarks.len(), 2, "z and x");
             assert!(
-                remarks[0].contains("in z is 1.500 times") && remarks[0].contains(cure),
+                remarks[0].contains("in z is 1.500 times") && remarks[0].contains(remedy),
                 "{remarks:?}"
             );
             assert!(remarks[1].contains("in x is 1.200 times"), "{remarks:?}");
@@ -371,7 +374,7 @@ mod tests {
     }
 
     #[test]
-    fn targets_of_any_unit_are_compared_and_constant_ones_are_not() {
+    fn targets_in_any_unit_are_compared_except_constant_ones() {
         let target = |mae: f64, r2: Option<f64>| TargetErrors {
             rmse: mae,
             mae,

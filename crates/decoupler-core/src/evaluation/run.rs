@@ -24,7 +24,7 @@ use crate::{
     },
 };
 
-/// A run: its sets of samples, one training per start, and the errors of the best network.
+/// Run: its sets of samples, one training per start, and the errors of the best network.
 ///
 /// Starts share the sets and scalings and differ only in their random initialisation. The *leader* is the start
 /// whose best network has the lowest validation error so far (training error if nothing is held out); the test set
@@ -37,7 +37,7 @@ pub struct Run {
     pub(super) starts: Vec<StartTrainer>,
     /// See [`Self::wall_time`].
     pub(super) wall_time: Option<Duration>,
-    /// Errors of the baselines; `None` if only the networks count.
+    /// Errors of the baselines; `None` if only the networks are needed.
     pub(super) baselines: Option<Baselines>,
 }
 
@@ -52,7 +52,7 @@ impl Run {
     pub fn step(&mut self) -> Option<StopReason> {
         let begun = Instant::now();
         match self.starts.as_mut_slice() {
-            // Stays on this thread, which saves a hand-over every epoch.
+            // Stays on this thread, which saves a thread switch per epoch.
             [only] => {
                 only.step();
             }
@@ -64,8 +64,8 @@ impl Run {
         self.stop_reason()
     }
 
-    /// Time that all starts together have taken by the clock, without pauses; `None` if the run was resumed and the
-    /// time before is not known. [`StartTrainer::elapsed`] adds up the times of trainings that ran side by side.
+    /// Wall time of all starts together, without pauses; `None` if the run was resumed and the time before is not
+    /// known. In contrast, [`StartTrainer::elapsed`] is the sum over trainings that ran in parallel.
     pub fn wall_time(&self) -> Option<Duration> {
         self.wall_time
     }
@@ -92,12 +92,13 @@ impl Run {
         self.leader().stop_reason()
     }
 
-    /// Finds the defect of the leader, once its trainings have ended; `None` for a sound run.
+    /// Returns the defect of the leader, once its trainings have ended; `None` if it has none.
     pub fn defect(&self) -> Option<RunDefect> {
         RunDefect::of(self.leader())
     }
 
-    /// Continues every start from its present weights with another method: [`Trainer::continue_with`](crate::training::Trainer::continue_with).
+    /// Continues every start from its current weights with another method:
+    /// [`Trainer::continue_with`](crate::training::Trainer::continue_with).
     ///
     /// # Errors
     /// If a setting is out of range, or the networks are too wide for the method; nothing is then changed.
@@ -106,7 +107,7 @@ impl Run {
         let trainings = rows.len() * self.starts.len();
         let samples = rows[0].samples();
         check_width(&method, rows[0].present().shape(), samples, trainings)?;
-        // Starts have the same shapes, so either the first is refused or none.
+        // Starts have the same shapes, so either the first is rejected or none.
         for start in &mut self.starts {
             start.continue_with(method)?;
         }
@@ -126,7 +127,7 @@ impl Run {
         Ok(())
     }
 
-    /// Trainings of all starts.
+    /// Returns the trainings of all starts.
     pub fn trainers(&self) -> &[StartTrainer] {
         &self.starts
     }
@@ -136,7 +137,7 @@ impl Run {
         lowest(self.starts.iter().map(StartTrainer::best_mse)).unwrap_or(0)
     }
 
-    /// Training of the leader.
+    /// Returns the training of the leader.
     pub fn leader(&self) -> &StartTrainer {
         &self.starts[self.leader_number()]
     }
@@ -165,12 +166,12 @@ impl Run {
         self.starts.iter().flat_map(StartTrainer::states).collect()
     }
 
-    /// The test set.
+    /// Returns the test set.
     pub fn test(&self) -> &Arc<Dataset> {
         &self.test
     }
 
-    /// Description of the readings and targets.
+    /// Returns the description of the readings and targets.
     pub fn problem(&self) -> &Arc<Problem> {
         &self.problem
     }
@@ -203,7 +204,7 @@ impl Run {
         self.errors_of(&self.decouple_test())
     }
 
-    /// Errors of the baselines on the test set; `None` for the run of a fold.
+    /// Returns the errors of the baselines on the test set; `None` for the run of a fold.
     pub fn baselines(&self) -> Option<&Baselines> {
         self.baselines.as_ref()
     }
@@ -217,21 +218,21 @@ impl Run {
     }
 }
 
-/// Defect of a run that has ended: trainings of its leader came to nothing or diverged. Its text says what to change.
+/// Defect of a run that has ended: trainings of its leader failed or diverged. Its text includes the remedy.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RunDefect {
     /// Number of networks: one, or one for each row-wire.
     pub networks: usize,
     /// Number of networks whose training has a defect.
     pub defective: usize,
-    /// Index of the first of them, from 0.
+    /// Index of the first defective network, from 0.
     pub first: usize,
-    /// Defect of the first.
+    /// Defect of the first defective network.
     pub defect: TrainingDefect,
 }
 
 impl RunDefect {
-    /// Finds the defect of one start whose trainings have all ended.
+    /// Returns the defect of a start whose trainings have all ended.
     pub(super) fn of(start: &StartTrainer) -> Option<Self> {
         start.stop_reason()?;
         let numbered = start.rows().iter().enumerate();
@@ -272,22 +273,22 @@ pub enum RunError {
     /// A number is out of range.
     #[error(transparent)]
     Count(#[from] CountError),
-    /// More samples than a run can hold.
+    /// There are more samples than a run can hold.
     #[error(
         "{training} training and {validation} validation samples, held together as whole snapshots of {rows} rows, are \
-         {total}: the limit is {most}; give fewer for validation"
+         {total}: the limit is {max}; give fewer for validation"
     )]
     TooManySamples {
-        /// Training samples that are held.
+        /// Number of training samples.
         training: usize,
-        /// Validation samples given.
+        /// Number of validation samples.
         validation: usize,
-        /// Row-wires of a snapshot.
+        /// Number of row-wires in a snapshot.
         rows: usize,
-        /// Samples of the whole snapshots.
+        /// Number of samples in whole snapshots.
         total: usize,
-        /// Largest number possible.
-        most: usize,
+        /// Maximum number of samples.
+        max: usize,
     },
     /// The sensor is invalid.
     #[error(transparent)]
@@ -323,7 +324,7 @@ pub enum RunError {
         /// Channels, targets or row-wires of the training set.
         expected: String,
     },
-    /// The samples are not such as the networks decode.
+    /// The samples do not match the networks.
     #[error(
         "the {set} set has {found}, the networks have {expected}: give samples of the sensor they were trained for"
     )]
@@ -332,11 +333,11 @@ pub enum RunError {
         set: &'static str,
         /// Channels, targets or row-wires of the set.
         found: String,
-        /// Their number in the networks.
+        /// Number in the networks.
         expected: usize,
     },
     /// A row-wire that needs its own network has no samples.
-    #[error("row {} has no {set} samples: give some of every row, or train one network for all rows", .row_wire + 1)]
+    #[error("row {} has no {set} samples: give samples of every row, or train one network for all rows", .row_wire + 1)]
     RowWithoutSamples {
         /// Row-wire, from 0.
         row_wire: usize,
@@ -344,9 +345,7 @@ pub enum RunError {
         set: &'static str,
     },
     /// The samples of a simulated run have no row-wires.
-    #[error(
-        "samples of a simulated sensor must know their row-wire: build the set with row-wires, or call it measured"
-    )]
+    #[error("samples of a simulated sensor need a row-wire: build the set with row-wires, or declare it as measured")]
     NoRowWires,
     /// A training cannot begin.
     #[error(transparent)]
@@ -360,7 +359,7 @@ pub enum RunError {
     Memory {
         /// Memory needed, in bytes.
         bytes: u64,
-        /// Memory that there is.
+        /// Memory of the machine.
         memory: MachineMemory,
     },
     /// A saved training cannot be resumed.

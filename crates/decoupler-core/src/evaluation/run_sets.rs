@@ -40,7 +40,7 @@ impl RunSets {
 }
 
 impl SimulatedSettings {
-    /// Draws the sets of these settings, as far as a run holds them in memory.
+    /// Draws the sets of these settings, if they fit into memory.
     ///
     /// # Errors
     /// If the settings are invalid, or the samples do not fit into memory.
@@ -48,8 +48,8 @@ impl SimulatedSettings {
         Ok(self.checked_sets_unless(&|| false)?.expect("nothing cancels it"))
     }
 
-    /// Draws the sets of these settings, after a check that they fit into memory; returns `None` once `is_cancelled`, which is
-    /// called between the parts of the work.
+    /// Draws the sets of these settings, after a check that they fit into memory; returns `None` once `is_cancelled`,
+    /// which is called between the parts of the work.
     ///
     /// # Errors
     /// If the settings are invalid, or the samples do not fit into memory.
@@ -58,7 +58,8 @@ impl SimulatedSettings {
         self.sets_unless(is_cancelled)
     }
 
-    /// Draws the sets of these settings; returns `None` once `is_cancelled`, which is called between the parts of the work.
+    /// Draws the sets of these settings; returns `None` once `is_cancelled`, which is called between the parts of the
+    /// work.
     ///
     /// # Errors
     /// If the settings are invalid.
@@ -68,7 +69,7 @@ impl SimulatedSettings {
     }
 }
 
-/// Checks that the sets of a run belong together and meet its settings.
+/// Checks that the sets of a run match each other and its settings.
 pub(super) fn check_sets(settings: &RunSettings, split: &Split, test: &Dataset) -> Result<(), RunError> {
     let training = &split.training;
     if matches!(settings.source, Source::Simulated(_)) && training.row_wires_read().is_none() {
@@ -96,7 +97,7 @@ pub(super) fn check_sets(settings: &RunSettings, split: &Split, test: &Dataset) 
         }
     }
     if settings.source.row_model() == RowModel::Each {
-        // A test set may lack a row, but not the sets that fit a network and select its weights.
+        // A test set may lack a row; the sets that fit a network and select its weights may not.
         for (name, set) in [("training", training)].into_iter().chain(sets) {
             let mut has_samples = vec![name == "test"; set.row_count()];
             (0..set.samples()).for_each(|sample| has_samples[set.row_index(sample)] = true);
@@ -109,7 +110,7 @@ pub(super) fn check_sets(settings: &RunSettings, split: &Split, test: &Dataset) 
     Ok(())
 }
 
-/// Checks that the sets of a split are such as `networks` decode.
+/// Checks that the sets of a split match `networks`.
 pub(super) fn check_networks(networks: &Networks, split: &Split) -> Result<(), RunError> {
     let network = networks.at(0);
     let sets = [
@@ -176,7 +177,7 @@ impl SimulatedSettings {
                 validation,
                 rows,
                 total,
-                most: LARGEST_SAMPLES,
+                max: LARGEST_SAMPLES,
             });
         }
         let test = self.draw_test()?;
@@ -208,8 +209,8 @@ impl SimulatedSettings {
         Ok(set)
     }
 
-    /// Draws the samples of `set`, drawn by [`Self::draw_training`], with the noise of the test set; `None` if that is the
-    /// same.
+    /// Draws the samples of `set`, which [`Self::draw_training`] drew, with the noise of the test set; `None` if the
+    /// noise is the same.
     pub(super) fn draw_tested_folds(&self, set: &Dataset) -> Result<Option<Dataset>, RunError> {
         let Simulation { sensor, scene, .. } = &self.source;
         let noise = scene.noise.in_test();
@@ -221,7 +222,7 @@ impl SimulatedSettings {
         Ok(Some(tested))
     }
 
-    /// Draws the test set of these settings, which the window shows before anything is trained.
+    /// Draws the test set of these settings, for display before anything is trained.
     ///
     /// # Errors
     /// If the sensor, scene, or number of samples is invalid.

@@ -40,18 +40,18 @@ pub type SimulatedSettings = RunSettings<Simulation>;
 /// Settings of a run on measured samples.
 pub type MeasuredSettings = RunSettings<Measured>;
 
-/// Largest number of starts in a run: enough for the distribution of its results, and within memory.
+/// Maximum number of starts in a run: enough for the distribution of its results, and limited for memory.
 pub const MAX_STARTS: usize = 100;
 
 /// Error for a number out of its range.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[error("{what}: {count} is not possible, give from {} to {}", .allowed.start(), .allowed.end())]
 pub struct CountError {
-    /// Name of the number.
+    /// Name of the setting.
     pub what: &'static str,
-    /// Number given.
+    /// Given number.
     pub count: usize,
-    /// Range allowed.
+    /// Allowed range.
     pub allowed: RangeInclusive<usize>,
 }
 
@@ -66,12 +66,12 @@ impl From<Measured> for RunSettings {
     /// Returns the settings for measured samples: raw readings scaled to [−1, 1], and 300 epochs of Bayesian
     /// regularisation for [recordings](Method::recorded_regularization) with nothing held out.
     ///
-    /// Recordings are short, noisy, and differ from one stretch to the next, so a validation part in time costs samples
-    /// and can end the training by chance: Levenberg-Marquardt stopped by the last fifth of a recording of forces has
-    /// errors that vary twofold with the seed, which Bayesian regularisation on all of it has not. It measures the
-    /// correlation of neighbouring frames, which carry less information than as many independent ones, and gives each class of weights a
-    /// strength of its own: with one for all, with 20 samples it is worse than ridge regression. The best of several starts
-    /// by their training error gains nothing.
+    /// Recordings are short, noisy, and vary over time, so a validation set of consecutive samples costs samples and
+    /// can end the training by chance. With Levenberg-Marquardt, stopped on the last fifth of a recording of forces,
+    /// errors vary twofold with the seed; with Bayesian regularisation on the whole recording they do not. It measures
+    /// the correlation of neighbouring frames, which carry less information than independent ones, and regularises each
+    /// class of weights with its own strength: with one strength for all, it is worse than ridge regression on 20
+    /// samples. Selecting the best of several starts by training error has no benefit.
     fn from(measured: Measured) -> Self {
         let mut settings = Self::of(measured.into(), InputChoice::MEASURED);
         settings.training.method = Method::recorded_regularization();
@@ -136,8 +136,8 @@ impl<S> RunSettings<S> {
 }
 
 impl RunSettings {
-    /// Share of the training samples of a recording to hold out for validation, unless the user says otherwise: a fifth,
-    /// or none where the method [needs none](Method::needs_validation).
+    /// Default share of the training samples of a recording held out for validation: a fifth, or none if the method
+    /// [needs none](Method::needs_validation).
     pub fn validation_fraction(&self) -> f64 {
         if self.training.method.needs_validation() {
             0.2
@@ -146,7 +146,7 @@ impl RunSettings {
         }
     }
 
-    /// Returns these settings as those of a run on measured samples, if they are.
+    /// Returns these settings as settings of a run on measured samples, if they are.
     pub fn measured(&self) -> Option<MeasuredSettings> {
         match self.source {
             Source::Simulated(_) => None,
@@ -154,7 +154,7 @@ impl RunSettings {
         }
     }
 
-    /// Returns these settings as those of a simulation, if they are.
+    /// Returns these settings as settings of a simulation, if they are.
     pub fn simulated(&self) -> Option<SimulatedSettings> {
         let simulation = self.source.simulation()?;
         Some(self.with_source(*simulation))
@@ -185,7 +185,7 @@ impl SimulatedSettings {
         published.filter(|_| self.is_papers_scene())
     }
 
-    /// Returns `true` if scene and inputs are those of the paper's experiments.
+    /// Returns `true` if the scene and inputs are those of the paper's experiments.
     pub fn is_papers_scene(&self) -> bool {
         self.source.scene == Scene::default() && self.inputs == InputChoice::PAPER
     }
@@ -201,22 +201,22 @@ fn check<const N: usize>(counts: [(&'static str, usize, RangeInclusive<usize>); 
 /// Memory and work of a run, from the sizes in its settings alone, so that both are known before it begins.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Workload {
-    /// Memory at its peak, in bytes: samples, drawn and scaled, equations of all trainings, and priors of the rows.
+    /// Peak memory in bytes: drawn and scaled samples, equations of all trainings, and priors of the rows.
     pub bytes: u64,
-    /// Pairs of nodes in the resistances of all samples that are drawn.
+    /// Number of pairs of nodes in the resistances of all drawn samples.
     node_pairs: f64,
-    /// Multiplications of an epoch of all trainings.
+    /// Number of multiplications per epoch of all trainings.
     epoch_multiplications: f64,
-    /// Largest number of epochs.
+    /// Maximum number of epochs.
     pub epochs: usize,
 }
 
-/// Time of a run on this machine, from rates measured on one thread. With more threads large runs are faster.
+/// Time of a run on this machine, from rates measured on one thread. Large runs are faster with more threads.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct WorkloadTime {
     /// Time to draw the samples.
     pub drawing: Duration,
-    /// Time of an epoch.
+    /// Time per epoch.
     pub epoch: Duration,
     /// Time of all epochs, if none of the other stopping rules ends the training.
     pub all_epochs: Duration,
@@ -235,15 +235,15 @@ impl Workload {
         let training = whole(source.samples);
         let held_out = whole(source.validation_samples) + whole(source.test_samples);
         let shape = largest_shape(settings);
-        // Readings and targets: drawn, split, scaled, and in blocks for the training.
+        // Readings and targets are drawn, split, scaled, and copied to blocks for the training.
         let per_sample = 3 * scale.columns() + 3 * scale.coordinates_per_row() + shape.inputs + 1 + shape.outputs;
         let samples = float_bytes(training.saturating_add(held_out), per_sample);
         let trainings = settings.starts * size.networks;
         let of_each = training.div_ceil(size.networks);
         let method = &settings.training.method;
-        /// Vectors of a method and its trainer with an entry for each weight.
+        /// Number of vectors with an entry for each weight in a method and its trainer.
         const VECTORS: usize = 8;
-        // Whitening may leave inputs out, and products of fewer inputs may be kept where those of all are recomputed.
+        // Whitening may leave inputs out, and products of fewer inputs may be kept that would be recomputed for all.
         let fewest = match settings.inputs.scaling {
             ScalingChoice::MinMax => shape.inputs,
             ScalingChoice::Whitening => 1,
@@ -264,8 +264,8 @@ impl Workload {
         })
     }
 
-    /// Computes the workload of measuring `decoders` with networks of each number of `hidden` nodes, one after the other: that
-    /// of the largest run.
+    /// Computes the workload of measuring `decoders` with networks of each number of `hidden` nodes one after the
+    /// other, which is the workload of the largest run.
     ///
     /// # Errors
     /// If the array lacks a row of the scene.
@@ -282,13 +282,13 @@ impl Workload {
         })
     }
 
-    /// Returns `true` if it takes this much memory or time that the user should know before it begins: a gigabyte, some
-    /// seconds to draw the samples, or a second an epoch.
+    /// Returns `true` if the user should be warned of the memory or time before the run begins: more than a gigabyte,
+    /// some seconds to draw the samples, or a second per epoch.
     pub fn is_large(&self) -> bool {
         self.bytes > 1_000_000_000 || self.node_pairs > 1e10 || self.epoch_multiplications > 1e10
     }
 
-    /// Computes the time on this machine. The first time its speed is measured, which takes some 20 ms.
+    /// Computes the time on this machine. The first call measures its speed, which takes about 20 ms.
     pub fn time(&self) -> WorkloadTime {
         let speed = Speed::measured();
         let duration = |seconds: f64| Duration::try_from_secs_f64(seconds).unwrap_or(Duration::MAX);
@@ -300,10 +300,10 @@ impl Workload {
         }
     }
 
-    /// Checks that there is the memory.
+    /// Checks that the machine has enough memory.
     ///
     /// # Errors
-    /// [`RunError::Memory`] if it has not.
+    /// [`RunError::Memory`] if it does not.
     pub fn check_memory(&self) -> Result<(), RunError> {
         let memory = MachineMemory::of_this_machine();
         if self.bytes > memory.bytes {
@@ -316,12 +316,12 @@ impl Workload {
     }
 }
 
-/// Shape of a network of these settings if no input is left out by its scaling.
+/// Returns the shape of a network with these settings if the scaling leaves out no input.
 fn largest_shape(settings: &SimulatedSettings) -> Shape {
     let (scene, scale) = (&settings.source.scene, settings.source.sensor.scale);
     let varying_axes = match (scene.movement, scene.rows) {
         (Movement::Xyz { .. }, _) => 3,
-        // A network that does not know the row also learns its x.
+        // A network that does not know the row also learns the x coordinate.
         (Movement::Z, Rows::All) if scale.rows() > 1 => 2,
         (Movement::Z, _) => 1,
     };
@@ -332,7 +332,7 @@ fn largest_shape(settings: &SimulatedSettings) -> Shape {
     }
 }
 
-/// Bytes of this many rows of numbers.
+/// Returns the number of bytes in this many rows of numbers.
 fn float_bytes(rows: usize, columns: usize) -> u64 {
     (rows as u64).saturating_mul((columns * size_of::<f64>()) as u64)
 }
@@ -354,7 +354,7 @@ mod tests {
     }
 
     #[test]
-    fn large_runs_are_told_from_ordinary_ones() {
+    fn large_runs_are_distinguished_from_ordinary_ones() {
         let cases = [
             ("10x10_5x30", "lm", 12, false),
             ("10x10_5x30", "br", 16, false),
@@ -377,7 +377,7 @@ mod tests {
         // 31·32/2 products of two inputs and 12 + 1 + 10 activations of each sample.
         let kept = 8 * 60_000 * (496 + 23);
         assert!(Workload::of(&known).unwrap().bytes > kept);
-        // Products of all 31 inputs would take 40 MB for each row, those of 27 take 30 MB and are kept.
+        // Products of all 31 inputs would take 40 MB for each row; those of 27 inputs take 30 MB and are kept.
         known.source.samples = 100_000;
         let by_range = Workload::of(&known).unwrap().bytes;
         known.inputs.scaling = ScalingChoice::Whitening;
@@ -398,7 +398,7 @@ mod tests {
     }
 
     #[test]
-    fn what_no_machine_has_is_refused() {
+    fn more_memory_than_the_machine_has_is_rejected() {
         let mut settings = settings("512x512_1x512", "lm", 512);
         settings.source.validation_samples = 1_000_000;
         settings.source.test_samples = 1_000_000;

@@ -17,7 +17,7 @@ use crate::{
 /// Source of the samples of a run.
 #[expect(
     clippy::large_enum_variant,
-    reason = "there is one a run, and a box would cost the settings their `Copy`"
+    reason = "there is one per run, and with a box the settings would not be `Copy`"
 )]
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -34,11 +34,11 @@ pub enum Source {
 pub struct Simulation {
     /// Model of the sensor.
     pub sensor: SensorModel,
-    /// Rows, axes, loading and noise that are modelled.
+    /// Scene: rows, axes, loading and noise.
     pub scene: Scene,
-    /// Number of training samples, of all row-wires read together.
+    /// Number of training samples, over all row-wires read.
     pub samples: usize,
-    /// Number of held-out samples, drawn in addition to choose the best weights and to stop the training; 0 for none.
+    /// Number of validation samples, drawn in addition to select the best weights and to stop the training; 0 for none.
     pub validation_samples: usize,
     /// Number of test samples.
     pub test_samples: usize,
@@ -48,7 +48,7 @@ pub struct Simulation {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Measured {
-    /// One network shared by all row-wires or one per row-wire; without row-wires both are the same.
+    /// One network shared by all row-wires or one per row-wire; without row-wires the two are the same.
     pub rows: RowModel,
 }
 
@@ -127,7 +127,7 @@ impl Simulation {
         })
     }
 
-    /// Largest travel of a node in millimetres, the full scale of its deformation.
+    /// Maximum travel of a node in millimetres, the full scale of its deformation.
     pub fn stroke_mm(&self) -> f64 {
         self.scene.stroke_mm(&self.sensor.geometry)
     }
@@ -139,11 +139,11 @@ pub enum Preset {
     /// As in the paper: one network for all rows, resistances scaled to [−1, 1].
     #[default]
     Paper,
-    /// The best settings measured: known rows, whitened conductances, more samples, and later early stopping.
+    /// Best settings found in experiments: known rows, whitened conductances, more samples, and later early stopping.
     Best,
 }
 
-/// Error for a word that names no preset.
+/// Error for an unknown preset.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 #[error("'{0}' is not a preset: give paper or best")]
 pub struct PresetError(String);
@@ -158,7 +158,7 @@ impl Preset {
     }
 
     /// Returns the settings of the preset for readings with `noise`. Accuracy then depends on the number of samples,
-    /// and few epochs suffice.
+    /// and few epochs are enough.
     pub fn settings_in(self, noise: Noise) -> SimulatedSettings {
         let mut paper = SimulatedSettings::default();
         paper.source.scene.noise = noise;
@@ -213,16 +213,16 @@ impl FromStr for Preset {
     }
 }
 
-/// Settings of a small network that learns the prints of balls on the sensor of `source` in a fraction of a second, with
-/// its rows, axes and stroke, and without noise; `None` for arrays on which it would take longer.
+/// Returns the settings of a small network that learns imprints of balls on the sensor of `source` in a fraction of a
+/// second, with its rows, axes and stroke, and without noise; `None` for arrays for which training would take longer.
 ///
-/// One network for each known row on conductances between −1 and 1 is the best measured for so few samples.
+/// One network for each known row, with conductances scaled to [−1, 1], was the best choice for so few samples.
 pub fn ready_settings(source: &Simulation) -> Option<SimulatedSettings> {
-    /// Training samples of each row.
+    /// Number of training samples per row.
     const SAMPLES: usize = 200;
-    /// Pairs of nodes in all samples: about a tenth of a second.
+    /// Maximum number of pairs of nodes in all samples: about a tenth of a second.
     const MAX_PAIRS: f64 = 5e7;
-    /// Unknowns and readings of all rows: with them grows the time of an epoch.
+    /// Maximum number of unknowns and readings of all rows, with which the time of an epoch grows.
     const MAX_CHANNELS: usize = 2000;
     let rows = source.model_size().ok()?;
     let samples = SAMPLES * rows.rows;
@@ -283,7 +283,7 @@ pub struct Problem {
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Channel {
-    /// Full name: that of the column in a file.
+    /// Full name, as in the header of a file.
     #[serde(deserialize_with = "cleaned")]
     pub name: String,
     /// Unit, if it is known.
@@ -295,7 +295,7 @@ pub struct Channel {
     pub unit: Option<String>,
 }
 
-/// A target that is measured at a known place of the skin.
+/// Position of a target that is measured at a known place of the skin.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct TargetPosition {
     /// Index of the target.
@@ -364,7 +364,7 @@ impl Simulation {
 }
 
 impl Channel {
-    /// Name, with the unit in brackets if it is known.
+    /// Returns the name, followed by the unit in parentheses if it is known.
     pub fn title(&self) -> String {
         match &self.unit {
             Some(unit) => format!("{} ({unit})", self.name),
@@ -374,12 +374,12 @@ impl Channel {
 }
 
 impl TargetPosition {
-    /// The lattice whose nodes are these positions; `None` if they are none, or no lattice.
+    /// Returns the lattice whose nodes are these positions; `None` if there are none or they do not form a lattice.
     pub fn lattice(positions: &[Self]) -> Option<Lattice> {
         Lattice::of(&Self::places_mm(positions))
     }
 
-    /// The positions (x, y), in millimetres.
+    /// Returns the positions (x, y) in millimetres.
     pub fn places_mm(positions: &[Self]) -> Vec<[f64; 2]> {
         positions
             .iter()
@@ -399,7 +399,8 @@ mod tests {
         scene::{Print, Touch},
     };
 
-    /// Mean error under a ball in the middle of the array, by the ready-made network and by answering the rest.
+    /// Returns the mean errors of the ready-made network, and of always answering the rest positions, for a ball
+    /// pressed on the middle of the array.
     fn errors_mm(scale: &str) -> [f64; 2] {
         let mut source = Simulation::default();
         source.sensor.scale = scale.parse().unwrap();
@@ -427,7 +428,7 @@ mod tests {
     }
 
     #[test]
-    fn the_ready_made_network_feels_a_print_on_every_array_of_the_paper() {
+    fn the_ready_made_network_decodes_imprints_on_every_array_of_the_paper() {
         for scale in ["10x6_3x18", "10x8_4x24", "10x10_5x30", "4x4_2x12"] {
             let [network, rest] = errors_mm(scale);
             assert!(network < 0.25 * rest, "{scale}: {network} of {rest} mm");
@@ -435,7 +436,7 @@ mod tests {
     }
 
     #[test]
-    fn large_arrays_have_none() {
+    fn large_arrays_have_no_ready_made_network() {
         let mut source = Simulation::default();
         source.sensor.scale = "96x96_96x288".parse().unwrap();
         assert_eq!(ready_settings(&source), None);

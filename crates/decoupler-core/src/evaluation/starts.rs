@@ -16,7 +16,7 @@ use crate::{
 pub struct StartRecord {
     /// Training error (mse, scaled) of the best network.
     pub train_mse: f64,
-    /// Validation error (mse, scaled) of the best network, if anything was held out.
+    /// Validation error (mse, scaled) of the best network, if samples were held out.
     pub validation_mse: Option<f64>,
     /// AveZerr of the best network on the test set of an array, in percent; never used for selection.
     pub z_percent: Option<f64>,
@@ -58,7 +58,7 @@ pub(super) fn lowest(errors: impl IntoIterator<Item = f64>) -> Option<usize> {
         .map(|(place, _)| place)
 }
 
-/// Trainings of one start: one shared by all row-wires, or one per row-wire where the row is known, in parallel.
+/// Trainings of one start: one shared by all row-wires, or one per row-wire if the row is known, in parallel.
 ///
 /// Values for several trainings are their means, epoch by epoch; a training that has ended keeps its last values.
 pub struct StartTrainer {
@@ -82,14 +82,14 @@ impl StartTrainer {
         joined
     }
 
-    /// Training of each row-wire, or the one shared by all.
+    /// Returns the training of each row-wire, or the shared training.
     pub fn rows(&self) -> &[Trainer] {
         &self.rows
     }
 
     /// Runs one epoch of every training that has not ended. Returns the reason for stopping once all have ended.
     pub(super) fn step(&mut self) -> Option<StopReason> {
-        // Stays on this thread, which saves a hand-over every epoch.
+        // Stays on this thread, which saves a thread switch per epoch.
         if let [only] = self.rows.as_mut_slice() {
             return only.step();
         }
@@ -143,7 +143,7 @@ impl StartTrainer {
     }
 
     pub(super) fn continue_with(&mut self, method: Method) -> Result<(), TrainingError> {
-        // Rows may differ in inputs, so all are checked before any is changed.
+        // Rows may have different inputs, so all are checked before any is changed.
         for trainer in &self.rows {
             trainer.check_method(&method)?;
         }
@@ -153,7 +153,7 @@ impl StartTrainer {
     }
 
     pub(super) fn set_stopping(&mut self, stopping: StoppingRules) -> Result<(), SettingError> {
-        // All rows have the same rules, so either the first is refused or none.
+        // All rows have the same rules, so either the first is rejected or none.
         self.rows
             .iter_mut()
             .try_for_each(|trainer| trainer.set_stopping(stopping))
@@ -163,7 +163,7 @@ impl StartTrainer {
         self.rows.iter().map(Trainer::state)
     }
 
-    /// Records of all epochs so far, beginning with the initialisation.
+    /// Returns the records of all epochs so far, beginning with the initialisation.
     pub fn history(&self) -> &[EpochRecord] {
         match &self.rows[..] {
             [only] => only.history(),
@@ -171,14 +171,14 @@ impl StartTrainer {
         }
     }
 
-    /// Record of the latest epoch.
+    /// Returns the record of the latest epoch.
     pub fn latest(&self) -> &EpochRecord {
         self.history()
             .last()
-            .expect("the start is recorded when the trainer is made")
+            .expect("the start is recorded when the trainer is created")
     }
 
-    /// Epoch of the best network; of several, the latest.
+    /// Epoch of the best network; the latest one if there are several networks.
     pub fn best_epoch(&self) -> usize {
         self.rows.iter().map(Trainer::best_epoch).max().unwrap_or(0)
     }
@@ -188,19 +188,19 @@ impl StartTrainer {
         mean(self.rows.iter().map(Trainer::best_mse))
     }
 
-    /// Best network of each row-wire, or the one shared by all.
+    /// Returns the best network of each row-wire, or the shared network.
     pub fn best(&self) -> impl Iterator<Item = &Mlp> {
         self.rows.iter().map(Trainer::best)
     }
 
-    /// Mean record of the trainings, each at its best epoch.
+    /// Returns the mean of the records of the trainings at their best epochs.
     pub(super) fn best_records(&self) -> EpochRecord {
         let best = |trainer: &Trainer| trainer.history()[trainer.best_epoch()];
         let records: Vec<EpochRecord> = self.rows.iter().map(best).collect();
         mean_record(self.best_epoch(), &records)
     }
 
-    /// Methods used so far, in order.
+    /// Returns the methods used so far, in order.
     pub fn stages(&self) -> &[Stage] {
         self.longest().stages()
     }
@@ -222,7 +222,7 @@ fn mean(values: impl ExactSizeIterator<Item = f64>) -> f64 {
     values.sum::<f64>() / count
 }
 
-/// Averages the errors of several records; a single record keeps its exact bits.
+/// Averages the errors of several records; a single record is returned unchanged.
 fn mean_record(epoch: usize, records: &[EpochRecord]) -> EpochRecord {
     let of = |value: fn(&EpochRecord) -> f64| mean(records.iter().map(value));
     let of_known = |value: fn(&EpochRecord) -> Option<f64>| {

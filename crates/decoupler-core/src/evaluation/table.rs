@@ -6,8 +6,8 @@ use crate::{
     decoupling::{CompiledNetworks, DecodeError, Decoder},
 };
 
-/// Error table: rows are baselines and decoders, columns follow from the channels. Targets of a recording have a block of
-/// rows each, and all of them together have one if they share a unit.
+/// Error table with baselines and decoders as rows; the columns depend on the channels. Each target of a recording has
+/// a block of rows, and so have all targets together if they share a unit.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ErrorTable {
     /// Measures of error, one for each column.
@@ -30,8 +30,8 @@ pub struct ErrorBlock {
 pub struct ErrorRow {
     /// Name of the decoder or baseline.
     pub name: &'static str,
-    /// Errors in the order of [`ErrorTable::measures`]; `None` where there is none: the paper gives percentages of the
-    /// coordinate only.
+    /// Errors in the order of [`ErrorTable::measures`]; `None` where there is none: the paper reports only percentages
+    /// of the coordinate.
     pub errors: Vec<Option<f64>>,
 }
 
@@ -46,7 +46,7 @@ pub enum ErrorMeasure {
     YPercent,
     /// Mean |decoupled z − z|, in millimetres.
     ZMm,
-    /// The same in percent of the stroke.
+    /// Mean |decoupled z − z|, in percent of the stroke.
     ZStrokePercent,
     /// Largest |decoupled z − z|, in millimetres.
     WorstMm,
@@ -93,7 +93,7 @@ impl ErrorMeasure {
         }
     }
 
-    /// Heading and fixed unit; the unit is empty where it is that of the target.
+    /// Returns the heading and the fixed unit; the unit is empty if it is the unit of the target.
     pub fn heading(self) -> (&'static str, &'static str) {
         match self {
             Self::ZPercent => ("Z", "%"),
@@ -110,7 +110,7 @@ impl ErrorMeasure {
         }
     }
 
-    /// Definition in a sentence.
+    /// Returns the definition in a sentence.
     pub fn definition(self) -> &'static str {
         match self {
             Self::ZPercent => {
@@ -159,7 +159,7 @@ impl ErrorMeasure {
         }
     }
 
-    /// Published error, if the paper gives this measure.
+    /// Returns the published error, if the paper reports this measure.
     fn published(self, published: &PublishedErrors) -> Option<f64> {
         match self {
             Self::ZPercent => Some(published.z_percent),
@@ -247,8 +247,8 @@ pub fn network_frame_time(run: &Run) -> Option<Duration> {
     Some(Duration::from_secs_f64(1e-6 * microseconds))
 }
 
-/// Returns what [`DecoderCost::frame_us`](super::DecoderCost::frame_us) is the time of, measured on `test`: "a sample", or
-/// "a frame of 4 row-wires".
+/// Returns the unit to which [`DecoderCost::frame_us`](super::DecoderCost::frame_us) measured on `test` refers: "a
+/// sample", or "a frame of 4 row-wires".
 pub fn decoded_unit(test: &Dataset) -> String {
     match (test.frames(), test.row_count()) {
         (Ok(_), rows @ 2..) => format!("a frame of {rows} row-wires"),
@@ -318,8 +318,8 @@ mod tests {
     }
 
     #[test]
-    fn targets_of_one_unit_have_errors_over_all_of_them() {
-        // By scikit-learn: mean_squared_error(t, a) ** 0.5, mean_absolute_error, r2_score (uniform average), max.
+    fn targets_that_share_a_unit_have_a_block_for_all_targets() {
+        // From scikit-learn: mean_squared_error(t, a) ** 0.5, mean_absolute_error, r2_score (uniform average), max.
         let targets = array![[0.0, 10.0], [1.0, 12.0], [2.0, 14.0], [3.0, 18.0]];
         let answers = array![[0.5, 10.0], [1.0, 11.0], [2.0, 14.0], [2.0, 20.0]];
         let errors = TestErrors::Targets(TargetErrors::measure(targets.view(), answers.view()));

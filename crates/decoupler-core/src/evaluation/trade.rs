@@ -8,10 +8,10 @@ use crate::{
     training::Method,
 };
 
-/// One decoder on the trade-off between speed and accuracy.
+/// One decoder in the trade-off between speed and accuracy.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TradeOffPoint {
-    /// Preset from which the settings were derived, if they were.
+    /// Preset from which the settings were derived, if any.
     pub preset: Option<Preset>,
     /// Settings of the run; hidden nodes and method matter only if the decoder has a network.
     pub settings: RunSettings,
@@ -19,7 +19,7 @@ pub struct TradeOffPoint {
     pub report: DecoderReport,
     /// Training or fitting time in seconds, summed over all rows and starts.
     pub training_seconds: f64,
-    /// Errors of the Bayesian reference in this scene; `None` for recordings and where a posterior did not converge.
+    /// Errors of the Bayesian reference in this scene; `None` for recordings and if a posterior did not converge.
     pub reference: Option<Errors>,
 }
 
@@ -40,27 +40,28 @@ impl TradeOffPoint {
         is_trained.then_some(self.settings.training.method)
     }
 
-    /// Its error in proportion to the reference: [`Errors::times`]; `None` without a reference.
+    /// Returns the ratio of the error to that of the reference: [`Errors::times`]; `None` without a reference.
     pub fn to_reference(&self) -> Option<f64> {
         self.report.errors.nodes()?.times(self.reference.as_ref()?)
     }
 
-    /// Returns decoding time in microseconds and the error in percent.
+    /// Returns the decoding time in microseconds and the error in percent.
     pub fn decoding(&self) -> (f64, f64) {
         (self.report.cost.frame_us, self.percent())
     }
 
-    /// Returns training time in seconds and the error in percent.
+    /// Returns the training time in seconds and the error in percent.
     pub fn training(&self) -> (f64, f64) {
         (self.training_seconds, self.percent())
     }
 }
 
-/// Measures every decoder of `decoders` on the test samples of `sets`, networks with each number of `hidden` nodes, and passes
-/// each point to `on_point` as soon as it is measured, or why a decoder cannot be used with these samples, together with the
-/// run whose networks the decoder has, if it needs any. Decoders that solve
-/// the equations of a sensor are left out where there is no model of one. Training uses all threads; decoding is timed on one.
-/// Returns `false` if cancelled before the end.
+/// Measures every decoder of `decoders` on the test samples of `sets`, with each number of `hidden` nodes for networks.
+///
+/// Each point is passed to `on_point` as soon as it is measured, or the reason why a decoder cannot be used with these
+/// samples, together with the run that trained the networks of the decoder, if it needs any. Decoders that solve the
+/// equations of a sensor are left out if there is no model of it. Training uses all threads; decoding is timed on one
+/// thread. Returns `false` if cancelled before the end.
 ///
 /// # Errors
 /// If the settings are invalid, or a network cannot be trained with them on these samples.
@@ -126,8 +127,8 @@ pub fn measure_trade_off(
     Ok(true)
 }
 
-/// Marks the points (cost, error) on the Pareto front: those that no other beats in one and equals or beats in the
-/// other.
+/// Marks the points (cost, error) on the Pareto front: those for which no other point is better in one coordinate and
+/// at least as good in the other.
 pub(crate) fn pareto_front(points: &[(f64, f64)]) -> Vec<bool> {
     let is_beaten = |&(cost, error): &(f64, f64)| {
         let beats = |other: &(f64, f64)| other.0 <= cost && other.1 <= error && (other.0 < cost || other.1 < error);
@@ -136,13 +137,13 @@ pub(crate) fn pareto_front(points: &[(f64, f64)]) -> Vec<bool> {
     points.iter().map(|point| !is_beaten(point)).collect()
 }
 
-/// Returns the point with the least decoding time among those with an error of at most `percent`.
+/// Returns the point with the shortest decoding time among those with an error of at most `percent`.
 pub fn fastest_under(points: &[TradeOffPoint], percent: f64) -> Option<&TradeOffPoint> {
     let good = points.iter().filter(|point| point.percent() <= percent);
     good.min_by(|a, b| a.decoding().0.total_cmp(&b.decoding().0))
 }
 
-/// Returns the point with the least error among those that decode a frame within `microseconds`.
+/// Returns the point with the smallest error among those that decode a frame within `microseconds`.
 pub fn most_accurate_under(points: &[TradeOffPoint], microseconds: f64) -> Option<&TradeOffPoint> {
     let quick = points.iter().filter(|point| point.report.cost.frame_us <= microseconds);
     quick.min_by(|a, b| a.percent().total_cmp(&b.percent()))
@@ -182,9 +183,9 @@ impl TradeOffCost {
 /// Limits of the questions "fastest under" and "most accurate under".
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TradeOffLimits {
-    /// Largest error, in percent.
+    /// Maximum error in percent.
     pub percent: f64,
-    /// Longest time of a frame, in microseconds.
+    /// Maximum time per frame in microseconds.
     pub microseconds: f64,
 }
 
@@ -226,16 +227,16 @@ impl TradeOffLevel {
     }
 }
 
-/// Conditioning of a scene and the warnings that follow, known before anything is trained.
+/// Conditioning of a scene and the resulting warnings, known before anything is trained.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Outlook {
-    /// Analysis of the worst conditioned row-wire of those read, its nodes half way down.
+    /// Analysis of the worst-conditioned row-wire of those read, with its nodes at half the stroke.
     pub worst_row: Identifiability,
-    /// Noise of a reading of that row relative to it, from all sources of the scene.
+    /// Relative noise of a reading of that row, from all sources of the scene.
     pub noise: RelativeNoise,
-    /// Standard deviation in mm to which readings with this noise know the pattern seen worst; 0 without noise.
+    /// Standard deviation in mm of the least determined pattern for readings with this noise; 0 without noise.
     pub worst_spread_mm: f64,
-    /// Obstacles to decoupling, and what to change.
+    /// Warnings about obstacles to decoupling, with remedies.
     pub warnings: Vec<IdentifiabilityWarning>,
 }
 
@@ -275,7 +276,7 @@ impl Outlook {
     }
 }
 
-/// Error of an outlook.
+/// Error in analysing a scene.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum OutlookError {
@@ -293,7 +294,7 @@ mod tests {
     use crate::scene::{Noise, Scene};
 
     #[test]
-    fn the_front_is_what_no_other_beats() {
+    fn the_front_consists_of_points_that_no_other_beats() {
         let points = [(1.0, 5.0), (2.0, 2.0), (3.0, 2.0), (4.0, 1.0), (5.0, 3.0), (1.0, 6.0)];
         assert_eq!(pareto_front(&points), [true, true, false, true, false, false]);
         let twins = [(1.0, 1.0), (1.0, 1.0)];
@@ -315,9 +316,9 @@ mod tests {
             .any(|warning| matches!(warning, IdentifiabilityWarning::Hopeless { .. }))
     }
 
-    /// The Bayesian reference of the same scene is far below the error of the mean, and rows differ by 20 times the noise.
+    /// The Bayesian reference of this scene is far below the error of the mean, and rows differ by 20 times the noise.
     #[test]
-    fn drift_is_not_taken_for_noise_of_each_reading() {
+    fn drift_is_not_treated_as_independent_noise() {
         let simulation = Simulation {
             scene: Scene {
                 noise: Noise {
@@ -335,7 +336,7 @@ mod tests {
     }
 
     #[test]
-    fn every_kind_of_noise_is_warned_of() {
+    fn every_kind_of_noise_causes_a_warning() {
         let of = |relative, additive_ohm, converter_bits, drift| Noise {
             relative,
             additive_ohm,
@@ -348,7 +349,7 @@ mod tests {
         // Resistances are below 100 ohm; 1 bit rounds to steps as large as the largest.
         assert!(is_hopeless(of(0.0, 1e3, None, 0.0)));
         assert!(is_hopeless(of(0.0, 0.0, Some(1), 0.0)));
-        // A gain that is common to all readings hides one pattern, and leaves the others.
+        // A gain that is common to all readings hides only one pattern.
         assert!(!is_hopeless(of(0.0, 0.0, None, 1.0)));
         assert!(is_hopeless(of(1.0, 0.0, None, 1.0)));
     }

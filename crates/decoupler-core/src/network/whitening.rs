@@ -162,7 +162,8 @@ impl TryFrom<Record> for Whitening {
             directions,
         } = record;
         let finite = |values: &[f64]| values.iter().all(|value| value.is_finite());
-        let is_valid = finite(&mean) && finite(&directions) && finite(&deviations) && deviations.iter().all(|&d| d > 0.0);
+        let is_valid =
+            finite(&mean) && finite(&directions) && finite(&deviations) && deviations.iter().all(|&d| d > 0.0);
         let directions = Array2::from_shape_vec((deviations.len(), mean.len()), directions);
         match directions {
             Ok(directions) if is_valid => Ok(Self {

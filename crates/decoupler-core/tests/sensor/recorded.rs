@@ -164,7 +164,7 @@ fn a_learning_curve_predicts_the_error_with_twice_the_samples() {
     let many = curve(2000, SplitBy::Time);
     assert!(!many.gains(), "{:?}", many.doubling);
     assert!(
-        many.sentence("y").starts_with("no gain seen for y"),
+        many.sentence("y").starts_with("no gain found for y"),
         "{}",
         many.sentence("y")
     );

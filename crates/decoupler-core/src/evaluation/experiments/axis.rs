@@ -27,7 +27,7 @@ pub enum Axis {
     Scaling(Vec<ScalingChoice>),
     /// Training methods with their settings.
     Method(Vec<Method>),
-    /// Largest numbers of epochs.
+    /// Maximum numbers of epochs.
     Epochs(Vec<usize>),
     /// Numbers of starts.
     Starts(Vec<usize>),
@@ -54,7 +54,7 @@ pub enum AxisKind {
     Scaling,
     /// Training method.
     Method,
-    /// Largest number of epochs.
+    /// Maximum number of epochs.
     Epochs,
     /// Number of starts.
     Starts,
@@ -65,7 +65,7 @@ pub enum AxisKind {
 }
 
 impl AxisKind {
-    /// All settings, in the order offered.
+    /// All settings, in the order offered to the user.
     pub const ALL: [Self; 11] = [
         Self::Hidden,
         Self::Array,
@@ -80,7 +80,7 @@ impl AxisKind {
         Self::Seed,
     ];
 
-    /// Returns the settings that runs on `source` have, in the order offered.
+    /// Returns the settings of runs on `source`, in the order offered to the user.
     pub fn of_source(source: &Source) -> impl Iterator<Item = Self> + use<> {
         let is_simulated = source.simulation().is_some();
         Self::ALL.into_iter().filter(move |kind| match kind {
@@ -109,7 +109,7 @@ impl AxisKind {
 }
 
 impl Axis {
-    /// Setting that it varies.
+    /// Returns the setting that the axis varies.
     pub fn kind(&self) -> AxisKind {
         match self {
             Self::Hidden(_) => AxisKind::Hidden,
@@ -169,7 +169,7 @@ impl Axis {
         }
     }
 
-    /// Writes value `index` to `cell`. A share for validation that follows from the method follows from the new one.
+    /// Writes value `index` to `cell`. A validation share that follows from the method is updated for a new method.
     ///
     /// # Panics
     /// If `index` is out of range.

@@ -10,13 +10,13 @@ use crate::{
     training::{SettingError, StoppingRules},
 };
 
-/// A grid of cells over one or two axes, each cell run with several seeds.
+/// Grid of cells over one or two axes, each cell run with several seeds.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Experiment {
     /// Settings shared by all cells; their seed is the first of [`Self::seeds`].
     pub base: RunSettings,
-    /// Recording that is divided; `None` for a simulated array.
+    /// Recording to divide; `None` for a simulated array.
     pub recording: Option<ExperimentRecording>,
     /// First varied setting.
     pub axis: Axis,
@@ -24,7 +24,7 @@ pub struct Experiment {
     pub second_axis: Option<Axis>,
     /// Number of consecutive seeds for each cell; 1 if the seed is an axis.
     pub seeds: usize,
-    /// Cross-validation to test by, instead of a separate test set.
+    /// Cross-validation for testing, instead of a separate test set.
     pub cross_validation: Option<CrossValidation>,
 }
 
@@ -36,13 +36,13 @@ pub struct ExperimentRecording {
     pub name: String,
     /// `true` if a column assigns its samples to groups.
     pub has_groups: bool,
-    /// `true` if the test samples have files of their own.
+    /// `true` if the test samples are in separate files.
     pub has_test_files: bool,
-    /// Division of its samples, where no axis varies it.
+    /// Division of its samples, if no axis varies it.
     pub division: Division,
 }
 
-/// A cell of the grid.
+/// Cell of the grid.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Cell {
     /// Index of its value on the first axis.
@@ -79,7 +79,7 @@ pub enum ExperimentError {
     /// The folds cannot be filled.
     #[error(transparent)]
     Folds(#[from] FoldsError),
-    /// Runs on such a source have no such setting.
+    /// Runs on this source do not have the setting.
     #[error("{of} have no setting '{axis}': vary another one")]
     NoSetting {
         /// Name of the setting.
@@ -88,16 +88,16 @@ pub enum ExperimentError {
         of: &'static str,
     },
     /// The settings are those of another source than the samples.
-    #[error("settings and samples are not of one source: one is simulated and one recorded")]
+    #[error("settings and samples have different sources: one is simulated, the other recorded")]
     OtherSamples,
-    /// A recording cannot be divided so.
+    /// A recording cannot be divided in this way.
     #[error(transparent)]
     Division(#[from] DivisionError),
     /// A recording without groups is divided by group.
-    #[error("split group: the recording has no column of groups; choose one, or leave this split out")]
+    #[error("split group: the recording has no column of groups; choose one, or omit this split")]
     NoGroups,
     /// A recording is cross-validated.
-    #[error("a recording is divided for each seed: give seeds instead of a cross-validation")]
+    #[error("a recording is divided again for each seed: give seeds instead of a cross-validation")]
     CrossValidation,
     /// There are too many trainings.
     #[error("{0} trainings: give fewer values, seeds or repeats, so that there are at most {MAX_TRAININGS}")]
@@ -107,10 +107,10 @@ pub enum ExperimentError {
     Threads(String),
 }
 
-/// Largest number of trainings in one experiment.
+/// Maximum number of trainings in one experiment.
 const MAX_TRAININGS: usize = 1_000_000;
 
-/// Largest number of seeds or repeats.
+/// Maximum number of seeds or repeats.
 const MAX_TRIALS: usize = 1000;
 
 impl Experiment {
@@ -168,13 +168,13 @@ impl Experiment {
             .map_or(1, |cross_validation| cross_validation.repeats)
     }
 
-    /// Number of networks trained per trial, each with as many starts as the settings say.
+    /// Number of networks trained per trial, each with the number of starts in the settings.
     pub(super) fn folds(&self) -> usize {
         self.cross_validation
             .map_or(1, |cross_validation| cross_validation.folds)
     }
 
-    /// Checks everything that can be known before samples are drawn.
+    /// Checks everything that can be checked before samples are drawn.
     ///
     /// # Errors
     /// The first problem found.
@@ -207,7 +207,7 @@ impl Experiment {
         self.cells().iter().try_for_each(|cell| self.check_cell(cell))
     }
 
-    /// Checks that source and axes belong together.
+    /// Checks that source and axes match.
     fn check_source(&self) -> Result<(), ExperimentError> {
         let of = match (self.base.source, &self.recording) {
             (Source::Simulated(_), None) => "simulated arrays",
@@ -261,7 +261,7 @@ impl Experiment {
     }
 }
 
-/// A table of the paper.
+/// Table of the paper.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum PaperTable {
@@ -300,9 +300,9 @@ impl PaperTable {
         format!("Table {}: {}", self.number(), self.title())
     }
 
-    /// Returns the experiment that reproduces the table. The paper does not say how long it trained: epochs and
-    /// starts are chosen to reproduce all tables in about a minute on two cores. All epochs are run; the validation
-    /// set only selects the weights.
+    /// Returns the experiment that reproduces the table. The paper does not report the number of epochs: epochs and
+    /// starts are chosen to reproduce all tables in about a minute on two cores. All epochs are run; the validation set
+    /// only selects the weights.
     pub fn experiment(self) -> Experiment {
         let with = |axis, epochs, starts, cross_validation| {
             let mut base = SimulatedSettings::default();
@@ -335,7 +335,7 @@ mod tests {
     use crate::training::Method;
 
     #[test]
-    fn the_papers_tables_meet_all_published_figures() {
+    fn the_papers_tables_cover_all_published_figures() {
         let mut published = 0;
         for table in PaperTable::ALL {
             let experiment = table.experiment();
@@ -369,7 +369,7 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_run_is_named_before_anything_is() {
+    fn invalid_experiments_are_rejected_before_anything_is_run() {
         let table = |change: fn(&mut Experiment)| {
             let mut experiment = PaperTable::CrossValidation.experiment();
             change(&mut experiment);
@@ -409,7 +409,7 @@ mod tests {
     }
 
     #[test]
-    fn a_seed_axis_takes_the_place_of_the_seeds() {
+    fn a_seed_axis_replaces_the_seeds() {
         let experiment = Experiment {
             axis: Axis::Seed(vec![Seed(4), Seed(9)]),
             ..PaperTable::HiddenNodes.experiment()

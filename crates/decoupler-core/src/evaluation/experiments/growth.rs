@@ -1,7 +1,7 @@
 /// Growth of a positive quantity t with a size x, fitted by a polynomial and an exponential law.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Growth {
-    /// Degree d of t = a + b·x^d: the best fit of 1, 2 and 3, with a and b not negative.
+    /// Degree d of t = a + b·x^d: the best fit of 1, 2 and 3, with nonnegative a and b.
     pub degree: i32,
     /// Root mean square residual of ln t for the polynomial law; 0.01 is about one percent.
     pub polynomial_residual: f64,
@@ -25,11 +25,11 @@ pub(super) enum GrowthLaw {
 impl Growth {
     /// Fits points (x, t); returns `None` without three different x, or if a number is not positive and finite.
     pub fn fit(points: &[(f64, f64)]) -> Option<Self> {
-        let is_sound = |&(x, t): &(f64, f64)| x > 0.0 && t > 0.0 && x.is_finite() && t.is_finite();
+        let is_valid = |&(x, t): &(f64, f64)| x > 0.0 && t > 0.0 && x.is_finite() && t.is_finite();
         let mut sizes: Vec<f64> = points.iter().map(|point| point.0).collect();
         sizes.sort_by(f64::total_cmp);
         sizes.dedup();
-        if sizes.len() < 3 || !points.iter().all(is_sound) {
+        if sizes.len() < 3 || !points.iter().all(is_valid) {
             return None;
         }
         let polynomials = [1, 2, 3].map(|degree| (degree, polynomial_residual(points, degree)));
@@ -46,25 +46,25 @@ impl Growth {
         })
     }
 
-    /// Returns the law that is clearly closer to the points; `None` where they do not decide: with few sizes a polynomial of
-    /// any degree follows an exponential within the error of a time.
+    /// Returns the law that fits the points clearly better; `None` if they do not decide: with few sizes, a polynomial
+    /// of some degree fits an exponential within the error of measured times.
     ///
-    /// Truly exponential times with 2 to 10 % of noise were called polynomial in none of 3000 simulations, truly polynomial
-    /// ones exponential in none of 4800.
+    /// With 2 to 10 % of noise, exponential times were classified as polynomial in none of 3000 simulations, and
+    /// polynomial times as exponential in none of 4800.
     pub(super) fn law(&self) -> Option<GrowthLaw> {
-        /// Fewest sizes that can decide.
-        const FEWEST: usize = 6;
-        /// Ratio of the standard errors up to which neither law is clearly closer: about √F of 95 % with 4 and 3 degrees of
-        /// freedom.
+        /// Minimum number of sizes for a decision.
+        const MIN_SIZES: usize = 6;
+        /// Maximum ratio of the standard errors at which neither law is clearly better: about √F at 95 % with 4 and 3
+        /// degrees of freedom.
         const CLEARLY: f64 = 3.0;
-        /// Relative error of a time at best.
-        const OF_A_TIME: f64 = 0.01;
-        if self.sizes < FEWEST {
+        /// Minimum relative error of a measured time.
+        const TIME_ERROR: f64 = 0.01;
+        if self.sizes < MIN_SIZES {
             return None;
         }
         let standard_error = |residual: f64, parameters: usize| {
             let share = self.sizes as f64 / (self.sizes - parameters) as f64;
-            (share * residual * residual + OF_A_TIME * OF_A_TIME).sqrt()
+            (share * residual * residual + TIME_ERROR * TIME_ERROR).sqrt()
         };
         let polynomial = standard_error(self.polynomial_residual, 3);
         let exponential = standard_error(self.exponential_residual, 2);
@@ -78,13 +78,13 @@ impl Growth {
     }
 }
 
-/// Root mean square of ln(model / t).
+/// Returns the root mean square of ln(model / t).
 fn residual(points: &[(f64, f64)], model: impl Fn(f64) -> f64) -> f64 {
     let squares = points.iter().map(|(x, t)| (model(*x) / t).ln().powi(2));
     (squares.sum::<f64>() / points.len() as f64).sqrt()
 }
 
-/// Residual of a + b·x^d, with a and b from least squares on the relative errors.
+/// Returns the residual of a + b·x^d, with a and b from least squares on the relative errors.
 fn polynomial_residual(points: &[(f64, f64)], degree: i32) -> f64 {
     let sum =
         |term: fn(f64, f64) -> f64| -> f64 { points.iter().map(|(x, t)| term(1.0 / t, x.powi(degree) / t)).sum() };
@@ -136,9 +136,10 @@ mod tests {
         assert!((exponential.factor_per_unit - 1.25).abs() < 1e-12 && exponential.exponential_residual < 1e-12);
     }
 
-    /// Before, three sizes were called polynomial in some 60 % of truly exponential growth.
+    /// Without a minimum number of sizes, three sizes were classified as polynomial in about 60 % of cases with
+    /// exponential growth.
     #[test]
-    fn the_wrong_law_is_hardly_ever_named() {
+    fn the_wrong_law_is_rarely_returned() {
         let mut rng = ChaCha8Rng::seed_from_u64(0);
         let mut wrong = 0;
         for sizes in [&[6.0, 8.0, 10.0][..], &[6.0, 8.0, 10.0, 12.0, 14.0, 16.0]] {
@@ -159,14 +160,14 @@ mod tests {
     }
 
     #[test]
-    fn a_quantity_that_does_not_grow_follows_no_law_of_growth() {
+    fn a_quantity_that_does_not_grow_has_no_law_of_growth() {
         assert_eq!(fit(|x| if x == 10.0 { 2.1 } else { 2.0 }).law(), None);
         let falling = fit(|x| 1.0 / x);
         assert!(falling.factor_per_unit < 1.0 && falling.polynomial_residual.is_finite());
     }
 
     #[test]
-    fn too_little_to_go_by_gives_no_fit() {
+    fn too_few_points_have_no_fit() {
         assert_eq!(Growth::fit(&[(1.0, 2.0), (2.0, 4.0), (2.0, 4.1)]), None);
         assert_eq!(Growth::fit(&[(1.0, 2.0), (2.0, 0.0), (3.0, 4.0)]), None);
         assert_eq!(Growth::fit(&[(1.0, 2.0), (2.0, f64::NAN), (3.0, 4.0)]), None);

@@ -1,9 +1,9 @@
 //! The paper's experiments, and experiments over any other settings, on a simulated array or on a recording.
 //!
 //! An [`Experiment`] is a grid of cells; each cell is run several times (seeds, repeats of a cross-validation) by
-//! independent jobs, each on its own [`TrialSamples`]. [`run_experiments`] runs them on all cores and passes on each [`Trial`] as it finishes;
-//! [`ExperimentResults`] collects them and is complete at any time for what is finished; [`verdicts`] judges which of
-//! the paper's claims they support.
+//! independent jobs, each on its own [`TrialSamples`]. [`run_experiments`] runs them on all cores and passes on each
+//! [`Trial`] as it finishes; [`ExperimentResults`] collects them and can be evaluated at any time; [`verdicts`] judges
+//! which of the paper's claims they support.
 
 mod axis;
 mod experiment;

@@ -28,7 +28,7 @@ pub struct CellResults {
     pub cell: Cell,
     /// Number of trials planned.
     pub expected: usize,
-    /// Finished trials, sorted by seed and repeat, in whichever order they finished.
+    /// Finished trials, sorted by seed and repeat regardless of the order in which they finished.
     pub trials: Vec<Trial>,
     /// Failed trials, sorted likewise.
     pub failures: Vec<TrialFailure>,
@@ -95,23 +95,23 @@ impl CellResults {
         self.trials.len() + self.failures.len() == self.expected
     }
 
-    /// Summarises a figure over the trials that have it.
+    /// Returns the spread of a figure over the trials that have it.
     pub fn spread(&self, figure: impl Fn(&Trial) -> Option<f64>) -> Option<Spread> {
         Spread::of(self.trials.iter().filter_map(figure))
     }
 
-    /// Summarises [`TestErrors::percent`](crate::evaluation::TestErrors::percent) over the trials.
+    /// Returns the spread of [`TestErrors::percent`](crate::evaluation::TestErrors::percent) over the trials.
     pub fn percent(&self) -> Option<Spread> {
         self.spread(|trial| trial.errors.percent())
     }
 
-    /// Time of the fastest epoch, the one least disturbed by other work on the machine.
+    /// Returns the time of the fastest epoch, which is least affected by other load on the machine.
     pub fn min_epoch_seconds(&self) -> Option<f64> {
         self.spread(|trial| Some(trial.min_epoch_seconds))
             .map(|spread| spread.smallest)
     }
 
-    /// Returns the trial with the median error in percent (the lower of two), as representative of the cell.
+    /// Returns the trial with the median error in percent (the lower of two), as representative for the cell.
     pub fn median_trial(&self) -> Option<&Trial> {
         let with_errors = self
             .trials
@@ -144,7 +144,7 @@ pub(super) mod tests {
         })
     }
 
-    /// A trial with these errors; the linear map has 1.6 %, an epoch takes a second.
+    /// Returns a trial with these errors; the linear map has 1.6 %, and an epoch takes a second.
     pub(in crate::evaluation::experiments) fn trial(seed: u64, z_percent: f64) -> Trial {
         Trial {
             seed: Seed(seed),
@@ -166,7 +166,7 @@ pub(super) mod tests {
     }
 
     #[test]
-    fn the_order_in_which_trials_finish_leaves_no_trace() {
+    fn results_do_not_depend_on_the_order_in_which_trials_finish() {
         let mut forwards = ExperimentResults::new(PaperTable::HiddenNodes.experiment());
         let mut backwards = forwards.clone();
         let trials = [trial(0, 3.0), trial(1, 1.0), trial(2, 2.0), trial(3, 9.0)];
@@ -189,7 +189,7 @@ pub(super) mod tests {
     }
 }
 
-/// Figures of a cell for tables and files: medians unless stated otherwise, `None` where there is no such figure (yet).
+/// Figures of a cell for tables and files: medians unless stated otherwise, `None` if there is no such figure (yet).
 #[derive(Clone, Debug, PartialEq)]
 pub struct CellSummary {
     /// Array scale; `None` for a recording.
@@ -202,7 +202,7 @@ pub struct CellSummary {
     pub split: Option<SplitBy>,
     /// Short name of the training method.
     pub method: &'static str,
-    /// Largest number of epochs.
+    /// Maximum number of epochs.
     pub epochs: usize,
     /// Number of starts per network.
     pub starts: usize,
@@ -221,17 +221,17 @@ pub struct CellSummary {
     pub mean_percent: Option<f64>,
     /// Error in percent of the linear baseline.
     pub linear_percent: Option<f64>,
-    /// Error in percent of the best answer possible with so few hidden nodes.
+    /// Error in percent of the best possible answer with this number of hidden nodes.
     pub bound_percent: Option<f64>,
     /// Mean number of epochs per start.
     pub epochs_run: Option<f64>,
     /// Training time of a network, over all its starts.
     pub training_seconds: Option<f64>,
-    /// Time of the fastest epoch, the one least disturbed by other work on the machine.
+    /// Time of the fastest epoch, which is least affected by other load on the machine.
     pub epoch_ms: Option<f64>,
 }
 
-/// Errors of a cell next to the one by which it is ranked.
+/// Errors of a cell in addition to the one by which it is ranked.
 #[derive(Clone, Debug, PartialEq)]
 pub enum SummaryErrors {
     /// Errors on the nodes of an array.
@@ -250,7 +250,7 @@ pub enum SummaryErrors {
     },
 }
 
-/// A measured figure next to the published one.
+/// Measured figure, with the published one for comparison.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Figure {
     /// Value that the paper reports.
@@ -335,7 +335,7 @@ fn without_rounding(percent: f64) -> f64 {
     if percent < 1e-9 { 0.0 } else { percent }
 }
 
-/// Errors of the trials of a cell that has some.
+/// Errors of the finished trials of a cell.
 #[derive(Clone, Debug)]
 pub(super) struct CellErrors {
     pub(super) label: String,
@@ -350,8 +350,9 @@ pub(super) struct CellErrors {
 }
 
 impl CellErrors {
-    /// Fewest trials that have a spread. By chance, the ranges of three and three trials are apart in this order once in 20.
-    pub(super) const FEWEST_TRIALS: usize = 3;
+    /// Minimum number of trials for a spread. By chance, the ranges of three and three trials are disjoint in a given
+    /// order once in 20.
+    pub(super) const MIN_TRIALS: usize = 3;
 
     /// Returns the cells that have results.
     pub(super) fn all(results: &ExperimentResults) -> Vec<Self> {
@@ -375,21 +376,23 @@ impl CellErrors {
         results.cells.iter().filter_map(errors).collect()
     }
 
-    /// Compares the errors of all trials with a figure; `None` within their spread, or with too few trials.
+    /// Compares the errors of all trials with a figure; `None` if it is within their range, or there are too few
+    /// trials.
     pub(super) fn against(&self, figure: f64) -> Option<Ordering> {
         self.apart([figure, figure])
     }
 
-    /// Compares the errors of all trials with those of another cell; `None` if their ranges overlap, or with too few trials.
+    /// Compares the errors of all trials with those of another cell; `None` if the ranges overlap, or there are too few
+    /// trials.
     pub(super) fn compare(&self, other: &Self) -> Option<Ordering> {
-        let is_enough = other.trials >= Self::FEWEST_TRIALS;
+        let is_enough = other.trials >= Self::MIN_TRIALS;
         self.apart([other.percent.smallest, other.percent.largest])
             .filter(|_| is_enough)
     }
 
     fn apart(&self, [low, high]: [f64; 2]) -> Option<Ordering> {
         match self.percent {
-            _ if self.trials < Self::FEWEST_TRIALS => None,
+            _ if self.trials < Self::MIN_TRIALS => None,
             Spread { largest, .. } if largest < low => Some(Ordering::Less),
             Spread { smallest, .. } if smallest > high => Some(Ordering::Greater),
             _ => None,
@@ -408,7 +411,7 @@ pub(super) fn sorted_by<K: Ord>(mut cells: Vec<CellErrors>, key: impl FnMut(&Cel
     cells
 }
 
-/// Formats the median, and the smallest to largest value where they differ.
+/// Formats the median, followed by the range if the values differ.
 fn spread(spread: &Spread) -> String {
     if spread.smallest == spread.largest {
         return format!("{} %", format_number(spread.median));

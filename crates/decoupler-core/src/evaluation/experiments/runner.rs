@@ -35,24 +35,24 @@ pub struct Finished {
     pub time_left: Option<Duration>,
 }
 
-/// Number of worker threads: one per core, or one fewer to leave a core to the window.
+/// Returns the number of worker threads: one per core, or one fewer to leave a core to the window.
 pub fn worker_threads(leave_one_core: bool) -> NonZero<usize> {
     let cores = thread::available_parallelism().map_or(1, NonZero::get);
     let threads = cores.saturating_sub(usize::from(leave_one_core));
     NonZero::new(threads).unwrap_or(NonZero::<usize>::MIN)
 }
 
-/// Runs all trials of `experiments` on `samples` and on `threads` threads, one trial per thread, and passes each to `on_finished` on the
-/// calling thread as soon as it finishes.
+/// Runs all trials of `experiments` on `samples` and on `threads` threads, one trial per thread, and passes each to
+/// `on_finished` on the calling thread as soon as it finishes.
 ///
-/// Returns when all are done or, once `is_cancelled`, when the epochs in progress are; `is_cancelled` is called before
-/// every epoch, from every thread.
+/// Returns when all trials are finished or, once `is_cancelled`, when the epochs in progress are finished;
+/// `is_cancelled` is called before every epoch, from every thread.
 ///
-/// The result of a trial depends on its settings alone, not on the number of threads or on other trials; only its times
-/// do.
+/// The result of a trial depends only on its settings, not on the number of threads or on other trials; only times
+/// vary.
 ///
 /// # Errors
-/// If any experiment cannot be run; then none is.
+/// If any experiment cannot be run; none is then run.
 pub fn run_experiments(
     experiments: &[Experiment],
     samples: &TrialSamples,
@@ -68,8 +68,8 @@ pub fn run_experiments(
     }
     let Queue { jobs, mut time_left } = Queue::new(experiments, samples, threads);
     let threads = threads.get().min(jobs.len());
-    // One pool of a single thread per worker: parallel code within a training stays on its thread, so that other
-    // trainings do not affect its times.
+    // One single-threaded pool per worker: parallel code within a training stays on its thread, so that other trainings
+    // do not affect its times.
     let pool = |_| {
         ThreadPoolBuilder::new()
             .num_threads(1)
@@ -89,7 +89,7 @@ pub fn run_experiments(
                     let Some(outcome) = job.run(samples, is_cancelled) else {
                         break;
                     };
-                    // The receiver is gone only if the calling thread panicked.
+                    // The receiver is dropped only if the calling thread panicked.
                     if sender.send((job, outcome, begun.elapsed())).is_err() {
                         break;
                     }
@@ -110,14 +110,14 @@ pub fn run_experiments(
             });
         }
         for worker in workers {
-            // The scope itself would panic without the reason.
+            // Otherwise the scope would panic without the original message.
             worker.join().unwrap_or_else(|panic| resume_unwind(panic));
         }
     });
     Ok(())
 }
 
-/// Jobs in the order in which they are run.
+/// Queue of jobs in the order of execution.
 struct Queue {
     jobs: Vec<Job>,
     time_left: TimeLeft,
@@ -140,8 +140,8 @@ struct Job {
 }
 
 impl Queue {
-    /// Orders the jobs: first one trial of every cell, so that the outline of each table appears early, then the
-    /// second, and so on; in each round the longest first, so that no core is idle for long at the end.
+    /// Orders the jobs: first one trial of every cell, so that preliminary tables appear early, then the second trials,
+    /// and so on; in each round the longest first, so that no core is idle for long at the end.
     fn new(experiments: &[Experiment], samples: &TrialSamples, threads: NonZero<usize>) -> Self {
         let mut jobs: Vec<Job> = Vec::new();
         let mut cells = Vec::new();
@@ -202,8 +202,9 @@ impl Job {
     }
 }
 
-/// Estimates the remaining time from the finished jobs. Jobs of a cell with finished jobs count as their mean; other
-/// jobs by the number of operations of their training, at the speed of all finished jobs.
+/// Estimate of the remaining time from the finished jobs. Jobs of a cell with finished jobs are assumed to take their
+/// mean time; for other jobs it follows from the number of multiplications of the training, at the speed of all
+/// finished jobs.
 pub(super) struct TimeLeft {
     threads: usize,
     cells: Vec<CellTime>,
@@ -218,7 +219,8 @@ struct CellTime {
 }
 
 impl TimeLeft {
-    /// Creates an estimate from `(work, jobs)` of each cell: multiplications per job, roughly, and number of jobs.
+    /// Creates an estimate from `(work, jobs)` of each cell: approximate number of multiplications per job, and number
+    /// of jobs.
     pub(super) fn new(cells: impl IntoIterator<Item = (f64, usize)>, threads: usize) -> Self {
         let cells = cells.into_iter().map(|(work, jobs)| CellTime {
             work,
@@ -239,7 +241,7 @@ impl TimeLeft {
         cell.seconds += took.as_secs_f64();
     }
 
-    /// Returns the time until all jobs are finished; `None` before the first is.
+    /// Returns the time until all jobs are finished; `None` before the first is finished.
     pub(super) fn estimate(&self) -> Option<Duration> {
         let (seconds, work) = self.cells.iter().fold((0.0, 0.0), |(seconds, work), cell| {
             (seconds + cell.seconds, work + cell.work * cell.finished as f64)
@@ -291,14 +293,14 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_finished_tells_what_is_left() {
+    fn the_remaining_time_follows_from_the_finished_jobs() {
         let mut time = TimeLeft::new([(1.0, 4), (3.0, 2)], 2);
         assert_eq!(time.estimate(), None);
         time.finished(0, Duration::from_secs(2));
-        // 3 more of 2 s, and 2 of three times the work: 18 s for two threads.
+        // 3 more jobs of 2 s, and 2 with three times the work: 18 s for two threads.
         assert_eq!(time.estimate(), Some(Duration::from_secs(9)));
         time.finished(1, Duration::from_secs(4));
-        // The cell's own time counts now: 3 of 2 s and 1 of 4 s.
+        // Now the measured time of the cell counts: 3 jobs of 2 s and 1 of 4 s.
         assert_eq!(time.estimate(), Some(Duration::from_secs(5)));
         for cell in [0, 0, 0, 1] {
             time.finished(cell, Duration::from_secs(1));

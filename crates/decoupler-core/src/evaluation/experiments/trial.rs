@@ -25,28 +25,28 @@ pub struct Trial {
     pub seed: Seed,
     /// Index of the repeat of a cross-validation, from 0.
     pub repeat: usize,
-    /// Errors on the test set; in a cross-validation, on all samples, each decoupled by the network that had not seen
-    /// it.
+    /// Errors on the test set; in a cross-validation, on all samples, each decoupled by the network for which it was
+    /// held out.
     pub errors: TestErrors,
     /// Errors of the baselines on the same samples.
     pub baselines: Baselines,
-    /// Errors, on the same samples, of the best answer possible with so few hidden nodes: see [`Bottleneck`]. `None` for a
-    /// recording with a network for each row-wire.
+    /// Errors, on the same samples, of the best possible answer with this number of hidden nodes: see [`Bottleneck`].
+    /// `None` for a recording with a network for each row-wire.
     pub bottleneck: Option<TestErrors>,
     /// Number of networks trained: 1, or one per fold.
     pub networks: usize,
     /// Number of epochs, over all starts and folds.
     pub epochs: usize,
-    /// Time spent on them.
+    /// Total time of the epochs.
     pub seconds: f64,
-    /// Time of the fastest epoch, the one least disturbed by other work on the machine.
+    /// Time of the fastest epoch, which is least affected by other load on the machine.
     pub min_epoch_seconds: f64,
-    /// Final state of every training, for [`Run::resume`]; empty for a cross-validation, which has as many networks as
-    /// folds.
+    /// Final state of every training, for [`Run::resume`]; empty for a cross-validation, which has one network per
+    /// fold.
     pub states: Vec<TrainerState>,
 }
 
-/// A trial that failed.
+/// Trial that failed.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[error("seed {seed}: {reason}")]
 pub struct TrialFailure {
@@ -89,7 +89,7 @@ impl Trial {
         let Some(effort) = Effort::train(&mut run, &is_cancelled) else {
             return Ok(None);
         };
-        let scores = run.scores().expect("a run that is not of a fold has baselines");
+        let scores = run.scores().expect("only runs of folds have no baselines");
         Ok(Some(Self {
             seed,
             repeat: 0,
@@ -140,7 +140,8 @@ impl Trial {
     }
 }
 
-/// Returns the best answers possible with so few hidden nodes, for each sample from the training set of its fold.
+/// Returns the best possible answers with this number of hidden nodes, for each sample from the training set of its
+/// fold.
 fn bottleneck_answers(set: &Dataset, validated: &CrossValidated, hidden: usize) -> Result<Array2<f64>, RunError> {
     let folds = &validated.folds;
     let mut answers = Array2::zeros(set.targets().dim());
@@ -158,16 +159,16 @@ fn bottleneck_answers(set: &Dataset, validated: &CrossValidated, hidden: usize) 
 /// Samples of the trials of an experiment.
 #[derive(Clone, Debug)]
 pub enum TrialSamples {
-    /// Drawn by each trial from the model of its settings.
+    /// Samples drawn by each trial from the model of its settings.
     Drawn,
-    /// Recorded, and divided by each trial.
+    /// Recorded samples, divided by each trial.
     Recorded(RecordedSamples),
 }
 
 /// Recorded samples, read once for all trials.
 #[derive(Clone, Debug)]
 pub struct RecordedSamples {
-    /// All samples but those of the test files.
+    /// All samples except those of the test files.
     pub set: Arc<Dataset>,
     /// Samples of the test files, if there are any.
     pub test: Option<Arc<Dataset>>,
@@ -179,7 +180,7 @@ impl RecordedSamples {
     /// Returns the sets of a run with this seed.
     ///
     /// # Errors
-    /// If the samples cannot be divided so.
+    /// If the samples cannot be divided in this way.
     pub fn divided(&self, division: &Division, seed: Seed) -> Result<RunSets, RunError> {
         let (split, test) = division.sets(&self.set, self.test.as_deref(), seed)?;
         Ok(RunSets {
@@ -217,9 +218,9 @@ impl TrialSamples {
 /// Lower bound on the error of a network with h hidden nodes, for any inputs, weights and training.
 ///
 /// The output is an affine function of h hidden values, so its deviations from their mean span at most h directions.
-/// Among all such answers, the projection of the true targets on their first h principal components has the least mean
-/// squared error (Eckart and Young, 1936). The bound holds for the scaled targets of the training set to which it was
-/// fitted; other sets are projected on the same components.
+/// Among all such answers, the projection of the true targets on their first h principal components has the smallest
+/// mean squared error (Eckart and Young, 1936). The bound holds for the scaled targets of the training set to which it
+/// was fitted; other sets are projected on the same components.
 #[derive(Clone, Debug)]
 pub struct Bottleneck {
     outputs: MinMax,
@@ -250,7 +251,8 @@ impl Bottleneck {
         })
     }
 
-    /// Least mean squared error (scaled) of any network with so few hidden nodes, on the set to which this was fitted.
+    /// Returns the minimum mean squared error (scaled) of any network with this number of hidden nodes, on the set to
+    /// which the bound was fitted.
     pub fn min_mse(&self) -> f64 {
         self.min_mse
     }
@@ -263,8 +265,8 @@ impl Bottleneck {
     }
 }
 
-/// Returns the first `kept` principal components of `deviations` (samples × channels) as channels × kept, and the sum of
-/// squares that they leave out.
+/// Returns the first `kept` principal components of `deviations` (samples × channels) as channels × kept, and the sum
+/// of squares of the remaining components.
 fn principal_components(deviations: &Mat<f64>, kept: usize) -> Result<(Array2<f64>, f64), ScalingError> {
     let svd = deviations.thin_svd().map_err(|_| ScalingError::NotConverged)?;
     let components = Array2::from_shape_fn((deviations.ncols(), kept), |(t, k)| svd.V()[(t, k)]);
@@ -278,7 +280,7 @@ mod tests {
 
     use super::*;
 
-    /// Corners of a cube: every direction varies equally, and min-max scaling leaves them as they are.
+    /// Corners of a cube: every direction varies equally, and min-max scaling does not change them.
     fn cube() -> Array2<f64> {
         Array2::from_shape_fn(
             (8, 3),
@@ -287,7 +289,7 @@ mod tests {
     }
 
     #[test]
-    fn where_all_directions_vary_alike_each_hidden_node_carries_its_share() {
+    fn if_all_directions_vary_equally_each_hidden_node_explains_its_share() {
         for hidden in 0..=4 {
             let bottleneck = Bottleneck::fit(cube().view(), hidden).unwrap();
             let expected = 1.0 - hidden.min(3) as f64 / 3.0;
@@ -308,14 +310,14 @@ mod tests {
     }
 
     #[test]
-    fn nothing_that_varies_needs_nothing() {
+    fn constant_targets_have_no_error() {
         let bottleneck = Bottleneck::fit(array![[1.0, 2.0], [1.0, 2.0]].view(), 3).unwrap();
         assert_eq!(bottleneck.min_mse(), 0.0);
         assert_eq!(bottleneck.reconstruct(array![[1.0, 2.0]].view()), array![[1.0, 2.0]]);
     }
 
     #[test]
-    fn what_does_not_converge_is_an_error_and_no_bound_of_zero() {
+    fn a_failed_decomposition_is_an_error_rather_than_a_bound_of_zero() {
         let deviations = Mat::from_fn(5, 3, |s, t| if (s, t) == (2, 1) { f64::NAN } else { 1.0 });
         assert_eq!(principal_components(&deviations, 2), Err(ScalingError::NotConverged));
     }

@@ -12,9 +12,9 @@ use crate::text::format_number;
 /// Verdict of an experiment on a claim.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Verdict {
-    /// Claim, either the paper's or one to compare it with.
+    /// Claim, either from the paper or for comparison with it.
     pub claim: &'static str,
-    /// VerdictStatus of the claim in this run.
+    /// Status of the claim in this run.
     pub standing: VerdictStatus,
     /// Numbers that support the verdict.
     pub finding: String,
@@ -45,7 +45,7 @@ impl fmt::Display for VerdictStatus {
     }
 }
 
-/// Judges the claims that this experiment can test by its finished trials.
+/// Judges the claims that this experiment can test, from its finished trials.
 pub fn verdicts(results: &ExperimentResults) -> Vec<Verdict> {
     let measured = CellErrors::all(results);
     let mut verdicts = Vec::new();
@@ -87,8 +87,8 @@ fn missing(claim: &'static str) -> Verdict {
     }
 }
 
-/// Returns the standing of a claim that is true, false or undecided (`None`) in each of several cases.
-fn standing_of(cases: impl IntoIterator<Item = Option<bool>>) -> VerdictStatus {
+/// Returns the status of a claim that is true, false or undecided (`None`) in each of several cases.
+fn status_of(cases: impl IntoIterator<Item = Option<bool>>) -> VerdictStatus {
     let (mut is_true, mut is_false, mut is_open) = (false, false, false);
     for case in cases {
         is_true |= case == Some(true);
@@ -103,22 +103,19 @@ fn standing_of(cases: impl IntoIterator<Item = Option<bool>>) -> VerdictStatus {
     }
 }
 
-/// Says in which cells the error is below a figure, above it, or within the spread of the trials.
+/// Lists the cells in which the error is below a figure, above it, or within the spread of the trials.
 fn judge_cells(
     claim: &'static str,
     cells: &[(&CellErrors, f64)],
     [below, above]: [&str; 2],
     note: impl Fn(&CellErrors, f64) -> String,
 ) -> Verdict {
-    let standings: Vec<Option<bool>> = cells
+    let is_below: Vec<Option<bool>> = cells
         .iter()
         .map(|(cell, figure)| Some(cell.against(*figure)?.is_lt()))
         .collect();
     let list = |wanted: Option<bool>| {
-        let those = cells
-            .iter()
-            .zip(&standings)
-            .filter(|(_, standing)| **standing == wanted);
+        let those = cells.iter().zip(&is_below).filter(|(_, is_below)| **is_below == wanted);
         let each = |((cell, figure), _): (&(&CellErrors, f64), _)| {
             let against = format!(
                 "{} against {}",
@@ -131,7 +128,7 @@ fn judge_cells(
     };
     let open = format!(
         "not decided with fewer than {} trials or within their spread at",
-        CellErrors::FEWEST_TRIALS
+        CellErrors::MIN_TRIALS
     );
     let parts = [
         (below, list(Some(true))),
@@ -145,7 +142,7 @@ fn judge_cells(
         .collect();
     Verdict {
         claim,
-        standing: standing_of(standings),
+        standing: status_of(is_below),
         finding: sentence(&parts.join("; ")),
     }
 }
@@ -179,7 +176,7 @@ fn sentence(text: &str) -> String {
     format!("{first}{}.", characters.as_str())
 }
 
-/// Looks for the least error among `cells`, which are sorted by number of hidden nodes.
+/// Checks whether the error has a minimum among `cells`, which are sorted by number of hidden nodes.
 fn optimum_exists(cells: Vec<CellErrors>) -> Verdict {
     let claim = "There is an optimal number of hidden nodes";
     let best = cells
@@ -215,7 +212,7 @@ fn optimum_exists(cells: Vec<CellErrors>) -> Verdict {
         _ => "",
     };
     let finding = sentence(&format!(
-        "least at {}; at the ends {}{open}",
+        "minimum at {}; at the ends {}{open}",
         best.figures(),
         ends.join(", ")
     ));
@@ -232,7 +229,7 @@ fn in_order(claim: &'static str, measured: Vec<CellErrors>) -> Verdict {
         return missing(claim);
     }
     let pairs = measured.windows(2);
-    let standing = standing_of(pairs.map(|pair| Some(pair[0].compare(&pair[1])?.is_lt())));
+    let standing = status_of(pairs.map(|pair| Some(pair[0].compare(&pair[1])?.is_lt())));
     let figures: Vec<_> = measured.iter().map(CellErrors::figures).collect();
     Verdict {
         claim,
@@ -264,7 +261,7 @@ fn time_does_not_explode(results: &ExperimentResults, what: &str, size: impl Fn(
         _ => "a + b·x³",
     };
     let finding = format!(
-        "Quickest epoch by {what}: {}. {law} describes that within {} %; an exponential, {} % more with each, within \
+        "Fastest epoch by {what}: {}. {law} fits these times within {} %; an exponential, {} % more with each, within \
          {} %.",
         times.collect::<Vec<_>>().join(", "),
         off(growth.polynomial_residual),
@@ -286,8 +283,8 @@ fn linear_is_beaten(claim: &'static str, measured: &[CellErrors]) -> Verdict {
     if cells.is_empty() {
         return missing(claim);
     }
-    let words = ["it beats it at", "it loses to it at"];
-    judge_cells(claim, &cells, words, |_, _| String::new())
+    let labels = ["better at", "worse at"];
+    judge_cells(claim, &cells, labels, |_, _| String::new())
 }
 
 #[cfg(test)]
@@ -295,7 +292,7 @@ mod tests {
     use super::*;
     use crate::evaluation::experiments::{PaperTable, Trial, results::tests::trial};
 
-    /// Z errors of the trials of each cell.
+    /// Returns the verdicts on trials with these Z errors in each cell.
     fn judged(table: PaperTable, cells: &[&[f64]], change: impl Fn(usize, &mut Trial)) -> Vec<Verdict> {
         let mut results = ExperimentResults::new(table.experiment());
         for (cell, z_percent) in cells.iter().enumerate() {
@@ -308,7 +305,7 @@ mod tests {
         verdicts(&results)
     }
 
-    fn standing(verdicts: &[Verdict], claim: &str) -> VerdictStatus {
+    fn status(verdicts: &[Verdict], claim: &str) -> VerdictStatus {
         let verdict = verdicts.iter().find(|verdict| verdict.claim.contains(claim));
         verdict.unwrap_or_else(|| panic!("no verdict on {claim}")).standing
     }
@@ -319,7 +316,7 @@ mod tests {
         let high: &[f64] = &[2.0, 2.1, 2.2];
         let cases: [(&[&[f64]], VerdictStatus); 7] = [
             (&[high, low, low, high], VerdictStatus::Holds),
-            // One seed or two have no spread.
+            // One or two seeds have no spread.
             (&[&[4.0], &[3.0], &[2.0], &[1.0], &[2.0]], VerdictStatus::Undecided),
             (&[&high[..2], &low[..2], &high[..2]], VerdictStatus::Undecided),
             (&[high, &[1.6, 1.7, 2.9], &[1.8, 1.9, 2.0]], VerdictStatus::Undecided),
@@ -329,14 +326,14 @@ mod tests {
         ];
         for (cells, expected) in cases {
             let verdicts = judged(PaperTable::HiddenNodes, cells, |_, _| {});
-            assert_eq!(standing(&verdicts, "optimal"), expected, "{cells:?}: {verdicts:?}");
+            assert_eq!(status(&verdicts, "optimal"), expected, "{cells:?}: {verdicts:?}");
         }
         let few = judged(PaperTable::HiddenNodes, &[high, low], |_, _| {});
-        assert_eq!(standing(&few, "optimal"), VerdictStatus::Undecided);
+        assert_eq!(status(&few, "optimal"), VerdictStatus::Undecided);
     }
 
     #[test]
-    fn an_order_holds_if_the_ranges_of_the_trials_are_apart() {
+    fn an_order_holds_if_the_ranges_of_the_trials_do_not_overlap() {
         let rising: [&[f64]; 3] = [&[1.0, 1.1, 1.2], &[1.3, 1.4, 1.6], &[2.0, 2.1, 2.2]];
         let [small, middle, large] = rising;
         let cases: [(&[&[f64]], VerdictStatus); 6] = [
@@ -349,16 +346,16 @@ mod tests {
         ];
         for (cells, expected) in cases {
             let verdicts = judged(PaperTable::ArrayScales, cells, |_, _| {});
-            assert_eq!(standing(&verdicts, "Smaller arrays"), expected, "{cells:?}");
+            assert_eq!(status(&verdicts, "Smaller arrays"), expected, "{cells:?}");
         }
         // The large dataset is the first cell.
         let sizes = |cells: [&[f64]; 2]| judged(PaperTable::CrossValidation, &cells, |_, _| {});
-        assert_eq!(standing(&sizes([small, large]), "larger dataset"), VerdictStatus::Holds);
-        assert_eq!(standing(&sizes([large, small]), "larger dataset"), VerdictStatus::Fails);
+        assert_eq!(status(&sizes([small, large]), "larger dataset"), VerdictStatus::Holds);
+        assert_eq!(status(&sizes([large, small]), "larger dataset"), VerdictStatus::Fails);
     }
 
     #[test]
-    fn published_figures_and_the_linear_map_are_met_everywhere_in_part_or_nowhere() {
+    fn published_figures_and_the_linear_map_are_beaten_everywhere_in_part_or_nowhere() {
         let of = |z: [f64; 3]| {
             let cells = z.map(|z| [z, z + 0.01, z + 0.02]);
             judged(
@@ -372,11 +369,11 @@ mod tests {
         let bad = of([3.0, 3.0, 3.0]);
         let within = of([0.1, 0.2, 2.27]);
         for claim in ["published", "linear map"] {
-            assert_eq!(standing(&good, claim), VerdictStatus::Holds);
-            assert_eq!(standing(&mixed, claim), VerdictStatus::HoldsInPart);
-            assert_eq!(standing(&bad, claim), VerdictStatus::Fails);
+            assert_eq!(status(&good, claim), VerdictStatus::Holds);
+            assert_eq!(status(&mixed, claim), VerdictStatus::HoldsInPart);
+            assert_eq!(status(&bad, claim), VerdictStatus::Fails);
         }
-        assert_eq!(standing(&within, "published"), VerdictStatus::Undecided);
+        assert_eq!(status(&within, "published"), VerdictStatus::Undecided);
         let one_seed = judged(PaperTable::ArrayScales, &[&[0.1], &[0.1], &[0.1]], |_, _| {});
         assert!(
             one_seed
@@ -402,18 +399,18 @@ mod tests {
             let verdicts = judged(PaperTable::HiddenNodes, &cells, |cell, trial| {
                 trial.min_epoch_seconds = law(hidden[cell]);
             });
-            standing(&verdicts, "time")
+            status(&verdicts, "time")
         };
         assert_eq!(judge(&|h| 0.01 * h * h * h), VerdictStatus::Holds);
         assert_eq!(judge(&|h| 0.01 * 1.3_f64.powf(h)), VerdictStatus::Fails);
         let three = judged(PaperTable::ArrayScales, &cells[..3], |cell, trial| {
             trial.min_epoch_seconds = [1.0, 2.0, 4.0][cell];
         });
-        assert_eq!(standing(&three, "time"), VerdictStatus::Undecided);
+        assert_eq!(status(&three, "time"), VerdictStatus::Undecided);
     }
 
     #[test]
-    fn nothing_finished_decides_nothing() {
+    fn without_finished_trials_nothing_is_decided() {
         for table in PaperTable::ALL {
             let verdicts = judged(table, &[], |_, _| {});
             assert!(!verdicts.is_empty());

@@ -18,20 +18,20 @@ pub enum ChannelRemark {
         /// Its only reading.
         value: f64,
     },
-    /// All readings are those of an earlier channel, or a linear function of them.
+    /// All readings equal those of an earlier channel, or a linear function of them.
     Duplicate {
         /// Channel.
         channel: usize,
         /// Earlier channel that it repeats.
         of: usize,
     },
-    /// Readings pile up at their least or largest value.
+    /// Readings accumulate at their smallest or largest value.
     Saturated {
         /// Channel.
         channel: usize,
-        /// Value at which they pile up.
+        /// Value at which they accumulate.
         value: f64,
-        /// True if it is the largest value, false if the least.
+        /// `true` if it is the largest value, `false` if it is the smallest.
         is_largest: bool,
         /// Share of the samples at that value.
         share: f64,
@@ -39,7 +39,7 @@ pub enum ChannelRemark {
 }
 
 impl ChannelRemark {
-    /// Channel at fault, from 0.
+    /// Returns the faulty channel, from 0.
     pub fn channel(&self) -> usize {
         match *self {
             Self::Constant { channel, .. } | Self::Duplicate { channel, .. } | Self::Saturated { channel, .. } => {
@@ -48,7 +48,7 @@ impl ChannelRemark {
         }
     }
 
-    /// A sentence with the channels' names.
+    /// Returns a sentence with the names of the channels.
     pub fn sentence(&self, name: impl Fn(usize) -> String) -> String {
         match *self {
             Self::Constant { channel, value } => format!(
@@ -57,7 +57,7 @@ impl ChannelRemark {
                 short(value)
             ),
             Self::Duplicate { channel, of } => format!(
-                "{} repeats {}: it adds nothing; check that it is the channel you meant",
+                "{} repeats {}: it adds no information; check that it is the right channel",
                 name(channel),
                 name(of)
             ),
@@ -80,9 +80,10 @@ impl ChannelRemark {
 
 /// Finds the constant, duplicated and saturated channels of `set`, channel by channel.
 ///
-/// A channel is saturated if at least 1 % of its samples, and no fewer than 5, have its smallest (or largest) value, and more
-/// than three times as many as have any of the three values next to it: the tail of a distribution thins out towards its
-/// end, where a limit piles it up. Channels of fewer than six different values, such as switches, are not judged.
+/// A channel is saturated if at least 1 % of its samples, and no fewer than 5, have its smallest (or largest) value,
+/// and more than three times as many as any of the next three values. The tail of a distribution thins out towards its
+/// end, whereas samples accumulate at a limit. Channels with fewer than six different values, such as switches, are not
+/// judged.
 pub fn channel_remarks(set: &Dataset) -> Vec<ChannelRemark> {
     let readings = set.readings();
     let units: Vec<Option<Vec<f64>>> = readings.axis_iter(Axis(1)).map(unit_vector).collect();
@@ -103,7 +104,7 @@ pub fn channel_remarks(set: &Dataset) -> Vec<ChannelRemark> {
     remarks
 }
 
-/// Deviations of the readings from their mean, as a vector of length 1; `None` for a constant channel.
+/// Returns the deviations of the readings from their mean as a vector of length 1; `None` for a constant channel.
 fn unit_vector(channel: ArrayView1<'_, f64>) -> Option<Vec<f64>> {
     if channel.iter().all(|value| *value == channel[0]) {
         return None;
@@ -115,9 +116,9 @@ fn unit_vector(channel: ArrayView1<'_, f64>) -> Option<Vec<f64>> {
     Some(off.into_iter().map(|value| value / length).collect())
 }
 
-/// Returns `true` if two unit vectors are the same except for their sign and for rounding.
+/// Returns `true` if two unit vectors are equal up to sign and rounding.
 fn is_parallel(one: &[f64], other: &[f64]) -> bool {
-    /// Distance of unit vectors that rounding of the readings explains.
+    /// Maximum distance of unit vectors due to rounding of the readings.
     const ROUNDING: f64 = 1e-9;
     let along: f64 = one.iter().zip(other).map(|(a, b)| a * b).sum();
     let apart = |(a, b): (&f64, &f64)| (a - along.signum() * b).powi(2);
@@ -125,10 +126,10 @@ fn is_parallel(one: &[f64], other: &[f64]) -> bool {
 }
 
 fn saturation(channel: usize, readings: ArrayView1<'_, f64>) -> Vec<ChannelRemark> {
-    const FEWEST: usize = 5;
+    const MIN_SAMPLES: usize = 5;
     const MIN_SHARE: f64 = 0.01;
-    /// Times as many as at any of the neighbouring values.
-    const PILE: usize = 3;
+    /// Minimum ratio to the number of samples at any of the neighbouring values.
+    const MIN_RATIO: usize = 3;
     let mut sorted = readings.to_vec();
     sorted.sort_by(f64::total_cmp);
     let runs: Vec<&[f64]> = sorted.chunk_by(|one, other| one == other).collect();
@@ -138,7 +139,7 @@ fn saturation(channel: usize, readings: ArrayView1<'_, f64>) -> Vec<ChannelRemar
     let judge = |end: &[f64], next: &[&[f64]], is_largest: bool| {
         let share = end.len() as f64 / sorted.len() as f64;
         let neighbours = next.iter().map(|run| run.len()).max().unwrap_or(0);
-        let piles_up = end.len() >= FEWEST && share >= MIN_SHARE && end.len() > PILE * neighbours;
+        let piles_up = end.len() >= MIN_SAMPLES && share >= MIN_SHARE && end.len() > MIN_RATIO * neighbours;
         piles_up.then_some(ChannelRemark::Saturated {
             channel,
             value: end[0],
@@ -154,22 +155,22 @@ fn saturation(channel: usize, readings: ArrayView1<'_, f64>) -> Vec<ChannelRemar
     ends.into_iter().flatten().collect()
 }
 
-/// Growth of the error of each target without a channel.
+/// Growth of the error of each target when a channel is left out.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ChannelImportance {
     /// Channel, from 0.
     pub channel: usize,
-    /// RMSE without the channel in proportion to that with all, target by target; `None` if either is 0, or the target
-    /// constant.
+    /// Ratio of the RMSE without the channel to that with all channels, target by target; `None` if either is 0, or the
+    /// target is constant.
     pub growth: Vec<Option<Interval>>,
 }
 
-/// Measures how much the held-out error grows without each channel, in the order of the channels; `None` if cancelled.
+/// Measures the growth of the held-out error without each channel, in the order of the channels; `None` if cancelled.
 ///
-/// The model is fitted again without the channel, rather than the channel permuted: with correlated channels, permuted
-/// readings are such as the sensor never gives, and the model's answers to them say little about the channel (Hooker,
-/// Mentch and Zhou 2021, doi:10.1007/s11222-021-10057-z). A channel that others can replace therefore counts little,
-/// however much a network uses it; of two copies, neither counts.
+/// The model is fitted again without the channel, instead of permuting the channel: with correlated channels, the
+/// sensor never gives permuted readings, and the model's answers to them contain little information about the channel
+/// (Hooker, Mentch and Zhou 2021, doi:10.1007/s11222-021-10057-z). A channel that others can replace is therefore
+/// unimportant, even if a network relies on it; of two copies, neither is important.
 ///
 /// Takes (channels + 1) × folds fits of `model`.
 ///
@@ -187,7 +188,7 @@ pub fn channel_importance(
         return Ok(None);
     };
     let mut found = Vec::with_capacity(channels);
-    // Without its only channel, nothing is left to fit.
+    // With a single channel, there would be nothing left to fit.
     for channel in (0..channels).filter(|_| channels > 1) {
         let others: Vec<usize> = (0..channels).filter(|&other| other != channel).collect();
         let Some(without) = model.held_out(settings, &set.of_channels(&others), folds, is_cancelled)? else {
@@ -202,8 +203,8 @@ pub fn channel_importance(
     Ok(Some(found))
 }
 
-/// RMSE of the first answers in proportion to that of the second, both to the same samples; `None` where it is not
-/// determined.
+/// Returns the ratio of the RMSE of the first answers to that of the second, both for the same samples; `None` if it is
+/// not determined.
 pub(super) fn rmse_ratio(
     set: &Dataset,
     [ours, theirs]: [ArrayView2<'_, f64>; 2],
@@ -227,13 +228,13 @@ pub(super) fn rmse_ratio(
 }
 
 impl ChannelImportance {
-    /// Largest growth over all targets; `None` if there is none.
+    /// Returns the largest growth over all targets; `None` if there is none.
     pub fn largest(&self) -> Option<Interval> {
         let growth = self.growth.iter().flatten().copied();
         growth.max_by(|one, other| one.value.total_cmp(&other.value))
     }
 
-    /// Returns `true` if no target's error grows without the channel by more than its interval shows.
+    /// Returns `true` if the error of no target grows significantly without the channel.
     pub fn is_dispensable(&self) -> bool {
         self.growth.iter().flatten().all(|growth| growth.low <= 1.0)
     }
@@ -248,7 +249,7 @@ mod tests {
     use crate::scene::standard_normal;
 
     #[test]
-    fn faulty_channels_are_named_and_sound_ones_are_not() {
+    fn only_faulty_channels_are_reported() {
         let mut rng = ChaCha8Rng::seed_from_u64(0);
         let mut readings = Array2::from_shape_simple_fn((2000, 8), || standard_normal(&mut rng));
         for mut row in readings.rows_mut() {

@@ -11,10 +11,11 @@ use crate::{
     evaluation::CrossValidated,
 };
 
-/// Coefficient of determination R² of held-out answers for one target: the share of its variance that the readings explain.
+/// Coefficient of determination R² of held-out answers for one target: the share of its variance explained by the
+/// readings.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Determination {
-    /// R² with its interval, which covers R² of the same fitted models on infinitely many other samples of this kind.
+    /// R² with its confidence interval for R² of the same fitted models on infinitely many other samples of this kind.
     pub r2: Interval,
     /// Number of independent units (samples, stretches or groups) behind the interval.
     pub units: usize,
@@ -22,14 +23,14 @@ pub struct Determination {
     pub is_heavy_tailed: bool,
 }
 
-/// Degrees to which readings determine a target.
+/// Degree to which readings determine a target.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Determinacy {
     /// R² ≥ 0.5 and its interval excludes 0.
     Determined,
-    /// R² is below 0.5: more of the target's variance remains than the readings explain.
+    /// R² is below 0.5: the readings explain less than half of the target's variance.
     WeaklyDetermined,
-    /// The interval of R² reaches 0, so that always answering the mean may be as good; or R² is below 0.1, so that the
+    /// The interval of R² includes 0, so that always answering the mean may be as good; or R² is below 0.1, so that the
     /// error is within 5 % (√0.9) of that of the mean.
     NotDetermined,
 }
@@ -39,17 +40,17 @@ pub enum Determinacy {
 #[non_exhaustive]
 pub enum Undetermined {
     /// The target is constant.
-    #[error("it is constant in the samples judged")]
+    #[error("it is constant in the analysed samples")]
     Constant,
     /// There are too few independent units for an interval.
-    #[error("fewer than 3 independent stretches or groups are judged: record longer, or more groups")]
+    #[error("there are fewer than 3 independent stretches or groups: record longer, or record more groups")]
     FewUnits {
         /// Number of independent stretches or groups.
         units: usize,
     },
-    /// The error is not known within a factor of 100, or is not a number.
+    /// The error is not known within a factor of 100, or is NaN.
     #[error(
-        "its R² is not determined by the {units} independent stretches or groups judged: record longer, or more groups"
+        "its R² is not determined by {units} independent stretches or groups: record longer, or record more groups"
     )]
     Unbounded {
         /// Number of independent stretches or groups.
@@ -58,16 +59,17 @@ pub enum Undetermined {
 }
 
 impl Determination {
-    /// Fewest units for an interval that can be relied on.
+    /// Minimum number of units for a reliable interval.
     pub const FEW_UNITS: usize = 10;
 
-    /// Measures `answers` (samples × outputs) against the targets of `set`, target by target. Evidence are groups if `by` is
-    /// [`SplitBy::Group`], otherwise stretches in the order of the samples.
+    /// Measures `answers` (samples × outputs) against the targets of `set`, target by target. The independent units are
+    /// groups if `by` is [`SplitBy::Group`], otherwise stretches in the order of the samples.
     ///
-    /// In simulations, the interval covers 92 to 98 % of the time for independent and autocorrelated samples (20 to 1500,
-    /// memory up to 0.9), for 5 to 20 groups, and for cross-validated answers, also without any relation. It covers more (up
-    /// to 100 %) where the answers of a single fit explain nothing, and less (about 88 %) for noise whose squares have no
-    /// variance, such as Student's t with 3 degrees of freedom: see [`Self::is_heavy_tailed`].
+    /// In simulations, the coverage of the interval is 92 to 98 % for independent and autocorrelated samples (20 to
+    /// 1500, autocorrelation up to 0.9), for 5 to 20 groups, and for cross-validated answers, also without any
+    /// relation. Coverage is higher (up to 100 %) if the answers of a single fit explain nothing, and lower (about 88
+    /// %) for noise whose squares have infinite variance, such as Student's t with 3 degrees of freedom: see
+    /// [`Self::is_heavy_tailed`].
     ///
     /// # Panics
     /// If the shapes differ.
@@ -85,13 +87,13 @@ impl Determination {
     fn of_one(evidence: &Evidence, truth: &[f64], answers: &[f64]) -> Result<Self, Undetermined> {
         let off = centred(truth);
         let scale = off.iter().copied().map(f64::abs).fold(0.0, f64::max);
-        let least = truth.iter().copied().fold(f64::INFINITY, f64::min);
-        let most = truth.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-        // Values that differ by no more than rounding.
-        if most - least <= 4.0 * f64::EPSILON * most.abs().max(least.abs()) {
+        let min = truth.iter().copied().fold(f64::INFINITY, f64::min);
+        let max = truth.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        // The values differ by no more than rounding.
+        if max - min <= 4.0 * f64::EPSILON * max.abs().max(min.abs()) {
             return Err(Undetermined::Constant);
         }
-        // In units of the largest deviation, so that nothing overflows.
+        // Scaled by the largest deviation to avoid overflow.
         let off: Vec<f64> = off.iter().map(|off| off / scale).collect();
         let errors: Vec<f64> = answers
             .iter()
@@ -102,7 +104,7 @@ impl Determination {
         let variation = total(&off);
         // 1 − R².
         let unexplained = total(&errors) / variation;
-        // By how much each sample moves it, to first order.
+        // Influence of each sample, to first order.
         let of_sample = |(error, off): (&f64, &f64)| (error * error - unexplained * off * off) / variation;
         let influences: Vec<f64> = errors.iter().zip(&off).map(of_sample).collect();
         let spread = evidence.variance(&influences);
@@ -113,7 +115,7 @@ impl Determination {
         let of_mean = evidence.variance(&off.iter().map(|off| off / variation.sqrt()).collect::<Vec<_>>());
         let count = truth.len() as f64;
         let variance = spread.variance
-            // Of the square of the mean: the mean of few units is not that of all.
+            // From the square of the mean: the mean of few units differs from the true mean.
             + 2.0 * (of_mean.variance * unexplained / count).powi(2)
             + of_fits(evidence, &off, &centred(answers), scale);
         let ratio = if unexplained == 0.0 {
@@ -143,7 +145,8 @@ impl Determination {
         }
     }
 
-    /// Returns a sentence on the target of this name, such as "the readings explain little of y (R² 0.35, 0.25 to 0.44)".
+    /// Returns a sentence on the target of this name, such as "the readings explain little of y (R² 0.35, 0.25 to
+    /// 0.44)".
     pub fn sentence(&self, name: &str) -> String {
         let verb = match self.determinacy() {
             Determinacy::Determined => "determine",
@@ -163,22 +166,22 @@ impl Determination {
         } else {
             ""
         };
-        // Decimals that show how far a good R² is from 1.
+        // Enough decimals to show how far a good R² is from 1.
         let digits = (1.0 - (1.0 - self.r2.value).abs().max(1e-9).log10().floor()).clamp(2.0, 6.0) as usize;
         let Interval { value, low, high } = self.r2;
         format!("the readings {verb} {name} (R² {value:.digits$}, {low:.digits$} to {high:.digits$}){few}{tails}")
     }
 }
 
-/// Deviations from the mean.
 fn centred(values: &[f64]) -> Vec<f64> {
     let mean = values.iter().map(|value| value / values.len() as f64).sum::<f64>();
     values.iter().map(|value| value - mean).collect()
 }
 
-/// Variance of 1 − R² from the covariance of errors in different folds: a sample moves its own error and, by the fit, those
-/// of the other folds, in the same direction (Bengio and Grandvalet 2004). It doubles the variance of the products of the
-/// residuals with the part of the answers that is noise, whose share is 1 less the slope of the targets on the answers.
+/// Returns the variance of 1 − R² from the covariance of errors in different folds: a sample changes its own error and,
+/// through the fit, the errors of the other folds, in the same direction (Bengio and Grandvalet 2004). This doubles the
+/// variance of the products of the residuals with the noise in the answers, whose share is 1 − slope of the targets on
+/// the answers.
 fn of_fits(evidence: &Evidence, off: &[f64], answers: &[f64], scale: f64) -> f64 {
     let product = |one: &[f64], other: &[f64]| one.iter().zip(other).map(|(one, other)| one * other).sum::<f64>();
     let answers: Vec<f64> = answers.iter().map(|answer| answer / scale).collect();
@@ -194,15 +197,15 @@ fn of_fits(evidence: &Evidence, off: &[f64], answers: &[f64], scale: f64) -> f64
     (1.0 - slope).clamp(0.0, 1.0) * evidence.variance(&cross.collect::<Vec<_>>()).variance
 }
 
-/// Held-out error of the network next to that of ridge regression for one target.
+/// Held-out error of the network compared with ridge regression, for one target.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct NonlinearGain {
-    /// RMSE of the network in proportion to that of ridge.
+    /// Ratio of the RMSE of the network to that of ridge.
     pub ratio: Interval,
 }
 
 impl NonlinearGain {
-    /// Compares the networks of a cross-validation on `set` with its ridge regressions, target by target; `None` where
+    /// Compares the networks of a cross-validation on `set` with its ridge regressions, target by target; `None` if
     /// either has no error.
     ///
     /// # Panics
@@ -217,15 +220,15 @@ impl NonlinearGain {
             .collect()
     }
 
-    /// Part of ridge's error that a network must save to be worth its weights.
-    const WORTH_HAVING: f64 = 0.05;
+    /// Minimum relative reduction of ridge's error that justifies a network.
+    const MIN_GAIN: f64 = 0.05;
 
-    /// Returns `true` if the network is better than ridge by at least 5 %, and by more than the interval shows.
+    /// Returns `true` if the network is better than ridge by at least 5 %, and significantly.
     pub fn is_supported(&self) -> bool {
-        self.ratio.high < 1.0 && self.ratio.value <= 1.0 - Self::WORTH_HAVING
+        self.ratio.high < 1.0 && self.ratio.value <= 1.0 - Self::MIN_GAIN
     }
 
-    /// A sentence on the target of this name where the network is no better than ridge, or hardly.
+    /// Returns a sentence on the target of this name if the network is no or little better than ridge.
     pub fn remark(&self, name: &str) -> Option<String> {
         (!self.is_supported()).then(|| {
             let better = if self.ratio.high < 1.0 {
@@ -233,14 +236,14 @@ impl NonlinearGain {
             } else {
                 "no better"
             };
-            // Decimals that show on which side of 1 the interval ends.
+            // Enough decimals to show on which side of 1 the interval ends.
             let differs = |decimals: &usize| format!("{:.decimals$}", self.ratio.high) != format!("{:.decimals$}", 1.0);
             let decimals = (2..6).find(differs).unwrap_or(2);
-            // A training can miss what there is: restarts of Bayesian regularisation that all end as a linear map are no
-            // proof that another method finds no more.
+            // A training can fail to find an existing relation: if all restarts of Bayesian regularisation end in a
+            // linear map, another method may still find more.
             format!(
                 "the network is {better} than ridge for {name} (error {:.decimals$} times ridge's): this training found \
-                 little more than a linear map; try another method or more starts, give more samples, or take ridge",
+                 little more than a linear map; try another method or more starts, give more samples, or use ridge",
                 self.ratio
             )
         })
@@ -255,17 +258,17 @@ mod tests {
     use super::*;
     use crate::scene::standard_normal;
 
-    /// Targets and errors that follow autoregressive series, of which the answers explain `share`.
+    /// Returns targets and answers from autoregressive series; the answers explain `share` of the variance.
     fn recording(samples: usize, memory: f64, share: f64, seed: u64) -> (Dataset, Array2<f64>) {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let step = (1.0 - memory * memory).sqrt();
-        let (mut told, mut hidden) = (standard_normal(&mut rng), standard_normal(&mut rng));
+        let (mut explained, mut residual) = (standard_normal(&mut rng), standard_normal(&mut rng));
         let (mut targets, mut answers) = (Array2::zeros((samples, 1)), Array2::zeros((samples, 1)));
         for sample in 0..samples {
-            told = memory * told + step * standard_normal(&mut rng);
-            hidden = memory * hidden + step * standard_normal(&mut rng);
-            answers[[sample, 0]] = share.sqrt() * told;
-            targets[[sample, 0]] = share.sqrt() * told + (1.0 - share).sqrt() * hidden;
+            explained = memory * explained + step * standard_normal(&mut rng);
+            residual = memory * residual + step * standard_normal(&mut rng);
+            answers[[sample, 0]] = share.sqrt() * explained;
+            targets[[sample, 0]] = share.sqrt() * explained + (1.0 - share).sqrt() * residual;
         }
         let set = Dataset::new(targets.clone(), targets, None, (0..samples).collect()).unwrap();
         (set, answers)
@@ -280,21 +283,21 @@ mod tests {
     enum Kind {
         /// Independent samples of a linear relation with R² = 0.6.
         Independent(usize),
-        /// As before, with noise of Student's t with 3 degrees of freedom: its squares have no variance.
+        /// As before, with noise from Student's t with 3 degrees of freedom, whose squares have infinite variance.
         HeavyTails(usize),
         /// As before, with half of the variance shared by the samples of a group.
         Groups(usize),
-        /// Autoregressive with this memory.
+        /// Autoregressive series with this coefficient.
         Autoregressive(usize, f64),
-        /// No relation: five folds, each answered by a linear map fitted to the others.
+        /// No relation: five folds, each answered by a linear map fitted to the other folds.
         Unrelated(usize),
     }
 
-    /// Set, answers, and R² of the decoders that answered, on infinitely many other samples.
+    /// Returns the set, the answers, and R² of the same decoders on infinitely many other samples.
     fn draw(kind: Kind, seed: u64) -> (Dataset, Array2<f64>, f64) {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let mut normal = || standard_normal(&mut rng);
-        let (told, hidden, group_size): (Vec<f64>, Vec<f64>, usize) = match kind {
+        let (explained, residual, group_size): (Vec<f64>, Vec<f64>, usize) = match kind {
             Kind::Independent(n) => (
                 (0..n).map(|_| normal()).collect(),
                 (0..n).map(|_| normal()).collect(),
@@ -303,11 +306,11 @@ mod tests {
             Kind::HeavyTails(n) => {
                 let mut t3 = || {
                     let squares: f64 = (0..3).map(|_| normal().powi(2)).sum();
-                    // A variance of 1.
+                    // Has a variance of 1.
                     normal() / squares.sqrt()
                 };
-                let hidden = (0..n).map(|_| t3()).collect();
-                ((0..n).map(|_| normal()).collect(), hidden, 1)
+                let residual = (0..n).map(|_| t3()).collect();
+                ((0..n).map(|_| normal()).collect(), residual, 1)
             }
             Kind::Groups(groups) => {
                 let mut grouped = || -> Vec<f64> {
@@ -336,15 +339,20 @@ mod tests {
             Kind::Unrelated(n) => return unrelated(n, &mut rng),
         };
         let column = |values: Vec<f64>| Array2::from_shape_vec((values.len(), 1), values).unwrap();
-        let answers: Vec<f64> = told.iter().map(|told| 0.6_f64.sqrt() * told).collect();
-        let pairs = answers.iter().zip(&hidden);
-        let targets = column(pairs.map(|(answer, hidden)| answer + 0.4_f64.sqrt() * hidden).collect());
+        let answers: Vec<f64> = explained.iter().map(|explained| 0.6_f64.sqrt() * explained).collect();
+        let pairs = answers.iter().zip(&residual);
+        let targets = column(
+            pairs
+                .map(|(answer, residual)| answer + 0.4_f64.sqrt() * residual)
+                .collect(),
+        );
         let groups = (0..targets.nrows()).map(|sample| sample / group_size).collect();
         let set = Dataset::new(targets.clone(), targets, None, groups).unwrap();
         (set, column(answers), 0.6)
     }
 
-    /// Targets of variance 1 that five channels do not explain. The map of a fold errs by 1 + |its weights|².
+    /// Returns targets of variance 1 that five channels do not explain. The mean squared error of the map of a fold is
+    /// 1 + |its weights|².
     fn unrelated(samples: usize, rng: &mut ChaCha8Rng) -> (Dataset, Array2<f64>, f64) {
         let readings = Array2::from_shape_simple_fn((samples, 5), || standard_normal(rng));
         let targets = Array2::from_shape_simple_fn((samples, 1), || standard_normal(rng));
@@ -372,7 +380,7 @@ mod tests {
         (set, answers, 1.0 - error)
     }
 
-    /// Number of `sets` sets whose interval contains the true R².
+    /// Returns the number of the `sets` drawn sets whose interval contains the true R².
     fn coverage(kind: Kind, sets: u64) -> usize {
         let by = match kind {
             Kind::Groups(_) => SplitBy::Group,
@@ -386,10 +394,11 @@ mod tests {
         holds.count()
     }
 
-    /// 95 % within three standard errors of 200 sets (0.015), and within 0.92 to 0.98 except for heavy tails.
+    /// Coverage of 95 % within three standard errors of 200 sets (0.015), and within 0.92 to 0.98 except for heavy
+    /// tails.
     #[test]
-    fn intervals_contain_the_true_r2_of_each_kind_of_data_as_often_as_they_say() {
-        for (kind, least) in [
+    fn intervals_of_r2_have_their_nominal_coverage_for_each_kind_of_data() {
+        for (kind, min) in [
             (Kind::Independent(40), 184),
             (Kind::Unrelated(40), 184),
             (Kind::Unrelated(100), 180),
@@ -400,13 +409,13 @@ mod tests {
             (Kind::HeavyTails(400), 170),
         ] {
             let covered = coverage(kind, 200);
-            assert!((least..=199).contains(&covered), "{kind:?}: {covered} of 200");
+            assert!((min..=199).contains(&covered), "{kind:?}: {covered} of 200");
         }
     }
 
     #[test]
-    fn groups_are_drawn_whole() {
-        // 20 groups of 50 equal samples are 20 pieces of evidence, not 1000.
+    fn groups_count_as_single_units() {
+        // 20 groups of 50 equal samples are 20 independent units, not 1000.
         let (few, answers) = recording(20, 0.0, 0.5, 3);
         let repeated: Vec<usize> = (0..1000).map(|sample| sample / 50).collect();
         let set = few.select(&repeated);
@@ -427,7 +436,7 @@ mod tests {
     }
 
     #[test]
-    fn each_standing_is_said_in_its_words() {
+    fn each_degree_of_determinacy_has_its_sentence() {
         for (share, words) in [
             (0.9, "the readings determine y (R² 0."),
             (0.3, "explain little of y"),
@@ -445,9 +454,8 @@ mod tests {
         assert!(sentence.contains("from only 5 independent"), "{sentence}");
     }
 
-    /// Sets in which nothing can be judged name the cause; numbers beyond measure do not appear.
     #[test]
-    fn what_determines_no_r2_is_refused_with_its_cause() {
+    fn undetermined_r2_is_an_error_with_its_cause() {
         let set = |targets: Vec<f64>, groups: Vec<usize>| {
             let targets = Array2::from_shape_vec((targets.len(), 1), targets).unwrap();
             Dataset::new(targets.clone(), targets, None, groups).unwrap()
@@ -467,7 +475,7 @@ mod tests {
         let two = set(vec![1.0, 2.0], vec![0, 1]);
         let found = measure(&two, &Array2::zeros((2, 1)), SplitBy::Time);
         assert_eq!(found, Err(Undetermined::FewUnits { units: 2 }));
-        // One of three groups has all of the variation and of the error.
+        // One of three groups has all of the variation and all of the error.
         let targets = (0..30).map(|sample| if sample == 29 { 1e8 } else { 0.0 }).collect();
         let found = measure(
             &set(targets, (0..30).map(|sample| sample / 10).collect()),
@@ -502,7 +510,7 @@ mod tests {
     }
 
     #[test]
-    fn the_remark_blames_the_training_and_shows_on_which_side_of_ridge_the_error_is() {
+    fn the_remark_names_the_training_as_cause_and_shows_whether_the_error_is_below_ridges() {
         let remark = |value, low, high| {
             NonlinearGain {
                 ratio: Interval { value, low, high },

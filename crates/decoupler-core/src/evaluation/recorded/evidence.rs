@@ -9,10 +9,10 @@ use crate::{
     evaluation::{CrossValidated, RunError, RunSettings, baselines::fit_baselines, cross_validation::scatter},
 };
 
-/// Independent evidence in a set of samples: its groups, or stretches of its order.
+/// Independent units in a set of samples: its groups, or stretches in the order of the samples.
 ///
-/// Neighbouring samples of a recording are nearly the same, and samples of a group have much in common. The variance of a
-/// sum is therefore estimated from whole groups, or from the slow cosines of its series.
+/// Neighbouring samples of a recording are nearly the same, and samples of a group are correlated. The variance of a
+/// sum is therefore estimated from whole groups, or from projections of the series on slow cosines.
 #[derive(Clone, Debug)]
 pub(super) enum Evidence {
     /// Samples of each group.
@@ -21,7 +21,7 @@ pub(super) enum Evidence {
     Order,
 }
 
-/// Variance of the sum of influences of samples.
+/// Variance of the sum of the influences of all samples.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct SumVariance {
     /// Estimated variance.
@@ -33,15 +33,15 @@ pub(super) struct SumVariance {
 }
 
 impl SumVariance {
-    /// Returns `true` if a few units make up most of the variance, as with heavy tails: the estimate of the variance then
-    /// depends on extreme values that short data rarely contain.
+    /// Returns `true` if a few units make up most of the variance, as with heavy tails: the estimated variance then
+    /// depends on extreme values that are rare in short data.
     pub(super) fn is_heavy_tailed(&self) -> bool {
         self.freedom < 0.15 * self.units as f64
     }
 }
 
 impl Evidence {
-    /// Evidence in `set`: its groups where it is split by group, otherwise its order.
+    /// Returns the groups of `set` if it is split by group, otherwise the order of its samples.
     pub(super) fn of(set: &Dataset, by: SplitBy) -> Self {
         match by {
             SplitBy::Group => Self::Groups(set.snapshots()),
@@ -51,10 +51,10 @@ impl Evidence {
 
     /// Returns the variance of the sum of `influences`, which have a sum of 0.
     ///
-    /// Groups are independent. Samples in order are as well if no memory is found; otherwise the variance is that of their
-    /// projections on the slowest cosines (Lazarus, Lewis, Stock and Watson 2018, doi:10.1080/07350015.2018.1506926), one
-    /// degree of freedom each. Few units with most of the variance leave fewer degrees of freedom: 2n / (κ − 1) with the
-    /// kurtosis κ (Satterthwaite 1946, doi:10.2307/3002019).
+    /// Groups are independent. So are samples in order if no autocorrelation is found; otherwise the variance is that
+    /// of their projections on the slowest cosines (Lazarus, Lewis, Stock and Watson 2018,
+    /// doi:10.1080/07350015.2018.1506926), with one degree of freedom each. If a few units have most of the variance,
+    /// there are fewer degrees of freedom: 2n / (κ − 1) with the kurtosis κ (Satterthwaite 1946, doi:10.2307/3002019).
     pub(super) fn variance(&self, influences: &[f64]) -> SumVariance {
         match self {
             Self::Groups(groups) => {
@@ -73,7 +73,7 @@ impl Evidence {
     }
 }
 
-/// Fewest degrees of freedom, below which intervals say nothing.
+/// Minimum degrees of freedom; with fewer, intervals are meaningless.
 const MIN_FREEDOM: f64 = 2.0;
 
 fn of_independent(values: &[f64]) -> SumVariance {
@@ -86,7 +86,7 @@ fn of_independent(values: &[f64]) -> SumVariance {
     }
 }
 
-/// 2n / (κ − 1), infinite for values of one size.
+/// Returns 2n / (κ − 1), which is infinite for values of equal magnitude.
 fn tail_freedom(values: &[f64]) -> f64 {
     let count = values.len() as f64;
     let power = |exponent| values.iter().map(|value| value.powi(exponent)).sum::<f64>();
@@ -98,29 +98,30 @@ fn tail_freedom(values: &[f64]) -> f64 {
     }
 }
 
-/// Number of cosines that are slow compared with the memory of `series`; `None` if no memory is found.
+/// Returns the number of cosines that are slow compared with the correlation length of `series`; `None` if no
+/// autocorrelation is found.
 ///
-/// The memory is that of an autoregressive series of order 1 with the correlation of neighbours, looked for in the series
-/// itself and in means of 2, 4, 8, … of its values, so that a slow drift is found beneath independent noise. The number
-/// ν limits the relative bias c·ν² with c = (π/n)²/6 · 2ρ/(1 − ρ)² against the variance 2/ν.
+/// The model is a first-order autoregressive series with the correlation of neighbours, estimated in the series itself
+/// and in means of 2, 4, 8, … of its values, so that a slow drift is found beneath independent noise. The number ν
+/// balances the relative bias c·ν² with c = (π/n)²/6 · 2ρ/(1 − ρ)² against the variance 2/ν.
 pub(super) fn slow_cosines(series: &[f64]) -> Option<usize> {
-    /// Shortest series in which memory can be seen.
-    const SHORTEST: usize = 16;
-    /// Weight of the squared bias: coverage suffers from bias more than from variance.
+    /// Minimum length of a series for detecting autocorrelation.
+    const MIN_LENGTH: usize = 16;
+    /// Weight of the squared bias, which affects coverage more than variance does.
     const WEIGHT: f64 = 25.0;
     const FEWEST: f64 = 3.0;
-    /// More change no interval.
+    /// Maximum number of cosines; more do not change the interval.
     const MAX: f64 = 60.0;
     let mut series = series.to_vec();
     let mut slow: Option<f64> = None;
-    while series.len() >= SHORTEST {
+    while series.len() >= MIN_LENGTH {
         let count = series.len() as f64;
         let mean = series.iter().sum::<f64>() / count;
         series.iter_mut().for_each(|value| *value -= mean);
         let products: f64 = series.windows(2).map(|pair| pair[0] * pair[1]).sum();
         let found = products / series.iter().map(|value| value * value).sum::<f64>();
         if found > 2.0 / count.sqrt() {
-            // Short series show less memory than they have (Marriott and Pope 1954, doi:10.1093/biomet/41.3-4.390).
+            // Estimates from short series are too small (Marriott and Pope 1954, doi:10.1093/biomet/41.3-4.390).
             let memory = (found + (1.0 + 3.0 * found) / count).min(0.97);
             let bias = (PI / count).powi(2) / 6.0 * 2.0 * memory / (1.0 - memory).powi(2);
             let best = (2.0 * bias * bias * WEIGHT).powf(-0.2).round();
@@ -131,9 +132,9 @@ pub(super) fn slow_cosines(series: &[f64]) -> Option<usize> {
     slow.map(|slow| slow as usize)
 }
 
-/// Variance of the sum of `series` from its projections on the `cosines` slowest cosines.
+/// Returns the variance of the sum of `series` from its projections on the `cosines` slowest cosines.
 fn of_cosines(series: &[f64], cosines: usize) -> f64 {
-    /// Enough for the slow cosines.
+    /// Maximum number of means of neighbouring values, enough for the slow cosines.
     const MAX_CELLS: usize = 2000;
     let count = series.len();
     let length = count.div_ceil(MAX_CELLS);
@@ -150,7 +151,7 @@ fn of_cosines(series: &[f64], cosines: usize) -> f64 {
 }
 
 /// Samples in the units that a bootstrap draws: groups (Davison and Hinkley 1997, section 3.8) or consecutive blocks
-/// (Carlstein 1986), so that what neighbouring samples have in common is not taken for independent evidence.
+/// (Carlstein 1986), so that correlated samples are not treated as independent.
 #[derive(Clone, Debug)]
 pub(super) struct Resampling {
     units: Vec<Vec<usize>>,
@@ -159,11 +160,11 @@ pub(super) struct Resampling {
 impl Resampling {
     /// Number of replicates.
     const REPLICATES: usize = 1000;
-    /// Most units: more would take long to draw and change no interval. Neighbours are joined to fewer.
+    /// Maximum number of units: more would be slow to draw and not change the interval. Neighbours are merged.
     const MAX_UNITS: usize = 2000;
 
-    /// Units of `set`: its groups where it is split by group, otherwise blocks as long as the independent stretches of
-    /// `series`, values of the samples in the order of the recording.
+    /// Returns the units of `set`: its groups if it is split by group, otherwise blocks as long as the independent
+    /// stretches of `series`, which has a value for each sample in the order of the recording.
     pub(super) fn of(set: &Dataset, by: SplitBy, series: &[f64]) -> Self {
         let units = match by {
             SplitBy::Group => {
@@ -186,7 +187,7 @@ impl Resampling {
         self.units.len()
     }
 
-    /// Returns the sums over each unit of K values of every sample.
+    /// Returns the sums of K values per sample over each unit.
     pub(super) fn sums<const K: usize>(&self, values: impl Fn(usize) -> [f64; K]) -> Vec<[f64; K]> {
         let sum = |unit: &Vec<usize>| {
             let mut sums = [0.0; K];
@@ -200,8 +201,8 @@ impl Resampling {
         self.units.iter().map(sum).collect()
     }
 
-    /// Draws as many units as there are, with replacement, and calls `replicate` with how often each was drawn, again and
-    /// again.
+    /// Repeatedly draws as many units as there are, with replacement, and calls `replicate` with the number of times
+    /// that each was drawn.
     pub(super) fn draw(&self, rng: &mut impl Rng, mut replicate: impl FnMut(&[f64])) {
         let mut times = vec![0.0; self.count()];
         for _ in 0..Self::REPLICATES {
@@ -214,7 +215,7 @@ impl Resampling {
     }
 }
 
-/// Sum of the units' sums, each as often as it was drawn.
+/// Returns the sum over units, each counted as often as it was drawn.
 pub(super) fn weighted<const K: usize>(sums: &[[f64; K]], times: &[f64]) -> [f64; K] {
     let mut total = [0.0; K];
     for (sums, &times) in sums.iter().zip(times) {
@@ -226,10 +227,10 @@ pub(super) fn weighted<const K: usize>(sums: &[[f64; K]], times: &[f64]) -> [f64
     total
 }
 
-/// Model that is fitted again and again to find out what the readings determine.
+/// Model that is fitted repeatedly to measure how well the readings determine the targets.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum FittedModel {
-    /// Ridge regression: a fit takes milliseconds, but it sees only what is linear.
+    /// Ridge regression: a fit takes milliseconds, but it finds only linear relations.
     #[default]
     Ridge,
     /// The network of the settings: each fit is a training.
@@ -237,7 +238,8 @@ pub enum FittedModel {
 }
 
 impl FittedModel {
-    /// Returns held-out answers for every sample of `set`, each by a model fitted without its fold; `None` if cancelled.
+    /// Returns held-out answers for every sample of `set`, each by a model fitted without its fold; `None` if
+    /// cancelled.
     pub(super) fn held_out(
         self,
         settings: &RunSettings,
@@ -279,9 +281,9 @@ mod tests {
         (0..n).map(|_| next()).collect()
     }
 
-    /// The sum of n values of an autoregressive series of variance 1 has the variance n (1 + ρ) / (1 − ρ) for large n.
+    /// The sum of n values of an autoregressive series of variance 1 has variance n (1 + ρ) / (1 − ρ) for large n.
     #[test]
-    fn the_variance_of_a_sum_is_that_of_theory() {
+    fn the_variance_of_a_sum_agrees_with_theory() {
         for memory in [0.0, 0.5, 0.9_f64] {
             let n = 5000;
             let theory = n as f64 * (1.0 + memory) / (1.0 - memory);
@@ -304,7 +306,7 @@ mod tests {
     }
 
     #[test]
-    fn short_constant_or_missing_values_show_no_memory() {
+    fn short_constant_or_nan_series_have_no_autocorrelation() {
         for series in [vec![], vec![1.0], vec![2.0; 100], vec![f64::NAN; 50]] {
             assert_eq!(slow_cosines(&series), None);
         }

@@ -12,7 +12,7 @@ use crate::{
 pub struct LearningCurve {
     /// Errors at each number of samples, ascending.
     pub points: Vec<LearningPoint>,
-    /// The law fitted to them; `None` with fewer than three numbers.
+    /// Law fitted to the points; `None` with fewer than three numbers of samples.
     pub law: Option<PowerLaw>,
     /// Gain from twice the training samples; `None` without a law.
     pub doubling: Option<Doubling>,
@@ -29,11 +29,12 @@ pub struct LearningPoint {
     pub range: [f64; 2],
 }
 
-/// Error with twice the training samples in proportion to that with all there are.
+/// Ratio of the error with twice the training samples to the error with all available samples.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Doubling {
-    /// Proportion with its interval: below 1 where more samples would help. The median over bootstrap samples of the test
-    /// set and of the fits, and over laws fitted from each number of samples on, since none holds down to the smallest.
+    /// Ratio with its interval: below 1 if more samples would help. It is the median over bootstrap samples of the test
+    /// set and of the fits, and over laws fitted from each number of samples upwards, since laws do not hold for few
+    /// samples.
     pub ratio: Interval,
 }
 
@@ -45,22 +46,22 @@ struct TestSquares {
 }
 
 impl LearningCurve {
-    /// Fits at each number of samples below all.
+    /// Number of fits at each number of samples, except with all samples.
     pub const REPEATS: usize = 4;
-    /// Numbers of samples, each the larger by √2, up to all. Below an eighth of a recording, stretches miss whole regions
-    /// of what is sensed, and errors follow no law that could be extended.
+    /// Number of levels, which differ by factors of √2 up to all samples. Stretches shorter than an eighth of a
+    /// recording miss whole regions of the input space, and their errors follow no law that could be extrapolated.
     const LEVELS: i32 = 7;
-    /// Largest number of fits of [`Self::measure`].
+    /// Maximum number of fits of [`Self::measure`].
     pub(super) const MAX_FITS: usize = Self::LEVELS as usize * Self::REPEATS;
-    /// Fewest training samples of a fit.
-    const FEWEST: usize = 8;
-    /// Part of the error that twice the samples must save to be called a gain.
-    const WORTH_SAYING: f64 = 0.01;
+    /// Minimum number of training samples of a fit.
+    const MIN_SAMPLES: usize = 8;
+    /// Minimum relative reduction of the error with twice the samples that counts as a gain.
+    const MIN_GAIN: f64 = 0.01;
 
     /// Fits `model` to all training samples of `parts`, to 1/√2 of them, and so on down to an eighth, and measures the
-    /// test samples, target by target; `None` if cancelled. DividedSamples of the training set are stretches of the recording, whole
-    /// groups or single samples as `by` says, so that twice as many samples mean twice as long a recording, or twice as
-    /// many groups. Takes up to 28 fits.
+    /// error on the test samples, target by target; `None` if cancelled. Subsets of the training set are stretches of
+    /// the recording, whole groups or single samples, depending on `by`, so that twice as many samples mean a recording
+    /// twice as long, or twice as many groups. Takes up to 28 fits.
     ///
     /// # Errors
     /// If the settings are invalid.
@@ -77,10 +78,10 @@ impl LearningCurve {
         for level in (0..Self::LEVELS).rev() {
             let share = std::f64::consts::FRAC_1_SQRT_2.powi(level);
             let wanted = (share * whole.training.samples() as f64).round() as usize;
-            if wanted < Self::FEWEST {
+            if wanted < Self::MIN_SAMPLES {
                 continue;
             }
-            // The network's start varies where its samples do not.
+            // With all samples, networks differ by their initialisation.
             let repeats = if level == 0 && model == FittedModel::Ridge {
                 1
             } else {
@@ -121,7 +122,7 @@ impl LearningCurve {
             if resampling.count() < Interval::FEWEST_UNITS {
                 return None;
             }
-            // Squared errors of every fit in every unit of the test set.
+            // Squared errors of every fit on every unit of the test set.
             let sums: Vec<Vec<[f64; 2]>> = columns
                 .iter()
                 .map(|squares| resampling.sums(|sample| [1.0, squares[sample]]))
@@ -139,7 +140,7 @@ impl LearningCurve {
                     first += level.len();
                     let mut pick = |errors: &[f64]| errors[picks.random_range(0..errors.len())];
                     let picked = errors.iter().map(|_| pick(&errors)).sum::<f64>() / errors.len() as f64;
-                    // A single fit has the luck of its samples, as much as one of the level before.
+                    // A single fit varies with its samples as much as one fit of the previous level.
                     let luck = if errors.len() == 1 && !before.is_empty() {
                         pick(&before) * before.len() as f64 / before.iter().sum::<f64>()
                     } else {
@@ -149,7 +150,7 @@ impl LearningCurve {
                     drawn.push((samples, picked * luck));
                     before = errors;
                 }
-                // A law holds only so far down: how far, no one knows.
+                // The smallest number of samples for which the law holds is unknown, so it is drawn.
                 let lowest = picks.random_range(0..=drawn.len().saturating_sub(3));
                 replicates.push(PowerLaw::fit(&drawn[lowest..]).map_or(f64::NAN, |law| law.doubling(whole)));
             });
@@ -161,13 +162,13 @@ impl LearningCurve {
         Self { points, law, doubling }
     }
 
-    /// Returns `true` if twice the samples would lower the error by more than the interval shows.
+    /// Returns `true` if twice the samples would lower the error significantly.
     pub fn gains(&self) -> bool {
         self.doubling
-            .is_some_and(|doubling| doubling.ratio.high < 1.0 - Self::WORTH_SAYING)
+            .is_some_and(|doubling| doubling.ratio.high < 1.0 - Self::MIN_GAIN)
     }
 
-    /// A sentence on what twice the samples would bring for the target of this name.
+    /// Returns a sentence on the gain from twice the samples for the target of this name.
     pub fn sentence(&self, name: &str) -> String {
         let percent = |ratio: f64| 100.0 * (1.0 - ratio);
         match self.doubling {
@@ -179,7 +180,7 @@ impl LearningCurve {
                 percent(ratio.low)
             ),
             Some(Doubling { ratio }) => format!(
-                "no gain seen for {name} from more samples like these (twice as many: {:.0} %, {:.0} to {:.0} %)",
+                "no gain found for {name} from more samples like these (twice as many: {:.0} %, {:.0} to {:.0} %)",
                 percent(ratio.value),
                 percent(ratio.high),
                 percent(ratio.low)
@@ -188,7 +189,7 @@ impl LearningCurve {
     }
 }
 
-/// Numbers of samples of one level: whole groups cannot be halved exactly.
+/// Returns `true` if two numbers of samples belong to the same level: whole groups cannot be halved exactly.
 fn near(one: usize, other: usize) -> bool {
     let ratio = one as f64 / other as f64;
     (0.85..1.18).contains(&ratio)
@@ -212,8 +213,8 @@ fn law_of(points: &[LearningPoint]) -> Option<PowerLaw> {
     PowerLaw::fit(&points)
 }
 
-/// Chooses about `wanted` samples for one of several repeats: a stretch that begins later with each repeat, groups or
-/// samples at random.
+/// Chooses about `wanted` samples for one of several repeats: a stretch that begins later with each repeat, or random
+/// groups or samples.
 fn choose(
     training: &Dataset,
     wanted: usize,
@@ -232,7 +233,7 @@ fn choose(
             groups.shuffle(rng);
             let mut chosen = Vec::new();
             for group in groups {
-                // The nearest number, but never none.
+                // Chooses the nearest possible number, but at least one group.
                 if !chosen.is_empty() && (chosen.len() + group.len() / 2) >= wanted {
                     break;
                 }
@@ -251,7 +252,7 @@ fn choose(
     }
 }
 
-/// Squared errors on `test` (samples × outputs) of a fit to `split`; `None` if cancelled.
+/// Returns the squared errors on `test` (samples × outputs) of a fit to `split`; `None` if cancelled.
 fn squared_errors(
     settings: &RunSettings,
     seed: Seed,
@@ -286,16 +287,16 @@ pub struct PowerLaw {
     pub floor: f64,
     /// Error above the floor at one sample.
     pub scale: f64,
-    /// Exponent of the decrease; 0.5 is that of averaging noise.
+    /// Exponent of the decrease; 0.5 corresponds to averaging noise.
     pub exponent: f64,
 }
 
 impl PowerLaw {
-    /// Fits the law to errors at numbers of samples, in proportion to the errors; `None` with fewer than three different
-    /// numbers or without errors above 0. Points weigh in proportion to their samples, as the law is to be extended from
-    /// the largest number on.
+    /// Fits the law to errors at numbers of samples by least squares on relative errors; `None` with fewer than three
+    /// different numbers or without errors above 0. Weights are proportional to the number of samples, since the law is
+    /// extrapolated beyond the largest number.
     ///
-    /// For each exponent of a grid, floor and scale are those of least squares that are not negative.
+    /// For each exponent of a grid, floor and scale are the nonnegative least-squares solution.
     pub(super) fn fit(points: &[(f64, f64)]) -> Option<Self> {
         let mut numbers: Vec<f64> = points.iter().map(|(number, _)| *number).collect();
         numbers.sort_by(f64::total_cmp);
@@ -309,7 +310,7 @@ impl PowerLaw {
         best.map(|(law, _)| law)
     }
 
-    /// The best law of this exponent, and its sum of squared relative errors.
+    /// Returns the best law with this exponent, and its sum of squared relative errors.
     fn with_exponent(points: &[(f64, f64)], exponent: f64) -> (Self, f64) {
         // Weighted sums of 1·1, 1·x, x·x, 1·y and x·y, with x = n^(−exponent).
         let mut sums = [0.0; 5];
@@ -333,15 +334,16 @@ impl PowerLaw {
             (law, misses.sum::<f64>())
         });
         let best = judged.min_by(|(_, one), (_, other)| one.total_cmp(other));
-        best.expect("the constant law of positive errors is not negative")
+        best.expect("the constant law of positive errors is nonnegative")
     }
 
-    /// Error at this number of samples.
+    /// Returns the error at this number of samples.
     pub fn at(&self, samples: f64) -> f64 {
         self.floor + self.scale * samples.powf(-self.exponent)
     }
 
-    /// Error with twice this many samples in proportion to that with this many: 1 where more bring nothing.
+    /// Returns the ratio of the error with twice this many samples to the error with this many: 1 if more have no
+    /// benefit.
     pub fn doubling(&self, samples: f64) -> f64 {
         self.at(2.0 * samples) / self.at(samples)
     }
@@ -352,7 +354,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_law_is_found_again_from_its_values() {
+    fn a_law_is_recovered_from_its_values() {
         for law in [
             PowerLaw {
                 floor: 0.2,
@@ -382,7 +384,7 @@ mod tests {
     }
 
     #[test]
-    fn a_rising_curve_brings_nothing_and_two_numbers_tell_no_law() {
+    fn a_rising_curve_has_no_gain_and_two_numbers_have_no_law() {
         let rising = [(10.0, 1.0), (20.0, 1.1), (40.0, 1.3)];
         assert_eq!(PowerLaw::fit(&rising).unwrap().doubling(40.0), 1.0);
         assert_eq!(PowerLaw::fit(&[(10.0, 1.0), (20.0, 0.9), (20.0, 0.8)]), None);

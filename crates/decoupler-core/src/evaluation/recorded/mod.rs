@@ -1,7 +1,8 @@
-//! Judges recordings by the knowledge in them: of each target, by each channel, and with more samples.
+//! Analysis of recordings: how well the readings determine each target, the importance of each channel, and the gain
+//! from more samples.
 //!
-//! Everything is judged on held-out answers, such as those of a [`CrossValidated`](super::CrossValidated), and every
-//! figure has a 95 % confidence interval from independent stretches or groups of samples, because neighbouring samples of a
+//! Every figure is computed from held-out answers, such as those of a [`CrossValidated`](super::CrossValidated), and
+//! has a 95 % confidence interval from independent stretches or groups of samples, because neighbouring samples of a
 //! recording are nearly the same.
 
 mod channel_remark;

@@ -11,11 +11,11 @@ use crate::{
     evaluation::{CrossValidated, RunError, RunSettings, Scores, TargetErrors},
 };
 
-/// Held-out errors of the same settings on the same samples, once with folds by group (by time without groups), once with
-/// random folds: the difference is how optimistic a random split is.
+/// Held-out errors with the same settings and samples, for folds by group (by time without groups) and for random
+/// folds. The difference shows how optimistic a random split is.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SplitComparison {
-    /// Rule of the folds that are not optimistic.
+    /// Rule of the folds that are not random.
     pub by: SplitBy,
     /// Errors of the network by that rule, target by target.
     pub network: Vec<TargetErrors>,
@@ -28,11 +28,12 @@ pub struct SplitComparison {
 }
 
 impl SplitComparison {
-    /// Share of the error that a random split must hide to be worth a sentence.
-    const WORTH_SAYING: f64 = 0.05;
+    /// Minimum share of the error hidden by a random split that is reported.
+    const MIN_OPTIMISM: f64 = 0.05;
 
-    /// Compares the cross-validation `validated` of `set`, with `folds` folds by `by`, with random folds: by group if there
-    /// are groups, else by `by`, or by time if that is random; `None` if cancelled. Takes up to 2 × folds trainings.
+    /// Compares random folds of `set` with folds by group if there are groups, otherwise by `by`, or by time if `by` is
+    /// random. `validated` is the cross-validation with `folds` folds by `by`. Returns `None` if cancelled. Takes up to
+    /// 2 × folds trainings.
     ///
     /// # Errors
     /// If the settings are invalid.
@@ -60,7 +61,7 @@ impl SplitComparison {
         Ok(random.map(|random| Self::of(honest, [of_honest, random])))
     }
 
-    /// Compares the errors of two runs or cross-validations, by `by` and at random.
+    /// Compares the errors of two runs or cross-validations, split by `by` and at random.
     pub fn of(by: SplitBy, [honest, random]: [Scores; 2]) -> Self {
         let errors =
             |scores: Scores| [&scores.baselines.linear, &scores.network].map(|errors| errors.targets().to_vec());
@@ -74,23 +75,23 @@ impl SplitComparison {
         }
     }
 
-    /// RMSE of the network on random folds in proportion to that by [`Self::by`]: below 1 where random folds are optimistic.
-    /// `None` if the latter is 0.
+    /// Returns the ratio of the RMSE of the network on random folds to that on folds by [`Self::by`]: below 1 if random
+    /// folds are optimistic. `None` if the RMSE on folds by [`Self::by`] is 0.
     pub fn network_ratio(&self, target: usize) -> Option<f64> {
         ratio(&self.random_network[target], &self.network[target])
     }
 
-    /// As [`Self::network_ratio`], of ridge regression.
+    /// As [`Self::network_ratio`], for ridge regression.
     pub fn ridge_ratio(&self, target: usize) -> Option<f64> {
         ratio(&self.random_ridge[target], &self.ridge[target])
     }
 
-    /// A sentence on what a random split would have reported for the target of this name.
+    /// Returns a sentence on the error that a random split would have reported for the target of this name.
     pub fn sentence(&self, target: usize, name: &str) -> String {
         let (honest, random) = (self.network[target].rmse, self.random_network[target].rmse);
         let by = self.by;
         match self.network_ratio(target) {
-            Some(ratio) if ratio < 1.0 - Self::WORTH_SAYING => format!(
+            Some(ratio) if ratio < 1.0 - Self::MIN_OPTIMISM => format!(
                 "a random split would report an RMSE of {random:.4} for {name}; split by {by} it is {honest:.4}: the random \
                  split is optimistic by {:.0} %, because neighbouring samples are nearly the same",
                 100.0 * (1.0 - ratio)
@@ -106,7 +107,7 @@ fn ratio(random: &TargetErrors, honest: &TargetErrors) -> Option<f64> {
     Some(random.rmse / honest.rmse).filter(|ratio| ratio.is_finite())
 }
 
-/// Findings on a recording: of each target, by each channel, and with more samples.
+/// Findings on a recording: for each target, for each channel, and with more samples.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Findings {
     /// Model behind [`Self::importance`] and the learning curves.
@@ -115,32 +116,32 @@ pub struct Findings {
     pub targets: Vec<TargetFindings>,
     /// Constant, duplicated and saturated channels.
     pub remarks: Vec<ChannelRemark>,
-    /// Worth of each channel; empty if there is only one.
+    /// Importance of each channel; empty if there is only one.
     pub importance: Vec<ChannelImportance>,
-    /// Errors that a random split would hide; `None` without networks.
+    /// Comparison with a random split; `None` without networks.
     pub comparison: Option<SplitComparison>,
 }
 
 /// Findings on one target.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TargetFindings {
-    /// R² of the network; `None` without networks, or where it is not determined.
+    /// R² of the network; `None` without networks, or if it is not determined.
     pub network: Option<Determination>,
     /// R² of ridge regression, or the reason why it is not determined.
     pub ridge: Result<Determination, Undetermined>,
-    /// Error of the network next to that of ridge.
+    /// Error of the network compared with ridge.
     pub gain: Option<NonlinearGain>,
-    /// Error with fewer and with more samples.
+    /// Error with fewer and more samples.
     pub curve: LearningCurve,
 }
 
-/// Part of the work of [`Findings::measure`].
+/// Stage of [`Findings::measure`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum StudyStep {
     /// Cross-validation by the rule of the split.
     Folds,
-    /// Cross-validation by other rules, to compare.
+    /// Cross-validation by other rules, for comparison.
     OtherFolds,
     /// Fits without each channel.
     Channels,
@@ -160,14 +161,15 @@ impl fmt::Display for StudyStep {
 }
 
 impl Findings {
-    /// Largest number of networks that [`Self::measure`] trains for this many channels, with this many folds.
+    /// Maximum number of networks that [`Self::measure`] trains for this many channels, with this many folds.
     pub fn max_trainings(channels: usize, folds: usize) -> usize {
         (3 + channels + 1) * folds + LearningCurve::MAX_FITS
     }
 
-    /// Studies `set` by cross-validation with `folds` folds by the rule of `division`, whose test samples judge the learning
-    /// curve; `None` if cancelled. `model` is what is fitted without each channel and to fewer samples: if it is not given, the
-    /// network where it is worth more than ridge regression for a target, else ridge; with ridge, no network is trained at all.
+    /// Analyses `set` by cross-validation with `folds` folds by the rule of `division`, whose test samples are used for
+    /// the learning curve; returns `None` if cancelled. `model` is fitted without each channel and to fewer samples. By
+    /// default it is the network if it is better than ridge regression for a target, otherwise ridge; with ridge, no
+    /// network is trained at all.
     ///
     /// # Errors
     /// If the set cannot be divided, or the settings are invalid.
@@ -204,7 +206,7 @@ impl Findings {
             gains = NonlinearGain::of_validated(set, &validated, by);
             comparison = Some(compared);
         }
-        // Where the readings determine nothing, the better answer is only nearer to the mean.
+        // If the readings determine nothing, the better answer is only closer to the mean.
         let is_worth_it = gains.iter().zip(&network).any(|(gain, network)| {
             let is_told = network
                 .as_ref()
@@ -244,7 +246,7 @@ impl Findings {
 }
 
 impl TargetFindings {
-    /// R² of the better of network and ridge, with the model.
+    /// Returns the better of network and ridge, with its R².
     pub fn best(&self) -> Option<(FittedModel, Determination)> {
         let network = self.network.map(|network| (FittedModel::Network, network));
         let ridge = self.ridge.ok().map(|ridge| (FittedModel::Ridge, ridge));
@@ -255,29 +257,29 @@ impl TargetFindings {
     }
 }
 
-/// A figure with its 95 % confidence interval.
+/// Figure with its 95 % confidence interval.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Interval {
-    /// The figure itself, on all samples.
+    /// Figure from all samples.
     pub value: f64,
-    /// Lower end.
+    /// Lower end of the interval.
     pub low: f64,
-    /// Upper end.
+    /// Upper end of the interval.
     pub high: f64,
 }
 
 impl Interval {
-    /// Fewest independent units for an interval.
+    /// Minimum number of independent units for an interval.
     pub(super) const FEWEST_UNITS: usize = 3;
-    /// Largest factor by which an end may differ from the figure: beyond it, the figure is not determined.
-    const LARGEST_FACTOR: f64 = 100.0;
+    /// Maximum factor between an end and the figure; beyond it, the figure is not determined.
+    const MAX_FACTOR: f64 = 100.0;
 
-    /// Returns the interval of a positive ratio whose sampling variance is `spread`: Student's, symmetric in the logarithm,
-    /// in which the ratio of two sums of squares is nearly normal. `None` if that determines nothing.
+    /// Returns the interval of a positive ratio with sampling variance `spread`: a Student's t interval in the
+    /// logarithm, in which the ratio of two sums of squares is nearly normal. `None` if the ratio is not determined.
     pub(super) fn of_ratio(ratio: f64, spread: SumVariance) -> Option<Self> {
         let reach = student_quantile(spread.freedom) * spread.variance.sqrt() / ratio;
-        // Not for NaN either.
-        let is_determined = ratio.is_finite() && ratio > 0.0 && reach <= Self::LARGEST_FACTOR.ln();
+        // False for NaN.
+        let is_determined = ratio.is_finite() && ratio > 0.0 && reach <= Self::MAX_FACTOR.ln();
         (is_determined && spread.units >= Self::FEWEST_UNITS).then(|| Self {
             value: ratio,
             low: ratio * (-reach).exp(),
@@ -285,8 +287,8 @@ impl Interval {
         })
     }
 
-    /// Returns the percentile interval (Efron 1979) of `replicates`, of which NaNs are left out;
-    /// `None` if the figure itself is none, or fewer than half of the replicates are left.
+    /// Returns the percentile interval (Efron 1979) of `replicates`, ignoring NaN; `None` if the figure itself is NaN,
+    /// or fewer than half of the replicates remain.
     pub(super) fn of_replicates(value: f64, replicates: &[f64]) -> Option<Self> {
         let mut sorted: Vec<f64> = replicates.iter().copied().filter(|value| value.is_finite()).collect();
         if !value.is_finite() || 2 * sorted.len() < replicates.len() || sorted.is_empty() {
@@ -296,13 +298,13 @@ impl Interval {
         let at = |share: f64| sorted[(share * (sorted.len() - 1) as f64).round() as usize];
         Some(Self {
             value,
-            // Few replicates may all lie on one side.
+            // All of a few replicates may lie on one side.
             low: at(0.025).min(value),
             high: at(0.975).max(value),
         })
     }
 
-    /// The interval of a monotonic function of the figure.
+    /// Returns the interval of a monotonic function of the figure.
     #[must_use]
     pub(super) fn map(&self, function: impl Fn(f64) -> f64) -> Self {
         let [low, high] = [self.low, self.high].map(&function);
@@ -315,10 +317,10 @@ impl Interval {
 }
 
 impl fmt::Display for Interval {
-    /// Writes `0.04 (0.01 to 0.09)`, with decimals as given, or two.
+    /// Writes `0.04 (0.01 to 0.09)`, with the given number of decimals, or two.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let digits = f.precision().unwrap_or(2);
-        // No -0.00.
+        // Avoids -0.00.
         let places = 10.0_f64.powi(digits as i32);
         let [value, low, high] =
             [self.value, self.low, self.high].map(|figure| (figure * places).round() / places + 0.0);
@@ -326,10 +328,10 @@ impl fmt::Display for Interval {
     }
 }
 
-/// 97.5 % quantile of Student's t with this many degrees of freedom, 2 or more, not necessarily whole: Hill 1970, algorithm
-/// 396 (doi:10.1145/355598.355600), within 3e-4 of the exact value.
+/// Returns the 97.5 % quantile of Student's t with this many degrees of freedom, at least 2 and not necessarily an
+/// integer (Hill 1970, algorithm 396, doi:10.1145/355598.355600), within 3e-4 of the exact value.
 pub(super) fn student_quantile(freedom: f64) -> f64 {
-    /// Probability beyond the quantile, on both sides.
+    /// Probability of both tails.
     const TAILS: f64 = 0.05;
     const NORMAL_QUANTILE: f64 = -1.959_963_984_540_054;
     let a = 1.0 / (freedom - 0.5);
@@ -371,15 +373,15 @@ mod tests {
     }
 
     #[test]
-    fn an_interval_is_written_with_both_of_its_ends() {
-        // t of 20 degrees of freedom is 2.086: e^(±0.2086).
+    fn an_interval_is_written_with_both_ends() {
+        // t with 20 degrees of freedom is 2.086: e^(±0.2086).
         let interval = of_ratio(1.0, 0.01, 21).unwrap();
         assert_eq!(format!("{interval:.4}"), "1.0000 (0.8117 to 1.2319)");
         assert_eq!(interval.map(|ratio| 1.0 - ratio).to_string(), "0.00 (-0.23 to 0.19)");
     }
 
     #[test]
-    fn what_determines_nothing_has_no_interval() {
+    fn an_undetermined_ratio_has_no_interval() {
         for (ratio, variance, units) in [
             (1.0, 0.01, 2),
             (1.0, 10.0, 20),
@@ -394,7 +396,7 @@ mod tests {
     }
 
     #[test]
-    fn quantiles_are_those_of_scipy() {
+    fn quantiles_agree_with_scipy() {
         for (freedom, expected) in [
             (2.0, 4.302_652_729_749_462),
             (2.3, 3.807_163_208_232_131),
