@@ -114,7 +114,7 @@ impl Train {
             Ok(honest) => honest,
             Err(error) => {
                 return Ok(vec![format!(
-                    "a random split is optimistic when neighbouring rows are similar, but it cannot be measured by how much: \
+                    "a random split is optimistic when neighbouring rows are similar; by how much cannot be measured here: \
                      split by {by}, {error}"
                 )]);
             }

@@ -446,7 +446,7 @@ impl FineTune {
         print(|out| {
             writeln!(
                 out,
-                "{} row-wires trained, {} for validation, {} for the test",
+                "{} row-wires trained, {} for validation, {} for testing",
                 report.training_samples, report.validation_samples, report.test_samples
             )?;
             let mm = format_number;

@@ -59,14 +59,14 @@ pub(super) enum Failure {
     #[error("{0}")]
     Interrupted(Interruption),
     #[error(
-        "interrupted during the second training; the first is complete, and how optimistic its random test samples are is not known: use --split {by}"
+        "interrupted during the second training; the first is complete, but the optimism of its random test samples was not measured: use --split {by}"
     )]
     InterruptedComparison { by: SplitBy },
     #[error(transparent)]
     Threads(ExperimentError),
     #[error("interrupted after {done} of {trials} trials")]
     InterruptedTrials { done: usize, trials: usize },
-    #[error("{place}: {cause}; only what was measured before is printed")]
+    #[error("{place}: {cause}; only earlier results are printed")]
     TradeOff { place: String, cause: Box<Failure> },
     #[error("interrupted after {done} points")]
     InterruptedTrade { done: usize },
@@ -126,9 +126,9 @@ pub(super) enum Failure {
     },
     #[error("'{}': line {line}: there is no network for row {row}; train with samples of it", .path.display())]
     UnknownRow { path: PathBuf, line: u64, row: usize },
-    #[error("'{}': it has no column '{column}' with the number of each line's row-wire, and there is a network for each; add it", .path.display())]
+    #[error("'{}': it has no column '{column}' with the row number of each line, which is needed because each row has its own network; add it", .path.display())]
     NoRowWires { path: PathBuf, column: String },
-    #[error("'{}': {lines} lines are not a multiple of {rows} rows: each snapshot needs one line per row-wire; add the rest, or a column named row with the number of each line's row-wire", .path.display())]
+    #[error("'{}': {lines} lines are not a multiple of {rows} rows: each snapshot needs one line per row-wire; add the missing lines, or a column named row with the row number of each line", .path.display())]
     PartOfSnapshot { path: PathBuf, lines: usize, rows: usize },
     #[error("'{}': line {line}: the resistances are so far outside the training range that the network's output is not a finite number; check them", .path.display())]
     NoAnswer { path: PathBuf, line: u64 },

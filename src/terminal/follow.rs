@@ -172,7 +172,8 @@ impl Follow {
                 Ok(true) => report.good(read_at.elapsed()),
                 Ok(false) => {
                     report.bad(&format_args!(
-                        "line {number}: the readings are so far outside the training range that the network's output is not a finite number"
+                        "line {number}: the readings are so far outside the training range that the network's \
+                         output is not a finite number"
                     ));
                     return Ok(Kept::AsBefore);
                 }
@@ -314,7 +315,8 @@ impl Faults {
         let scale = sensor.scale;
         let reason = if scene.noise.in_test().is_none() {
             Some(
-                "fault detection needs the noise of the readings, and the network was trained without noise; give --noise REL",
+                "fault detection needs the noise of the readings, and the network was trained without noise; give \
+                 --noise REL",
             )
         } else if !FaultMonitor::is_affordable(scale, &scene) {
             Some("the array is too large")
@@ -389,7 +391,8 @@ impl Faults {
         match watch.monitor.check(&watch.frame_ohm) {
             Some(FaultEvent::Named(fault)) => {
                 warn(&format!(
-                    "line {line}: {fault}; left out from here on; its row is decoded from the other readings by the Gauss-Newton method"
+                    "line {line}: {fault}; left out from here on; frames are decoded from the other readings \
+                     by the Gauss-Newton method"
                 ));
             }
             Some(FaultEvent::Unexplained) => warn(&format!(

@@ -85,7 +85,7 @@ pub(super) struct ImportArguments {
     /// Test samples: the last in time, whole groups, or random ones [default: group with --group, else time]
     #[arg(long, value_name = "time|group|random")]
     split: Option<SplitBy>,
-    /// Share of the samples for the test [default: 0.2]
+    /// Share of the samples held out for testing [default: 0.2]
     #[arg(long, value_name = "SHARE", value_parser = share, conflicts_with = "test_data")]
     test_fraction: Option<f64>,
     /// Share of the other samples that selects the best weights and ends the training; 0 for none [default: 0 with

@@ -251,7 +251,7 @@ impl RecordingReport {
         write_files(&self.files, self.rows, &self.dropped, out)?;
         writeln!(
             out,
-            "{} for training, {} for validation, {} for the test (split by {})",
+            "{} for training, {} for validation, {} for testing (split by {})",
             counted(self.samples, "sample"),
             self.validation_samples,
             self.test_samples,

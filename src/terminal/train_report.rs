@@ -445,7 +445,7 @@ fn write_array(
     let whole = |samples: usize| samples.div_ceil(rows) * rows;
     writeln!(
         out,
-        "{} for training, {} for validation, {} for the test",
+        "{} for training, {} for validation, {} for testing",
         counted(whole(source.samples), "sample"),
         whole(source.validation_samples),
         whole(source.test_samples)

@@ -130,7 +130,7 @@ fn an_unwritable_file_is_refused_before_training_and_leaves_nothing() {
         ("fixed.json", "read-only"),
     ];
     for (path, expected) in cases {
-        // So many epochs that training before the check would be noticed.
+        // With this many epochs, training before the check would be noticed.
         let text = failure(&format!("train --epochs 1000000 --out {path}"), folder.path(), 1);
         assert!(text.contains(expected), "{text}");
         assert!(failure(&format!("simulate --out {path}"), folder.path(), 1).contains(expected));

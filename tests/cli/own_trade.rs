@@ -142,7 +142,7 @@ fn the_table_lists_the_errors_of_each_target_in_its_unit() {
         folder.path(),
     );
     for expected in [
-        "160 samples for training, 0 for validation, 40 for the test (split by time)",
+        "160 samples for training, 0 for validation, 40 for testing (split by time)",
         "Time to decode a sample",
         "% of range",
         "c4 (mm)",
