@@ -18,7 +18,7 @@ use crate::{
     training::{Examples, Problem, Trainer, TrainingSettings},
 };
 
-/// Sensor touched with the pointer: positions of its nodes and readings of its wires, without noise.
+/// Sensor deformed by a [`Touch`]: positions of its nodes and readings of its wires, without noise.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Pressed {
     /// Coordinates of the nodes: rows read × 3·M2.

@@ -65,7 +65,7 @@ impl fmt::Display for Remark {
                 match times {
                     None => write!(
                         f,
-                        "it has an error in {target}, in which always answering the mean is exact"
+                        "it has an error in {target}, although always answering the mean is exact"
                     )?,
                     Some(times @ ..1e4) => write!(
                         f,
@@ -361,7 +361,7 @@ mod tests {
         assert_eq!(of_exact_mean.len(), 1, "{of_exact_mean:?}");
         let text = of_exact_mean[0].to_string();
         assert!(
-            text.contains("error in x, in which always answering the mean is exact"),
+            text.contains("error in x, although always answering the mean is exact"),
             "{text}"
         );
         assert!(!text.contains("inf") && !text.contains("times"), "{text}");

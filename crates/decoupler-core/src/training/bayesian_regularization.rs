@@ -198,8 +198,8 @@ impl Algorithm for BayesianRegularization {
     const DESCRIPTION: Description = Description {
         short_name: "br",
         name: "Bayesian regularisation",
-        summary: "Levenberg-Marquardt that keeps weights small, balanced against the error by what the data can \
-                  determine: for few or noisy samples.",
+        summary: "Levenberg-Marquardt with a penalty on the weights whose strength is estimated from the data: for few or \
+                  noisy samples.",
         parameter_name: "mu",
         remedy: "try another seed, more samples, or Levenberg-Marquardt (lm)",
     };

@@ -157,7 +157,7 @@ pub(super) fn check_limit(
 /// Defect of a training that has ended. Its text describes the problem and the remedy.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TrainingDefect {
-    /// Epoch in which the error rose above its initial value for good, if it did.
+    /// Epoch from which on the error stayed above its initial value, if the training diverged.
     pub diverged_in: Option<usize>,
     /// `true` if the best network is hardly better than the random start: [`TrainingDefect::MIN_GAIN`].
     pub is_at_start: bool,

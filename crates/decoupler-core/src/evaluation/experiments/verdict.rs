@@ -208,7 +208,7 @@ fn optimum_exists(cells: Vec<CellErrors>) -> Verdict {
     let ends = [&cells[0], last].into_iter().filter(|end| end.column != best.column);
     let ends: Vec<_> = ends.map(CellErrors::figures).collect();
     let open = match standing {
-        VerdictStatus::Undecided => "; not decided with so few trials or so wide a spread",
+        VerdictStatus::Undecided => "; not decided: too few trials, or their spread is too wide",
         _ => "",
     };
     let finding = sentence(&format!(

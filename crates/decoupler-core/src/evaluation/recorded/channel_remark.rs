@@ -139,8 +139,8 @@ fn saturation(channel: usize, readings: ArrayView1<'_, f64>) -> Vec<ChannelRemar
     let judge = |end: &[f64], next: &[&[f64]], is_largest: bool| {
         let share = end.len() as f64 / sorted.len() as f64;
         let neighbours = next.iter().map(|run| run.len()).max().unwrap_or(0);
-        let piles_up = end.len() >= MIN_SAMPLES && share >= MIN_SHARE && end.len() > MIN_RATIO * neighbours;
-        piles_up.then_some(ChannelRemark::Saturated {
+        let is_saturated = end.len() >= MIN_SAMPLES && share >= MIN_SHARE && end.len() > MIN_RATIO * neighbours;
+        is_saturated.then_some(ChannelRemark::Saturated {
             channel,
             value: end[0],
             is_largest,

@@ -134,7 +134,7 @@ pub(super) fn slow_cosines(series: &[f64]) -> Option<usize> {
 
 /// Returns the variance of the sum of `series` from its projections on the `cosines` slowest cosines.
 fn of_cosines(series: &[f64], cosines: usize) -> f64 {
-    /// Maximum number of means of neighbouring values, enough for the slow cosines.
+    /// Maximum number of sums of neighbouring values, enough for the slow cosines.
     const MAX_CELLS: usize = 2000;
     let count = series.len();
     let length = count.div_ceil(MAX_CELLS);
