@@ -106,7 +106,7 @@ terms! { ERROR_TERMS:
         "Bayesian reference: the error that remains given the noise and the loading of the scene. On average, no decoder of a \
          row's own readings does better. Without noise, only the rounding of the readings is left.";
     PUBLISHED = "Published",
-        "What the paper reports for this array, hidden nodes and samples.";
+        "Error that the paper reports for this array and these numbers of hidden nodes and samples.";
     RESIDUAL = "Residual",
         "Relative difference between the readings and those that Eq. (2) gives for the decoded deformation (root mean \
          square). It needs no ground truth.",
@@ -209,7 +209,7 @@ terms! { SENSOR_TERMS:
         "Distance that a node can travel downwards, in mm: the full scale of the deformation.",
         "stroke = largest compression · height";
     CONDITION_NUMBER = "Condition number",
-        "Worst-case amplification of a relative error in the readings, for the worst row with its nodes pressed half way.",
+        "Worst-case amplification of a relative error in the readings, for the worst row with its nodes pressed halfway.",
         "largest / smallest singular value of the Jacobian of ln R";
     SINGULAR_VALUES = "Singular values",
         "How strongly each independent pattern of movement of a row changes its readings, per millimetre. Patterns with \
@@ -221,7 +221,7 @@ terms! { SENSOR_TERMS:
          than half of the rows is preserved.",
         "gain = R unloaded / R of the model at rest";
     WIRE_FAULT = "Fault",
-        "A broken, shorted, drifting or stuck wire, named once four frames in a row contradict Eq. (2).";
+        "A broken, shorted, drifting or stuck wire, reported after four consecutive frames that contradict Eq. (2).";
 }
 
 terms! { SCENE_TERMS:

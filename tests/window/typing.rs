@@ -33,7 +33,7 @@ fn invalid_values_are_rejected_in_place_and_the_old_value_stays() {
             "5 kg",
             "“kg” is not a unit of this field: type mm, µm, nm, cm, m, in or none.",
         ),
-        ("Height", "thick", "“thick” is not a number: type for instance 0.5 mm."),
+        ("Height", "thick", "“thick” is not a number: type, for example, 0.5 mm."),
         ("Largest compression", "120 %", "120 % is too large: at most 99 %."),
         ("Seed", "-1", "−1 is too small: at least 0."),
     ] {

@@ -83,9 +83,12 @@ pub(super) fn plot_ui(ui: &mut Ui, id: Id, plot: &Plot, pointer: Pointer) -> (Pl
         lines_behind(plot_ui, plot, &palette);
         let transform = *plot_ui.transform();
         let pixels = f64::from(transform.frame().width() * plot_ui.ctx().pixels_per_point());
-        let column = transform.bounds().width() / pixels;
+        let extent = Extent {
+            ranges: [&x, &y],
+            column: transform.bounds().width() / pixels,
+        };
         for series in &plot.series {
-            draw_series(plot_ui, plot, series, ([&x, &y], column), &palette);
+            draw_series(plot_ui, plot, series, extent, &palette);
         }
     });
     shown.response.widget_info(|| {
@@ -164,11 +167,18 @@ fn lines_behind(plot_ui: &mut PlotUi<'_>, plot: &Plot, palette: &Palette) {
     }
 }
 
+/// Ranges of the axes, and the width of a column of pixels on the x axis.
+#[derive(Clone, Copy)]
+struct Extent<'a> {
+    ranges: [&'a RangeInclusive<f64>; 2],
+    column: f64,
+}
+
 fn draw_series(
     plot_ui: &mut PlotUi<'_>,
     plot: &Plot,
     series: &Series,
-    (ranges, column): ([&RangeInclusive<f64>; 2], f64),
+    Extent { ranges, column }: Extent<'_>,
     palette: &Palette,
 ) {
     // The tooltip is looked up by this number.

@@ -18,6 +18,13 @@ use glam::Vec2;
 
 use crate::window::theme::{Palette, Theme, rgb, type_size};
 
+/// Nodes that are marked or highlighted.
+#[derive(Clone, Copy)]
+pub(super) struct Highlights<'a> {
+    pub(super) marked: Option<usize>,
+    pub(super) lit: &'a [usize],
+}
+
 /// Laid-out surface with the arguments that it depends on.
 pub(super) struct Painted {
     surface: Surface,
@@ -84,7 +91,7 @@ impl Painted {
         painter: &Painter,
         palette: &Palette,
         section: Option<&Section>,
-        (marked, lit): (Option<usize>, &[usize]),
+        highlights: Highlights<'_>,
     ) {
         paint_frame(painter, palette, &self.lines, &self.texts);
         painter.add(Shape::Mesh(Arc::clone(&self.mesh)));
@@ -103,7 +110,7 @@ impl Painted {
             ring,
             ink,
             opacity,
-        } in self.dots.discs(marked, lit)
+        } in self.dots.discs(highlights.marked, highlights.lit)
         {
             let (at, colour) = (to_egui(at), colour(ink, palette).gamma_multiply(opacity));
             match ring {

@@ -5,7 +5,7 @@ use eframe::egui::{
     StrokeKind, Tooltip, Ui, Vec2, WidgetInfo,
 };
 
-use super::painted::{Painted, to_egui, to_glam};
+use super::painted::{Highlights, Painted, to_egui, to_glam};
 use crate::window::theme::{Theme, type_size};
 use decoupler_files::{
     export::format_number,
@@ -114,8 +114,11 @@ impl SurfaceView<'_> {
             .hovered_node
             .and_then(|node| painted.dots.position(node))
             .map(to_egui);
-        let nodes = (shown.hovered_node.or(self.marked_node), self.lit_nodes);
-        painted.paint(&painter, &self.theme.palette, self.section, nodes);
+        let highlights = Highlights {
+            marked: shown.hovered_node.or(self.marked_node),
+            lit: self.lit_nodes,
+        };
+        painted.paint(&painter, &self.theme.palette, self.section, highlights);
         if let Some(note) = &painted.note {
             // Below the axes, partly in the margin of the card, to keep the size of the picture.
             let size = type_size().small;

@@ -155,7 +155,7 @@ impl Progress {
     }
 }
 
-/// Appends newer epochs to a history; replaces the history if it is that of another leading start.
+/// Appends newer epochs to a history; older records of the same epochs, which are those of another start, are removed.
 pub fn append_epochs(history: &mut Vec<EpochRecord>, newer: Vec<EpochRecord>) {
     if let Some(first) = newer.first() {
         history.retain(|record| record.epoch < first.epoch);
@@ -196,7 +196,7 @@ pub struct RunResult {
 
 /// Continues `run` for additional epochs, counted from the start that is furthest ahead. With the same method, the result is
 /// the same as if all epochs had been requested from the beginning; another method, or a training that ended for another
-/// reason, restarts from the current weights.
+/// reason, starts from the current weights.
 ///
 /// # Errors
 /// If a setting is out of range, or the networks are too wide for the method; the run is unchanged.

@@ -248,14 +248,15 @@ pub fn usually<N>(usual: N, range: RangeInclusive<N>) -> Limits<N> {
 /// resets the value; a right click copies it.
 pub fn number_ui<N: Numeric>(ui: &mut Ui, value: &mut N, limits: &Limits<N>, unit: &str, size: Vec2) -> Response {
     let shown = input_text(value.to_f64());
-    typed_number_ui(ui, value, limits, (unit, &shown), size).0
+    let shown = Shown { text: &shown, unit };
+    typed_number_ui(ui, value, limits, shown, size).0
 }
 
 /// As [`number_ui`], for a whole number with full 64-bit precision.
 pub fn whole_ui(ui: &mut Ui, value: &mut u64, limits: &Limits<u64>, size: Vec2) -> Response {
     let shown = value.to_string();
     let before = *value;
-    let (mut response, typed) = typed_number_ui(ui, value, limits, ("", &shown), size);
+    let (mut response, typed) = typed_number_ui(ui, value, limits, Shown { text: &shown, unit: "" }, size);
     // The number field computes with fewer digits.
     if let Some(exact) = typed.and_then(|typed| typed.trim().parse().ok())
         && limits.range.contains(&exact)
@@ -268,12 +269,19 @@ pub fn whole_ui(ui: &mut Ui, value: &mut u64, limits: &Limits<u64>, size: Vec2) 
     response
 }
 
-/// Shows a field; `shown` is the text of its value. Also returns a typed text that was accepted.
+/// Text of a value, and its unit.
+#[derive(Clone, Copy)]
+struct Shown<'a> {
+    text: &'a str,
+    unit: &'a str,
+}
+
+/// Shows a field. Also returns a typed text that was accepted.
 fn typed_number_ui<N: Numeric>(
     ui: &mut Ui,
     value: &mut N,
     limits: &Limits<N>,
-    (unit, shown): (&str, &str),
+    Shown { text: shown, unit }: Shown<'_>,
     size: Vec2,
 ) -> (Response, Option<String>) {
     let range = limits.range.start().to_f64()..=limits.range.end().to_f64();

@@ -118,9 +118,9 @@ fn not_a_number(typed: &str, unit: &str) -> String {
         _ => "0.5 or 5e-1".to_owned(),
     };
     if typed.is_empty() {
-        format!("The field is empty: type a number, for instance {example}.")
+        format!("The field is empty: type a number, for example {example}.")
     } else {
-        format!("“{typed}” is not a number: type for instance {example}.")
+        format!("“{typed}” is not a number: type, for example, {example}.")
     }
 }
 
@@ -218,13 +218,13 @@ mod tests {
                 "",
                 "mm",
                 false,
-                "The field is empty: type a number, for instance 0.5 mm.",
+                "The field is empty: type a number, for example 0.5 mm.",
             ),
             (
                 "thick",
                 "mm",
                 false,
-                "“thick” is not a number: type for instance 0.5 mm.",
+                "“thick” is not a number: type, for example, 0.5 mm.",
             ),
             ("nan", "mm", false, "“nan” is not a number"),
             ("inf", "", false, "“inf” is not a number"),

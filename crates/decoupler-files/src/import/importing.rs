@@ -177,7 +177,7 @@ impl Recipe {
                 .map(|column| column.name.as_str())
                 .take(30)
                 .collect();
-            let reason = format!("it has no column '{wanted}' for its times, but {}", all.join(", "));
+            let reason = format!("it has no time column '{wanted}', only {}", all.join(", "));
             return Err(refuse(reason, Cure::NameJoinedTime));
         };
         let id = ColumnId { file: number, column };

@@ -146,7 +146,7 @@ impl InputLines {
             }
             (Some(_), None) => {
                 let name = row_wire.unwrap_or("row").to_owned();
-                let near = "it has the number of the row-wire, and there is a network for each".to_owned();
+                let near = "each row-wire has its own network, which is selected by this column".to_owned();
                 return Err(InputLineError::Header(InputError::Missing { name, near }));
             }
         };

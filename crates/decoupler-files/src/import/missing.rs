@@ -156,14 +156,15 @@ impl FromStr for Condition {
             let part = words.join(" ");
             let place = part
                 .find(['<', '>', '=', '!'])
-                .ok_or_else(|| wrong(format!("'{part}' compares nothing")))?;
+                .ok_or_else(|| wrong(format!("'{part}' has no comparison")))?;
             let (column, rest) = part.split_at(place);
             let found = WRITTEN
                 .iter()
                 .find_map(|(written, relation)| Some((rest.strip_prefix(written)?, *relation)));
-            let (number, relation) = found.ok_or_else(|| wrong(format!("'{rest}' begins with no comparison")))?;
+            let (number, relation) =
+                found.ok_or_else(|| wrong(format!("'{rest}' does not begin with a comparison")))?;
             if column.trim().is_empty() {
-                return Err(wrong(format!("'{part}' names no column")));
+                return Err(wrong(format!("'{part}' has no column")));
             }
             let finite = number.trim().parse().ok().filter(|number: &f64| number.is_finite());
             Ok(Comparison {
@@ -230,12 +231,12 @@ mod tests {
             assert_eq!(written.parse::<Condition>().unwrap(), condition);
         }
         for (text, reason) in [
-            ("", "compares nothing"),
-            ("c4", "compares nothing"),
-            ("<3", "names no column"),
+            ("", "has no comparison"),
+            ("c4", "has no comparison"),
+            ("<3", "has no column"),
             ("c4<x", "'x' is not a number"),
-            ("c4<1 and", "compares nothing"),
-            ("c4!3", "begins with no comparison"),
+            ("c4<1 and", "has no comparison"),
+            ("c4!3", "does not begin with a comparison"),
             ("c4<inf", "'inf' is not a number"),
         ] {
             let error = text.parse::<Condition>().unwrap_err().to_string();

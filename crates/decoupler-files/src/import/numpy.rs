@@ -77,7 +77,7 @@ pub(super) fn read(name: &str, mut source: impl Read) -> Result<Array, TableErro
     };
     let size = header.element.size();
     let expected = rows.checked_mul(width).and_then(|count| count.checked_mul(size));
-    let expected = expected.ok_or_else(|| wrong(format!("{rows} × {width} numbers fit in no memory")))?;
+    let expected = expected.ok_or_else(|| wrong(format!("{rows} × {width} numbers do not fit into memory")))?;
     if expected == 0 {
         return Err(wrong(format!("it is empty ({rows} × {width})")));
     }
@@ -151,7 +151,7 @@ impl Header {
             _ => {
                 let descr: String = descr.chars().take(20).collect();
                 return Err(format!(
-                    "its type '{descr}' is not read; convert it with .astype(float)"
+                    "its type '{descr}' is not supported; convert it with .astype(float)"
                 ));
             }
         };
@@ -325,11 +325,11 @@ mod tests {
             read("a", &bytes[..]).unwrap_err().to_string()
         };
         for (descr, shape, cause) in [
-            ("'|O'", "(2,)", "'|O' is not read"),
-            ("'<c16'", "(1,)", "'<c16' is not read"),
+            ("'|O'", "(2,)", "'|O' is not supported"),
+            ("'<c16'", "(1,)", "'<c16' is not supported"),
             ("[('x', '<f8')]", "(2,)", "named fields"),
             ("'<f8'", "(1, 1, 2)", "1 × 1 × 2"),
-            ("'<f8'", "(18446744073709551615, 2)", "no memory"),
+            ("'<f8'", "(18446744073709551615, 2)", "do not fit into memory"),
             (
                 "'<f8'",
                 "(99999999999, 2)",
@@ -337,7 +337,7 @@ mod tests {
             ),
             ("'<f8'", "(0, 2)", "it is empty (0 × 2)"),
             ("'<f8'", "(x, 2)", "no shape"),
-            ("'<f8", "(2,)", "is not read"),
+            ("'<f8", "(2,)", "is not supported"),
         ] {
             let error = of(descr, shape);
             assert!(error.contains(cause), "{descr} {shape}: {error}");

@@ -153,7 +153,7 @@ fn arrays_of_numpy_and_matlab_are_read_as_saved() {
         let notes = read(name).unwrap().notes;
         assert!(notes.iter().any(|note| note.contains(left_out)), "{name}: {notes:?}");
     }
-    assert!(read("complex.npy").unwrap_err().contains("'<c16' is not read"));
+    assert!(read("complex.npy").unwrap_err().contains("'<c16' is not supported"));
     assert!(read("level4.mat").unwrap_err().contains("-v7"));
 }
 
