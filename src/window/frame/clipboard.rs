@@ -184,7 +184,7 @@ impl DecouplerWindow {
             // There is nothing to wait for.
             toolkit @ Clipboard::Toolkit => {
                 let copied = toolkit.take(Content::Text(text), notice);
-                self.tell_copied(copied);
+                self.report_copied(copied);
             }
             _ => self.copying.start(ToCopy::Text(text), notice),
         }
@@ -193,7 +193,7 @@ impl DecouplerWindow {
     /// Shows a notice of what was copied.
     pub(super) fn take_copied(&mut self) {
         while let Some(copied) = self.copying.job.next_event() {
-            self.tell_copied(copied.unwrap_or_else(|error| (None, not_copied(&error.to_string()))));
+            self.report_copied(copied.unwrap_or_else(|error| (None, not_copied(&error.to_string()))));
         }
     }
 

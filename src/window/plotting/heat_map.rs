@@ -41,12 +41,14 @@ pub fn heat_map_ui(ui: &mut Ui, map: &HeatMap, marked: Option<[usize; 2]>) -> Op
         let response = ui.interact(cell, ui.scope_id().with(("heat", row, column)), Sense::click());
         let is_marked = marked == Some([row, column]);
         value_under(ui, cell, number);
-        let note = &map.notes[[row, column]];
+        let tooltip = &map.notes[[row, column]];
         response.widget_info(|| {
-            let name = note.lines().next().unwrap_or_default();
+            let name = tooltip.lines().next().unwrap_or_default();
             WidgetInfo::selected(Role::Button, true, is_marked, name)
         });
-        let response = response.on_hover_cursor(CursorIcon::PointingHand).on_hover_text(note);
+        let response = response
+            .on_hover_cursor(CursorIcon::PointingHand)
+            .on_hover_text(tooltip);
         if response.clicked() {
             pointed = Some(([row, column], CellPointed::Once));
         }

@@ -195,6 +195,7 @@ pub struct EpochOutline {
 }
 
 impl EpochOutline {
+    /// Creates an empty outline.
     pub fn new() -> Self {
         Self::default()
     }

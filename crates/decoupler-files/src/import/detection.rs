@@ -76,7 +76,7 @@ pub(super) fn detect(beginning: &[u8], is_whole: bool, choice: &DialectChoice) -
         decimal,
         header,
         trailing_separator: separator != Separator::Space && score.width > 1 && ends_empty(&rows, score.width),
-        sep_line: said.is_some(),
+        sep_line: declared.is_some(),
         skipped_lines,
         carriage_returns,
     })
