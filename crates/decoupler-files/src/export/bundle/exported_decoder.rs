@@ -1,5 +1,5 @@
 use decoupler_core::{
-    dataset::{Dataset, PerRow, Seed, Stream},
+    dataset::{Dataset, Memory, PerRow, Seed, Stream},
     decoupling::{CompiledNetworks, Decoder, DecoderKind, Description, Layer, Precision, decode_set},
     evaluation::{
         Channel, DecoderSet, Problem, RunError, RunSets, RunSettings, SimulatedSettings, TargetErrors, TestErrors,
@@ -89,11 +89,17 @@ impl<'a> ExportedDecoder<'a> {
         &self.fitted.description
     }
 
+    /// Memory whose features the decoder takes, if it has one.
+    pub(super) fn memory(&self) -> Option<&Memory> {
+        self.origin.problem.memory.as_ref()
+    }
+
     pub(super) fn meaning(&self) -> Meaning {
         match self.origin.settings.simulated() {
             Some(settings) => Meaning::Array(settings.source.sensor.scale),
             None => Meaning::Own {
-                inputs: self.origin.problem.inputs.clone(),
+                inputs: self.origin.problem.features(),
+                has_memory: self.memory().is_some(),
                 targets: self.origin.problem.targets.clone(),
                 row_wires: match (&self.origin.row_wires, self.fitted.reading_ranges.len()) {
                     (Some(row_wires), 2..) => row_wires.clone(),
@@ -254,7 +260,8 @@ fn of_recording(origin: &Origin, portable: &Portable, errors: &TestErrors) -> Va
         "trained_by": origin.program,
         "files": origin.files,
         "row_numbers": portable.takes_row().then(|| row_wires.collect::<Vec<_>>()),
-        "inputs": columns(&origin.problem.inputs),
+        "inputs": columns(&origin.problem.features()),
+        "memory": origin.problem.memory,
         "outputs": columns(&origin.problem.targets),
         "method": origin.settings.training.method.short_name(),
         "seed": origin.settings.seed,
