@@ -11,13 +11,14 @@ use decoupler_core::{
 use serde::Serialize;
 
 use super::{
-    Cells, Cure, DialectChoice, Excess, Format, ImportError, Joined, Missing, Recipe, Table, TableError, Watch,
+    Cells, Cure, DialectChoice, Excess, FileSet, Format, ImportError, Joined, Missing, Recipe, Table, TableError, Watch,
     csv_table::{self, Reading},
     input_lines::Watched,
     inputs::{ColumnId, Names},
     join::{Partners, Source, gather, median_interval, nearest},
     numpy,
     positions::read_positions,
+    part::Part,
     selection::{Rows, not_a_number},
     suggestion::Meanings,
     table::stem,
@@ -29,6 +30,20 @@ impl Recipe {
     /// # Errors
     /// If a file cannot be read, a column is missing, a used cell is not a number, no row is left, or `watch` breaks.
     pub fn import(&self, folder: &Path, watch: Watch<'_>) -> Result<Recording, ImportError> {
+        let first = self.import_set(folder, watch);
+        if self.append.is_empty() {
+            return first.map(|part| part.recording);
+        }
+        let mut parts = vec![first.map_err(|error| error.of_file(&self.data))?];
+        for FileSet { data, join } in &self.append {
+            let part = self.of_files(data, join)?.import_set(folder, watch);
+            parts.push(part.map_err(|error| error.of_file(data))?);
+        }
+        Part::joined(parts, self.group.is_some())
+    }
+
+    /// Imports the samples of the first file, without those of appended files.
+    fn import_set(&self, folder: &Path, watch: Watch<'_>) -> Result<Part, ImportError> {
         let stems = self.stems();
         let mut files = vec![self.read(folder, 0, &self.data, None, watch)?];
         for (number, (joined, stem)) in self.join.iter().zip(&stems).enumerate() {
@@ -58,7 +73,7 @@ impl Recipe {
             .time
             .map(|id| kept.iter().map(|&row| rows.number(id, row)).collect());
         let lines = kept.iter().map(|&row| files[0].1.line(row)).collect();
-        let groups = rows.groups(&kept);
+        let (groups, group_names) = rows.groups(&kept);
         let row_wires = rows.row_wires(&kept)?;
         let channels = |ids: &[ColumnId]| ids.iter().map(|id| rows.channel(*id)).collect::<Vec<Channel>>();
         let (inputs, targets) = (channels(&meanings.inputs), channels(&meanings.targets));
@@ -80,7 +95,7 @@ impl Recipe {
         };
         let targets_of_rows = gather(&mut source, &meanings.targets, &meanings.inputs);
         let readings = gather(&mut source, &meanings.inputs, &[]);
-        Ok(Recording {
+        let recording = Recording {
             set: Dataset::new(readings, targets_of_rows, row_wires.as_deref(), groups)?,
             inputs,
             targets,
@@ -92,7 +107,8 @@ impl Recipe {
             dropped,
             files: reports,
             warnings,
-        })
+        };
+        Ok(Part { recording, group_names })
     }
 
     /// Returns the name prefixed to the columns of each joined file.
@@ -294,8 +310,9 @@ fn read_file(
 /// Measured samples with a description of their channels.
 #[derive(Clone, Debug)]
 pub struct Recording {
-    /// Samples sorted by time, or in the order of the file; readings and targets in the order of [`Self::inputs`] and
-    /// [`Self::targets`]. Without a group column, each sample is a group of its own.
+    /// Samples of one file after another, within a file sorted by time or in its order; readings and targets in the order of
+    /// [`Self::inputs`] and [`Self::targets`]. Without a group column, each of several files is a group, or each sample of a
+    /// single file.
     pub set: Dataset,
     /// Names and units of the readings.
     pub inputs: Vec<Channel>,
@@ -303,17 +320,17 @@ pub struct Recording {
     pub targets: Vec<Channel>,
     /// Positions of targets on the skin, for those that have one.
     pub positions: Vec<TargetPosition>,
-    /// Line of each sample in the first file, from 1.
+    /// Line of each sample in its file, from 1.
     pub lines: Vec<u64>,
     /// Time of each sample, if there is a time column.
     pub times: Option<Vec<f64>>,
-    /// `true` if there is a group column.
+    /// `true` if there is a group column, or several files.
     pub has_groups: bool,
     /// Number of rows in the file, including dropped rows.
     pub rows: usize,
     /// Dropped rows, by reason.
     pub dropped: Vec<Dropped>,
-    /// The files read: the first, then those joined.
+    /// The files read: the first, then those joined; then those appended, likewise.
     pub files: Vec<FileReport>,
     /// Warnings for the user.
     pub warnings: Vec<String>,

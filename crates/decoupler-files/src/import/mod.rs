@@ -20,6 +20,7 @@ mod join;
 mod matlab;
 mod missing;
 mod numpy;
+mod part;
 mod plan;
 mod positions;
 mod recipe;
@@ -39,7 +40,7 @@ pub use inspection::{ColumnKind, ColumnSummary, InspectedFile, Inspection, TimeS
 pub use missing::{Condition, Missing};
 pub use plan::{Plan, PlannedSets, TestFiles};
 pub use positions::{PositionsError, holds_positions};
-pub use recipe::{FileChecksum, Joined, Recipe, Recorded, file_crc32, stored};
+pub use recipe::{FileChecksum, FileSet, Joined, Recipe, Recorded, file_crc32, stored};
 pub use setup::{Recordings, Setup, SetupError, SetupSets};
 pub use suggestion::{Meaning, suggested_plan, suggested_plan_in_order};
 pub use table::{Cells, Column, Excess, Fault, Faults, Table};

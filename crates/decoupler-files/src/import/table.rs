@@ -178,6 +178,17 @@ impl Cells {
         }
     }
 
+    /// Returns the name of a group: the label or the number.
+    pub(super) fn name_of_group(&self, row: usize) -> String {
+        match self {
+            Self::Numbers(numbers) => numbers[row].to_string(),
+            Self::Labels { numbers, texts } => {
+                let label = numbers[row].map(|label| texts[label as usize].0.clone());
+                label.unwrap_or_default()
+            }
+        }
+    }
+
     /// Returns the first label that is not a number.
     pub(super) fn wordy_label(&self) -> Option<&str> {
         match self {
