@@ -54,6 +54,7 @@ impl Part {
                 times.extend(more);
                 times
             });
+            whole.history.append(&part.history);
             whole.rows += part.rows;
             whole.dropped.extend(part.dropped);
             whole.files.extend(part.files);
