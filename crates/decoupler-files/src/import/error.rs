@@ -242,6 +242,14 @@ pub enum TableError {
         /// Line of the first zero byte.
         line: u64,
     },
+    /// The file is of another kind.
+    #[error("it is {what}, which is not read; {cure}")]
+    OtherKind {
+        /// The kind of file.
+        what: &'static str,
+        /// What to do instead.
+        cure: &'static str,
+    },
     /// No row ends within the limit.
     #[error("line {line}: no row ends within {} MiB; check its quotes and line breaks", .limit >> 20)]
     Endless {

@@ -1,6 +1,7 @@
 use std::{
+    borrow::Cow,
     fs::File,
-    io::{Read, Seek},
+    io::{BufReader, Read, Seek},
     path::{Path, PathBuf},
 };
 
@@ -12,7 +13,9 @@ use serde::Serialize;
 
 use super::{
     Cells, Cure, DialectChoice, Excess, FileSet, Format, ImportError, Joined, Missing, Recipe, Table, TableError, Watch,
+    arrays,
     csv_table::{self, Reading},
+    format::Contents,
     input_lines::Watched,
     inputs::{ColumnId, Names},
     join::{Partners, Source, gather, median_interval, nearest},
@@ -20,6 +23,8 @@ use super::{
     positions::read_positions,
     part::Part,
     selection::{Rows, not_a_number},
+    sentinel::{Sentinel, is_rounding, rounding_warning},
+    sheet::Spreadsheet,
     suggestion::Meanings,
     table::stem,
 };
@@ -30,6 +35,17 @@ impl Recipe {
     /// # Errors
     /// If a file cannot be read, a column is missing, a used cell is not a number, no row is left, or `watch` breaks.
     pub fn import(&self, folder: &Path, watch: Watch<'_>) -> Result<Recording, ImportError> {
+        let mut recording = self.import_all(folder, watch)?;
+        let values = recording.set.targets();
+        let targets = recording.targets.iter().zip(values.columns());
+        let rounded = targets.filter(|(_, values)| is_rounding(&values.to_vec()));
+        let warnings = Vec::from_iter(rounded.map(|(target, _)| rounding_warning(&target.name)));
+        recording.warnings.extend(warnings);
+        Ok(recording)
+    }
+
+    /// Imports the samples of all files.
+    fn import_all(&self, folder: &Path, watch: Watch<'_>) -> Result<Recording, ImportError> {
         let first = self.import_set(folder, watch);
         if self.append.is_empty() {
             return first.map(|part| part.recording);
@@ -89,6 +105,11 @@ impl Recipe {
             Some(file) => read_positions(&folder.join(file), &targets, watch)?,
             None => Vec::new(),
         };
+        for &id in meanings.inputs.iter().chain(&meanings.targets) {
+            if let Cells::Numbers(numbers) = &files[id.file].1.columns[id.column].cells {
+                warnings.extend(Sentinel::find(numbers).map(|found| found.warning(names.name(id))));
+            }
+        }
         let reports = rows.reports();
         let total = files[0].1.rows + files[0].1.too_long.rows;
         let partners: Vec<Option<Vec<Option<u32>>>> = joins
@@ -120,6 +141,7 @@ impl Recipe {
             targets: problem.targets.clone(),
             problem,
             history,
+            parts: vec![(0, reports[0].path.clone())],
             lines,
             times,
             has_groups: self.group.is_some(),
@@ -168,10 +190,13 @@ impl Recipe {
             })
             .collect();
         let path = folder.join(file);
+        let columns = self.inputs.iter().chain(&self.targets);
+        let used = columns.chain(&self.time).chain(&self.group).chain(&self.row_wire);
         let reading = Reading {
             choice: self.dialect,
             missing,
             labels: self.group.iter().filter_map(|group| own_name(group)).collect(),
+            used: used.filter_map(|name| own_name(name)).collect(),
         };
         let mut table = read(&path, &reading, watch)?;
         if number == 0 {
@@ -226,10 +251,21 @@ impl Recipe {
             let reason = "its times are a group as well".to_owned();
             return Err(refuse(reason, Cure::GiveOneMeaning));
         };
-        let Some(limit) = joined.limit.or_else(|| Some(median_interval(joined_times)? / 2.0)) else {
+        let joined_times = match (main.columns[time.column].start, table.columns[column].start) {
+            (None, None) => Cow::Borrowed(joined_times),
+            (Some(start), Some(joined_start)) if start.has_zone == joined_start.has_zone => {
+                let later = joined_start.seconds_since(start);
+                Cow::Owned(joined_times.iter().map(|time| later + time).collect())
+            }
+            _ => {
+                let reason = "only one of the two files has time stamps, or only one has a time zone".to_owned();
+                return Err(refuse(reason, Cure::NameJoinedTime));
+            }
+        };
+        let Some(limit) = joined.limit.or_else(|| Some(median_interval(&joined_times)? / 2.0)) else {
             return Err(refuse("its times are all the same".to_owned(), Cure::GiveLimit));
         };
-        let partners = nearest(times, joined_times, limit);
+        let partners = nearest(times, &joined_times, limit);
         let mut uses = vec![0_usize; table.rows];
         partners.rows.iter().flatten().for_each(|&row| uses[row as usize] += 1);
         let several = uses.iter().filter(|&&count| count > 1).count();
@@ -318,13 +354,24 @@ fn read_file(
     }
     (&file).take(Format::BEGINNING).read_to_end(&mut start)?;
     file.rewind()?;
-    match Format::of_arrays(path, &start) {
-        Some((format, read_arrays)) => {
-            let (found, left_out) = read_arrays(file, size, watch)?;
-            numpy::table(path, found, format, left_out, reading)
+    let (found, left_out, format) = match Contents::of(path, &start)? {
+        Contents::Text => return csv_table::read(path, Watched::new(file, size, watch), reading),
+        Contents::OldExcel => return Spreadsheet::Xls.read(path, file, reading, watch),
+        Contents::Zip => {
+            let kind = Spreadsheet::of_zip(&file)?;
+            file.rewind()?;
+            if let Some(kind) = kind {
+                return kind.read(path, file, reading, watch);
+            }
+            let (found, left_out) = numpy::read_archive(BufReader::new(file), watch)?;
+            (found, left_out, Format::Npz)
         }
-        None => csv_table::read(path, Watched::new(file, size, watch), reading),
-    }
+        Contents::Arrays(format, read_arrays) => {
+            let (found, left_out) = read_arrays(file, size, watch)?;
+            (found, left_out, format)
+        }
+    };
+    arrays::table(path, found, format, left_out, reading)
 }
 
 /// Measured samples with a description of their channels.
@@ -342,6 +389,8 @@ pub struct Recording {
     problem: Problem,
     /// Readings in order of time, for [other memories](Self::with_memory).
     pub(super) history: History,
+    /// Index of the first sample of each data file, and the file.
+    pub(super) parts: Vec<(usize, PathBuf)>,
     /// Line of each sample in its file, from 1.
     pub lines: Vec<u64>,
     /// Time of each sample, if there is a time column.

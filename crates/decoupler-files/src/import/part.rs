@@ -1,6 +1,6 @@
 //! Samples of the files of one experiment, one file after another.
 
-use std::collections::HashMap;
+use std::{collections::HashMap, path::Path};
 
 use decoupler_core::{dataset::Dataset, text::counted};
 use ndarray::{Array2, ArrayView2, Axis, concatenate};
@@ -49,6 +49,9 @@ impl Part {
         let mut parts = parts.into_iter().map(|part| part.recording);
         let mut whole = parts.next().expect("there is a part").naming_its_file();
         for part in parts.map(Recording::naming_its_file) {
+            let before = whole.lines.len();
+            let starts = part.parts.into_iter().map(|(first, path)| (before + first, path));
+            whole.parts.extend(starts);
             whole.lines.extend(part.lines);
             whole.times = whole.times.zip(part.times).map(|(mut times, more)| {
                 times.extend(more);
@@ -60,15 +63,18 @@ impl Part {
             whole.files.extend(part.files);
             whole.warnings.extend(part.warnings);
         }
-        Ok(Recording {
-            set,
-            has_groups: true,
-            ..whole
-        })
+        (whole.set, whole.has_groups) = (set, true);
+        Ok(whole)
     }
 }
 
 impl Recording {
+    /// Returns the file of a sample, whose line is in [`Self::lines`].
+    pub fn file_of(&self, sample: usize) -> &Path {
+        let after = self.parts.partition_point(|(first, _)| *first <= sample);
+        &self.parts[after - 1].1
+    }
+
     /// Names the file in remarks on its rows, which are those of one of several files.
     fn naming_its_file(mut self) -> Self {
         let file = self.files[0].path.display().to_string();
@@ -110,6 +116,7 @@ fn has_names(file: &FileReport) -> bool {
     match &file.format {
         Format::Text(dialect) => dialect.header,
         Format::Npy => false,
+        Format::Sheet { header, .. } => *header,
         Format::Npz | Format::Matlab => true,
     }
 }
