@@ -14,7 +14,7 @@ use super::{
 };
 use decoupler_core::{
     evaluation::{
-        Baselines, Channel, DecoderReport, Errors, Outlook, ReferenceNote, Run, RunError, SimulatedSettings,
+        Baselines, Channel, DecoderReport, Errors, Outlook, Problem, ReferenceNote, Run, RunError, SimulatedSettings,
         StartRecord, TestErrors, best_start, error_remarks,
         recorded::{Determination, Extrapolation, Undetermined},
     },
@@ -405,7 +405,10 @@ fn epoch_seconds(training: &TrainingRecord) -> f64 {
 fn inputs(problem: &Problem) -> String {
     let count = counted(problem.feature_count(), "input");
     match &problem.memory {
-        Some(memory) => format!("{count} ({} and their memory: {memory})", counted(problem.inputs.len(), "reading")),
+        Some(memory) => format!(
+            "{count} ({} and their memory: {memory})",
+            counted(problem.inputs.len(), "reading")
+        ),
         None => count,
     }
 }
