@@ -313,6 +313,7 @@ impl<'a> TrainingLoop<'a> {
             let scores = Scores {
                 network: errors.clone(),
                 baselines: baselines.clone(),
+                coverage: Vec::new(),
             };
             let method = run.settings().training.method;
             remarks.extend(describe_worse_than_ridge(run.problem(), &scores, method));

@@ -3,7 +3,7 @@ use std::{fmt::Display, io::Write as _, path::Path, sync::Arc};
 use decoupler_core::{
     dataset::Dataset,
     evaluation::{
-        ErrorTable, PastNetwork, Problem, Run, RunSettings, Scores, SimulatedSettings, StartRecord, TargetPosition,
+        ErrorTable, Intervals, PastNetwork, Problem, Run, RunSettings, Scores, SimulatedSettings, StartRecord, TargetPosition,
         TestErrors,
     },
     network::{DecouplingNetwork, Networks},
@@ -44,6 +44,8 @@ pub struct NetworkFile {
     pub training: TrainingRecord,
     /// Errors of the network and of the baselines on the test set.
     pub scores: Scores,
+    /// Prediction intervals of the answers, if they were calibrated.
+    pub intervals: Option<Intervals>,
 }
 
 /// The part of the file that the checksum covers.
@@ -58,6 +60,8 @@ struct Document {
     network: Networks,
     training: TrainingRecord,
     scores: Scores,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    intervals: Option<Intervals>,
 }
 
 impl NetworkFile {
@@ -77,6 +81,7 @@ impl NetworkFile {
             network: run.network(),
             training: TrainingRecord::of(run),
             scores,
+            intervals: run.intervals().cloned(),
         })
     }
 
@@ -89,6 +94,9 @@ impl NetworkFile {
         let mut file = Self::from_run(run, recorded)?;
         file.scores.network = run.errors_of(&past.networks.decouple(run.test()));
         file.network = past.networks.clone();
+        // The intervals belong to the latest network.
+        file.intervals = None;
+        file.scores.coverage.clear();
         file.training = TrainingRecord::until(run, past);
         Ok(file)
     }
@@ -159,6 +167,7 @@ impl NetworkFile {
             network,
             training,
             scores,
+            intervals,
         } = self.clone();
         let document = Document {
             settings,
@@ -168,6 +177,7 @@ impl NetworkFile {
             network,
             training,
             scores,
+            intervals,
         };
         let run = to_raw_value(&document).map_err(|error| unsound(error.to_string()))?;
         Ok(Sealed::new(KIND, &program, &run).save(path, commit)?)
@@ -201,6 +211,7 @@ impl NetworkFile {
             network: document.network,
             training: document.training,
             scores: document.scores,
+            intervals: document.intervals,
         })
     }
 }
@@ -281,7 +292,9 @@ pub(super) fn defect(file: &NetworkFile) -> Option<String> {
         scores: Scores {
             network: errors,
             baselines,
+            coverage: _,
         },
+        intervals,
     } = file;
     let weight = |network: &DecouplingNetwork| {
         let weights = network.mlp().weights();
@@ -302,6 +315,9 @@ pub(super) fn defect(file: &NetworkFile) -> Option<String> {
         (!(training.seconds >= 0.0 && training.seconds.is_finite()))
             .then(|| format!("training.seconds: {} is not a time", training.seconds)),
         starts_defect(file),
+        (intervals.as_ref())
+            .and_then(|intervals| intervals.check(problem.targets.len()).err())
+            .map(|defect| format!("intervals: {defect}")),
         unmeasured("scores.network", errors, problem),
         unmeasured("scores.baselines.mean", &baselines.mean, problem),
         unmeasured("scores.baselines.linear", &baselines.linear, problem),
