@@ -11,7 +11,7 @@ use std::{
 };
 
 use decoupler_core::{
-    evaluation::{Baselines, PastNetworks, Problem, Run, RunDefect, RunError, RunSettings, StartRecord, TestErrors},
+    evaluation::{Baselines, Coverage, PastNetworks, Problem, Run, RunDefect, RunError, RunSettings, StartRecord, TestErrors},
     network::Networks,
     training::{EpochRecord, Stage, StopReason, StoppingRules, TrainerState, TrainingError, TrainingSettings},
 };
@@ -176,6 +176,8 @@ pub struct RunResult {
     pub frame: Option<(usize, Frame)>,
     /// Errors of the decoded values.
     pub errors: TestErrors,
+    /// Coverage of the intervals on the test set, if they were calibrated.
+    pub coverage: Vec<Option<Coverage>>,
     /// Epoch of the network.
     pub best_epoch: usize,
     /// Problem of the training, when it has ended.

@@ -271,6 +271,7 @@ impl<'a> TrainingLoop<'a> {
                 charts,
                 frame,
                 errors,
+                coverage: run.coverage().to_vec(),
                 best_epoch: trainer.best_epoch(),
                 defect: run.defect(),
                 epochs_run: furthest_epoch(run),

@@ -1,4 +1,4 @@
-use ndarray::{ArrayView2, Axis};
+use ndarray::{ArrayView1, ArrayView2};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
@@ -76,7 +76,7 @@ impl Intervals {
         let folds = Folds::by(set, folds, by, &mut Seed(0).rng(Stream::Split)).ok();
         let targets = set.targets();
         let columns = targets.columns().into_iter().zip(answers.columns());
-        let half_width = |(truth, answers): (ndarray::ArrayView1<'_, f64>, ndarray::ArrayView1<'_, f64>)| {
+        let half_width = |(truth, answers): (ArrayView1<'_, f64>, ArrayView1<'_, f64>)| {
             let answers = answers.to_vec();
             let errors: Vec<f64> = answers.iter().zip(truth).map(|(answer, truth)| (answer - truth).abs()).collect();
             HalfWidth::calibrate(&answers, &errors, folds.as_ref(), &evidence)
@@ -247,12 +247,12 @@ impl Coverage {
 
 /// Returns the conformal quantile of `scores` with the effective number of samples; `None` if there are too few.
 ///
-/// The effective number refers to the events that a score exceeds the quantile, since only these determine coverage.
+/// The effective number refers to the events that a score is at least the quantile, since only these determine coverage.
 fn conformal_quantile(scores: &[f64], evidence: &Evidence) -> Option<(f64, f64)> {
     let count = scores.len();
     let first = nth_smallest(scores, (Intervals::NOMINAL * count as f64).ceil() as usize);
-    let exceeds: Vec<f64> = scores.iter().map(|score| f64::from(u8::from(*score > first))).collect();
-    let effective = evidence.effective_samples(&exceeds);
+    let is_large: Vec<f64> = scores.iter().map(|score| f64::from(u8::from(*score >= first))).collect();
+    let effective = evidence.effective_samples(&is_large);
     if effective < Intervals::FEWEST_SAMPLES {
         return None;
     }
@@ -315,11 +315,11 @@ fn interpolate(points: &[[f64; 2]], at: f64) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use ndarray::{Array2, array};
+    use ndarray::Array2;
     use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
 
     use super::*;
-    use crate::scene::standard_normal;
+    use crate::{evaluation::cross_validation::scatter, scene::standard_normal};
 
     /// Synthetic relation y = 2x with noise, whose intervals are known.
     #[derive(Clone, Copy)]
@@ -357,7 +357,7 @@ mod tests {
         let count = x.len() as f64;
         let mean_x = x.iter().sum::<f64>() / count;
         let squares: f64 = x.iter().map(|x| (x - mean_x).powi(2)).sum();
-        let line = |y: ndarray::ArrayView1<'_, f64>| {
+        let line = |y: ArrayView1<'_, f64>| {
             let mean_y = y.sum() / count;
             let slope = x.iter().zip(y).map(|(x, y)| (x - mean_x) * (y - mean_y)).sum::<f64>() / squares;
             [mean_y - slope * mean_x, slope]
@@ -371,8 +371,8 @@ mod tests {
         })
     }
 
-    /// Mean coverage of both targets on new samples over `repeats` sets, mean share of sets with intervals, and share
-    /// of tests of the same length that are said to be off.
+    /// Mean coverage of both targets on new samples over `repeats` sets, and share of shorter tests whose coverage is
+    /// said to be too low.
     fn coverage(truth: Truth, repeats: u64) -> (f64, f64) {
         let (mut total, mut alarms, mut intervals_found) = (0.0, 0.0, 0.0);
         for seed in 0..repeats {
@@ -383,7 +383,7 @@ mod tests {
             for fold in 0..folds.count() {
                 let lines = fit(&set.select(&folds.without(&[fold])));
                 let of_fold = answers(&lines, &set.select(folds.test(fold)));
-                super::super::cross_validation::scatter(&mut held_out, folds.test(fold), &of_fold);
+                scatter(&mut held_out, folds.test(fold), &of_fold);
             }
             let intervals = Intervals::calibrate(&set, held_out.view(), SplitBy::Time);
             let lines = fit(&set);
@@ -397,8 +397,55 @@ mod tests {
                 intervals_found += 1.0;
             }
         }
-        println!("{} {} {}", total / intervals_found, alarms / intervals_found, intervals_found / repeats as f64);
         (total / intervals_found, alarms / intervals_found)
+    }
+
+    #[test]
+    fn half_widths_follow_the_noise_only_if_it_varies() {
+        let calibrate = |growth: f64| {
+            let truth = Truth {
+                memory: 0.0,
+                growth,
+                samples: 1000,
+            };
+            let set = truth.draw(truth.samples, &mut ChaCha8Rng::seed_from_u64(0));
+            let answers = Array2::from_shape_fn((1000, 2), |(sample, _)| 2.0 * set.readings()[[sample, 0]]);
+            Intervals::calibrate(&set, answers.view(), SplitBy::Time)
+        };
+        // The 90 % quantile of |noise| is 1.645 standard deviations: 0.1 and 0.5 without growth.
+        let constant = calibrate(0.0);
+        for (target, spread) in [0.1, 0.5].into_iter().enumerate() {
+            let half_width = constant.targets[target].as_ref().unwrap();
+            assert!(half_width.by_answer.is_empty(), "{half_width:?}");
+            assert!((half_width.constant / (1.645 * spread) - 1.0).abs() < 0.1, "{half_width:?}");
+        }
+        // With growth, the standard deviation is 0.1 (1 + 5x) at the answer 2x.
+        let growing = calibrate(5.0);
+        for answer in [0.4, 1.0, 1.6] {
+            let ratio = growing.half_width(0, answer).unwrap() / (0.1645 * (1.0 + 2.5 * answer));
+            assert!((ratio - 1.0).abs() < 0.2, "{answer}: {ratio}");
+        }
+    }
+
+    #[test]
+    fn too_few_samples_or_groups_have_no_interval() {
+        let truth = Truth {
+            memory: 0.0,
+            growth: 0.0,
+            samples: 8,
+        };
+        let mut rng = ChaCha8Rng::seed_from_u64(0);
+        let few = truth.draw(8, &mut rng);
+        assert!(Intervals::calibrate(&few, few.targets().mapv(|y| y + 1.0).view(), SplitBy::Time).is_empty());
+        // Errors that differ only between three subjects.
+        let set = truth.draw(300, &mut rng);
+        let groups: Vec<usize> = (0..300).map(|sample| sample / 100).collect();
+        let answers = Array2::from_shape_fn((300, 2), |(sample, target)| {
+            set.targets()[[sample, target]] + groups[sample] as f64
+        });
+        let set = Dataset::new(set.readings().to_owned(), set.targets().to_owned(), None, groups).unwrap();
+        let intervals = Intervals::calibrate(&set, answers.view(), SplitBy::Group);
+        assert!(intervals.is_empty(), "{intervals:?}");
     }
 
     /// The mean over 200 sets and two targets has a standard error of about 0.3 %, 0.6 % with autocorrelation.

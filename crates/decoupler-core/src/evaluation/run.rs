@@ -224,12 +224,17 @@ impl Run {
         self.intervals.as_ref().map(|(intervals, _)| intervals)
     }
 
+    /// Coverage of [`Self::intervals`] on the test set, target by target; empty if there are none.
+    pub fn coverage(&self) -> &[Option<Coverage>] {
+        self.intervals.as_ref().map_or(&[], |(_, coverage)| coverage)
+    }
+
     /// Returns the errors of [`Self::network`] and of the baselines on the test set; `None` for the run of a fold.
     pub fn scores(&self) -> Option<Scores> {
         Some(Scores {
             network: self.errors(),
             baselines: self.baselines.clone()?,
-            coverage: self.intervals.as_ref().map_or(Vec::new(), |(_, coverage)| coverage.clone()),
+            coverage: self.coverage().to_vec(),
         })
     }
 }

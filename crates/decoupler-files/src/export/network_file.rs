@@ -6,6 +6,7 @@ use decoupler_core::{
         ErrorTable, Intervals, PastNetwork, Problem, Run, RunSettings, Scores, SimulatedSettings, StartRecord, TargetPosition,
         TestErrors,
     },
+    live::DriftReference,
     network::{DecouplingNetwork, Networks},
 };
 use glam::DVec3;
@@ -46,6 +47,8 @@ pub struct NetworkFile {
     pub scores: Scores,
     /// Prediction intervals of the answers, if they were calibrated.
     pub intervals: Option<Intervals>,
+    /// Training readings of a recording, by which a later drift is detected.
+    pub drift: Option<DriftReference>,
 }
 
 /// The part of the file that the checksum covers.
@@ -62,6 +65,8 @@ struct Document {
     scores: Scores,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     intervals: Option<Intervals>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    drift: Option<DriftReference>,
 }
 
 impl NetworkFile {
@@ -82,6 +87,7 @@ impl NetworkFile {
             training: TrainingRecord::of(run),
             scores,
             intervals: run.intervals().cloned(),
+            drift: None,
         })
     }
 
@@ -173,6 +179,7 @@ impl NetworkFile {
             training,
             scores,
             intervals,
+            drift,
         } = self.clone();
         let document = Document {
             settings,
@@ -183,6 +190,7 @@ impl NetworkFile {
             training,
             scores,
             intervals,
+            drift,
         };
         let run = to_raw_value(&document).map_err(|error| unsound(error.to_string()))?;
         Ok(Sealed::new(KIND, &program, &run).save(path, commit)?)
@@ -217,6 +225,7 @@ impl NetworkFile {
             training: document.training,
             scores: document.scores,
             intervals: document.intervals,
+            drift: document.drift,
         })
     }
 }
@@ -300,6 +309,7 @@ pub(super) fn defect(file: &NetworkFile) -> Option<String> {
             coverage: _,
         },
         intervals,
+        drift,
     } = file;
     let weight = |network: &DecouplingNetwork| {
         let weights = network.mlp().weights();
@@ -323,6 +333,9 @@ pub(super) fn defect(file: &NetworkFile) -> Option<String> {
         (intervals.as_ref())
             .and_then(|intervals| intervals.check(problem.targets.len()).err())
             .map(|defect| format!("intervals: {defect}")),
+        (drift.as_ref())
+            .filter(|drift| !drift.is_valid() || drift.channels() != problem.inputs.len())
+            .map(|_| "drift: it does not match the inputs".to_owned()),
         unmeasured("scores.network", errors, problem),
         unmeasured("scores.baselines.mean", &baselines.mean, problem),
         unmeasured("scores.baselines.linear", &baselines.linear, problem),

@@ -184,6 +184,7 @@ fn own_data(array: &Portable) -> Portable {
             inputs: channels(array.channels),
             targets: channels(array.outputs),
             row_wires: Vec::new(),
+            half_widths: Vec::new(),
         },
         ..array.clone()
     }
