@@ -8,8 +8,7 @@ use std::{
 use clap::ValueEnum;
 use decoupler_core::{
     evaluation::{Channel, Coverage, Intervals, Run, RunError},
-    live::{DriftMonitor, DriftReference},
-    ndarray::s,
+    live::DriftMonitor,
 };
 use decoupler_files::{
     export::{NetworkFile, format_duration, format_number},
@@ -86,18 +85,6 @@ pub(super) fn calibrate(run: &mut Run, sets: &SetupSets, when: WhenCalibrated) -
 fn note(message: &str) {
     // There is no one to report to if this fails.
     let _ = writeln!(stderr(), "{message}");
-}
-
-/// Describes the training readings of a recording for the drift monitor; `None` if the row-wires are known, or there are
-/// too few independent readings.
-pub(super) fn drift_reference(file: &NetworkFile, sets: &SetupSets) -> Option<DriftReference> {
-    sets.recordings.as_ref()?;
-    let training = &sets.sets.split.training;
-    if training.row_wires_read().is_some() {
-        return None;
-    }
-    // With a memory, the readings are followed by values from the past, which the monitor does not need.
-    DriftReference::of(training.readings().slice(s![.., ..file.problem.inputs.len()]))
 }
 
 /// Warns of the targets whose intervals contain significantly fewer test samples than stated, with cause and remedy.

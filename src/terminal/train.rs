@@ -10,7 +10,7 @@ use super::{
     failure::{Failure, Interruption},
     import_arguments::ImportArguments,
     interruption::{CheckpointArguments, Checkpointing, Graceful},
-    intervals::{WhenCalibrated, calibrate, drift_reference},
+    intervals::{WhenCalibrated, calibrate},
     output::progress_bar,
     samples::{announce, following, sets},
     train_report::Trained,
@@ -88,7 +88,7 @@ impl Train {
             end = Err(error.into());
         }
         let mut file = NetworkFile::from_run(&run, sets.recorded())?;
-        file.drift = drift_reference(&file, &sets);
+        file.drift = sets.drift_reference();
         // The figures are printed even if something fails from here on.
         let saved = self.out.as_ref().map_or(Ok(()), |path| file.save(path));
         let (mut decoders, mut optimism, mut measured) = (Vec::new(), Vec::new(), Ok(()));

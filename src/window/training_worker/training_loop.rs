@@ -367,12 +367,17 @@ impl TrainedRun {
         Self {
             run,
             recorded: sets.recorded().cloned(),
+            drift: sets.drift_reference(),
         }
     }
 
     /// Returns the best network so far, with its history and errors.
     pub fn network_file(&self) -> Result<NetworkFile, String> {
-        NetworkFile::from_run(&self.run, self.recorded.as_ref()).map_err(|error| error.to_string())
+        let file = NetworkFile::from_run(&self.run, self.recorded.as_ref()).map_err(|error| error.to_string())?;
+        Ok(NetworkFile {
+            drift: self.drift.clone(),
+            ..file
+        })
     }
 
     /// Returns the current state, to be resumed later.

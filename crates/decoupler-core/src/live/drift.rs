@@ -106,7 +106,8 @@ impl DriftReference {
             let metric = Metric::fit(readings, range.clone())?;
             distances.extend(range.map(|sample| metric.distance(readings.row(sample).iter().copied(), &mut scratch)));
         }
-        let block = (Self::TIMES * autocorrelation_time(&distances)).ceil() as usize;
+        let longest = samples as f64 / (Self::FEWEST_BLOCKS as f64 * Self::TIMES);
+        let block = (Self::TIMES * autocorrelation_time(&distances, longest)).ceil() as usize;
         let blocks = distances.chunks_exact(block);
         if blocks.len() < Self::FEWEST_BLOCKS {
             return None;
@@ -150,8 +151,8 @@ impl DriftReference {
 }
 
 /// Integrated autocorrelation time of `series` in samples, at least 1: the sum of the autocorrelations up to the first
-/// below 0.05.
-fn autocorrelation_time(series: &[f64]) -> f64 {
+/// below 0.05, or until it exceeds `limit`.
+fn autocorrelation_time(series: &[f64], limit: f64) -> f64 {
     const NEGLIGIBLE: f64 = 0.05;
     let count = series.len() as f64;
     let mean = series.iter().sum::<f64>() / count;
@@ -161,8 +162,14 @@ fn autocorrelation_time(series: &[f64]) -> f64 {
         let products = off[lag..].iter().zip(&off).map(|(one, other)| one * other);
         products.sum::<f64>() / (count - lag as f64) / variance
     };
-    let correlations = (1..series.len() / 4).map(correlation);
-    1.0 + 2.0 * correlations.take_while(|found| *found >= NEGLIGIBLE).sum::<f64>()
+    let mut time = 1.0;
+    for found in (1..series.len()).map(correlation) {
+        if found < NEGLIGIBLE || time > limit {
+            break;
+        }
+        time += 2.0 * found;
+    }
+    time
 }
 
 /// Monitor that reports when readings no longer look like the training readings, so that the intervals of the network no
