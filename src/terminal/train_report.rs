@@ -10,6 +10,7 @@ use super::{
     errors_report::{ErrorsReport, Target, targets, write_starts},
     failure::Failure,
     inspect::{RecordingReport, import_warnings, write_warnings},
+    intervals::describe_coverage,
     output::{print, print_object},
 };
 use decoupler_core::{
@@ -218,10 +219,10 @@ impl<'a> Trained<'a> {
                 recording: RecordingReport::new(&self.sets.sets, recordings),
                 test_outside_training: self.extrapolation().map_or(0.0, |(found, _)| found.share()),
                 seconds: self.run.wall_time().map(|time| time.as_secs_f64()),
-                targets: targets(&file.problem.targets, &scores.network, &determined),
+                targets: targets(&file.problem.targets, &scores.network, &determined, &scores.coverage),
                 baselines: BTreeMap::from([
-                    ("mean", targets(&file.problem.targets, &scores.baselines.mean, &[])),
-                    ("ridge", targets(&file.problem.targets, &scores.baselines.linear, &[])),
+                    ("mean", targets(&file.problem.targets, &scores.baselines.mean, &[], &[])),
+                    ("ridge", targets(&file.problem.targets, &scores.baselines.linear, &[], &[])),
                 ]),
             })),
             (None, Some(settings)) => SourceReport::Array(Box::new(ArrayReport::new(file, &settings, self.remarks())?)),
@@ -281,6 +282,7 @@ impl<'a> Trained<'a> {
             .chain(self.run.defect().map(|defect| defect.to_string()))
             .chain(describe_determinacy(&self.file.problem.targets, determined))
             .chain(describe_worse_than_ridge(problem, scores, settings.training.method))
+            .chain(describe_coverage(&problem.targets, &scores.coverage))
             .collect()
     }
 
