@@ -269,7 +269,7 @@ impl<'a> Trained<'a> {
             .chain(self.optimism.iter().cloned())
             .chain(self.run.defect().map(|defect| defect.to_string()))
             .chain(describe_determinacy(&self.file.problem.targets, determined))
-            .chain(describe_worse_than_ridge(problem, scores, settings.training.method))
+            .chain(describe_worse_than_ridge(problem, scores))
             .collect()
     }
 

@@ -50,7 +50,7 @@ fn each_target_and_channel_is_judged_with_an_interval() {
         target(1)["sentence"]
             .as_str()
             .unwrap()
-            .starts_with("the readings do not determine y (R² ")
+            .starts_with("ridge regression explains nothing of y (R² ")
     );
     let channel = |index: usize| &report["channels"][index];
     // Without b the error of x is √(0.3² + 0.05²)/0.05 times as large; without a nothing is lost, because d repeats it.
@@ -70,7 +70,7 @@ fn each_target_and_channel_is_judged_with_an_interval() {
     let text = String::from_utf8(decoupler(&format!("{INSPECT} --model ridge"), folder.path()).stdout).unwrap();
     for expected in [
         "The readings determine x (R² 0.99",
-        "do not determine y",
+        "Ridge regression explains nothing of y",
         "dispensable",
         "samples   ",
     ] {
@@ -96,7 +96,7 @@ fn networks_are_compared_with_ridge_and_with_a_random_split() {
     assert!(
         report["warnings"]
             .to_string()
-            .contains("found little more than a linear map")
+            .contains("no better than ridge for x")
     );
     assert_eq!(target["splits"]["by"], "time");
     assert!(target["splits"]["sentence"].as_str().unwrap().contains("split by time"));

@@ -314,8 +314,7 @@ impl<'a> TrainingLoop<'a> {
                 network: errors.clone(),
                 baselines: baselines.clone(),
             };
-            let method = run.settings().training.method;
-            remarks.extend(describe_worse_than_ridge(run.problem(), &scores, method));
+            remarks.extend(describe_worse_than_ridge(run.problem(), &scores));
         }
         remarks
     }

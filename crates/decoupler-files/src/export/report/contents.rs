@@ -226,7 +226,7 @@ impl RunReport<'_> {
             settings,
             ..
         } = self.file;
-        remarks.extend(describe_worse_than_ridge(problem, scores, settings.training.method));
+        remarks.extend(describe_worse_than_ridge(problem, scores));
         if plan.is_optimistic() {
             let text = "test samples are drawn at random, which is optimistic where neighbouring rows are similar; split \
                         by time or by group for an honest test";
