@@ -97,7 +97,9 @@ mod tests {
         let paths = |names: &[&str]| Vec::from_iter(names.iter().map(PathBuf::from));
         let sets = file_sets("", paths(&["a", "b"]), paths(&["a1", "a2", "b1", "b2"])).unwrap();
         assert_eq!((&sets[1].data, &sets[1].join), (&"b".into(), &paths(&["b1", "b2"])));
-        let error = file_sets("test-", paths(&["a", "b"]), paths(&["a1"])).unwrap_err().to_string();
+        let error = file_sets("test-", paths(&["a", "b"]), paths(&["a1"]))
+            .unwrap_err()
+            .to_string();
         assert!(error.contains("--test-join"), "{error}");
     }
 }

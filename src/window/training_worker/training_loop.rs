@@ -316,8 +316,7 @@ impl<'a> TrainingLoop<'a> {
                 baselines: baselines.clone(),
                 coverage: Vec::new(),
             };
-            let method = run.settings().training.method;
-            remarks.extend(describe_worse_than_ridge(run.problem(), &scores, method));
+            remarks.extend(describe_worse_than_ridge(run.problem(), &scores));
         }
         remarks
     }

@@ -43,8 +43,16 @@ const REFUSED: [(&[u8], &str, &str); 20] = [
         "an HDF5 file",
         "save it as .npz with numpy.savez, with the option -v7 from MATLAB, or as CSV",
     ),
-    (b"PAR1", "a Parquet file", "save it as CSV, for example with DataFrame.to_csv"),
-    (b"ARROW1", "an Arrow file", "save it as CSV, for example with DataFrame.to_csv"),
+    (
+        b"PAR1",
+        "a Parquet file",
+        "save it as CSV, for example with DataFrame.to_csv",
+    ),
+    (
+        b"ARROW1",
+        "an Arrow file",
+        "save it as CSV, for example with DataFrame.to_csv",
+    ),
     (b"SQLite format 3", "an SQLite database", "export the table as CSV"),
     (b"#ROSBAG", "a ROS bag", "export the topics as CSV"),
     (b"\x89MCAP", "an MCAP log", "export the topics as CSV"),
