@@ -22,7 +22,7 @@ mod products;
 mod schur;
 
 pub(super) use equations::{FactoredEquations, NormalEquations};
-pub(super) use schur::{Decay, PerClass, Traces, class_sizes, class_squares};
+pub(super) use schur::{Decay, OutputTraces, PerClass, Traces, class_sizes, class_squares};
 
 use conjugate::{ConjugateGradient, HiddenSolver};
 use schur::SchurComplement;

@@ -130,6 +130,7 @@ fn every_class_of_weights_decays_at_its_own_rate() {
     let parts: f64 = equations
         .traces_of_inverse(&mlp, PerClass::all(0.7))
         .unwrap()
+        .classes()
         .values()
         .iter()
         .sum();
