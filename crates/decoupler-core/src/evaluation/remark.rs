@@ -230,7 +230,7 @@ impl Remark {
 /// for `reason`, and on the linear map.
 pub fn error_remarks(
     settings: &SimulatedSettings,
-    Scores { network, baselines }: &Scores,
+    Scores { network, baselines, .. }: &Scores,
     reason: Option<StopReason>,
 ) -> Vec<(&'static str, Remark)> {
     let simulation = &settings.source;
