@@ -36,7 +36,9 @@ pub use reference::{NoReference, ReferenceNote, reference_errors};
 pub use remark::{Cause, MissingFigures, Remark, error_remarks};
 pub use run::{Run, RunDefect, RunError};
 pub use run_sets::RunSets;
-pub use settings::{CountError, MAX_STARTS, MeasuredSettings, RunSettings, SimulatedSettings, Workload, WorkloadTime};
+pub use settings::{
+    CountError, MAX_STARTS, MeasuredSettings, RecordedSize, RunSettings, SimulatedSettings, Workload, WorkloadTime,
+};
 pub use source::{
     Channel, Measured, ModelSize, Preset, PresetError, Problem, Simulation, Source, TargetPosition, ready_settings,
 };
