@@ -133,7 +133,7 @@ impl Train {
         }
         let scores = [&honest, run].map(|run| run.scores().expect("a run without folds has baselines"));
         Ok(sentences(
-            &SplitComparison::of(by, scores),
+            &SplitComparison::of(set, by, scores),
             &recordings.training.targets,
         ))
     }

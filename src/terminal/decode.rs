@@ -223,7 +223,7 @@ impl FrameArguments {
         };
         let recording = with_bar(is_json, |watch| plan.recording(working_folder(), watch))?;
         self.import.save_recipe(&plan)?;
-        let (set, lines, scale) = (recording.set, recording.lines, sensor.scale);
+        let (set, lines, scale) = (recording.set.clone(), &recording.lines, sensor.scale);
         let (argument, targets) = if has_depths {
             ("--depths", scale.nodes_per_row())
         } else {
@@ -255,7 +255,7 @@ impl FrameArguments {
         let checked = limits.check(sensor, &pressed_rows(&frames, sensor)?);
         checked.map_err(|source| match source.sample() {
             Some(sample) => Failure::Press {
-                path: plan.import.data.clone(),
+                path: recording.file_of(sample).to_owned(),
                 line: lines[sample],
                 source,
             },

@@ -12,6 +12,7 @@ mod decode;
 mod errors_report;
 mod export;
 mod failure;
+mod file_patterns;
 mod findings;
 mod follow;
 mod follow_report;

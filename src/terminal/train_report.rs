@@ -15,9 +15,9 @@ use super::{
 };
 use decoupler_core::{
     evaluation::{
-        Baselines, Channel, DecoderReport, Errors, Outlook, ReferenceNote, Run, RunError, SimulatedSettings,
+        Baselines, Channel, DecoderReport, Errors, Outlook, Problem, ReferenceNote, Run, RunError, SimulatedSettings,
         StartRecord, TestErrors, best_start, error_remarks,
-        recorded::{Determination, Undetermined},
+        recorded::{Determination, Extrapolation, Undetermined},
     },
     network::InputChoice,
     scene::{Noise, NoisySets, Scene},
@@ -30,7 +30,7 @@ use decoupler_files::{
         NetworkFile, TrainingRecord, decoder_table, describe_determinacy, describe_worse_than_ridge, error_table,
         format_duration,
     },
-    import::SetupSets,
+    import::{Recording, SetupSets},
 };
 
 /// A trained network and its measured errors.
@@ -99,6 +99,8 @@ struct RecordingFigures<'a> {
     #[serde(flatten)]
     recording: RecordingReport,
     seconds: Option<f64>,
+    /// Share of the test samples outside the range of the training samples.
+    test_outside_training: f64,
     targets: Vec<Target<'a>>,
     baselines: BTreeMap<&'static str, Vec<Target<'a>>>,
 }
@@ -215,6 +217,7 @@ impl<'a> Trained<'a> {
         let source = match (&self.sets.recordings, settings.simulated()) {
             (Some(recordings), _) => SourceReport::Recording(Box::new(RecordingFigures {
                 recording: RecordingReport::new(&self.sets.sets, recordings),
+                test_outside_training: self.extrapolation().map_or(0.0, |(found, _)| found.share()),
                 seconds: self.run.wall_time().map(|time| time.as_secs_f64()),
                 targets: targets(&file.problem.targets, &scores.network, &determined, &scores.coverage),
                 baselines: BTreeMap::from([
@@ -252,6 +255,13 @@ impl<'a> Trained<'a> {
         Determination::measure(self.run.test(), self.run.decouple_test().view(), by)
     }
 
+    /// Test samples of a recording outside the range of its training samples.
+    fn extrapolation(&self) -> Option<(Extrapolation, &Recording)> {
+        let recordings = self.sets.recordings.as_ref()?;
+        let found = Extrapolation::measure(&self.sets.sets.split.training, self.run.test());
+        Some((found, &recordings.training))
+    }
+
     /// Warnings of the source and of the training.
     fn warnings(&self, determined: &[Result<Determination, Undetermined>]) -> Vec<String> {
         let source = self.file.settings.simulated().map(|settings| settings.source);
@@ -267,6 +277,7 @@ impl<'a> Trained<'a> {
         of_array
             .map(ToString::to_string)
             .chain(of_import.into_iter().flatten())
+            .chain(self.extrapolation().and_then(|(found, recording)| found.warning(&recording.inputs, &recording.targets)))
             .chain(self.optimism.iter().cloned())
             .chain(self.run.defect().map(|defect| defect.to_string()))
             .chain(describe_determinacy(&self.file.problem.targets, determined))
@@ -396,7 +407,10 @@ fn epoch_seconds(training: &TrainingRecord) -> f64 {
 fn inputs(problem: &Problem) -> String {
     let count = counted(problem.feature_count(), "input");
     match &problem.memory {
-        Some(memory) => format!("{count} ({} and their memory: {memory})", counted(problem.inputs.len(), "reading")),
+        Some(memory) => format!(
+            "{count} ({} and their memory: {memory})",
+            counted(problem.inputs.len(), "reading")
+        ),
         None => count,
     }
 }

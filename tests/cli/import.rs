@@ -186,7 +186,7 @@ fn moved_files_of_a_checkpoint_are_found_by_the_given_name() {
     }
     let resume = "train --checkpoint moved/c.json --resume --epochs 8";
     let message = failure(resume, folder.path(), 1);
-    for expected in ["'moved/c.json'", "sensor.csv' is missing", "give --data FILE"] {
+    for expected in ["'moved/c.json'", "sensor.csv' is missing", "give its new path with --data FILE"] {
         assert!(message.contains(expected), "{message}");
     }
     let message = failure(
@@ -401,7 +401,7 @@ fn options_of_a_simulated_sensor_are_refused_with_a_reason() {
     let folder = recordings();
     for (arguments, cause) in [
         ("--array 2x2_2x6", "--array: a recording (--data) has no array"),
-        ("--noise 0.1", "--noise: a recording (--data) has noise of its own"),
+        ("--noise 0.1", "--noise: a recording (--data) has its own noise"),
         ("--loading random", "--loading: a recording (--data) has no scene"),
         ("--samples 10", "--samples: all rows"),
         ("--rows known", "--row-wire"),
@@ -463,7 +463,7 @@ fn positions_of_targets_are_reported_kept_in_the_recipe_and_checked_by_line() {
     let units = format!("{TRAIN} --positions taxels.csv");
     let message = failure(&units, folder.path(), 1);
     assert!(
-        message.contains("states.c2 (mm) and states.c3 have positions and not the same unit"),
+        message.contains("states.c2 (mm) and states.c3 have positions but different units"),
         "{message}"
     );
     positions("target,x,y\nstates.c2,0,0\nstates.c4,4,0\n");

@@ -211,7 +211,7 @@ impl Recipe {
             return Err(self.uneven(path, line));
         }
         let names = Names::of(&[table], &[]);
-        let has_header = table.dialect().is_none_or(|dialect| dialect.header);
+        let has_header = table.has_header();
         let found = if has_header {
             InputColumns::find(&table.columns, inputs, others)
         } else {
