@@ -235,6 +235,7 @@ fn open(to_open: ToOpen, report: &Report<OpeningEvent>) -> Result<Opened, String
         suggested_plan(&inspected_files)
     };
     plan.import.dialect = recipe.dialect;
+    plan.import.derive.clone_from(&recipe.derive);
     plan.import.missing = match &files.older {
         Some(older) => {
             let stems = plan.import.stems();
@@ -268,6 +269,7 @@ fn to_look_at(paths: Vec<PathBuf>, older: Option<&Draft>) -> Recipe {
             })
             .collect(),
         dialect: older.map(|older| older.plan.import.dialect).unwrap_or_default(),
+        derive: older.map(|older| older.plan.import.derive.clone()).unwrap_or_default(),
         missing: missing.into_iter().filter(|missing| missing.column.is_none()).collect(),
         ..Recipe::default()
     }
