@@ -11,7 +11,8 @@ use decoupler_core::dataset::{Division, Memory, Span, SplitBy};
 use decoupler_files::{
     export::{RecipeFile, RecipeSource},
     import::{
-        Condition, Decimal, Derived, DialectChoice, Encoding, FileSet, Joined, Missing, Plan, Recipe, Recorded, Separator, TestFiles,
+        Condition, Decimal, Derived, DialectChoice, Encoding, FileSet, Joined, Missing, Plan, Recipe, Recorded,
+        Separator, TestFiles,
     },
 };
 
@@ -316,7 +317,11 @@ impl ImportArguments {
         let joined = import.join.iter().map(|joined| &joined.file);
         let joined = Vec::from_iter(joined.chain(import.append.iter().flat_map(|set| &set.join)));
         let test_sets = test.iter().flat_map(|test| &test.append);
-        let tested = Vec::from_iter(test.iter().map(|test| &test.data).chain(test_sets.clone().map(|set| &set.data)));
+        let tested = Vec::from_iter(
+            test.iter()
+                .map(|test| &test.data)
+                .chain(test_sets.clone().map(|set| &set.data)),
+        );
         let test_joined = test.iter().flat_map(|test| &test.join);
         let test_joined = Vec::from_iter(test_joined.chain(test_sets.flat_map(|set| &set.join)));
         let all = [

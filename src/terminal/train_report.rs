@@ -276,7 +276,10 @@ impl<'a> Trained<'a> {
         of_array
             .map(ToString::to_string)
             .chain(of_import.into_iter().flatten())
-            .chain(self.extrapolation().and_then(|(found, recording)| found.warning(&recording.inputs, &recording.targets)))
+            .chain(
+                self.extrapolation()
+                    .and_then(|(found, recording)| found.warning(&recording.inputs, &recording.targets)),
+            )
             .chain(self.optimism.iter().cloned())
             .chain(self.run.defect().map(|defect| defect.to_string()))
             .chain(describe_determinacy(&self.file.problem.targets, determined))

@@ -82,10 +82,14 @@ impl Derived {
                 let other = found.ok_or_else(|| refuse(format!("there is no column '{other}' in the same file")))?;
                 (numbers(other)?, other.unit.clone())
             }
-            Reference::Rows(rows) => (vec![mean(&values[..values.len().min(*rows)]); values.len()], column.unit.clone()),
+            Reference::Rows(rows) => (
+                vec![mean(&values[..values.len().min(*rows)]); values.len()],
+                column.unit.clone(),
+            ),
             Reference::Seconds(limit_s) => {
                 let time = time.and_then(find);
-                let time = time.ok_or_else(|| refuse("seconds need the time column; give a number of rows".to_owned()))?;
+                let time =
+                    time.ok_or_else(|| refuse("seconds need the time column; give a number of rows".to_owned()))?;
                 let factor = seconds(time.unit.as_deref());
                 let factor = factor.ok_or_else(|| refuse(format!("'{}' has no unit of time", time.name)))?;
                 let times = numbers(time)?;
@@ -112,7 +116,11 @@ impl Derived {
         let unit = match self.operator {
             Operator::Minus => column.unit.clone().filter(|_| is_same_unit),
             Operator::Over if is_same_unit => None,
-            Operator::Over => column.unit.as_ref().zip(unit.as_ref()).map(|(one, other)| format!("{one}/{other}")),
+            Operator::Over => column
+                .unit
+                .as_ref()
+                .zip(unit.as_ref())
+                .map(|(one, other)| format!("{one}/{other}")),
         };
         table.columns.push(Column {
             name,
@@ -158,12 +166,18 @@ impl FromStr for Derived {
             None => Reference::Column(reference.to_owned()),
             Some(span) => match span.trim().strip_suffix('s') {
                 Some(seconds) => {
-                    let seconds = seconds.trim().parse().ok().filter(|seconds: &f64| seconds.is_finite() && *seconds > 0.0);
+                    let seconds = seconds
+                        .trim()
+                        .parse()
+                        .ok()
+                        .filter(|seconds: &f64| seconds.is_finite() && *seconds > 0.0);
                     Reference::Seconds(seconds.ok_or_else(|| refuse("start(…s) needs a number of seconds above 0"))?)
                 }
                 None => {
                     let rows = span.trim().parse().ok().filter(|rows| *rows > 0);
-                    Reference::Rows(rows.ok_or_else(|| refuse("start(…) needs a number of rows, or seconds such as 2s"))?)
+                    Reference::Rows(
+                        rows.ok_or_else(|| refuse("start(…) needs a number of rows, or seconds such as 2s"))?,
+                    )
                 }
             },
         };

@@ -12,16 +12,16 @@ use decoupler_core::{
 use serde::Serialize;
 
 use super::{
-    Cells, Cure, Derived, DialectChoice, Excess, FileSet, Format, ImportError, Joined, Missing, Recipe, Table, TableError, Watch,
-    arrays,
+    Cells, Cure, Derived, DialectChoice, Excess, FileSet, Format, ImportError, Joined, Missing, Recipe, Table,
+    TableError, Watch, arrays,
     csv_table::{self, Reading},
     format::Contents,
     input_lines::Watched,
     inputs::{ColumnId, Names},
     join::{Partners, Source, gather, median_interval, nearest},
     numpy,
-    positions::read_positions,
     part::Part,
+    positions::read_positions,
     selection::{Rows, not_a_number},
     sentinel::{Sentinel, is_rounding, rounding_warning},
     sheet::Spreadsheet,

@@ -174,8 +174,17 @@ fn variables_of_a_workspace_are_chosen_by_their_columns() {
     assert_eq!(column("log.force"), each(|press| 0.25 * press));
     assert_eq!(column("log.nested.z"), each(|press| press));
     assert_eq!(column("records.xy.c2"), each(|press| 2.0 * press));
-    for note in ["log.label is text", "calibration is 5 × 1", "cube is 12 × 2 × 3, read as 12 × 6", "2 rows per sample"] {
-        assert!(table.notes.iter().any(|found| found.contains(note)), "{note}: {:?}", table.notes);
+    for note in [
+        "log.label is text",
+        "calibration is 5 × 1",
+        "cube is 12 × 2 × 3, read as 12 × 6",
+        "2 rows per sample",
+    ] {
+        assert!(
+            table.notes.iter().any(|found| found.contains(note)),
+            "{note}: {:?}",
+            table.notes
+        );
     }
     // The named columns determine the rows: each of a pair is a sample of its own.
     let recipe = Recipe {
@@ -184,7 +193,10 @@ fn variables_of_a_workspace_are_chosen_by_their_columns() {
         targets: vec!["pairs.c2".to_owned()],
         ..Recipe::default()
     };
-    let set = recipe.import(Path::new(""), &mut |_| ControlFlow::Continue(())).unwrap().set;
+    let set = recipe
+        .import(Path::new(""), &mut |_| ControlFlow::Continue(()))
+        .unwrap()
+        .set;
     assert_eq!(set.samples(), 24);
 }
 
@@ -217,7 +229,10 @@ fn time_stamps_are_seconds_since_the_first_and_join_files_by_moment() {
             "states.csv",
             "when,force\n2026-11-24 11:00:00.51Z,20\n2026-11-24 11:00:01.01Z,30\n2026-11-24 11:00:01.5Z,40\n",
         ),
-        ("mixed.csv", "when,force\n2026-11-24 11:00:00Z,20\n2026-11-24 11:00:01,30\n"),
+        (
+            "mixed.csv",
+            "when,force\n2026-11-24 11:00:00Z,20\n2026-11-24 11:00:01,30\n",
+        ),
     ]);
     let table = read(&folder.path().join("sensor.csv")).unwrap();
     assert_eq!(numbers(&table), [[0.0, 0.5, 1.0], [1.0, 2.0, 3.0]]);
@@ -245,11 +260,17 @@ fn time_stamps_are_seconds_since_the_first_and_join_files_by_moment() {
 #[test]
 fn files_of_other_kinds_are_refused_by_name() {
     for (start, expected) in [
-        (&b"\x89HDF\r\n\x1a\n\0\0\0\0\0\0\0\0"[..], "an HDF5 file, which is not read; save it as .npz"),
+        (
+            &b"\x89HDF\r\n\x1a\n\0\0\0\0\0\0\0\0"[..],
+            "an HDF5 file, which is not read; save it as .npz",
+        ),
         (b"PAR1\x15\x04\x15", "a Parquet file"),
         (b"\x89PNG\r\n\x1a\n", "a PNG image"),
         (b"\x80\x04\x95\x10", "a Python pickle"),
-        (b"\x1f\x8b\x08\x00", "compressed with gzip, which is not read; unpack it"),
+        (
+            b"\x1f\x8b\x08\x00",
+            "compressed with gzip, which is not read; unpack it",
+        ),
         (b"%PDF-1.7", "a PDF document"),
     ] {
         let folder = tempfile::tempdir().unwrap();
@@ -499,9 +520,14 @@ fn derived_columns_are_differences_and_ratios_also_with_the_start_of_the_file() 
         inputs: problem.inputs[..1].to_vec(),
         ..problem
     };
-    let found = inputs.read_inputs(&path, &one, false, &mut |_| ControlFlow::Continue(())).unwrap();
+    let found = inputs
+        .read_inputs(&path, &one, false, &mut |_| ControlFlow::Continue(()))
+        .unwrap();
     assert_eq!(found.readings.column(0).to_vec(), [1.0, 4.0, 6.0, 4.0]);
     let without_time = Recipe { time: None, ..recipe };
     let error = import(&without_time, &folder).unwrap_err();
-    assert!(error.contains("r=a / start(1s)") && error.contains("time column"), "{error}");
+    assert!(
+        error.contains("r=a / start(1s)") && error.contains("time column"),
+        "{error}"
+    );
 }

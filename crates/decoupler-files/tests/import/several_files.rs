@@ -55,7 +55,10 @@ fn rows_of_all_files_follow_one_another_and_each_file_is_a_group() {
     let recording = import(&recipe(3), &folder).unwrap();
     let forces = Vec::from_iter((0..3).flat_map(|session| (0..5).map(move |row| f64::from(10 * session + row))));
     assert_eq!(recording.set.targets().column(0).to_vec(), forces);
-    assert_eq!(recording.set.readings().column(0).to_vec(), Vec::from_iter(forces.iter().map(|force| 2.0 * force)));
+    assert_eq!(
+        recording.set.readings().column(0).to_vec(),
+        Vec::from_iter(forces.iter().map(|force| 2.0 * force))
+    );
     let groups = Vec::from_iter((0..3).flat_map(|session| [session; 5]));
     assert_eq!((recording.set.groups(), recording.has_groups), (&groups[..], true));
     assert_eq!((recording.rows, recording.files.len()), (15, 6));
@@ -70,7 +73,9 @@ fn rows_of_all_files_follow_one_another_and_each_file_is_a_group() {
     };
     plan.division.by = SplitBy::Group;
     plan.division.validation_fraction = 0.0;
-    let sets = plan.sets(folder.path(), Seed(0), &mut |_| ControlFlow::Continue(())).unwrap();
+    let sets = plan
+        .sets(folder.path(), Seed(0), &mut |_| ControlFlow::Continue(()))
+        .unwrap();
     assert_eq!((sets.test.samples(), sets.split.training.samples()), (5, 10));
 }
 
@@ -107,7 +112,10 @@ fn a_file_with_other_columns_is_refused_by_name() {
     let error = error_with("t,resistance\n0,1\n0.1,2\n");
     assert!(error.contains("1/sensor.csv': there is no column 'r'"), "{error}");
     let error = error_with("t,r (ohm)\n0,1\n0.1,2\n");
-    assert!(error.contains("r (ohm)") && error.contains("need the same columns"), "{error}");
+    assert!(
+        error.contains("r (ohm)") && error.contains("need the same columns"),
+        "{error}"
+    );
     let error = error_with("t,r\n0,1\n0.1,bad\n");
     assert!(error.contains("1/sensor.csv': line 3"), "{error}");
     let error = error_with("t,r\n50,1\n51,2\n");

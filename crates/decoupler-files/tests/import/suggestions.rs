@@ -219,9 +219,16 @@ fn files_with_the_same_columns_are_appended_and_split_by_file() {
     let three: &[fn(usize) -> f64] = &[VARYING, OTHER, THIRD];
     let first = table(None, 30, three);
     let second = table(None, 40, three);
-    let plan = guessed(&[("squat_S1.csv", &first), ("squat_S3.csv", &second), ("squat_S5.csv", &first)]);
+    let plan = guessed(&[
+        ("squat_S1.csv", &first),
+        ("squat_S3.csv", &second),
+        ("squat_S5.csv", &first),
+    ]);
     let appended = Vec::from_iter(plan.import.append.iter().map(|set| set.data.display().to_string()));
-    assert_eq!((appended, plan.import.join.len()), (vec!["squat_S3.csv".to_owned(), "squat_S5.csv".to_owned()], 0));
+    assert_eq!(
+        (appended, plan.import.join.len()),
+        (vec!["squat_S3.csv".to_owned(), "squat_S5.csv".to_owned()], 0)
+    );
     assert_eq!(plan.division.by, SplitBy::Group);
     // Two recordings of a sensor and a probe each.
     let clocked: &[fn(usize) -> f64] = &[CLOCK, VARYING, OTHER];
@@ -232,7 +239,10 @@ fn files_with_the_same_columns_are_appended_and_split_by_file() {
         ("sensor_2.csv", &sensor),
         ("states_2.csv", &states),
     ]);
-    assert_eq!((plan.import.data.to_str(), plan.import.join.len()), (Some("sensor_1.csv"), 1));
+    assert_eq!(
+        (plan.import.data.to_str(), plan.import.join.len()),
+        (Some("sensor_1.csv"), 1)
+    );
     assert_eq!(plan.import.append[0].data, Path::new("sensor_2.csv"));
     assert_eq!(plan.import.append[0].join, [Path::new("states_2.csv")]);
     // Files of different kinds are joined, as before.
