@@ -9,6 +9,7 @@
 
 mod arrays;
 mod csv_table;
+mod derived;
 mod detection;
 mod dialect;
 mod error;
@@ -34,6 +35,7 @@ mod suggestion;
 mod table;
 mod time_stamp;
 
+pub use derived::Derived;
 pub use dialect::{Decimal, Dialect, DialectChoice, DialectError, Encoding, Separator};
 pub use error::{Cure, ImportError, TableError};
 pub use format::Format;
