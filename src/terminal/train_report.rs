@@ -14,8 +14,8 @@ use super::{
 };
 use decoupler_core::{
     evaluation::{
-        Baselines, Channel, DecoderReport, Errors, Outlook, ReferenceNote, Run, RunError, SimulatedSettings,
-        StartRecord, TestErrors, best_start, error_remarks,
+        Baselines, Channel, Combination, DecoderReport, Errors, Outlook, ReferenceNote, Run, RunError,
+        SimulatedSettings, StartRecord, TestErrors, best_start, error_remarks,
         recorded::{Determination, Undetermined},
     },
     network::InputChoice,
@@ -51,6 +51,7 @@ struct Report<'a> {
     method: &'static str,
     seed: u64,
     starts: &'a [StartRecord],
+    combine: Combination,
     epochs: usize,
     best_epoch: usize,
     stop_reason: Option<StopReason>,
@@ -232,6 +233,7 @@ impl<'a> Trained<'a> {
             method: settings.training.method.short_name(),
             seed: settings.seed.0,
             starts: &training.starts,
+            combine: settings.combine,
             epochs: epochs(training),
             best_epoch: training.best_epoch,
             stop_reason: training.stop_reason,
@@ -320,7 +322,12 @@ impl<'a> Trained<'a> {
         )?;
         writeln!(out, "Weights kept from epoch {}\n", training.best_epoch)?;
         if training.starts.len() > 1 {
-            write_starts(&training.starts, file.problem.test_percent_name(), out)?;
+            write_starts(
+                &training.starts,
+                settings.combine,
+                file.problem.test_percent_name(),
+                out,
+            )?;
             writeln!(out)?;
         }
         write!(out, "{}", error_table(&file.error_table()).aligned())?;

@@ -6,7 +6,7 @@ use clap::{
 use super::{count, failure::Failure, interruption::check_same, number, scene_arguments::SceneArguments, seed};
 use decoupler_core::{
     dataset::{LARGEST_SAMPLES, Seed},
-    evaluation::{MAX_STARTS, RunSettings, SimulatedSettings, Simulation, Source},
+    evaluation::{Combination, MAX_STARTS, RunSettings, SimulatedSettings, Simulation, Source},
     network::LARGEST_HIDDEN,
     sensor::{ArrayScale, SensorModel},
     training::{Method, StoppingRules, TrainingSettings},
@@ -24,9 +24,13 @@ pub(super) struct TrainingArguments {
     /// Hidden nodes [default: 12]
     #[arg(long, value_name = "N", value_parser = count(1..=LARGEST_HIDDEN))]
     hidden: Option<usize>,
-    /// Number of trainings from different random weights; the one with the lowest validation error is kept [default: 1]
+    /// Number of trainings from different random weights, which --combine makes one network [default: 1]
     #[arg(long, value_name = "N", value_parser = count(1..=MAX_STARTS))]
     starts: Option<usize>,
+    /// How several starts become one network: best keeps the one with the lowest validation error, mean averages their
+    /// answers [default: best]
+    #[arg(long, value_name = "best|mean")]
+    combine: Option<Combination>,
     /// Training method [default: lm; br for a recording]
     #[arg(long, value_parser = method())]
     method: Option<Method>,
@@ -82,6 +86,7 @@ impl TrainingArguments {
             },
             hidden: self.hidden.unwrap_or(default.hidden),
             starts: self.starts.unwrap_or(default.starts),
+            combine: self.combine.unwrap_or(default.combine),
             training: self.training(default.training)?,
             seed: self.seed.map_or(default.seed, Seed),
             ..default
@@ -109,6 +114,7 @@ impl TrainingArguments {
         Ok(RunSettings {
             hidden: self.hidden.unwrap_or(default.hidden),
             starts: self.starts.unwrap_or(default.starts),
+            combine: self.combine.unwrap_or(default.combine),
             training: self.training(default.training)?,
             seed: self.seed.map_or(default.seed, Seed),
             ..default
@@ -170,6 +176,7 @@ impl TrainingArguments {
         }
         check_same("hidden", self.hidden, settings.hidden)?;
         check_same("starts", self.starts, settings.starts)?;
+        check_same("combine", self.combine, settings.combine)?;
         check_same("seed", self.seed, settings.seed)?;
         self.training(settings.training)
     }

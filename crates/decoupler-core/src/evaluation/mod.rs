@@ -5,6 +5,7 @@
 //! [`measure_trade_off`] compares speed with accuracy; [`experiments`] repeats runs over a grid of settings;
 //! [`recorded`] measures how well recorded readings determine the targets.
 
+pub mod auto;
 mod baselines;
 mod cross_validation;
 mod decoder_set;
@@ -34,7 +35,10 @@ pub use reference::{NoReference, ReferenceNote, reference_errors};
 pub use remark::{Cause, MissingFigures, Remark, error_remarks};
 pub use run::{Run, RunDefect, RunError};
 pub use run_sets::RunSets;
-pub use settings::{CountError, MAX_STARTS, MeasuredSettings, RunSettings, SimulatedSettings, Workload, WorkloadTime};
+pub use settings::{
+    Combination, CombinationError, CountError, MAX_STARTS, MeasuredSettings, RunSettings, SimulatedSettings, Workload,
+    WorkloadTime,
+};
 pub use source::{
     Channel, Measured, ModelSize, Preset, PresetError, Problem, Simulation, Source, TargetPosition, ready_settings,
 };

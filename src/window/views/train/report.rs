@@ -7,8 +7,8 @@ use std::time::Duration;
 use decoupler_core::{
     dataset::SplitBy,
     evaluation::{
-        Baselines, ErrorTable, Errors, NodeAddress, Outlook, Problem, ReferenceNote, Scores, SimulatedSettings, Spread,
-        StartRecord, TestErrors, best_start, error_remarks,
+        Baselines, Combination, ErrorTable, Errors, NodeAddress, Outlook, Problem, ReferenceNote, Scores,
+        SimulatedSettings, Spread, StartRecord, TestErrors, best_start, error_remarks,
     },
     identifiability::Identifiability,
     training::StopReason,
@@ -71,7 +71,7 @@ pub fn report_ui(ui: &mut Ui, view: &mut TrainView, shared: &Shared, effects: &m
             let asked = decoders_ui(ui, decoders, shared.phase, measured, target, source.as_ref());
             effects.extend(asked.map(Effect::ChooseFile));
             effective_parameters_ui(ui, run, result);
-            spread_ui(ui, &run.problem, &run.starts);
+            spread_ui(ui, &run.problem, run.settings().combine, &run.starts);
         } else {
             expectation_ui(ui, shared);
         }
@@ -316,7 +316,7 @@ pub fn conditioning_ui(ui: &mut Ui, test: &TestView) {
 }
 
 /// Shows the spread of the results of several starts: a strip of dots and three figures. Nothing for one start.
-pub fn spread_ui(ui: &mut Ui, problem: &Problem, starts: &[StartRecord]) {
+pub fn spread_ui(ui: &mut Ui, problem: &Problem, combine: Combination, starts: &[StartRecord]) {
     let Some(best) = best_start(starts).filter(|_| starts.len() > 1) else {
         return;
     };
@@ -341,7 +341,13 @@ pub fn spread_ui(ui: &mut Ui, problem: &Problem, starts: &[StartRecord]) {
     let error = if is_held_out { "validation mse" } else { "training mse" };
     let errors = Spread::of(starts.iter().map(StartRecord::deciding_mse));
     described_table_ui(ui, "spread", &spread_table(&[(of_test, spread), (error, errors)]));
-    let text = format!("Start {} is kept: it has the lowest {error}.", best + 1);
+    let text = match combine {
+        Combination::Best => format!("Start {} is kept: it has the lowest {error}.", best + 1),
+        Combination::Mean => format!(
+            "The mean of all starts is kept; start {} has the lowest {error}.",
+            best + 1
+        ),
+    };
     ui.label(RichText::new(text).size(type_size().note).color(palette.dim));
 }
 

@@ -172,12 +172,7 @@ fn training_ui<S>(ui: &mut Ui, settings: &mut RunSettings<S>, phase: Phase) {
             stopping_ui(ui, &mut settings.training.stopping);
         });
         fold_ui(ui, "Method settings", &of_method(settings), |ui| {
-            method_settings_ui(
-                ui,
-                &mut settings.training.method,
-                &mut settings.starts,
-                !phase.is_busy(),
-            );
+            method_settings_ui(ui, settings, !phase.is_busy());
         });
     });
 }
@@ -274,6 +269,7 @@ pub fn applied(preset: Preset, draft: &SimulatedSettings) -> SimulatedSettings {
         },
         hidden: draft.hidden,
         starts: draft.starts,
+        combine: draft.combine,
         seed: draft.seed,
         ..settings
     }
