@@ -179,7 +179,7 @@ fn impossible_readings_and_depths_are_refused_with_their_line() {
             }
             cells.join(",") + "\n"
         });
-        fs::write(path.join("frames.csv"), spoilt.collect::<String>()).unwrap();
+        fs::write(path.join("frames.csv"), damaged.collect::<String>()).unwrap();
         let calibrated = format!("calibrate --array {ARRAY} {FRAMES}");
         let tuned = format!("fine-tune --network net.json {FRAMES} --epochs 1 --out tuned.json");
         for command in [&calibrated, &tuned] {

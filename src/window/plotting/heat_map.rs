@@ -46,7 +46,9 @@ pub fn heat_map_ui(ui: &mut Ui, map: &HeatMap, marked: Option<[usize; 2]>) -> Op
             let name = tooltip.lines().next().unwrap_or_default();
             WidgetInfo::selected(Role::Button, true, is_marked, name)
         });
-        let response = response.on_hover_cursor(CursorIcon::PointingHand).on_hover_text(tooltip);
+        let response = response
+            .on_hover_cursor(CursorIcon::PointingHand)
+            .on_hover_text(tooltip);
         if response.clicked() {
             pointed = Some(([row, column], CellPointed::Once));
         }

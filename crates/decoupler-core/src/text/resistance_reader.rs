@@ -95,8 +95,8 @@ pub enum ReadError {
     Io(#[from] io::Error),
 }
 
-/// Maximum number of bytes up to the end of the next row, blank lines included: 1 MiB. A row of the largest array takes about
-/// 100 kB.
+/// Maximum number of bytes up to the end of the next row, blank lines included: 1 MiB. A row of the largest array takes
+/// about 100 kB.
 pub const LONGEST_ROW: u64 = 1 << 20;
 
 impl<R: BufRead> Rows<R> {
