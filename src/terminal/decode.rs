@@ -259,6 +259,8 @@ const MAX_LISTED: usize = 10;
 /// Lines with readings or targets outside the range seen in training, where a network extrapolates.
 pub(super) struct OutsideTraining<'a> {
     problem: &'a Problem,
+    /// Names of the inputs of the network.
+    features: Vec<Channel>,
     lines: usize,
     outside: usize,
     listed: Vec<String>,
@@ -276,6 +278,7 @@ impl<'a> OutsideTraining<'a> {
     pub(super) fn new(problem: &'a Problem) -> Self {
         Self {
             problem,
+            features: problem.features(),
             lines: 0,
             outside: 0,
             listed: Vec::new(),
@@ -309,7 +312,7 @@ impl<'a> OutsideTraining<'a> {
         self.outside += 1;
         if self.listed.len() < MAX_LISTED {
             let first_reading = outside().next().zip(range).map(|(channel, range)| {
-                let (name, extremes) = (&self.problem.inputs[channel], range.extremes(channel));
+                let (name, extremes) = (&self.features[channel], range.extremes(channel));
                 described(name, readings[channel], extremes)
             });
             let first_target = || {

@@ -3,7 +3,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 
 use super::{failure::Failure, interruption::check_same};
-use decoupler_core::dataset::{Division, SplitBy};
+use decoupler_core::dataset::{Division, Memory, Span, SplitBy};
 use decoupler_files::{
     export::{RecipeFile, RecipeSource},
     import::{
@@ -61,6 +61,17 @@ pub(super) struct ImportArguments {
     /// Column that groups samples with equal values, such as one press or session
     #[arg(long, value_name = "COLUMN", requires = "data")]
     group: Option<String>,
+    /// Inputs from the past: the readings of so many samples, or seconds, before each sample, such as 5,10,20 or 0.5s; within
+    /// a group and across no gap in time (over five usual intervals)
+    #[arg(long, value_name = "SPANS", value_delimiter = ',', requires = "data")]
+    lags: Vec<Span>,
+    /// Inputs from the past: exponential averages of the readings with these time constants, such as 0.1s,1s,10s, which need
+    /// --time, or 20,100 samples
+    #[arg(long, value_name = "SPANS", value_delimiter = ',', requires = "data")]
+    memory: Vec<Span>,
+    /// The past as its difference from the present reading; without --lags and --memory, from the sample before
+    #[arg(long, requires = "data")]
+    differences: bool,
     /// Column with the row number from 1
     #[arg(long, value_name = "COLUMN", requires = "data")]
     row_wire: Option<String>,
@@ -173,6 +184,9 @@ impl ImportArguments {
             (!self.join.is_empty(), "--join"),
             (self.group.is_some(), "--group"),
             (self.row_wire.is_some(), "--row-wire"),
+            (!self.lags.is_empty(), "--lags"),
+            (!self.memory.is_empty(), "--memory"),
+            (self.differences, "--differences"),
             (!self.conditions.is_empty(), "--where"),
             (!self.missing.is_empty(), "--missing"),
             (!self.unit.is_empty(), "--unit"),
@@ -228,6 +242,10 @@ impl ImportArguments {
             ("row-wire", &self.row_wire, &import.row_wire),
         ] {
             check_same(argument, column.as_ref(), saved.as_deref().unwrap_or("none"))?;
+        }
+        if let Some(memory) = self.of_memory() {
+            let none = Memory::default();
+            check_same("memory", Some(memory), import.memory.clone().unwrap_or(none))?;
         }
         let given = [
             (self.recipe.is_some(), "--recipe"),
@@ -403,11 +421,23 @@ impl ImportArguments {
             time: self.time.clone(),
             group: self.group.clone(),
             row_wire: self.row_wire.clone(),
+            memory: self.of_memory(),
             conditions: self.conditions.clone(),
             missing: self.missing.clone(),
             units: self.unit.iter().cloned().collect(),
             positions: self.positions.clone(),
         })
+    }
+
+    /// Inputs from the past, if requested.
+    fn of_memory(&self) -> Option<Memory> {
+        let memory = Memory {
+            lags: self.lags.clone(),
+            averages: self.memory.clone(),
+            differences: self.differences,
+            interval_s: None,
+        };
+        (!memory.is_empty()).then_some(memory)
     }
 
     /// The recipe to use.

@@ -76,9 +76,7 @@ pub(super) fn read(
 /// Reads the columns named like the inputs, or as many unnamed columns as there are inputs, from a file of any format.
 fn read_columns(file: &NetworkFile, recipe: &Recipe, input: &Path) -> Result<Readings, Failure> {
     let has_rows = file.network.only().is_none();
-    let table = with_bar(true, |watch| {
-        recipe.read_inputs(input, &file.problem.inputs, has_rows, watch)
-    })?;
+    let table = with_bar(true, |watch| recipe.read_inputs(input, &file.problem, has_rows, watch))?;
     let InputTable {
         readings,
         row_wires,

@@ -301,7 +301,7 @@ impl<'a> Trained<'a> {
         writeln!(
             out,
             "{}, {}, {method}, {}, seed {}",
-            counted(file.problem.inputs.len(), "input"),
+            inputs(&file.problem),
             counted(settings.hidden, "hidden node"),
             counted(settings.starts, "start"),
             settings.seed
@@ -397,6 +397,15 @@ fn epoch_seconds(training: &TrainingRecord) -> f64 {
 }
 
 /// Condition number of the worst row; none if the Jacobian is singular.
+/// Number of inputs of the network, with the memory if there is one.
+fn inputs(problem: &Problem) -> String {
+    let count = counted(problem.feature_count(), "input");
+    match &problem.memory {
+        Some(memory) => format!("{count} ({} and their memory: {memory})", counted(problem.inputs.len(), "reading")),
+        None => count,
+    }
+}
+
 fn condition(outlook: Option<&Outlook>) -> Option<f64> {
     let condition = outlook?.worst_row.condition();
     Some(condition).filter(|condition| condition.is_finite())

@@ -1,4 +1,4 @@
-use std::collections::HashMap;
+use std::{collections::HashMap, fmt};
 
 use ndarray::{Array2, ArrayView2};
 use serde::{Deserialize, Serialize};
@@ -190,6 +190,26 @@ impl Memory {
         let lags = self.lags.iter().copied().chain(previous.then_some(Span::Samples(1.0)));
         lags.map(Past::Lag)
             .chain(self.averages.iter().copied().map(Past::Average))
+    }
+}
+
+/// In words: `averages over 2s, 10s and lags of 5, 10, as differences`.
+impl fmt::Display for Memory {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let list = |spans: &[Span]| Vec::from_iter(spans.iter().map(Span::to_string)).join(", ");
+        let mut parts = Vec::new();
+        if !self.averages.is_empty() {
+            parts.push(format!("averages over {}", list(&self.averages)));
+        }
+        if !self.lags.is_empty() {
+            parts.push(format!("lags of {}", list(&self.lags)));
+        }
+        match (parts.is_empty(), self.differences) {
+            (true, false) => f.write_str("none"),
+            (true, true) => f.write_str("differences from the sample before"),
+            (false, false) => f.write_str(&parts.join(" and ")),
+            (false, true) => write!(f, "{}, as differences", parts.join(" and ")),
+        }
     }
 }
 

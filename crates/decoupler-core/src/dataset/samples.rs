@@ -252,6 +252,22 @@ impl Dataset {
         }
     }
 
+    /// Returns the samples with other readings (samples × channels), such as the features of a [`Memory`](super::Memory).
+    ///
+    /// # Panics
+    /// If there is not one row of readings for each sample, or there are no channels.
+    #[must_use]
+    pub fn with_readings(&self, readings: Array2<f64>) -> Self {
+        assert_eq!(readings.nrows(), self.samples(), "one row of readings for each sample");
+        assert!(readings.ncols() > 0, "a sample has at least one reading");
+        Self {
+            readings: readings.as_standard_layout().into_owned(),
+            targets: self.targets.clone(),
+            rows: self.rows.clone(),
+            groups: self.groups.clone(),
+        }
+    }
+
     /// Returns the samples of the row-wire with this index among those read, in order; all samples if row-wires are
     /// unknown.
     #[must_use]

@@ -1,7 +1,7 @@
 use std::{fmt::Display, io::Write as _, path::Path, sync::Arc};
 
 use decoupler_core::{
-    dataset::Dataset,
+    dataset::{Dataset, MemoryStream},
     evaluation::{
         ErrorTable, PastNetwork, Problem, Run, RunSettings, Scores, SimulatedSettings, StartRecord, TargetPosition,
         TestErrors,
@@ -18,7 +18,7 @@ use super::{
     document::PROGRAM,
     unfinished::folder_of,
 };
-use crate::import::{InputLines, Recorded, Setup, SetupError};
+use crate::import::{InputLines, OtherColumns, Recorded, Setup, SetupError};
 
 const KIND: DocumentKind = DocumentKind::Network;
 
@@ -95,11 +95,16 @@ impl NetworkFile {
 
     /// Returns a parser for lines with the inputs of a network that was trained on a recording.
     pub fn input_lines(&self) -> InputLines {
-        let recorded = self.recorded.as_ref();
-        let row_wire = recorded.and_then(|recorded| recorded.plan.import.row_wire.clone());
+        let import = self.recorded.as_ref().map(|recorded| &recorded.plan.import);
+        let others = import.map_or_else(OtherColumns::default, |import| import.other_columns(&self.problem));
         let has_rows = self.network.only().is_none();
         let row_wires = self.row_wires.clone().filter(|_| has_rows);
-        InputLines::new(self.problem.inputs.clone(), row_wire, row_wires)
+        let memory = self.problem.memory.as_ref().map(|memory| {
+            let networks = self.network.values().len();
+            MemoryStream::new(memory, self.problem.inputs.len(), networks)
+                .expect("reading and writing check the memory")
+        });
+        InputLines::new(self.problem.inputs.clone(), others, row_wires).with_memory(memory)
     }
 
     /// Setup of the run.
@@ -312,6 +317,13 @@ pub(super) fn defect(file: &NetworkFile) -> Option<String> {
     let problem_defect = match simulated {
         Some(settings) if *problem != settings.source.problem() => Some("problem: it does not match the array"),
         None if problem.has_nodes => Some("problem: the targets of a recording are not nodes"),
+        None if problem
+            .memory
+            .as_ref()
+            .is_some_and(|memory| memory.check(problem.inputs.len()).is_err()) =>
+        {
+            Some("problem.memory: it is not possible for these inputs")
+        }
         None if !problem.positions.iter().all(is_placed) => Some("problem.positions: a target does not exist"),
         _ => None,
     };
@@ -387,7 +399,12 @@ fn number_defect(network: &Networks, settings: &RunSettings, row_wires: Option<&
 
 fn mismatch(network: &DecouplingNetwork, problem: &Problem, hidden: usize) -> Option<String> {
     let sizes = [
-        ("reads", network.inputs().channels(), problem.inputs.len(), "readings"),
+        (
+            "reads",
+            network.inputs().channels(),
+            problem.feature_count(),
+            "readings",
+        ),
         ("gives", network.outputs().channels(), problem.targets.len(), "targets"),
         ("has", network.mlp().shape().hidden, hidden, "hidden nodes"),
     ];

@@ -1,7 +1,7 @@
 use std::{fmt, io, path::PathBuf};
 
 use decoupler_core::{
-    dataset::{DatasetError, DivisionError},
+    dataset::{DatasetError, DivisionError, MemoryError},
     text::system_cause,
 };
 use thiserror::Error;
@@ -140,6 +140,19 @@ pub enum ImportError {
         path: PathBuf,
         /// Error in its contents.
         source: PositionsError,
+    },
+    /// The memory is invalid for the readings.
+    #[error(transparent)]
+    Memory(#[from] MemoryError),
+    /// The unit of the times is not a unit of time.
+    #[error(
+        "the times in '{name}' are in {unit}, and a memory needs times in s, ms, us, ns, min or h: give the unit of the column"
+    )]
+    TimeUnit {
+        /// Full name of the time column.
+        name: String,
+        /// Its unit.
+        unit: String,
     },
     /// The samples are not a valid dataset.
     #[error(transparent)]

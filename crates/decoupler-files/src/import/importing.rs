@@ -5,7 +5,7 @@ use std::{
 };
 
 use decoupler_core::{
-    dataset::Dataset,
+    dataset::{Dataset, History, Memory, MemoryError},
     evaluation::{Channel, Problem, TargetPosition},
 };
 use serde::Serialize;
@@ -51,15 +51,19 @@ impl Recipe {
         };
         rows.check_numbers()?;
         let (mut kept, dropped) = rows.select()?;
+        // The past includes rows that are no samples.
+        let mut read = rows.with_readings();
         if let Some(id) = meanings.time {
             warnings.extend(rows.put_in_order(id, &mut kept));
+            rows.put_in_order(id, &mut read);
         }
-        let times = meanings
+        let times: Option<Vec<f64>> = meanings
             .time
             .map(|id| kept.iter().map(|&row| rows.number(id, row)).collect());
         let lines = kept.iter().map(|&row| files[0].1.line(row)).collect();
         let groups = rows.groups(&kept);
         let row_wires = rows.row_wires(&kept)?;
+        let past = rows.past(&read, &kept)?;
         let channels = |ids: &[ColumnId]| ids.iter().map(|id| rows.channel(*id)).collect::<Vec<Channel>>();
         let (inputs, targets) = (channels(&meanings.inputs), channels(&meanings.targets));
         let positions = match &self.positions {
@@ -79,12 +83,24 @@ impl Recipe {
             rows: &kept,
         };
         let targets_of_rows = gather(&mut source, &meanings.targets, &meanings.inputs);
-        let readings = gather(&mut source, &meanings.inputs, &[]);
-        Ok(Recording {
-            set: Dataset::new(readings, targets_of_rows, row_wires.as_deref(), groups)?,
+        source.rows = &read;
+        let history = past.with_readings(gather(&mut source, &meanings.inputs, &[]));
+        let memory = self.memory.as_ref().filter(|memory| !memory.is_empty());
+        let memory = memory.map(|memory| history.resolved(memory));
+        let readings = history.features(memory.as_ref().unwrap_or(&Memory::default()))?;
+        let problem = Problem {
             inputs,
             targets,
+            memory,
             positions,
+            has_nodes: false,
+        };
+        Ok(Recording {
+            set: Dataset::new(readings, targets_of_rows, row_wires.as_deref(), groups)?,
+            inputs: problem.features(),
+            targets: problem.targets.clone(),
+            problem,
+            history,
             lines,
             times,
             has_groups: self.group.is_some(),
@@ -297,12 +313,14 @@ pub struct Recording {
     /// Samples sorted by time, or in the order of the file; readings and targets in the order of [`Self::inputs`] and
     /// [`Self::targets`]. Without a group column, each sample is a group of its own.
     pub set: Dataset,
-    /// Names and units of the readings.
+    /// Names and units of the channels of [`Self::set`]: the readings and, with a memory, the values from their past.
     pub inputs: Vec<Channel>,
     /// Names and units of the targets.
     pub targets: Vec<Channel>,
-    /// Positions of targets on the skin, for those that have one.
-    pub positions: Vec<TargetPosition>,
+    /// Description of the readings, the targets and the memory.
+    problem: Problem,
+    /// Readings in order of time, for [other memories](Self::with_memory).
+    history: History,
     /// Line of each sample in the first file, from 1.
     pub lines: Vec<u64>,
     /// Time of each sample, if there is a time column.
@@ -363,11 +381,42 @@ pub struct JoinReport {
 impl Recording {
     /// Returns the description of the channels.
     pub fn problem(&self) -> Problem {
-        Problem {
-            inputs: self.inputs.clone(),
-            targets: self.targets.clone(),
-            positions: self.positions.clone(),
-            has_nodes: false,
-        }
+        self.problem.clone()
+    }
+
+    /// Positions of targets on the skin, for those that have one.
+    pub fn positions(&self) -> &[TargetPosition] {
+        &self.problem.positions
+    }
+
+    /// Memory whose features are the channels of the samples, with its usual interval.
+    pub fn memory(&self) -> Option<&Memory> {
+        self.problem.memory.as_ref()
+    }
+
+    /// Readings in order of time, from which the features of any memory are computed.
+    pub fn history(&self) -> &History {
+        &self.history
+    }
+
+    /// Returns the recording with another memory, or without one.
+    ///
+    /// # Errors
+    /// If the memory is invalid for the readings, such as one in seconds without times.
+    pub fn with_memory(&self, memory: Option<&Memory>) -> Result<Self, MemoryError> {
+        let memory = memory
+            .filter(|memory| !memory.is_empty())
+            .map(|memory| self.history.resolved(memory));
+        let features = self.history.features(memory.as_ref().unwrap_or(&Memory::default()))?;
+        let problem = Problem {
+            memory,
+            ..self.problem.clone()
+        };
+        Ok(Self {
+            set: self.set.with_readings(features),
+            inputs: problem.features(),
+            problem,
+            ..self.clone()
+        })
     }
 }

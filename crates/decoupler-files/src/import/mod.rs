@@ -34,7 +34,7 @@ pub use error::{Cure, ImportError, TableError};
 pub use format::Format;
 pub use importing::{Dropped, FileReport, JoinReport, Recording, read_table};
 pub use input_lines::{InputLine, InputLineError, InputLines, Progress, Watch};
-pub use inputs::{InputColumns, InputError, InputTable};
+pub use inputs::{InputColumns, InputError, InputTable, InputTime, OtherColumns};
 pub use inspection::{ColumnKind, ColumnSummary, InspectedFile, Inspection, TimeSummary};
 pub use missing::{Condition, Missing};
 pub use plan::{Plan, PlannedSets, TestFiles};

@@ -74,7 +74,10 @@ impl Plan {
             None => None,
             Some(files) => {
                 self.check_test_files(folder, files)?;
-                Some(self.import.of_test(files)?.import(folder, watch)?)
+                let mut recipe = self.import.of_test(files)?;
+                // Lags in seconds have as many samples as in training.
+                recipe.memory = recording.memory().cloned();
+                Some(recipe.import(folder, watch)?)
             }
         };
         Ok((recording, test_recording))

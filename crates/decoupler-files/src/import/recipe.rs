@@ -7,7 +7,7 @@ use std::{
     path::{Component, Path, PathBuf},
 };
 
-use decoupler_core::dataset::Dataset;
+use decoupler_core::dataset::{Dataset, Memory};
 use serde::{Deserialize, Serialize};
 
 use super::{Condition, DialectChoice, ImportError, Missing, Plan, PlannedSets};
@@ -40,6 +40,9 @@ pub struct Recipe {
     /// Column with the number of the row-wire, from 1.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub row_wire: Option<String>,
+    /// Inputs from the past: lags and averages of the readings.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub memory: Option<Memory>,
     /// Conditions that every used row must meet.
     #[serde(default, rename = "where", skip_serializing_if = "Vec::is_empty")]
     pub conditions: Vec<Condition>,

@@ -6,7 +6,11 @@ use super::{
     join::Partners,
     suggestion::Meanings,
 };
-use decoupler_core::evaluation::Channel;
+use decoupler_core::{
+    dataset::{History, Memory},
+    evaluation::Channel,
+};
+use ndarray::Array2;
 
 /// Largest number of a row-wire.
 const LAST_ROW_WIRE: f64 = 10_000.0;
@@ -131,6 +135,47 @@ impl Rows<'_> {
         Ok((kept, dropped))
     }
 
+    /// Returns the rows with all readings and a time, including rows that are not samples.
+    pub(super) fn with_readings(&self) -> Vec<usize> {
+        let single = self
+            .meanings
+            .time
+            .into_iter()
+            .chain(self.meanings.row_wire)
+            .chain(self.meanings.group);
+        let used = Vec::from_iter(single.chain(self.meanings.inputs.iter().copied()));
+        let has_row_wire = |id: ColumnId, row: usize| row_wire(self.names.name(id), self.number(id, row)).is_ok();
+        let is_complete = |&row: &usize| {
+            !used.iter().any(|id| self.is_missing(*id, row))
+                && self.meanings.row_wire.is_none_or(|id| has_row_wire(id, row))
+        };
+        (0..self.files[0].1.rows).filter(is_complete).collect()
+    }
+
+    /// Describes the rows `read` in order of time, of which those in `kept` are samples.
+    pub(super) fn past(&self, read: &[usize], kept: &[usize]) -> Result<Past, ImportError> {
+        let mut place = HashMap::with_capacity(read.len());
+        place.extend(read.iter().enumerate().map(|(place, &row)| (row, place)));
+        let times_s = match self.meanings.time {
+            None => None,
+            Some(id) => {
+                let Channel { name, unit } = self.channel(id);
+                let factor = seconds(unit.as_deref());
+                if factor.is_none() && self.recipe.memory.as_ref().is_some_and(Memory::needs_clock) {
+                    let unit = unit.unwrap_or_default();
+                    return Err(ImportError::TimeUnit { name, unit });
+                }
+                factor.map(|factor| read.iter().map(|&row| factor * self.number(id, row)).collect())
+            }
+        };
+        Ok(Past {
+            groups: self.meanings.group.map(|_| self.groups(read)),
+            row_wires: self.row_wires(read)?,
+            times_s,
+            samples: kept.iter().map(|row| place[row]).collect(),
+        })
+    }
+
     /// Sorts the rows by time; returns a note if they were not in order.
     pub(super) fn put_in_order(&self, time: ColumnId, kept: &mut [usize]) -> Option<String> {
         let falls = |pair: &[usize]| self.number(time, pair[1]) < self.number(time, pair[0]);
@@ -200,6 +245,34 @@ impl Rows<'_> {
         };
         self.files.iter().enumerate().map(report).collect()
     }
+}
+
+/// Rows of a history, before their readings are moved.
+pub(super) struct Past {
+    groups: Option<Vec<usize>>,
+    row_wires: Option<Vec<usize>>,
+    times_s: Option<Vec<f64>>,
+    samples: Vec<usize>,
+}
+
+impl Past {
+    pub(super) fn with_readings(self, readings: Array2<f64>) -> History {
+        let (groups, row_wires) = (self.groups.as_deref(), self.row_wires.as_deref());
+        History::new(readings, groups, row_wires, self.times_s, self.samples)
+    }
+}
+
+/// Returns the number of seconds in the unit of a time column; times without a unit are in seconds.
+pub(super) fn seconds(unit: Option<&str>) -> Option<f64> {
+    Some(match unit.map(str::trim) {
+        None | Some("" | "s" | "sec" | "secs" | "second" | "seconds") => 1.0,
+        Some("ms" | "msec" | "millisecond" | "milliseconds") => 1e-3,
+        Some("us" | "µs" | "μs" | "usec" | "microsecond" | "microseconds") => 1e-6,
+        Some("ns" | "nanosecond" | "nanoseconds") => 1e-9,
+        Some("min" | "minute" | "minutes") => 60.0,
+        Some("h" | "hour" | "hours") => 3600.0,
+        Some(_) => return None,
+    })
 }
 
 #[derive(Clone, Copy, PartialEq, Eq)]

@@ -134,7 +134,11 @@ fn outside_ui(ui: &mut Ui, targets: &LiveTargets) {
     let readings = match targets.readings_outside {
         None => "readings not known".to_owned(),
         Some(0) if targets.targets_outside == 0 => "none".to_owned(),
-        Some(readings) => format!("{} of {}", counted(readings, "reading"), targets.problem.inputs.len()),
+        Some(readings) => format!(
+            "{} of {}",
+            counted(readings, "reading"),
+            targets.problem.feature_count()
+        ),
     };
     let value = match targets.targets_outside {
         0 => readings,

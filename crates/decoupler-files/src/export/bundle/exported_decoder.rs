@@ -1,5 +1,5 @@
 use decoupler_core::{
-    dataset::{Dataset, PerRow, Seed, Stream},
+    dataset::{Dataset, Memory, PerRow, Seed, Stream},
     decoupling::{CompiledNetworks, Decoder, DecoderKind, Description, Layer, Precision, decode_set},
     evaluation::{
         Channel, DecoderSet, Problem, RunError, RunSets, RunSettings, SimulatedSettings, TargetErrors, TestErrors,
@@ -87,6 +87,11 @@ impl<'a> ExportedDecoder<'a> {
 
     pub(super) fn description(&self) -> &Description {
         &self.fitted.description
+    }
+
+    /// Memory whose features the decoder takes, if it has one.
+    pub(super) fn memory(&self) -> Option<&Memory> {
+        self.origin.problem.memory.as_ref()
     }
 
     pub(super) fn meaning(&self) -> Meaning {

@@ -33,6 +33,9 @@ pub fn export_bundle<'a>(
     if format == BundleFormat::Json && fs::symlink_metadata(path).is_ok() {
         return Err(BundleError::Exists(path.to_owned()));
     }
+    if let Some(memory) = exported.memory() {
+        return Err(BundleError::Memory(format, memory.clone()));
+    }
     let folder = AtomicFolder::create(path)?;
     let portable = Portable::of(&exported)?;
     let mut bundle = Bundle {

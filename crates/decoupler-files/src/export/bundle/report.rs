@@ -1,6 +1,7 @@
 use std::{fmt::Write, path::PathBuf};
 
 use decoupler_core::{
+    dataset::Memory,
     decoupling::NotDescribed,
     evaluation::{Channel, RunError},
 };
@@ -236,6 +237,11 @@ pub enum BundleError {
         /// The cause.
         reason: NotDescribed,
     },
+    /// The format has no state for a memory.
+    #[error(
+        "{0} has no state, which the memory of this network needs ({1}): train without --lags, --memory and --differences, or decode with this program"
+    )]
+    Memory(BundleFormat, Memory),
     /// Rows whose equations have no unique solution.
     #[error(
         "{decoder} cannot be exported: the equations of {open} of {rows} rows drawn in the scene have no solution or more than one; take another decoder"

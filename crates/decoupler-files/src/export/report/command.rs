@@ -4,7 +4,7 @@ use std::{fmt, path::Path};
 
 use crate::import::{DialectChoice, Plan, Recipe, Setup};
 use decoupler_core::{
-    dataset::{Division, SplitBy},
+    dataset::{Division, Span, SplitBy},
     evaluation::{Measured, RunSettings, SimulatedSettings},
     scene::{Loading, Movement, NoisySets, RowModel},
     sensor::SensorModel,
@@ -195,6 +195,7 @@ impl Command {
             time,
             group,
             row_wire,
+            memory,
             conditions,
             missing,
             units,
@@ -214,6 +215,17 @@ impl Command {
         self.add("targets", targets.join(","));
         for (name, column) in [("time", time), ("group", group), ("row-wire", row_wire)] {
             column.iter().for_each(|column| self.add(name, column));
+        }
+        if let Some(memory) = memory {
+            for (name, spans) in [("lags", &memory.lags), ("memory", &memory.averages)] {
+                let spans = Vec::from_iter(spans.iter().map(Span::to_string));
+                if !spans.is_empty() {
+                    self.add(name, spans.join(","));
+                }
+            }
+            if memory.differences {
+                self.0 += " --differences";
+            }
         }
         conditions.iter().for_each(|condition| self.add("where", condition));
         missing.iter().for_each(|missing| self.add("missing", missing));

@@ -94,10 +94,11 @@ pub(super) fn recording_facts(file: &NetworkFile, recorded: &Recorded, test: &Da
     for condition in &import.conditions {
         facts.push(("Rows used", condition.to_string()));
     }
-    facts.extend([
-        ("Readings", names(&file.problem.inputs)),
-        ("Targets", names(&file.problem.targets)),
-    ]);
+    facts.push(("Readings", names(&file.problem.inputs)));
+    if let Some(memory) = &file.problem.memory {
+        facts.push(("Memory", memory.to_string()));
+    }
+    facts.push(("Targets", names(&file.problem.targets)));
     let samples = counted(test.samples(), "test sample");
     facts.push((
         "Split",

@@ -62,7 +62,7 @@ impl TargetSession {
             compiled: CompiledNetworks::new(&network.network, network.network.values().len()),
             source,
             tally: Tally::new(Instant::now()),
-            sample: vec![0.0; 1 + problem.inputs.len()],
+            sample: vec![0.0; 1 + problem.feature_count()],
             answer: vec![0.0; problem.targets.len()],
             history: VecDeque::new(),
             ranges: vec![(f64::INFINITY, f64::NEG_INFINITY); problem.targets.len()],
@@ -247,8 +247,10 @@ fn read(file: &NetworkFile, path: &Path, is_wanted: &dyn Fn() -> bool) -> Result
             ControlFlow::Break(())
         }
     };
-    let (inputs, has_rows) = (&file.problem.inputs, file.network.only().is_none());
-    let table = recipe.unwrap_or_default().read_inputs(path, inputs, has_rows, watch);
+    let has_rows = file.network.only().is_none();
+    let table = recipe
+        .unwrap_or_default()
+        .read_inputs(path, &file.problem, has_rows, watch);
     let table = table.map_err(|error| error.to_string())?;
     let mut samples = Vec::with_capacity(table.readings.len() + table.readings.nrows());
     for (sample, readings) in table.readings.rows().into_iter().enumerate() {
@@ -276,7 +278,7 @@ fn read(file: &NetworkFile, path: &Path, is_wanted: &dyn Fn() -> bool) -> Result
         samples.push(row_index as f64);
         samples.extend(readings);
     }
-    let shape = (table.readings.nrows(), 1, 1 + inputs.len());
+    let shape = (table.readings.nrows(), 1, 1 + table.readings.ncols());
     let samples = Array3::from_shape_vec(shape, samples).expect("each sample has its row and all inputs");
     Recording::at_rate(samples, RATE_WITHOUT_TIMES).map_err(|error| format!("'{}': {error}", path.display()))
 }
