@@ -15,7 +15,9 @@ use super::{
 use decoupler_core::{
     evaluation::{
         Baselines, Channel, Combination, DecoderReport, Errors, Outlook, ReferenceNote, Run, RunError,
-        SimulatedSettings, StartRecord, TestErrors, best_start, error_remarks,
+        SimulatedSettings, StartRecord, TestErrors,
+        auto::AutoRecord,
+        best_start, error_remarks,
         recorded::{Determination, Undetermined},
     },
     network::InputChoice,
@@ -26,8 +28,8 @@ use decoupler_core::{
 };
 use decoupler_files::{
     export::{
-        NetworkFile, TrainingRecord, decoder_table, describe_determinacy, describe_worse_than_ridge, error_table,
-        format_duration,
+        NetworkFile, TrainingRecord, decoder_table, describe_determinacy, describe_search, describe_worse_than_ridge,
+        error_table, format_duration, search_table,
     },
     import::SetupSets,
 };
@@ -58,6 +60,9 @@ struct Report<'a> {
     networks: usize,
     weights: usize,
     warnings: Vec<String>,
+    /// What was tried to choose the settings, if they were chosen.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    search: Option<&'a AutoRecord>,
     /// Other decoders; absent for a recording if none was requested.
     #[serde(skip_serializing_if = "Option::is_none")]
     decoders: Option<BTreeMap<String, Decoder<'a>>>,
@@ -240,6 +245,7 @@ impl<'a> Trained<'a> {
             networks: file.network.values().len(),
             weights: file.network.weights(),
             warnings: self.warnings(&determined),
+            search: search(file),
             decoders: has_decoders.then(|| self.decoders.iter().map(decoder).collect()),
         })
     }
@@ -268,6 +274,7 @@ impl<'a> Trained<'a> {
         of_array
             .map(ToString::to_string)
             .chain(of_import.into_iter().flatten())
+            .chain(search(self.file).and_then(AutoRecord::remark))
             .chain(self.optimism.iter().cloned())
             .chain(self.run.defect().map(|defect| defect.to_string()))
             .chain(describe_determinacy(&self.file.problem.targets, determined))
@@ -295,6 +302,9 @@ impl<'a> Trained<'a> {
             (Some(recordings), _) => RecordingReport::new(&self.sets.sets, recordings).write(out)?,
             (None, Some(settings)) => write_array(file, &settings, out)?,
             (None, None) => unreachable!("sets are recorded or simulated"),
+        }
+        if let Some(record) = search(file) {
+            writeln!(out, "\n{}\n{}", describe_search(record), search_table(record).aligned())?;
         }
         let first = training.stages.first();
         let method = first.map_or(settings.training.method, |stage| stage.method);
@@ -387,6 +397,11 @@ impl<'a> Trained<'a> {
     }
 }
 
+/// Record of the choice of settings, if they were chosen.
+fn search(file: &NetworkFile) -> Option<&AutoRecord> {
+    file.recorded.as_ref()?.search.as_ref()
+}
+
 fn epochs(training: &TrainingRecord) -> usize {
     training.history.last().map_or(0, |record| record.epoch)
 }
@@ -401,7 +416,10 @@ fn epoch_seconds(training: &TrainingRecord) -> f64 {
 fn inputs(problem: &Problem) -> String {
     let count = counted(problem.feature_count(), "input");
     match &problem.memory {
-        Some(memory) => format!("{count} ({} and their memory: {memory})", counted(problem.inputs.len(), "reading")),
+        Some(memory) => format!(
+            "{count} ({} and their memory: {memory})",
+            counted(problem.inputs.len(), "reading")
+        ),
         None => count,
     }
 }

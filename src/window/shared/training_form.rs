@@ -126,6 +126,8 @@ pub enum Effect {
     Configure(Box<SimulatedSettings>),
     /// Change the settings of the next training on a recording.
     ConfigureRecording(Box<RunSettings>),
+    /// Choose the settings of a training on a recording automatically, or not.
+    ChooseAutomatically(bool),
     /// Use this plan of an import for the next training, or show what it lacks.
     Import(Result<Arc<Plan>, String>),
     /// Select the kind of source to train on.

@@ -11,12 +11,14 @@ mod cross_validation;
 mod decoder_set;
 mod errors;
 pub mod experiments;
+mod linear_start;
 mod past_networks;
 mod preparation;
 mod pressed;
 pub mod recorded;
 mod reference;
 mod remark;
+mod ridge_path;
 mod run;
 mod run_sets;
 mod settings;
@@ -36,8 +38,8 @@ pub use remark::{Cause, MissingFigures, Remark, error_remarks};
 pub use run::{Run, RunDefect, RunError};
 pub use run_sets::RunSets;
 pub use settings::{
-    Combination, CombinationError, CountError, MAX_STARTS, MeasuredSettings, RunSettings, SimulatedSettings, Workload,
-    WorkloadTime,
+    Combination, CombinationError, CountError, Initialization, InitializationError, MAX_STARTS, MeasuredSettings,
+    RunSettings, SimulatedSettings, Workload, WorkloadTime,
 };
 pub use source::{
     Channel, Measured, ModelSize, Preset, PresetError, Problem, Simulation, Source, TargetPosition, ready_settings,

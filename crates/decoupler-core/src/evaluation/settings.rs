@@ -30,6 +30,9 @@ pub struct RunSettings<S = Source> {
     /// How several starts become one network.
     #[serde(default, skip_serializing_if = "Combination::is_best")]
     pub combine: Combination,
+    /// Weights with which a training begins.
+    #[serde(default, skip_serializing_if = "Initialization::is_random")]
+    pub initialization: Initialization,
     /// Training method, its settings, and the stopping rules.
     pub training: TrainingSettings,
     /// Seed from which all randomness follows.
@@ -78,6 +81,48 @@ impl FromStr for Combination {
     fn from_str(text: &str) -> Result<Self, CombinationError> {
         let found = Self::ALL.into_iter().find(|choice| choice.to_string() == text.trim());
         found.ok_or_else(|| CombinationError(text.to_owned()))
+    }
+}
+
+/// Weights with which a training begins.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Initialization {
+    /// Random weights ([Nguyen and Widrow](crate::network::nguyen_widrow)).
+    #[default]
+    Random,
+    /// Ridge regression: one hidden node for each of its principal directions, in the linear range of tanh; random weights
+    /// elsewhere.
+    Ridge,
+}
+
+/// Error for an unknown initialisation.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+#[error("'{0}' is not an initialisation: give random or ridge")]
+pub struct InitializationError(String);
+
+impl Initialization {
+    fn is_random(&self) -> bool {
+        *self == Self::Random
+    }
+}
+
+impl fmt::Display for Initialization {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(match self {
+            Self::Random => "random",
+            Self::Ridge => "ridge",
+        })
+    }
+}
+
+impl FromStr for Initialization {
+    type Err = InitializationError;
+
+    fn from_str(text: &str) -> Result<Self, InitializationError> {
+        let mut choices = [Self::Random, Self::Ridge].into_iter();
+        let found = choices.find(|choice| choice.to_string() == text.trim());
+        found.ok_or_else(|| InitializationError(text.to_owned()))
     }
 }
 
@@ -147,6 +192,7 @@ impl<S> RunSettings<S> {
             hidden: 12,
             starts: 1,
             combine: Combination::Best,
+            initialization: Initialization::Random,
             training: TrainingSettings::default(),
             seed: Seed::default(),
         }
@@ -159,6 +205,7 @@ impl<S> RunSettings<S> {
             hidden,
             starts,
             combine,
+            initialization,
             training,
             seed,
         } = self;
@@ -168,6 +215,7 @@ impl<S> RunSettings<S> {
             hidden,
             starts,
             combine,
+            initialization,
             training,
             seed,
         }

@@ -14,7 +14,7 @@ use decoupler_core::{
     training::StopReason,
 };
 use decoupler_files::{
-    export::{Cell, Table, TableColumn, format_duration, format_number},
+    export::{Cell, Table, TableColumn, describe_search, format_duration, format_number, search_table},
     figure::frame_time,
 };
 use eframe::egui::{Align, Layout, RichText, Ui, WidgetInfo, accesskit::Role};
@@ -32,7 +32,7 @@ use crate::window::{
         view::TrainView,
     },
     widgets::{
-        Landmark, described_table_ui, dim_ui, fields::capitalised, ghost_button, note_ui, scrolled_ui,
+        Landmark, described_table_ui, dim_ui, fields::capitalised, fold_ui, ghost_button, note_ui, scrolled_ui,
         section_heading_ui,
     },
 };
@@ -72,6 +72,7 @@ pub fn report_ui(ui: &mut Ui, view: &mut TrainView, shared: &Shared, effects: &m
             effects.extend(asked.map(Effect::ChooseFile));
             effective_parameters_ui(ui, run, result);
             spread_ui(ui, &run.problem, run.settings().combine, &run.starts);
+            search_ui(ui, run);
         } else {
             expectation_ui(ui, shared);
         }
@@ -82,6 +83,19 @@ pub fn report_ui(ui: &mut Ui, view: &mut TrainView, shared: &Shared, effects: &m
         if let Some((run, result)) = shown {
             section_heading_ui(ui, "Cost");
             cost_ui(ui, run, run.result.as_ref().unwrap_or(result));
+        }
+    });
+}
+
+/// The candidates from which the settings were chosen, folded.
+fn search_ui(ui: &mut Ui, run: &RunView) {
+    let Some(search) = &run.search else { return };
+    let summary = format!("{} tried", search.tried.len());
+    fold_ui(ui, "Choice of settings", &summary, |ui| {
+        dim_ui(ui, &format!("{}.", describe_search(search)));
+        described_table_ui(ui, "choice of settings", &search_table(search));
+        if let Some(remark) = search.remark() {
+            note_ui(ui, &remark);
         }
     });
 }
