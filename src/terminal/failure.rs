@@ -210,6 +210,7 @@ impl Failure {
                 | ImportError::TwoMeanings { .. }
                 | ImportError::NoColumns(_)
                 | ImportError::Condition { .. }
+                | ImportError::Memory(_)
                 | ImportError::Division(_),
             ) => 2,
             Self::Run(error) if is_argument_error(error) => 2,

@@ -7,11 +7,12 @@ use clap::{
     builder::{PossibleValuesParser, TypedValueParser},
 };
 use decoupler_core::{
-    dataset::Seed,
+    dataset::{Dataset, Memory, Seed, SplitBy},
     evaluation::{
         Channel, Measured, RunSettings, TargetErrors,
         recorded::{
-            ChannelImportance, Determinacy, Determination, Findings, FittedModel, Interval, LearningCurve, StudyStep,
+            ChannelImportance, Determinacy, Determination, Findings, FittedModel, Interval, LearningCurve, MemoryGain,
+            StudyStep,
         },
     },
     network::LARGEST_HIDDEN,
@@ -20,7 +21,7 @@ use decoupler_core::{
 };
 use decoupler_files::{
     export::{Cell, Table, describe_target, describe_warnings, format_number},
-    import::{Dropped, Plan, Recording},
+    import::{Dropped, ImportError, Plan, Recording},
 };
 use serde::Serialize;
 
@@ -89,8 +90,36 @@ impl StudyArguments {
         let found = Findings::measure(&settings, &recording.set, divided, self.model, &begin, &|| false);
         bar.finish_and_clear();
         let Some(findings) = found? else { return Ok(()) };
-        Report::new(&plan, &recording, &settings, folds, &findings).print(is_json)
+        let gain = memory_gain(&settings, &recording, (by, folds))?;
+        Report::new(&plan, &recording, &settings, folds, (&findings, gain.as_ref())).print(is_json)
     }
+}
+
+/// Measures whether the memory of the recording, or the usual one, reduces the held-out error of ridge regression; `None` for
+/// a recording that is too short for a memory.
+fn memory_gain(
+    settings: &RunSettings,
+    recording: &Recording,
+    divided: (SplitBy, usize),
+) -> Result<Option<MemoryGain>, Failure> {
+    let history = recording.history();
+    let given = recording.memory().cloned();
+    let memory = given.unwrap_or_else(|| MemoryGain::usual_memory(history));
+    if memory.is_empty() {
+        return Ok(None);
+    }
+    let set = |memory: &Memory| -> Result<Dataset, Failure> {
+        let features = history.features(memory).map_err(ImportError::from)?;
+        Ok(recording.set.with_readings(features))
+    };
+    let (without, with) = (set(&Memory::default())?, set(&memory)?);
+    Ok(MemoryGain::measure(
+        settings,
+        &memory,
+        [&without, &with],
+        divided,
+        &|| false,
+    )?)
 }
 
 /// The object printed by `inspect --targets --json`.
@@ -127,6 +156,9 @@ struct Target<'a> {
     network_to_ridge: Option<Figure>,
     /// RMSE of the network and of ridge with honest and with random folds.
     splits: Option<Splits>,
+    /// RMSE of ridge with a memory relative to that without.
+    with_memory: Option<Figure>,
+    memory_sentence: Option<String>,
     learning_curve: Vec<Point>,
     /// RMSE with twice the samples relative to that with all samples.
     with_twice_the_samples: Option<Figure>,
@@ -192,7 +224,7 @@ impl<'a> Report<'a> {
         recording: &'a Recording,
         settings: &RunSettings,
         folds: usize,
-        findings: &Findings,
+        (findings, gain): (&Findings, Option<&MemoryGain>),
     ) -> Self {
         let channels = &recording.inputs;
         let mut warnings = recording.warnings.clone();
@@ -215,7 +247,7 @@ impl<'a> Report<'a> {
             seed: settings.seed.0,
             model: name_of(findings.model),
             targets: targets
-                .map(|(index, channel)| Target::new(index, channel, findings))
+                .map(|(index, channel)| Target::new(index, channel, findings, gain))
                 .collect(),
             channels: findings.importance.iter().map(worth).collect(),
             warnings,
@@ -234,6 +266,7 @@ impl<'a> Report<'a> {
                 self.samples, self.folds, self.split
             )?;
             self.write_targets(out)?;
+            self.write_memory(out)?;
             self.write_splits(out)?;
             self.write_channels(out)?;
             self.write_curves(out)?;
@@ -258,6 +291,17 @@ impl<'a> Report<'a> {
                     String::new()
                 }
             )?;
+        }
+        writeln!(out)
+    }
+
+    fn write_memory(&self, out: &mut impl Write) -> io::Result<()> {
+        let sentences = Vec::from_iter(self.targets.iter().filter_map(|target| target.memory_sentence.as_ref()));
+        if sentences.is_empty() {
+            return Ok(());
+        }
+        for sentence in sentences {
+            writeln!(out, "{}", capitalised(sentence))?;
         }
         writeln!(out)
     }
@@ -330,7 +374,7 @@ impl<'a> Report<'a> {
 }
 
 impl<'a> Target<'a> {
-    fn new(index: usize, channel: &'a Channel, findings: &Findings) -> Self {
+    fn new(index: usize, channel: &'a Channel, findings: &Findings, gain: Option<&MemoryGain>) -> Self {
         let of = &findings.targets[index];
         let (best, name) = (of.best(), &channel.name);
         let r2 = |determination: Option<Determination>| determination.map(|of| of.r2.into());
@@ -360,6 +404,8 @@ impl<'a> Target<'a> {
                     sentence: comparison.sentence(index, name),
                 }
             }),
+            with_memory: gain.and_then(|gain| gain.ratios[index]).map(Figure::from),
+            memory_sentence: gain.map(|gain| gain.sentence(index, name)),
             learning_curve: points
                 .iter()
                 .map(|point| Point {

@@ -14,7 +14,7 @@ use super::{
 };
 use decoupler_core::{
     evaluation::{
-        Baselines, Channel, Combination, DecoderReport, Errors, Outlook, ReferenceNote, Run, RunError,
+        Baselines, Channel, Combination, DecoderReport, Errors, Outlook, Problem, ReferenceNote, Run, RunError,
         SimulatedSettings, StartRecord, TestErrors,
         auto::AutoRecord,
         best_start, error_remarks,

@@ -10,6 +10,7 @@ mod files;
 #[cfg(unix)]
 mod follow;
 mod import;
+mod memory;
 mod own_export;
 mod own_trade;
 mod printed;

@@ -98,7 +98,8 @@ impl<'a> ExportedDecoder<'a> {
         match self.origin.settings.simulated() {
             Some(settings) => Meaning::Array(settings.source.sensor.scale),
             None => Meaning::Own {
-                inputs: self.origin.problem.inputs.clone(),
+                inputs: self.origin.problem.features(),
+                has_memory: self.memory().is_some(),
                 targets: self.origin.problem.targets.clone(),
                 row_wires: match (&self.origin.row_wires, self.fitted.reading_ranges.len()) {
                     (Some(row_wires), 2..) => row_wires.clone(),
@@ -259,7 +260,8 @@ fn of_recording(origin: &Origin, portable: &Portable, errors: &TestErrors) -> Va
         "trained_by": origin.program,
         "files": origin.files,
         "row_numbers": portable.takes_row().then(|| row_wires.collect::<Vec<_>>()),
-        "inputs": columns(&origin.problem.inputs),
+        "inputs": columns(&origin.problem.features()),
+        "memory": origin.problem.memory,
         "outputs": columns(&origin.problem.targets),
         "method": origin.settings.training.method.short_name(),
         "seed": origin.settings.seed,

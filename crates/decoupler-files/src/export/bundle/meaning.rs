@@ -9,6 +9,8 @@ pub(super) enum Meaning {
     Own {
         inputs: Vec<Channel>,
         targets: Vec<Channel>,
+        /// The inputs are features of a memory, not readings.
+        has_memory: bool,
         /// Row-wires that have a network each, from 0, in their order; empty if one network serves all.
         row_wires: Vec<usize>,
     },
@@ -17,7 +19,10 @@ pub(super) enum Meaning {
 impl Meaning {
     /// Identifier of the readings in code and graphs.
     pub(super) fn readings(&self) -> &'static str {
-        self.either("resistances_ohm", "readings")
+        match self {
+            Self::Own { has_memory: true, .. } => "features",
+            _ => self.either("resistances_ohm", "readings"),
+        }
     }
 
     /// Identifier of the outputs.
@@ -105,6 +110,7 @@ impl Meaning {
         let Self::Own {
             inputs,
             targets,
+            has_memory,
             row_wires,
         } = self
         else {
@@ -114,7 +120,10 @@ impl Meaning {
             let titles: Vec<String> = channels.iter().map(|channel| comment(&channel.title())).collect();
             format!("{what}, in this order: {}.", titles.join(", "))
         };
-        let mut sentences = vec![list("Readings", inputs), list("Targets", targets)];
+        let mut sentences = vec![
+            list(if *has_memory { "Features" } else { "Readings" }, inputs),
+            list("Targets", targets),
+        ];
         // The usual numbering is not mentioned.
         if row_wires.iter().enumerate().any(|(index, &row_wire)| index != row_wire) {
             let rows = row_wires.iter().enumerate();
@@ -174,6 +183,7 @@ mod tests {
         let meaning = Meaning::Own {
             inputs: odd.iter().map(channel).collect(),
             targets: vec![channel(&"x")],
+            has_memory: false,
             row_wires: vec![0, 4],
         };
         let text = meaning.legend().join("\n");

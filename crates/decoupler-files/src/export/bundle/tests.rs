@@ -183,6 +183,7 @@ fn own_data(array: &Portable) -> Portable {
         meaning: Meaning::Own {
             inputs: channels(array.channels),
             targets: channels(array.outputs),
+            has_memory: false,
             row_wires: Vec::new(),
         },
         ..array.clone()

@@ -7,7 +7,7 @@ use std::{
     sync::Arc,
 };
 
-use decoupler_core::dataset::SplitBy;
+use decoupler_core::dataset::{Memory, Span, SpanError, SplitBy};
 use decoupler_files::import::{Condition, InspectedFile, Joined, Meaning, Missing, Plan, TestFiles};
 
 use super::columns_card::Renaming;
@@ -26,6 +26,8 @@ pub(super) struct Draft {
     pub(super) conditions: String,
     /// Cells that mean missing, as typed, with commas between them.
     pub(super) missing: String,
+    /// Inputs from the past, as typed.
+    pub(super) memory: MemoryTexts,
     /// Meanings chosen by the user or a recipe, including columns hidden by the current layout.
     chosen: BTreeMap<ColumnKey, Meaning>,
     /// Units given by the user or a recipe, likewise.
@@ -44,6 +46,7 @@ impl Draft {
     pub(super) fn new(mut plan: Plan, files: Vec<InspectedFile>) -> Self {
         let import = &mut plan.import;
         let (conditions, missing) = (joined(&import.conditions, " and "), joined(&import.missing, ", "));
+        let memory = MemoryTexts::from(&import.memory.take().unwrap_or_default());
         let mut units = BTreeMap::new();
         for file in &files {
             for (column, summary) in file.inspection.columns.iter().enumerate() {
@@ -63,6 +66,7 @@ impl Draft {
         Self {
             conditions,
             missing,
+            memory,
             tests: paths.zip(of_tests.cloned()).collect(),
             files,
             plan,
@@ -96,6 +100,7 @@ impl Draft {
         let renaming = Renaming::new(&older.files, stems);
         self.conditions = renaming.conditions(&older.conditions);
         self.missing = renaming.missing(&older.missing);
+        self.memory.clone_from(&older.memory);
         for (name, unit) in &older.plan.import.units {
             self.plan
                 .import
@@ -303,6 +308,7 @@ impl Draft {
             text => vec![text.parse::<Condition>().map_err(|error| error.to_string())?],
         };
         import.missing = missing(&self.missing);
+        import.memory = self.memory.parsed()?;
         let of = |meaning: Meaning| -> Vec<String> {
             let of_file = |file: &InspectedFile| -> Vec<String> {
                 let columns = file.meanings.iter().enumerate().filter(|(_, other)| **other == meaning);
@@ -365,6 +371,7 @@ impl Draft {
         MadeOf {
             plan: self.plan.clone(),
             texts: [self.conditions.clone(), self.missing.clone()],
+            memory: self.memory.clone(),
             units: self.units.clone(),
             tests: self.tests.clone(),
             meanings: self.files.iter().map(|file| file.meanings.clone()).collect(),
@@ -376,6 +383,7 @@ impl Draft {
         let MadeOf {
             plan,
             texts,
+            memory,
             units,
             tests,
             meanings,
@@ -383,7 +391,7 @@ impl Draft {
         let [conditions, missing] = texts;
         let now = self.files.iter().map(|file| &file.meanings);
         (&self.plan, &self.conditions, &self.missing) == (plan, conditions, missing)
-            && (&self.units, &self.tests) == (units, tests)
+            && (&self.memory, &self.units, &self.tests) == (memory, units, tests)
             && now.eq(meanings)
     }
 
@@ -406,6 +414,48 @@ impl Draft {
 }
 
 /// Returns `true` if a column of the same file or of another one must give up a meaning that a column gets.
+/// Inputs from the past, as typed: spans with commas between them.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(super) struct MemoryTexts {
+    pub(super) averages: String,
+    pub(super) lags: String,
+    pub(super) differences: bool,
+}
+
+impl From<&Memory> for MemoryTexts {
+    fn from(memory: &Memory) -> Self {
+        Self {
+            averages: joined(&memory.averages, ", "),
+            lags: joined(&memory.lags, ", "),
+            differences: memory.differences,
+        }
+    }
+}
+
+impl MemoryTexts {
+    /// Returns the memory; `None` if there is none.
+    ///
+    /// # Errors
+    /// If a span cannot be understood.
+    pub(super) fn parsed(&self) -> Result<Option<Memory>, String> {
+        let memory = Memory {
+            averages: spans(&self.averages)?,
+            lags: spans(&self.lags)?,
+            differences: self.differences,
+            interval_s: None,
+        };
+        Ok(Some(memory).filter(|memory| !memory.is_empty()))
+    }
+}
+
+/// Returns the spans in a text with commas between them.
+pub(super) fn spans(text: &str) -> Result<Vec<Span>, String> {
+    let texts = text.split(',').map(str::trim).filter(|text| !text.is_empty());
+    texts
+        .map(|text| text.parse().map_err(|error: SpanError| error.to_string()))
+        .collect()
+}
+
 fn is_taken(meaning: Meaning, is_same_file: bool) -> bool {
     match meaning {
         Meaning::Time => is_same_file,
@@ -448,6 +498,7 @@ pub(super) fn file_name(path: &Path) -> String {
 pub(super) struct MadeOf {
     pub(super) plan: Plan,
     pub(super) texts: [String; 2],
+    pub(super) memory: MemoryTexts,
     pub(super) units: BTreeMap<ColumnKey, String>,
     pub(super) tests: BTreeMap<PathBuf, PathBuf>,
     /// Meanings and units of the columns of each file.
