@@ -57,7 +57,7 @@ fn features_come_from_all_readings_and_start_again_after_a_gap() {
     assert_eq!(recording.set.samples(), 32);
     let weight = 1.0 - f64::exp(-0.2);
     let mut average = 0.0;
-    for row in 0..40 {
+    for row in 0..40_usize {
         let (reading, is_first) = (row as f64, row == 0 || row == 20);
         average = if is_first {
             reading

@@ -420,7 +420,7 @@ fn check(plan: &Plan, seed: Seed, report: &Report<CheckingEvent>) -> Result<Box<
         files: recordings()
             .flat_map(|recording| recording.files.iter().cloned())
             .collect(),
-        positions: describe_positions(sets.recording.positions()),
+        positions: describe_positions(&sets.recording.positions),
         warnings,
     }))
 }
