@@ -2,7 +2,7 @@
 //! published figures.
 //!
 //! A [`Run`] goes from [`RunSettings`] to trained networks and error tables; [`CrossValidation`] tests on every sample;
-//! [`measure_trade_off`] compares speed with accuracy; [`experiments`] repeats runs over a grid of settings;
+//! [`auto`] chooses settings by cross-validation; [`measure_trade_off`] compares speed with accuracy; [`experiments`] repeats runs over a grid of settings;
 //! [`recorded`] measures how well recorded readings determine the targets.
 
 pub mod auto;

@@ -14,6 +14,8 @@ mod fold_errors;
 mod folded_training;
 mod search;
 mod spans;
+#[cfg(test)]
+mod tests;
 
 use std::fmt;
 

@@ -126,7 +126,7 @@ impl<'a> Search<'a> {
     /// Runs all stages; returns the index of the choice in [`Self::networks`].
     fn stages(&mut self) -> Result<usize, End> {
         // Shares of the budget at the end of each stage.
-        let [features, nodes, refined, all] = [0.2, 0.65, 0.8, 1.0];
+        let [features, nodes, refined, all] = [0.35, 0.7, 0.85, 1.0];
         let feature_sets = self.screen_features()?;
         let hidden = self.fixed.hidden.unwrap_or(FIRST_HIDDEN);
         let method = self.fixed.method.unwrap_or_else(|| regularized(0.0));
@@ -302,10 +302,7 @@ impl<'a> Search<'a> {
             variants.push(Candidate { inputs, ..best.clone() });
         }
         if self.fixed.method.is_none() {
-            for method in [
-                regularized(CORRELATION_EPOCH),
-                Method::LevenbergMarquardt(Damping::default()),
-            ] {
+            for method in [regularized(CORRELATION_EPOCH), Method::LevenbergMarquardt(DAMPING)] {
                 variants.push(Candidate { method, ..best.clone() });
             }
         }
@@ -320,20 +317,20 @@ impl<'a> Search<'a> {
     /// Cross-validates the best candidates again as committees, and decides.
     fn decide(&mut self, share: f64) -> Result<usize, End> {
         let wanted = self.fixed.starts.unwrap_or(COMMITTEE);
-        let best: Vec<Candidate> = self
-            .ranked()
-            .into_iter()
-            .take(FINALISTS)
-            .map(|place| self.networks[place].candidate.clone())
+        let ranked = self.ranked().into_iter().take(FINALISTS);
+        let best: Vec<(Candidate, usize)> = ranked
+            .map(|place| &self.networks[place])
+            .map(|network| (network.candidate.clone(), network.best.epoch))
             .collect();
-        for (number, candidate) in best.iter().enumerate() {
-            let starts = wanted.min(LARGEST_HIDDEN / candidate.hidden).max(1);
+        for (number, (candidate, epochs)) in best.iter().enumerate() {
+            /// Epochs beyond the best.
+            const BEYOND: usize = 5;
             self.expected = best.len() - number;
             let committee = Candidate {
-                starts,
+                starts: wanted.min(LARGEST_HIDDEN / candidate.hidden).max(1),
                 ..candidate.clone()
             };
-            self.try_network(committee, share, best.len() - number)?;
+            self.try_for(committee, share, best.len() - number, epochs + BEYOND)?;
         }
         // A committee is compared with a smaller one where it was too expensive: it would hardly be worse.
         let error = |place: usize| self.networks[place].best.errors.relative();
@@ -355,6 +352,11 @@ impl<'a> Search<'a> {
     /// Cross-validates a network within its part of the budget: what is left until `share`, divided by the number of
     /// candidates still to come in this stage. Returns its error; `None` if it was too expensive.
     fn try_network(&mut self, candidate: Candidate, share: f64, to_come: usize) -> Result<Option<f64>, End> {
+        self.try_for(candidate, share, to_come, MIN_EPOCHS)
+    }
+
+    /// As [`Self::try_network`], unless this many epochs are too expensive.
+    fn try_for(&mut self, candidate: Candidate, share: f64, to_come: usize, needed: usize) -> Result<Option<f64>, End> {
         if let Some(place) = self.networks.iter().position(|network| network.candidate == candidate) {
             return Ok(Some(self.networks[place].best.errors.relative()));
         }
@@ -375,7 +377,7 @@ impl<'a> Search<'a> {
             ..self.base
         };
         settings.training.method = candidate.method;
-        let stride = self.stride(&settings, &set, limit);
+        let stride = self.stride(&settings, &set, limit, needed);
         let Some(stride) = stride.or(is_first.then_some(self.largest_stride())) else {
             return Ok(None);
         };
@@ -424,8 +426,8 @@ impl<'a> Search<'a> {
     }
 
     /// Returns the smallest number such that, with every so manieth sample, trainings of [`TYPICAL_EPOCHS`] stay within
-    /// `limit` multiplications; `None` if too few samples would be left, even for [`MIN_EPOCHS`].
-    fn stride(&self, settings: &RunSettings, set: &Dataset, limit: f64) -> Option<usize> {
+    /// `limit` multiplications; `None` if too few samples would be left, even for the `needed` epochs.
+    fn stride(&self, settings: &RunSettings, set: &Dataset, limit: f64, needed: usize) -> Option<usize> {
         let inputs = match settings.inputs.scaling {
             ScalingChoice::MinMax => set.channels(),
             ScalingChoice::Whitening => {
@@ -449,13 +451,13 @@ impl<'a> Search<'a> {
         };
         let largest = self.largest_stride();
         let fits = |epochs: usize| (1..=largest).find(|&stride| epoch(stride) * epochs as f64 <= limit);
-        fits(TYPICAL_EPOCHS).or_else(|| fits(MIN_EPOCHS))
+        fits(TYPICAL_EPOCHS.max(needed)).or_else(|| fits(needed))
     }
 
     /// Largest number such that enough samples are left when every so manieth is kept.
     fn largest_stride(&self) -> usize {
         /// Minimum number of samples after thinning.
-        const ENOUGH: usize = 1500;
+        const ENOUGH: usize = 3000;
         (self.samples.set.samples() / ENOUGH).clamp(1, 20)
     }
 
@@ -559,11 +561,26 @@ const TYPICAL_EPOCHS: usize = 30;
 /// Epoch after which the correlation of errors is measured, if it is.
 const CORRELATION_EPOCH: f64 = 20.0;
 
+/// Initial damping, and its factor after each epoch. Gauss-Newton steps without damping fit noise within an epoch or two
+/// where weights are many; with damping that falls gradually, the number of epochs regularises.
+const DAMPING: Damping = Damping {
+    mu: 1e3,
+    mu_decrease: 0.3,
+    mu_increase: 10.0,
+    mu_max: 1e10,
+};
+
+/// Ratio of the damping of Bayesian regularisation, which is relative to the noise, to that of Levenberg-Marquardt.
+const PER_NOISE: f64 = 100.0;
+
 /// Bayesian regularisation for recordings.
 fn regularized(correlation_epoch: f64) -> Method {
+    let usual = RegularizationSettings::recorded();
     Method::BayesianRegularization(RegularizationSettings {
+        mu: PER_NOISE * DAMPING.mu,
+        mu_decrease: DAMPING.mu_decrease,
         correlation_epoch,
-        ..RegularizationSettings::recorded()
+        ..usual
     })
 }
 
