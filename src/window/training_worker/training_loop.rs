@@ -304,6 +304,7 @@ impl<'a> TrainingLoop<'a> {
                 charts,
                 frame,
                 errors,
+                coverage: run.coverage().to_vec(),
                 best_epoch: trainer.best_epoch(),
                 defect: run.defect(),
                 epochs_run: furthest_epoch(run),
@@ -346,9 +347,9 @@ impl<'a> TrainingLoop<'a> {
             let scores = Scores {
                 network: errors.clone(),
                 baselines: baselines.clone(),
+                coverage: Vec::new(),
             };
-            let method = run.settings().training.method;
-            remarks.extend(describe_worse_than_ridge(run.problem(), &scores, method));
+            remarks.extend(describe_worse_than_ridge(run.problem(), &scores));
         }
         remarks
     }
@@ -401,12 +402,17 @@ impl TrainedRun {
         Self {
             run,
             recorded: sets.recorded().cloned(),
+            drift: sets.drift_reference(),
         }
     }
 
     /// Returns the best network so far, with its history and errors.
     pub fn network_file(&self) -> Result<NetworkFile, String> {
-        NetworkFile::from_run(&self.run, self.recorded.as_ref()).map_err(|error| error.to_string())
+        let file = NetworkFile::from_run(&self.run, self.recorded.as_ref()).map_err(|error| error.to_string())?;
+        Ok(NetworkFile {
+            drift: self.drift.clone(),
+            ..file
+        })
     }
 
     /// Returns the current state, to be resumed later.

@@ -181,6 +181,7 @@ impl Run {
             scalings: tasks.map(|task| task.scaling.clone()),
             starts,
             baselines: None,
+            intervals: None,
         }))
     }
 }

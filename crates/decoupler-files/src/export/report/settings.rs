@@ -85,6 +85,9 @@ pub(super) fn recording_facts(file: &NetworkFile, recorded: &Recorded, test: &Da
     for joined in &import.join {
         facts.push(("Joined file", joined.file.display().to_string()));
     }
+    for set in &import.append {
+        facts.push(("Appended", set.data.display().to_string()));
+    }
     if let Some(time) = &import.time {
         facts.push(("Time", time.clone()));
     }

@@ -10,12 +10,15 @@ use std::{
 
 use decoupler_core::{
     dataset::{Dataset, Seed},
-    evaluation::{Simulation, recorded::channel_remarks},
+    evaluation::{
+        Simulation,
+        recorded::{Extrapolation, channel_remarks},
+    },
 };
 use decoupler_files::{
     export::{CheckpointFile, DocumentKind, NetworkFile, RecipeFile, RecipeSource, describe_positions},
     import::{
-        Dropped, FileReport, InspectedFile, Joined, Plan, Progress, Recipe, Recording, Watch, holds_positions,
+        Dropped, FileReport, FileSet, InspectedFile, Joined, Plan, Progress, Recipe, Recording, Watch, holds_positions,
         suggested_plan, suggested_plan_in_order,
     },
 };
@@ -209,7 +212,12 @@ fn open(to_open: ToOpen, report: &Report<OpeningEvent>) -> Result<Opened, String
         return Ok(Opened::Positions(path.clone()));
     }
     let is_same_files = recordings.is_empty();
+    let appended = files.older.as_ref().map(|older| older.plan.import.append.clone());
+    let appended = appended.unwrap_or_default();
     let mut paths = files.open;
+    if !is_same_files {
+        paths.extend(appended.iter().flat_map(FileSet::files).cloned());
+    }
     for path in recordings {
         if !paths.contains(&path) {
             paths.push(path);
@@ -220,7 +228,9 @@ fn open(to_open: ToOpen, report: &Report<OpeningEvent>) -> Result<Opened, String
     let inspected_files = inspected_files.map_err(|error| in_window(&error))?;
     // The file with the readings is guessed only if the set of files has changed.
     let mut plan = if is_same_files {
-        suggested_plan_in_order(&inspected_files)
+        let mut plan = suggested_plan_in_order(&inspected_files);
+        plan.import.append = appended;
+        plan
     } else {
         suggested_plan(&inspected_files)
     };
@@ -410,6 +420,8 @@ fn check(plan: &Plan, seed: Seed, report: &Report<CheckingEvent>) -> Result<Box<
         .flat_map(|recording| recording.warnings.iter().cloned())
         .collect();
     warnings.extend(channels(&sets.recording));
+    let outside = Extrapolation::measure(&sets.split.training, &sets.test);
+    warnings.extend(outside.warning(&sets.recording.inputs, &sets.recording.targets));
     let validation = sets.split.validation.as_ref().map_or(0, Dataset::samples);
     Ok(Box::new(Checked {
         samples: [sets.split.training.samples(), validation, sets.test.samples()],
