@@ -135,6 +135,15 @@ fn recording_ui(ui: &mut Ui, recording: &mut RecordingEditor, shared: &Shared, e
     ui.add_space(space(2));
     ui.separator();
     ui.add_enabled_ui(!is_busy, |ui| {
+        let mut is_auto = shared.recording.is_auto;
+        let hint = glossary::AUTO.hint;
+        if ui
+            .checkbox(&mut is_auto, "Choose settings automatically")
+            .on_hover_text(hint)
+            .changed()
+        {
+            effects.push(Effect::ChooseAutomatically(is_auto));
+        }
         hidden_choice_ui(ui, &mut settings.hidden, recording.channels());
     });
     method_ui(ui, &mut settings, shared.phase);
@@ -172,12 +181,7 @@ fn training_ui<S>(ui: &mut Ui, settings: &mut RunSettings<S>, phase: Phase) {
             stopping_ui(ui, &mut settings.training.stopping);
         });
         fold_ui(ui, "Method settings", &of_method(settings), |ui| {
-            method_settings_ui(
-                ui,
-                &mut settings.training.method,
-                &mut settings.starts,
-                !phase.is_busy(),
-            );
+            method_settings_ui(ui, settings, !phase.is_busy());
         });
     });
 }
@@ -274,6 +278,8 @@ pub fn applied(preset: Preset, draft: &SimulatedSettings) -> SimulatedSettings {
         },
         hidden: draft.hidden,
         starts: draft.starts,
+        combine: draft.combine,
+        initialization: draft.initialization,
         seed: draft.seed,
         ..settings
     }
