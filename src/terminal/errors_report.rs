@@ -3,7 +3,7 @@
 use std::io::{self, Write};
 
 use decoupler_core::evaluation::{
-    Channel, Spread, StartRecord, TargetErrors, TestErrors, best_start,
+    Channel, Coverage, Spread, StartRecord, TargetErrors, TestErrors, best_start,
     recorded::{Determination, Undetermined},
 };
 use decoupler_files::export::format_number;
@@ -36,6 +36,9 @@ pub(super) struct Target<'a> {
     r2_interval: Option<[f64; 2]>,
     worst: f64,
     percent_of_range: Option<f64>,
+    /// 90 % prediction intervals of the network.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    interval: Option<Coverage>,
 }
 
 impl<'a> ErrorsReport<'a> {
@@ -47,18 +50,19 @@ impl<'a> ErrorsReport<'a> {
             },
             TestErrors::Targets(_) => Self::Targets {
                 percent_of_range: errors.percent(),
-                targets: targets(channels, errors, &[]),
+                targets: targets(channels, errors, &[], &[]),
             },
         }
     }
 }
 
 /// Returns the errors of the targets `channels`; `determined` are the coefficients of determination with their intervals,
-/// if they were measured.
+/// and `coverage` that of the prediction intervals, if they were measured.
 pub(super) fn targets<'a>(
     channels: &'a [Channel],
     errors: &TestErrors,
     determined: &[Result<Determination, Undetermined>],
+    coverage: &[Option<Coverage>],
 ) -> Vec<Target<'a>> {
     let target = |(index, (channel, errors)): (usize, (&'a Channel, &TargetErrors))| Target {
         name: &channel.name,
@@ -72,6 +76,7 @@ pub(super) fn targets<'a>(
             .map(|determined| [determined.r2.low, determined.r2.high]),
         worst: errors.worst,
         percent_of_range: errors.percent_of_range,
+        interval: coverage.get(index).copied().flatten(),
     };
     let channels = channels.iter().zip(errors.targets());
     channels.enumerate().map(target).collect()

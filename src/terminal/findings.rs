@@ -1,6 +1,9 @@
 //! Analysis of a recording in the terminal.
 
-use std::io::{self, Write};
+use std::{
+    io::{self, IsTerminal as _, Write, stderr},
+    time::Instant,
+};
 
 use clap::{
     Args,
@@ -48,6 +51,10 @@ pub(super) struct StudyArguments {
     /// it is better]
     #[arg(long, value_name = "ridge|network", value_parser = model())]
     model: Option<FittedModel>,
+    /// Time in seconds after which no more networks are trained and no more channels left out, for recordings of many
+    /// channels [default: 30; with --model, none]
+    #[arg(long, value_name = "SECONDS", value_parser = seconds)]
+    budget: Option<f64>,
     /// Seed of all random numbers [default: 0]
     #[arg(long, value_parser = seed)]
     seed: Option<u64>,
@@ -60,10 +67,22 @@ fn model() -> impl TypedValueParser<Value = FittedModel> {
     })
 }
 
+fn seconds(text: &str) -> Result<f64, String> {
+    let number = text.parse().ok().filter(|number| (0.0..1e9).contains(number));
+    number.ok_or_else(|| "give a number of seconds, for example 120".to_owned())
+}
+
+/// Budget in seconds if none is given.
+const BUDGET_S: f64 = 30.0;
+
 impl StudyArguments {
     /// Returns `true` if any of them is given.
     pub(super) fn are_given(&self) -> bool {
-        !self.inputs.is_empty() || self.hidden.is_some() || self.model.is_some() || self.seed.is_some()
+        !self.inputs.is_empty()
+            || self.hidden.is_some()
+            || self.model.is_some()
+            || self.budget.is_some()
+            || self.seed.is_some()
     }
 
     /// Measures and prints how well the readings of a recording determine its targets.
@@ -82,16 +101,46 @@ impl StudyArguments {
         let by = plan.division.by;
         let folds = import.folds.unwrap_or_else(|| by.folds_of(&recording.set, FOLDS));
         let bar = progress_bar(is_json, 4, "{bar:20} {msg}");
+        let begun = Instant::now();
         let begin = |stage: StudyStep| {
             bar.inc(1);
             bar.set_message(stage.to_string());
+            // The bar is not shown in a log.
+            if !stderr().is_terminal() {
+                // There is no one to report to if this fails.
+                let _ = writeln!(stderr(), "{:.0} s: {stage}", begun.elapsed().as_secs_f64());
+            }
         };
         let divided = (&plan.division, folds);
-        let found = Findings::measure(&settings, &recording.set, divided, self.model, &begin, &|| false);
+        let budget_s = self.budget.or(self.model.is_none().then_some(BUDGET_S));
+        let is_spent = || budget_s.is_some_and(|budget_s| begun.elapsed().as_secs_f64() > budget_s);
+        let ends: [&dyn Fn() -> bool; 2] = [&|| false, &is_spent];
+        let found = Findings::measure(&settings, &recording.set, divided, self.model, &begin, ends);
         bar.finish_and_clear();
         let Some(findings) = found? else { return Ok(()) };
         let gain = memory_gain(&settings, &recording, (by, folds))?;
-        Report::new(&plan, &recording, &settings, folds, (&findings, gain.as_ref())).print(is_json)
+        let mut report = Report::new(&plan, &recording, &settings, folds, (&findings, gain.as_ref()));
+        if !findings.left_out.is_empty() {
+            let steps = Vec::from_iter(findings.left_out.iter().map(|step| left_out(*step)));
+            report.warnings.push(format!(
+                "the budget of {} s was spent, so these were left out: {}; --budget SECONDS changes it, and --model ridge \
+                 needs no networks",
+                format_number(budget_s),
+                steps.join("; ")
+            ));
+        }
+        report.print(is_json)
+    }
+}
+
+/// Describes a step of the study that was left out.
+fn left_out(step: StudyStep) -> &'static str {
+    match step {
+        StudyStep::Folds => "the network (R² is that of ridge regression)",
+        StudyStep::OtherFolds => "the comparison with a random split",
+        StudyStep::Samples => "networks trained on fewer samples (ridge regression instead)",
+        StudyStep::Channels => "the importance of channels",
+        _ => "another step",
     }
 }
 

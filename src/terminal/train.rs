@@ -10,6 +10,7 @@ use super::{
     failure::{Failure, Interruption},
     import_arguments::ImportArguments,
     interruption::{CheckpointArguments, Checkpointing, Graceful},
+    intervals::{WhenCalibrated, calibrate},
     output::progress_bar,
     samples::{announce, following, sets},
     train_report::Trained,
@@ -53,6 +54,10 @@ pub(super) struct Train {
     /// File for a report with errors, figures, settings and the command that repeats the run, as one HTML page
     #[arg(long, value_name = "FILE")]
     pub(super) report: Option<PathBuf>,
+    /// When to calibrate the 90 % prediction intervals of a recording's targets, by cross-validation of the training
+    /// samples, which takes four times as long as the training: auto if that is at most a minute
+    #[arg(long, value_name = "WHEN", default_value = "auto")]
+    pub(super) intervals: WhenCalibrated,
     /// Print one JSON object instead of text and progress
     #[arg(long)]
     pub(super) json: bool,
@@ -77,7 +82,13 @@ impl Train {
             }
         };
         let mut end = self.train(&mut run, self.checkpoint.checkpointing(sets.recorded()));
-        let file = NetworkFile::from_run(&run, sets.recorded())?;
+        if end.is_ok()
+            && let Err(error) = calibrate(&mut run, &sets, self.intervals)
+        {
+            end = Err(error.into());
+        }
+        let mut file = NetworkFile::from_run(&run, sets.recorded())?;
+        file.drift = sets.drift_reference();
         // The figures are printed even if something fails from here on.
         let saved = self.out.as_ref().map_or(Ok(()), |path| file.save(path));
         let (mut decoders, mut optimism, mut measured) = (Vec::new(), Vec::new(), Ok(()));

@@ -10,13 +10,14 @@ use super::{
     errors_report::{ErrorsReport, Target, targets, write_starts},
     failure::Failure,
     inspect::{RecordingReport, import_warnings, write_warnings},
+    intervals::describe_coverage,
     output::{print, print_object},
 };
 use decoupler_core::{
     evaluation::{
         Baselines, Channel, DecoderReport, Errors, Outlook, Problem, ReferenceNote, Run, RunError, SimulatedSettings,
         StartRecord, TestErrors, best_start, error_remarks,
-        recorded::{Determination, Undetermined},
+        recorded::{Determination, Extrapolation, Undetermined},
     },
     network::InputChoice,
     scene::{Noise, NoisySets, Scene},
@@ -29,7 +30,7 @@ use decoupler_files::{
         NetworkFile, TrainingRecord, decoder_table, describe_determinacy, describe_worse_than_ridge, error_table,
         format_duration,
     },
-    import::SetupSets,
+    import::{Recording, SetupSets},
 };
 
 /// A trained network and its measured errors.
@@ -98,6 +99,8 @@ struct RecordingFigures<'a> {
     #[serde(flatten)]
     recording: RecordingReport,
     seconds: Option<f64>,
+    /// Share of the test samples outside the range of the training samples.
+    test_outside_training: f64,
     targets: Vec<Target<'a>>,
     baselines: BTreeMap<&'static str, Vec<Target<'a>>>,
 }
@@ -214,11 +217,15 @@ impl<'a> Trained<'a> {
         let source = match (&self.sets.recordings, settings.simulated()) {
             (Some(recordings), _) => SourceReport::Recording(Box::new(RecordingFigures {
                 recording: RecordingReport::new(&self.sets.sets, recordings),
+                test_outside_training: self.extrapolation().map_or(0.0, |(found, _)| found.share()),
                 seconds: self.run.wall_time().map(|time| time.as_secs_f64()),
-                targets: targets(&file.problem.targets, &scores.network, &determined),
+                targets: targets(&file.problem.targets, &scores.network, &determined, &scores.coverage),
                 baselines: BTreeMap::from([
-                    ("mean", targets(&file.problem.targets, &scores.baselines.mean, &[])),
-                    ("ridge", targets(&file.problem.targets, &scores.baselines.linear, &[])),
+                    ("mean", targets(&file.problem.targets, &scores.baselines.mean, &[], &[])),
+                    (
+                        "ridge",
+                        targets(&file.problem.targets, &scores.baselines.linear, &[], &[]),
+                    ),
                 ]),
             })),
             (None, Some(settings)) => SourceReport::Array(Box::new(ArrayReport::new(file, &settings, self.remarks())?)),
@@ -251,6 +258,13 @@ impl<'a> Trained<'a> {
         Determination::measure(self.run.test(), self.run.decouple_test().view(), by)
     }
 
+    /// Test samples of a recording outside the range of its training samples.
+    fn extrapolation(&self) -> Option<(Extrapolation, &Recording)> {
+        let recordings = self.sets.recordings.as_ref()?;
+        let found = Extrapolation::measure(&self.sets.sets.split.training, self.run.test());
+        Some((found, &recordings.training))
+    }
+
     /// Warnings of the source and of the training.
     fn warnings(&self, determined: &[Result<Determination, Undetermined>]) -> Vec<String> {
         let source = self.file.settings.simulated().map(|settings| settings.source);
@@ -266,10 +280,15 @@ impl<'a> Trained<'a> {
         of_array
             .map(ToString::to_string)
             .chain(of_import.into_iter().flatten())
+            .chain(
+                self.extrapolation()
+                    .and_then(|(found, recording)| found.warning(&recording.inputs, &recording.targets)),
+            )
             .chain(self.optimism.iter().cloned())
             .chain(self.run.defect().map(|defect| defect.to_string()))
             .chain(describe_determinacy(&self.file.problem.targets, determined))
-            .chain(describe_worse_than_ridge(problem, scores, settings.training.method))
+            .chain(describe_worse_than_ridge(problem, scores))
+            .chain(describe_coverage(&problem.targets, &scores.coverage))
             .collect()
     }
 

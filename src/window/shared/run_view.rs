@@ -107,6 +107,7 @@ impl RunView {
         Scores {
             network: result.errors.clone(),
             baselines: self.baselines.clone(),
+            coverage: result.coverage.clone(),
         }
     }
 

@@ -11,7 +11,10 @@ use std::{
 };
 
 use decoupler_core::{
-    evaluation::{Baselines, PastNetworks, Problem, Run, RunDefect, RunError, RunSettings, StartRecord, TestErrors},
+    evaluation::{
+        Baselines, Coverage, PastNetworks, Problem, Run, RunDefect, RunError, RunSettings, StartRecord, TestErrors,
+    },
+    live::DriftReference,
     network::Networks,
     training::{EpochRecord, Stage, StopReason, StoppingRules, TrainerState, TrainingError, TrainingSettings},
 };
@@ -80,6 +83,8 @@ pub struct TrainedRun {
     pub run: Run,
     /// Origin of recorded samples; `None` for a simulated array.
     pub recorded: Option<Recorded>,
+    /// Training readings of a recording, by which a later drift is detected.
+    pub drift: Option<DriftReference>,
 }
 
 impl Inspection {
@@ -176,6 +181,8 @@ pub struct RunResult {
     pub frame: Option<(usize, Frame)>,
     /// Errors of the decoded values.
     pub errors: TestErrors,
+    /// Coverage of the intervals on the test set, if they were calibrated.
+    pub coverage: Vec<Option<Coverage>>,
     /// Epoch of the network.
     pub best_epoch: usize,
     /// Problem of the training, when it has ended.

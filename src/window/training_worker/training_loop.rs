@@ -156,8 +156,8 @@ impl<'a> TrainingLoop<'a> {
             let Some(sets) = setup.sets(Path::new(""), is_cancelled, on_progress)? else {
                 return Ok(None);
             };
-            let recorded = sets.recorded().cloned();
-            Ok(run(sets, is_cancelled)?.map(|run| TrainedRun { run, recorded }))
+            let (recorded, drift) = (sets.recorded().cloned(), sets.drift_reference());
+            Ok(run(sets, is_cancelled)?.map(|run| TrainedRun { run, recorded, drift }))
         })
     }
 
@@ -271,6 +271,7 @@ impl<'a> TrainingLoop<'a> {
                 charts,
                 frame,
                 errors,
+                coverage: run.coverage().to_vec(),
                 best_epoch: trainer.best_epoch(),
                 defect: run.defect(),
                 epochs_run: furthest_epoch(run),
@@ -313,9 +314,9 @@ impl<'a> TrainingLoop<'a> {
             let scores = Scores {
                 network: errors.clone(),
                 baselines: baselines.clone(),
+                coverage: Vec::new(),
             };
-            let method = run.settings().training.method;
-            remarks.extend(describe_worse_than_ridge(run.problem(), &scores, method));
+            remarks.extend(describe_worse_than_ridge(run.problem(), &scores));
         }
         remarks
     }
@@ -365,12 +366,17 @@ impl TrainedRun {
         Self {
             run,
             recorded: sets.recorded().cloned(),
+            drift: sets.drift_reference(),
         }
     }
 
     /// Returns the best network so far, with its history and errors.
     pub fn network_file(&self) -> Result<NetworkFile, String> {
-        NetworkFile::from_run(&self.run, self.recorded.as_ref()).map_err(|error| error.to_string())
+        let file = NetworkFile::from_run(&self.run, self.recorded.as_ref()).map_err(|error| error.to_string())?;
+        Ok(NetworkFile {
+            drift: self.drift.clone(),
+            ..file
+        })
     }
 
     /// Returns the current state, to be resumed later.

@@ -78,6 +78,29 @@ impl History {
         }
     }
 
+    /// Appends the rows of another history of the same channels, with stretches of their own. The usual interval stays; times
+    /// are known if both histories know them.
+    ///
+    /// # Panics
+    /// If the numbers of channels differ.
+    pub fn append(&mut self, other: &Self) {
+        let rows = self.readings.nrows();
+        let next = self.stretches.iter().max().map_or(0, |last| last + 1);
+        let appended = self.readings.append(Axis(0), other.readings.view());
+        appended.expect("histories of the same channels");
+        self.stretches
+            .extend(other.stretches.iter().map(|stretch| next + stretch));
+        self.samples.extend(other.samples.iter().map(|row| rows + row));
+        self.times_s = self
+            .times_s
+            .take()
+            .zip(other.times_s.as_ref())
+            .map(|(mut times_s, more)| {
+                times_s.extend(more);
+                times_s
+            });
+    }
+
     /// Readings of all rows: rows × channels.
     pub fn readings(&self) -> ArrayView2<'_, f64> {
         self.readings.view()
@@ -225,6 +248,18 @@ mod tests {
         let history = History::new(counting(6), Some(&[0, 1, 0, 1, 0, 1]), None, Some(times_s), vec![5]);
         assert_eq!(history.stretches(), [0, 1, 0, 1, 0, 1]);
         assert_eq!(history.features(&Memory::of_lags(&[1])).unwrap()[[0, 1]], 3.0);
+    }
+
+    #[test]
+    fn the_past_of_one_file_is_not_that_of_the_next() {
+        let times_s = |from: f64| Some(Vec::from_iter((0..4).map(|row| from + 0.1 * f64::from(row))));
+        let mut history = History::new(counting(4), None, None, times_s(0.0), vec![1, 3]);
+        // The second file goes on where the first ended, with the same clock.
+        history.append(&History::new(counting(4), None, None, times_s(0.4), vec![0, 2]));
+        assert_eq!(history.stretches(), [0, 0, 0, 0, 1, 1, 1, 1]);
+        assert_eq!(history.samples(), [1, 3, 4, 6]);
+        let features = history.features(&Memory::of_lags(&[1])).unwrap();
+        assert_eq!(features.column(1).to_vec(), [0.0, 2.0, 0.0, 1.0]);
     }
 
     #[test]

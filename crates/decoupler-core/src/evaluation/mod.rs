@@ -10,6 +10,7 @@ mod cross_validation;
 mod decoder_set;
 mod errors;
 pub mod experiments;
+mod intervals;
 mod past_networks;
 mod preparation;
 mod pressed;
@@ -28,13 +29,16 @@ pub use baselines::{Baselines, PublishedErrors, Scores, published_errors};
 pub use cross_validation::{CrossValidated, CrossValidation, Effort};
 pub use decoder_set::{DecoderCost, DecoderReport, DecoderSet};
 pub use errors::{Errors, NodeAddress, Spread, TargetErrors, TestErrors, node_rms_mm};
+pub use intervals::{Coverage, HalfWidth, Intervals, IntervalsDefect};
 pub use past_networks::{PastNetwork, PastNetworks};
 pub use pressed::{Pressed, PressedAnswer, fine_tune, press_limits, pressed_rows, rebased};
 pub use reference::{NoReference, ReferenceNote, reference_errors};
 pub use remark::{Cause, MissingFigures, Remark, error_remarks};
 pub use run::{Run, RunDefect, RunError};
 pub use run_sets::RunSets;
-pub use settings::{CountError, MAX_STARTS, MeasuredSettings, RunSettings, SimulatedSettings, Workload, WorkloadTime};
+pub use settings::{
+    CountError, MAX_STARTS, MeasuredSettings, RecordedSize, RunSettings, SimulatedSettings, Workload, WorkloadTime,
+};
 pub use source::{
     Channel, Measured, ModelSize, Preset, PresetError, Problem, Simulation, Source, TargetPosition, ready_settings,
 };

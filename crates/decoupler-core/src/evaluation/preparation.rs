@@ -179,6 +179,7 @@ impl Run {
             scalings: tasks.map(|task| task.scaling.clone()),
             starts,
             baselines: None,
+            intervals: None,
         }))
     }
 }

@@ -9,10 +9,11 @@ use rayon::prelude::*;
 use thiserror::Error;
 
 use super::{
-    Baselines, CountError, Problem, RunSettings, Scores, StartRecord, StartTrainer, TestErrors, starts::lowest,
+    Baselines, CountError, Coverage, Intervals, Problem, RunSettings, Scores, StartRecord, StartTrainer, TestErrors,
+    starts::lowest,
 };
 use crate::{
-    dataset::{Dataset, DivisionError, FoldsError, PerRow, SimulationError},
+    dataset::{Dataset, DivisionError, FoldsError, PerRow, SimulationError, SplitBy},
     decoupling::{DecodeError, FitError},
     machine::MachineMemory,
     network::{DecouplingNetwork, Inputs, MinMax, Mlp, Networks, ScalingError},
@@ -39,6 +40,8 @@ pub struct Run {
     pub(super) wall_time: Option<Duration>,
     /// Errors of the baselines; `None` if only the networks are needed.
     pub(super) baselines: Option<Baselines>,
+    /// Intervals of the present network, with their coverage on the test set.
+    pub(super) intervals: Option<(Intervals, Vec<Option<Coverage>>)>,
 }
 
 impl Run {
@@ -51,6 +54,7 @@ impl Run {
     /// start has ended. Results are bit-identical for any number of threads.
     pub fn step(&mut self) -> Option<StopReason> {
         let begun = Instant::now();
+        self.intervals = None;
         match self.starts.as_mut_slice() {
             // Stays on this thread, which saves a thread switch per epoch.
             [only] => {
@@ -209,11 +213,29 @@ impl Run {
         self.baselines.as_ref()
     }
 
+    /// Sets the intervals of [`Self::network`], and measures their coverage on the test set, which was held out by the
+    /// rule `by`. Another epoch removes them.
+    pub fn set_intervals(&mut self, intervals: Intervals, by: SplitBy) {
+        let coverage = intervals.coverage(&self.test, self.decouple_test().view(), by);
+        self.intervals = Some((intervals, coverage));
+    }
+
+    /// Intervals of [`Self::network`], if they were calibrated.
+    pub fn intervals(&self) -> Option<&Intervals> {
+        self.intervals.as_ref().map(|(intervals, _)| intervals)
+    }
+
+    /// Coverage of [`Self::intervals`] on the test set, target by target; empty if there are none.
+    pub fn coverage(&self) -> &[Option<Coverage>] {
+        self.intervals.as_ref().map_or(&[], |(_, coverage)| coverage)
+    }
+
     /// Returns the errors of [`Self::network`] and of the baselines on the test set; `None` for the run of a fold.
     pub fn scores(&self) -> Option<Scores> {
         Some(Scores {
             network: self.errors(),
             baselines: self.baselines.clone()?,
+            coverage: self.coverage().to_vec(),
         })
     }
 }

@@ -5,12 +5,12 @@ use thiserror::Error;
 
 use super::{Measured, PublishedErrors, RunError, Simulation, Source};
 use crate::{
-    dataset::{LARGEST_SAMPLES, Seed},
+    dataset::{Dataset, LARGEST_SAMPLES, Seed},
     decoupling::{DecoderKind, Posterior},
     machine::{MachineMemory, Speed, node_pairs_per_row},
     network::{InputChoice, LARGEST_HIDDEN, ScalingChoice, Shape},
-    scene::{Movement, Rows, Scene},
-    training::{Method, TrainingSettings},
+    scene::{Movement, RowModel, Rows, Scene},
+    training::{Method, ScaledConjugateGradientSettings, StoppingRules, TrainingSettings},
 };
 
 /// Settings of a run. The same settings (and the same sets, if measured) give the same network, bit for bit.
@@ -68,14 +68,13 @@ impl From<Measured> for RunSettings {
     ///
     /// Recordings are short, noisy, and vary over time, so a validation set of consecutive samples costs samples and
     /// can end the training by chance. With Levenberg-Marquardt, stopped on the last fifth of a recording of forces,
-    /// errors vary twofold with the seed; with Bayesian regularisation on the whole recording they do not. It measures
-    /// the correlation of neighbouring frames, which carry less information than independent ones, and regularises each
-    /// class of weights with its own strength: with one strength for all, it is worse than ridge regression on 20
-    /// samples. Selecting the best of several starts by training error has no benefit.
+    /// errors vary twofold with the seed; with Bayesian regularisation on the whole recording they do not. It estimates
+    /// the noise of each target, and regularises each class of weights with its own strength: with one strength for
+    /// all, it is worse than ridge regression on 20 samples. Selecting the best of several starts by training error has no benefit.
     fn from(measured: Measured) -> Self {
         let mut settings = Self::of(measured.into(), InputChoice::MEASURED);
         settings.training.method = Method::recorded_regularization();
-        settings.training.stopping.epochs = 300;
+        settings.training.stopping = StoppingRules::recorded(&settings.training.method);
         settings
     }
 }
@@ -146,6 +145,27 @@ impl RunSettings {
         }
     }
 
+    /// Changes the method. On a recording, Bayesian regularisation with its usual settings gets [those for
+    /// recordings](Method::recorded_regularization), and the [default rules](StoppingRules::recorded) of the present
+    /// method become those of the new one.
+    pub fn choose_method(&mut self, method: Method) {
+        let before = std::mem::replace(&mut self.training.method, method);
+        if matches!(self.source, Source::Simulated(_)) {
+            return;
+        }
+        if method == Method::bayesian_regularization() {
+            self.training.method = Method::recorded_regularization();
+        }
+        let (usual, then) = (StoppingRules::recorded(&before), StoppingRules::recorded(&method));
+        let rules = &mut self.training.stopping;
+        if rules.epochs == usual.epochs {
+            rules.epochs = then.epochs;
+        }
+        if rules.max_fail == usual.max_fail {
+            rules.max_fail = then.max_fail;
+        }
+    }
+
     /// Returns these settings as settings of a run on measured samples, if they are.
     pub fn measured(&self) -> Option<MeasuredSettings> {
         match self.source {
@@ -198,7 +218,7 @@ fn check<const N: usize>(counts: [(&'static str, usize, RangeInclusive<usize>); 
     }
 }
 
-/// Memory and work of a run, from the sizes in its settings alone, so that both are known before it begins.
+/// Memory and work of a run, from the sizes of its network and samples alone, so that both are known before it begins.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Workload {
     /// Peak memory in bytes: drawn and scaled samples, equations of all trainings, and priors of the rows.
@@ -209,6 +229,34 @@ pub struct Workload {
     epoch_multiplications: f64,
     /// Maximum number of epochs.
     pub epochs: usize,
+}
+
+/// Size of the training set of a recording.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct RecordedSize {
+    /// Number of training samples.
+    pub samples: usize,
+    /// Number of inputs.
+    pub inputs: usize,
+    /// Number of targets.
+    pub targets: usize,
+    /// Number of networks: 1, or one for each row-wire.
+    pub networks: usize,
+}
+
+impl RecordedSize {
+    /// Returns the size of a training set on which networks with these settings are trained.
+    pub fn of(settings: &RunSettings, training: &Dataset) -> Self {
+        Self {
+            samples: training.samples(),
+            inputs: training.readings().ncols(),
+            targets: training.targets().ncols(),
+            networks: match settings.source.row_model() {
+                RowModel::Shared => 1,
+                RowModel::Each => training.row_count(),
+            },
+        }
+    }
 }
 
 /// Time of a run on this machine, from rates measured on one thread. Large runs are faster with more threads.
@@ -223,6 +271,9 @@ pub struct WorkloadTime {
 }
 
 impl Workload {
+    /// Number of vectors with an entry for each weight in a method and its trainer.
+    const VECTORS: usize = 8;
+
     /// Computes the workload of `settings`.
     ///
     /// # Errors
@@ -241,8 +292,6 @@ impl Workload {
         let trainings = settings.starts * size.networks;
         let of_each = training.div_ceil(size.networks);
         let method = &settings.training.method;
-        /// Number of vectors with an entry for each weight in a method and its trainer.
-        const VECTORS: usize = 8;
         // Whitening may leave inputs out, and products of fewer inputs may be kept that would be recomputed for all.
         let fewest = match settings.inputs.scaling {
             ScalingChoice::MinMax => shape.inputs,
@@ -250,7 +299,7 @@ impl Workload {
         };
         let with_inputs = |inputs| method.equations_bytes(Shape { inputs, ..shape }, of_each);
         let equations_bytes = (fewest..=shape.inputs).map(with_inputs).max().unwrap_or(0);
-        let training_bytes = (equations_bytes as u64).saturating_add(float_bytes(shape.weights(), VECTORS));
+        let training_bytes = (equations_bytes as u64).saturating_add(float_bytes(shape.weights(), Self::VECTORS));
         let priors = Posterior::prior_bytes(&source.scene, size.rows, size.unknowns / size.rows);
         let per_row = node_pairs_per_row(&source.sensor);
         let bytes = samples
@@ -262,6 +311,41 @@ impl Workload {
             epoch_multiplications: trainings as f64 * method.epoch_multiplications(shape, of_each),
             epochs: settings.training.stopping.epochs,
         })
+    }
+
+    /// Computes the workload of a training on a recording. Its samples, which have been read by then, are not counted.
+    pub fn of_recording(settings: &RunSettings, size: RecordedSize) -> Self {
+        let shape = Shape {
+            inputs: size.inputs,
+            hidden: settings.hidden,
+            outputs: size.targets,
+        };
+        let (method, of_each) = (&settings.training.method, size.samples.div_ceil(size.networks.max(1)));
+        let trainings = settings.starts * size.networks;
+        let bytes = (method.equations_bytes(shape, of_each) as u64)
+            .saturating_add(float_bytes(shape.weights(), Self::VECTORS));
+        Self {
+            bytes: bytes.saturating_mul(trainings as u64),
+            node_pairs: 0.0,
+            epoch_multiplications: trainings as f64 * method.epoch_multiplications(shape, of_each),
+            epochs: settings.training.stopping.epochs,
+        }
+    }
+
+    /// Returns the methods that would train on the same recording in less than half of this time, with the time of each
+    /// for the number of epochs that it gets by default.
+    pub fn faster_methods(&self, settings: &RunSettings, size: RecordedSize) -> Vec<(Method, Duration)> {
+        let present = self.time().all_epochs;
+        let candidates = [
+            Method::default(),
+            Method::ScaledConjugateGradient(ScaledConjugateGradientSettings::default()),
+        ];
+        let of_each = candidates.into_iter().map(|method| {
+            let mut other = *settings;
+            other.choose_method(method);
+            (method, Self::of_recording(&other, size).time().all_epochs)
+        });
+        of_each.filter(|(_, time)| time.saturating_mul(2) < present).collect()
     }
 
     /// Computes the workload of measuring `decoders` with networks of each number of `hidden` nodes one after the
@@ -286,6 +370,11 @@ impl Workload {
     /// some seconds to draw the samples, or a second per epoch.
     pub fn is_large(&self) -> bool {
         self.bytes > 1_000_000_000 || self.node_pairs > 1e10 || self.epoch_multiplications > 1e10
+    }
+
+    /// Returns `true` if samples are drawn, not read.
+    pub fn draws_samples(&self) -> bool {
+        self.node_pairs > 0.0
     }
 
     /// Computes the time on this machine. The first call measures its speed, which takes about 20 ms.

@@ -169,7 +169,7 @@ impl Rows<'_> {
             }
         };
         Ok(Past {
-            groups: self.meanings.group.map(|_| self.groups(read)),
+            groups: self.meanings.group.map(|_| self.groups(read).0),
             row_wires: self.row_wires(read)?,
             times_s,
             samples: kept.iter().map(|row| place[row]).collect(),
@@ -188,18 +188,23 @@ impl Rows<'_> {
         ))
     }
 
-    /// Returns the group of each sample; groups are numbered in order of first occurrence.
-    pub(super) fn groups(&self, kept: &[usize]) -> Vec<usize> {
+    /// Returns the group of each sample, numbered in order of first occurrence, and the name of each group. Without a group
+    /// column, each sample is a group without a name.
+    pub(super) fn groups(&self, kept: &[usize]) -> (Vec<usize>, Vec<String>) {
         let Some(id) = self.meanings.group else {
-            return (0..kept.len()).collect();
+            return ((0..kept.len()).collect(), Vec::new());
         };
-        let mut known = HashMap::new();
+        let (mut known, mut names) = (HashMap::new(), Vec::new());
         let numbers = kept.iter().map(|&row| {
             let next = known.len();
-            let key = self.partner(id.file, row).map(|row| self.column(id).group(row));
-            *known.entry(key).or_insert(next)
+            let partner = self.partner(id.file, row);
+            let key = partner.map(|row| self.column(id).group(row));
+            *known.entry(key).or_insert_with(|| {
+                names.push(partner.map_or_else(String::new, |row| self.column(id).name_of_group(row)));
+                next
+            })
         });
-        numbers.collect()
+        (numbers.collect(), names)
     }
 
     pub(super) fn row_wires(&self, kept: &[usize]) -> Result<Option<Vec<usize>>, ImportError> {

@@ -1,5 +1,6 @@
 use std::{ops::ControlFlow, path::Path, sync::Arc};
 
+use ndarray::{Axis, Slice};
 use thiserror::Error;
 
 use super::{ImportError, Plan, PlannedSets, Progress, Recorded, Recording};
@@ -8,6 +9,7 @@ use decoupler_core::{
         Run, RunError, RunSets, RunSettings, SimulatedSettings, Source,
         experiments::{ExperimentRecording, RecordedSamples, TrialSamples},
     },
+    live::DriftReference,
     training::TrainerState,
 };
 
@@ -237,6 +239,19 @@ impl SetupSets {
         is_cancelled: &dyn Fn() -> bool,
     ) -> Result<Option<Run>, RunError> {
         Run::resume_unless(setup.settings, states, self.sets, is_cancelled)
+    }
+
+    /// Describes the training readings of a recording, by which a later drift is detected; `None` for an array, whose
+    /// readings are checked against its model, if the row-wires are known, or if there are too few independent readings.
+    pub fn drift_reference(&self) -> Option<DriftReference> {
+        let training = &self.sets.split.training;
+        if self.recordings.is_none() || training.row_wires_read().is_some() {
+            return None;
+        }
+        // With a memory, the readings are followed by values from the past, which a monitor does not need.
+        let channels = self.sets.problem.inputs.len();
+        let readings = training.readings();
+        DriftReference::of(readings.slice_axis(Axis(1), Slice::from(..channels)))
     }
 
     /// Checks that recorded samples are those `saved` with a run.

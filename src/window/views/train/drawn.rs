@@ -200,6 +200,7 @@ mod tests {
             answers: Arc::new(decoupled_mm),
             charts: None,
             remarks: Vec::new(),
+            coverage: Vec::new(),
             frame: None,
             best_epoch: 0,
             defect: None,

@@ -104,6 +104,7 @@ fn expectation_ui(ui: &mut Ui, shared: &Shared) {
         let scores = Scores {
             network: baselines.mean.clone(),
             baselines,
+            coverage: Vec::new(),
         };
         let mut table = ErrorTable::of_scores(&preview.settings.source.problem(), &scores, published.as_ref());
         let rows = table.blocks.iter_mut().flat_map(|block| &mut block.rows);

@@ -2,7 +2,7 @@
 
 use std::{fmt, path::Path};
 
-use crate::import::{DialectChoice, Plan, Recipe, Setup};
+use crate::import::{DialectChoice, FileSet, Plan, Recipe, Setup};
 use decoupler_core::{
     dataset::{Division, Span, SplitBy},
     evaluation::{Measured, RunSettings, SimulatedSettings},
@@ -165,13 +165,17 @@ impl Command {
             None => self.import(&plan.import),
         }
         if let Some(test) = &plan.test {
-            self.add("test-data", test.data.display());
-            test.join.iter().for_each(|file| self.add("test-join", file.display()));
+            let sets = std::iter::once((&test.data, &test.join));
+            let sets = sets.chain(test.append.iter().map(|set| (&set.data, &set.join)));
+            for (data, join) in sets {
+                self.add("test-data", data.display());
+                join.iter().for_each(|file| self.add("test-join", file.display()));
+            }
         }
         let (division, default) = (plan.division, Division::default());
-        let by_default = match plan.import.group {
-            Some(_) => SplitBy::Group,
-            None => default.by,
+        let by_default = match plan.import.has_groups() {
+            true => SplitBy::Group,
+            false => default.by,
         };
         // The recipe may have another division.
         if recipe.is_some() || division.by != by_default || division.by != default.by {
@@ -189,6 +193,7 @@ impl Command {
         let Recipe {
             data,
             join,
+            append,
             dialect,
             inputs,
             targets,
@@ -197,12 +202,17 @@ impl Command {
             row_wire,
             memory,
             conditions,
+            derive,
             missing,
             units,
             positions,
         } = recipe;
         self.add("data", data.display());
         join.iter().for_each(|joined| self.add("join", joined.file.display()));
+        for FileSet { data, join } in append {
+            self.add("data", data.display());
+            join.iter().for_each(|file| self.add("join", file.display()));
+        }
         let times = Vec::from_iter(join.iter().filter_map(|joined| joined.time.as_deref()));
         // One for all, or one for each.
         let is_one = times.windows(2).all(|pair| pair[0] == pair[1]);
@@ -228,6 +238,7 @@ impl Command {
             }
         }
         conditions.iter().for_each(|condition| self.add("where", condition));
+        derive.iter().for_each(|derived| self.add("derive", derived));
         missing.iter().for_each(|missing| self.add("missing", missing));
         units
             .iter()

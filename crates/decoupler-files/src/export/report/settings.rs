@@ -85,11 +85,17 @@ pub(super) fn recording_facts(file: &NetworkFile, recorded: &Recorded, test: &Da
     for joined in &import.join {
         facts.push(("Joined file", joined.file.display().to_string()));
     }
+    for set in &import.append {
+        facts.push(("Appended", set.data.display().to_string()));
+    }
     if let Some(time) = &import.time {
         facts.push(("Time", time.clone()));
     }
     if let Some(group) = &import.group {
         facts.push(("Group", group.clone()));
+    }
+    for derived in &import.derive {
+        facts.push(("Derived column", derived.to_string()));
     }
     for condition in &import.conditions {
         facts.push(("Rows used", condition.to_string()));

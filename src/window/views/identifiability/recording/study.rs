@@ -234,7 +234,8 @@ fn find(
     let division = (&plan.division, folds);
     let begin = |stage| report.send(StudyEvent::Began(stage));
     let is_cancelled = || report.is_cancelled();
-    let found = Findings::measure(setup.settings(), &recording.set, division, model, &begin, &is_cancelled);
+    let ends: [&dyn Fn() -> bool; 2] = [&is_cancelled, &|| false];
+    let found = Findings::measure(setup.settings(), &recording.set, division, model, &begin, ends);
     if let Some(findings) = found.map_err(|error| error.to_string())? {
         report.send(StudyEvent::Found(Box::new(RecordingFindings {
             setup,
@@ -279,7 +280,7 @@ fn validate(
     for (target, channel) in recording.targets.iter().enumerate() {
         let name = &channel.name;
         remarks.push(match &determined[target] {
-            Ok(determined) => determined.sentence(name),
+            Ok(determined) => determined.sentence(name, &[FittedModel::Network]),
             Err(cause) => format!("{name}: {cause}"),
         });
         remarks.extend(gains[target].and_then(|gain| gain.remark(name)));

@@ -8,7 +8,7 @@ use std::{
 };
 
 use decoupler_core::dataset::{Memory, Span, SpanError, SplitBy};
-use decoupler_files::import::{Condition, InspectedFile, Joined, Meaning, Missing, Plan, TestFiles};
+use decoupler_files::import::{Condition, FileSet, InspectedFile, Joined, Meaning, Missing, Plan, TestFiles};
 
 use super::columns_card::Renaming;
 
@@ -36,6 +36,8 @@ pub(super) struct Draft {
     split: Option<SplitBy>,
     /// Files of test samples, by the recording that each one replaces.
     tests: BTreeMap<PathBuf, PathBuf>,
+    /// Further test files, which the window does not change.
+    more_tests: Vec<FileSet>,
     /// The plan of the recipe as read, and the same plan as this import writes it.
     of_recipe: Option<Box<[Plan; 2]>>,
     cache: RefCell<PlanCache>,
@@ -55,10 +57,10 @@ impl Draft {
                 }
             }
         }
-        let of_tests = plan.test.take();
-        let of_tests = of_tests
-            .iter()
-            .flat_map(|test| std::iter::once(&test.data).chain(&test.join));
+        let (of_tests, more_tests) = plan.test.take().map_or_else(Default::default, |test| {
+            let first = Vec::from_iter(std::iter::once(test.data).chain(test.join));
+            (first, test.append)
+        });
         // The meanings of the columns are kept with the columns.
         (import.time, import.group, import.row_wire) = (None, None, None);
         (import.inputs, import.targets) = (Vec::new(), Vec::new());
@@ -67,7 +69,8 @@ impl Draft {
             conditions,
             missing,
             memory,
-            tests: paths.zip(of_tests.cloned()).collect(),
+            tests: paths.zip(of_tests).collect(),
+            more_tests,
             files,
             plan,
             chosen: BTreeMap::new(),
@@ -140,7 +143,7 @@ impl Draft {
 
     /// Gives a column a meaning; if only one column can have it, the previous one loses it.
     pub(super) fn choose(&mut self, file: usize, column: usize, meaning: Meaning) {
-        let had_group = self.has(Meaning::Group);
+        let had_group = self.has_groups();
         for path in self.give(file, column, meaning) {
             self.chosen.insert(path, Meaning::Unused);
         }
@@ -198,7 +201,7 @@ impl Draft {
 
     /// Returns the rule of division: that of the user, or by group if there are any groups.
     fn settle_split(&mut self) {
-        self.plan.division.by = match (self.split, self.has(Meaning::Group)) {
+        self.plan.division.by = match (self.split, self.has_groups()) {
             (Some(SplitBy::Group), false) | (None, false) => SplitBy::Time,
             (None, true) => SplitBy::Group,
             (Some(by), _) => by,
@@ -208,6 +211,17 @@ impl Draft {
     /// Returns `true` if a column of any file has this meaning.
     pub(super) fn has(&self, meaning: Meaning) -> bool {
         self.files.iter().any(|file| file.meanings.contains(&meaning))
+    }
+
+    /// Returns `true` if samples belong to groups, by a column or by several files of one experiment.
+    pub(super) fn has_groups(&self) -> bool {
+        self.has(Meaning::Group) || !self.plan.import.append.is_empty()
+    }
+
+    /// Closes one of the files whose rows follow those of the first, with the files joined to it.
+    pub(super) fn close_appended(&mut self, number: usize) {
+        self.plan.import.append.remove(number);
+        self.settle_split();
     }
 
     /// Returns the number of columns of this meaning.
@@ -288,6 +302,7 @@ impl Draft {
 
     /// Closes the file that replaces this recording for the test.
     pub(super) fn close_test_file(&mut self, recording: &Path) {
+        self.more_tests.clear();
         self.tests.remove(recording);
     }
 
@@ -363,6 +378,7 @@ impl Draft {
         Ok(files.next().map(|data| TestFiles {
             data,
             join: files.collect(),
+            append: self.more_tests.clone(),
         }))
     }
 

@@ -157,6 +157,12 @@ impl RecordingEditor {
         let Some(draft) = &mut self.draft else { return };
         let mut paths = draft.paths();
         paths.remove(file);
+        let append = &mut draft.plan.import.append;
+        if file == 0 && !append.is_empty() {
+            paths = append.remove(0).files().cloned().collect();
+        } else if let Some(joined) = file.checked_sub(1) {
+            append.iter_mut().for_each(|set| drop(set.join.remove(joined)));
+        }
         if paths.is_empty() {
             self.close_all();
         } else {

@@ -250,7 +250,7 @@ fn samples_summary(draft: &Draft, settings: &RunSettings) -> String {
 
 fn split_ui(ui: &mut Ui, draft: &mut Draft, usual_validation: f64, task: FileTask, effects: &mut Vec<Effect>) {
     let needs_validation = usual_validation > 0.0;
-    let (has_group, is_given) = (draft.has(Meaning::Group), draft.has_tests());
+    let (has_group, is_given) = (draft.has_groups(), draft.has_tests());
     let options = [
         (
             SplitBy::Time,
