@@ -12,7 +12,7 @@ use super::{
     interruption::{CheckpointArguments, Checkpointing, Graceful},
     intervals::{WhenCalibrated, calibrate},
     output::progress_bar,
-    samples::{announce, following, sets},
+    samples::{announce, announce_recording, following, sets},
     train_report::Trained,
     training_arguments::TrainingArguments,
 };
@@ -77,6 +77,7 @@ impl Train {
                 }
                 let sets = sets(&setup, self.json)?;
                 self.import.save_recipe(&setup)?;
+                announce_recording(&setup, &sets);
                 let run = sets.run(&setup, &|| false)?.expect("nothing cancels it");
                 (run, sets)
             }

@@ -322,8 +322,8 @@ impl Workload {
         };
         let (method, of_each) = (&settings.training.method, size.samples.div_ceil(size.networks.max(1)));
         let trainings = settings.starts * size.networks;
-        let bytes = (method.equations_bytes(shape, of_each) as u64)
-            .saturating_add(float_bytes(shape.weights(), Self::VECTORS));
+        let bytes =
+            (method.equations_bytes(shape, of_each) as u64).saturating_add(float_bytes(shape.weights(), Self::VECTORS));
         Self {
             bytes: bytes.saturating_mul(trainings as u64),
             node_pairs: 0.0,
