@@ -18,7 +18,8 @@ use decoupler_core::{
 };
 use decoupler_files::{
     export::{
-        AtomicFile, NetworkFile, WriteError, check_writable, format_number, is_same, write_decoded, write_decoded_header,
+        AtomicFile, NetworkFile, WriteError, check_writable, format_number, is_same, write_decoded,
+        write_decoded_header,
     },
     import::KeptColumn,
 };
@@ -296,7 +297,10 @@ pub(super) fn write_heading(file: &NetworkFile, kept: &[String], rows: usize, ou
         return write_decoded_header(rows * problem.targets.len() / 3, out);
     }
     let titles = problem.targets.iter().enumerate().flat_map(|(index, target)| {
-        let of_target = file.intervals.as_ref().and_then(|intervals| intervals.targets.get(index));
+        let of_target = file
+            .intervals
+            .as_ref()
+            .and_then(|intervals| intervals.targets.get(index));
         let half_width = of_target.is_some_and(Option::is_some).then(|| Channel {
             name: half_width_name(target),
             unit: target.unit.clone(),
@@ -304,7 +308,9 @@ pub(super) fn write_heading(file: &NetworkFile, kept: &[String], rows: usize, ou
         [Some(target.clone()), half_width].into_iter().flatten()
     });
     let kept = kept.iter().map(|title| inert(title));
-    let names = kept.chain(titles.map(|target| inert(&target.title()))).chain(["readings_outside".to_owned(), "targets_outside".to_owned()]);
+    let names = kept
+        .chain(titles.map(|target| inert(&target.title())))
+        .chain(["readings_outside".to_owned(), "targets_outside".to_owned()]);
     let mut writer = csv::Writer::from_writer(out);
     writer.write_record(names).map_err(io::Error::other)?;
     writer.flush()

@@ -78,7 +78,11 @@ const BUDGET_S: f64 = 30.0;
 impl StudyArguments {
     /// Returns `true` if any of them is given.
     pub(super) fn are_given(&self) -> bool {
-        !self.inputs.is_empty() || self.hidden.is_some() || self.model.is_some() || self.budget.is_some() || self.seed.is_some()
+        !self.inputs.is_empty()
+            || self.hidden.is_some()
+            || self.model.is_some()
+            || self.budget.is_some()
+            || self.seed.is_some()
     }
 
     /// Measures and prints how well the readings of a recording determine its targets.

@@ -129,7 +129,9 @@ fn columns_table(columns: &[ColumnSummary]) -> Table {
         let notes = [
             column.is_constant.then(|| "constant".to_owned()),
             column.is_rounding.then(|| "constant but for rounding".to_owned()),
-            column.sentinel.map(|found| format!("{} × {}: none?", found.cells, found.value)),
+            column
+                .sentinel
+                .map(|found| format!("{} × {}: none?", found.cells, found.value)),
             column.duplicate_of.as_ref().map(|other| format!("the same as {other}")),
             column.first_text.as_ref().map(|(line, text)| {
                 format!(

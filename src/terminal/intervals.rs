@@ -40,7 +40,9 @@ pub(super) fn calibrate(run: &mut Run, sets: &SetupSets, when: WhenCalibrated) -
         return Ok(());
     }
     // Each of the folds trains on the share (k − 1) / k of the samples.
-    let seconds = run.wall_time().map(|time| (Intervals::FOLDS - 1) as f64 * time.as_secs_f64());
+    let seconds = run
+        .wall_time()
+        .map(|time| (Intervals::FOLDS - 1) as f64 * time.as_secs_f64());
     let describe = |seconds| format_duration(Duration::try_from_secs_f64(seconds).unwrap_or_default());
     if let Some(seconds) = seconds.filter(|seconds| when == WhenCalibrated::Auto && *seconds > MAX_SECONDS) {
         note(&format!(
@@ -51,7 +53,9 @@ pub(super) fn calibrate(run: &mut Run, sets: &SetupSets, when: WhenCalibrated) -
     }
     if let Some(seconds) = seconds.filter(|seconds| *seconds > 2.0) {
         let seconds = describe(seconds);
-        note(&format!("Calibrating the prediction intervals by cross-validation takes about {seconds}"));
+        note(&format!(
+            "Calibrating the prediction intervals by cross-validation takes about {seconds}"
+        ));
     }
     let by = recordings.recorded.plan.division.by;
     let graceful = Graceful::begin();

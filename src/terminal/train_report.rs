@@ -222,7 +222,10 @@ impl<'a> Trained<'a> {
                 targets: targets(&file.problem.targets, &scores.network, &determined, &scores.coverage),
                 baselines: BTreeMap::from([
                     ("mean", targets(&file.problem.targets, &scores.baselines.mean, &[], &[])),
-                    ("ridge", targets(&file.problem.targets, &scores.baselines.linear, &[], &[])),
+                    (
+                        "ridge",
+                        targets(&file.problem.targets, &scores.baselines.linear, &[], &[]),
+                    ),
                 ]),
             })),
             (None, Some(settings)) => SourceReport::Array(Box::new(ArrayReport::new(file, &settings, self.remarks())?)),
@@ -277,11 +280,14 @@ impl<'a> Trained<'a> {
         of_array
             .map(ToString::to_string)
             .chain(of_import.into_iter().flatten())
-            .chain(self.extrapolation().and_then(|(found, recording)| found.warning(&recording.inputs, &recording.targets)))
+            .chain(
+                self.extrapolation()
+                    .and_then(|(found, recording)| found.warning(&recording.inputs, &recording.targets)),
+            )
             .chain(self.optimism.iter().cloned())
             .chain(self.run.defect().map(|defect| defect.to_string()))
             .chain(describe_determinacy(&self.file.problem.targets, determined))
-            .chain(describe_worse_than_ridge(problem, scores, settings.training.method))
+            .chain(describe_worse_than_ridge(problem, scores))
             .chain(describe_coverage(&problem.targets, &scores.coverage))
             .collect()
     }

@@ -186,7 +186,11 @@ fn moved_files_of_a_checkpoint_are_found_by_the_given_name() {
     }
     let resume = "train --checkpoint moved/c.json --resume --epochs 8";
     let message = failure(resume, folder.path(), 1);
-    for expected in ["'moved/c.json'", "sensor.csv' is missing", "give its new path with --data FILE"] {
+    for expected in [
+        "'moved/c.json'",
+        "sensor.csv' is missing",
+        "give its new path with --data FILE",
+    ] {
         assert!(message.contains(expected), "{message}");
     }
     let message = failure(

@@ -11,7 +11,9 @@ use std::{
 };
 
 use decoupler_core::{
-    evaluation::{Baselines, Coverage, PastNetworks, Problem, Run, RunDefect, RunError, RunSettings, StartRecord, TestErrors},
+    evaluation::{
+        Baselines, Coverage, PastNetworks, Problem, Run, RunDefect, RunError, RunSettings, StartRecord, TestErrors,
+    },
     live::DriftReference,
     network::Networks,
     training::{EpochRecord, Stage, StopReason, StoppingRules, TrainerState, TrainingError, TrainingSettings},

@@ -156,8 +156,8 @@ impl<'a> TrainingLoop<'a> {
             let Some(sets) = setup.sets(Path::new(""), is_cancelled, on_progress)? else {
                 return Ok(None);
             };
-            let recorded = sets.recorded().cloned();
-            Ok(run(sets, is_cancelled)?.map(|run| TrainedRun { run, recorded }))
+            let (recorded, drift) = (sets.recorded().cloned(), sets.drift_reference());
+            Ok(run(sets, is_cancelled)?.map(|run| TrainedRun { run, recorded, drift }))
         })
     }
 
@@ -316,8 +316,7 @@ impl<'a> TrainingLoop<'a> {
                 baselines: baselines.clone(),
                 coverage: Vec::new(),
             };
-            let method = run.settings().training.method;
-            remarks.extend(describe_worse_than_ridge(run.problem(), &scores, method));
+            remarks.extend(describe_worse_than_ridge(run.problem(), &scores));
         }
         remarks
     }

@@ -88,12 +88,17 @@ impl History {
         let next = self.stretches.iter().max().map_or(0, |last| last + 1);
         let appended = self.readings.append(Axis(0), other.readings.view());
         appended.expect("histories of the same channels");
-        self.stretches.extend(other.stretches.iter().map(|stretch| next + stretch));
+        self.stretches
+            .extend(other.stretches.iter().map(|stretch| next + stretch));
         self.samples.extend(other.samples.iter().map(|row| rows + row));
-        self.times_s = self.times_s.take().zip(other.times_s.as_ref()).map(|(mut times_s, more)| {
-            times_s.extend(more);
-            times_s
-        });
+        self.times_s = self
+            .times_s
+            .take()
+            .zip(other.times_s.as_ref())
+            .map(|(mut times_s, more)| {
+                times_s.extend(more);
+                times_s
+            });
     }
 
     /// Readings of all rows: rows × channels.

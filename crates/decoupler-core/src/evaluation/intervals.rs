@@ -78,7 +78,11 @@ impl Intervals {
         let columns = targets.columns().into_iter().zip(answers.columns());
         let half_width = |(truth, answers): (ArrayView1<'_, f64>, ArrayView1<'_, f64>)| {
             let answers = answers.to_vec();
-            let errors: Vec<f64> = answers.iter().zip(truth).map(|(answer, truth)| (answer - truth).abs()).collect();
+            let errors: Vec<f64> = answers
+                .iter()
+                .zip(truth)
+                .map(|(answer, truth)| (answer - truth).abs())
+                .collect();
             HalfWidth::calibrate(&answers, &errors, folds.as_ref(), &evidence)
         };
         Self {
@@ -97,7 +101,12 @@ impl Intervals {
         by: SplitBy,
         is_cancelled: &dyn Fn() -> bool,
     ) -> Result<Option<Self>, RunError> {
-        let folds = Folds::by(set, by.folds_of(set, Self::FOLDS), by, &mut settings.seed.rng(Stream::Split))?;
+        let folds = Folds::by(
+            set,
+            by.folds_of(set, Self::FOLDS),
+            by,
+            &mut settings.seed.rng(Stream::Split),
+        )?;
         let validated = CrossValidated::on_folds(settings, set, folds, is_cancelled)?;
         Ok(validated.map(|validated| Self::calibrate(set, validated.network.view(), by)))
     }
@@ -124,10 +133,11 @@ impl Intervals {
         let targets = test.targets();
         let of = |(target, half_width): (usize, &Option<HalfWidth>)| {
             let (truth, answers) = (targets.column(target), answers.column(target));
-            Some(half_width.as_ref()?.coverage(
-                truth.iter().copied().zip(answers.iter().copied()).collect(),
-                &evidence,
-            ))
+            Some(
+                half_width
+                    .as_ref()?
+                    .coverage(truth.iter().copied().zip(answers.iter().copied()).collect(), &evidence),
+            )
         };
         self.targets.iter().enumerate().map(of).collect()
     }
@@ -136,7 +146,10 @@ impl Intervals {
     pub fn check(&self, targets: usize) -> Result<(), IntervalsDefect> {
         if self.targets.len() != targets {
             let found = self.targets.len();
-            return Err(IntervalsDefect::Targets { found, expected: targets });
+            return Err(IntervalsDefect::Targets {
+                found,
+                expected: targets,
+            });
         }
         let is_valid = |half_width: &HalfWidth| {
             let widths = half_width.by_answer.iter().map(|point| point[1]);
@@ -184,7 +197,11 @@ impl HalfWidth {
         let points = (effective_samples / Self::SAMPLES_PER_POINT) as usize;
         let scaled = folds.and_then(|folds| {
             let spreads = held_out_spreads(answers, errors, folds, points.min(Self::MOST_POINTS))?;
-            let scores: Vec<f64> = errors.iter().zip(&spreads).map(|(error, spread)| error / spread).collect();
+            let scores: Vec<f64> = errors
+                .iter()
+                .zip(&spreads)
+                .map(|(error, spread)| error / spread)
+                .collect();
             let mean_spread = spreads.iter().sum::<f64>() / spreads.len() as f64;
             // Mean half-widths at a coverage that is exactly the nominal one on the held-out samples.
             let rank = (Intervals::NOMINAL * errors.len() as f64).ceil() as usize;
@@ -193,7 +210,10 @@ impl HalfWidth {
             let all: Vec<usize> = (0..errors.len()).collect();
             let points = spread_points(answers, errors, &all, points.min(Self::MOST_POINTS))?;
             let (factor, effective_samples) = conformal_quantile(&scores, evidence).filter(|_| is_narrower)?;
-            let points: Points = points.into_iter().map(|[answer, spread]| [answer, factor * spread]).collect();
+            let points: Points = points
+                .into_iter()
+                .map(|[answer, spread]| [answer, factor * spread])
+                .collect();
             Some((points, effective_samples))
         });
         let (by_answer, effective_samples) = scaled.unwrap_or((Points::new(), effective_samples));
@@ -232,7 +252,10 @@ impl HalfWidth {
         Coverage {
             share: 1.0 - outside.iter().sum::<f64>() / count,
             half_width: mean(&|&(_, answer)| self.at(answer)),
-            expected: [(Intervals::NOMINAL - deviation).max(0.0), (Intervals::NOMINAL + deviation).min(1.0)],
+            expected: [
+                (Intervals::NOMINAL - deviation).max(0.0),
+                (Intervals::NOMINAL + deviation).min(1.0),
+            ],
             bias: mean(&|&(truth, answer)| answer - truth),
         }
     }
@@ -251,7 +274,10 @@ impl Coverage {
 fn conformal_quantile(scores: &[f64], evidence: &Evidence) -> Option<(f64, f64)> {
     let count = scores.len();
     let first = nth_smallest(scores, (Intervals::NOMINAL * count as f64).ceil() as usize);
-    let is_large: Vec<f64> = scores.iter().map(|score| f64::from(u8::from(*score >= first))).collect();
+    let is_large: Vec<f64> = scores
+        .iter()
+        .map(|score| f64::from(u8::from(*score >= first)))
+        .collect();
     let effective = evidence.effective_samples(&is_large);
     if effective < Intervals::FEWEST_SAMPLES {
         return None;
@@ -417,7 +443,10 @@ mod tests {
         for (target, spread) in [0.1, 0.5].into_iter().enumerate() {
             let half_width = constant.targets[target].as_ref().unwrap();
             assert!(half_width.by_answer.is_empty(), "{half_width:?}");
-            assert!((half_width.constant / (1.645 * spread) - 1.0).abs() < 0.1, "{half_width:?}");
+            assert!(
+                (half_width.constant / (1.645 * spread) - 1.0).abs() < 0.1,
+                "{half_width:?}"
+            );
         }
         // With growth, the standard deviation is 0.1 (1 + 5x) at the answer 2x.
         let growing = calibrate(5.0);
@@ -459,7 +488,14 @@ mod tests {
             ("autocorrelated noise, many samples", 0.9, 0.0, 3000),
             ("autocorrelated noise that grows", 0.9, 5.0, 1500),
         ] {
-            let (share, alarms) = coverage(Truth { memory, growth, samples }, 200);
+            let (share, alarms) = coverage(
+                Truth {
+                    memory,
+                    growth,
+                    samples,
+                },
+                200,
+            );
             assert!((0.88..0.92).contains(&share), "{what}: {share}");
             assert!(alarms < 0.02, "{what}: {alarms}");
         }

@@ -9,7 +9,8 @@ use rayon::prelude::*;
 use thiserror::Error;
 
 use super::{
-    Baselines, CountError, Coverage, Intervals, Problem, RunSettings, Scores, StartRecord, StartTrainer, TestErrors, starts::lowest,
+    Baselines, CountError, Coverage, Intervals, Problem, RunSettings, Scores, StartRecord, StartTrainer, TestErrors,
+    starts::lowest,
 };
 use crate::{
     dataset::{Dataset, DivisionError, FoldsError, PerRow, SimulationError, SplitBy},

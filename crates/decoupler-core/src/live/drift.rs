@@ -34,14 +34,22 @@ const RIDGE: f64 = 0.01;
 impl Metric {
     /// Fits the metric to `readings` (samples × channels) without the samples `left_out`.
     fn fit(readings: ArrayView2<'_, f64>, left_out: std::ops::Range<usize>) -> Option<Self> {
-        let kept: Vec<usize> = (0..readings.nrows()).filter(|sample| !left_out.contains(sample)).collect();
+        let kept: Vec<usize> = (0..readings.nrows())
+            .filter(|sample| !left_out.contains(sample))
+            .collect();
         let (count, channels) = (kept.len() as f64, readings.ncols());
         let kept = readings.select(Axis(0), &kept);
         let means = kept.mean_axis(Axis(0))?.to_vec();
         let spread = kept.std_axis(Axis(0), 0.0);
         let is_constant = |channel: usize| spread[channel] <= 1e-9 * means[channel].abs() || spread[channel] == 0.0;
         let inverse_deviations: Vec<f64> = (0..channels)
-            .map(|channel| if is_constant(channel) { 0.0 } else { spread[channel].recip() })
+            .map(|channel| {
+                if is_constant(channel) {
+                    0.0
+                } else {
+                    spread[channel].recip()
+                }
+            })
             .collect();
         let scaled = Mat::from_fn(kept.nrows(), channels, |sample, channel| {
             (kept[[sample, channel]] - means[channel]) * inverse_deviations[channel]
@@ -112,7 +120,9 @@ impl DriftReference {
         if blocks.len() < Self::FEWEST_BLOCKS {
             return None;
         }
-        let mut distances: Vec<f64> = blocks.map(|block| block.iter().sum::<f64>() / block.len() as f64).collect();
+        let mut distances: Vec<f64> = blocks
+            .map(|block| block.iter().sum::<f64>() / block.len() as f64)
+            .collect();
         distances.sort_by(f64::total_cmp);
         Some(Self {
             metric: Metric::fit(readings, 0..0)?,
@@ -139,7 +149,11 @@ impl DriftReference {
             factor,
         } = &self.metric;
         let channels = means.len();
-        let numbers = means.iter().chain(inverse_deviations).chain(factor).chain(&self.distances);
+        let numbers = means
+            .iter()
+            .chain(inverse_deviations)
+            .chain(factor)
+            .chain(&self.distances);
         let diagonal = (0..channels).map(|row| row * (row + 3) / 2);
         (inverse_deviations.len(), factor.len()) == (channels, channels * (channels + 1) / 2)
             && numbers.clone().all(|number| number.is_finite())
@@ -223,7 +237,10 @@ impl DriftMonitor {
         if !readings.iter().all(|reading| reading.is_finite()) {
             return false;
         }
-        self.sum += self.reference.metric.distance(readings.iter().copied(), &mut self.scratch);
+        self.sum += self
+            .reference
+            .metric
+            .distance(readings.iter().copied(), &mut self.scratch);
         self.count += 1;
         if self.count < self.reference.block {
             return false;
@@ -299,7 +316,9 @@ mod tests {
                 alarms += usize::from(alarm(&reference, &same).is_some());
                 // The standard deviation of a channel is √2.
                 let mut shifted = readings(20 * block, memory, &mut rng);
-                shifted.column_mut(2).mapv_inplace(|reading| reading + 3.0 * 2f64.sqrt());
+                shifted
+                    .column_mut(2)
+                    .mapv_inplace(|reading| reading + 3.0 * 2f64.sqrt());
                 let found = alarm(&reference, &shifted).unwrap_or(usize::MAX);
                 latest = latest.max(found / block);
             }

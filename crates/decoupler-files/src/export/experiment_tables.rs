@@ -474,8 +474,8 @@ pub fn describe_worse_than_mean(results: &ExperimentResults) -> Vec<String> {
         let (worse, trials) = (cell.trials.iter().filter(is_worse).count(), cell.trials.len());
         (worse > 0).then(|| {
             format!(
-                "At {}, {worse} of {trials} are worse than always answering the training mean: run more epochs, or use \
-                 more samples, other hidden nodes or another method",
+                "At {}, {worse} of {trials} are worse than always answering the training mean: other epochs, hidden \
+                 nodes, methods or more samples may help",
                 results.cell_labels(cell).join(", ")
             )
         })

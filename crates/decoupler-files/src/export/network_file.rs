@@ -3,8 +3,8 @@ use std::{fmt::Display, io::Write as _, path::Path, sync::Arc};
 use decoupler_core::{
     dataset::{Dataset, MemoryStream},
     evaluation::{
-        ErrorTable, Intervals, PastNetwork, Problem, Run, RunSettings, Scores, SimulatedSettings, StartRecord, TargetPosition,
-        TestErrors,
+        ErrorTable, Intervals, PastNetwork, Problem, Run, RunSettings, Scores, SimulatedSettings, StartRecord,
+        TargetPosition, TestErrors,
     },
     live::DriftReference,
     network::{DecouplingNetwork, Networks},

@@ -54,7 +54,10 @@ pub(super) fn table(
         }
         let each = array.rows / rows;
         if each > 1 {
-            notes.push(format!("{} is {}: {each} rows per sample, side by side", array.name, array.shape));
+            notes.push(format!(
+                "{} is {}: {each} rows per sample, side by side",
+                array.name, array.shape
+            ));
         } else if array.is_reshaped {
             let width = array.columns.len();
             notes.push(format!("{} is {}, read as {rows} × {width}", array.name, array.shape));
@@ -152,4 +155,3 @@ fn column(name: String, mut numbers: Vec<f64>, reading: &Reading<'_>) -> Column 
     }
     column
 }
-

@@ -122,7 +122,9 @@ impl Inspection {
         };
         let time = chosen.and_then(|(column, is_guessed)| TimeSummary::of(table, column, is_guessed));
         let mut warnings = table.notes.clone();
-        let sentinels = columns.iter().filter_map(|column| Some(column.sentinel?.warning(&column.name)));
+        let sentinels = columns
+            .iter()
+            .filter_map(|column| Some(column.sentinel?.warning(&column.name)));
         warnings.extend(sentinels);
         let rounded = columns.iter().filter(|column| column.is_rounding);
         warnings.extend(rounded.map(|column| rounding_warning(&column.name)));

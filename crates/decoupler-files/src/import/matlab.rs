@@ -171,12 +171,7 @@ impl Value {
     }
 
     /// Reads the fields of `shape` structures.
-    fn structures(
-        mut source: &mut dyn Read,
-        endian: Endian,
-        shape: &[f64],
-        depth: usize,
-    ) -> Result<Self, TableError> {
+    fn structures(mut source: &mut dyn Read, endian: Endian, shape: &[f64], depth: usize) -> Result<Self, TableError> {
         let length = Element::I32.read(&data(&mut source, endian)?.1, endian);
         let length = length.first().map_or(0, |length| *length as usize);
         let names = data(&mut source, endian)?.1;

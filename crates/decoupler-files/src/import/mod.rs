@@ -9,6 +9,7 @@
 
 mod arrays;
 mod csv_table;
+mod derived;
 mod detection;
 mod dialect;
 mod error;
@@ -34,12 +35,13 @@ mod suggestion;
 mod table;
 mod time_stamp;
 
+pub use derived::Derived;
 pub use dialect::{Decimal, Dialect, DialectChoice, DialectError, Encoding, Separator};
 pub use error::{Cure, ImportError, TableError};
 pub use format::Format;
 pub use importing::{Dropped, FileReport, JoinReport, Recording, read_table};
 pub use input_lines::{InputLine, InputLineError, InputLines, Progress, Watch};
-pub use inputs::{InputColumns, InputError, InputTable, KeptColumn, InputTime, OtherColumns};
+pub use inputs::{InputColumns, InputError, InputTable, InputTime, KeptColumn, OtherColumns};
 pub use inspection::{ColumnKind, ColumnSummary, InspectedFile, Inspection, TimeSummary};
 pub use missing::{Condition, Missing};
 pub use plan::{Plan, PlannedSets, TestFiles};

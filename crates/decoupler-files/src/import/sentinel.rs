@@ -48,11 +48,7 @@ impl Sentinel {
                 _ if is_code => gap > range,
                 _ => gap > MIN_GAP * range && range > 0.0 && cells as f64 >= MIN_SHARE * present as f64,
             };
-            (cells >= MIN_CELLS && is_apart).then_some(Self {
-                value,
-                cells,
-                nearest,
-            })
+            (cells >= MIN_CELLS && is_apart).then_some(Self { value, cells, nearest })
         })
     }
 
@@ -79,11 +75,16 @@ impl Extremes {
     /// Returns `None` unless there are two different numbers.
     fn of(numbers: &[f64]) -> Option<Self> {
         let present = || numbers.iter().copied().filter(|number| !number.is_nan());
-        let (min, max) = (present().fold(f64::INFINITY, f64::min), present().fold(f64::NEG_INFINITY, f64::max));
+        let (min, max) = (
+            present().fold(f64::INFINITY, f64::min),
+            present().fold(f64::NEG_INFINITY, f64::max),
+        );
         (min < max).then(|| Self {
             min,
             above_min: present().filter(|number| *number > min).fold(f64::INFINITY, f64::min),
-            below_max: present().filter(|number| *number < max).fold(f64::NEG_INFINITY, f64::max),
+            below_max: present()
+                .filter(|number| *number < max)
+                .fold(f64::NEG_INFINITY, f64::max),
             max,
         })
     }
@@ -139,12 +140,28 @@ mod tests {
         let forces = || (0..200).map(|row| 3.25 + 0.7 * f64::from(row % 97));
         let classes = || (0..90).map(|row| f64::from(row % 3 - 1));
         let cases = [
-            (with(-1.0, 40, forces()), Some(-1.0), "-1 before forces that are positive"),
-            (with(9999.0, 6, forces()), Some(9999.0), "a usual code far from the rest"),
+            (
+                with(-1.0, 40, forces()),
+                Some(-1.0),
+                "-1 before forces that are positive",
+            ),
+            (
+                with(9999.0, 6, forces()),
+                Some(9999.0),
+                "a usual code far from the rest",
+            ),
             (with(5000.0, 6, forces()), Some(5000.0), "any number far from the rest"),
             (with(5000.0, 2, forces()), None, "an outlier is not repeated"),
-            (with(70.0, 40, forces()), None, "a number near the others, such as saturation"),
-            (with(-1.0, 40, forces().map(|force| force - 40.0)), None, "-1 among negative numbers"),
+            (
+                with(70.0, 40, forces()),
+                None,
+                "a number near the others, such as saturation",
+            ),
+            (
+                with(-1.0, 40, forces().map(|force| force - 40.0)),
+                None,
+                "-1 among negative numbers",
+            ),
             (classes().collect(), None, "classes"),
             (with(0.0, 500, [1.0; 300].into_iter()), None, "two states"),
             (vec![-1.0; 50], None, "a constant"),

@@ -1,6 +1,6 @@
 use std::{ops::ControlFlow, path::Path, sync::Arc};
 
-use ndarray::s;
+use ndarray::{Axis, Slice};
 use thiserror::Error;
 
 use super::{ImportError, Plan, PlannedSets, Progress, Recorded, Recording};
@@ -250,7 +250,8 @@ impl SetupSets {
         }
         // With a memory, the readings are followed by values from the past, which a monitor does not need.
         let channels = self.sets.problem.inputs.len();
-        DriftReference::of(training.readings().slice_move(s![.., ..channels]))
+        let readings = training.readings();
+        DriftReference::of(readings.slice_axis(Axis(1), Slice::from(..channels)))
     }
 
     /// Checks that recorded samples are those `saved` with a run.

@@ -90,7 +90,9 @@ impl Spreadsheet {
             ..reading.clone()
         };
         let mut table = csv_table::read(path, Watched::new(Cursor::new(text), Some(size), watch), &reading)?;
-        let others = sheets.iter().filter(|(other, range)| other != name && !range.is_empty());
+        let others = sheets
+            .iter()
+            .filter(|(other, range)| other != name && !range.is_empty());
         table.notes.extend(others.map(|(other, range)| {
             let (rows, width) = range.get_size();
             format!("left out: sheet '{other}' is {rows} × {width}; save it as its own file to use it")

@@ -128,7 +128,8 @@ fn series<'a>(files: &[&'a InspectedFile]) -> Vec<Vec<&'a InspectedFile>> {
 /// Returns `true` if two files have the same columns and are of the same kind: their names differ in numbers only, or they
 /// have a header and different numbers of rows, so that they cannot be joined row by row.
 fn are_alike(one: &InspectedFile, other: &InspectedFile) -> bool {
-    let columns = |file: &InspectedFile| Vec::from_iter(file.inspection.columns.iter().map(|column| column.name.clone()));
+    let columns =
+        |file: &InspectedFile| Vec::from_iter(file.inspection.columns.iter().map(|column| column.name.clone()));
     let letters = |file: &InspectedFile| {
         let name = stem(&file.path).to_lowercase();
         name.chars().filter(|letter| letter.is_alphabetic()).collect::<String>()
@@ -319,7 +320,11 @@ fn guesses(file: &InspectedFile, is_alone: bool) -> Vec<Meaning> {
         }
         // A single file contains both inputs and targets.
         if is_alone && looks_like_target(&name, column.unit.as_deref()) {
-            if column.is_rounding { Meaning::Unused } else { Meaning::Target }
+            if column.is_rounding {
+                Meaning::Unused
+            } else {
+                Meaning::Target
+            }
         } else {
             Meaning::Input
         }

@@ -22,7 +22,11 @@ impl TimeStamp {
         let digits = |from: usize, count: usize| -> Option<i128> {
             let digits = cell.get(from..from + count)?;
             let is_number = digits.iter().all(u8::is_ascii_digit);
-            is_number.then(|| digits.iter().fold(0, |number, digit| 10 * number + i128::from(digit - b'0')))
+            is_number.then(|| {
+                digits
+                    .iter()
+                    .fold(0, |number, digit| 10 * number + i128::from(digit - b'0'))
+            })
         };
         let [year, month, day] = [digits(0, 4)?, digits(5, 2)?, digits(8, 2)?];
         let [hour, minute] = [digits(11, 2)?, digits(14, 2)?];

@@ -255,6 +255,14 @@ pub enum FittedModel {
 }
 
 impl FittedModel {
+    /// Returns the name within a sentence.
+    pub(super) fn noun(self) -> &'static str {
+        match self {
+            Self::Ridge => "ridge regression",
+            Self::Network => "the network",
+        }
+    }
+
     /// Returns held-out answers for every sample of `set`, each by a model fitted without its fold; `None` if
     /// cancelled.
     pub(super) fn held_out(

@@ -69,13 +69,17 @@ impl Extrapolation {
         }
         let of = |counts: &[(usize, usize)], channels: &[Channel], kind: &str| {
             let named = counts.iter().take(NAMED);
-            let mut parts = Vec::from_iter(named.map(|(column, count)| format!("{} in {count}", channels[*column].name)));
+            let mut parts =
+                Vec::from_iter(named.map(|(column, count)| format!("{} in {count}", channels[*column].name)));
             if counts.len() > NAMED {
                 parts.push(format!("{} others", counts.len() - NAMED));
             }
             (!parts.is_empty()).then(|| format!("{kind} {}", parts.join(", ")))
         };
-        let columns = [of(&self.readings, inputs, "readings"), of(&self.targets, targets, "targets")];
+        let columns = [
+            of(&self.readings, inputs, "readings"),
+            of(&self.targets, targets, "targets"),
+        ];
         Some(format!(
             "{:.0} % of the test samples ({} of {}) are outside the range of the training samples by more than a tenth of \
              it ({}); the network extrapolates there, and its error says little about the accuracy within the range",

@@ -76,7 +76,12 @@ impl SplitComparison {
             ridge,
             random_network,
             random_ridge,
-            successive: set.targets().columns().into_iter().map(successive_correlation).collect(),
+            successive: set
+                .targets()
+                .columns()
+                .into_iter()
+                .map(successive_correlation)
+                .collect(),
         }
     }
 
@@ -100,7 +105,9 @@ impl SplitComparison {
         };
         match self.successive[target] {
             Some(correlation) if correlation >= Self::MIN_CORRELATION => {
-                format!("; successive values of the target correlate by {correlation:.2}, so that random folds share them")
+                format!(
+                    "; successive values of the target correlate by {correlation:.2}, so that random folds share them"
+                )
             }
             Some(correlation) => format!(
                 "; successive values of the target correlate by {correlation:.2} only, so that the relation of readings \

@@ -202,6 +202,7 @@ impl Command {
             row_wire,
             memory,
             conditions,
+            derive,
             missing,
             units,
             positions,
@@ -237,6 +238,7 @@ impl Command {
             }
         }
         conditions.iter().for_each(|condition| self.add("where", condition));
+        derive.iter().for_each(|derived| self.add("derive", derived));
         missing.iter().for_each(|missing| self.add("missing", missing));
         units
             .iter()

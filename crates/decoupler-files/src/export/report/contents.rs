@@ -220,13 +220,8 @@ impl RunReport<'_> {
     fn recording_remarks(&self, plan: &Plan, answers: &ndarray::Array2<f64>) -> Vec<String> {
         let measured = Determination::measure(self.test, answers.view(), plan.division.by);
         let mut remarks = describe_determinacy(&self.file.problem.targets, &measured);
-        let NetworkFile {
-            problem,
-            scores,
-            settings,
-            ..
-        } = self.file;
-        remarks.extend(describe_worse_than_ridge(problem, scores, settings.training.method));
+        let NetworkFile { problem, scores, .. } = self.file;
+        remarks.extend(describe_worse_than_ridge(problem, scores));
         if plan.is_optimistic() {
             let text = "test samples are drawn at random, which is optimistic where neighbouring rows are similar; split \
                         by time or by group for an honest test";

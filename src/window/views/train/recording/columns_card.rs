@@ -68,7 +68,11 @@ impl RecordingEditor {
                 ui.label(RichText::new(text).color(dim));
             });
             ui.add_space(space(3));
-            if ui.add(primary_button("Open files…")).on_hover_text(FILES.description).clicked() {
+            if ui
+                .add(primary_button("Open files…"))
+                .on_hover_text(FILES.description)
+                .clicked()
+            {
                 effects.push(Effect::ChooseFile(self.open_task()));
             }
         });

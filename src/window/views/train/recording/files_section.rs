@@ -26,7 +26,20 @@ pub(super) const FILES: FileWords = FileWords {
     kind: "recording",
     description: "A table of readings and targets (CSV or other text, Excel, .npy, .npz, .mat), a recipe, a network or a \
                   checkpoint.",
-    extensions: &["csv", "txt", "tsv", "dat", "npy", "npz", "mat", "xlsx", "xls", "ods", "json", "checkpoint"],
+    extensions: &[
+        "csv",
+        "txt",
+        "tsv",
+        "dat",
+        "npy",
+        "npz",
+        "mat",
+        "xlsx",
+        "xls",
+        "ods",
+        "json",
+        "checkpoint",
+    ],
 };
 
 /// An open file by its use.

@@ -156,9 +156,7 @@ impl Header<'_> {
             },
             overflow = match self.reading {
                 "int32_t" => String::new(),
-                _ => format!(
-                    " Readings so extreme that the sums overflow give {upper}_BAD_READING."
-                ),
+                _ => format!(" Readings so extreme that the sums overflow give {upper}_BAD_READING."),
             },
         );
         if portable.known_ranges().is_some() {
