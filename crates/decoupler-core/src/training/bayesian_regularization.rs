@@ -640,7 +640,7 @@ impl RegularizationSettings {
 #[cfg(test)]
 mod tests {
     use faer::linalg::solvers::Llt;
-    use ndarray::{Array2, s};
+    use ndarray::{Array2, ArrayView2, Axis};
     use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
 
     use super::*;
@@ -745,7 +745,7 @@ mod tests {
         (inputs, targets)
     }
 
-    fn problem(inputs: &Array2<f64>, targets: ndarray::ArrayView2<'_, f64>) -> Problem {
+    fn problem(inputs: &Array2<f64>, targets: ArrayView2<'_, f64>) -> Problem {
         Problem {
             training: Examples::new(inputs.view(), targets),
             validation: None,
@@ -779,9 +779,15 @@ mod tests {
             own_noise,
             ..RegularizationSettings::recorded()
         };
-        let trainer = trained(problem(&inputs, all.slice(s![.., ..targets])), 8, settings, 150);
+        let trainer = trained(
+            problem(&inputs, all.select(Axis(1), &Vec::from_iter(0..targets)).view()),
+            8,
+            settings,
+            150,
+        );
         let (inputs, all) = good_and_bad_targets(1000, 9);
-        let errors = trainer.best().forward(inputs.view()).slice(s![.., ..2]).to_owned() - all.slice(s![.., ..2]);
+        let good = |values: &Array2<f64>| values.select(Axis(1), &[0, 1]);
+        let errors = good(&trainer.best().forward(inputs.view())) - good(&all);
         (errors.mapv(|error| error * error).mean().unwrap()).sqrt()
     }
 
@@ -807,7 +813,7 @@ mod tests {
     #[test]
     fn noise_levels_and_decay_maximise_the_evidence() {
         let (inputs, all) = good_and_bad_targets(200, 3);
-        let targets = all.select(ndarray::Axis(1), &[0, 1, 4]);
+        let targets = all.select(Axis(1), &[0, 1, 4]);
         let settings = RegularizationSettings {
             own_noise: 1.0,
             ..RegularizationSettings::default()

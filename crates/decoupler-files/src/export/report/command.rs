@@ -279,7 +279,9 @@ impl Command {
                 self.add("set", format!("{}={}", setting.name.replace(' ', "-"), setting.value));
             }
         }
-        let (rules, usual) = (settings.training.stopping, default.training.stopping);
+        let mut usual = *default;
+        usual.choose_method(settings.training.method);
+        let (rules, usual) = (settings.training.stopping, usual.training.stopping);
         self.option("epochs", rules.epochs, usual.epochs);
         self.option("goal", rules.goal_mse, usual.goal_mse);
         self.option("max-fail", rules.max_fail, usual.max_fail);
