@@ -1,6 +1,6 @@
 //! Files given as arguments: several, a pattern such as `runs/*.csv`, or a folder.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use decoupler_files::import::{FileSet, Format};
 
@@ -17,7 +17,7 @@ pub(super) fn expanded(argument: &str, given: &[PathBuf]) -> Result<Vec<PathBuf>
         let refuse = |reason: &str| Failure::Arguments(format!("{argument}: '{text}' {reason}"));
         let is_pattern = text.contains(['*', '?', '[']);
         if path.is_dir() {
-            let mut found = tables_in(path).map_err(|error| refuse(&format!("cannot be read: {error}")))?;
+            let mut found = Format::tables_in(path).map_err(|error| refuse(&format!("cannot be read: {error}")))?;
             if found.is_empty() {
                 let endings = Format::EXTENSIONS.join(", .");
                 return Err(refuse(&format!("is a folder without tables (.{endings})")));
@@ -35,21 +35,6 @@ pub(super) fn expanded(argument: &str, given: &[PathBuf]) -> Result<Vec<PathBuf>
         }
     }
     Ok(files)
-}
-
-/// Returns the tables in a folder, sorted by name.
-fn tables_in(folder: &Path) -> std::io::Result<Vec<PathBuf>> {
-    let is_table = |path: &PathBuf| {
-        let extension = path.extension().map(|found| found.to_string_lossy().to_lowercase());
-        path.is_file() && extension.is_some_and(|found| Format::EXTENSIONS.contains(&found.as_str()))
-    };
-    let mut found = Vec::new();
-    for entry in folder.read_dir()? {
-        found.push(entry?.path());
-    }
-    found.retain(is_table);
-    found.sort();
-    Ok(found)
 }
 
 /// Divides the joined files among the data files, in order; `kind` is "test-" for those of the test.

@@ -11,8 +11,8 @@ use decoupler_core::dataset::{Division, Memory, Span, SplitBy};
 use decoupler_files::{
     export::{RecipeFile, RecipeSource},
     import::{
-        Condition, Decimal, DialectChoice, Encoding, FileSet, Joined, Missing, Plan, Recipe, Recorded, Separator,
-        TestFiles,
+        Condition, Decimal, Derived, DialectChoice, Encoding, FileSet, Joined, Missing, Plan, Recipe, Recorded,
+        Separator, TestFiles,
     },
 };
 
@@ -86,6 +86,10 @@ pub(super) struct ImportArguments {
     /// Use only rows that meet this condition, for example "c4<145.1 and c5!=0"; may be repeated
     #[arg(long = "where", value_name = "CONDITION", requires = "data")]
     conditions: Vec<Condition>,
+    /// Add a column computed from others of the same file: a difference such as d=c1-c2, a ratio such as q=c1/c2, or either
+    /// with its own mean over the first seconds or rows, such as r=c1/start(2s) or r=c1-start(100); may be repeated
+    #[arg(long, value_name = "NAME=EXPRESSION", requires = "data")]
+    derive: Vec<Derived>,
     /// Number or text that marks a missing value, in all columns or in one, such as -1 or states.c5=-1; may be repeated
     #[arg(long, value_name = "[COLUMN=]VALUE", requires = "data")]
     missing: Vec<Missing>,
@@ -196,6 +200,7 @@ impl ImportArguments {
             (!self.memory.is_empty(), "--memory"),
             (self.differences, "--differences"),
             (!self.conditions.is_empty(), "--where"),
+            (!self.derive.is_empty(), "--derive"),
             (!self.missing.is_empty(), "--missing"),
             (!self.unit.is_empty(), "--unit"),
             (self.positions.is_some(), "--positions"),
@@ -261,6 +266,7 @@ impl ImportArguments {
             (!self.join_time.is_empty(), "--join-time"),
             (self.join_limit.is_some(), "--join-limit"),
             (!self.conditions.is_empty(), "--where"),
+            (!self.derive.is_empty(), "--derive"),
             (!self.missing.is_empty(), "--missing"),
             (!self.unit.is_empty(), "--unit"),
             (self.folds.is_some(), "--folds"),
@@ -444,6 +450,7 @@ impl ImportArguments {
             row_wire: self.row_wire.clone(),
             memory: self.of_memory(),
             conditions: self.conditions.clone(),
+            derive: self.derive.clone(),
             missing: self.missing.clone(),
             units: self.unit.iter().cloned().collect(),
             positions: self.positions.clone(),

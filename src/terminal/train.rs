@@ -12,7 +12,7 @@ use super::{
     interruption::{CheckpointArguments, Checkpointing, Graceful},
     intervals::{WhenCalibrated, calibrate},
     output::progress_bar,
-    samples::{announce, following, sets, working_folder},
+    samples::{announce, announce_recording, following, sets, working_folder},
     train_report::Trained,
     training_arguments::TrainingArguments,
 };
@@ -90,6 +90,7 @@ impl Train {
                     }
                 };
                 self.import.save_recipe(&setup)?;
+                announce_recording(&setup, &sets);
                 let run = sets.run(&setup, &|| false)?.expect("nothing cancels it");
                 (run, sets)
             }

@@ -276,12 +276,7 @@ impl<'a> Trained<'a> {
     /// Warnings of the source and of the training.
     fn warnings(&self, determined: &[Result<Determination, Undetermined>]) -> Vec<String> {
         let source = self.file.settings.simulated().map(|settings| settings.source);
-        let NetworkFile {
-            problem,
-            scores,
-            settings,
-            ..
-        } = self.file;
+        let NetworkFile { problem, scores, .. } = self.file;
         let outlook = source.and_then(|source| Outlook::of(&source).ok());
         let of_array = outlook.iter().flat_map(|outlook| &outlook.warnings);
         let of_import = self.sets.recordings.as_ref().map(import_warnings);

@@ -44,13 +44,15 @@ pub(super) struct TrainingArguments {
     method: Option<Method>,
     #[arg(long = "set", value_name = "NAME=VALUE", value_parser = assignment, help = settings_help())]
     set: Vec<(String, f64)>,
-    /// Maximum number of epochs [default: 1000; 300 for a recording]
+    /// Maximum number of epochs [default: 1000; for a recording 300, or 2000 with a method that follows gradients (scg,
+    /// rp, gd…)]
     #[arg(long, value_name = "N", value_parser = count(1..=StoppingRules::MAX_EPOCHS))]
     epochs: Option<usize>,
     /// Training error (mse, scaled) at which training ends [default: 0]
     #[arg(long, value_name = "MSE", value_parser = number)]
     goal: Option<f64>,
-    /// Validation failures, epochs without a new best validation error, that end training [default: 6]
+    /// Validation failures, epochs without a new best validation error, that end training [default: 6; 100
+    /// for a recording with a method that follows gradients]
     #[arg(long, value_name = "N", value_parser = count(1..=StoppingRules::MAX_EPOCHS))]
     max_fail: Option<usize>,
     /// Norm of the gradient below which training ends [default: 1e-7]
@@ -185,7 +187,10 @@ impl TrainingArguments {
 
     /// Settings of a new run on a recording.
     fn recorded(&self, has_row_wires: bool) -> Result<RunSettings, Failure> {
-        let default = self.recorded_source(has_row_wires)?;
+        let mut default = self.recorded_source(has_row_wires)?;
+        if let Some(method) = self.method {
+            default.choose_method(method);
+        }
         Ok(RunSettings {
             hidden: self.hidden().unwrap_or(default.hidden),
             starts: self.starts.unwrap_or(default.starts),
@@ -336,10 +341,19 @@ fn dashed(name: &str) -> String {
 
 fn settings_help() -> String {
     let of = |mut method: Method| {
+        let mut recorded = method;
+        if method == Method::bayesian_regularization() {
+            recorded = Method::recorded_regularization();
+        }
         let settings = method.settings();
-        let list = settings
-            .iter()
-            .map(|setting| format!("{} (default {})", dashed(setting.name), setting.default));
+        let list = settings.iter().zip(recorded.settings()).map(|(setting, recorded)| {
+            let (name, default, recorded) = (dashed(setting.name), setting.default, *recorded.value);
+            if recorded == default {
+                format!("{name} (default {default})")
+            } else {
+                format!("{name} (default {default}; {recorded} for a recording)")
+            }
+        });
         let list = list.collect::<Vec<_>>().join(", ");
         format!("{} has {list}", method.short_name())
     };
@@ -379,13 +393,20 @@ mod tests {
         // Naming the default method keeps its settings for recordings.
         assert_eq!(recorded("train --method br"), default);
         let given = recorded(
-            "train --method br --set correlation-epoch=0 --set groups-of-weights=1 --epochs 7 --starts 2 --hidden 3 --seed 4",
+            "train --method br --set own-noise=0 --set groups-of-weights=1 --epochs 7 --starts 2 --hidden 3 --seed 4",
         );
         assert_eq!(
             (given.training.stopping.epochs, given.starts, given.hidden, given.seed),
             (7, 2, 3, Seed(4))
         );
         assert_eq!(given.training.method, Method::bayesian_regularization());
+        let rules = |line: &str| {
+            let rules = recorded(line).training.stopping;
+            (rules.epochs, rules.max_fail)
+        };
+        assert_eq!(rules("train --method lm"), (300, 6));
+        assert_eq!(rules("train --method scg"), (2000, 100));
+        assert_eq!(rules("train --method rp --epochs 300 --max-fail 6"), (300, 6));
     }
 
     #[test]

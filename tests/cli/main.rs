@@ -7,6 +7,7 @@ mod causes;
 mod commands;
 mod export;
 mod files;
+mod files_as_they_are;
 #[cfg(unix)]
 mod follow;
 mod import;

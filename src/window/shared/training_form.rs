@@ -71,9 +71,8 @@ pub fn method_settings_ui<S>(ui: &mut Ui, settings: &mut RunSettings<S>, is_new:
     });
 }
 
-/// The rules that end a training; changes `stopping`.
-pub fn stopping_ui(ui: &mut Ui, stopping: &mut StoppingRules) {
-    let usual = StoppingRules::default();
+/// The rules that end a training, whose defaults are `usual`; changes `stopping`.
+pub fn stopping_ui(ui: &mut Ui, stopping: &mut StoppingRules, usual: StoppingRules) {
     let hint = format!(
         "Largest number of epochs. {} Train counts from the first epoch, Continue from the current one.",
         glossary::EPOCH.hint
@@ -85,7 +84,7 @@ pub fn stopping_ui(ui: &mut Ui, stopping: &mut StoppingRules) {
         &mut stopping.epochs,
         usually(usual.epochs, 1..=StoppingRules::MAX_EPOCHS),
     );
-    let hint = format!("{} Default 6.", glossary::VALIDATION_FAILURES.hint);
+    let hint = format!("{} Default {}.", glossary::VALIDATION_FAILURES.hint, usual.max_fail);
     count_ui(
         ui,
         "Validation failures",

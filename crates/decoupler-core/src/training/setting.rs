@@ -270,7 +270,11 @@ impl StoppingRules {
     /// Methods that [follow gradients](Method::follows_gradients) get more epochs and more patience: their validation
     /// error rises for some epochs long before the end, and 6 failures stop them far from any minimum.
     pub fn recorded(method: &Method) -> Self {
-        let (epochs, max_fail) = if method.follows_gradients() { (2000, 100) } else { (300, 6) };
+        let (epochs, max_fail) = if method.follows_gradients() {
+            (2000, 100)
+        } else {
+            (300, 6)
+        };
         Self {
             epochs,
             max_fail,

@@ -107,6 +107,14 @@ pub enum ImportError {
         /// Cause.
         reason: String,
     },
+    /// A derived column cannot be parsed or computed.
+    #[error("the derived column '{text}': {reason}; write for example \"d=c1-c2\" or \"r=c1/start(2s)\"")]
+    Derived {
+        /// The column, as written.
+        text: String,
+        /// Cause.
+        reason: String,
+    },
     /// Two files cannot be joined.
     #[error("'{}' cannot be joined: {reason}; {cure}", .path.display())]
     Join {
@@ -197,6 +205,7 @@ impl ImportError {
             | Self::Range(_)
             | Self::NoRows { .. }
             | Self::RowWire { .. }
+            | Self::Derived { .. }
             | Self::Condition { .. } => Self::OfFile {
                 path: path.to_owned(),
                 source: Box::new(self),

@@ -1,6 +1,11 @@
 //! File formats of recordings. To add one, add a variant of [`Format`] here and a module that reads its arrays.
 
-use std::{fmt, fs::File, io::BufReader, path::Path};
+use std::{
+    fmt,
+    fs::File,
+    io::{self, BufReader},
+    path::{Path, PathBuf},
+};
 
 use super::{Decimal, Dialect, TableError, Watch, input_lines::Watched, matlab, numpy};
 
@@ -84,6 +89,22 @@ impl Format {
 
     /// Usual file extensions, those of text files first.
     pub const EXTENSIONS: [&str; 10] = ["csv", "txt", "tsv", "dat", "npy", "npz", "mat", "xlsx", "xls", "ods"];
+
+    /// Returns the files in `folder` with one of the usual extensions, sorted by name.
+    ///
+    /// # Errors
+    /// If the folder cannot be read.
+    pub fn tables_in(folder: &Path) -> io::Result<Vec<PathBuf>> {
+        let is_table = |path: &PathBuf| {
+            let extension = path.extension().map(|found| found.to_string_lossy().to_lowercase());
+            path.is_file() && extension.is_some_and(|found| Self::EXTENSIONS.contains(&found.as_str()))
+        };
+        let entries = folder.read_dir()?.map(|entry| Ok(entry?.path()));
+        let mut found = entries.collect::<io::Result<Vec<_>>>()?;
+        found.retain(is_table);
+        found.sort();
+        Ok(found)
+    }
 
     /// Number of bytes from which a format is recognised.
     pub(super) const BEGINNING: u64 = 16;

@@ -12,8 +12,8 @@ use decoupler_core::{
 use serde::Serialize;
 
 use super::{
-    Cells, Cure, DialectChoice, Excess, FileSet, Format, ImportError, Joined, Missing, Recipe, Table, TableError,
-    Watch, arrays,
+    Cells, Cure, Derived, DialectChoice, Excess, FileSet, Format, ImportError, Joined, Missing, Recipe, Table,
+    TableError, Watch, arrays,
     csv_table::{self, Reading},
     format::Contents,
     input_lines::Watched,
@@ -192,6 +192,7 @@ impl Recipe {
             .collect();
         let path = folder.join(file);
         let columns = self.inputs.iter().chain(&self.targets);
+        let columns = columns.chain(self.derive.iter().flat_map(Derived::columns));
         let used = columns.chain(&self.time).chain(&self.group).chain(&self.row_wire);
         let reading = Reading {
             choice: self.dialect,
@@ -200,6 +201,13 @@ impl Recipe {
             used: used.filter_map(|name| own_name(name)).collect(),
         };
         let mut table = read(&path, &reading, watch)?;
+        let time = match number.checked_sub(1).and_then(|joined| self.join.get(joined)) {
+            Some(joined) => joined.time.clone().or_else(|| self.time.clone()),
+            None => self.time.clone(),
+        };
+        for derived in &self.derive {
+            derived.add_to(&mut table, own_name, time.as_deref())?;
+        }
         if number == 0 {
             table.stem = stem(file);
         }

@@ -211,7 +211,8 @@ impl Recipe {
             return Err(self.uneven(path, line));
         }
         let names = Names::of(&[table], &[]);
-        let has_header = table.has_header();
+        // Derived columns have names.
+        let has_header = table.has_header() || !self.derive.is_empty();
         let found = if has_header {
             InputColumns::find(&table.columns, inputs, others)
         } else {

@@ -11,6 +11,7 @@
 mod arrays;
 mod choosing;
 mod csv_table;
+mod derived;
 mod detection;
 mod dialect;
 mod error;
@@ -37,6 +38,7 @@ mod table;
 mod time_stamp;
 
 pub use choosing::{ChoosingProgress, ChosenSetup};
+pub use derived::Derived;
 pub use dialect::{Decimal, Dialect, DialectChoice, DialectError, Encoding, Separator};
 pub use error::{Cure, ImportError, TableError};
 pub use format::Format;

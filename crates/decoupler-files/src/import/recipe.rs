@@ -13,7 +13,7 @@ use decoupler_core::{
 };
 use serde::{Deserialize, Serialize};
 
-use super::{Condition, DialectChoice, ImportError, Missing, Plan, PlannedSets};
+use super::{Condition, Derived, DialectChoice, ImportError, Missing, Plan, PlannedSets};
 
 /// Recipe for importing samples: the files to read and to join, and the meaning of each column.
 ///
@@ -53,6 +53,9 @@ pub struct Recipe {
     /// Conditions that every used row must meet.
     #[serde(default, rename = "where", skip_serializing_if = "Vec::is_empty")]
     pub conditions: Vec<Condition>,
+    /// Columns computed from others of the same file.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub derive: Vec<Derived>,
     /// Markers of missing values, in addition to empty cells.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub missing: Vec<Missing>,

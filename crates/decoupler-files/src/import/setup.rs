@@ -1,6 +1,6 @@
 use std::{ops::ControlFlow, path::Path, sync::Arc};
 
-use ndarray::Axis;
+use ndarray::{Axis, Slice};
 use thiserror::Error;
 
 use super::{ImportError, Plan, PlannedSets, Progress, Recorded, Recording};
@@ -256,7 +256,7 @@ impl SetupSets {
         // With a memory, the readings are followed by values from the past, which a monitor does not need.
         let channels = self.sets.problem.inputs.len();
         let readings = training.readings();
-        DriftReference::of(readings.slice_axis(Axis(1), (..channels).into()))
+        DriftReference::of(readings.slice_axis(Axis(1), Slice::from(..channels)))
     }
 
     /// Checks that recorded samples are those `saved` with a run.

@@ -7,5 +7,6 @@ mod networks;
 mod positions;
 mod recordings;
 mod samples;
+mod several_files;
 mod suggestions;
 mod test_files;

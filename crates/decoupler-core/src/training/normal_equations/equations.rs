@@ -109,7 +109,12 @@ impl NormalEquations<SchurComplement> {
         self.elimination.factor(sums, damping)?;
         self.solver.factor(sums, self.elimination.f.as_ref(), v, damping)?;
         let traces = self.solver.traces_of_inverse(&mut self.elimination, v);
-        traces.classes().values().iter().all(|trace| trace.is_finite()).then_some(traces)
+        traces
+            .classes()
+            .values()
+            .iter()
+            .all(|trace| trace.is_finite())
+            .then_some(traces)
     }
 }
 

@@ -81,7 +81,10 @@ impl Products {
         let weighted: Vec<f64> = if precisions.is_empty() {
             Vec::new()
         } else {
-            v.iter().zip(precisions.iter().cycle()).map(|(v, precision)| v * precision).collect()
+            v.iter()
+                .zip(precisions.iter().cycle())
+                .map(|(v, precision)| v * precision)
+                .collect()
         };
         let v = if precisions.is_empty() { v } else { &weighted[..] };
         let v = MatRef::from_row_major_slice(v, hidden + 1, outputs).subrows(0, hidden);

@@ -202,6 +202,7 @@ impl Command {
             row_wire,
             memory,
             conditions,
+            derive,
             missing,
             units,
             positions,
@@ -237,6 +238,7 @@ impl Command {
             }
         }
         conditions.iter().for_each(|condition| self.add("where", condition));
+        derive.iter().for_each(|derived| self.add("derive", derived));
         missing.iter().for_each(|missing| self.add("missing", missing));
         units
             .iter()
@@ -277,7 +279,9 @@ impl Command {
                 self.add("set", format!("{}={}", setting.name.replace(' ', "-"), setting.value));
             }
         }
-        let (rules, usual) = (settings.training.stopping, default.training.stopping);
+        let mut usual = *default;
+        usual.choose_method(settings.training.method);
+        let (rules, usual) = (settings.training.stopping, usual.training.stopping);
         self.option("epochs", rules.epochs, usual.epochs);
         self.option("goal", rules.goal_mse, usual.goal_mse);
         self.option("max-fail", rules.max_fail, usual.max_fail);

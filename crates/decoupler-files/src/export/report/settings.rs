@@ -94,6 +94,9 @@ pub(super) fn recording_facts(file: &NetworkFile, recorded: &Recorded, test: &Da
     if let Some(group) = &import.group {
         facts.push(("Group", group.clone()));
     }
+    for derived in &import.derive {
+        facts.push(("Derived column", derived.to_string()));
+    }
     for condition in &import.conditions {
         facts.push(("Rows used", condition.to_string()));
     }

@@ -18,8 +18,8 @@ use decoupler_core::{
 use decoupler_files::{
     export::{CheckpointFile, DocumentKind, NetworkFile, RecipeFile, RecipeSource, describe_positions},
     import::{
-        Dropped, FileReport, FileSet, InspectedFile, Joined, Plan, Progress, Recipe, Recording, Watch, holds_positions,
-        suggested_plan, suggested_plan_in_order,
+        Dropped, FileReport, FileSet, Format, InspectedFile, Joined, Plan, Progress, Recipe, Recording, Watch,
+        holds_positions, suggested_plan, suggested_plan_in_order,
     },
 };
 
@@ -171,7 +171,10 @@ fn open(to_open: ToOpen, report: &Report<OpeningEvent>) -> Result<Opened, String
             new: vec![write_sample(&folder)?],
             ..Files::default()
         },
-        ToOpen::Files(files) => files,
+        ToOpen::Files(mut files) => {
+            files.new = with_tables_of_folders(files.new)?;
+            files
+        }
     };
     for path in &files.new {
         match (DocumentKind::of_file(path), files.new.len()) {
@@ -235,6 +238,7 @@ fn open(to_open: ToOpen, report: &Report<OpeningEvent>) -> Result<Opened, String
         suggested_plan(&inspected_files)
     };
     plan.import.dialect = recipe.dialect;
+    plan.import.derive.clone_from(&recipe.derive);
     plan.import.missing = match &files.older {
         Some(older) => {
             let stems = plan.import.stems();
@@ -247,6 +251,24 @@ fn open(to_open: ToOpen, report: &Report<OpeningEvent>) -> Result<Opened, String
     };
     plan.import.positions = positions;
     Ok(Opened::Recordings(inspected(plan, Draft::new, &mut watch)?))
+}
+
+/// Replaces folders by the tables in them.
+fn with_tables_of_folders(paths: Vec<PathBuf>) -> Result<Vec<PathBuf>, String> {
+    let mut files = Vec::new();
+    for path in paths {
+        if path.is_dir() {
+            let found = Format::tables_in(&path);
+            let mut found = found.map_err(|error| format!("cannot read '{}': {error}", path.display()))?;
+            if found.is_empty() {
+                return Err(format!("'{}' is a folder without tables: open a file", path.display()));
+            }
+            files.append(&mut found);
+        } else {
+            files.push(path);
+        }
+    }
+    Ok(files)
 }
 
 /// Returns the recipe for the first inspection of recordings, with the layout and stems of an older import. Missing-cell
@@ -268,6 +290,7 @@ fn to_look_at(paths: Vec<PathBuf>, older: Option<&Draft>) -> Recipe {
             })
             .collect(),
         dialect: older.map(|older| older.plan.import.dialect).unwrap_or_default(),
+        derive: older.map(|older| older.plan.import.derive.clone()).unwrap_or_default(),
         missing: missing.into_iter().filter(|missing| missing.column.is_none()).collect(),
         ..Recipe::default()
     }
@@ -337,6 +360,8 @@ fn missing_of_checkpoint(path: &Path) -> Result<Opened, String> {
 pub(super) struct Checked {
     /// Number of samples for training, validation and test.
     pub(super) samples: [usize; 3],
+    /// Numbers of inputs, with those from the past, and targets.
+    pub(super) channels: (usize, usize),
     /// Number of rows of the files, dropped ones included.
     pub(super) rows: usize,
     /// Rows that are not samples, by reason.
@@ -425,6 +450,10 @@ fn check(plan: &Plan, seed: Seed, report: &Report<CheckingEvent>) -> Result<Box<
     let validation = sets.split.validation.as_ref().map_or(0, Dataset::samples);
     Ok(Box::new(Checked {
         samples: [sets.split.training.samples(), validation, sets.test.samples()],
+        channels: (
+            sets.split.training.readings().ncols(),
+            sets.split.training.targets().ncols(),
+        ),
         rows: recordings().map(|recording| recording.rows).sum(),
         dropped: recordings()
             .flat_map(|recording| recording.dropped.iter().cloned())
