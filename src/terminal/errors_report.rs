@@ -3,7 +3,7 @@
 use std::io::{self, Write};
 
 use decoupler_core::evaluation::{
-    Channel, Coverage, Spread, StartRecord, TargetErrors, TestErrors, best_start,
+    Channel, Combination, Coverage, Spread, StartRecord, TargetErrors, TestErrors, best_start,
     recorded::{Determination, Undetermined},
 };
 use decoupler_files::export::format_number;
@@ -87,16 +87,32 @@ const WIDTH: usize = 64;
 
 /// Writes the spread of the results of several starts: a table, and a box plot of the test error, called `error_name`,
 /// above a strip plot of the starts.
-pub(super) fn write_starts(starts: &[StartRecord], error_name: &str, out: &mut dyn Write) -> io::Result<()> {
+pub(super) fn write_starts(
+    starts: &[StartRecord],
+    combine: Combination,
+    error_name: &str,
+    out: &mut dyn Write,
+) -> io::Result<()> {
     let Some(best) = best_start(starts) else { return Ok(()) };
     let held_out = starts.iter().all(|start| start.validation_mse.is_some());
     let error = if held_out { "validation mse" } else { "training mse" };
-    writeln!(
-        out,
-        "{} starts, of which number {} is kept: it has the lowest {error}",
-        starts.len(),
-        best + 1
-    )?;
+    let (count, number) = (starts.len(), best + 1);
+    let mark = match combine {
+        Combination::Best => {
+            writeln!(
+                out,
+                "{count} starts, of which number {number} is kept: it has the lowest {error}"
+            )?;
+            "the one kept"
+        }
+        Combination::Mean => {
+            writeln!(
+                out,
+                "{count} starts, whose mean is the network; number {number} has the lowest {error}"
+            )?;
+            "the one with the lowest error"
+        }
+    };
     let z_percent: Vec<f64> = starts.iter().filter_map(StartRecord::percent).collect();
     let rows = [
         (error_name, Spread::of(z_percent.iter().copied())),
@@ -127,7 +143,7 @@ pub(super) fn write_starts(starts: &[StartRecord], error_name: &str, out: &mut d
         (Some(spread), Some(kept)) if spread.smallest < spread.largest => {
             let [plot, strip] = plot(&spread, &z_percent, kept);
             writeln!(out, "\n{plot}  box: quartiles of {error_name}, | median")?;
-            writeln!(out, "{strip}  o a start, * the one kept")
+            writeln!(out, "{strip}  o a start, * {mark}")
         }
         _ => Ok(()),
     }
@@ -174,7 +190,7 @@ mod tests {
     fn the_plot_shows_quartiles_and_the_kept_start() {
         let starts = [start(3.0, 1.0), start(1.0, 2.0), start(2.0, 4.15), start(5.0, 7.3)];
         let mut text = Vec::new();
-        write_starts(&starts, "test Z %", &mut text).unwrap();
+        write_starts(&starts, Combination::Best, "test Z %", &mut text).unwrap();
         let text = String::from_utf8(text).unwrap();
         let lines: Vec<_> = text.lines().collect();
         assert_eq!(
@@ -193,7 +209,7 @@ mod tests {
     #[test]
     fn equal_starts_have_no_plot() {
         let mut text = Vec::new();
-        write_starts(&[start(1.0, 2.0); 3], "test Z %", &mut text).unwrap();
+        write_starts(&[start(1.0, 2.0); 3], Combination::Best, "test Z %", &mut text).unwrap();
         assert_eq!(String::from_utf8(text).unwrap().lines().count(), 4);
     }
 }

@@ -15,8 +15,10 @@ use super::{
 };
 use decoupler_core::{
     evaluation::{
-        Baselines, Channel, DecoderReport, Errors, Outlook, Problem, ReferenceNote, Run, RunError, SimulatedSettings,
-        StartRecord, TestErrors, best_start, error_remarks,
+        Baselines, Channel, Combination, DecoderReport, Errors, Outlook, Problem, ReferenceNote, Run, RunError,
+        SimulatedSettings, StartRecord, TestErrors,
+        auto::AutoRecord,
+        best_start, error_remarks,
         recorded::{Determination, Extrapolation, Undetermined},
     },
     network::InputChoice,
@@ -27,8 +29,8 @@ use decoupler_core::{
 };
 use decoupler_files::{
     export::{
-        NetworkFile, TrainingRecord, decoder_table, describe_determinacy, describe_worse_than_ridge, error_table,
-        format_duration,
+        NetworkFile, TrainingRecord, decoder_table, describe_determinacy, describe_search, describe_worse_than_ridge,
+        error_table, format_duration, search_table,
     },
     import::{Recording, SetupSets},
 };
@@ -52,12 +54,16 @@ struct Report<'a> {
     method: &'static str,
     seed: u64,
     starts: &'a [StartRecord],
+    combine: Combination,
     epochs: usize,
     best_epoch: usize,
     stop_reason: Option<StopReason>,
     networks: usize,
     weights: usize,
     warnings: Vec<String>,
+    /// What was tried to choose the settings, if they were chosen.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    search: Option<&'a AutoRecord>,
     /// Other decoders; absent for a recording if none was requested.
     #[serde(skip_serializing_if = "Option::is_none")]
     decoders: Option<BTreeMap<String, Decoder<'a>>>,
@@ -239,12 +245,14 @@ impl<'a> Trained<'a> {
             method: settings.training.method.short_name(),
             seed: settings.seed.0,
             starts: &training.starts,
+            combine: settings.combine,
             epochs: epochs(training),
             best_epoch: training.best_epoch,
             stop_reason: training.stop_reason,
             networks: file.network.values().len(),
             weights: file.network.weights(),
             warnings: self.warnings(&determined),
+            search: search(file),
             decoders: has_decoders.then(|| self.decoders.iter().map(decoder).collect()),
         })
     }
@@ -279,6 +287,7 @@ impl<'a> Trained<'a> {
                 self.extrapolation()
                     .and_then(|(found, recording)| found.warning(&recording.inputs, &recording.targets)),
             )
+            .chain(search(self.file).and_then(AutoRecord::remark))
             .chain(self.optimism.iter().cloned())
             .chain(self.run.defect().map(|defect| defect.to_string()))
             .chain(describe_determinacy(&self.file.problem.targets, determined))
@@ -308,6 +317,9 @@ impl<'a> Trained<'a> {
             (None, Some(settings)) => write_array(file, &settings, out)?,
             (None, None) => unreachable!("sets are recorded or simulated"),
         }
+        if let Some(record) = search(file) {
+            writeln!(out, "\n{}\n{}", describe_search(record), search_table(record).aligned())?;
+        }
         let first = training.stages.first();
         let method = first.map_or(settings.training.method, |stage| stage.method);
         writeln!(
@@ -334,7 +346,12 @@ impl<'a> Trained<'a> {
         )?;
         writeln!(out, "Weights kept from epoch {}\n", training.best_epoch)?;
         if training.starts.len() > 1 {
-            write_starts(&training.starts, file.problem.test_percent_name(), out)?;
+            write_starts(
+                &training.starts,
+                settings.combine,
+                file.problem.test_percent_name(),
+                out,
+            )?;
             writeln!(out)?;
         }
         write!(out, "{}", error_table(&file.error_table()).aligned())?;
@@ -392,6 +409,11 @@ impl<'a> Trained<'a> {
         }
         Ok(())
     }
+}
+
+/// Record of the choice of settings, if they were chosen.
+fn search(file: &NetworkFile) -> Option<&AutoRecord> {
+    file.recorded.as_ref()?.search.as_ref()
 }
 
 fn epochs(training: &TrainingRecord) -> usize {

@@ -2,21 +2,24 @@
 //! published figures.
 //!
 //! A [`Run`] goes from [`RunSettings`] to trained networks and error tables; [`CrossValidation`] tests on every sample;
-//! [`measure_trade_off`] compares speed with accuracy; [`experiments`] repeats runs over a grid of settings;
+//! [`auto`] chooses settings by cross-validation; [`measure_trade_off`] compares speed with accuracy; [`experiments`] repeats runs over a grid of settings;
 //! [`recorded`] measures how well recorded readings determine the targets.
 
+pub mod auto;
 mod baselines;
 mod cross_validation;
 mod decoder_set;
 mod errors;
 pub mod experiments;
 mod intervals;
+mod linear_start;
 mod past_networks;
 mod preparation;
 mod pressed;
 pub mod recorded;
 mod reference;
 mod remark;
+mod ridge_path;
 mod run;
 mod run_sets;
 mod settings;
@@ -37,7 +40,8 @@ pub use remark::{Cause, MissingFigures, Remark, error_remarks};
 pub use run::{Run, RunDefect, RunError};
 pub use run_sets::RunSets;
 pub use settings::{
-    CountError, MAX_STARTS, MeasuredSettings, RecordedSize, RunSettings, SimulatedSettings, Workload, WorkloadTime,
+    Combination, CombinationError, CountError, Initialization, InitializationError, MAX_STARTS, MeasuredSettings,
+    RecordedSize, RunSettings, SimulatedSettings, Workload, WorkloadTime,
 };
 pub use source::{
     Channel, Measured, ModelSize, Preset, PresetError, Problem, Simulation, Source, TargetPosition, ready_settings,

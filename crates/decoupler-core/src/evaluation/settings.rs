@@ -1,4 +1,4 @@
-use std::{ops::RangeInclusive, time::Duration};
+use std::{fmt, ops::RangeInclusive, str::FromStr, time::Duration};
 
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
@@ -25,13 +25,105 @@ pub struct RunSettings<S = Source> {
     pub inputs: InputChoice,
     /// Number of hidden nodes.
     pub hidden: usize,
-    /// Number of starts: trainings from different random initialisations, the best of which by validation error is
-    /// kept.
+    /// Number of starts: trainings from different random initialisations.
     pub starts: usize,
+    /// How several starts become one network.
+    #[serde(default, skip_serializing_if = "Combination::is_best")]
+    pub combine: Combination,
+    /// Weights with which a training begins.
+    #[serde(default, skip_serializing_if = "Initialization::is_random")]
+    pub initialization: Initialization,
     /// Training method, its settings, and the stopping rules.
     pub training: TrainingSettings,
     /// Seed from which all randomness follows.
     pub seed: Seed,
+}
+
+/// How several starts become the network that a run answers with.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Combination {
+    /// The network of the start with the lowest validation error, or training error if nothing is held out.
+    #[default]
+    Best,
+    /// A committee: the mean of the answers of all starts. Starts share their scalings, so that the mean is exactly one
+    /// network with the hidden nodes of all, [`Mlp::mean`](crate::network::Mlp::mean). Its error is never larger than
+    /// the mean of their errors (Krogh and Vedelsby 1995).
+    Mean,
+}
+
+/// Error for an unknown combination.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+#[error("'{0}' does not combine starts: give best or mean")]
+pub struct CombinationError(String);
+
+impl Combination {
+    /// All combinations, in the order offered to the user.
+    pub const ALL: [Self; 2] = [Self::Best, Self::Mean];
+
+    fn is_best(&self) -> bool {
+        *self == Self::Best
+    }
+}
+
+impl fmt::Display for Combination {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(match self {
+            Self::Best => "best",
+            Self::Mean => "mean",
+        })
+    }
+}
+
+impl FromStr for Combination {
+    type Err = CombinationError;
+
+    fn from_str(text: &str) -> Result<Self, CombinationError> {
+        let found = Self::ALL.into_iter().find(|choice| choice.to_string() == text.trim());
+        found.ok_or_else(|| CombinationError(text.to_owned()))
+    }
+}
+
+/// Weights with which a training begins.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Initialization {
+    /// Random weights ([Nguyen and Widrow](crate::network::nguyen_widrow)).
+    #[default]
+    Random,
+    /// Ridge regression: one hidden node for each of its principal directions, in the linear range of tanh; random weights
+    /// elsewhere.
+    Ridge,
+}
+
+/// Error for an unknown initialisation.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+#[error("'{0}' is not an initialisation: give random or ridge")]
+pub struct InitializationError(String);
+
+impl Initialization {
+    fn is_random(&self) -> bool {
+        *self == Self::Random
+    }
+}
+
+impl fmt::Display for Initialization {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(match self {
+            Self::Random => "random",
+            Self::Ridge => "ridge",
+        })
+    }
+}
+
+impl FromStr for Initialization {
+    type Err = InitializationError;
+
+    fn from_str(text: &str) -> Result<Self, InitializationError> {
+        let mut choices = [Self::Random, Self::Ridge].into_iter();
+        let found = choices.find(|choice| choice.to_string() == text.trim());
+        found.ok_or_else(|| InitializationError(text.to_owned()))
+    }
 }
 
 /// Settings of a run on simulated samples.
@@ -98,6 +190,8 @@ impl<S> RunSettings<S> {
             inputs,
             hidden: 12,
             starts: 1,
+            combine: Combination::Best,
+            initialization: Initialization::Random,
             training: TrainingSettings::default(),
             seed: Seed::default(),
         }
@@ -109,6 +203,8 @@ impl<S> RunSettings<S> {
             inputs,
             hidden,
             starts,
+            combine,
+            initialization,
             training,
             seed,
         } = self;
@@ -117,6 +213,8 @@ impl<S> RunSettings<S> {
             inputs,
             hidden,
             starts,
+            combine,
+            initialization,
             training,
             seed,
         }
@@ -130,7 +228,20 @@ impl<S> RunSettings<S> {
         check([
             ("hidden nodes", self.hidden, 1..=LARGEST_HIDDEN),
             ("starts", self.starts, 1..=MAX_STARTS),
+            (
+                "hidden nodes of all starts together",
+                self.network_hidden(),
+                1..=LARGEST_HIDDEN,
+            ),
         ])
+    }
+
+    /// Number of hidden nodes of the network that a run answers with: those of all starts if their mean is kept.
+    pub fn network_hidden(&self) -> usize {
+        match self.combine {
+            Combination::Best => self.hidden,
+            Combination::Mean => self.hidden.saturating_mul(self.starts),
+        }
     }
 }
 

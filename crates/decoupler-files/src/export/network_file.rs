@@ -321,7 +321,7 @@ pub(super) fn defect(file: &NetworkFile) -> Option<String> {
         (network.values().iter().find_map(weight))
             .map(|index| format!("network: weight {index} is not a finite number")),
         number_defect(network, settings, row_wires.as_deref()),
-        (network.values().iter()).find_map(|network| mismatch(network, problem, settings.hidden)),
+        (network.values().iter()).find_map(|network| mismatch(network, problem, settings.network_hidden())),
         simulated.and_then(|settings| place_defect(network, &settings)),
         last_epoch.is_none().then(|| "training.history: it is empty".to_owned()),
         last_epoch

@@ -147,22 +147,7 @@ impl Setup {
             Err(_) if is_cancelled() => return Ok(None),
             planned => planned?,
         };
-        let recorded = Recorded::of(plan.within(folder).absolute(), &planned)?;
-        let PlannedSets {
-            recording,
-            test_recording,
-            split,
-            test,
-        } = planned;
-        let sets = RunSets::new(split, test).described(recording.problem());
-        Ok(Some(SetupSets {
-            sets,
-            recordings: Some(Recordings {
-                recorded,
-                training: recording,
-                test: test_recording,
-            }),
-        }))
+        Ok(Some(SetupSets::of_plan(plan, folder, planned)?))
     }
 }
 
@@ -205,7 +190,7 @@ impl Setup {
 }
 
 /// Returns a callback that reports progress and cancels the import if `is_cancelled`.
-fn watch(
+pub(super) fn watch(
     is_cancelled: &dyn Fn() -> bool,
     on_progress: &mut dyn FnMut(Progress),
 ) -> impl FnMut(Progress) -> ControlFlow<()> {
@@ -220,6 +205,26 @@ fn watch(
 }
 
 impl SetupSets {
+    /// Returns the datasets of a plan whose paths are relative to `folder`.
+    pub(super) fn of_plan(plan: &Plan, folder: &Path, planned: PlannedSets) -> Result<Self, ImportError> {
+        let recorded = Recorded::of(plan.within(folder).absolute(), &planned)?;
+        let PlannedSets {
+            recording,
+            test_recording,
+            split,
+            test,
+        } = planned;
+        let sets = RunSets::new(split, test).described(recording.problem());
+        Ok(Self {
+            sets,
+            recordings: Some(Recordings {
+                recorded,
+                training: recording,
+                test: test_recording,
+            }),
+        })
+    }
+
     /// Prepares a run of `setup` on these datasets; returns `None` if cancelled.
     ///
     /// # Errors

@@ -225,7 +225,9 @@ mod tests {
         let mut shared = Shared::new(true);
         shared.run = Some(RunView::new(Began {
             id: RunId::new(),
+            asked: settings.into(),
             setup: settings.into(),
+            search: None,
             problem: Arc::clone(run.problem()),
             weights: 0,
             test: TestSet::of(&run).unwrap(),

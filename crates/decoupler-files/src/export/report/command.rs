@@ -262,6 +262,8 @@ impl Command {
     /// Adds the options of the network and its training.
     fn training(&mut self, settings: &RunSettings, default: &RunSettings) {
         self.option("starts", settings.starts, default.starts);
+        self.option("begin", settings.initialization, default.initialization);
+        self.option("combine", settings.combine, default.combine);
         let (mut method, mut usual_method) = (settings.training.method, default.training.method);
         self.option("method", method.short_name(), usual_method.short_name());
         let is_usual = method.short_name() == usual_method.short_name();

@@ -135,6 +135,15 @@ fn recording_ui(ui: &mut Ui, recording: &mut RecordingEditor, shared: &Shared, e
     ui.add_space(space(2));
     ui.separator();
     ui.add_enabled_ui(!is_busy, |ui| {
+        let mut is_auto = shared.recording.is_auto;
+        let hint = glossary::AUTO.hint;
+        if ui
+            .checkbox(&mut is_auto, "Choose settings automatically")
+            .on_hover_text(hint)
+            .changed()
+        {
+            effects.push(Effect::ChooseAutomatically(is_auto));
+        }
         hidden_choice_ui(ui, &mut settings.hidden, recording.channels());
     });
     let before = settings;
@@ -143,7 +152,9 @@ fn recording_ui(ui: &mut Ui, recording: &mut RecordingEditor, shared: &Shared, e
         let chosen = std::mem::replace(&mut settings, before).training.method;
         settings.choose_method(chosen);
     }
-    if let Some(size) = recording.training_size(&settings) {
+    if !shared.recording.is_auto
+        && let Some(size) = recording.training_size(&settings)
+    {
         recorded_workload_ui(ui, &settings, size);
     }
     Landmark::Choices.stands_at(ui, ui.min_rect().with_min_y(top));
@@ -181,12 +192,7 @@ fn training_ui<S>(ui: &mut Ui, settings: &mut RunSettings<S>, usual: StoppingRul
             stopping_ui(ui, &mut settings.training.stopping, usual);
         });
         fold_ui(ui, "Method settings", &of_method(settings), |ui| {
-            method_settings_ui(
-                ui,
-                &mut settings.training.method,
-                &mut settings.starts,
-                !phase.is_busy(),
-            );
+            method_settings_ui(ui, settings, !phase.is_busy());
         });
     });
 }
@@ -283,6 +289,8 @@ pub fn applied(preset: Preset, draft: &SimulatedSettings) -> SimulatedSettings {
         },
         hidden: draft.hidden,
         starts: draft.starts,
+        combine: draft.combine,
+        initialization: draft.initialization,
         seed: draft.seed,
         ..settings
     }
