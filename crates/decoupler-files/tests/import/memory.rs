@@ -57,7 +57,7 @@ fn features_come_from_all_readings_and_start_again_after_a_gap() {
     assert_eq!(recording.set.samples(), 32);
     let weight = 1.0 - f64::exp(-0.2);
     let mut average = 0.0;
-    for row in 0..40 {
+    for row in 0..40_usize {
         let (reading, is_first) = (row as f64, row == 0 || row == 20);
         average = if is_first {
             reading
@@ -122,6 +122,7 @@ fn the_state_continues_into_the_test_samples_and_test_files_have_the_intervals_o
     plan.test = Some(TestFiles {
         data: "slow.csv".into(),
         join: Vec::new(),
+        append: Vec::new(),
     });
     let sets = plan
         .sets(folder.path(), Seed(0), &mut |_| ControlFlow::Continue(()))
