@@ -212,10 +212,10 @@ fn print_folds(
         hidden: settings.hidden,
         method: settings.training.method.short_name(),
         seed: settings.seed.0,
-        targets: targets(channels, &scores.network, &determined),
+        targets: targets(channels, &scores.network, &determined, &[]),
         baselines: BTreeMap::from([
-            ("mean", targets(channels, &scores.baselines.mean, &[])),
-            ("ridge", targets(channels, &scores.baselines.linear, &[])),
+            ("mean", targets(channels, &scores.baselines.mean, &[], &[])),
+            ("ridge", targets(channels, &scores.baselines.linear, &[], &[])),
         ]),
         better,
         warnings,

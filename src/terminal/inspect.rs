@@ -267,8 +267,8 @@ impl RecordingReport {
             validation_samples,
             test_samples,
             dropped: all().flat_map(|recording| recording.dropped.iter().cloned()).collect(),
-            positions: recording.positions().iter().map(position).collect(),
-            positions_text: describe_positions(recording.positions()),
+            positions: recording.positions.iter().map(position).collect(),
+            positions_text: describe_positions(&recording.positions),
         }
     }
 

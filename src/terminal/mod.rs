@@ -19,6 +19,7 @@ mod follow_report;
 mod import_arguments;
 mod inspect;
 mod interruption;
+mod intervals;
 mod output;
 mod reproduce;
 mod samples;

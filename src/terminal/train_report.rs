@@ -10,12 +10,15 @@ use super::{
     errors_report::{ErrorsReport, Target, targets, write_starts},
     failure::Failure,
     inspect::{RecordingReport, import_warnings, write_warnings},
+    intervals::describe_coverage,
     output::{print, print_object},
 };
 use decoupler_core::{
     evaluation::{
-        Baselines, Channel, DecoderReport, Errors, Outlook, Problem, ReferenceNote, Run, RunError, SimulatedSettings,
-        StartRecord, TestErrors, best_start, error_remarks,
+        Baselines, Channel, Combination, DecoderReport, Errors, Outlook, Problem, ReferenceNote, Run, RunError,
+        SimulatedSettings, StartRecord, TestErrors,
+        auto::AutoRecord,
+        best_start, error_remarks,
         recorded::{Determination, Extrapolation, Undetermined},
     },
     network::InputChoice,
@@ -26,8 +29,8 @@ use decoupler_core::{
 };
 use decoupler_files::{
     export::{
-        NetworkFile, TrainingRecord, decoder_table, describe_determinacy, describe_worse_than_ridge, error_table,
-        format_duration,
+        NetworkFile, TrainingRecord, decoder_table, describe_determinacy, describe_search, describe_worse_than_ridge,
+        error_table, format_duration, search_table,
     },
     import::{Recording, SetupSets},
 };
@@ -51,12 +54,16 @@ struct Report<'a> {
     method: &'static str,
     seed: u64,
     starts: &'a [StartRecord],
+    combine: Combination,
     epochs: usize,
     best_epoch: usize,
     stop_reason: Option<StopReason>,
     networks: usize,
     weights: usize,
     warnings: Vec<String>,
+    /// What was tried to choose the settings, if they were chosen.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    search: Option<&'a AutoRecord>,
     /// Other decoders; absent for a recording if none was requested.
     #[serde(skip_serializing_if = "Option::is_none")]
     decoders: Option<BTreeMap<String, Decoder<'a>>>,
@@ -218,10 +225,13 @@ impl<'a> Trained<'a> {
                 recording: RecordingReport::new(&self.sets.sets, recordings),
                 test_outside_training: self.extrapolation().map_or(0.0, |(found, _)| found.share()),
                 seconds: self.run.wall_time().map(|time| time.as_secs_f64()),
-                targets: targets(&file.problem.targets, &scores.network, &determined),
+                targets: targets(&file.problem.targets, &scores.network, &determined, &scores.coverage),
                 baselines: BTreeMap::from([
-                    ("mean", targets(&file.problem.targets, &scores.baselines.mean, &[])),
-                    ("ridge", targets(&file.problem.targets, &scores.baselines.linear, &[])),
+                    ("mean", targets(&file.problem.targets, &scores.baselines.mean, &[], &[])),
+                    (
+                        "ridge",
+                        targets(&file.problem.targets, &scores.baselines.linear, &[], &[]),
+                    ),
                 ]),
             })),
             (None, Some(settings)) => SourceReport::Array(Box::new(ArrayReport::new(file, &settings, self.remarks())?)),
@@ -235,12 +245,14 @@ impl<'a> Trained<'a> {
             method: settings.training.method.short_name(),
             seed: settings.seed.0,
             starts: &training.starts,
+            combine: settings.combine,
             epochs: epochs(training),
             best_epoch: training.best_epoch,
             stop_reason: training.stop_reason,
             networks: file.network.values().len(),
             weights: file.network.weights(),
             warnings: self.warnings(&determined),
+            search: search(file),
             decoders: has_decoders.then(|| self.decoders.iter().map(decoder).collect()),
         })
     }
@@ -264,12 +276,7 @@ impl<'a> Trained<'a> {
     /// Warnings of the source and of the training.
     fn warnings(&self, determined: &[Result<Determination, Undetermined>]) -> Vec<String> {
         let source = self.file.settings.simulated().map(|settings| settings.source);
-        let NetworkFile {
-            problem,
-            scores,
-            settings,
-            ..
-        } = self.file;
+        let NetworkFile { problem, scores, .. } = self.file;
         let outlook = source.and_then(|source| Outlook::of(&source).ok());
         let of_array = outlook.iter().flat_map(|outlook| &outlook.warnings);
         let of_import = self.sets.recordings.as_ref().map(import_warnings);
@@ -280,10 +287,12 @@ impl<'a> Trained<'a> {
                 self.extrapolation()
                     .and_then(|(found, recording)| found.warning(&recording.inputs, &recording.targets)),
             )
+            .chain(search(self.file).and_then(AutoRecord::remark))
             .chain(self.optimism.iter().cloned())
             .chain(self.run.defect().map(|defect| defect.to_string()))
             .chain(describe_determinacy(&self.file.problem.targets, determined))
-            .chain(describe_worse_than_ridge(problem, scores, settings.training.method))
+            .chain(describe_worse_than_ridge(problem, scores))
+            .chain(describe_coverage(&problem.targets, &scores.coverage))
             .collect()
     }
 
@@ -307,6 +316,9 @@ impl<'a> Trained<'a> {
             (Some(recordings), _) => RecordingReport::new(&self.sets.sets, recordings).write(out)?,
             (None, Some(settings)) => write_array(file, &settings, out)?,
             (None, None) => unreachable!("sets are recorded or simulated"),
+        }
+        if let Some(record) = search(file) {
+            writeln!(out, "\n{}\n{}", describe_search(record), search_table(record).aligned())?;
         }
         let first = training.stages.first();
         let method = first.map_or(settings.training.method, |stage| stage.method);
@@ -334,7 +346,12 @@ impl<'a> Trained<'a> {
         )?;
         writeln!(out, "Weights kept from epoch {}\n", training.best_epoch)?;
         if training.starts.len() > 1 {
-            write_starts(&training.starts, file.problem.test_percent_name(), out)?;
+            write_starts(
+                &training.starts,
+                settings.combine,
+                file.problem.test_percent_name(),
+                out,
+            )?;
             writeln!(out)?;
         }
         write!(out, "{}", error_table(&file.error_table()).aligned())?;
@@ -392,6 +409,11 @@ impl<'a> Trained<'a> {
         }
         Ok(())
     }
+}
+
+/// Record of the choice of settings, if they were chosen.
+fn search(file: &NetworkFile) -> Option<&AutoRecord> {
+    file.recorded.as_ref()?.search.as_ref()
 }
 
 fn epochs(training: &TrainingRecord) -> usize {

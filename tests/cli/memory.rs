@@ -112,6 +112,52 @@ fn memories_are_kept_in_recipes_and_refused_where_they_are_not_possible() {
     assert!(message.contains("a memory of 2s needs times"), "{message}");
     let message = refused(&format!("{TRAIN} --memory 2h"), folder.path());
     assert!(message.contains("write a number of samples as in 20"), "{message}");
-    let message = refused("export --network a.json --format c99 --out c", folder.path());
-    assert!(message.contains("memory"), "{message}");
+    for precision in ["f32", "fixed16"] {
+        let export = format!("export --network a.json --format c99 --precision {precision} --out c");
+        let message = refused(&export, folder.path());
+        assert!(message.contains("give --precision f64"), "{message}");
+    }
+}
+
+#[test]
+fn every_format_exports_the_memory_with_its_state_and_a_golden_sequence() {
+    let folder = creeping();
+    let memory = "--memory 0.5s,40 --lags 3,0.2s --differences --out n.json";
+    succeed(&format!("{TRAIN} {memory}"), folder.path());
+    for (format, file) in [
+        ("c99", "c99_memory.c"),
+        ("onnx", "stream.onnx"),
+        ("numpy", "memory.py"),
+        ("matlab", "matlab_memory.m"),
+    ] {
+        let export = format!("export --network n.json --format {format} --out {format} --json");
+        let report = json(&export, folder.path());
+        assert!(report["deviation"].as_f64().unwrap() <= 1e-12, "{format}: {report}");
+        let found = folder.path().join(format);
+        assert!(found.join(file).is_file(), "{format}");
+        let sequence = fs::read_to_string(found.join("sequence.csv")).unwrap();
+        let header = sequence.lines().next().unwrap();
+        assert!(
+            header.starts_with("restart,interval_s,\"u\",\"u-u[-3]\",\"u-u[-0.2s]\",\"u-u~0.5s\",\"u-u~40\""),
+            "{header}"
+        );
+        let restarts = sequence.lines().filter(|line| line.starts_with("1,")).count();
+        assert_eq!(restarts, 2, "{format}");
+        let readme = fs::read_to_string(found.join("README.txt")).unwrap();
+        assert!(readme.contains("sequence.csv has samples in order"), "{readme}");
+    }
+}
+
+#[test]
+fn inspect_reports_whether_the_past_helps() {
+    let folder = creeping();
+    let inspect = "inspect --data press.csv --time t --inputs u --targets force --model ridge";
+    let report = json(&format!("{inspect} --json"), folder.path());
+    let target = &report["targets"][0];
+    assert!(target["with_memory"]["high"].as_f64().unwrap() < 0.5, "{target}");
+    let text = succeed(inspect, folder.path());
+    assert!(
+        text.contains("The past helps to predict force: with averages over 0.5s, 5s"),
+        "{text}"
+    );
 }

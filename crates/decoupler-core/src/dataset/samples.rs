@@ -235,6 +235,15 @@ impl Dataset {
         }
     }
 
+    /// Returns the samples with each as a group of its own.
+    #[must_use]
+    pub(crate) fn ungrouped(&self) -> Self {
+        Self {
+            groups: (0..self.samples()).collect(),
+            ..self.clone()
+        }
+    }
+
     /// Returns all samples with the readings of these channels only, in this order.
     ///
     /// # Panics

@@ -10,7 +10,7 @@ use crate::{
     training::{Method, StopReason},
 };
 
-/// Remark on an unreliable result of a decoder, with cause and remedy. Printed next to its errors.
+/// Remark on an unreliable result of a decoder, with what may help. Printed next to its errors.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Remark {
@@ -21,7 +21,7 @@ pub enum Remark {
         /// Ratio of the mean absolute error to that of the mean; `None` if the mean is exact, for instance if a
         /// coordinate is the same in all samples.
         times: Option<f64>,
-        /// Most likely cause.
+        /// Circumstance that may be the cause.
         cause: Cause,
     },
     /// Figures are missing.
@@ -30,7 +30,7 @@ pub enum Remark {
     NotAllSolved(SolvedRows),
 }
 
-/// Most likely cause of a result that is worse than the mean.
+/// Circumstance that may be the cause of a result that is worse than the mean. It is known; that it is the cause is not.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Cause {
@@ -43,9 +43,9 @@ pub enum Cause {
         /// Number of readings per sample.
         readings: usize,
     },
-    /// The network is under- or overfitted.
+    /// The settings of the training.
     Training,
-    /// The training of the network ended too early or got stuck.
+    /// The end of the training of the network.
     End {
         /// Reason why the training ended.
         reason: StopReason,
@@ -54,7 +54,7 @@ pub enum Cause {
     },
     /// The noise of the readings.
     Noise,
-    /// Unknown: the decoder does not suit these data.
+    /// Unknown.
     Unknown,
 }
 
@@ -92,25 +92,20 @@ impl fmt::Display for Cause {
             }
             Self::FewSamples { samples, readings } => {
                 let (samples, readings) = (counted(*samples, "training sample"), counted(*readings, "reading"));
-                write!(f, "{samples} for {readings} are too few; give more samples")
+                write!(f, "it was fitted to {samples} of {readings}; more samples may help")
             }
-            Self::Training => f.write_str(
-                "the network is under- or overfitted; train it for more epochs, with a \
-                 different number of hidden nodes, or on more samples",
-            ),
+            Self::Training => {
+                f.write_str("more or fewer epochs, another number of hidden nodes, or more samples may help")
+            }
             Self::End { reason, method } => f.write_str(&reason.remedy(method)),
-            Self::Noise => {
-                f.write_str("the noise of the readings is too large; reduce the noise, or give more samples")
-            }
-            Self::Unknown => {
-                f.write_str("this decoder does not suit these data; use another one, or give more samples")
-            }
+            Self::Noise => f.write_str("the readings have noise; less noise or more samples may help"),
+            Self::Unknown => f.write_str("use another decoder; more samples may help"),
         }
     }
 }
 
 impl Cause {
-    /// Finds the most likely cause for a decoder fitted with `settings` to `samples` training samples of `readings`
+    /// Finds the circumstance to name for a decoder fitted with `settings` to `samples` training samples of `readings`
     /// each.
     fn of(kind: DecoderKind, settings: &RunSettings, samples: usize, readings: usize) -> Self {
         /// Samples per reading below which more samples would help most.
@@ -230,7 +225,7 @@ impl Remark {
 /// for `reason`, and on the linear map.
 pub fn error_remarks(
     settings: &SimulatedSettings,
-    Scores { network, baselines }: &Scores,
+    Scores { network, baselines, .. }: &Scores,
     reason: Option<StopReason>,
 ) -> Vec<(&'static str, Remark)> {
     let simulation = &settings.source;
@@ -316,7 +311,7 @@ mod tests {
     }
 
     #[test]
-    fn only_errors_worse_than_the_mean_are_reported_with_cause_and_remedy() {
+    fn only_errors_worse_than_the_mean_are_reported_with_what_may_help() {
         let none = Noise::default();
         for good in [
             errors(0.2, Some(5.0)),
@@ -336,11 +331,11 @@ mod tests {
                 DecoderKind::Ridge,
                 none,
                 62,
-                "62 training samples for 30 readings are too few",
+                "it was fitted to 62 training samples of 30 readings; more samples may help",
             ),
-            (DecoderKind::Network, none, 500, "more epochs"),
-            (DecoderKind::RadialBasis, Noise::relative(1e-2), 500, "reduce the noise"),
-            (DecoderKind::RadialBasis, none, 500, "use another one"),
+            (DecoderKind::Network, none, 500, "epochs"),
+            (DecoderKind::RadialBasis, Noise::relative(1e-2), 500, "less noise"),
+            (DecoderKind::RadialBasis, none, 500, "use another decoder"),
         ];
         for (kind, noise, samples, remedy) in cases {
             let remarks = remarks(kind, noise, samples, &bad);

@@ -3,9 +3,10 @@ use std::{fmt::Display, io::Write as _, path::Path, sync::Arc};
 use decoupler_core::{
     dataset::{Dataset, MemoryStream},
     evaluation::{
-        ErrorTable, PastNetwork, Problem, Run, RunSettings, Scores, SimulatedSettings, StartRecord, TargetPosition,
-        TestErrors,
+        ErrorTable, Intervals, PastNetwork, Problem, Run, RunSettings, Scores, SimulatedSettings, StartRecord,
+        TargetPosition, TestErrors,
     },
+    live::DriftReference,
     network::{DecouplingNetwork, Networks},
 };
 use glam::DVec3;
@@ -44,6 +45,10 @@ pub struct NetworkFile {
     pub training: TrainingRecord,
     /// Errors of the network and of the baselines on the test set.
     pub scores: Scores,
+    /// Prediction intervals of the answers, if they were calibrated.
+    pub intervals: Option<Intervals>,
+    /// Training readings of a recording, by which a later drift is detected.
+    pub drift: Option<DriftReference>,
 }
 
 /// The part of the file that the checksum covers.
@@ -58,6 +63,10 @@ struct Document {
     network: Networks,
     training: TrainingRecord,
     scores: Scores,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    intervals: Option<Intervals>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    drift: Option<DriftReference>,
 }
 
 impl NetworkFile {
@@ -77,6 +86,8 @@ impl NetworkFile {
             network: run.network(),
             training: TrainingRecord::of(run),
             scores,
+            intervals: run.intervals().cloned(),
+            drift: None,
         })
     }
 
@@ -89,6 +100,9 @@ impl NetworkFile {
         let mut file = Self::from_run(run, recorded)?;
         file.scores.network = run.errors_of(&past.networks.decouple(run.test()));
         file.network = past.networks.clone();
+        // The intervals belong to the latest network.
+        file.intervals = None;
+        file.scores.coverage.clear();
         file.training = TrainingRecord::until(run, past);
         Ok(file)
     }
@@ -164,6 +178,8 @@ impl NetworkFile {
             network,
             training,
             scores,
+            intervals,
+            drift,
         } = self.clone();
         let document = Document {
             settings,
@@ -173,6 +189,8 @@ impl NetworkFile {
             network,
             training,
             scores,
+            intervals,
+            drift,
         };
         let run = to_raw_value(&document).map_err(|error| unsound(error.to_string()))?;
         Ok(Sealed::new(KIND, &program, &run).save(path, commit)?)
@@ -206,6 +224,8 @@ impl NetworkFile {
             network: document.network,
             training: document.training,
             scores: document.scores,
+            intervals: document.intervals,
+            drift: document.drift,
         })
     }
 }
@@ -286,7 +306,10 @@ pub(super) fn defect(file: &NetworkFile) -> Option<String> {
         scores: Scores {
             network: errors,
             baselines,
+            coverage: _,
         },
+        intervals,
+        drift,
     } = file;
     let weight = |network: &DecouplingNetwork| {
         let weights = network.mlp().weights();
@@ -298,7 +321,7 @@ pub(super) fn defect(file: &NetworkFile) -> Option<String> {
         (network.values().iter().find_map(weight))
             .map(|index| format!("network: weight {index} is not a finite number")),
         number_defect(network, settings, row_wires.as_deref()),
-        (network.values().iter()).find_map(|network| mismatch(network, problem, settings.hidden)),
+        (network.values().iter()).find_map(|network| mismatch(network, problem, settings.network_hidden())),
         simulated.and_then(|settings| place_defect(network, &settings)),
         last_epoch.is_none().then(|| "training.history: it is empty".to_owned()),
         last_epoch
@@ -307,6 +330,12 @@ pub(super) fn defect(file: &NetworkFile) -> Option<String> {
         (!(training.seconds >= 0.0 && training.seconds.is_finite()))
             .then(|| format!("training.seconds: {} is not a time", training.seconds)),
         starts_defect(file),
+        (intervals.as_ref())
+            .and_then(|intervals| intervals.check(problem.targets.len()).err())
+            .map(|defect| format!("intervals: {defect}")),
+        (drift.as_ref())
+            .filter(|drift| !drift.is_valid() || drift.channels() != problem.inputs.len())
+            .map(|_| "drift: it does not match the inputs".to_owned()),
         unmeasured("scores.network", errors, problem),
         unmeasured("scores.baselines.mean", &baselines.mean, problem),
         unmeasured("scores.baselines.linear", &baselines.linear, problem),

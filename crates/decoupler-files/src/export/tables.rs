@@ -4,9 +4,9 @@ use decoupler_core::{
     evaluation::{
         Channel, DecoderReport, ErrorBlock, ErrorMeasure, ErrorRow, ErrorTable, Errors, Problem, Scores, TargetErrors,
         TargetPosition, TestErrors,
-        recorded::{Determinacy, Determination, Findings, TargetFindings, Undetermined},
+        recorded::{Determinacy, Determination, Findings, FittedModel, TargetFindings, Undetermined},
     },
-    training::{EpochRecord, Method},
+    training::EpochRecord,
 };
 use serde::Deserialize;
 use serde_json::error::Category;
@@ -216,7 +216,8 @@ fn in_last_number(bytes: &[u8], error: &serde_json::Error) -> bool {
 pub fn describe_determinacy(targets: &[Channel], measured: &[Result<Determination, Undetermined>]) -> Vec<String> {
     let of = |(target, measured): (&Channel, &Result<Determination, Undetermined>)| match measured {
         Err(cause) => Some(format!("{}: {cause}", target.name)),
-        Ok(measured) => (measured.determinacy() != Determinacy::Determined).then(|| measured.sentence(&target.name)),
+        Ok(measured) => (measured.determinacy() != Determinacy::Determined)
+            .then(|| measured.sentence(&target.name, &[FittedModel::Network])),
     };
     targets.iter().zip(measured).filter_map(of).collect()
 }
@@ -237,8 +238,8 @@ pub fn describe_positions(positions: &[TargetPosition]) -> Option<String> {
 /// Describes how much of a target the readings explain, judged by the better of network and ridge.
 pub fn describe_target(name: &str, found: &TargetFindings) -> String {
     match found.best() {
-        Some((_, best)) if found.network.is_some() => best.sentence(name),
-        Some((_, best)) => format!("{}, as far as a linear map goes", best.sentence(name)),
+        Some((_, best)) if found.network.is_some() => best.sentence(name, &[FittedModel::Ridge, FittedModel::Network]),
+        Some((_, best)) => best.sentence(name, &[FittedModel::Ridge]),
         None => {
             let cause = found.ridge.err();
             let cause = cause.map_or_else(|| "nothing can be judged".to_owned(), |cause| cause.to_string());
@@ -259,7 +260,9 @@ pub fn describe_warnings(inputs: &[Channel], targets: &[Channel], findings: &Fin
 }
 
 /// Warns of the targets on which the network is worse than ridge, or no better to three digits; `None` if there are none.
-pub fn describe_worse_than_ridge(problem: &Problem, scores: &Scores, method: Method) -> Option<String> {
+///
+/// The errors show that ridge is the better choice; they do not show why.
+pub fn describe_worse_than_ridge(problem: &Problem, scores: &Scores) -> Option<String> {
     /// Maximum number of targets that are named; a skin can have hundreds.
     const NAMED: usize = 3;
     let errors = scores.network.targets().iter().zip(scores.baselines.linear.targets());
@@ -285,13 +288,10 @@ pub fn describe_worse_than_ridge(problem: &Problem, scores: &Scores, method: Met
     if !more.is_empty() {
         targets.truncate(NAMED);
     }
-    let cure = match method {
-        Method::BayesianRegularization(_) => "record more samples, or use fewer hidden nodes",
-        _ => "record more samples, or use fewer hidden nodes or Bayesian regularisation",
-    };
     let targets = targets.join(", ");
     Some(format!(
-        "the network is {comparison} ridge regression for {targets}{more}: use ridge, {cure}"
+        "the network is {comparison} ridge regression for {targets}{more}: use ridge, or compare other settings by \
+         cross-validation"
     ))
 }
 

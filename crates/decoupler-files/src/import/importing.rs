@@ -139,6 +139,7 @@ impl Recipe {
             set: Dataset::new(readings, targets_of_rows, row_wires.as_deref(), groups)?,
             inputs: problem.features(),
             targets: problem.targets.clone(),
+            positions: problem.positions.clone(),
             problem,
             history,
             parts: vec![(0, reports[0].path.clone())],
@@ -393,6 +394,8 @@ pub struct Recording {
     pub inputs: Vec<Channel>,
     /// Names and units of the targets.
     pub targets: Vec<Channel>,
+    /// Positions of targets on the skin, for those that have one.
+    pub positions: Vec<TargetPosition>,
     /// Description of the readings, the targets and the memory.
     problem: Problem,
     /// Readings in order of time, for [other memories](Self::with_memory).
@@ -460,11 +463,6 @@ impl Recording {
     /// Returns the description of the channels.
     pub fn problem(&self) -> Problem {
         self.problem.clone()
-    }
-
-    /// Positions of targets on the skin, for those that have one.
-    pub fn positions(&self) -> &[TargetPosition] {
-        &self.problem.positions
     }
 
     /// Memory whose features are the channels of the samples, with its usual interval.

@@ -19,6 +19,18 @@ pub struct InputTable {
     pub row_wires: Option<Vec<usize>>,
     /// Line of each sample, from 1.
     pub lines: Vec<u64>,
+    /// Columns of the recipe that say when or to what a sample belongs, as far as the file has them: time, group and
+    /// row-wire.
+    pub kept: Vec<KeptColumn>,
+}
+
+/// Column that is copied from an input to the output.
+#[derive(Clone, Debug)]
+pub struct KeptColumn {
+    /// Name, with the unit in brackets if there is one.
+    pub title: String,
+    /// Text of each cell; empty if it is missing.
+    pub cells: Vec<String>,
 }
 
 /// Columns of a table that contain the inputs of a network.
@@ -262,10 +274,21 @@ impl Recipe {
                 features
             }
         };
+        let kept = [&self.time, &self.group, &self.row_wire].into_iter().flatten();
+        let kept = kept.filter_map(|name| Some(names.find(name).ok()?.column));
+        let kept = kept.filter(|column| !columns.contains(column)).map(|column| {
+            let Column { name, unit, cells, .. } = &table.columns[column];
+            let (name, unit) = (name.clone(), unit.clone());
+            KeptColumn {
+                title: Channel { name, unit }.title(),
+                cells: (0..table.rows).map(|row| cells.text(row)).collect(),
+            }
+        });
         Ok(InputTable {
             readings,
             row_wires,
             lines: (0..table.rows).map(|row| table.line(row)).collect(),
+            kept: kept.collect(),
         })
     }
 

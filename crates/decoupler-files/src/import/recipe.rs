@@ -7,7 +7,10 @@ use std::{
     path::{Component, Path, PathBuf},
 };
 
-use decoupler_core::dataset::{Dataset, Memory};
+use decoupler_core::{
+    dataset::{Dataset, Memory},
+    evaluation::auto::AutoRecord,
+};
 use serde::{Deserialize, Serialize};
 
 use super::{Condition, Derived, DialectChoice, ImportError, Missing, Plan, PlannedSets};
@@ -179,6 +182,9 @@ pub struct Recorded {
     pub files: Vec<FileChecksum>,
     /// CRC-32 of the bits of all readings and targets, as hexadecimal digits.
     pub samples_crc32: String,
+    /// What was tried to choose the settings and the memory, if they were chosen automatically.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub search: Option<AutoRecord>,
 }
 
 /// Checksum of a file.
@@ -211,6 +217,7 @@ impl Recorded {
         Ok(Self {
             files,
             samples_crc32: samples_crc32([&sets.recording.set, &sets.test]),
+            search: None,
             plan,
         })
     }
@@ -251,6 +258,7 @@ impl Recorded {
             files: self.files.iter().map(file).collect(),
             plan: self.plan.with_paths(|path| of(path)),
             samples_crc32: self.samples_crc32.clone(),
+            search: self.search.clone(),
         }
     }
 }

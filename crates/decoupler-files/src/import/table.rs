@@ -173,6 +173,17 @@ impl Cells {
         }
     }
 
+    /// Returns the cell as text; empty if it is missing. A number reads back bit for bit.
+    pub(super) fn text(&self, row: usize) -> String {
+        match self {
+            Self::Numbers(numbers) if numbers[row].is_nan() => String::new(),
+            Self::Numbers(numbers) => numbers[row].to_string(),
+            Self::Labels { numbers, texts } => {
+                numbers[row].map_or(String::new(), |label| texts[label as usize].0.clone())
+            }
+        }
+    }
+
     /// Returns `true` if the cell is missing.
     pub(super) fn is_missing(&self, row: usize) -> bool {
         match self {

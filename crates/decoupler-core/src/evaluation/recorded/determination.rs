@@ -2,7 +2,7 @@ use ndarray::ArrayView2;
 use thiserror::Error;
 
 use super::{
-    Interval,
+    FittedModel, Interval,
     channel_remark::rmse_ratio,
     evidence::{Evidence, SumVariance},
 };
@@ -145,13 +145,17 @@ impl Determination {
         }
     }
 
-    /// Returns a sentence on the target of this name, such as "the readings explain little of y (R² 0.35, 0.25 to
-    /// 0.44)".
-    pub fn sentence(&self, name: &str) -> String {
-        let verb = match self.determinacy() {
-            Determinacy::Determined => "determine",
-            Determinacy::WeaklyDetermined => "explain little of",
-            Determinacy::NotDetermined => "do not determine",
+    /// Returns a sentence on the target of this name, such as "the network explains little of y (R² 0.35, 0.25 to
+    /// 0.44); another decoder may explain more". `tried` are the models whose best answers were measured.
+    ///
+    /// Good answers show that the readings determine a target. Bad ones show only that the models that were tried have
+    /// failed.
+    pub fn sentence(&self, name: &str, tried: &[FittedModel]) -> String {
+        let is_determined = self.determinacy() == Determinacy::Determined;
+        let claim = match self.determinacy() {
+            Determinacy::Determined => format!("the readings determine {name}"),
+            Determinacy::WeaklyDetermined => format!("{} little of {name}", explains(tried)),
+            Determinacy::NotDetermined => format!("{} nothing of {name}", explains(tried)),
         };
         let few = if self.units < Self::FEW_UNITS {
             format!(
@@ -169,8 +173,20 @@ impl Determination {
         // Enough decimals to show how far a good R² is from 1.
         let digits = (1.0 - (1.0 - self.r2.value).abs().max(1e-9).log10().floor()).clamp(2.0, 6.0) as usize;
         let Interval { value, low, high } = self.r2;
-        format!("the readings {verb} {name} (R² {value:.digits$}, {low:.digits$} to {high:.digits$}){few}{tails}")
+        let others = if is_determined {
+            ""
+        } else {
+            "; another decoder may explain more"
+        };
+        format!("{claim} (R² {value:.digits$}, {low:.digits$} to {high:.digits$}){few}{tails}{others}")
     }
+}
+
+/// Returns the models and their verb: "the network explains", "ridge regression and the network explain".
+fn explains(tried: &[FittedModel]) -> String {
+    let names: Vec<&str> = tried.iter().copied().map(FittedModel::noun).collect();
+    let verb = if names.len() > 1 { "explain" } else { "explains" };
+    format!("{} {verb}", names.join(" and "))
 }
 
 fn centred(values: &[f64]) -> Vec<f64> {
@@ -239,11 +255,10 @@ impl NonlinearGain {
             // Enough decimals to show on which side of 1 the interval ends.
             let differs = |decimals: &usize| format!("{:.decimals$}", self.ratio.high) != format!("{:.decimals$}", 1.0);
             let decimals = (2..6).find(differs).unwrap_or(2);
-            // A training can fail to find an existing relation: if all restarts of Bayesian regularisation end in a
-            // linear map, another method may still find more.
+            // The error does not show whether a nonlinear relation is absent, or this training has missed it.
             format!(
-                "the network is {better} than ridge for {name} (error {:.decimals$} times ridge's): this training found \
-                 little more than a linear map; try another method or more starts, give more samples, or use ridge",
+                "the network is {better} than ridge for {name} (error {:.decimals$} times ridge's): with these settings, \
+                 use ridge",
                 self.ratio
             )
         })
@@ -437,20 +452,24 @@ mod tests {
 
     #[test]
     fn each_degree_of_determinacy_has_its_sentence() {
-        for (share, words) in [
-            (0.9, "the readings determine y (R² 0."),
-            (0.3, "explain little of y"),
-            (0.01, "do not determine y"),
+        let both = [FittedModel::Ridge, FittedModel::Network];
+        for (share, tried, words) in [
+            (0.9, &both[..], "the readings determine y (R² 0."),
+            (0.3, &both[..1], "ridge regression explains little of y"),
+            (0.01, &both[1..], "the network explains nothing of y"),
+            (0.01, &both[..], "ridge regression and the network explain nothing of y"),
         ] {
             let (set, answers) = recording(4000, 0.0, share, 5);
-            let sentence = measure(&set, &answers, SplitBy::Time).unwrap().sentence("y");
+            let sentence = measure(&set, &answers, SplitBy::Time).unwrap().sentence("y", tried);
             assert!(sentence.contains(words), "{share}: {sentence}");
+            let is_open = sentence.ends_with("another decoder may explain more");
+            assert_eq!(is_open, share < 0.5, "{share}: {sentence}");
         }
         let (set, answers) = recording(12, 0.0, 0.9, 6);
         let few = set.select(&[0, 1, 2, 3, 4]);
         let sentence = measure(&few, &answers.select(ndarray::Axis(0), &[0, 1, 2, 3, 4]), SplitBy::Time)
             .unwrap()
-            .sentence("y");
+            .sentence("y", &both);
         assert!(sentence.contains("from only 5 independent"), "{sentence}");
     }
 
@@ -510,7 +529,7 @@ mod tests {
     }
 
     #[test]
-    fn the_remark_names_the_training_as_cause_and_shows_whether_the_error_is_below_ridges() {
+    fn the_remark_claims_no_cause_and_shows_whether_the_error_is_below_ridges() {
         let remark = |value, low, high| {
             NonlinearGain {
                 ratio: Interval { value, low, high },
@@ -522,11 +541,7 @@ mod tests {
             worse.contains("no better than ridge for y (error 1.00 (0.98 to 1.02) times ridge's)"),
             "{worse}"
         );
-        assert!(
-            worse.contains("this training found little more than a linear map; try another method"),
-            "{worse}"
-        );
-        assert!(!worse.contains("these data do not support"), "{worse}");
+        assert!(worse.ends_with("with these settings, use ridge"), "{worse}");
         let hardly = remark(0.996, 0.994, 0.9991).unwrap();
         assert!(
             hardly.contains("little better") && hardly.contains("0.996 (0.994 to 0.999) times ridge's)"),

@@ -15,6 +15,7 @@ mod split_comparison;
 
 pub use channel_remark::{ChannelImportance, ChannelRemark, channel_importance, channel_remarks};
 pub use determination::{Determinacy, Determination, NonlinearGain, Undetermined};
+pub(crate) use evidence::Evidence;
 pub use evidence::FittedModel;
 pub use extrapolation::Extrapolation;
 pub use learning_curve::{Doubling, LearningCurve, LearningPoint, PowerLaw};

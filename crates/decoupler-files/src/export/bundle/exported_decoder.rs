@@ -105,8 +105,17 @@ impl<'a> ExportedDecoder<'a> {
                     (Some(row_wires), 2..) => row_wires.clone(),
                     _ => Vec::new(),
                 },
+                half_widths: self.half_widths(),
             },
         }
+    }
+
+    /// Half-width of the 90 % prediction interval of each target of the network, as far as they were calibrated.
+    fn half_widths(&self) -> Vec<Option<f64>> {
+        let file = self.file.filter(|_| self.fitted.kind.is_network());
+        let intervals = file.and_then(|file| file.intervals.as_ref());
+        let targets = intervals.iter().flat_map(|intervals| &intervals.targets);
+        targets.map(|target| Some(target.as_ref()?.constant)).collect()
     }
 
     /// Ranges of the readings in training: one for all row-wires, or one for each if the row is an argument.
@@ -192,8 +201,10 @@ impl<'a> ExportedDecoder<'a> {
             Some(settings) => of_array(&self.origin, &settings, portable, errors),
             None => of_recording(&self.origin, portable, errors),
         };
+        let half_widths = self.half_widths();
+        let intervals = (!half_widths.is_empty()).then(|| json!({ "half_widths_90": half_widths }));
         let mut fields = Metadata::new();
-        for part in [Some(common), network, Some(own)] {
+        for part in [Some(common), network, Some(own), intervals] {
             if let Some(Value::Object(part)) = part {
                 fields.extend(part);
             }

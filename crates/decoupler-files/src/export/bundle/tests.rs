@@ -185,6 +185,7 @@ fn own_data(array: &Portable) -> Portable {
             targets: channels(array.outputs),
             has_memory: false,
             row_wires: Vec::new(),
+            half_widths: Vec::new(),
         },
         ..array.clone()
     }

@@ -262,6 +262,8 @@ impl Command {
     /// Adds the options of the network and its training.
     fn training(&mut self, settings: &RunSettings, default: &RunSettings) {
         self.option("starts", settings.starts, default.starts);
+        self.option("begin", settings.initialization, default.initialization);
+        self.option("combine", settings.combine, default.combine);
         let (mut method, mut usual_method) = (settings.training.method, default.training.method);
         self.option("method", method.short_name(), usual_method.short_name());
         let is_usual = method.short_name() == usual_method.short_name();
@@ -277,7 +279,9 @@ impl Command {
                 self.add("set", format!("{}={}", setting.name.replace(' ', "-"), setting.value));
             }
         }
-        let (rules, usual) = (settings.training.stopping, default.training.stopping);
+        let mut usual = *default;
+        usual.choose_method(settings.training.method);
+        let (rules, usual) = (settings.training.stopping, usual.training.stopping);
         self.option("epochs", rules.epochs, usual.epochs);
         self.option("goal", rules.goal_mse, usual.goal_mse);
         self.option("max-fail", rules.max_fail, usual.max_fail);

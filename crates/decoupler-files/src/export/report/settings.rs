@@ -6,7 +6,7 @@ use crate::{
 };
 use decoupler_core::{
     dataset::Dataset,
-    evaluation::{Channel, SimulatedSettings},
+    evaluation::{Channel, Combination, SimulatedSettings},
     scene::{Loading, Movement, Noise, NoisySets, RowModel},
     text::counted,
 };
@@ -154,7 +154,13 @@ fn training_facts(file: &NetworkFile) -> Vec<(&'static str, String)> {
         facts.push(("Method", format!("{from}{}", stage.method)));
     }
     facts.extend([
-        ("Starts", file.settings.starts.to_string()),
+        (
+            "Starts",
+            match file.settings.combine {
+                Combination::Best => file.settings.starts.to_string(),
+                Combination::Mean => format!("{}, whose mean is the network", file.settings.starts),
+            },
+        ),
         (
             "Ends",
             format!(

@@ -280,7 +280,7 @@ fn validate(
     for (target, channel) in recording.targets.iter().enumerate() {
         let name = &channel.name;
         remarks.push(match &determined[target] {
-            Ok(determined) => determined.sentence(name),
+            Ok(determined) => determined.sentence(name, &[FittedModel::Network]),
             Err(cause) => format!("{name}: {cause}"),
         });
         remarks.extend(gains[target].and_then(|gain| gain.remark(name)));

@@ -10,7 +10,7 @@ use std::{
 use decoupler_core::{
     decoupling::{CompiledNetworks, Decoder},
     evaluation::Problem,
-    live::{Recording, Source},
+    live::{DriftMonitor, Recording, Source},
 };
 use decoupler_files::{
     export::NetworkFile,
@@ -46,6 +46,7 @@ pub(super) struct TargetSession {
     history: VecDeque<(f64, Arc<[f64]>)>,
     ranges: Vec<(f64, f64)>,
     outside: (Option<usize>, usize),
+    drift: Option<DriftMonitor>,
     has_events: bool,
 }
 
@@ -67,6 +68,7 @@ impl TargetSession {
             history: VecDeque::new(),
             ranges: vec![(f64::INFINITY, f64::NEG_INFINITY); problem.targets.len()],
             outside: (None, 0),
+            drift: network.drift.clone().map(DriftMonitor::new),
             has_events: false,
             surface: surface.map(Arc::new),
             network,
@@ -82,6 +84,9 @@ impl TargetSession {
             let reason = "readings so far from the training range that the network has no answer";
             self.tally.bad(format!("sample at {:.3} s: {reason}", arrived.time_s));
             return;
+        }
+        if let Some(drift) = &mut self.drift {
+            drift.take(readings);
         }
         let network = self.network.network.at(row_index);
         let inputs = network.inputs();
@@ -165,6 +170,8 @@ impl LiveSession for TargetSession {
             frame: None,
             targets: latest.map(|_| LiveTargets {
                 problem: Arc::clone(&self.problem),
+                network: Arc::clone(&self.network),
+                is_drifted: self.drift.as_ref().map(DriftMonitor::is_drifted),
                 surface: self.surface.clone(),
                 ranges: self.ranges.clone(),
                 history: self.history.iter().cloned().collect(),

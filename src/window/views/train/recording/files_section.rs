@@ -317,6 +317,7 @@ impl From<Plan> for Reopened {
         Self::from(Recorded {
             files: plan.files().map(unknown).collect(),
             samples_crc32: String::new(),
+            search: None,
             plan,
         })
     }

@@ -360,6 +360,8 @@ fn missing_of_checkpoint(path: &Path) -> Result<Opened, String> {
 pub(super) struct Checked {
     /// Number of samples for training, validation and test.
     pub(super) samples: [usize; 3],
+    /// Numbers of inputs, with those from the past, and targets.
+    pub(super) channels: (usize, usize),
     /// Number of rows of the files, dropped ones included.
     pub(super) rows: usize,
     /// Rows that are not samples, by reason.
@@ -448,6 +450,10 @@ fn check(plan: &Plan, seed: Seed, report: &Report<CheckingEvent>) -> Result<Box<
     let validation = sets.split.validation.as_ref().map_or(0, Dataset::samples);
     Ok(Box::new(Checked {
         samples: [sets.split.training.samples(), validation, sets.test.samples()],
+        channels: (
+            sets.split.training.readings().ncols(),
+            sets.split.training.targets().ncols(),
+        ),
         rows: recordings().map(|recording| recording.rows).sum(),
         dropped: recordings()
             .flat_map(|recording| recording.dropped.iter().cloned())
@@ -455,7 +461,7 @@ fn check(plan: &Plan, seed: Seed, report: &Report<CheckingEvent>) -> Result<Box<
         files: recordings()
             .flat_map(|recording| recording.files.iter().cloned())
             .collect(),
-        positions: describe_positions(sets.recording.positions()),
+        positions: describe_positions(&sets.recording.positions),
         warnings,
     }))
 }
