@@ -16,7 +16,7 @@ use decoupler_core::{
     evaluation::{
         Baselines, Channel, DecoderReport, Errors, Outlook, ReferenceNote, Run, RunError, SimulatedSettings,
         StartRecord, TestErrors, best_start, error_remarks,
-        recorded::{Determination, Undetermined},
+        recorded::{Determination, HysteresisLoop, Undetermined},
     },
     network::InputChoice,
     scene::{Noise, NoisySets, Scene},
@@ -100,6 +100,8 @@ struct RecordingFigures<'a> {
     seconds: Option<f64>,
     targets: Vec<Target<'a>>,
     baselines: BTreeMap<&'static str, Vec<Target<'a>>>,
+    /// Errors of loading and unloading for each target; none if it does not rise and fall, or the order in time is lost.
+    hysteresis: Vec<Option<HysteresisLoop>>,
 }
 
 #[derive(Serialize)]
@@ -220,6 +222,7 @@ impl<'a> Trained<'a> {
                     ("mean", targets(&file.problem.targets, &scores.baselines.mean, &[])),
                     ("ridge", targets(&file.problem.targets, &scores.baselines.linear, &[])),
                 ]),
+                hysteresis: self.loops(),
             })),
             (None, Some(settings)) => SourceReport::Array(Box::new(ArrayReport::new(file, &settings, self.remarks())?)),
             (None, None) => unreachable!("sets are recorded or simulated"),
@@ -249,6 +252,15 @@ impl<'a> Trained<'a> {
         };
         let by = recordings.recorded.plan.division.by;
         Determination::measure(self.run.test(), self.run.decouple_test().view(), by)
+    }
+
+    /// Errors of loading and unloading for each target of a recording.
+    fn loops(&self) -> Vec<Option<HysteresisLoop>> {
+        let Some(recordings) = &self.sets.recordings else {
+            return Vec::new();
+        };
+        let by = recordings.recorded.plan.test_order();
+        HysteresisLoop::of_test(self.run.test(), self.run.decouple_test().view(), by)
     }
 
     /// Warnings of the source and of the training.
@@ -323,7 +335,13 @@ impl<'a> Trained<'a> {
             write_starts(&training.starts, file.problem.test_percent_name(), out)?;
             writeln!(out)?;
         }
-        write!(out, "{}", error_table(&file.error_table()).aligned())?;
+        let loops = self.loops();
+        write!(out, "{}", error_table(&file.error_table().with_loops(&loops)).aligned())?;
+        for (target, found) in file.problem.targets.iter().zip(&loops) {
+            if let Some(found) = found {
+                writeln!(out, "{}", found.sentence(&target.name))?;
+            }
+        }
         write_warnings(&self.warnings(&self.determined()), out)?;
         write_warnings(&self.remarks(), out)?;
         self.write_decoders(out)?;

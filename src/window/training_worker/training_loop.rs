@@ -19,12 +19,13 @@ use crate::window::{
     test_view::{TestSet, TestViewError},
 };
 use decoupler_core::{
+    dataset::SplitBy,
     evaluation::{PastNetworks, Run, RunError, Scores, TestErrors, network_frame_time, recorded::Determination},
     training::TrainingSettings,
 };
 use decoupler_files::{
     export::{CheckpointFile, NetworkFile, describe_determinacy, describe_worse_than_ridge},
-    import::{Progress, Setup, SetupSets},
+    import::{Plan, Progress, Setup, SetupSets},
 };
 
 /// Minimum time between two progress reports. Each makes the window draw a frame; the time in between keeps the window
@@ -345,12 +346,13 @@ const REPLACED: &str = "the file was not written, because another training has r
 fn begun(trained: TrainedRun) -> Result<(TrainedRun, Box<Began>), TestViewError> {
     let run = &trained.run;
     let plan = trained.recorded.as_ref().map(|recorded| recorded.plan.clone());
+    let order = plan.as_ref().map_or(SplitBy::Time, Plan::test_order);
     let began = Began {
         id: RunId::new(),
         setup: Setup::of(*run.settings(), plan).expect("a recorded run has its plan"),
         problem: Arc::clone(run.problem()),
         weights: run.leader().weights(),
-        test: TestSet::of(run)?,
+        test: TestSet::of(run, order)?,
         baselines: run
             .baselines()
             .cloned()
