@@ -201,7 +201,7 @@ mod tests {
     use super::{consequents::Penalty, *};
     use crate::{
         dataset::{Seed, Stream},
-        decoupling::{RadialBasisNetwork, RadialBasisSettings, decode_set},
+        decoupling::{RadialBasisNetwork, decode_set},
         scene::{Noise, Rows, Scene},
         sensor::SensorModel,
     };
@@ -251,10 +251,9 @@ mod tests {
                 quantity,
                 ..InputChoice::BEST
             };
-            let settings = RadialBasisSettings::default();
             let mut rng = Seed(0).rng(Stream::Expectation);
             let mut basis =
-                RadialBasisNetwork::fit(&training, choice, NoiseSource::default(), settings, &mut rng).unwrap();
+                RadialBasisNetwork::fit(&training, choice, NoiseSource::default(), &mut rng).unwrap();
             let mut fuzzy = fit(&training, quantity);
             let (ours, theirs) = (squared_error(&mut fuzzy, &test), squared_error(&mut basis, &test));
             assert!(ours < theirs, "{quantity:?}: {ours} {theirs}");
