@@ -269,6 +269,94 @@ def train_on_own_data():
     run(PROGRAM, "train", "--recipe", HOME / OWN / "recipe.json", "--epochs", 40, "--out", HOME / OWN / "network.json", "--json")
 
 
+STREAM = """#include "c99_decode.h"
+#include "c99_memory.h"
+#include <stdio.h>
+int main(void)
+{
+    c99_memory memory;
+    c99_memory_init(&memory);
+    double interval_s, readings[C99_READINGS], features[C99_FEATURES], targets[C99_OUTPUTS];
+    for (int line = 0; scanf("%lf", &interval_s) == 1; ++line) {
+        for (int i = 0; i < C99_READINGS; ++i) {
+            if (scanf("%lf", &readings[i]) != 1) { return 1; }
+        }
+        c99_memory copy = memory;
+        c99_memory_step(&copy, readings, interval_s, features);
+        memory = copy;
+        if (c99_decode(features, targets) != C99_OK) { return 2; }
+        printf("%.17g\\n", targets[0]);
+    }
+    return 0;
+}
+"""
+
+
+def check_memory():
+    """Decodes 10 000 frames of a creeping sensor with the state of each bundle, stored and continued in the middle."""
+    import onnxruntime
+
+    home = HOME / "memory"
+    home.mkdir()
+    rng = np.random.default_rng(1)
+    frames, cut = 10_000, 5_000
+    times = np.cumsum(rng.uniform(0.005, 0.015, frames))
+    force = np.sin(0.8 * times) + np.sin(0.23 * times**1.1)
+    crept = np.zeros(frames)
+    for k in range(1, frames):
+        crept[k] = crept[k - 1] + (1 - np.exp(-(times[k] - times[k - 1]))) * (force[k] - crept[k - 1])
+    readings = np.column_stack([0.5 * (force + crept), force - 0.3 * crept**2])
+    np.savetxt(home / "data.csv", np.column_stack([times, readings, force]), delimiter=",", header="t,a,b,force", comments="", fmt="%.17g")
+    data = ["--data", home / "data.csv", "--time", "t", "--inputs", "a,b", "--targets", "force"]
+    memory = ["--memory", "0.1s,1s,50", "--lags", "3,0.2s", "--differences"]
+    run(PROGRAM, "train", *data, *memory, "--hidden", 4, "--starts", 1, "--epochs", 20, "--out", home / "network.json", "--json")
+    run(PROGRAM, "decode", "--network", home / "network.json", "--input", home / "data.csv", "--output", home / "decoded.csv")
+    with open(home / "decoded.csv") as file:
+        expected = np.array([float(line["force"]) for line in csv.DictReader(file)])
+    intervals = np.diff(times, prepend=times[0])
+    scale = np.ptp(force)
+    report = lambda reader, found: show("memory", "f64", reader, float(np.max(np.abs(found - expected)) / scale), LIMITS["f64"])
+    folders = {}
+    for form in ["c99", "numpy", "onnx", "matlab"]:
+        folders[form] = home / form
+        run(PROGRAM, "export", "--network", home / "network.json", "--format", form, "--out", folders[form])
+
+    sys.path.insert(0, str(folders["numpy"]))
+    decode, state = importlib.import_module("decode"), importlib.import_module("memory").Memory()
+    features = []
+    for k in range(frames):
+        if k == cut:
+            state = type(state)(state.state.copy())
+        features.append(state.step(readings[k], intervals[k]))
+    report(f"NumPy {np.__version__}", decode.decode(np.array(features))[0][:, 0])
+
+    (folders["c99"] / "stream.c").write_text(STREAM)
+    sources = [folders["c99"] / name for name in ["stream.c", "c99_decode.c", "c99_memory.c"]]
+    run("gcc", *FLAGS, *sources, "-lm", "-o", folders["c99"] / "stream")
+    lines = "".join(f"{interval:.17g} {a:.17g} {b:.17g}\n" for interval, (a, b) in zip(intervals, readings))
+    report("gcc", np.array(run(folders["c99"] / "stream", input=lines).split(), dtype=float))
+
+    session, kept, found = onnxruntime.InferenceSession(folders["onnx"] / "stream.onnx"), None, []
+    shape = next(value.shape for value in session.get_inputs() if value.name == "state")
+    kept = np.zeros(shape)
+    for k in range(frames):
+        if k == cut:
+            session = onnxruntime.InferenceSession(folders["onnx"] / "stream.onnx")
+        inputs = {"readings": readings[k : k + 1], "interval_s": intervals[k].reshape(1, 1), "state": kept}
+        targets, kept = session.run(["targets", "next_state"], inputs)
+        found.append(targets[0, 0])
+    report(f"onnxruntime {onnxruntime.__version__}", np.array(found))
+
+    np.savetxt(folders["matlab"] / "frames.txt", np.column_stack([intervals, readings]), fmt="%.17g")
+    script = (
+        f"d = load('frames.txt'); n = {cut}; [f, s] = matlab_memory(d(1:n, 2:end), d(1:n, 1), []); "
+        "g = matlab_memory(d(n + 1:end, 2:end), d(n + 1:end, 1), s); "
+        "dlmwrite('answers.txt', matlab_decode([f; g]), 'precision', '%.17g');"
+    )
+    run("octave-cli", "--no-gui", "--quiet", "--eval", script, cwd=folders["matlab"])
+    report("GNU Octave", np.loadtxt(folders["matlab"] / "answers.txt"))
+
+
 def check_layers(network):
     """Checks all formats of a decoder that consists of layers."""
     for precision in ["f64", "f32"]:
@@ -296,5 +384,6 @@ for network in LAYERED:
 for network in EQUATIONS:
     check_c(network, "f64")
     check_numpy(network, "f64")
+check_memory()
 if failures:
     sys.exit("failed: " + ", ".join(failures))

@@ -133,7 +133,7 @@ impl Train {
         }
         let scores = [&honest, run].map(|run| run.scores().expect("a run without folds has baselines"));
         Ok(sentences(
-            &SplitComparison::of(by, scores),
+            &SplitComparison::of(set, by, scores),
             &recordings.training.targets,
         ))
     }
@@ -212,10 +212,10 @@ fn print_folds(
         hidden: settings.hidden,
         method: settings.training.method.short_name(),
         seed: settings.seed.0,
-        targets: targets(channels, &scores.network, &determined),
+        targets: targets(channels, &scores.network, &determined, &[]),
         baselines: BTreeMap::from([
-            ("mean", targets(channels, &scores.baselines.mean, &[])),
-            ("ridge", targets(channels, &scores.baselines.linear, &[])),
+            ("mean", targets(channels, &scores.baselines.mean, &[], &[])),
+            ("ridge", targets(channels, &scores.baselines.linear, &[], &[])),
         ]),
         better,
         warnings,

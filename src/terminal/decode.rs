@@ -16,17 +16,22 @@ use decoupler_core::{
     text::inert,
     training::StoppingRules,
 };
-use decoupler_files::export::{
-    AtomicFile, NetworkFile, WriteError, check_writable, format_number, is_same, write_decoded, write_decoded_header,
+use decoupler_files::{
+    export::{
+        AtomicFile, NetworkFile, WriteError, check_writable, format_number, is_same, write_decoded,
+        write_decoded_header,
+    },
+    import::KeptColumn,
 };
 use glam::DVec3;
-use ndarray::{Array2, Axis, Slice};
+use ndarray::{Array2, ArrayView1, Axis, Slice};
 use serde::Serialize;
 
 use super::{
     failure::Failure,
     follow::Follow,
     import_arguments::ImportArguments,
+    intervals::Drift,
     output::{Readings, print, print_object, progress_bar, read},
     samples::{with_bar, working_folder},
 };
@@ -40,7 +45,10 @@ use super::{
 /// range; and coordinates_outside, the number of coordinates outside by more than the whole range. A warning lists such
 /// lines. With --follow, frames are decoded as they arrive, also from standard input, a serial port or a socket. The
 /// network of a recording (train --data) reads columns named like its inputs (or as many unnamed columns) from CSV, .npy,
-/// .npz or .mat, and writes its targets under their names.
+/// .npz or .mat, and writes its targets under their names, after the time, group and row columns of the input. The column
+/// TARGET_half_width_90 has the half-width of the 90 % prediction interval: the true value is within TARGET ± this half-width
+/// with a probability of 90 %, as long as the readings are like those of the training. A warning says from which line on they
+/// no longer are.
 #[derive(Args)]
 pub(super) struct Decode {
     /// Network saved by train --out or by the window
@@ -90,14 +98,21 @@ impl Decode {
 fn decode_file(file: &NetworkFile, input: &Path, output: &Path) -> Result<(), Failure> {
     let mut written = AtomicFile::create(output)?;
     let refused = |source| WriteError::io(output, source);
-    write_heading(&file.problem, 1, &mut written).map_err(refused)?;
+    let mut has_heading = false;
+    let mut drift = Drift::new(file);
+    let mut values = Vec::new();
     let mut outside = OutsideTraining::new(&file.problem);
     let mut compiled = CompiledNetworks::<f64>::new(&file.network, rows_read(file)?);
     read(file, input, &mut |readings| {
+        if !std::mem::replace(&mut has_heading, true) {
+            let kept = readings.kept.iter().map(|column| column.title.clone());
+            write_heading(file, &kept.collect::<Vec<_>>(), 1, &mut written).map_err(refused)?;
+        }
         let answers = decoded(file, &mut compiled, &readings);
+        let kept = &readings.kept;
         let lines = readings.lines.iter().zip(&readings.row_indices);
-        let values = readings.values.outer_iter().zip(answers.outer_iter());
-        for ((&line, &row_index), (readings, answer)) in lines.zip(values) {
+        let rows = readings.values.outer_iter().zip(answers.outer_iter());
+        for (row, ((&line, &row_index), (readings, answer))) in lines.zip(rows).enumerate() {
             if answer.iter().any(|value| !value.is_finite()) {
                 let path = input.to_owned();
                 return Err(Failure::NoAnswer { path, line });
@@ -105,13 +120,46 @@ fn decode_file(file: &NetworkFile, input: &Path, output: &Path) -> Result<(), Fa
             let [readings, targets] =
                 [&readings, &answer].map(|row| row.to_slice().expect("a row of a standard array is contiguous"));
             let of_line = outside.count(file.network.at(row_index), line, readings, targets);
-            write_decoded(answer, of_line.readings, of_line.targets, &mut written).map_err(refused)?;
+            drift.take(line, readings);
+            write_cells(kept, row, &mut written).map_err(refused)?;
+            with_half_widths(file, targets, &mut values);
+            write_decoded(
+                ArrayView1::from(&values),
+                of_line.readings,
+                of_line.targets,
+                &mut written,
+            )
+            .map_err(refused)?;
         }
         Ok(())
     })?;
     written.commit()?;
     outside.warn();
     Ok(())
+}
+
+/// Writes the cells of the kept columns, each followed by a comma.
+fn write_cells(kept: &[KeptColumn], row: usize, out: &mut dyn Write) -> io::Result<()> {
+    for column in kept {
+        let cell = inert(&column.cells[row]);
+        if cell.contains([',', '"', '\n', '\r']) {
+            write!(out, "\"{}\",", cell.replace('"', "\"\""))?;
+        } else {
+            write!(out, "{cell},")?;
+        }
+    }
+    Ok(())
+}
+
+/// Fills `values` with the answers, each followed by the half-width of its interval if the target has one.
+pub(super) fn with_half_widths(file: &NetworkFile, answers: &[f64], values: &mut Vec<f64>) {
+    let targets = file.problem.targets.len();
+    values.clear();
+    for (index, &answer) in answers.iter().enumerate() {
+        let intervals = file.intervals.as_ref();
+        values.push(answer);
+        values.extend(intervals.and_then(|intervals| intervals.half_width(index % targets, answer)));
+    }
 }
 
 /// Decodes each line with the network of its row; a single network for all rows of an array uses one matrix product.
@@ -176,7 +224,7 @@ impl FrameArguments {
         };
         let recording = with_bar(is_json, |watch| plan.recording(working_folder(), watch))?;
         self.import.save_recipe(&plan)?;
-        let (set, lines, scale) = (recording.set, recording.lines, sensor.scale);
+        let (set, lines, scale) = (recording.set.clone(), &recording.lines, sensor.scale);
         let (argument, targets) = if has_depths {
             ("--depths", scale.nodes_per_row())
         } else {
@@ -208,7 +256,7 @@ impl FrameArguments {
         let checked = limits.check(sensor, &pressed_rows(&frames, sensor)?);
         checked.map_err(|source| match source.sample() {
             Some(sample) => Failure::Press {
-                path: plan.import.data.clone(),
+                path: recording.file_of(sample).to_owned(),
                 line: lines[sample],
                 source,
             },
@@ -241,16 +289,36 @@ pub(super) fn rows_read(file: &NetworkFile) -> Result<usize, Failure> {
     }
 }
 
-/// Writes the header: the targets of `rows` row-wires, and the counts of values outside the training range.
-pub(super) fn write_heading(problem: &Problem, rows: usize, out: &mut dyn Write) -> io::Result<()> {
+/// Writes the header: the columns `kept` from the input, the targets of `rows` row-wires, each followed by the half-width
+/// of its interval if it has one, and the counts of values outside the training range.
+pub(super) fn write_heading(file: &NetworkFile, kept: &[String], rows: usize, out: &mut dyn Write) -> io::Result<()> {
+    let problem = &file.problem;
     if problem.has_nodes {
         return write_decoded_header(rows * problem.targets.len() / 3, out);
     }
-    let titles = problem.targets.iter().map(|target| inert(&target.title()));
-    let names = titles.chain(["readings_outside".to_owned(), "targets_outside".to_owned()]);
+    let titles = problem.targets.iter().enumerate().flat_map(|(index, target)| {
+        let of_target = file
+            .intervals
+            .as_ref()
+            .and_then(|intervals| intervals.targets.get(index));
+        let half_width = of_target.is_some_and(Option::is_some).then(|| Channel {
+            name: half_width_name(target),
+            unit: target.unit.clone(),
+        });
+        [Some(target.clone()), half_width].into_iter().flatten()
+    });
+    let kept = kept.iter().map(|title| inert(title));
+    let names = kept
+        .chain(titles.map(|target| inert(&target.title())))
+        .chain(["readings_outside".to_owned(), "targets_outside".to_owned()]);
     let mut writer = csv::Writer::from_writer(out);
     writer.write_record(names).map_err(io::Error::other)?;
     writer.flush()
+}
+
+/// Name of the column with the half-width of the 90 % interval of `target`.
+fn half_width_name(target: &Channel) -> String {
+    format!("{}_half_width_90", target.name)
 }
 
 /// Maximum number of lines listed individually; a damaged file may have thousands.
@@ -259,6 +327,8 @@ const MAX_LISTED: usize = 10;
 /// Lines with readings or targets outside the range seen in training, where a network extrapolates.
 pub(super) struct OutsideTraining<'a> {
     problem: &'a Problem,
+    /// Names of the inputs of the network.
+    features: Vec<Channel>,
     lines: usize,
     outside: usize,
     listed: Vec<String>,
@@ -276,6 +346,7 @@ impl<'a> OutsideTraining<'a> {
     pub(super) fn new(problem: &'a Problem) -> Self {
         Self {
             problem,
+            features: problem.features(),
             lines: 0,
             outside: 0,
             listed: Vec::new(),
@@ -309,7 +380,7 @@ impl<'a> OutsideTraining<'a> {
         self.outside += 1;
         if self.listed.len() < MAX_LISTED {
             let first_reading = outside().next().zip(range).map(|(channel, range)| {
-                let (name, extremes) = (&self.problem.inputs[channel], range.extremes(channel));
+                let (name, extremes) = (&self.features[channel], range.extremes(channel));
                 described(name, readings[channel], extremes)
             });
             let first_target = || {

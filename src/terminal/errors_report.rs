@@ -3,7 +3,7 @@
 use std::io::{self, Write};
 
 use decoupler_core::evaluation::{
-    Channel, Spread, StartRecord, TargetErrors, TestErrors, best_start,
+    Channel, Combination, Coverage, Spread, StartRecord, TargetErrors, TestErrors, best_start,
     recorded::{Determination, Undetermined},
 };
 use decoupler_files::export::format_number;
@@ -36,6 +36,9 @@ pub(super) struct Target<'a> {
     r2_interval: Option<[f64; 2]>,
     worst: f64,
     percent_of_range: Option<f64>,
+    /// 90 % prediction intervals of the network.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    interval: Option<Coverage>,
 }
 
 impl<'a> ErrorsReport<'a> {
@@ -47,18 +50,19 @@ impl<'a> ErrorsReport<'a> {
             },
             TestErrors::Targets(_) => Self::Targets {
                 percent_of_range: errors.percent(),
-                targets: targets(channels, errors, &[]),
+                targets: targets(channels, errors, &[], &[]),
             },
         }
     }
 }
 
 /// Returns the errors of the targets `channels`; `determined` are the coefficients of determination with their intervals,
-/// if they were measured.
+/// and `coverage` that of the prediction intervals, if they were measured.
 pub(super) fn targets<'a>(
     channels: &'a [Channel],
     errors: &TestErrors,
     determined: &[Result<Determination, Undetermined>],
+    coverage: &[Option<Coverage>],
 ) -> Vec<Target<'a>> {
     let target = |(index, (channel, errors)): (usize, (&'a Channel, &TargetErrors))| Target {
         name: &channel.name,
@@ -72,6 +76,7 @@ pub(super) fn targets<'a>(
             .map(|determined| [determined.r2.low, determined.r2.high]),
         worst: errors.worst,
         percent_of_range: errors.percent_of_range,
+        interval: coverage.get(index).copied().flatten(),
     };
     let channels = channels.iter().zip(errors.targets());
     channels.enumerate().map(target).collect()
@@ -82,16 +87,32 @@ const WIDTH: usize = 64;
 
 /// Writes the spread of the results of several starts: a table, and a box plot of the test error, called `error_name`,
 /// above a strip plot of the starts.
-pub(super) fn write_starts(starts: &[StartRecord], error_name: &str, out: &mut dyn Write) -> io::Result<()> {
+pub(super) fn write_starts(
+    starts: &[StartRecord],
+    combine: Combination,
+    error_name: &str,
+    out: &mut dyn Write,
+) -> io::Result<()> {
     let Some(best) = best_start(starts) else { return Ok(()) };
     let held_out = starts.iter().all(|start| start.validation_mse.is_some());
     let error = if held_out { "validation mse" } else { "training mse" };
-    writeln!(
-        out,
-        "{} starts, of which number {} is kept: it has the lowest {error}",
-        starts.len(),
-        best + 1
-    )?;
+    let (count, number) = (starts.len(), best + 1);
+    let mark = match combine {
+        Combination::Best => {
+            writeln!(
+                out,
+                "{count} starts, of which number {number} is kept: it has the lowest {error}"
+            )?;
+            "the one kept"
+        }
+        Combination::Mean => {
+            writeln!(
+                out,
+                "{count} starts, whose mean is the network; number {number} has the lowest {error}"
+            )?;
+            "the one with the lowest error"
+        }
+    };
     let z_percent: Vec<f64> = starts.iter().filter_map(StartRecord::percent).collect();
     let rows = [
         (error_name, Spread::of(z_percent.iter().copied())),
@@ -122,7 +143,7 @@ pub(super) fn write_starts(starts: &[StartRecord], error_name: &str, out: &mut d
         (Some(spread), Some(kept)) if spread.smallest < spread.largest => {
             let [plot, strip] = plot(&spread, &z_percent, kept);
             writeln!(out, "\n{plot}  box: quartiles of {error_name}, | median")?;
-            writeln!(out, "{strip}  o a start, * the one kept")
+            writeln!(out, "{strip}  o a start, * {mark}")
         }
         _ => Ok(()),
     }
@@ -169,7 +190,7 @@ mod tests {
     fn the_plot_shows_quartiles_and_the_kept_start() {
         let starts = [start(3.0, 1.0), start(1.0, 2.0), start(2.0, 4.15), start(5.0, 7.3)];
         let mut text = Vec::new();
-        write_starts(&starts, "test Z %", &mut text).unwrap();
+        write_starts(&starts, Combination::Best, "test Z %", &mut text).unwrap();
         let text = String::from_utf8(text).unwrap();
         let lines: Vec<_> = text.lines().collect();
         assert_eq!(
@@ -188,7 +209,7 @@ mod tests {
     #[test]
     fn equal_starts_have_no_plot() {
         let mut text = Vec::new();
-        write_starts(&[start(1.0, 2.0); 3], "test Z %", &mut text).unwrap();
+        write_starts(&[start(1.0, 2.0); 3], Combination::Best, "test Z %", &mut text).unwrap();
         assert_eq!(String::from_utf8(text).unwrap().lines().count(), 4);
     }
 }

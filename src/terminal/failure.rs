@@ -190,7 +190,7 @@ fn in_arguments(cure: &Cure) -> String {
         Cure::NameTimes => "name the columns of their times with --time and --join-time".to_owned(),
         Cure::NameJoinedTime => "name it with --join-time".to_owned(),
         Cure::GiveLimit => "give the limit with --join-limit".to_owned(),
-        Cure::GiveTestFiles => "give one --test-join for each --join".to_owned(),
+        Cure::GiveJoinedFiles => "give as many --test-join as --join".to_owned(),
         other => other.to_string(),
     }
 }
@@ -210,6 +210,7 @@ impl Failure {
                 | ImportError::TwoMeanings { .. }
                 | ImportError::NoColumns(_)
                 | ImportError::Condition { .. }
+                | ImportError::Memory(_)
                 | ImportError::Division(_),
             ) => 2,
             Self::Run(error) if is_argument_error(error) => 2,

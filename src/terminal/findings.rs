@@ -1,17 +1,21 @@
 //! Analysis of a recording in the terminal.
 
-use std::io::{self, Write};
+use std::{
+    io::{self, IsTerminal as _, Write, stderr},
+    time::Instant,
+};
 
 use clap::{
     Args,
     builder::{PossibleValuesParser, TypedValueParser},
 };
 use decoupler_core::{
-    dataset::Seed,
+    dataset::{Dataset, Memory, Seed, SplitBy},
     evaluation::{
         Channel, Measured, RunSettings, TargetErrors,
         recorded::{
-            ChannelImportance, Determinacy, Determination, Findings, FittedModel, Interval, LearningCurve, StudyStep,
+            ChannelImportance, Determinacy, Determination, Findings, FittedModel, Interval, LearningCurve, MemoryGain,
+            StudyStep,
         },
     },
     network::LARGEST_HIDDEN,
@@ -20,7 +24,7 @@ use decoupler_core::{
 };
 use decoupler_files::{
     export::{Cell, Table, describe_target, describe_warnings, format_number},
-    import::{Dropped, Plan, Recording},
+    import::{Dropped, ImportError, Plan, Recording},
 };
 use serde::Serialize;
 
@@ -47,6 +51,10 @@ pub(super) struct StudyArguments {
     /// it is better]
     #[arg(long, value_name = "ridge|network", value_parser = model())]
     model: Option<FittedModel>,
+    /// Time in seconds after which no more networks are trained and no more channels left out, for recordings of many
+    /// channels [default: 30; with --model, none]
+    #[arg(long, value_name = "SECONDS", value_parser = seconds)]
+    budget: Option<f64>,
     /// Seed of all random numbers [default: 0]
     #[arg(long, value_parser = seed)]
     seed: Option<u64>,
@@ -59,10 +67,22 @@ fn model() -> impl TypedValueParser<Value = FittedModel> {
     })
 }
 
+fn seconds(text: &str) -> Result<f64, String> {
+    let number = text.parse().ok().filter(|number| (0.0..1e9).contains(number));
+    number.ok_or_else(|| "give a number of seconds, for example 120".to_owned())
+}
+
+/// Budget in seconds if none is given.
+const BUDGET_S: f64 = 30.0;
+
 impl StudyArguments {
     /// Returns `true` if any of them is given.
     pub(super) fn are_given(&self) -> bool {
-        !self.inputs.is_empty() || self.hidden.is_some() || self.model.is_some() || self.seed.is_some()
+        !self.inputs.is_empty()
+            || self.hidden.is_some()
+            || self.model.is_some()
+            || self.budget.is_some()
+            || self.seed.is_some()
     }
 
     /// Measures and prints how well the readings of a recording determine its targets.
@@ -81,16 +101,74 @@ impl StudyArguments {
         let by = plan.division.by;
         let folds = import.folds.unwrap_or_else(|| by.folds_of(&recording.set, FOLDS));
         let bar = progress_bar(is_json, 4, "{bar:20} {msg}");
+        let begun = Instant::now();
         let begin = |stage: StudyStep| {
             bar.inc(1);
             bar.set_message(stage.to_string());
+            // The bar is not shown in a log.
+            if !stderr().is_terminal() {
+                // There is no one to report to if this fails.
+                let _ = writeln!(stderr(), "{:.0} s: {stage}", begun.elapsed().as_secs_f64());
+            }
         };
         let divided = (&plan.division, folds);
-        let found = Findings::measure(&settings, &recording.set, divided, self.model, &begin, &|| false);
+        let budget_s = self.budget.or(self.model.is_none().then_some(BUDGET_S));
+        let is_spent = || budget_s.is_some_and(|budget_s| begun.elapsed().as_secs_f64() > budget_s);
+        let ends: [&dyn Fn() -> bool; 2] = [&|| false, &is_spent];
+        let found = Findings::measure(&settings, &recording.set, divided, self.model, &begin, ends);
         bar.finish_and_clear();
         let Some(findings) = found? else { return Ok(()) };
-        Report::new(&plan, &recording, &settings, folds, &findings).print(is_json)
+        let gain = memory_gain(&settings, &recording, (by, folds))?;
+        let mut report = Report::new(&plan, &recording, &settings, folds, (&findings, gain.as_ref()));
+        if !findings.left_out.is_empty() {
+            let steps = Vec::from_iter(findings.left_out.iter().map(|step| left_out(*step)));
+            report.warnings.push(format!(
+                "the budget of {} s was spent, so these were left out: {}; --budget SECONDS changes it, and --model ridge \
+                 needs no networks",
+                format_number(budget_s),
+                steps.join("; ")
+            ));
+        }
+        report.print(is_json)
     }
+}
+
+/// Describes a step of the study that was left out.
+fn left_out(step: StudyStep) -> &'static str {
+    match step {
+        StudyStep::Folds => "the network (R² is that of ridge regression)",
+        StudyStep::OtherFolds => "the comparison with a random split",
+        StudyStep::Samples => "networks trained on fewer samples (ridge regression instead)",
+        StudyStep::Channels => "the importance of channels",
+        _ => "another step",
+    }
+}
+
+/// Measures whether the memory of the recording, or the usual one, reduces the held-out error of ridge regression; `None` for
+/// a recording that is too short for a memory.
+fn memory_gain(
+    settings: &RunSettings,
+    recording: &Recording,
+    divided: (SplitBy, usize),
+) -> Result<Option<MemoryGain>, Failure> {
+    let history = recording.history();
+    let given = recording.memory().cloned();
+    let memory = given.unwrap_or_else(|| MemoryGain::usual_memory(history));
+    if memory.is_empty() {
+        return Ok(None);
+    }
+    let set = |memory: &Memory| -> Result<Dataset, Failure> {
+        let features = history.features(memory).map_err(ImportError::from)?;
+        Ok(recording.set.with_readings(features))
+    };
+    let (without, with) = (set(&Memory::default())?, set(&memory)?);
+    Ok(MemoryGain::measure(
+        settings,
+        &memory,
+        [&without, &with],
+        divided,
+        &|| false,
+    )?)
 }
 
 /// The object printed by `inspect --targets --json`.
@@ -127,6 +205,9 @@ struct Target<'a> {
     network_to_ridge: Option<Figure>,
     /// RMSE of the network and of ridge with honest and with random folds.
     splits: Option<Splits>,
+    /// RMSE of ridge with a memory relative to that without.
+    with_memory: Option<Figure>,
+    memory_sentence: Option<String>,
     learning_curve: Vec<Point>,
     /// RMSE with twice the samples relative to that with all samples.
     with_twice_the_samples: Option<Figure>,
@@ -192,7 +273,7 @@ impl<'a> Report<'a> {
         recording: &'a Recording,
         settings: &RunSettings,
         folds: usize,
-        findings: &Findings,
+        (findings, gain): (&Findings, Option<&MemoryGain>),
     ) -> Self {
         let channels = &recording.inputs;
         let mut warnings = recording.warnings.clone();
@@ -215,7 +296,7 @@ impl<'a> Report<'a> {
             seed: settings.seed.0,
             model: name_of(findings.model),
             targets: targets
-                .map(|(index, channel)| Target::new(index, channel, findings))
+                .map(|(index, channel)| Target::new(index, channel, findings, gain))
                 .collect(),
             channels: findings.importance.iter().map(worth).collect(),
             warnings,
@@ -234,6 +315,7 @@ impl<'a> Report<'a> {
                 self.samples, self.folds, self.split
             )?;
             self.write_targets(out)?;
+            self.write_memory(out)?;
             self.write_splits(out)?;
             self.write_channels(out)?;
             self.write_curves(out)?;
@@ -258,6 +340,17 @@ impl<'a> Report<'a> {
                     String::new()
                 }
             )?;
+        }
+        writeln!(out)
+    }
+
+    fn write_memory(&self, out: &mut impl Write) -> io::Result<()> {
+        let sentences = Vec::from_iter(self.targets.iter().filter_map(|target| target.memory_sentence.as_ref()));
+        if sentences.is_empty() {
+            return Ok(());
+        }
+        for sentence in sentences {
+            writeln!(out, "{}", capitalised(sentence))?;
         }
         writeln!(out)
     }
@@ -330,7 +423,7 @@ impl<'a> Report<'a> {
 }
 
 impl<'a> Target<'a> {
-    fn new(index: usize, channel: &'a Channel, findings: &Findings) -> Self {
+    fn new(index: usize, channel: &'a Channel, findings: &Findings, gain: Option<&MemoryGain>) -> Self {
         let of = &findings.targets[index];
         let (best, name) = (of.best(), &channel.name);
         let r2 = |determination: Option<Determination>| determination.map(|of| of.r2.into());
@@ -360,6 +453,8 @@ impl<'a> Target<'a> {
                     sentence: comparison.sentence(index, name),
                 }
             }),
+            with_memory: gain.and_then(|gain| gain.ratios[index]).map(Figure::from),
+            memory_sentence: gain.map(|gain| gain.sentence(index, name)),
             learning_curve: points
                 .iter()
                 .map(|point| Point {

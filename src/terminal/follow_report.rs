@@ -14,8 +14,9 @@ use ndarray::ArrayView1;
 use serde_json::{Map, Value, json};
 
 use super::{
-    decode::{OutsideTraining, rows_read, write_heading},
+    decode::{OutsideTraining, rows_read, with_half_widths, write_heading},
     failure::Failure,
+    intervals::Drift,
 };
 
 /// Counts of decoded and bad lines, and messages on standard error.
@@ -142,6 +143,9 @@ pub(super) struct Answers<'a> {
     compiled: CompiledNetworks<f64>,
     rows: usize,
     answer: Vec<f64>,
+    /// Answers with the half-widths of their intervals.
+    values: Vec<f64>,
+    drift: Drift,
     outside: OutsideTraining<'a>,
     form: Form,
     has_heading: bool,
@@ -156,6 +160,8 @@ impl<'a> Answers<'a> {
             compiled: CompiledNetworks::new(&file.network, rows),
             rows,
             answer: vec![0.0; rows * file.problem.targets.len()],
+            values: Vec::new(),
+            drift: Drift::new(file),
             outside: OutsideTraining::new(&file.problem),
             form,
             has_heading: form == Form::Jsonl,
@@ -219,20 +225,24 @@ impl<'a> Answers<'a> {
             let of_row = self.outside.count(network, line, readings, answer);
             readings_outside = readings_outside.zip(of_row.readings).map(|(sum, count)| sum + count);
             targets_outside += of_row.targets;
+            self.drift.take(line, readings);
         }
         let problem = &self.file.problem;
         if !self.has_heading {
-            write_heading(problem, rows, &mut self.output)?;
+            write_heading(self.file, &[], rows, &mut self.output)?;
             self.has_heading = true;
         }
         let answer = &self.answer[..rows * outputs];
         match self.form {
-            Form::Csv => write_decoded(
-                ArrayView1::from(answer),
-                readings_outside,
-                targets_outside,
-                &mut self.output,
-            )?,
+            Form::Csv => {
+                with_half_widths(self.file, answer, &mut self.values);
+                write_decoded(
+                    ArrayView1::from(&self.values),
+                    readings_outside,
+                    targets_outside,
+                    &mut self.output,
+                )?;
+            }
             Form::Jsonl if problem.has_nodes => {
                 write!(self.output, "{{\"line\":{line},\"coordinates_mm\":[")?;
                 for (index, coordinate) in answer.iter().enumerate() {
@@ -252,12 +262,21 @@ impl<'a> Answers<'a> {
             Form::Jsonl => {
                 let targets = problem.targets.iter().zip(answer);
                 let targets = targets.map(|(target, value)| (target.name.clone(), (*value).into()));
-                let answer = json!({
+                let half_widths = problem.targets.iter().zip(answer).enumerate();
+                let half_widths = half_widths.filter_map(|(index, (target, value))| {
+                    let half_width = self.file.intervals.as_ref()?.half_width(index, *value)?;
+                    Some((target.name.clone(), half_width.into()))
+                });
+                let half_widths = half_widths.collect::<Map<String, Value>>();
+                let mut answer = json!({
                     "line": line,
                     "targets": targets.collect::<Map<String, Value>>(),
                     "readings_outside": readings_outside,
                     "targets_outside": targets_outside,
                 });
+                if !half_widths.is_empty() {
+                    answer["half_widths_90"] = half_widths.into();
+                }
                 writeln!(self.output, "{answer}")?;
             }
         }

@@ -2,12 +2,17 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 
-use super::{failure::Failure, interruption::check_same};
-use decoupler_core::dataset::{Division, SplitBy};
+use super::{
+    failure::Failure,
+    file_patterns::{expanded, file_sets},
+    interruption::check_same,
+};
+use decoupler_core::dataset::{Division, Memory, Span, SplitBy};
 use decoupler_files::{
     export::{RecipeFile, RecipeSource},
     import::{
-        Condition, Decimal, DialectChoice, Encoding, Joined, Missing, Plan, Recipe, Recorded, Separator, TestFiles,
+        Condition, Decimal, Derived, DialectChoice, Encoding, FileSet, Joined, Missing, Plan, Recipe, Recorded,
+        Separator, TestFiles,
     },
 };
 
@@ -36,15 +41,18 @@ pub(super) struct DialectArguments {
 #[derive(Args)]
 #[command(next_help_heading = "Recording")]
 pub(super) struct ImportArguments {
-    /// Use the samples of this file (CSV, .npy, .npz or .mat) instead of a simulated array
+    /// Use the samples of this file (CSV, Excel, .npy, .npz or .mat) instead of a simulated array; several files, a pattern
+    /// or a folder for one experiment
     ///
     /// A column is named as in the header, or c1, c2, … without one; c2..c16 is a range. --inputs and --targets name
-    /// columns, separated by commas.
-    #[arg(long, value_name = "FILE", conflicts_with = "recipe")]
-    pub(super) data: Option<PathBuf>,
+    /// columns, separated by commas. The rows of several files with the same columns follow one another; without --group,
+    /// each file is a group.
+    #[arg(long, value_name = "FILE", conflicts_with = "recipe", num_args = 1..)]
+    pub(super) data: Vec<PathBuf>,
     /// Join this file: by time (nearest row), or row by row without --time; its columns are prefixed with its stem, as in
-    /// states.c2; may be repeated
-    #[arg(long, value_name = "FILE", requires = "data")]
+    /// states.c2; may be repeated. With several files in --data, first those joined to the first, then those joined to the
+    /// second, and so on
+    #[arg(long, value_name = "FILE", requires = "data", num_args = 1..)]
     join: Vec<PathBuf>,
     /// Time column of a joined file, without its stem; once, or once for each --join [default: as --time]
     #[arg(long, value_name = "COLUMN", requires = "join")]
@@ -61,12 +69,27 @@ pub(super) struct ImportArguments {
     /// Column that groups samples with equal values, such as one press or session
     #[arg(long, value_name = "COLUMN", requires = "data")]
     group: Option<String>,
+    /// Inputs from the past: the readings of so many samples, or seconds, before each sample, such as 5,10,20 or 0.5s; within
+    /// a group and across no gap in time (over five usual intervals)
+    #[arg(long, value_name = "SPANS", value_delimiter = ',', requires = "data")]
+    lags: Vec<Span>,
+    /// Inputs from the past: exponential averages of the readings with these time constants, such as 0.1s,1s,10s, which need
+    /// --time, or 20,100 samples
+    #[arg(long, value_name = "SPANS", value_delimiter = ',', requires = "data")]
+    memory: Vec<Span>,
+    /// The past as its difference from the present reading; without --lags and --memory, from the sample before
+    #[arg(long, requires = "data")]
+    differences: bool,
     /// Column with the row number from 1
     #[arg(long, value_name = "COLUMN", requires = "data")]
     row_wire: Option<String>,
     /// Use only rows that meet this condition, for example "c4<145.1 and c5!=0"; may be repeated
     #[arg(long = "where", value_name = "CONDITION", requires = "data")]
     conditions: Vec<Condition>,
+    /// Add a column computed from others of the same file: a difference such as d=c1-c2, a ratio such as q=c1/c2, or either
+    /// with its own mean over the first seconds or rows, such as r=c1/start(2s) or r=c1-start(100); may be repeated
+    #[arg(long, value_name = "NAME=EXPRESSION", requires = "data")]
+    derive: Vec<Derived>,
     /// Number or text that marks a missing value, in all columns or in one, such as -1 or states.c5=-1; may be repeated
     #[arg(long, value_name = "[COLUMN=]VALUE", requires = "data")]
     missing: Vec<Missing>,
@@ -92,11 +115,11 @@ pub(super) struct ImportArguments {
     /// --method br, the default; else 0.2]
     #[arg(long, value_name = "SHARE", value_parser = share)]
     validation_fraction: Option<f64>,
-    /// File of the test samples, with the columns of --data
-    #[arg(long, value_name = "FILE")]
-    test_data: Option<PathBuf>,
+    /// File of the test samples, with the columns of --data; may be repeated, or be a pattern or a folder
+    #[arg(long, value_name = "FILE", num_args = 1..)]
+    test_data: Vec<PathBuf>,
     /// File joined to --test-data, corresponding to --join; may be repeated
-    #[arg(long, value_name = "FILE", requires = "test_data")]
+    #[arg(long, value_name = "FILE", requires = "test_data", num_args = 1..)]
     test_join: Vec<PathBuf>,
     /// Test on every sample by cross-validation with this many folds, divided by --split
     #[arg(long, value_name = "K", conflicts_with_all = ["test_fraction", "test_data"])]
@@ -156,7 +179,7 @@ impl DialectArguments {
 impl ImportArguments {
     /// Returns `true` if the samples come from files.
     pub(super) fn is_given(&self) -> bool {
-        self.data.is_some() || self.recipe.is_some()
+        !self.data.is_empty() || self.recipe.is_some()
     }
 
     /// Returns `true` if columns have roles, so that there are samples.
@@ -164,16 +187,20 @@ impl ImportArguments {
         !self.targets.is_empty() || self.recipe.is_some()
     }
 
-    /// The file, if no columns are selected.
+    /// The files, if no columns are selected.
     ///
     /// # Errors
     /// If there is no file, or an argument needs targets.
-    pub(super) fn only_file(&self) -> Result<&Path, Failure> {
+    pub(super) fn only_files(&self) -> Result<Vec<PathBuf>, Failure> {
         let given = [
             (!self.join.is_empty(), "--join"),
             (self.group.is_some(), "--group"),
             (self.row_wire.is_some(), "--row-wire"),
+            (!self.lags.is_empty(), "--lags"),
+            (!self.memory.is_empty(), "--memory"),
+            (self.differences, "--differences"),
             (!self.conditions.is_empty(), "--where"),
+            (!self.derive.is_empty(), "--derive"),
             (!self.missing.is_empty(), "--missing"),
             (!self.unit.is_empty(), "--unit"),
             (self.positions.is_some(), "--positions"),
@@ -181,14 +208,15 @@ impl ImportArguments {
             (self.split.is_some(), "--split"),
             (self.test_fraction.is_some(), "--test-fraction"),
             (self.validation_fraction.is_some(), "--validation-fraction"),
-            (self.test_data.is_some(), "--test-data"),
+            (!self.test_data.is_empty(), "--test-data"),
             (self.folds.is_some(), "--folds"),
         ];
         refuse(&given, |argument| format!("{argument} needs --inputs and --targets"))?;
-        let message = "--data: name the file to inspect";
-        self.data
-            .as_deref()
-            .ok_or_else(|| Failure::Arguments(message.to_owned()))
+        if self.data.is_empty() {
+            let message = "--data: name the file to inspect";
+            return Err(Failure::Arguments(message.to_owned()));
+        }
+        expanded("--data", &self.data)
     }
 
     /// Returns `true` if the validation share is given in an argument or a recipe.
@@ -202,7 +230,7 @@ impl ImportArguments {
             (self.split.is_some(), "--split"),
             (self.test_fraction.is_some(), "--test-fraction"),
             (self.validation_fraction.is_some(), "--validation-fraction"),
-            (self.test_data.is_some(), "--test-data"),
+            (!self.test_data.is_empty(), "--test-data"),
             (self.folds.is_some(), "--folds"),
             (self.dialect.choice() != DialectChoice::default(), "the layout of files"),
         ];
@@ -229,11 +257,16 @@ impl ImportArguments {
         ] {
             check_same(argument, column.as_ref(), saved.as_deref().unwrap_or("none"))?;
         }
+        if let Some(memory) = self.of_memory() {
+            let none = Memory::default();
+            check_same("memory", Some(memory), import.memory.clone().unwrap_or(none))?;
+        }
         let given = [
             (self.recipe.is_some(), "--recipe"),
             (!self.join_time.is_empty(), "--join-time"),
             (self.join_limit.is_some(), "--join-limit"),
             (!self.conditions.is_empty(), "--where"),
+            (!self.derive.is_empty(), "--derive"),
             (!self.missing.is_empty(), "--missing"),
             (!self.unit.is_empty(), "--unit"),
             (self.folds.is_some(), "--folds"),
@@ -281,22 +314,29 @@ impl ImportArguments {
     /// Given files, with their arguments and the corresponding files of `saved`.
     fn files<'a>(&'a self, saved: &'a Plan) -> Vec<(&'static str, &'a PathBuf, Option<&'a PathBuf>)> {
         let (import, test) = (&saved.import, saved.test.as_ref());
-        let joined = |place| import.join.get(place).map(|joined: &Joined| &joined.file);
-        let test_joined = |place| test.and_then(|test| test.join.get(place));
-        let data = self.data.iter().map(|file| ("--data", file, Some(&import.data)));
-        let join = self.join.iter().enumerate();
-        let join = join.map(|(place, file)| ("--join", file, joined(place)));
+        let joined = import.join.iter().map(|joined| &joined.file);
+        let joined = Vec::from_iter(joined.chain(import.append.iter().flat_map(|set| &set.join)));
+        let test_sets = test.iter().flat_map(|test| &test.append);
+        let tested = Vec::from_iter(
+            test.iter()
+                .map(|test| &test.data)
+                .chain(test_sets.clone().map(|set| &set.data)),
+        );
+        let test_joined = test.iter().flat_map(|test| &test.join);
+        let test_joined = Vec::from_iter(test_joined.chain(test_sets.flat_map(|set| &set.join)));
+        let all = [
+            ("--data", &self.data, Vec::from_iter(import.data_files())),
+            ("--join", &self.join, joined),
+            ("--test-data", &self.test_data, tested),
+            ("--test-join", &self.test_join, test_joined),
+        ];
+        let given = all.into_iter().flat_map(|(argument, given, saved)| {
+            let files = given.iter().enumerate();
+            files.map(move |(place, file)| (argument, file, saved.get(place).copied()))
+        });
         let positions = self.positions.iter();
         let positions = positions.map(|file| ("--positions", file, import.positions.as_ref()));
-        let test_data = self.test_data.iter();
-        let test_data = test_data.map(|file| ("--test-data", file, test.map(|test| &test.data)));
-        let test_join = self.test_join.iter().enumerate();
-        let test_join = test_join.map(|(place, file)| ("--test-join", file, test_joined(place)));
-        data.chain(join)
-            .chain(positions)
-            .chain(test_data)
-            .chain(test_join)
-            .collect()
+        given.chain(positions).collect()
     }
 
     /// The plan of a recording as in [`Self::plan`]; `None` if the source is a simulated array.
@@ -343,7 +383,7 @@ impl ImportArguments {
                     import: self.import(inputs, targets)?,
                     ..Plan::default()
                 };
-                if self.group.is_some() {
+                if plan.import.has_groups() {
                     plan.division.by = SplitBy::Group;
                 }
                 plan
@@ -364,14 +404,15 @@ impl ImportArguments {
             test_fraction: self.test_fraction.unwrap_or(test_fraction),
             validation_fraction: self.validation_fraction.unwrap_or(validation_fraction),
         };
-        if let Some(data) = &self.test_data {
-            plan.test = Some(TestFiles {
-                data: data.clone(),
-                join: self.test_join.clone(),
-            });
+        if !self.test_data.is_empty() {
+            let (data, join) = (
+                expanded("--test-data", &self.test_data)?,
+                expanded("--test-join", &self.test_join)?,
+            );
+            plan.test = TestFiles::of(file_sets("test-", data, join)?);
         }
-        if plan.division.by == SplitBy::Group && plan.import.group.is_none() {
-            let message = "--split group: give the group column with --group";
+        if plan.division.by == SplitBy::Group && !plan.import.has_groups() {
+            let message = "--split group: give the group column with --group, or several files with --data";
             return Err(Failure::Arguments(message.to_owned()));
         }
         Ok(plan)
@@ -384,30 +425,47 @@ impl ImportArguments {
                 return Err(Failure::Arguments(message));
             }
         }
-        if self.join_time.len() > 1 && self.join_time.len() != self.join.len() {
-            let message = "--join-time: give it once, or once for each --join";
+        let files = file_sets("", expanded("--data", &self.data)?, expanded("--join", &self.join)?)?;
+        let mut files = files.into_iter();
+        let FileSet { data, join } = files.next().unwrap_or_default();
+        if self.join_time.len() > 1 && self.join_time.len() != join.len() {
+            let message = "--join-time: give it once, or once for each joined file of the first --data";
             return Err(Failure::Arguments(message.to_owned()));
         }
-        let joined = |(number, file): (usize, &PathBuf)| Joined {
-            file: file.clone(),
+        let joined = |(number, file): (usize, PathBuf)| Joined {
+            file,
             stem: None,
             time: self.join_time.get(number).or(self.join_time.first()).cloned(),
             limit: self.join_limit,
         };
         Ok(Recipe {
-            data: self.data.clone().unwrap_or_default(),
-            join: self.join.iter().enumerate().map(joined).collect(),
+            data,
+            join: join.into_iter().enumerate().map(joined).collect(),
+            append: files.collect(),
             dialect: self.dialect.choice(),
             inputs: inputs.to_vec(),
             targets: targets.to_vec(),
             time: self.time.clone(),
             group: self.group.clone(),
             row_wire: self.row_wire.clone(),
+            memory: self.of_memory(),
             conditions: self.conditions.clone(),
+            derive: self.derive.clone(),
             missing: self.missing.clone(),
             units: self.unit.iter().cloned().collect(),
             positions: self.positions.clone(),
         })
+    }
+
+    /// Inputs from the past, if requested.
+    fn of_memory(&self) -> Option<Memory> {
+        let memory = Memory {
+            lags: self.lags.clone(),
+            averages: self.memory.clone(),
+            differences: self.differences,
+            interval_s: None,
+        };
+        (!memory.is_empty()).then_some(memory)
     }
 
     /// The recipe to use.

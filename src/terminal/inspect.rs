@@ -31,7 +31,7 @@ use super::{
 
 /// List the columns of a recording, and measure how well its readings determine targets
 ///
-/// Reads CSV, .npy, .npz and .mat. Each column has its name, unit, kind, range, number of missing cells and a histogram
+/// Reads CSV, Excel, .npy, .npz and .mat. Each column has its name, unit, kind, range, number of missing cells and a histogram
 /// over its range. The names are those that train --data takes. With --inputs and --targets (or --recipe), and with the
 /// arguments of train --data, it measures on held-out samples how well the readings determine each target, how optimistic
 /// a random split would be, how much each channel contributes and how much more samples would help, with confidence
@@ -51,9 +51,9 @@ pub(super) struct Inspect {
 struct Report<'a> {
     file: &'a Path,
     format: String,
-    dialect: Option<&'a Dialect>,
+    dialect: Option<Dialect>,
     #[serde(flatten)]
-    inspection: &'a Inspection,
+    inspection: Inspection,
 }
 
 impl Inspect {
@@ -61,36 +61,58 @@ impl Inspect {
         if self.study.are_given() || self.import.has_roles() {
             return self.study.run(&self.import, self.json);
         }
-        let data = self.import.only_file()?;
-        let (inspection, table) = with_bar(self.json, |watch| {
-            Inspection::read(data, self.import.dialect.choice(), self.import.time.as_deref(), watch)
-        })?;
-        if self.json {
-            return print_object(&Report {
-                file: data,
+        let files = self.import.only_files()?;
+        let mut reports = Vec::new();
+        for file in &files {
+            let (inspection, table) = with_bar(self.json, |watch| {
+                Inspection::read(file, self.import.dialect.choice(), self.import.time.as_deref(), watch)
+            })?;
+            reports.push(Report {
+                file,
                 format: table.format.to_string(),
-                dialect: table.dialect(),
-                inspection: &inspection,
+                dialect: table.dialect().copied(),
+                inspection,
             });
         }
-        print(|out| {
-            writeln!(
-                out,
-                "{}: {} × {}",
-                data.display(),
-                counted(inspection.rows, "row"),
-                counted(inspection.columns.len(), "column")
-            )?;
-            writeln!(out, "{}\n", table.format)?;
-            write!(out, "{}", columns_table(&inspection.columns).aligned())?;
-            if let Some(time) = &inspection.time {
-                write_time(time, out)?;
-            }
-            inspection
-                .warnings
-                .iter()
-                .try_for_each(|warning| writeln!(out, "Warning: {warning}"))
-        })
+        match &reports[..] {
+            [report] if self.json => print_object(report),
+            reports if self.json => print_object(&Reports { files: reports }),
+            reports => print(|out| {
+                for (number, report) in reports.iter().enumerate() {
+                    if number > 0 {
+                        writeln!(out)?;
+                    }
+                    report.write(out)?;
+                }
+                Ok(())
+            }),
+        }
+    }
+}
+
+/// Reports on several files, as JSON.
+#[derive(Serialize)]
+struct Reports<'a> {
+    files: &'a [Report<'a>],
+}
+
+impl Report<'_> {
+    fn write(&self, out: &mut impl Write) -> io::Result<()> {
+        let inspection = &self.inspection;
+        writeln!(
+            out,
+            "{}: {} × {}",
+            self.file.display(),
+            counted(inspection.rows, "row"),
+            counted(inspection.columns.len(), "column")
+        )?;
+        writeln!(out, "{}\n", self.format)?;
+        write!(out, "{}", columns_table(&inspection.columns).aligned())?;
+        if let Some(time) = &inspection.time {
+            write_time(time, out)?;
+        }
+        let mut warnings = inspection.warnings.iter();
+        warnings.try_for_each(|warning| writeln!(out, "Warning: {warning}"))
     }
 }
 
@@ -106,6 +128,10 @@ fn columns_table(columns: &[ColumnSummary]) -> Table {
         let number = |number: Option<f64>| number.map_or("–".to_owned(), plain);
         let notes = [
             column.is_constant.then(|| "constant".to_owned()),
+            column.is_rounding.then(|| "constant but for rounding".to_owned()),
+            column
+                .sentinel
+                .map(|found| format!("{} × {}: none?", found.cells, found.value)),
             column.duplicate_of.as_ref().map(|other| format!("the same as {other}")),
             column.first_text.as_ref().map(|(line, text)| {
                 format!(

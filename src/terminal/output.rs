@@ -15,7 +15,7 @@ use decoupler_core::{
 };
 use decoupler_files::{
     export::NetworkFile,
-    import::{InputTable, Recipe},
+    import::{InputTable, KeptColumn, Recipe},
 };
 use indicatif::{ProgressBar, ProgressStyle};
 use ndarray::Array2;
@@ -58,6 +58,8 @@ pub(super) struct Readings {
     pub(super) lines: Vec<u64>,
     /// Index of the row-wire of each line among those that the network reads; 0 if one network reads all.
     pub(super) row_indices: Vec<usize>,
+    /// Columns copied to the output.
+    pub(super) kept: Vec<KeptColumn>,
 }
 
 /// Reads the file `input` for the network of `file` and passes its lines to `take`, block by block.
@@ -76,13 +78,12 @@ pub(super) fn read(
 /// Reads the columns named like the inputs, or as many unnamed columns as there are inputs, from a file of any format.
 fn read_columns(file: &NetworkFile, recipe: &Recipe, input: &Path) -> Result<Readings, Failure> {
     let has_rows = file.network.only().is_none();
-    let table = with_bar(true, |watch| {
-        recipe.read_inputs(input, &file.problem.inputs, has_rows, watch)
-    })?;
+    let table = with_bar(true, |watch| recipe.read_inputs(input, &file.problem, has_rows, watch))?;
     let InputTable {
         readings,
         row_wires,
         lines,
+        kept,
     } = table;
     let row_indices = match (row_wires, &file.row_wires) {
         _ if !has_rows => vec![0; lines.len()],
@@ -108,6 +109,7 @@ fn read_columns(file: &NetworkFile, recipe: &Recipe, input: &Path) -> Result<Rea
         values: readings,
         lines,
         row_indices,
+        kept,
     })
 }
 
@@ -167,6 +169,7 @@ fn read_resistances(
             values: resistances_ohm,
             lines,
             row_indices,
+            kept: Vec::new(),
         })?;
     }
     if is_empty {

@@ -10,12 +10,16 @@ use clap::Args;
 use decoupler_core::{
     dataset::{Dataset, LARGEST_SAMPLES, Seed, SimulationError, Stream},
     decoupling::{Decoder, Precision, decode_set},
-    evaluation::{DecoderSet, Run, RunError, RunSettings, SimulatedSettings, Simulation, Workload, error_remarks},
+    evaluation::{
+        DecoderSet, RecordedSize, Run, RunError, RunSettings, SimulatedSettings, Simulation, Workload, error_remarks,
+    },
     scene::{Fault, FaultySensor},
     sensor::{ArrayScale, SensorModel},
 };
 use decoupler_files::{
-    export::{AtomicFile, WriteError, describe_workload, write_samples, write_samples_header},
+    export::{
+        AtomicFile, WriteError, describe_recorded_workload, describe_workload, write_samples, write_samples_header,
+    },
     import::{Progress, Setup, SetupError, SetupSets},
 };
 
@@ -69,6 +73,18 @@ pub(super) fn announce(settings: &RunSettings) -> Result<(), RunError> {
     match settings.simulated() {
         Some(settings) => announce_workload(&Workload::of(&settings)?),
         None => Ok(()),
+    }
+}
+
+/// Reports on standard error how long a training on a recording will take, if it is long.
+pub(super) fn announce_recording(setup: &Setup, sets: &SetupSets) {
+    let settings = setup.settings();
+    let size = RecordedSize::of(settings, &sets.sets.split.training);
+    if setup.plan().is_some()
+        && let Some(text) = describe_recorded_workload(settings, size)
+    {
+        // There is no one to report to if this fails.
+        let _ = writeln!(stderr(), "{text}");
     }
 }
 

@@ -30,7 +30,7 @@ pub(super) struct SceneArguments {
     inputs: Vec<String>,
     /// Scaling of the inputs: each to its range, or whitened principal components
     #[arg(long, value_name = "minmax|whiten")]
-    scaling: Option<ScalingChoice>,
+    pub(super) scaling: Option<ScalingChoice>,
     /// Noise of each reading (standard deviation), relative to the reading
     #[arg(long, value_name = "REL", value_parser = number, value_delimiter = ',')]
     pub(super) noise: Vec<f64>,

@@ -228,9 +228,7 @@ impl Trade {
             false,
         ])?;
         settings.seed = Seed(self.seed);
-        let training = &mut settings.training;
-        training.stopping.epochs = self.epochs.unwrap_or(training.stopping.epochs);
-        let default = training.method;
+        let default = settings.training.method;
         let mut decoders = self.scene.decoders();
         decoders.retain(|kind| !kind.needs_sensor());
         let methods = if self.method.is_empty() {
@@ -240,10 +238,9 @@ impl Trade {
         };
         let case = |(number, method): (usize, &Method)| {
             let mut settings = settings;
-            // The default method has settings that suit recordings.
-            if method.short_name() != default.short_name() {
-                settings.training.method = *method;
-            }
+            settings.choose_method(*method);
+            let stopping = &mut settings.training.stopping;
+            stopping.epochs = self.epochs.unwrap_or(stopping.epochs);
             let mut plan = plan.clone();
             if !self.import.holds_out() {
                 plan.division.validation_fraction = settings.validation_fraction();

@@ -10,14 +10,15 @@ use super::{
     failure::{Failure, Interruption},
     import_arguments::ImportArguments,
     interruption::{CheckpointArguments, Checkpointing, Graceful},
+    intervals::{WhenCalibrated, calibrate},
     output::progress_bar,
-    samples::{announce, following, sets},
+    samples::{announce, announce_recording, following, sets, working_folder},
     train_report::Trained,
     training_arguments::TrainingArguments,
 };
 use decoupler_core::{
     decoupling::DecoderKind,
-    evaluation::{DecoderReport, DecoderSet, Run, RunError, Source},
+    evaluation::{DecoderReport, DecoderSet, Run, RunError, Source, auto::DEFAULT_BUDGET_S},
     training::TrainingSettings,
 };
 use decoupler_files::{
@@ -25,7 +26,7 @@ use decoupler_files::{
         CheckpointFile, NetworkFile, SensorFile, check_writable, format_number, is_same,
         report::{RunReport, quoted},
     },
-    import::{Setup, SetupError, SetupSets},
+    import::{ChoosingProgress, Setup, SetupError, SetupSets},
 };
 
 /// Train a network and print its errors
@@ -33,7 +34,8 @@ use decoupler_files::{
 /// Draws samples of the array, trains, and compares the network on its test samples with the mean of the training set,
 /// with the best linear map, with other decoders, with the minimum error achievable in the scene (the reference), and
 /// with the published figures, if any. With --data it trains on the samples of a recording, and compares the network with
-/// the mean, with ridge regression and with other decoders, target by target. Ctrl-C stops after the epoch, keeps the
+/// the mean, with ridge regression and with other decoders, target by target; unless settings of the training are given,
+/// they are first chosen by cross-validation on the training samples (--hidden auto). Ctrl-C stops after the epoch, keeps the
 /// best network so far, and ends with status 130; a second Ctrl-C ends at once.
 #[derive(Args)]
 #[command(allow_negative_numbers = true)]
@@ -53,6 +55,14 @@ pub(super) struct Train {
     /// File for a report with errors, figures, settings and the command that repeats the run, as one HTML page
     #[arg(long, value_name = "FILE")]
     pub(super) report: Option<PathBuf>,
+    /// Time on one core that a choice of settings (--hidden auto) may take, estimated from its work, so that it gives the
+    /// same choice on every machine [default: 60]
+    #[arg(long, value_name = "SECONDS", value_parser = budget)]
+    budget: Option<f64>,
+    /// When to calibrate the 90 % prediction intervals of a recording's targets, by cross-validation of the training
+    /// samples, which takes four times as long as the training: auto if that is at most a minute
+    #[arg(long, value_name = "WHEN", default_value = "auto")]
+    pub(super) intervals: WhenCalibrated,
     /// Print one JSON object instead of text and progress
     #[arg(long)]
     pub(super) json: bool,
@@ -68,16 +78,31 @@ impl Train {
             None => {
                 let setup = self.setup()?;
                 if let Some(folds) = self.import.folds {
+                    self.training
+                        .refuse_auto("--folds measures the same settings in every fold")?;
                     return self.cross_validate(&setup, folds);
                 }
-                let sets = sets(&setup, self.json)?;
+                let (setup, sets) = match self.chooses(&setup)? {
+                    true => self.choose(&setup)?,
+                    false => {
+                        let sets = sets(&setup, self.json)?;
+                        (setup, sets)
+                    }
+                };
                 self.import.save_recipe(&setup)?;
+                announce_recording(&setup, &sets);
                 let run = sets.run(&setup, &|| false)?.expect("nothing cancels it");
                 (run, sets)
             }
         };
         let mut end = self.train(&mut run, self.checkpoint.checkpointing(sets.recorded()));
-        let file = NetworkFile::from_run(&run, sets.recorded())?;
+        if end.is_ok()
+            && let Err(error) = calibrate(&mut run, &sets, self.intervals)
+        {
+            end = Err(error.into());
+        }
+        let mut file = NetworkFile::from_run(&run, sets.recorded())?;
+        file.drift = sets.drift_reference();
         // The figures are printed even if something fails from here on.
         let saved = self.out.as_ref().map_or(Ok(()), |path| file.save(path));
         let (mut decoders, mut optimism, mut measured) = (Vec::new(), Vec::new(), Ok(()));
@@ -124,6 +149,44 @@ impl Train {
             }
             _ => Ok(setup),
         }
+    }
+
+    /// Returns `true` if the settings of the run are to be chosen.
+    ///
+    /// # Errors
+    /// If this is requested but not possible, or a budget is given for nothing.
+    fn chooses(&self, setup: &Setup) -> Result<bool, Failure> {
+        if !setup.can_choose() {
+            self.training
+                .refuse_auto("settings are chosen for a recording (--data) with one network for all rows")?;
+        }
+        let chooses = setup.can_choose() && self.training.is_auto();
+        if self.budget.is_some() && !chooses {
+            let message = "--budget: it is for a choice of settings; give --data and --hidden auto, or leave it out";
+            return Err(Failure::Arguments(message.to_owned()));
+        }
+        Ok(chooses)
+    }
+
+    /// Chooses the settings of `setup`, with a progress bar of the budget.
+    fn choose(&self, setup: &Setup) -> Result<(Setup, SetupSets), Failure> {
+        let bar = progress_bar(self.json, 100, "{bar:20} {msg}");
+        let chosen = setup.choose(
+            &self.training.fixed(setup.settings()),
+            self.budget.unwrap_or(DEFAULT_BUDGET_S),
+            working_folder(),
+            &|| false,
+            &mut |progress| match progress {
+                ChoosingProgress::Reading(_) => bar.set_message("Reading the recording"),
+                ChoosingProgress::Trying(progress) => {
+                    bar.set_position((100.0 * progress.share) as u64);
+                    bar.set_message(progress.to_string());
+                }
+            },
+        );
+        bar.finish_and_clear();
+        let chosen = chosen?.expect("nothing cancels it");
+        Ok((chosen.setup, chosen.sets))
     }
 
     /// Decoders to measure: those given, by default all for a simulated array and none for a recording.
@@ -264,6 +327,11 @@ impl Train {
         }
         command
     }
+}
+
+fn budget(text: &str) -> Result<f64, String> {
+    let seconds = text.parse().ok().filter(|seconds| (1.0..=86_400.0).contains(seconds));
+    seconds.ok_or_else(|| "give seconds from 1 to 86400, for example 60".to_owned())
 }
 
 /// Returns the first failure, and prints the others.

@@ -10,13 +10,16 @@ use super::{
     errors_report::{ErrorsReport, Target, targets, write_starts},
     failure::Failure,
     inspect::{RecordingReport, import_warnings, write_warnings},
+    intervals::describe_coverage,
     output::{print, print_object},
 };
 use decoupler_core::{
     evaluation::{
-        Baselines, Channel, DecoderReport, Errors, Outlook, ReferenceNote, Run, RunError, SimulatedSettings,
-        StartRecord, TestErrors, best_start, error_remarks,
-        recorded::{Determination, HysteresisLoop, Undetermined},
+        Baselines, Channel, Combination, DecoderReport, Errors, Outlook, Problem, ReferenceNote, Run, RunError,
+        SimulatedSettings, StartRecord, TestErrors,
+        auto::AutoRecord,
+        best_start, error_remarks,
+        recorded::{Determination, Extrapolation, HysteresisLoop, Undetermined},
     },
     network::InputChoice,
     scene::{Noise, NoisySets, Scene},
@@ -26,10 +29,10 @@ use decoupler_core::{
 };
 use decoupler_files::{
     export::{
-        NetworkFile, TrainingRecord, decoder_table, describe_determinacy, describe_worse_than_ridge, error_table,
-        format_duration,
+        NetworkFile, TrainingRecord, decoder_table, describe_determinacy, describe_search, describe_worse_than_ridge,
+        error_table, format_duration, search_table,
     },
-    import::SetupSets,
+    import::{Recording, SetupSets},
 };
 
 /// A trained network and its measured errors.
@@ -51,12 +54,16 @@ struct Report<'a> {
     method: &'static str,
     seed: u64,
     starts: &'a [StartRecord],
+    combine: Combination,
     epochs: usize,
     best_epoch: usize,
     stop_reason: Option<StopReason>,
     networks: usize,
     weights: usize,
     warnings: Vec<String>,
+    /// What was tried to choose the settings, if they were chosen.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    search: Option<&'a AutoRecord>,
     /// Other decoders; absent for a recording if none was requested.
     #[serde(skip_serializing_if = "Option::is_none")]
     decoders: Option<BTreeMap<String, Decoder<'a>>>,
@@ -98,6 +105,8 @@ struct RecordingFigures<'a> {
     #[serde(flatten)]
     recording: RecordingReport,
     seconds: Option<f64>,
+    /// Share of the test samples outside the range of the training samples.
+    test_outside_training: f64,
     targets: Vec<Target<'a>>,
     baselines: BTreeMap<&'static str, Vec<Target<'a>>>,
     /// Errors of loading and unloading for each target; none if it does not rise and fall, or the order in time is lost.
@@ -216,11 +225,15 @@ impl<'a> Trained<'a> {
         let source = match (&self.sets.recordings, settings.simulated()) {
             (Some(recordings), _) => SourceReport::Recording(Box::new(RecordingFigures {
                 recording: RecordingReport::new(&self.sets.sets, recordings),
+                test_outside_training: self.extrapolation().map_or(0.0, |(found, _)| found.share()),
                 seconds: self.run.wall_time().map(|time| time.as_secs_f64()),
-                targets: targets(&file.problem.targets, &scores.network, &determined),
+                targets: targets(&file.problem.targets, &scores.network, &determined, &scores.coverage),
                 baselines: BTreeMap::from([
-                    ("mean", targets(&file.problem.targets, &scores.baselines.mean, &[])),
-                    ("ridge", targets(&file.problem.targets, &scores.baselines.linear, &[])),
+                    ("mean", targets(&file.problem.targets, &scores.baselines.mean, &[], &[])),
+                    (
+                        "ridge",
+                        targets(&file.problem.targets, &scores.baselines.linear, &[], &[]),
+                    ),
                 ]),
                 hysteresis: self.loops(),
             })),
@@ -235,12 +248,14 @@ impl<'a> Trained<'a> {
             method: settings.training.method.short_name(),
             seed: settings.seed.0,
             starts: &training.starts,
+            combine: settings.combine,
             epochs: epochs(training),
             best_epoch: training.best_epoch,
             stop_reason: training.stop_reason,
             networks: file.network.values().len(),
             weights: file.network.weights(),
             warnings: self.warnings(&determined),
+            search: search(file),
             decoders: has_decoders.then(|| self.decoders.iter().map(decoder).collect()),
         })
     }
@@ -263,25 +278,33 @@ impl<'a> Trained<'a> {
         HysteresisLoop::of_test(self.run.test(), self.run.decouple_test().view(), by)
     }
 
+    /// Test samples of a recording outside the range of its training samples.
+    fn extrapolation(&self) -> Option<(Extrapolation, &Recording)> {
+        let recordings = self.sets.recordings.as_ref()?;
+        let found = Extrapolation::measure(&self.sets.sets.split.training, self.run.test());
+        Some((found, &recordings.training))
+    }
+
     /// Warnings of the source and of the training.
     fn warnings(&self, determined: &[Result<Determination, Undetermined>]) -> Vec<String> {
         let source = self.file.settings.simulated().map(|settings| settings.source);
-        let NetworkFile {
-            problem,
-            scores,
-            settings,
-            ..
-        } = self.file;
+        let NetworkFile { problem, scores, .. } = self.file;
         let outlook = source.and_then(|source| Outlook::of(&source).ok());
         let of_array = outlook.iter().flat_map(|outlook| &outlook.warnings);
         let of_import = self.sets.recordings.as_ref().map(import_warnings);
         of_array
             .map(ToString::to_string)
             .chain(of_import.into_iter().flatten())
+            .chain(
+                self.extrapolation()
+                    .and_then(|(found, recording)| found.warning(&recording.inputs, &recording.targets)),
+            )
+            .chain(search(self.file).and_then(AutoRecord::remark))
             .chain(self.optimism.iter().cloned())
             .chain(self.run.defect().map(|defect| defect.to_string()))
             .chain(describe_determinacy(&self.file.problem.targets, determined))
             .chain(describe_worse_than_ridge(problem, scores))
+            .chain(describe_coverage(&problem.targets, &scores.coverage))
             .collect()
     }
 
@@ -306,12 +329,15 @@ impl<'a> Trained<'a> {
             (None, Some(settings)) => write_array(file, &settings, out)?,
             (None, None) => unreachable!("sets are recorded or simulated"),
         }
+        if let Some(record) = search(file) {
+            writeln!(out, "\n{}\n{}", describe_search(record), search_table(record).aligned())?;
+        }
         let first = training.stages.first();
         let method = first.map_or(settings.training.method, |stage| stage.method);
         writeln!(
             out,
             "{}, {}, {method}, {}, seed {}",
-            counted(file.problem.inputs.len(), "input"),
+            inputs(&file.problem),
             counted(settings.hidden, "hidden node"),
             counted(settings.starts, "start"),
             settings.seed
@@ -332,7 +358,12 @@ impl<'a> Trained<'a> {
         )?;
         writeln!(out, "Weights kept from epoch {}\n", training.best_epoch)?;
         if training.starts.len() > 1 {
-            write_starts(&training.starts, file.problem.test_percent_name(), out)?;
+            write_starts(
+                &training.starts,
+                settings.combine,
+                file.problem.test_percent_name(),
+                out,
+            )?;
             writeln!(out)?;
         }
         let loops = self.loops();
@@ -398,6 +429,11 @@ impl<'a> Trained<'a> {
     }
 }
 
+/// Record of the choice of settings, if they were chosen.
+fn search(file: &NetworkFile) -> Option<&AutoRecord> {
+    file.recorded.as_ref()?.search.as_ref()
+}
+
 fn epochs(training: &TrainingRecord) -> usize {
     training.history.last().map_or(0, |record| record.epoch)
 }
@@ -408,6 +444,18 @@ fn epoch_seconds(training: &TrainingRecord) -> f64 {
 }
 
 /// Condition number of the worst row; none if the Jacobian is singular.
+/// Number of inputs of the network, with the memory if there is one.
+fn inputs(problem: &Problem) -> String {
+    let count = counted(problem.feature_count(), "input");
+    match &problem.memory {
+        Some(memory) => format!(
+            "{count} ({} and their memory: {memory})",
+            counted(problem.inputs.len(), "reading")
+        ),
+        None => count,
+    }
+}
+
 fn condition(outlook: Option<&Outlook>) -> Option<f64> {
     let condition = outlook?.worst_row.condition();
     Some(condition).filter(|condition| condition.is_finite())

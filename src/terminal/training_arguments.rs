@@ -6,7 +6,9 @@ use clap::{
 use super::{count, failure::Failure, interruption::check_same, number, scene_arguments::SceneArguments, seed};
 use decoupler_core::{
     dataset::{LARGEST_SAMPLES, Seed},
-    evaluation::{MAX_STARTS, RunSettings, SimulatedSettings, Simulation, Source},
+    evaluation::{
+        Combination, Initialization, MAX_STARTS, RunSettings, SimulatedSettings, Simulation, Source, auto::AutoFixed,
+    },
     network::LARGEST_HIDDEN,
     sensor::{ArrayScale, SensorModel},
     training::{Method, StoppingRules, TrainingSettings},
@@ -21,24 +23,36 @@ pub(super) struct TrainingArguments {
     /// Array scale M1xM2_M3xM4: rows x nodes on each, nodes on each column x columns [default: 10x10_5x30]
     #[arg(long, value_name = "SCALE")]
     array: Option<ArrayScale>,
-    /// Hidden nodes [default: 12]
-    #[arg(long, value_name = "N", value_parser = count(1..=LARGEST_HIDDEN))]
-    hidden: Option<usize>,
-    /// Number of trainings from different random weights; the one with the lowest validation error is kept [default: 1]
+    /// Hidden nodes. For a recording, auto chooses them, the memory, the method, its epochs and a committee by
+    /// cross-validation on the training samples; what else is given here is kept. It is the default for a recording if
+    /// none of --hidden, --starts, --combine, --begin, --method, --set, --epochs, --goal, --max-fail and --min-gradient is given
+    /// [default: 12; auto for a recording]
+    #[arg(long, value_name = "N|auto", value_parser = hidden_nodes)]
+    hidden: Option<HiddenNodes>,
+    /// Number of trainings from different random weights, which --combine makes one network [default: 1]
     #[arg(long, value_name = "N", value_parser = count(1..=MAX_STARTS))]
     starts: Option<usize>,
+    /// How several starts become one network: best keeps the one with the lowest validation error, mean averages their
+    /// answers [default: best]
+    #[arg(long, value_name = "best|mean")]
+    combine: Option<Combination>,
+    /// Weights with which a training begins: random, or ridge regression with random weights added [default: random]
+    #[arg(long, value_name = "random|ridge")]
+    begin: Option<Initialization>,
     /// Training method [default: lm; br for a recording]
     #[arg(long, value_parser = method())]
     method: Option<Method>,
     #[arg(long = "set", value_name = "NAME=VALUE", value_parser = assignment, help = settings_help())]
     set: Vec<(String, f64)>,
-    /// Maximum number of epochs [default: 1000; 300 for a recording]
+    /// Maximum number of epochs [default: 1000; for a recording 300, or 2000 with a method that follows gradients (scg,
+    /// rp, gd…)]
     #[arg(long, value_name = "N", value_parser = count(1..=StoppingRules::MAX_EPOCHS))]
     epochs: Option<usize>,
     /// Training error (mse, scaled) at which training ends [default: 0]
     #[arg(long, value_name = "MSE", value_parser = number)]
     goal: Option<f64>,
-    /// Validation failures, epochs without a new best validation error, that end training [default: 6]
+    /// Validation failures, epochs without a new best validation error, that end training [default: 6; 100
+    /// for a recording with a method that follows gradients]
     #[arg(long, value_name = "N", value_parser = count(1..=StoppingRules::MAX_EPOCHS))]
     max_fail: Option<usize>,
     /// Norm of the gradient below which training ends [default: 1e-7]
@@ -58,7 +72,72 @@ pub(super) struct TrainingArguments {
     seed: Option<u64>,
 }
 
+/// Number of hidden nodes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum HiddenNodes {
+    /// Chosen by cross-validation, together with other settings.
+    Auto,
+    /// Given.
+    Count(usize),
+}
+
+fn hidden_nodes(text: &str) -> Result<HiddenNodes, String> {
+    match text {
+        "auto" => Ok(HiddenNodes::Auto),
+        _ => count(1..=LARGEST_HIDDEN)(text).map(HiddenNodes::Count),
+    }
+}
+
 impl TrainingArguments {
+    /// Number of hidden nodes, if it is given.
+    fn hidden(&self) -> Option<usize> {
+        match self.hidden? {
+            HiddenNodes::Auto => None,
+            HiddenNodes::Count(count) => Some(count),
+        }
+    }
+
+    /// Returns `true` if the settings of a training on a recording are to be chosen: on request, or if none is given.
+    pub(super) fn is_auto(&self) -> bool {
+        let is_any_given = self.hidden.is_some()
+            || self.starts.is_some()
+            || self.combine.is_some()
+            || self.begin.is_some()
+            || self.method.is_some()
+            || !self.set.is_empty()
+            || self.epochs.is_some()
+            || self.goal.is_some()
+            || self.max_fail.is_some()
+            || self.min_gradient.is_some();
+        self.asks_for_auto() || !is_any_given
+    }
+
+    /// Returns `true` if `--hidden auto` is given.
+    pub(super) fn asks_for_auto(&self) -> bool {
+        self.hidden == Some(HiddenNodes::Auto)
+    }
+
+    /// Given settings, which a choice keeps; `settings` are those of the run.
+    pub(super) fn fixed(&self, settings: &RunSettings) -> AutoFixed {
+        let is_method_given = self.method.is_some() || !self.set.is_empty();
+        AutoFixed {
+            hidden: self.hidden(),
+            method: is_method_given.then_some(settings.training.method),
+            epochs: self.epochs,
+            starts: self.starts,
+            scaling: self.scene.scaling,
+            memory: None,
+        }
+    }
+
+    /// Refuses `--hidden auto` where settings cannot be chosen.
+    pub(super) fn refuse_auto(&self, reason: &str) -> Result<(), Failure> {
+        if self.asks_for_auto() {
+            return Err(Failure::Arguments(format!("--hidden auto: {reason}; give a number")));
+        }
+        Ok(())
+    }
+
     /// Settings of a new run on a simulated array.
     pub(super) fn settings(&self) -> Result<SimulatedSettings, Failure> {
         self.settings_on(None)
@@ -67,6 +146,7 @@ impl TrainingArguments {
     /// Settings of a new run with the given arguments on this simulated array, by default that of the preset.
     fn settings_on(&self, simulation: Option<Simulation>) -> Result<SimulatedSettings, Failure> {
         self.scene.check_one_noise()?;
+        self.refuse_auto("settings are chosen for a recording (--data)")?;
         let default = match simulation {
             Some(simulation) => self.scene.settings_on(simulation)?,
             None => self.scene.settings()?,
@@ -80,8 +160,10 @@ impl TrainingArguments {
                 test_samples: self.test_samples.unwrap_or(source.test_samples),
                 ..source
             },
-            hidden: self.hidden.unwrap_or(default.hidden),
+            hidden: self.hidden().unwrap_or(default.hidden),
             starts: self.starts.unwrap_or(default.starts),
+            combine: self.combine.unwrap_or(default.combine),
+            initialization: self.begin.unwrap_or(default.initialization),
             training: self.training(default.training)?,
             seed: self.seed.map_or(default.seed, Seed),
             ..default
@@ -105,10 +187,15 @@ impl TrainingArguments {
 
     /// Settings of a new run on a recording.
     fn recorded(&self, has_row_wires: bool) -> Result<RunSettings, Failure> {
-        let default = self.recorded_source(has_row_wires)?;
+        let mut default = self.recorded_source(has_row_wires)?;
+        if let Some(method) = self.method {
+            default.choose_method(method);
+        }
         Ok(RunSettings {
-            hidden: self.hidden.unwrap_or(default.hidden),
+            hidden: self.hidden().unwrap_or(default.hidden),
             starts: self.starts.unwrap_or(default.starts),
+            combine: self.combine.unwrap_or(default.combine),
+            initialization: self.begin.unwrap_or(default.initialization),
             training: self.training(default.training)?,
             seed: self.seed.map_or(default.seed, Seed),
             ..default
@@ -168,8 +255,10 @@ impl TrainingArguments {
                 )?;
             }
         }
-        check_same("hidden", self.hidden, settings.hidden)?;
+        check_same("hidden", self.hidden(), settings.hidden)?;
         check_same("starts", self.starts, settings.starts)?;
+        check_same("begin", self.begin, settings.initialization)?;
+        check_same("combine", self.combine, settings.combine)?;
         check_same("seed", self.seed, settings.seed)?;
         self.training(settings.training)
     }
@@ -252,10 +341,19 @@ fn dashed(name: &str) -> String {
 
 fn settings_help() -> String {
     let of = |mut method: Method| {
+        let mut recorded = method;
+        if method == Method::bayesian_regularization() {
+            recorded = Method::recorded_regularization();
+        }
         let settings = method.settings();
-        let list = settings
-            .iter()
-            .map(|setting| format!("{} (default {})", dashed(setting.name), setting.default));
+        let list = settings.iter().zip(recorded.settings()).map(|(setting, recorded)| {
+            let (name, default, recorded) = (dashed(setting.name), setting.default, *recorded.value);
+            if recorded == default {
+                format!("{name} (default {default})")
+            } else {
+                format!("{name} (default {default}; {recorded} for a recording)")
+            }
+        });
         let list = list.collect::<Vec<_>>().join(", ");
         format!("{} has {list}", method.short_name())
     };
@@ -295,13 +393,20 @@ mod tests {
         // Naming the default method keeps its settings for recordings.
         assert_eq!(recorded("train --method br"), default);
         let given = recorded(
-            "train --method br --set correlation-epoch=0 --set groups-of-weights=1 --epochs 7 --starts 2 --hidden 3 --seed 4",
+            "train --method br --set own-noise=0 --set groups-of-weights=1 --epochs 7 --starts 2 --hidden 3 --seed 4",
         );
         assert_eq!(
             (given.training.stopping.epochs, given.starts, given.hidden, given.seed),
             (7, 2, 3, Seed(4))
         );
         assert_eq!(given.training.method, Method::bayesian_regularization());
+        let rules = |line: &str| {
+            let rules = recorded(line).training.stopping;
+            (rules.epochs, rules.max_fail)
+        };
+        assert_eq!(rules("train --method lm"), (300, 6));
+        assert_eq!(rules("train --method scg"), (2000, 100));
+        assert_eq!(rules("train --method rp --epochs 300 --max-fail 6"), (300, 6));
     }
 
     #[test]

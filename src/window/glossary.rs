@@ -135,8 +135,13 @@ terms! { NETWORK_TERMS:
          large ones, unless noise hides them.",
         "component / √(σ² + noise²)";
     STARTS = "Starts",
-        "Number of trainings from different random weights, side by side; the one with the lowest validation error is \
-         kept. Several starts show how much the results vary.";
+        "Number of trainings from different random weights, side by side. Several starts show how much the results vary.";
+    AUTO = "Automatic settings",
+        "Hidden nodes, memory, scaling, method, epochs and a committee of networks are chosen by cross-validation on the \
+         training samples, in about a minute. Changing a setting below turns this off.";
+    COMBINE = "Combine starts",
+        "Keep the start with the lowest validation error, or average the answers of all starts: their mean is one network \
+         with the hidden nodes of all, and varies less than any of them.";
     SEED = "Seed",
         "Seed of all random numbers: the same seed gives the same network.";
 }

@@ -186,7 +186,11 @@ fn moved_files_of_a_checkpoint_are_found_by_the_given_name() {
     }
     let resume = "train --checkpoint moved/c.json --resume --epochs 8";
     let message = failure(resume, folder.path(), 1);
-    for expected in ["'moved/c.json'", "sensor.csv' is missing", "give --data FILE"] {
+    for expected in [
+        "'moved/c.json'",
+        "sensor.csv' is missing",
+        "give its new path with --data FILE",
+    ] {
         assert!(message.contains(expected), "{message}");
     }
     let message = failure(
@@ -257,14 +261,18 @@ fn the_network_of_a_recording_decodes_files_and_lines_by_column_names() {
     let lines: Vec<&str> = decoded.lines().collect();
     assert_eq!(
         (lines[0], lines.len()),
-        ("states.c2 (mm),states.c3,readings_outside,targets_outside", 301)
+        (
+            "c1,states.c2 (mm),states.c2_half_width_90 (mm),states.c3,states.c3_half_width_90,readings_outside,\
+             targets_outside",
+            301
+        )
     );
     let states = fs::read_to_string(folder.path().join("states.csv")).unwrap();
     let number = |line: &str, column: usize| line.split(',').nth(column).unwrap().parse::<f64>().unwrap();
     let errors = lines[1..]
         .iter()
         .zip(states.lines())
-        .map(|(decoded, state)| (number(decoded, 0) - number(state, 1)).abs());
+        .map(|(decoded, state)| (number(decoded, 1) - number(state, 1)).abs());
     assert!(errors.sum::<f64>() / 300.0 < 0.1);
     // The same readings as lines, without the time.
     let mut follow = Command::new(env!("CARGO_BIN_EXE_decoupler"));
@@ -291,7 +299,8 @@ fn the_network_of_a_recording_decodes_files_and_lines_by_column_names() {
         .unwrap();
     let output = follow.wait_with_output().unwrap();
     let followed = String::from_utf8(output.stdout).unwrap();
-    assert_eq!(followed.lines().collect::<Vec<_>>(), lines[..6]);
+    let without_time = lines[..6].iter().map(|line| line.split_once(',').unwrap().1);
+    assert_eq!(followed.lines().collect::<Vec<_>>(), Vec::from_iter(without_time));
     let message = String::from_utf8(output.stderr).unwrap();
     assert!(message.contains("line 7: 2 cells where 3 are needed"), "{message}");
     let message = failure(
@@ -396,7 +405,7 @@ fn options_of_a_simulated_sensor_are_refused_with_a_reason() {
     let folder = recordings();
     for (arguments, cause) in [
         ("--array 2x2_2x6", "--array: a recording (--data) has no array"),
-        ("--noise 0.1", "--noise: a recording (--data) has noise of its own"),
+        ("--noise 0.1", "--noise: a recording (--data) has its own noise"),
         ("--loading random", "--loading: a recording (--data) has no scene"),
         ("--samples 10", "--samples: all rows"),
         ("--rows known", "--row-wire"),
@@ -458,7 +467,7 @@ fn positions_of_targets_are_reported_kept_in_the_recipe_and_checked_by_line() {
     let units = format!("{TRAIN} --positions taxels.csv");
     let message = failure(&units, folder.path(), 1);
     assert!(
-        message.contains("states.c2 (mm) and states.c3 have positions and not the same unit"),
+        message.contains("states.c2 (mm) and states.c3 have positions but different units"),
         "{message}"
     );
     positions("target,x,y\nstates.c2,0,0\nstates.c4,4,0\n");

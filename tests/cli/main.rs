@@ -7,9 +7,11 @@ mod causes;
 mod commands;
 mod export;
 mod files;
+mod files_as_they_are;
 #[cfg(unix)]
 mod follow;
 mod import;
+mod memory;
 mod own_export;
 mod own_trade;
 mod printed;

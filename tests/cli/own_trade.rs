@@ -163,7 +163,7 @@ fn options_of_a_simulated_sensor_are_refused_and_vice_versa() {
         (own("--samples 10"), "--where"),
         (own("--test-samples 10"), "--test-fraction"),
         (own("--preset best"), "no scene"),
-        (own("--noise 0,1e-3"), "noise of its own"),
+        (own("--noise 0,1e-3"), "its own noise"),
         (
             own("--decoder ridge,newton"),
             "--decoder newton: it solves the equations of a simulated array",

@@ -93,13 +93,73 @@ fn networks_are_compared_with_ridge_and_with_a_random_split() {
             "{figure}: {value}"
         );
     }
-    assert!(
-        report["warnings"]
-            .to_string()
-            .contains("no better than ridge for x")
-    );
+    assert!(report["warnings"].to_string().contains("no better than ridge for x"));
     assert_eq!(target["splits"]["by"], "time");
     assert!(target["splits"]["sentence"].as_str().unwrap().contains("split by time"));
+}
+
+#[test]
+fn answers_have_calibrated_intervals_and_drift_is_reported() {
+    let folder = recording();
+    let train = "train --data r.csv --inputs a,b --targets x,y --time t --hidden 2 --epochs 20 --json --out";
+    // A time column, which decode keeps.
+    let path = folder.path().join("r.csv");
+    let text = fs::read_to_string(&path).unwrap();
+    let timed = text.lines().enumerate().map(|(row, line)| match row {
+        0 => format!("t (s),{line}\n"),
+        _ => format!("{row},{line}\n"),
+    });
+    fs::write(&path, timed.collect::<String>()).unwrap();
+    let report = json(&format!("{train} n.json"), folder.path());
+    // 90 % of the noise of x is within 0.9 × 0.05; y is nothing but noise between -1 and 1.
+    for (target, half_width) in [(0, 0.045), (1, 0.9)] {
+        let interval = &report["targets"][target]["interval"];
+        let figure = |name: &str| interval[name].as_f64().unwrap();
+        assert!((figure("half_width") / half_width - 1.0).abs() < 0.2, "{interval}");
+        let expected = [0, 1].map(|end| interval["expected"][end].as_f64().unwrap());
+        assert!((expected[0]..=expected[1]).contains(&figure("share")), "{interval}");
+    }
+    let without = json(&format!("{train} without.json --intervals never"), folder.path());
+    assert_eq!(without["targets"][0].get("interval"), None);
+    let decode = |input: &str| {
+        let command = format!("decode --network n.json --input {input} --output {input}.out");
+        let output = decoupler(&command, folder.path());
+        let message = String::from_utf8(output.stderr).unwrap();
+        assert!(output.status.success(), "{message}");
+        let decoded = fs::read_to_string(folder.path().join(format!("{input}.out"))).unwrap();
+        (decoded, message)
+    };
+    let (decoded, message) = decode("r.csv");
+    let mut lines = decoded.lines();
+    assert_eq!(
+        lines.next(),
+        Some("t (s),x (mm),x_half_width_90 (mm),y,y_half_width_90,readings_outside,targets_outside")
+    );
+    assert!(
+        lines.next().unwrap().starts_with("1,") && !message.contains("recalibrate"),
+        "{message}"
+    );
+    // An offset of a by three standard deviations.
+    let shifted = text.lines().skip(1).map(|line| {
+        let (a, rest) = line.split_once(',').unwrap();
+        format!("{},{rest}\n", a.parse::<f64>().unwrap() + 1.7)
+    });
+    let shifted = format!("a,b,d,e,x (mm),y\n{}", shifted.collect::<String>());
+    fs::write(folder.path().join("shifted.csv"), shifted).unwrap();
+    let (_, message) = decode("shifted.csv");
+    assert!(
+        message.contains("no longer look like the training readings"),
+        "{message}"
+    );
+    json(
+        "export --network n.json --format json --json --out bundle",
+        folder.path(),
+    );
+    let exported = fs::read_dir(folder.path().join("bundle")).unwrap();
+    let has_half_widths = |entry: std::io::Result<fs::DirEntry>| {
+        fs::read_to_string(entry.unwrap().path()).is_ok_and(|text| text.contains("half_widths_90"))
+    };
+    assert!(exported.into_iter().any(has_half_widths));
 }
 
 #[test]

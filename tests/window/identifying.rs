@@ -217,7 +217,14 @@ fn the_analysis_of_a_recording_agrees_with_the_library() {
         .recording(Path::new(""), &mut |_| ControlFlow::Continue(()))
         .unwrap();
     let (division, model) = ((&plan.division, 5), Some(FittedModel::Ridge));
-    let found = Findings::measure(setup.settings(), &recording.set, division, model, &|_| (), &|| false);
+    let found = Findings::measure(
+        setup.settings(),
+        &recording.set,
+        division,
+        model,
+        &|_| (),
+        [&|| false, &|| false],
+    );
     let found = found.unwrap().unwrap();
     let sentence = |text: &str| {
         let (first, rest) = text.split_at(1);

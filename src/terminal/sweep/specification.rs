@@ -282,6 +282,8 @@ impl TrialArguments {
             RecipeSource::Recording(plan) => RecipeSource::Recording(plan.absolute()),
             simulated @ RecipeSource::Simulated(_) => simulated,
         });
+        self.training
+            .refuse_auto("a sweep has the same settings in every trial")?;
         self.training.setup(source, holds_out)
     }
 

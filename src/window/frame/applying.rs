@@ -25,9 +25,12 @@ impl DecouplerWindow {
         match effect {
             Effect::Configure(draft) => self.configure(*draft),
             Effect::ConfigureRecording(settings) => {
+                // Settings that the user gives are not chosen.
+                shared.recording.is_auto &= *settings == shared.recording.settings;
                 shared.recording.settings = *settings;
                 self.notices.settle(Matter::Settings);
             }
+            Effect::ChooseAutomatically(is_auto) => shared.recording.is_auto = is_auto,
             Effect::Import(plan) => shared.recording.plan = plan,
             Effect::ChooseSource(source) if !shared.phase.is_busy() => self.choose_source(source),
             Effect::ChooseSource(_) => {}
@@ -36,6 +39,9 @@ impl DecouplerWindow {
             Effect::Train => {
                 self.opened = None;
                 match shared.setup() {
+                    Ok(setup) if setup.can_choose() && shared.recording.is_auto => {
+                        self.prepare(Request::Choose(Box::new(setup)));
+                    }
                     Ok(setup) => self.prepare(Request::Train(Box::new(setup))),
                     Err(obstacle) => self.notices.fail(Matter::Settings, obstacle),
                 }
@@ -302,6 +308,7 @@ impl DecouplerWindow {
                 self.views.open_plan(&plan);
                 self.shared.recording = RecordingDraft {
                     settings: *setup.settings(),
+                    is_auto: false,
                     plan: Ok(Arc::new(plan)),
                 };
             }

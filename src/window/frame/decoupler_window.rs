@@ -115,6 +115,7 @@ impl DecouplerWindow {
             window.shared.draft = draft;
         }
         if let Some(settings) = window.remembered.recording {
+            window.shared.recording.is_auto &= settings == window.shared.recording.settings;
             window.shared.recording.settings = settings;
         }
         window.shared.source = window.remembered.source.unwrap_or_default();

@@ -100,6 +100,9 @@ impl DecouplerWindow {
         if !matches!(event, Event::Reading(_)) {
             shared.reading = None;
         }
+        if !matches!(event, Event::Choosing(_)) {
+            shared.choosing = None;
+        }
         match event {
             Event::Began(Ok(began)) => {
                 shared.preview = None;
@@ -147,6 +150,7 @@ impl DecouplerWindow {
                 self.notices.fail(Matter::Training, error);
             }
             Event::Reading(progress) => shared.reading = Some(progress),
+            Event::Choosing(progress) => shared.choosing = Some(*progress),
             Event::Progressed(progress) => {
                 if let Some(reason) = progress.stop_reason {
                     shared.phase = Phase::Ended(reason);

@@ -110,7 +110,7 @@ fn a_worker_that_died_takes_no_results_with_it_also_when_another_is_started() {
 
     export(&mut window, "network.json".into());
     window.wait(|window| window.notice().is_some());
-    let lost = "the network was lost when the training thread ended: train again";
+    let lost = "the network was lost when the training thread ended; train again";
     assert_eq!(window.notice(), Some(&Notice::Failed(lost.to_owned())));
     assert_eq!(
         window.shared.phase, ended,

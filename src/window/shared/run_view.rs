@@ -3,7 +3,7 @@ use std::{sync::Arc, time::Duration};
 use decoupler_core::{
     evaluation::{
         Baselines, ErrorTable, PastNetworks, Problem, PublishedErrors, RunSettings, Scores, SimulatedSettings,
-        StartRecord, TestErrors,
+        StartRecord, TestErrors, auto::AutoRecord,
     },
     text::capitalised,
     training::{EpochRecord, Stage, StopReason},
@@ -57,6 +57,8 @@ pub struct RunView {
     pub result: Option<RunResult>,
     /// Reason for which it ended, if it has.
     pub stop_reason: Option<StopReason>,
+    /// What was tried to choose its settings, if they were chosen.
+    pub search: Option<AutoRecord>,
     /// True while it is unchanged since it was opened from a checkpoint.
     pub is_saved: bool,
 }
@@ -66,7 +68,9 @@ impl RunView {
     pub fn new(began: Began) -> Self {
         let Began {
             id,
+            asked,
             setup,
+            search,
             problem,
             weights,
             test,
@@ -75,8 +79,9 @@ impl RunView {
         Self {
             id,
             published: setup.simulated().and_then(|settings| settings.published()),
-            asked: setup.clone(),
+            asked,
             setup,
+            search,
             problem,
             weights,
             test,
@@ -107,6 +112,7 @@ impl RunView {
         Scores {
             network: result.errors.clone(),
             baselines: self.baselines.clone(),
+            coverage: result.coverage.clone(),
         }
     }
 
@@ -230,7 +236,9 @@ pub fn training_status_ui(ui: &mut Ui, shared: &Shared) {
         let (colour, text) = phase_in_words(shared, &palette);
         state_ui(ui, colour, &text);
         if let (Phase::Preparing, SourceKind::Recording) = (shared.phase, shared.source) {
-            if let Some(Reading { bytes, of: Some(of) }) = shared.reading {
+            if let Some(choosing) = &shared.choosing {
+                status_progress_ui(ui, "Choosing settings", choosing.share as f32);
+            } else if let Some(Reading { bytes, of: Some(of) }) = shared.reading {
                 status_progress_ui(ui, "Reading", bytes as f32 / of.max(1) as f32);
             }
             return;
@@ -260,6 +268,10 @@ fn phase_in_words(shared: &Shared, palette: &Palette) -> (Color32, String) {
             (palette.dim, "Ready: open a recording".to_owned())
         }
         Phase::Idle => (palette.dim, "Ready: press Train".to_owned()),
+        Phase::Preparing if is_recording && shared.choosing.is_some() => {
+            let choosing = shared.choosing.as_ref().map(ToString::to_string);
+            (palette.accent, choosing.unwrap_or_default())
+        }
         Phase::Preparing if is_recording => (palette.accent, "Reading the recording".to_owned()),
         Phase::Preparing => (palette.accent, "Drawing samples".to_owned()),
         Phase::Training => (palette.accent, "Training".to_owned()),

@@ -1,7 +1,7 @@
 use std::sync::Arc;
 
 use decoupler_core::{
-    evaluation::{Baselines, Measured, RunSettings, SimulatedSettings, Simulation},
+    evaluation::{Baselines, Measured, RunSettings, SimulatedSettings, Simulation, auto::AutoProgress},
     scene::{Indenter, Loading, RowModel, Scene},
     training::{StopReason, TrainingSettings},
 };
@@ -32,6 +32,8 @@ pub struct Shared {
     pub preview: Option<Preview>,
     /// Progress of reading a recording before a training.
     pub reading: Option<Progress>,
+    /// Progress of choosing the settings of a training.
+    pub choosing: Option<AutoProgress>,
     /// The current or last training.
     pub run: Option<RunView>,
     /// The run list.
@@ -58,6 +60,8 @@ pub enum SourceKind {
 pub struct RecordingDraft {
     /// Settings; their source is measured.
     pub settings: RunSettings,
+    /// True if they are chosen by cross-validation before the training, with a memory.
+    pub is_auto: bool,
     /// Plan of the import with absolute paths, or what is missing and what to do.
     pub plan: Result<Arc<Plan>, String>,
 }
@@ -71,6 +75,7 @@ impl Default for RecordingDraft {
     fn default() -> Self {
         Self {
             settings: RunSettings::from(Measured { rows: RowModel::Shared }),
+            is_auto: true,
             plan: Err(Self::NOTHING_OPEN.to_owned()),
         }
     }
@@ -121,6 +126,7 @@ impl Shared {
             phase: Phase::Idle,
             preview: None,
             reading: None,
+            choosing: None,
             run: None,
             runs: RunList::default(),
             look: Look {

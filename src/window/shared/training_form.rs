@@ -1,7 +1,7 @@
 use std::{path::PathBuf, sync::Arc};
 
 use decoupler_core::{
-    evaluation::{MAX_STARTS, RunSettings, SimulatedSettings},
+    evaluation::{Combination, MAX_STARTS, RunSettings, SimulatedSettings},
     training::{Method, StoppingRules, TrainerState},
 };
 use decoupler_files::{
@@ -42,10 +42,10 @@ pub fn method_choice_ui(ui: &mut Ui, method: &mut Method) {
     ui.label(RichText::new(method.description()).size(type_size().note).color(dim));
 }
 
-/// The settings of the chosen method and the number of starts; changes both. A paused training (`is_new` is false)
-/// keeps its starts.
-pub fn method_settings_ui(ui: &mut Ui, method: &mut Method, starts: &mut usize, is_new: bool) {
-    for setting in method.settings() {
+/// The settings of the chosen method, the number of starts, and how they become one network; changes all. A paused
+/// training (`is_new` is false) keeps its starts.
+pub fn method_settings_ui<S>(ui: &mut Ui, settings: &mut RunSettings<S>, is_new: bool) {
+    for setting in settings.training.method.settings() {
         let hint = format!("{} Default {}.", setting.meaning, input_text(setting.default));
         let limits = usually(setting.default, setting.range);
         quantity_ui(ui, &capitalised(setting.name), &hint, setting.value, limits, "");
@@ -55,13 +55,24 @@ pub fn method_settings_ui(ui: &mut Ui, method: &mut Method, starts: &mut usize, 
     }
     let hint = format!("{} Default 1.", glossary::STARTS.hint);
     ui.add_enabled_ui(is_new, |ui| {
-        count_ui(ui, "Starts", &hint, starts, usually(1, 1..=MAX_STARTS))
+        count_ui(ui, "Starts", &hint, &mut settings.starts, usually(1, 1..=MAX_STARTS));
+        let label = ui.label("Combine starts").on_hover_text(glossary::COMBINE.hint);
+        let name = |combine: Combination| match combine {
+            Combination::Best => "keep the best",
+            Combination::Mean => "average their answers",
+        };
+        let combo = ComboBox::from_id_salt("combine").selected_text(name(settings.combine));
+        let shown = combo.show_ui(ui, |ui| {
+            for option in Combination::ALL {
+                ui.selectable_value(&mut settings.combine, option, name(option));
+            }
+        });
+        shown.response.labelled_by(label.id);
     });
 }
 
-/// The rules that end a training; changes `stopping`.
-pub fn stopping_ui(ui: &mut Ui, stopping: &mut StoppingRules) {
-    let usual = StoppingRules::default();
+/// The rules that end a training, whose defaults are `usual`; changes `stopping`.
+pub fn stopping_ui(ui: &mut Ui, stopping: &mut StoppingRules, usual: StoppingRules) {
     let hint = format!(
         "Largest number of epochs. {} Train counts from the first epoch, Continue from the current one.",
         glossary::EPOCH.hint
@@ -73,7 +84,7 @@ pub fn stopping_ui(ui: &mut Ui, stopping: &mut StoppingRules) {
         &mut stopping.epochs,
         usually(usual.epochs, 1..=StoppingRules::MAX_EPOCHS),
     );
-    let hint = format!("{} Default 6.", glossary::VALIDATION_FAILURES.hint);
+    let hint = format!("{} Default {}.", glossary::VALIDATION_FAILURES.hint, usual.max_fail);
     count_ui(
         ui,
         "Validation failures",
@@ -114,6 +125,8 @@ pub enum Effect {
     Configure(Box<SimulatedSettings>),
     /// Change the settings of the next training on a recording.
     ConfigureRecording(Box<RunSettings>),
+    /// Choose the settings of a training on a recording automatically, or not.
+    ChooseAutomatically(bool),
     /// Use this plan of an import for the next training, or show what it lacks.
     Import(Result<Arc<Plan>, String>),
     /// Select the kind of source to train on.

@@ -11,7 +11,11 @@ use std::{
 };
 
 use decoupler_core::{
-    evaluation::{Baselines, PastNetworks, Problem, Run, RunDefect, RunError, RunSettings, StartRecord, TestErrors},
+    evaluation::{
+        Baselines, Coverage, PastNetworks, Problem, Run, RunDefect, RunError, RunSettings, StartRecord, TestErrors,
+        auto::{AutoProgress, AutoRecord},
+    },
+    live::DriftReference,
     network::Networks,
     training::{EpochRecord, Stage, StopReason, StoppingRules, TrainerState, TrainingError, TrainingSettings},
 };
@@ -32,6 +36,8 @@ use crate::window::{
 pub enum Request {
     /// Start a training; one in progress is discarded.
     Train(Box<Setup>),
+    /// Choose the settings for this recording, and start a training with them; one in progress is discarded.
+    Choose(Box<Setup>),
     /// Load the training saved in this file and pause it; one in progress is discarded.
     Open(PathBuf),
     /// Restore the training with these states of its starts and pause it; one in progress is discarded.
@@ -61,6 +67,8 @@ pub enum Event {
     Continued(Result<Box<RunSettings>, String>),
     /// Progress of reading a recording before a training.
     Reading(Reading),
+    /// Progress of choosing the settings of a training.
+    Choosing(Box<AutoProgress>),
     /// Progress of the training.
     Progressed(Box<Progress>),
     /// The current training has ended: the network file to keep, or the reason why there is none.
@@ -80,6 +88,8 @@ pub struct TrainedRun {
     pub run: Run,
     /// Origin of recorded samples; `None` for a simulated array.
     pub recorded: Option<Recorded>,
+    /// Training readings of a recording, by which a later drift is detected.
+    pub drift: Option<DriftReference>,
 }
 
 impl Inspection {
@@ -118,7 +128,11 @@ pub struct Began {
     /// Its identity.
     pub id: RunId,
     /// Requested setup.
+    pub asked: Setup,
+    /// Setup of the training: as requested, or with the settings that were chosen.
     pub setup: Setup,
+    /// What was tried to choose the settings, if they were chosen.
+    pub search: Option<AutoRecord>,
     /// Description of the readings and targets.
     pub problem: Arc<Problem>,
     /// Number of weights and biases of the network.
@@ -176,6 +190,8 @@ pub struct RunResult {
     pub frame: Option<(usize, Frame)>,
     /// Errors of the decoded values.
     pub errors: TestErrors,
+    /// Coverage of the intervals on the test set, if they were calibrated.
+    pub coverage: Vec<Option<Coverage>>,
     /// Epoch of the network.
     pub best_epoch: usize,
     /// Problem of the training, when it has ended.
@@ -272,7 +288,9 @@ impl Worker {
     /// [`Self::next_event`] reports it.
     pub fn ask(&self, request: Request) {
         match request {
-            Request::Train(_) | Request::Open(_) | Request::TakeUp(..) => self.requested.set(self.requested.get() + 1),
+            Request::Train(_) | Request::Choose(_) | Request::Open(_) | Request::TakeUp(..) => {
+                self.requested.set(self.requested.get() + 1)
+            }
             Request::Stop => self.cancelled.store(self.requested.get(), Ordering::Relaxed),
             _ => {}
         }

@@ -20,12 +20,17 @@ use crate::window::{
 };
 use decoupler_core::{
     dataset::SplitBy,
-    evaluation::{PastNetworks, Run, RunError, Scores, TestErrors, network_frame_time, recorded::Determination},
+    evaluation::{
+        PastNetworks, Run, RunError, Scores, TestErrors,
+        auto::{AutoFixed, DEFAULT_BUDGET_S},
+        network_frame_time,
+        recorded::Determination,
+    },
     training::TrainingSettings,
 };
 use decoupler_files::{
     export::{CheckpointFile, NetworkFile, describe_determinacy, describe_worse_than_ridge},
-    import::{Plan, Progress, Setup, SetupSets},
+    import::{ChoosingProgress, Plan, Progress, Setup, SetupSets},
 };
 
 /// Minimum time between two progress reports. Each makes the window draw a frame; the time in between keeps the window
@@ -109,6 +114,15 @@ impl<'a> TrainingLoop<'a> {
                 let prepared = self.prepare_setup(&setup, |sets, is_cancelled| sets.run(&setup, is_cancelled));
                 self.begin(prepared, false, Event::Began);
             }
+            Request::Choose(setup) => {
+                let prepared = self.choose(&setup).map(|prepared| {
+                    prepared.map(|(trained, began)| {
+                        let asked = Setup::clone(&setup);
+                        (trained, Box::new(Began { asked, ..*began }))
+                    })
+                });
+                self.begin(prepared, false, Event::Began);
+            }
             Request::Open(path) => {
                 let prepared = CheckpointFile::load(&path).map_err(|error| error.to_string());
                 let prepared = prepared.and_then(|file| {
@@ -157,8 +171,27 @@ impl<'a> TrainingLoop<'a> {
             let Some(sets) = setup.sets(Path::new(""), is_cancelled, on_progress)? else {
                 return Ok(None);
             };
-            let recorded = sets.recorded().cloned();
-            Ok(run(sets, is_cancelled)?.map(|run| TrainedRun { run, recorded }))
+            let (recorded, drift) = (sets.recorded().cloned(), sets.drift_reference());
+            Ok(run(sets, is_cancelled)?.map(|run| TrainedRun { run, recorded, drift }))
+        })
+    }
+
+    /// Reads the recording of `setup`, chooses its settings and initialises the networks; returns `None` if cancelled.
+    fn choose(&self, setup: &Setup) -> Result<Option<(TrainedRun, Box<Began>)>, TestViewError> {
+        let report = self.report;
+        self.prepare(|is_cancelled, on_progress| {
+            let mut on_choosing = |progress| match progress {
+                ChoosingProgress::Reading(progress) => on_progress(progress),
+                ChoosingProgress::Trying(progress) => {
+                    report.progress(Event::Choosing(Box::new(progress)), |_, _| ());
+                }
+            };
+            let (fixed, folder) = (AutoFixed::default(), Path::new(""));
+            let chosen = setup.choose(&fixed, DEFAULT_BUDGET_S, folder, is_cancelled, &mut on_choosing)?;
+            let Some(chosen) = chosen else { return Ok(None) };
+            let recorded = chosen.sets.recorded().cloned();
+            let run = chosen.sets.run(&chosen.setup, is_cancelled)?;
+            Ok(run.map(|run| TrainedRun { run, recorded }))
         })
     }
 
@@ -272,6 +305,7 @@ impl<'a> TrainingLoop<'a> {
                 charts,
                 frame,
                 errors,
+                coverage: run.coverage().to_vec(),
                 best_epoch: trainer.best_epoch(),
                 defect: run.defect(),
                 epochs_run: furthest_epoch(run),
@@ -314,6 +348,7 @@ impl<'a> TrainingLoop<'a> {
             let scores = Scores {
                 network: errors.clone(),
                 baselines: baselines.clone(),
+                coverage: Vec::new(),
             };
             remarks.extend(describe_worse_than_ridge(run.problem(), &scores));
         }
@@ -347,9 +382,12 @@ fn begun(trained: TrainedRun) -> Result<(TrainedRun, Box<Began>), TestViewError>
     let run = &trained.run;
     let plan = trained.recorded.as_ref().map(|recorded| recorded.plan.clone());
     let order = plan.as_ref().map_or(SplitBy::Time, Plan::test_order);
+    let setup = Setup::of(*run.settings(), plan).expect("a recorded run has its plan");
     let began = Began {
         id: RunId::new(),
-        setup: Setup::of(*run.settings(), plan).expect("a recorded run has its plan"),
+        asked: setup.clone(),
+        setup,
+        search: trained.recorded.as_ref().and_then(|recorded| recorded.search.clone()),
         problem: Arc::clone(run.problem()),
         weights: run.leader().weights(),
         test: TestSet::of(run, order)?,
@@ -366,12 +404,17 @@ impl TrainedRun {
         Self {
             run,
             recorded: sets.recorded().cloned(),
+            drift: sets.drift_reference(),
         }
     }
 
     /// Returns the best network so far, with its history and errors.
     pub fn network_file(&self) -> Result<NetworkFile, String> {
-        NetworkFile::from_run(&self.run, self.recorded.as_ref()).map_err(|error| error.to_string())
+        let file = NetworkFile::from_run(&self.run, self.recorded.as_ref()).map_err(|error| error.to_string())?;
+        Ok(NetworkFile {
+            drift: self.drift.clone(),
+            ..file
+        })
     }
 
     /// Returns the current state, to be resumed later.

@@ -81,6 +81,12 @@ impl Folds {
         })
     }
 
+    /// Divides samples, numbered in order, into consecutive blocks.
+    pub(crate) fn consecutive(samples: usize, folds: usize) -> Self {
+        let units: Vec<Vec<usize>> = (0..samples).map(|sample| vec![sample]).collect();
+        Self::blocks(&units, folds)
+    }
+
     fn shuffled(units: &[Vec<usize>], folds: usize, rng: &mut impl Rng) -> Self {
         let mut order: Vec<usize> = (0..units.len()).collect();
         order.shuffle(rng);

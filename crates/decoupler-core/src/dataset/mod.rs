@@ -3,18 +3,25 @@
 //!
 //! Simulated samples are drawn as whole snapshots, with resistances as readings and the absolute coordinates of the
 //! row's nodes as targets; measured samples are built from their parts by [`Dataset::new`]. [`hold_out`], [`Division`]
-//! and [`Folds`] divide a set, and [`Frames`] groups it into whole frames.
+//! and [`Folds`] divide a set, and [`Frames`] groups it into whole frames. A [`Memory`] adds inputs from
+//! the past, which it takes from the [`History`] of a recording or from a stream.
 
 mod division;
 mod folds;
 mod frames;
+mod history;
+mod memory;
 mod samples;
 mod seed;
 mod simulation;
+mod span;
 
 pub use division::{DividedSamples, Division, DivisionError, Split, SplitBy, SplitByError, hold_out};
 pub use folds::{FoldUnit, Folds, FoldsError};
 pub use frames::{Frames, FramesError, PerRow};
+pub use history::{History, MemoryStream};
+pub use memory::{LARGEST_LAG, Memory, MemoryConstants, MemoryError, MemoryState};
 pub use samples::{Dataset, DatasetError, LARGEST_SAMPLES};
 pub use seed::{Seed, Stream};
 pub use simulation::SimulationError;
+pub use span::{Span, SpanError};

@@ -235,6 +235,15 @@ impl Dataset {
         }
     }
 
+    /// Returns the samples with each as a group of its own.
+    #[must_use]
+    pub(crate) fn ungrouped(&self) -> Self {
+        Self {
+            groups: (0..self.samples()).collect(),
+            ..self.clone()
+        }
+    }
+
     /// Returns all samples with the readings of these channels only, in this order.
     ///
     /// # Panics
@@ -249,6 +258,22 @@ impl Dataset {
                 .as_standard_layout()
                 .into_owned(),
             ..self.clone()
+        }
+    }
+
+    /// Returns the samples with other readings (samples × channels), such as the features of a [`Memory`](super::Memory).
+    ///
+    /// # Panics
+    /// If there is not one row of readings for each sample, or there are no channels.
+    #[must_use]
+    pub fn with_readings(&self, readings: Array2<f64>) -> Self {
+        assert_eq!(readings.nrows(), self.samples(), "one row of readings for each sample");
+        assert!(readings.ncols() > 0, "a sample has at least one reading");
+        Self {
+            readings: readings.as_standard_layout().into_owned(),
+            targets: self.targets.clone(),
+            rows: self.rows.clone(),
+            groups: self.groups.clone(),
         }
     }
 

@@ -31,11 +31,11 @@ const PENALTIES: [f64; 10] = [1.0, 1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-
 /// Number of blocks that are left out in turn.
 const BLOCKS: usize = 4;
 /// Maximum number of samples from which width and penalties are chosen.
-const MAX_SEARCHED: usize = 900;
+const MAX_SEARCHED: usize = 1200;
 /// Products of sharpness and total variance of the inputs that are compared, as powers of 2.
-const SHARPNESS_EXPONENTS: Range<i32> = -9..7;
+const SHARPNESS_EXPONENTS: Range<f64> = -9.0..7.0;
 /// Exponent at which the search begins.
-const FIRST_EXPONENT: i32 = -1;
+const FIRST_EXPONENT: f64 = -1.0;
 
 impl KernelRidge {
     /// Maximum number of samples that are all centres.
@@ -125,27 +125,23 @@ impl Choice {
             };
         }
         let distances = distances2(&units.x);
-        let judge = |exponent: i32| {
-            let sharpness = 2.0_f64.powi(exponent) / variance;
+        let judge = |exponent: f64| {
+            let sharpness = exponent.exp2() / variance;
             let (penalties, errors) = held_out(units, distances.as_ref(), sharpness);
             // The geometric mean over the outputs, whose errors have different sizes.
             let score: f64 = errors.iter().map(|error| error.max(f64::MIN_POSITIVE).ln()).sum();
             (score, Self { sharpness, penalties })
         };
-        let mut best = judge(FIRST_EXPONENT);
-        for step in [1, -1] {
-            let mut exponent = FIRST_EXPONENT + step;
-            let first_score = best.0;
-            while SHARPNESS_EXPONENTS.contains(&exponent) {
-                let next = judge(exponent);
+        let mut at = FIRST_EXPONENT;
+        let mut best = judge(at);
+        // Whole octaves up or down, then half an octave.
+        for step in [1.0, -1.0, 0.5, -0.5] {
+            while SHARPNESS_EXPONENTS.contains(&(at + step)) {
+                let next = judge(at + step);
                 if next.0 >= best.0 {
                     break;
                 }
-                best = next;
-                exponent += step;
-            }
-            if best.0 < first_score {
-                break;
+                (best, at) = (next, at + step);
             }
         }
         best.1

@@ -1,6 +1,6 @@
 use serde::{Deserialize, Serialize};
 
-use super::{Errors, NoReference, RunError, RunSettings, Source, TestErrors};
+use super::{Coverage, Errors, NoReference, RunError, RunSettings, Source, TestErrors};
 use crate::{
     dataset::{Dataset, PerRow},
     decoupling::{AffineMap, TrainingMean},
@@ -35,6 +35,9 @@ pub struct Scores<E = TestErrors> {
     pub network: E,
     /// Errors of the baselines.
     pub baselines: Baselines<E>,
+    /// Coverage of the network's intervals for each target on the test set; empty if it has no intervals.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub coverage: Vec<Option<Coverage>>,
 }
 
 impl Baselines {
@@ -63,6 +66,7 @@ impl Scores {
         Some(Scores {
             network: *self.network.nodes()?,
             baselines: self.baselines.nodes()?,
+            coverage: self.coverage.clone(),
         })
     }
 }

@@ -169,6 +169,7 @@ impl CrossValidated {
                 reference: None,
                 no_reference: None,
             },
+            coverage: Vec::new(),
         }
     }
 }

@@ -2,20 +2,24 @@
 //! published figures.
 //!
 //! A [`Run`] goes from [`RunSettings`] to trained networks and error tables; [`CrossValidation`] tests on every sample;
-//! [`measure_trade_off`] compares speed with accuracy; [`experiments`] repeats runs over a grid of settings;
+//! [`auto`] chooses settings by cross-validation; [`measure_trade_off`] compares speed with accuracy; [`experiments`] repeats runs over a grid of settings;
 //! [`recorded`] measures how well recorded readings determine the targets.
 
+pub mod auto;
 mod baselines;
 mod cross_validation;
 mod decoder_set;
 mod errors;
 pub mod experiments;
+mod intervals;
+mod linear_start;
 mod past_networks;
 mod preparation;
 mod pressed;
 pub mod recorded;
 mod reference;
 mod remark;
+mod ridge_path;
 mod run;
 mod run_sets;
 mod settings;
@@ -28,13 +32,17 @@ pub use baselines::{Baselines, PublishedErrors, Scores, published_errors};
 pub use cross_validation::{CrossValidated, CrossValidation, Effort};
 pub use decoder_set::{DecoderCost, DecoderReport, DecoderSet};
 pub use errors::{Errors, NodeAddress, Spread, TargetErrors, TestErrors, node_rms_mm};
+pub use intervals::{Coverage, HalfWidth, Intervals, IntervalsDefect};
 pub use past_networks::{PastNetwork, PastNetworks};
 pub use pressed::{Pressed, PressedAnswer, fine_tune, press_limits, pressed_rows, rebased};
 pub use reference::{NoReference, ReferenceNote, reference_errors};
 pub use remark::{Cause, MissingFigures, Remark, error_remarks};
 pub use run::{Run, RunDefect, RunError};
 pub use run_sets::RunSets;
-pub use settings::{CountError, MAX_STARTS, MeasuredSettings, RunSettings, SimulatedSettings, Workload, WorkloadTime};
+pub use settings::{
+    Combination, CombinationError, CountError, Initialization, InitializationError, MAX_STARTS, MeasuredSettings,
+    RecordedSize, RunSettings, SimulatedSettings, Workload, WorkloadTime,
+};
 pub use source::{
     Channel, Measured, ModelSize, Preset, PresetError, Problem, Simulation, Source, TargetPosition, ready_settings,
 };

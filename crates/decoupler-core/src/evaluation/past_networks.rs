@@ -82,7 +82,8 @@ impl PastNetworks {
             self.kept.pop();
             self.bytes -= latest.bytes_after(self.kept.last());
         }
-        let weights = leader.best().enumerate().map(|(row, mlp)| {
+        let best = run.best();
+        let weights = best.iter().enumerate().map(|(row, mlp)| {
             let before = latest.as_ref().and_then(|latest| latest.weights.get(row));
             let same = before.filter(|before| ***before == *mlp.weights());
             same.map_or_else(|| mlp.weights().into(), Arc::clone)
@@ -154,7 +155,11 @@ mod tests {
     use std::collections::HashSet;
 
     use super::*;
-    use crate::{evaluation::SimulatedSettings, scene::Rows, training::Method};
+    use crate::{
+        evaluation::{Combination, SimulatedSettings},
+        scene::Rows,
+        training::Method,
+    };
 
     const NO_BOUND: [usize; 2] = [usize::MAX; 2];
 
@@ -193,7 +198,11 @@ mod tests {
         several.starts = 3;
         let mut known = settings();
         known.source.scene.rows = Rows::Known;
-        for settings in [settings(), several, known] {
+        let committee = SimulatedSettings {
+            combine: Combination::Mean,
+            ..several
+        };
+        for settings in [settings(), several, known, committee] {
             let (run, past) = record(settings, NO_BOUND, |_, _| {});
             let last = past.epochs().last().unwrap();
             for epoch in [0, 1, 7, last] {

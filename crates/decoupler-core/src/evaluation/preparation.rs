@@ -1,15 +1,17 @@
 use std::time::Instant;
 
+use rand::Rng;
 use rayon::prelude::*;
 
 use super::{
-    Baselines, Errors, NoReference, Run, RunError, RunSets, RunSettings, SimulatedSettings, Simulation, Source,
-    StartTrainer, TestErrors, baselines::fit_baselines, reference_errors, run_sets::check_sets,
+    Baselines, Errors, Initialization, NoReference, Run, RunError, RunSets, RunSettings, SimulatedSettings, Simulation,
+    Source, StartTrainer, TestErrors, baselines::fit_baselines, linear_start::LinearStart, reference_errors,
+    run_sets::check_sets,
 };
 use crate::{
     dataset::{Dataset, PerRow, Split, Stream},
     decoupling::decode_set,
-    network::{Inputs, MinMax, Shape, nguyen_widrow},
+    network::{Inputs, MinMax, Mlp, Shape, nguyen_widrow},
     scene::{NoiseSource, NoisySets, RowModel},
     training::{Examples, Problem, ResumeError, Trainer, TrainerState, check_width},
 };
@@ -179,6 +181,7 @@ impl Run {
             scalings: tasks.map(|task| task.scaling.clone()),
             starts,
             baselines: None,
+            intervals: None,
         }))
     }
 }
@@ -192,10 +195,7 @@ fn whole(prepared: Result<Option<Run>, RunError>) -> Result<Run, RunError> {
 fn begin(settings: RunSettings, tasks: &[Task]) -> Result<Vec<StartTrainer>, RunError> {
     let starts = (0..settings.starts).into_par_iter().map(|number| {
         let mut rng = settings.seed.start_rng(number);
-        let begun: Vec<_> = tasks
-            .iter()
-            .map(|task| (task, nguyen_widrow(task.shape, &mut rng)))
-            .collect();
+        let begun: Vec<_> = tasks.iter().map(|task| (task, task.start(&mut rng))).collect();
         let rows = begun
             .into_par_iter()
             .map(|(task, start)| Trainer::new(start, task.problem.clone(), settings.training));
@@ -252,6 +252,8 @@ pub(super) struct Task {
     pub(super) problem: Problem,
     pub(super) shape: Shape,
     pub(super) scaling: (Inputs, MinMax),
+    /// Weights that replace random ones.
+    linear: Option<LinearStart>,
 }
 
 impl Task {
@@ -264,9 +266,17 @@ impl Task {
     ) -> Result<Self, RunError> {
         let inputs = Inputs::fit(settings.inputs, training.readings(), unseen_noise(&settings.source)?)?;
         let outputs = MinMax::fit(training.targets())?;
+        let scaled = |set: &Dataset| (inputs.of(set.readings()), outputs.scale(set.targets()));
+        let linear = match settings.initialization {
+            Initialization::Random => None,
+            Initialization::Ridge => {
+                let (x, y) = scaled(training);
+                LinearStart::fit(x.view(), y.view(), LinearStart::nodes(settings.hidden))
+            }
+        };
         let examples = |set: &Dataset| {
-            let scaled = inputs.of(set.readings());
-            Examples::new(scaled.view(), outputs.scale(set.targets()).view())
+            let (x, y) = scaled(set);
+            Examples::new(x.view(), y.view())
         };
         let problem = Problem {
             training: examples(training),
@@ -282,7 +292,17 @@ impl Task {
             problem,
             shape,
             scaling: (inputs, outputs),
+            linear,
         })
+    }
+
+    /// Returns the weights with which a training begins.
+    fn start(&self, rng: &mut impl Rng) -> Mlp {
+        let mut mlp = nguyen_widrow(self.shape, rng);
+        if let Some(linear) = &self.linear {
+            linear.apply(&mut mlp);
+        }
+        mlp
     }
 }
 

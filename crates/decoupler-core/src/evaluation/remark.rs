@@ -98,12 +98,8 @@ impl fmt::Display for Cause {
                 f.write_str("more or fewer epochs, another number of hidden nodes, or more samples may help")
             }
             Self::End { reason, method } => f.write_str(&reason.remedy(method)),
-            Self::Noise => {
-                f.write_str("the readings have noise; less noise or more samples may help")
-            }
-            Self::Unknown => {
-                f.write_str("use another decoder; more samples may help")
-            }
+            Self::Noise => f.write_str("the readings have noise; less noise or more samples may help"),
+            Self::Unknown => f.write_str("use another decoder; more samples may help"),
         }
     }
 }
@@ -229,7 +225,7 @@ impl Remark {
 /// for `reason`, and on the linear map.
 pub fn error_remarks(
     settings: &SimulatedSettings,
-    Scores { network, baselines }: &Scores,
+    Scores { network, baselines, .. }: &Scores,
     reason: Option<StopReason>,
 ) -> Vec<(&'static str, Remark)> {
     let simulation = &settings.source;

@@ -9,10 +9,11 @@ use rayon::prelude::*;
 use thiserror::Error;
 
 use super::{
-    Baselines, CountError, Problem, RunSettings, Scores, StartRecord, StartTrainer, TestErrors, starts::lowest,
+    Baselines, Combination, CountError, Coverage, Intervals, Problem, RunSettings, Scores, StartRecord, StartTrainer,
+    TestErrors, starts::lowest,
 };
 use crate::{
-    dataset::{Dataset, DivisionError, FoldsError, PerRow, SimulationError},
+    dataset::{Dataset, DivisionError, FoldsError, PerRow, SimulationError, SplitBy},
     decoupling::{DecodeError, FitError},
     machine::MachineMemory,
     network::{DecouplingNetwork, Inputs, MinMax, Mlp, Networks, ScalingError},
@@ -28,7 +29,8 @@ use crate::{
 ///
 /// Starts share the sets and scalings and differ only in their random initialisation. The *leader* is the start
 /// whose best network has the lowest validation error so far (training error if nothing is held out); the test set
-/// never decides.
+/// never decides. The run answers with the leader's network, or with the mean of those of all starts
+/// ([`RunSettings::combine`]).
 pub struct Run {
     pub(super) settings: RunSettings,
     pub(super) test: Arc<Dataset>,
@@ -39,6 +41,8 @@ pub struct Run {
     pub(super) wall_time: Option<Duration>,
     /// Errors of the baselines; `None` if only the networks are needed.
     pub(super) baselines: Option<Baselines>,
+    /// Intervals of the present network, with their coverage on the test set.
+    pub(super) intervals: Option<(Intervals, Vec<Option<Coverage>>)>,
 }
 
 impl Run {
@@ -51,6 +55,7 @@ impl Run {
     /// start has ended. Results are bit-identical for any number of threads.
     pub fn step(&mut self) -> Option<StopReason> {
         let begun = Instant::now();
+        self.intervals = None;
         match self.starts.as_mut_slice() {
             // Stays on this thread, which saves a thread switch per epoch.
             [only] => {
@@ -92,9 +97,13 @@ impl Run {
         self.leader().stop_reason()
     }
 
-    /// Returns the defect of the leader, once its trainings have ended; `None` if it has none.
+    /// Returns the defect of the leader, or of the first start with one if their mean is kept, once the trainings have
+    /// ended; `None` if there is none.
     pub fn defect(&self) -> Option<RunDefect> {
-        RunDefect::of(self.leader())
+        match self.settings.combine {
+            Combination::Best => RunDefect::of(self.leader()),
+            Combination::Mean => self.starts.iter().find_map(RunDefect::of),
+        }
     }
 
     /// Continues every start from its current weights with another method:
@@ -146,7 +155,7 @@ impl Run {
     pub fn starts(&self) -> Vec<StartRecord> {
         let record = |trainer: &StartTrainer| {
             let best = trainer.best_records();
-            let errors = self.errors_of(&self.network_of(trainer).decouple(&self.test));
+            let errors = self.errors_of(&self.network_of(trainer.best().cloned()).decouple(&self.test));
             let is_array = errors.nodes().is_some();
             StartRecord {
                 train_mse: best.training_mse,
@@ -176,15 +185,29 @@ impl Run {
         &self.problem
     }
 
-    /// Returns the leader's best networks so far, ready to decode readings.
+    /// Returns the best networks so far, ready to decode readings: the leader's, or the mean of those of all starts.
     pub fn network(&self) -> Networks {
-        self.network_of(self.leader())
+        self.network_of(self.best())
     }
 
-    fn network_of(&self, start: &StartTrainer) -> Networks {
-        let rows = self.scalings.values().iter().zip(start.best());
-        let network = |((inputs, outputs), mlp): (&(Inputs, MinMax), &Mlp)| {
-            DecouplingNetwork::new(inputs.clone(), mlp.clone(), outputs.clone())
+    /// Returns the best weights so far, for all rows or for each.
+    pub(super) fn best(&self) -> Vec<Mlp> {
+        match self.settings.combine {
+            Combination::Best => self.leader().best().cloned().collect(),
+            Combination::Mean => {
+                let of_row = |row: usize| {
+                    let of_starts: Vec<&Mlp> = self.starts.iter().map(|start| start.rows()[row].best()).collect();
+                    Mlp::mean(&of_starts)
+                };
+                (0..self.scalings.values().len()).map(of_row).collect()
+            }
+        }
+    }
+
+    fn network_of(&self, weights: impl IntoIterator<Item = Mlp>) -> Networks {
+        let rows = self.scalings.values().iter().zip(weights);
+        let network = |((inputs, outputs), mlp): (&(Inputs, MinMax), Mlp)| {
+            DecouplingNetwork::new(inputs.clone(), mlp, outputs.clone())
         };
         Networks::each(rows.map(network).collect())
     }
@@ -209,11 +232,29 @@ impl Run {
         self.baselines.as_ref()
     }
 
+    /// Sets the intervals of [`Self::network`], and measures their coverage on the test set, which was held out by the
+    /// rule `by`. Another epoch removes them.
+    pub fn set_intervals(&mut self, intervals: Intervals, by: SplitBy) {
+        let coverage = intervals.coverage(&self.test, self.decouple_test().view(), by);
+        self.intervals = Some((intervals, coverage));
+    }
+
+    /// Intervals of [`Self::network`], if they were calibrated.
+    pub fn intervals(&self) -> Option<&Intervals> {
+        self.intervals.as_ref().map(|(intervals, _)| intervals)
+    }
+
+    /// Coverage of [`Self::intervals`] on the test set, target by target; empty if there are none.
+    pub fn coverage(&self) -> &[Option<Coverage>] {
+        self.intervals.as_ref().map_or(&[], |(_, coverage)| coverage)
+    }
+
     /// Returns the errors of [`Self::network`] and of the baselines on the test set; `None` for the run of a fold.
     pub fn scores(&self) -> Option<Scores> {
         Some(Scores {
             network: self.errors(),
             baselines: self.baselines.clone()?,
+            coverage: self.coverage().to_vec(),
         })
     }
 }

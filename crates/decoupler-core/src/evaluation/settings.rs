@@ -1,16 +1,16 @@
-use std::{ops::RangeInclusive, time::Duration};
+use std::{fmt, ops::RangeInclusive, str::FromStr, time::Duration};
 
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use super::{Measured, PublishedErrors, RunError, Simulation, Source};
 use crate::{
-    dataset::{LARGEST_SAMPLES, Seed},
+    dataset::{Dataset, LARGEST_SAMPLES, Seed},
     decoupling::{DecoderKind, Posterior},
     machine::{MachineMemory, Speed, node_pairs_per_row},
     network::{InputChoice, LARGEST_HIDDEN, ScalingChoice, Shape},
-    scene::{Movement, Rows, Scene},
-    training::{Method, TrainingSettings},
+    scene::{Movement, RowModel, Rows, Scene},
+    training::{Method, ScaledConjugateGradientSettings, StoppingRules, TrainingSettings},
 };
 
 /// Settings of a run. The same settings (and the same sets, if measured) give the same network, bit for bit.
@@ -25,13 +25,105 @@ pub struct RunSettings<S = Source> {
     pub inputs: InputChoice,
     /// Number of hidden nodes.
     pub hidden: usize,
-    /// Number of starts: trainings from different random initialisations, the best of which by validation error is
-    /// kept.
+    /// Number of starts: trainings from different random initialisations.
     pub starts: usize,
+    /// How several starts become one network.
+    #[serde(default, skip_serializing_if = "Combination::is_best")]
+    pub combine: Combination,
+    /// Weights with which a training begins.
+    #[serde(default, skip_serializing_if = "Initialization::is_random")]
+    pub initialization: Initialization,
     /// Training method, its settings, and the stopping rules.
     pub training: TrainingSettings,
     /// Seed from which all randomness follows.
     pub seed: Seed,
+}
+
+/// How several starts become the network that a run answers with.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Combination {
+    /// The network of the start with the lowest validation error, or training error if nothing is held out.
+    #[default]
+    Best,
+    /// A committee: the mean of the answers of all starts. Starts share their scalings, so that the mean is exactly one
+    /// network with the hidden nodes of all, [`Mlp::mean`](crate::network::Mlp::mean). Its error is never larger than
+    /// the mean of their errors (Krogh and Vedelsby 1995).
+    Mean,
+}
+
+/// Error for an unknown combination.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+#[error("'{0}' does not combine starts: give best or mean")]
+pub struct CombinationError(String);
+
+impl Combination {
+    /// All combinations, in the order offered to the user.
+    pub const ALL: [Self; 2] = [Self::Best, Self::Mean];
+
+    fn is_best(&self) -> bool {
+        *self == Self::Best
+    }
+}
+
+impl fmt::Display for Combination {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(match self {
+            Self::Best => "best",
+            Self::Mean => "mean",
+        })
+    }
+}
+
+impl FromStr for Combination {
+    type Err = CombinationError;
+
+    fn from_str(text: &str) -> Result<Self, CombinationError> {
+        let found = Self::ALL.into_iter().find(|choice| choice.to_string() == text.trim());
+        found.ok_or_else(|| CombinationError(text.to_owned()))
+    }
+}
+
+/// Weights with which a training begins.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Initialization {
+    /// Random weights ([Nguyen and Widrow](crate::network::nguyen_widrow)).
+    #[default]
+    Random,
+    /// Ridge regression: one hidden node for each of its principal directions, in the linear range of tanh; random weights
+    /// elsewhere.
+    Ridge,
+}
+
+/// Error for an unknown initialisation.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+#[error("'{0}' is not an initialisation: give random or ridge")]
+pub struct InitializationError(String);
+
+impl Initialization {
+    fn is_random(&self) -> bool {
+        *self == Self::Random
+    }
+}
+
+impl fmt::Display for Initialization {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(match self {
+            Self::Random => "random",
+            Self::Ridge => "ridge",
+        })
+    }
+}
+
+impl FromStr for Initialization {
+    type Err = InitializationError;
+
+    fn from_str(text: &str) -> Result<Self, InitializationError> {
+        let mut choices = [Self::Random, Self::Ridge].into_iter();
+        let found = choices.find(|choice| choice.to_string() == text.trim());
+        found.ok_or_else(|| InitializationError(text.to_owned()))
+    }
 }
 
 /// Settings of a run on simulated samples.
@@ -68,14 +160,13 @@ impl From<Measured> for RunSettings {
     ///
     /// Recordings are short, noisy, and vary over time, so a validation set of consecutive samples costs samples and
     /// can end the training by chance. With Levenberg-Marquardt, stopped on the last fifth of a recording of forces,
-    /// errors vary twofold with the seed; with Bayesian regularisation on the whole recording they do not. It measures
-    /// the correlation of neighbouring frames, which carry less information than independent ones, and regularises each
-    /// class of weights with its own strength: with one strength for all, it is worse than ridge regression on 20
-    /// samples. Selecting the best of several starts by training error has no benefit.
+    /// errors vary twofold with the seed; with Bayesian regularisation on the whole recording they do not. It estimates
+    /// the noise of each target, and regularises each class of weights with its own strength: with one strength for
+    /// all, it is worse than ridge regression on 20 samples. Selecting the best of several starts by training error has no benefit.
     fn from(measured: Measured) -> Self {
         let mut settings = Self::of(measured.into(), InputChoice::MEASURED);
         settings.training.method = Method::recorded_regularization();
-        settings.training.stopping.epochs = 300;
+        settings.training.stopping = StoppingRules::recorded(&settings.training.method);
         settings
     }
 }
@@ -99,6 +190,8 @@ impl<S> RunSettings<S> {
             inputs,
             hidden: 12,
             starts: 1,
+            combine: Combination::Best,
+            initialization: Initialization::Random,
             training: TrainingSettings::default(),
             seed: Seed::default(),
         }
@@ -110,6 +203,8 @@ impl<S> RunSettings<S> {
             inputs,
             hidden,
             starts,
+            combine,
+            initialization,
             training,
             seed,
         } = self;
@@ -118,6 +213,8 @@ impl<S> RunSettings<S> {
             inputs,
             hidden,
             starts,
+            combine,
+            initialization,
             training,
             seed,
         }
@@ -131,7 +228,20 @@ impl<S> RunSettings<S> {
         check([
             ("hidden nodes", self.hidden, 1..=LARGEST_HIDDEN),
             ("starts", self.starts, 1..=MAX_STARTS),
+            (
+                "hidden nodes of all starts together",
+                self.network_hidden(),
+                1..=LARGEST_HIDDEN,
+            ),
         ])
+    }
+
+    /// Number of hidden nodes of the network that a run answers with: those of all starts if their mean is kept.
+    pub fn network_hidden(&self) -> usize {
+        match self.combine {
+            Combination::Best => self.hidden,
+            Combination::Mean => self.hidden.saturating_mul(self.starts),
+        }
     }
 }
 
@@ -143,6 +253,27 @@ impl RunSettings {
             0.2
         } else {
             0.0
+        }
+    }
+
+    /// Changes the method. On a recording, Bayesian regularisation with its usual settings gets [those for
+    /// recordings](Method::recorded_regularization), and the [default rules](StoppingRules::recorded) of the present
+    /// method become those of the new one.
+    pub fn choose_method(&mut self, method: Method) {
+        let before = std::mem::replace(&mut self.training.method, method);
+        if matches!(self.source, Source::Simulated(_)) {
+            return;
+        }
+        if method == Method::bayesian_regularization() {
+            self.training.method = Method::recorded_regularization();
+        }
+        let (usual, then) = (StoppingRules::recorded(&before), StoppingRules::recorded(&method));
+        let rules = &mut self.training.stopping;
+        if rules.epochs == usual.epochs {
+            rules.epochs = then.epochs;
+        }
+        if rules.max_fail == usual.max_fail {
+            rules.max_fail = then.max_fail;
         }
     }
 
@@ -198,7 +329,7 @@ fn check<const N: usize>(counts: [(&'static str, usize, RangeInclusive<usize>); 
     }
 }
 
-/// Memory and work of a run, from the sizes in its settings alone, so that both are known before it begins.
+/// Memory and work of a run, from the sizes of its network and samples alone, so that both are known before it begins.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Workload {
     /// Peak memory in bytes: drawn and scaled samples, equations of all trainings, and priors of the rows.
@@ -209,6 +340,34 @@ pub struct Workload {
     epoch_multiplications: f64,
     /// Maximum number of epochs.
     pub epochs: usize,
+}
+
+/// Size of the training set of a recording.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct RecordedSize {
+    /// Number of training samples.
+    pub samples: usize,
+    /// Number of inputs.
+    pub inputs: usize,
+    /// Number of targets.
+    pub targets: usize,
+    /// Number of networks: 1, or one for each row-wire.
+    pub networks: usize,
+}
+
+impl RecordedSize {
+    /// Returns the size of a training set on which networks with these settings are trained.
+    pub fn of(settings: &RunSettings, training: &Dataset) -> Self {
+        Self {
+            samples: training.samples(),
+            inputs: training.readings().ncols(),
+            targets: training.targets().ncols(),
+            networks: match settings.source.row_model() {
+                RowModel::Shared => 1,
+                RowModel::Each => training.row_count(),
+            },
+        }
+    }
 }
 
 /// Time of a run on this machine, from rates measured on one thread. Large runs are faster with more threads.
@@ -223,6 +382,9 @@ pub struct WorkloadTime {
 }
 
 impl Workload {
+    /// Number of vectors with an entry for each weight in a method and its trainer.
+    const VECTORS: usize = 8;
+
     /// Computes the workload of `settings`.
     ///
     /// # Errors
@@ -241,8 +403,6 @@ impl Workload {
         let trainings = settings.starts * size.networks;
         let of_each = training.div_ceil(size.networks);
         let method = &settings.training.method;
-        /// Number of vectors with an entry for each weight in a method and its trainer.
-        const VECTORS: usize = 8;
         // Whitening may leave inputs out, and products of fewer inputs may be kept that would be recomputed for all.
         let fewest = match settings.inputs.scaling {
             ScalingChoice::MinMax => shape.inputs,
@@ -250,7 +410,7 @@ impl Workload {
         };
         let with_inputs = |inputs| method.equations_bytes(Shape { inputs, ..shape }, of_each);
         let equations_bytes = (fewest..=shape.inputs).map(with_inputs).max().unwrap_or(0);
-        let training_bytes = (equations_bytes as u64).saturating_add(float_bytes(shape.weights(), VECTORS));
+        let training_bytes = (equations_bytes as u64).saturating_add(float_bytes(shape.weights(), Self::VECTORS));
         let priors = Posterior::prior_bytes(&source.scene, size.rows, size.unknowns / size.rows);
         let per_row = node_pairs_per_row(&source.sensor);
         let bytes = samples
@@ -262,6 +422,41 @@ impl Workload {
             epoch_multiplications: trainings as f64 * method.epoch_multiplications(shape, of_each),
             epochs: settings.training.stopping.epochs,
         })
+    }
+
+    /// Computes the workload of a training on a recording. Its samples, which have been read by then, are not counted.
+    pub fn of_recording(settings: &RunSettings, size: RecordedSize) -> Self {
+        let shape = Shape {
+            inputs: size.inputs,
+            hidden: settings.hidden,
+            outputs: size.targets,
+        };
+        let (method, of_each) = (&settings.training.method, size.samples.div_ceil(size.networks.max(1)));
+        let trainings = settings.starts * size.networks;
+        let bytes =
+            (method.equations_bytes(shape, of_each) as u64).saturating_add(float_bytes(shape.weights(), Self::VECTORS));
+        Self {
+            bytes: bytes.saturating_mul(trainings as u64),
+            node_pairs: 0.0,
+            epoch_multiplications: trainings as f64 * method.epoch_multiplications(shape, of_each),
+            epochs: settings.training.stopping.epochs,
+        }
+    }
+
+    /// Returns the methods that would train on the same recording in less than half of this time, with the time of each
+    /// for the number of epochs that it gets by default.
+    pub fn faster_methods(&self, settings: &RunSettings, size: RecordedSize) -> Vec<(Method, Duration)> {
+        let present = self.time().all_epochs;
+        let candidates = [
+            Method::default(),
+            Method::ScaledConjugateGradient(ScaledConjugateGradientSettings::default()),
+        ];
+        let of_each = candidates.into_iter().map(|method| {
+            let mut other = *settings;
+            other.choose_method(method);
+            (method, Self::of_recording(&other, size).time().all_epochs)
+        });
+        of_each.filter(|(_, time)| time.saturating_mul(2) < present).collect()
     }
 
     /// Computes the workload of measuring `decoders` with networks of each number of `hidden` nodes one after the
@@ -286,6 +481,11 @@ impl Workload {
     /// some seconds to draw the samples, or a second per epoch.
     pub fn is_large(&self) -> bool {
         self.bytes > 1_000_000_000 || self.node_pairs > 1e10 || self.epoch_multiplications > 1e10
+    }
+
+    /// Returns `true` if samples are drawn, not read.
+    pub fn draws_samples(&self) -> bool {
+        self.node_pairs > 0.0
     }
 
     /// Computes the time on this machine. The first call measures its speed, which takes about 20 ms.

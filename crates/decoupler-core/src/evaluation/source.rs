@@ -5,6 +5,7 @@ use thiserror::Error;
 
 use super::SimulatedSettings;
 use crate::{
+    dataset::Memory,
     machine::node_pairs_per_row,
     network::{InputChoice, Quantity, ScalingChoice},
     scene::{Indenter, Loading, Noise, RowModel, Rows, Scene, SceneError},
@@ -271,12 +272,29 @@ pub struct Problem {
     pub inputs: Vec<Channel>,
     /// Names and units of the targets, in their order.
     pub targets: Vec<Channel>,
+    /// Memory: the inputs of a network are then the [features](Self::features) of the readings and of their past.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub memory: Option<Memory>,
     /// Positions of targets on the skin, for those that have one.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub positions: Vec<TargetPosition>,
     /// `true` if the targets are the coordinates x, y and z of the nodes of a row-wire, in millimetres.
     #[serde(default)]
     pub has_nodes: bool,
+}
+
+/// Names and units of the features of these channels.
+fn features(memory: &Memory, channels: &[Channel]) -> Vec<Channel> {
+    let names = memory.names(channels.iter().map(|channel| channel.name.as_str()));
+    let units = channels.iter().map(|channel| &channel.unit).cycle();
+    names
+        .into_iter()
+        .zip(units)
+        .map(|(name, unit)| Channel {
+            name,
+            unit: unit.clone(),
+        })
+        .collect()
 }
 
 /// Name and unit of a reading or target.
@@ -307,6 +325,20 @@ pub struct TargetPosition {
 }
 
 impl Problem {
+    /// Names and units of the inputs of a network: the readings and, with a memory, the values computed from their past.
+    pub fn features(&self) -> Vec<Channel> {
+        match &self.memory {
+            Some(memory) => features(memory, &self.inputs),
+            None => self.inputs.clone(),
+        }
+    }
+
+    /// Number of inputs of a network.
+    pub fn feature_count(&self) -> usize {
+        let count = self.inputs.len();
+        self.memory.as_ref().map_or(count, |memory| memory.features(count))
+    }
+
     /// Name of the [error in percent](super::TestErrors::percent) on the test set.
     pub fn test_percent_name(&self) -> &'static str {
         if self.has_nodes {
@@ -359,6 +391,7 @@ impl Simulation {
                 .collect(),
             positions: Vec::new(),
             has_nodes: true,
+            memory: None,
         }
     }
 }

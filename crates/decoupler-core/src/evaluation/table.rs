@@ -1,6 +1,8 @@
 use std::time::{Duration, Instant};
 
-use super::{Channel, Errors, Problem, PublishedErrors, Run, Scores, TargetErrors, TestErrors, recorded::HysteresisLoop};
+use super::{
+    Channel, Coverage, Errors, Problem, PublishedErrors, Run, Scores, TargetErrors, TestErrors, recorded::HysteresisLoop,
+};
 use crate::{
     dataset::Dataset,
     decoupling::{CompiledNetworks, DecodeError, Decoder},
@@ -60,7 +62,14 @@ pub enum ErrorMeasure {
     Worst,
     /// Mean absolute error in percent of the range of the target.
     RangePercent,
+    /// Share of the samples within their intervals, in percent.
+    CoveragePercent,
+    /// Mean half-width of the intervals, in the unit of the target.
+    HalfWidth,
 }
+
+/// Name of the row of the network.
+const NETWORK: &str = "network";
 
 /// Name of the block of all targets.
 const ALL_TARGETS: &str = "all targets";
@@ -75,6 +84,15 @@ impl ErrorMeasure {
         Self::WorstMm,
     ];
     const OF_TARGETS: [Self; 5] = [Self::Rmse, Self::Mae, Self::R2, Self::Worst, Self::RangePercent];
+    const OF_TARGETS_WITH_INTERVALS: [Self; 7] = [
+        Self::Rmse,
+        Self::Mae,
+        Self::R2,
+        Self::Worst,
+        Self::RangePercent,
+        Self::HalfWidth,
+        Self::CoveragePercent,
+    ];
 
     /// Name in files, such as `z_percent`.
     pub fn field(self) -> &'static str {
@@ -90,6 +108,8 @@ impl ErrorMeasure {
             Self::R2 => "r2",
             Self::Worst => "worst",
             Self::RangePercent => "percent_of_range",
+            Self::CoveragePercent => "coverage_percent",
+            Self::HalfWidth => "half_width",
         }
     }
 
@@ -107,6 +127,8 @@ impl ErrorMeasure {
             Self::R2 => ("R²", ""),
             Self::Worst => ("worst", ""),
             Self::RangePercent => ("MAE", "% of range"),
+            Self::CoveragePercent => ("in 90 % interval", "%"),
+            Self::HalfWidth => ("90 % interval ±", ""),
         }
     }
 
@@ -132,6 +154,8 @@ impl ErrorMeasure {
             }
             Self::Worst => "Largest absolute error, in the unit of the target",
             Self::RangePercent => "Mean absolute error in percent of the range of the target",
+            Self::CoveragePercent => "Share of the test samples whose target is within its 90 % interval, in percent",
+            Self::HalfWidth => "Mean half-width of the 90 % intervals, in the unit of the target",
         }
     }
 
@@ -143,7 +167,13 @@ impl ErrorMeasure {
             Self::ZMm => Some(errors.z_mm),
             Self::ZStrokePercent => Some(errors.z_full_scale_percent),
             Self::WorstMm => Some(errors.worst_mm),
-            Self::Rmse | Self::Mae | Self::R2 | Self::Worst | Self::RangePercent => None,
+            Self::Rmse
+            | Self::Mae
+            | Self::R2
+            | Self::Worst
+            | Self::RangePercent
+            | Self::CoveragePercent
+            | Self::HalfWidth => None,
         }
     }
 
@@ -156,6 +186,17 @@ impl ErrorMeasure {
             Self::Worst => Some(errors.worst),
             Self::RangePercent => errors.percent_of_range,
             Self::ZPercent | Self::XPercent | Self::YPercent | Self::ZMm | Self::ZStrokePercent | Self::WorstMm => None,
+            // Measures of intervals, which baselines have not.
+            Self::CoveragePercent | Self::HalfWidth => None,
+        }
+    }
+
+    /// Returns this measure of intervals.
+    fn of_intervals(self, coverage: &Coverage) -> Option<f64> {
+        match self {
+            Self::CoveragePercent => Some(100.0 * coverage.share),
+            Self::HalfWidth => Some(coverage.half_width),
+            _ => None,
         }
     }
 
@@ -178,10 +219,13 @@ impl ErrorTable {
         let mut rows = vec![
             ("training mean", &baselines.mean),
             (baselines.linear_name(), &baselines.linear),
-            ("network", &scores.network),
+            (NETWORK, &scores.network),
         ];
         rows.extend(baselines.reference.as_ref().map(|errors| ("reference", errors)));
         let mut table = Self::new(problem, &rows);
+        if !problem.has_nodes && scores.coverage.iter().any(Option::is_some) {
+            table.add_coverage(&scores.coverage);
+        }
         let last = table.blocks.last_mut();
         if let (Some(published), Some(block)) = (published, last.filter(|_| problem.has_nodes)) {
             block.rows.push(ErrorRow {
@@ -211,6 +255,19 @@ impl ErrorTable {
             }));
         }
         self
+    }
+
+    /// Adds the measures of the intervals of the network, target by target.
+    fn add_coverage(&mut self, coverage: &[Option<Coverage>]) {
+        self.measures = &ErrorMeasure::OF_TARGETS_WITH_INTERVALS;
+        let added = &self.measures[ErrorMeasure::OF_TARGETS.len()..];
+        for (index, block) in self.blocks.iter_mut().enumerate() {
+            for row in &mut block.rows {
+                let coverage = coverage.get(index).copied().flatten().filter(|_| row.name == NETWORK);
+                let measure = |measure: &ErrorMeasure| measure.of_intervals(&coverage?);
+                row.errors.extend(added.iter().map(measure));
+            }
+        }
     }
 
     /// Returns the table of these errors, each with its name.

@@ -2,9 +2,10 @@
 //!
 //! A [`Source`] provides bytes, [`Lines`] splits them into lines, and [`LineParser`] parses the readings.
 //! [`FaultMonitor`] checks whether Eq. (2) explains them and identifies the faulty wire; [`LeftOutDecoder`] decodes
-//! without it. [`Simulated`] needs no hardware. [`ReZero`] estimates the unloaded state from recent frames, and
+//! without it. [`DriftMonitor`] reports readings that no longer look like those of the training. [`Simulated`] needs no hardware. [`ReZero`] estimates the unloaded state from recent frames, and
 //! [`Recorder`] saves frames for replay.
 
+mod drift;
 mod faults;
 mod left_out_decoder;
 mod line_parser;
@@ -13,6 +14,7 @@ mod re_zero;
 mod recording;
 mod source;
 
+pub use drift::{DriftMonitor, DriftReference};
 pub use faults::{Diagnosis, FaultCause, FaultEvent, FaultMonitor, FaultyWire};
 pub use left_out_decoder::LeftOutDecoder;
 pub use line_parser::{LineError, LineParser, ParsedLine};

@@ -56,6 +56,37 @@ impl Mlp {
         Self { shape, weights }
     }
 
+    /// Returns the network whose outputs are the mean of the outputs of `networks`, exact but for rounding: their hidden
+    /// nodes side by side, with output weights divided by the number of networks.
+    ///
+    /// # Panics
+    /// If there are none, or their numbers of inputs or outputs differ.
+    pub fn mean(networks: &[&Self]) -> Self {
+        let Shape { inputs, outputs, .. } = networks[0].shape;
+        let is_alike = |network: &&Self| (network.shape.inputs, network.shape.outputs) == (inputs, outputs);
+        assert!(networks.iter().all(is_alike), "the networks share inputs and outputs");
+        let count = networks.len() as f64;
+        let shape = Shape {
+            hidden: networks.iter().map(|network| network.shape.hidden).sum(),
+            ..networks[0].shape
+        };
+        let mut weights = Vec::with_capacity(shape.weights());
+        for input in 0..=inputs {
+            for network in networks {
+                weights.extend(network.hidden_layer().row(input));
+            }
+        }
+        for network in networks {
+            let of_nodes = &network.layers().1[..network.shape.hidden * outputs];
+            weights.extend(of_nodes.iter().map(|weight| weight / count));
+        }
+        for output in 0..outputs {
+            let bias = |network: &&Self| network.output_layer()[[network.shape.hidden, output]];
+            weights.push(networks.iter().map(bias).sum::<f64>() / count);
+        }
+        Self::from_weights(shape, weights)
+    }
+
     /// Number of channels in each layer.
     pub fn shape(&self) -> Shape {
         self.shape
@@ -179,6 +210,27 @@ mod tests {
         let y = mlp.forward(array![[1.0, -2.0]].view());
         let (first, second) = ((0.1 - 0.4 + 0.3_f64).tanh(), (-0.4 - 1.0 - 0.6_f64).tanh());
         assert!((y[[0, 0]] - (2.0 * first - 3.0 * second + 0.7)).abs() < 1e-15);
+    }
+
+    #[test]
+    fn the_mean_of_networks_answers_with_the_mean_of_their_answers() {
+        let network = |hidden, seed| {
+            let shape = Shape {
+                inputs: 5,
+                hidden,
+                outputs: 3,
+            };
+            nguyen_widrow(shape, &mut Seed(seed).rng(Stream::Start))
+        };
+        let networks = [network(4, 0), network(4, 1), network(7, 2)];
+        let inputs = Array2::from_shape_fn((20, 5), |(sample, input)| ((3 * sample + 7 * input) as f64).sin());
+        let answers = networks.each_ref().map(|network| network.forward(inputs.view()));
+        let mean = (&answers[0] + &answers[1] + &answers[2]) / 3.0;
+        let merged = Mlp::mean(&networks.each_ref());
+        assert_eq!(merged.shape().hidden, 15);
+        let difference = &merged.forward(inputs.view()) - &mean;
+        assert!(difference.iter().all(|value| value.abs() < 1e-13), "{difference}");
+        assert_eq!(Mlp::mean(&[&networks[0]]), networks[0]);
     }
 
     #[test]

@@ -120,6 +120,22 @@ impl KeptActivations {
         self.squares
     }
 
+    /// Runs the network on all examples; returns the sum of squared errors of each output.
+    pub(super) fn squares_of_outputs(&mut self, mlp: &Mlp, examples: &Examples) -> Vec<f64> {
+        self.evaluate(mlp, examples);
+        let mut parts = vec![vec![0.0; examples.outputs()]; self.parts];
+        self.for_each_block(mlp, examples, &mut parts, |sums, now| {
+            for (sum, errors) in sums.iter_mut().zip(now.errors().col_iter()) {
+                *sum += errors.squared_norm_l2();
+            }
+        });
+        let (first, others) = parts.split_at_mut(1);
+        for other in others {
+            first[0].iter_mut().zip(other).for_each(|(sum, value)| *sum += *value);
+        }
+        parts.swap_remove(0)
+    }
+
     fn run(&mut self, mlp: &Mlp, examples: &Examples) -> f64 {
         let mut buffers = self.buffers.as_mut_slice();
         let part = |blocks: Range<usize>| {

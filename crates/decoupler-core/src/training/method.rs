@@ -191,9 +191,23 @@ impl Method {
         Self::BayesianRegularization(BayesianRegularization::default_settings())
     }
 
-    /// Returns Bayesian regularisation for samples in the order of recording, whose errors are correlated.
+    /// Returns Bayesian regularisation with the settings for recordings.
     pub fn recorded_regularization() -> Self {
         Self::BayesianRegularization(RegularizationSettings::recorded())
+    }
+
+    /// Returns `true` for a method whose steps follow gradients: it needs many short epochs, and its validation error
+    /// does not fall in every one of them.
+    pub fn follows_gradients(&self) -> bool {
+        match self {
+            Self::LevenbergMarquardt(_) | Self::BayesianRegularization(_) | Self::VariableProjection(_) => false,
+            Self::ScaledConjugateGradient(_)
+            | Self::Resilient(_)
+            | Self::AdaptiveDescent(_)
+            | Self::StepMomentum(_)
+            | Self::Momentum(_)
+            | Self::GradientDescent(_) => true,
+        }
     }
 
     /// Returns `false` for Bayesian regularisation, which balances the fit against the size of the weights by itself:

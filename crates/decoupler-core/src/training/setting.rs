@@ -265,6 +265,23 @@ impl Default for StoppingRules {
 }
 
 impl StoppingRules {
+    /// Returns the default rules for a training on a recording with this method.
+    ///
+    /// Methods that [follow gradients](Method::follows_gradients) get more epochs and more patience: their validation
+    /// error rises for some epochs long before the end, and 6 failures stop them far from any minimum.
+    pub fn recorded(method: &Method) -> Self {
+        let (epochs, max_fail) = if method.follows_gradients() {
+            (2000, 100)
+        } else {
+            (300, 6)
+        };
+        Self {
+            epochs,
+            max_fail,
+            ..Self::default()
+        }
+    }
+
     /// Largest number of epochs that can be set.
     pub const MAX_EPOCHS: usize = 1_000_000;
 

@@ -86,10 +86,13 @@ impl CheckpointFile {
         if let Some(settings) = setup.simulated() {
             settings.check_states(&self.starts)?;
         }
-        let Some(sets) = setup.sets(Path::new(""), is_cancelled, on_progress)? else {
+        let Some(mut sets) = setup.sets(Path::new(""), is_cancelled, on_progress)? else {
             return Ok(None);
         };
         sets.check_saved(self.recorded.as_ref())?;
+        if let (Some(recordings), Some(saved)) = (&mut sets.recordings, self.recorded) {
+            recordings.recorded.search = saved.search;
+        }
         let run = sets.clone().resume(&setup, self.starts, is_cancelled)?;
         Ok(run.map(|run| (run.with_wall_time(self.wall_time), sets)))
     }

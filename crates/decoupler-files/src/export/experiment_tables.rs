@@ -8,7 +8,7 @@ use std::{
 use decoupler_core::{
     dataset::SplitBy,
     evaluation::{
-        Channel, CrossValidation, Simulation, TargetErrors,
+        Channel, Combination, CrossValidation, Simulation, TargetErrors,
         experiments::{
             AxisKind, CellResults, CellSummary, Experiment, ExperimentRecording, ExperimentResults, Figure,
             SummaryErrors, Trial, Verdict,
@@ -400,7 +400,10 @@ pub fn describe_conditions(experiment: &Experiment) -> String {
     said.push(counted(base.training.stopping.epochs, "epoch"));
     said.push(match base.starts {
         1 => "one start".to_owned(),
-        starts => format!("best of {starts} starts by validation error"),
+        starts => match base.combine {
+            Combination::Best => format!("best of {starts} starts by validation error"),
+            Combination::Mean => format!("mean of {starts} starts"),
+        },
     });
     said.push(match experiment.seeds {
         1 => format!("seed {}", base.seed),

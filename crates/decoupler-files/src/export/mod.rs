@@ -38,6 +38,7 @@ mod recipe_file;
 pub mod report;
 mod run_folder;
 mod samples;
+mod search_table;
 mod sensor_file;
 mod sweep;
 mod table;
@@ -59,6 +60,7 @@ pub use network_file::NetworkFile;
 pub use recipe_file::{RecipeFile, RecipeSource};
 pub use run_folder::{KeptRun, KeptRuns, RunFolder};
 pub use samples::{TrainingRecord, write_decoded, write_decoded_header, write_samples, write_samples_header};
+pub use search_table::{describe_search, search_table};
 pub use sensor_file::SensorFile;
 pub use sweep::{
     MergedSweep, PlanAxis, SweepFiles, SweepFolderError, SweepPlan, SweepRow, SweepTableFormat, Trial, TrialId,
@@ -69,5 +71,5 @@ pub use tables::{
     decoder_table, describe_determinacy, describe_positions, describe_target, describe_warnings,
     describe_worse_than_ridge, error_table, write_loss_curves,
 };
-pub use trade_tables::{describe_workload, trade_off_points, trade_off_summary};
+pub use trade_tables::{describe_recorded_workload, describe_workload, trade_off_points, trade_off_summary};
 pub use unfinished::exit_leaving_nothing;

@@ -1,11 +1,12 @@
 use std::{fmt::Display, io::Write as _, path::Path, sync::Arc};
 
 use decoupler_core::{
-    dataset::Dataset,
+    dataset::{Dataset, MemoryStream},
     evaluation::{
-        ErrorTable, PastNetwork, Problem, Run, RunSettings, Scores, SimulatedSettings, StartRecord, TargetPosition,
-        TestErrors,
+        ErrorTable, Intervals, PastNetwork, Problem, Run, RunSettings, Scores, SimulatedSettings, StartRecord,
+        TargetPosition, TestErrors,
     },
+    live::DriftReference,
     network::{DecouplingNetwork, Networks},
 };
 use glam::DVec3;
@@ -18,7 +19,7 @@ use super::{
     document::PROGRAM,
     unfinished::folder_of,
 };
-use crate::import::{InputLines, Recorded, Setup, SetupError};
+use crate::import::{InputLines, OtherColumns, Recorded, Setup, SetupError};
 
 const KIND: DocumentKind = DocumentKind::Network;
 
@@ -44,6 +45,10 @@ pub struct NetworkFile {
     pub training: TrainingRecord,
     /// Errors of the network and of the baselines on the test set.
     pub scores: Scores,
+    /// Prediction intervals of the answers, if they were calibrated.
+    pub intervals: Option<Intervals>,
+    /// Training readings of a recording, by which a later drift is detected.
+    pub drift: Option<DriftReference>,
 }
 
 /// The part of the file that the checksum covers.
@@ -58,6 +63,10 @@ struct Document {
     network: Networks,
     training: TrainingRecord,
     scores: Scores,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    intervals: Option<Intervals>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    drift: Option<DriftReference>,
 }
 
 impl NetworkFile {
@@ -77,6 +86,8 @@ impl NetworkFile {
             network: run.network(),
             training: TrainingRecord::of(run),
             scores,
+            intervals: run.intervals().cloned(),
+            drift: None,
         })
     }
 
@@ -89,17 +100,25 @@ impl NetworkFile {
         let mut file = Self::from_run(run, recorded)?;
         file.scores.network = run.errors_of(&past.networks.decouple(run.test()));
         file.network = past.networks.clone();
+        // The intervals belong to the latest network.
+        file.intervals = None;
+        file.scores.coverage.clear();
         file.training = TrainingRecord::until(run, past);
         Ok(file)
     }
 
     /// Returns a parser for lines with the inputs of a network that was trained on a recording.
     pub fn input_lines(&self) -> InputLines {
-        let recorded = self.recorded.as_ref();
-        let row_wire = recorded.and_then(|recorded| recorded.plan.import.row_wire.clone());
+        let import = self.recorded.as_ref().map(|recorded| &recorded.plan.import);
+        let others = import.map_or_else(OtherColumns::default, |import| import.other_columns(&self.problem));
         let has_rows = self.network.only().is_none();
         let row_wires = self.row_wires.clone().filter(|_| has_rows);
-        InputLines::new(self.problem.inputs.clone(), row_wire, row_wires)
+        let memory = self.problem.memory.as_ref().map(|memory| {
+            let networks = self.network.values().len();
+            MemoryStream::new(memory, self.problem.inputs.len(), networks)
+                .expect("reading and writing check the memory")
+        });
+        InputLines::new(self.problem.inputs.clone(), others, row_wires).with_memory(memory)
     }
 
     /// Setup of the run.
@@ -159,6 +178,8 @@ impl NetworkFile {
             network,
             training,
             scores,
+            intervals,
+            drift,
         } = self.clone();
         let document = Document {
             settings,
@@ -168,6 +189,8 @@ impl NetworkFile {
             network,
             training,
             scores,
+            intervals,
+            drift,
         };
         let run = to_raw_value(&document).map_err(|error| unsound(error.to_string()))?;
         Ok(Sealed::new(KIND, &program, &run).save(path, commit)?)
@@ -201,6 +224,8 @@ impl NetworkFile {
             network: document.network,
             training: document.training,
             scores: document.scores,
+            intervals: document.intervals,
+            drift: document.drift,
         })
     }
 }
@@ -281,7 +306,10 @@ pub(super) fn defect(file: &NetworkFile) -> Option<String> {
         scores: Scores {
             network: errors,
             baselines,
+            coverage: _,
         },
+        intervals,
+        drift,
     } = file;
     let weight = |network: &DecouplingNetwork| {
         let weights = network.mlp().weights();
@@ -293,7 +321,7 @@ pub(super) fn defect(file: &NetworkFile) -> Option<String> {
         (network.values().iter().find_map(weight))
             .map(|index| format!("network: weight {index} is not a finite number")),
         number_defect(network, settings, row_wires.as_deref()),
-        (network.values().iter()).find_map(|network| mismatch(network, problem, settings.hidden)),
+        (network.values().iter()).find_map(|network| mismatch(network, problem, settings.network_hidden())),
         simulated.and_then(|settings| place_defect(network, &settings)),
         last_epoch.is_none().then(|| "training.history: it is empty".to_owned()),
         last_epoch
@@ -302,6 +330,12 @@ pub(super) fn defect(file: &NetworkFile) -> Option<String> {
         (!(training.seconds >= 0.0 && training.seconds.is_finite()))
             .then(|| format!("training.seconds: {} is not a time", training.seconds)),
         starts_defect(file),
+        (intervals.as_ref())
+            .and_then(|intervals| intervals.check(problem.targets.len()).err())
+            .map(|defect| format!("intervals: {defect}")),
+        (drift.as_ref())
+            .filter(|drift| !drift.is_valid() || drift.channels() != problem.inputs.len())
+            .map(|_| "drift: it does not match the inputs".to_owned()),
         unmeasured("scores.network", errors, problem),
         unmeasured("scores.baselines.mean", &baselines.mean, problem),
         unmeasured("scores.baselines.linear", &baselines.linear, problem),
@@ -312,6 +346,13 @@ pub(super) fn defect(file: &NetworkFile) -> Option<String> {
     let problem_defect = match simulated {
         Some(settings) if *problem != settings.source.problem() => Some("problem: it does not match the array"),
         None if problem.has_nodes => Some("problem: the targets of a recording are not nodes"),
+        None if problem
+            .memory
+            .as_ref()
+            .is_some_and(|memory| memory.check(problem.inputs.len()).is_err()) =>
+        {
+            Some("problem.memory: it is not possible for these inputs")
+        }
         None if !problem.positions.iter().all(is_placed) => Some("problem.positions: a target does not exist"),
         _ => None,
     };
@@ -387,7 +428,12 @@ fn number_defect(network: &Networks, settings: &RunSettings, row_wires: Option<&
 
 fn mismatch(network: &DecouplingNetwork, problem: &Problem, hidden: usize) -> Option<String> {
     let sizes = [
-        ("reads", network.inputs().channels(), problem.inputs.len(), "readings"),
+        (
+            "reads",
+            network.inputs().channels(),
+            problem.feature_count(),
+            "readings",
+        ),
         ("gives", network.outputs().channels(), problem.targets.len(), "targets"),
         ("has", network.mlp().shape().hidden, hidden, "hidden nodes"),
     ];

@@ -307,6 +307,7 @@ mod tests {
         };
         let problem = Problem {
             has_nodes: true,
+            memory: None,
             ..Problem::default()
         };
         let mut errors = ErrorTable::new(&problem, &[]);

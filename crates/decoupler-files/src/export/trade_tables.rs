@@ -1,6 +1,8 @@
+use std::time::Duration;
+
 use decoupler_core::{
     decoupling::Precision,
-    evaluation::{TradeOffCost, TradeOffLevel, TradeOffPoint, Workload, WorkloadTime},
+    evaluation::{RecordedSize, RunSettings, TradeOffCost, TradeOffLevel, TradeOffPoint, Workload, WorkloadTime},
     machine::{MachineMemory, MemorySource},
     text::counted,
 };
@@ -147,17 +149,67 @@ pub fn describe_workload(workload: &Workload) -> String {
     )
 }
 
+/// Describes the time that a training on a recording will take on this machine, and if it is more than a minute, what
+/// would take less; `None` if it is below ten seconds. The first call measures the speed of the machine, which takes
+/// about 20 ms.
+pub fn describe_recorded_workload(settings: &RunSettings, size: RecordedSize) -> Option<String> {
+    const SHORT: Duration = Duration::from_secs(10);
+    const LONG: Duration = Duration::from_secs(60);
+    let workload = Workload::of_recording(settings, size);
+    let WorkloadTime { epoch, all_epochs, .. } = workload.time();
+    if all_epochs < SHORT {
+        return None;
+    }
+    let mut text = format!(
+        "on one thread about {} per epoch, {} for {}",
+        format_duration(epoch),
+        format_duration(all_epochs),
+        counted(workload.epochs, "epoch")
+    );
+    if all_epochs > LONG {
+        let faster = workload.faster_methods(settings, size).into_iter();
+        let faster = faster.map(|(method, time)| {
+            format!(
+                "{method} ({}) takes about {}",
+                method.short_name(),
+                format_duration(time)
+            )
+        });
+        let faster = Vec::from_iter(faster.chain(["fewer hidden nodes or epochs take less".to_owned()]));
+        text += &format!("; {}", faster.join(", "));
+    }
+    Some(text)
+}
+
 #[cfg(test)]
 mod tests {
     use decoupler_core::{
         dataset::{Dataset, Split},
         decoupling::DecoderKind,
-        evaluation::{Measured, RunSets, RunSettings, measure_trade_off},
+        evaluation::{Measured, RunSets, measure_trade_off},
         scene::RowModel,
     };
     use ndarray::Array2;
 
     use super::*;
+
+    #[test]
+    fn a_long_training_on_a_recording_is_announced_with_faster_methods() {
+        let size = |inputs| RecordedSize {
+            samples: 10_000,
+            inputs,
+            targets: 3,
+            networks: 1,
+        };
+        let mut settings = RunSettings::from(Measured { rows: RowModel::Shared });
+        assert_eq!(describe_recorded_workload(&settings, size(1)), None);
+        settings.hidden = 24;
+        let text = describe_recorded_workload(&settings, size(192)).unwrap();
+        assert!(
+            text.contains("for 300 epochs; ") && text.contains("(scg) takes about"),
+            "{text}"
+        );
+    }
 
     #[test]
     fn points_of_a_recording_have_no_columns_of_a_sensor_model() {

@@ -161,7 +161,7 @@ fn along_the_axis(results: &ExperimentResults, summaries: &[CellSummary]) -> Plo
     let mut plot = Plot::new(x, PlotAxis::linear(error_axis(results)).including([0.0, 1.0]), series);
     if let Some(problem) = results.problem.as_ref().filter(|_| is_number) {
         // The suggestions of Eq. (12) and (13).
-        let suggested = HiddenSuggestions::new(problem.inputs.len(), problem.targets.len());
+        let suggested = HiddenSuggestions::new(problem.feature_count(), problem.targets.len());
         let (fewest, most) = (
             *suggested.square_root.start() as f64,
             *suggested.square_root.end() as f64,

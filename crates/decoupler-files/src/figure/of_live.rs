@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use decoupler_core::evaluation::Channel;
+use decoupler_core::evaluation::{Channel, Intervals};
 use ndarray::Array2;
 
 use super::{
@@ -16,8 +16,13 @@ const HUES: [Hue; 6] = [Hue::Blue, Hue::Orange, Hue::Green, Hue::Violet, Hue::Cy
 /// Maximum number of targets with their own colours and names; more targets are all drawn as fine lines.
 const MAX_NAMES: usize = 2 * HUES.len();
 
-/// Values of all targets over time, one plot per unit; `history` has times in seconds with a value for each target.
-pub fn targets_over_time_figure(targets: &[Channel], history: &[(f64, Arc<[f64]>)]) -> PlotFigure {
+/// Values of all targets over time, one plot per unit; `history` has times in seconds with a value for each target. Fine
+/// lines limit the band of the 90 % `intervals`, if there are any and targets have their own colours.
+pub fn targets_over_time_figure(
+    targets: &[Channel],
+    history: &[(f64, Arc<[f64]>)],
+    intervals: Option<&Intervals>,
+) -> PlotFigure {
     let mut units: Vec<&Option<String>> = Vec::new();
     for target in targets {
         if !units.contains(&&target.unit) {
@@ -37,6 +42,18 @@ pub fn targets_over_time_figure(targets: &[Channel], history: &[(f64, Arc<[f64]>
         let points = history.iter().map(|(time_s, values)| [*time_s, values[target]]);
         Series::new(targets[target].name.clone(), look(target), points)
     };
+    let limit = |target: usize, sign: f64| {
+        let intervals = intervals.filter(|intervals| has_names && intervals.half_width(target, 0.0).is_some())?;
+        let points = history.iter().filter_map(move |(time_s, values)| {
+            let half_width = intervals.half_width(target, values[target])?;
+            Some([*time_s, values[target] + sign * half_width])
+        });
+        let side = if sign < 0.0 { "lower" } else { "upper" };
+        let name = format!("{}, {side} limit of the 90 % interval", targets[target].name);
+        let look = Look::line(HUES[target % HUES.len()], LineStyle::Fine);
+        Some(Series::new(name, look, points))
+    };
+    let limits = |target: usize| [-1.0, 1.0].into_iter().filter_map(move |sign| limit(target, sign));
     let plot = |unit: &Option<String>| {
         let of_unit = (0..targets.len()).filter(|&target| targets[target].unit == *unit);
         let name = match unit {
@@ -46,7 +63,7 @@ pub fn targets_over_time_figure(targets: &[Channel], history: &[(f64, Arc<[f64]>
         Plot::new(
             PlotAxis::linear("time (s)"),
             PlotAxis::linear(name),
-            of_unit.map(series).collect(),
+            of_unit.clone().map(series).chain(of_unit.flat_map(limits)).collect(),
         )
     };
     let keys = (0..targets.len()).filter(|_| has_names);
@@ -89,6 +106,7 @@ fn of_wires(values: Array2<f64>, rows: &[usize], value_axis: PlotAxis) -> HeatMa
 
 #[cfg(test)]
 mod tests {
+    use decoupler_core::evaluation::HalfWidth;
     use ndarray::array;
 
     use super::*;
@@ -101,7 +119,7 @@ mod tests {
         };
         let targets = [channel("x", "mm"), channel("force", "N"), channel("y", "mm")];
         let history = [(0.0, Arc::from([1.0, 2.0, 3.0])), (0.5, Arc::from([4.0, 5.0, 6.0]))];
-        let figure = targets_over_time_figure(&targets, &history);
+        let figure = targets_over_time_figure(&targets, &history, None);
         let names = |plot: &Plot| Vec::from_iter(plot.series.iter().map(|series| series.name.clone()));
         assert_eq!(
             figure.plots.iter().map(names).collect::<Vec<_>>(),
@@ -110,6 +128,28 @@ mod tests {
         let last = &figure.plots[0].series[1].points[1];
         assert_eq!([last.x, last.y], [0.5, 6.0]);
         assert_eq!(figure.keys.len(), 3);
+    }
+
+    #[test]
+    fn intervals_limit_a_band_around_the_values() {
+        let target = Channel {
+            name: "force".to_owned(),
+            unit: None,
+        };
+        let history = [(0.0, Arc::from([1.0])), (0.5, Arc::from([4.0]))];
+        let half_width = HalfWidth {
+            constant: 0.5,
+            by_answer: Vec::new(),
+            samples: 100,
+            effective_samples: 100.0,
+        };
+        let intervals = Intervals {
+            targets: vec![Some(half_width)],
+        };
+        let figure = targets_over_time_figure(&[target], &history, Some(&intervals));
+        let last = |series: &Series| series.points.last().map(|point| point.y);
+        let last = Vec::from_iter(figure.plots[0].series.iter().filter_map(last));
+        assert_eq!(last, [4.0, 3.5, 4.5]);
     }
 
     #[test]

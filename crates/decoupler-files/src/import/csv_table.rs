@@ -12,6 +12,7 @@ use super::{
     input_lines::table_error,
     rows::Rows,
     table::{Excess, Labels, Lines, name_and_unit, stem},
+    time_stamp::TimeStamp,
 };
 use decoupler_core::text::clean_name;
 
@@ -28,6 +29,8 @@ pub(super) struct Reading<'a> {
     pub(super) missing: Vec<(Option<String>, &'a Missing)>,
     /// Columns that hold labels.
     pub(super) labels: Vec<String>,
+    /// Columns or ranges that are used, which choose among the arrays of a file.
+    pub(super) used: Vec<String>,
 }
 
 /// Reads a table from text.
@@ -78,6 +81,8 @@ struct Body<'a> {
 struct Builder<'a> {
     column: Column,
     numbers: Vec<f64>,
+    /// `true` once a cell was a number.
+    has_numbers: bool,
     labels: Option<Labels>,
     missing: Vec<&'a Missing>,
 }
@@ -184,6 +189,7 @@ impl<'a> Builder<'a> {
                 .collect(),
             labels: reading.labels.contains(&column.name).then(Labels::default),
             numbers: Vec::new(),
+            has_numbers: false,
             column,
         }
     }
@@ -201,22 +207,44 @@ impl<'a> Builder<'a> {
             labels.push((!is_missing).then_some((&text, number)));
             return;
         }
-        self.numbers.push(match found {
-            Cell::Number(number) if !is_missing => number,
-            Cell::Text if !is_missing => {
-                let faults = &mut self.column.faults;
-                faults.count += 1;
-                faults.first.get_or_insert_with(|| Fault {
-                    line,
-                    text: excerpt(&text_of(cell, dialect.encoding)),
-                });
-                f64::NAN
+        let number = match found {
+            Cell::Number(number) if !is_missing && self.column.start.is_none() => {
+                self.has_numbers = true;
+                number
             }
-            _ => f64::NAN,
-        });
+            Cell::Missing => f64::NAN,
+            _ if is_missing => f64::NAN,
+            _ => match self.seconds(cell) {
+                Some(seconds) => seconds,
+                None => {
+                    let faults = &mut self.column.faults;
+                    faults.count += 1;
+                    faults.first.get_or_insert_with(|| Fault {
+                        line,
+                        text: excerpt(&text_of(cell, dialect.encoding)),
+                    });
+                    f64::NAN
+                }
+            },
+        };
+        self.numbers.push(number);
     }
 
-    fn finish(self) -> Column {
+    /// Returns the seconds since the first time stamp of a column; `None` unless all of its cells are time stamps, all with or
+    /// all without a zone.
+    fn seconds(&mut self, cell: &[u8]) -> Option<f64> {
+        let stamp = TimeStamp::parse(cell)?;
+        if self.has_numbers || self.column.faults.count > 0 {
+            return None;
+        }
+        let start = *self.column.start.get_or_insert(stamp);
+        (start.has_zone == stamp.has_zone).then(|| stamp.seconds_since(start))
+    }
+
+    fn finish(mut self) -> Column {
+        if self.column.start.is_some() {
+            self.column.unit.get_or_insert_with(|| "s".to_owned());
+        }
         Column {
             cells: match self.labels {
                 Some(labels) => labels.into_cells(),

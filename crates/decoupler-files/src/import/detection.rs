@@ -3,6 +3,7 @@ use super::{
     dialect::utf8_of_utf16,
     format::{Cell, parse},
     rows::Rows,
+    time_stamp::TimeStamp,
 };
 
 /// Number of bytes from which the layout is detected.
@@ -127,7 +128,7 @@ fn sample(text: &[u8], separator: Separator, decimal: Decimal, crs: bool) -> Res
     let mut sample = Vec::new();
     while sample.len() < MAX_ROWS {
         match rows.advance() {
-            Ok(true) => sample.push(rows.cells().map(|cell| parse(cell, decimal)).collect()),
+            Ok(true) => sample.push(rows.cells().map(|cell| parse_or_stamp(cell, decimal)).collect()),
             Ok(false) => break,
             // The closing quote may lie beyond the beginning.
             Err(TableError::Quote { .. }) if !sample.is_empty() => break,
@@ -135,6 +136,14 @@ fn sample(text: &[u8], separator: Separator, decimal: Decimal, crs: bool) -> Res
         }
     }
     Ok(sample)
+}
+
+/// Parses a cell; a time stamp counts as a number.
+fn parse_or_stamp(cell: &[u8], decimal: Decimal) -> Cell {
+    match parse(cell, decimal) {
+        Cell::Text if TimeStamp::parse(cell).is_some() => Cell::Number(0.0),
+        found => found,
+    }
 }
 
 fn has_names(rows: &[Vec<Cell>]) -> bool {

@@ -1,7 +1,10 @@
-use std::{fmt, io, path::PathBuf};
+use std::{
+    fmt, io,
+    path::{Path, PathBuf},
+};
 
 use decoupler_core::{
-    dataset::{DatasetError, DivisionError},
+    dataset::{DatasetError, DivisionError, MemoryError},
     text::system_cause,
 };
 use thiserror::Error;
@@ -104,6 +107,14 @@ pub enum ImportError {
         /// Cause.
         reason: String,
     },
+    /// A derived column cannot be parsed or computed.
+    #[error("the derived column '{text}': {reason}; write for example \"d=c1-c2\" or \"r=c1/start(2s)\"")]
+    Derived {
+        /// The column, as written.
+        text: String,
+        /// Cause.
+        reason: String,
+    },
     /// Two files cannot be joined.
     #[error("'{}' cannot be joined: {reason}; {cure}", .path.display())]
     Join {
@@ -113,6 +124,26 @@ pub enum ImportError {
         reason: String,
         /// Cure.
         cure: Cure,
+    },
+    /// One of several files of an experiment cannot be imported.
+    #[error("'{}': {source}", .path.display())]
+    OfFile {
+        /// The file.
+        path: PathBuf,
+        /// Error without a path of its own.
+        source: Box<ImportError>,
+    },
+    /// Two files of one experiment have different columns.
+    #[error("'{}': {found}, and '{}': {expected}; files of one experiment need the same columns", .path.display(), .first.display())]
+    OtherColumns {
+        /// The file.
+        path: PathBuf,
+        /// Its columns.
+        found: String,
+        /// First file of the experiment.
+        first: PathBuf,
+        /// Columns of the first file.
+        expected: String,
     },
     /// A test file is also used for training.
     #[error("'{}' is trained on, so it cannot be a test file; give another one", .0.display())]
@@ -141,6 +172,19 @@ pub enum ImportError {
         /// Error in its contents.
         source: PositionsError,
     },
+    /// The memory is invalid for the readings.
+    #[error(transparent)]
+    Memory(#[from] MemoryError),
+    /// The unit of the times is not a unit of time.
+    #[error(
+        "the times in '{name}' are in {unit}, and a memory needs times in s, ms, us, ns, min or h: give the unit of the column"
+    )]
+    TimeUnit {
+        /// Full name of the time column.
+        name: String,
+        /// Its unit.
+        unit: String,
+    },
     /// The samples are not a valid dataset.
     #[error(transparent)]
     Dataset(#[from] DatasetError),
@@ -153,8 +197,28 @@ pub enum ImportError {
 }
 
 impl ImportError {
+    /// Returns the error with the file whose import failed, unless the message names a file already.
+    pub(super) fn of_file(self, path: &Path) -> Self {
+        match self {
+            Self::Unknown { .. }
+            | Self::Ambiguous { .. }
+            | Self::Range(_)
+            | Self::NoRows { .. }
+            | Self::RowWire { .. }
+            | Self::Derived { .. }
+            | Self::Condition { .. } => Self::OfFile {
+                path: path.to_owned(),
+                source: Box::new(self),
+            },
+            error => error,
+        }
+    }
+
     /// Returns the message with the cure in the caller's wording, for example with the names of fields or arguments.
     pub fn with_cure(&self, phrase: impl Fn(&Cure) -> String) -> String {
+        if let Self::OfFile { path, source } = self {
+            return format!("'{}': {}", path.display(), source.with_cure(phrase));
+        }
         let text = self.to_string();
         let cure = match self {
             Self::NotANumber { text, .. } => Cure::CallMissing(text.clone()),
@@ -186,6 +250,14 @@ pub enum TableError {
     Binary {
         /// Line of the first zero byte.
         line: u64,
+    },
+    /// The file is of another kind.
+    #[error("it is {what}, which is not read; {cure}")]
+    OtherKind {
+        /// The kind of file.
+        what: &'static str,
+        /// What to do instead.
+        cure: &'static str,
     },
     /// No row ends within the limit.
     #[error("line {line}: no row ends within {} MiB; check its quotes and line breaks", .limit >> 20)]
@@ -252,8 +324,8 @@ pub enum Cure {
     GiveOneMeaning,
     /// Give the maximum time difference between joined rows.
     GiveLimit,
-    /// Give as many joined test files as there are joined files.
-    GiveTestFiles,
+    /// Give as many joined files with each further file or test file as with the first.
+    GiveJoinedFiles,
 }
 
 impl fmt::Display for Cure {
@@ -264,7 +336,7 @@ impl fmt::Display for Cure {
             Self::NameJoinedTime => f.write_str("name it"),
             Self::GiveOneMeaning => f.write_str("give the column one meaning"),
             Self::GiveLimit => f.write_str("give the limit"),
-            Self::GiveTestFiles => f.write_str("give as many"),
+            Self::GiveJoinedFiles => f.write_str("give as many"),
         }
     }
 }

@@ -1,6 +1,11 @@
 //! File formats of recordings. To add one, add a variant of [`Format`] here and a module that reads its arrays.
 
-use std::{fmt, fs::File, io::BufReader, path::Path};
+use std::{
+    fmt,
+    fs::File,
+    io::{self, BufReader},
+    path::{Path, PathBuf},
+};
 
 use super::{Decimal, Dialect, TableError, Watch, input_lines::Watched, matlab, numpy};
 
@@ -15,47 +20,127 @@ pub enum Format {
     Npz,
     /// A `.mat` file of versions 5 to 7.
     Matlab,
+    /// A sheet of an Excel or OpenDocument file.
+    Sheet {
+        /// Its name.
+        name: String,
+        /// `true` if its first row has the names of the columns.
+        header: bool,
+    },
 }
+
+/// Contents of a file, recognised by its beginning.
+pub(super) enum Contents {
+    /// Text.
+    Text,
+    /// Arrays, with the function that reads them.
+    Arrays(Format, ReadArrays),
+    /// A zip archive: arrays, or sheets.
+    Zip,
+    /// A file of Excel up to 2003.
+    OldExcel,
+}
+
+/// Beginnings of files that are not read, with what they are and what to do.
+const REFUSED: [(&[u8], &str, &str); 20] = [
+    (
+        b"\x89HDF\r\n\x1a\n",
+        "an HDF5 file",
+        "save it as .npz with numpy.savez, with the option -v7 from MATLAB, or as CSV",
+    ),
+    (
+        b"PAR1",
+        "a Parquet file",
+        "save it as CSV, for example with DataFrame.to_csv",
+    ),
+    (
+        b"ARROW1",
+        "an Arrow file",
+        "save it as CSV, for example with DataFrame.to_csv",
+    ),
+    (b"SQLite format 3", "an SQLite database", "export the table as CSV"),
+    (b"#ROSBAG", "a ROS bag", "export the topics as CSV"),
+    (b"\x89MCAP", "an MCAP log", "export the topics as CSV"),
+    (b"TDSm", "a TDMS file", "save it as CSV, for example with npTDMS"),
+    (b"\x80\x02", "a Python pickle", PICKLE),
+    (b"\x80\x03", "a Python pickle", PICKLE),
+    (b"\x80\x04", "a Python pickle", PICKLE),
+    (b"\x80\x05", "a Python pickle", PICKLE),
+    (b"\x1f\x8b", "compressed with gzip", UNPACK),
+    (b"BZh", "compressed with bzip2", UNPACK),
+    (b"\xfd7zXZ", "compressed with xz", UNPACK),
+    (b"\x28\xb5\x2f\xfd", "compressed with zstd", UNPACK),
+    (b"7z\xbc\xaf", "a 7z archive", UNPACK),
+    (b"\x89PNG", "a PNG image", TABLE),
+    (b"\xff\xd8\xff", "a JPEG image", TABLE),
+    (b"%PDF", "a PDF document", TABLE),
+    (b"RIFF", "a WAV or AVI file", "export its channels as CSV or .npy"),
+];
+const PICKLE: &str = "load it in Python and save the arrays with numpy.savez";
+const UNPACK: &str = "unpack it";
+const TABLE: &str = "give a table of numbers";
 
 /// Reads the arrays of a file of this size; returns them and the names of the items that are not arrays of numbers.
 type ReadArrays = fn(File, Option<u64>, Watch<'_>) -> Result<(Vec<Array>, Vec<String>), TableError>;
 
 impl Format {
     /// Names of all formats, for messages and help.
-    pub const NAMES: &str = "CSV, .npy, .npz or .mat";
+    pub const NAMES: &str = "CSV, Excel, .npy, .npz or .mat";
 
     /// Usual file extensions, those of text files first.
-    pub const EXTENSIONS: [&str; 7] = ["csv", "txt", "tsv", "dat", "npy", "npz", "mat"];
+    pub const EXTENSIONS: [&str; 10] = ["csv", "txt", "tsv", "dat", "npy", "npz", "mat", "xlsx", "xls", "ods"];
+
+    /// Returns the files in `folder` with one of the usual extensions, sorted by name.
+    ///
+    /// # Errors
+    /// If the folder cannot be read.
+    pub fn tables_in(folder: &Path) -> io::Result<Vec<PathBuf>> {
+        let is_table = |path: &PathBuf| {
+            let extension = path.extension().map(|found| found.to_string_lossy().to_lowercase());
+            path.is_file() && extension.is_some_and(|found| Self::EXTENSIONS.contains(&found.as_str()))
+        };
+        let entries = folder.read_dir()?.map(|entry| Ok(entry?.path()));
+        let mut found = entries.collect::<io::Result<Vec<_>>>()?;
+        found.retain(is_table);
+        found.sort();
+        Ok(found)
+    }
 
     /// Number of bytes from which a format is recognised.
-    pub(super) const BEGINNING: u64 = 10;
+    pub(super) const BEGINNING: u64 = 16;
+}
 
-    /// Returns the array format of the file at `path`, recognised by its `beginning`, with the function that reads it; `None`
-    /// for text.
-    pub(super) fn of_arrays(path: &Path, beginning: &[u8]) -> Option<(Self, ReadArrays)> {
+impl Contents {
+    /// Recognises the contents of the file at `path` by its `beginning`.
+    ///
+    /// # Errors
+    /// If it is a known kind of file that is not read.
+    pub(super) fn of(path: &Path, beginning: &[u8]) -> Result<Self, TableError> {
         let has_extension = |extension: &str| {
             path.extension()
                 .is_some_and(|found| found.eq_ignore_ascii_case(extension))
         };
-        match beginning {
-            [0x93, b'N', b'U', b'M', b'P', b'Y', ..] => Some((Self::Npy, |file, size, watch| {
+        if let Some((_, what, cure)) = REFUSED.iter().find(|(start, ..)| beginning.starts_with(start)) {
+            return Err(TableError::OtherKind { what, cure });
+        }
+        Ok(match beginning {
+            [0x93, b'N', b'U', b'M', b'P', b'Y', ..] => Self::Arrays(Format::Npy, |file, size, watch| {
                 let array = numpy::read("", BufReader::new(Watched::new(file, size, watch)));
                 let array = array.map_err(|error| match error {
                     TableError::Array { reason, .. } => TableError::array("NumPy array", reason),
                     error => error,
                 })?;
                 Ok((vec![array], Vec::new()))
-            })),
-            [b'P', b'K', 3 | 5, ..] => Some((Self::Npz, |file, _, watch| {
-                numpy::read_archive(BufReader::new(file), watch)
-            })),
+            }),
+            [b'P', b'K', 3 | 5, ..] => Self::Zip,
+            [0xd0, 0xcf, 0x11, 0xe0, ..] => Self::OldExcel,
             _ if has_extension("mat") || beginning.starts_with(b"MATLAB") => {
-                Some((Self::Matlab, |file, size, watch| {
+                Self::Arrays(Format::Matlab, |file, size, watch| {
                     matlab::read(BufReader::new(Watched::new(file, size, watch)))
-                }))
+                })
             }
-            _ => None,
-        }
+            _ => Self::Text,
+        })
     }
 }
 
@@ -66,6 +151,7 @@ impl fmt::Display for Format {
             Self::Npy => f.write_str("NumPy array"),
             Self::Npz => f.write_str("archive of NumPy arrays"),
             Self::Matlab => f.write_str("MATLAB file"),
+            Self::Sheet { name, .. } => write!(f, "sheet '{name}'"),
         }
     }
 }
@@ -137,26 +223,33 @@ impl Element {
     }
 }
 
-/// A named array of numbers: rows × columns, column by column.
+/// A named array of numbers: samples × columns, column by column.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Array {
     pub(super) name: String,
     pub(super) rows: usize,
     pub(super) columns: Vec<Vec<f64>>,
+    /// Shape in the file, as text.
+    pub(super) shape: String,
+    /// `true` if it has more than two dimensions in the file.
+    pub(super) is_reshaped: bool,
 }
 
 impl Array {
-    /// Splits `numbers` into columns.
+    /// Splits `numbers` into columns: the first dimension of `shape` counts samples, and the others are joined in the order of
+    /// the numbers.
     pub(super) fn new(
         name: String,
-        rows: usize,
-        width: usize,
+        shape: &[usize],
         numbers: Vec<f64>,
         is_by_column: bool,
     ) -> Result<Self, TableError> {
+        let rows = shape.first().copied().unwrap_or(1);
+        let width = shape.iter().skip(1).product();
         if width > super::rows::MAX_CELLS {
             let reason = format!(
-                "{rows} × {width} is more than {} columns; transpose it",
+                "{} is more than {} columns; transpose it",
+                written(shape),
                 super::rows::MAX_CELLS
             );
             return Err(TableError::array(name, reason));
@@ -169,7 +262,22 @@ impl Array {
             let column = |index| numbers.iter().skip(index).step_by(width).copied().collect();
             (0..width).map(column).collect()
         };
-        Ok(Self { name, rows, columns })
+        Ok(Self {
+            name,
+            rows,
+            columns,
+            shape: written(shape),
+            is_reshaped: shape.len() > 2,
+        })
+    }
+}
+
+/// Returns a shape as text, such as 500 × 192.
+pub(super) fn written(shape: &[usize]) -> String {
+    match shape {
+        [] => "one number".to_owned(),
+        [rows] => format!("{rows} × 1"),
+        shape => Vec::from_iter(shape.iter().map(usize::to_string)).join(" × "),
     }
 }
 

@@ -1,24 +1,30 @@
 use std::{
+    borrow::Cow,
     fs::File,
-    io::{Read, Seek},
+    io::{BufReader, Read, Seek},
     path::{Path, PathBuf},
 };
 
 use decoupler_core::{
-    dataset::Dataset,
+    dataset::{Dataset, History, Memory, MemoryError},
     evaluation::{Channel, Problem, TargetPosition},
 };
 use serde::Serialize;
 
 use super::{
-    Cells, Cure, DialectChoice, Excess, Format, ImportError, Joined, Missing, Recipe, Table, TableError, Watch,
+    Cells, Cure, Derived, DialectChoice, Excess, FileSet, Format, ImportError, Joined, Missing, Recipe, Table,
+    TableError, Watch, arrays,
     csv_table::{self, Reading},
+    format::Contents,
     input_lines::Watched,
     inputs::{ColumnId, Names},
     join::{Partners, Source, gather, median_interval, nearest},
     numpy,
+    part::Part,
     positions::read_positions,
     selection::{Rows, not_a_number},
+    sentinel::{Sentinel, is_rounding, rounding_warning},
+    sheet::Spreadsheet,
     suggestion::Meanings,
     table::stem,
 };
@@ -29,6 +35,35 @@ impl Recipe {
     /// # Errors
     /// If a file cannot be read, a column is missing, a used cell is not a number, no row is left, or `watch` breaks.
     pub fn import(&self, folder: &Path, watch: Watch<'_>) -> Result<Recording, ImportError> {
+        let mut recording = self.import_all(folder, watch)?;
+        let values = recording.set.targets();
+        let targets = recording.targets.iter().zip(values.columns());
+        let rounded = targets.filter(|(_, values)| is_rounding(&values.to_vec()));
+        let warnings = Vec::from_iter(rounded.map(|(target, _)| rounding_warning(&target.name)));
+        recording.warnings.extend(warnings);
+        Ok(recording)
+    }
+
+    /// Imports the samples of all files.
+    fn import_all(&self, folder: &Path, watch: Watch<'_>) -> Result<Recording, ImportError> {
+        let first = self.import_set(folder, watch);
+        if self.append.is_empty() {
+            return first.map(|part| part.recording);
+        }
+        let mut parts = vec![first.map_err(|error| error.of_file(&self.data))?];
+        // Lags in seconds have as many samples in all files.
+        let memory = parts[0].recording.memory().cloned();
+        for FileSet { data, join } in &self.append {
+            let mut recipe = self.of_files(data, join)?;
+            recipe.memory.clone_from(&memory);
+            let part = recipe.import_set(folder, watch);
+            parts.push(part.map_err(|error| error.of_file(data))?);
+        }
+        Part::joined(parts, self.group.is_some())
+    }
+
+    /// Imports the samples of the first file, without those of appended files.
+    fn import_set(&self, folder: &Path, watch: Watch<'_>) -> Result<Part, ImportError> {
         let stems = self.stems();
         let mut files = vec![self.read(folder, 0, &self.data, None, watch)?];
         for (number, (joined, stem)) in self.join.iter().zip(&stems).enumerate() {
@@ -51,21 +86,30 @@ impl Recipe {
         };
         rows.check_numbers()?;
         let (mut kept, dropped) = rows.select()?;
+        // The past includes rows that are no samples.
+        let mut read = rows.with_readings();
         if let Some(id) = meanings.time {
             warnings.extend(rows.put_in_order(id, &mut kept));
+            rows.put_in_order(id, &mut read);
         }
-        let times = meanings
+        let times: Option<Vec<f64>> = meanings
             .time
             .map(|id| kept.iter().map(|&row| rows.number(id, row)).collect());
         let lines = kept.iter().map(|&row| files[0].1.line(row)).collect();
-        let groups = rows.groups(&kept);
+        let (groups, group_names) = rows.groups(&kept);
         let row_wires = rows.row_wires(&kept)?;
+        let past = rows.past(&read, &kept)?;
         let channels = |ids: &[ColumnId]| ids.iter().map(|id| rows.channel(*id)).collect::<Vec<Channel>>();
         let (inputs, targets) = (channels(&meanings.inputs), channels(&meanings.targets));
         let positions = match &self.positions {
             Some(file) => read_positions(&folder.join(file), &targets, watch)?,
             None => Vec::new(),
         };
+        for &id in meanings.inputs.iter().chain(&meanings.targets) {
+            if let Cells::Numbers(numbers) = &files[id.file].1.columns[id.column].cells {
+                warnings.extend(Sentinel::find(numbers).map(|found| found.warning(names.name(id))));
+            }
+        }
         let reports = rows.reports();
         let total = files[0].1.rows + files[0].1.too_long.rows;
         let partners: Vec<Option<Vec<Option<u32>>>> = joins
@@ -79,12 +123,26 @@ impl Recipe {
             rows: &kept,
         };
         let targets_of_rows = gather(&mut source, &meanings.targets, &meanings.inputs);
-        let readings = gather(&mut source, &meanings.inputs, &[]);
-        Ok(Recording {
-            set: Dataset::new(readings, targets_of_rows, row_wires.as_deref(), groups)?,
+        source.rows = &read;
+        let history = past.with_readings(gather(&mut source, &meanings.inputs, &[]));
+        let memory = self.memory.as_ref().filter(|memory| !memory.is_empty());
+        let memory = memory.map(|memory| history.resolved(memory));
+        let readings = history.features(memory.as_ref().unwrap_or(&Memory::default()))?;
+        let problem = Problem {
             inputs,
             targets,
+            memory,
             positions,
+            has_nodes: false,
+        };
+        let recording = Recording {
+            set: Dataset::new(readings, targets_of_rows, row_wires.as_deref(), groups)?,
+            inputs: problem.features(),
+            targets: problem.targets.clone(),
+            positions: problem.positions.clone(),
+            problem,
+            history,
+            parts: vec![(0, reports[0].path.clone())],
             lines,
             times,
             has_groups: self.group.is_some(),
@@ -92,7 +150,8 @@ impl Recipe {
             dropped,
             files: reports,
             warnings,
-        })
+        };
+        Ok(Part { recording, group_names })
     }
 
     /// Returns the name prefixed to the columns of each joined file.
@@ -132,12 +191,23 @@ impl Recipe {
             })
             .collect();
         let path = folder.join(file);
+        let columns = self.inputs.iter().chain(&self.targets);
+        let columns = columns.chain(self.derive.iter().flat_map(Derived::columns));
+        let used = columns.chain(&self.time).chain(&self.group).chain(&self.row_wire);
         let reading = Reading {
             choice: self.dialect,
             missing,
             labels: self.group.iter().filter_map(|group| own_name(group)).collect(),
+            used: used.filter_map(|name| own_name(name)).collect(),
         };
         let mut table = read(&path, &reading, watch)?;
+        let time = match number.checked_sub(1).and_then(|joined| self.join.get(joined)) {
+            Some(joined) => joined.time.clone().or_else(|| self.time.clone()),
+            None => self.time.clone(),
+        };
+        for derived in &self.derive {
+            derived.add_to(&mut table, own_name, time.as_deref())?;
+        }
         if number == 0 {
             table.stem = stem(file);
         }
@@ -190,10 +260,21 @@ impl Recipe {
             let reason = "its times are a group as well".to_owned();
             return Err(refuse(reason, Cure::GiveOneMeaning));
         };
-        let Some(limit) = joined.limit.or_else(|| Some(median_interval(joined_times)? / 2.0)) else {
+        let joined_times = match (main.columns[time.column].start, table.columns[column].start) {
+            (None, None) => Cow::Borrowed(joined_times),
+            (Some(start), Some(joined_start)) if start.has_zone == joined_start.has_zone => {
+                let later = joined_start.seconds_since(start);
+                Cow::Owned(joined_times.iter().map(|time| later + time).collect())
+            }
+            _ => {
+                let reason = "only one of the two files has time stamps, or only one has a time zone".to_owned();
+                return Err(refuse(reason, Cure::NameJoinedTime));
+            }
+        };
+        let Some(limit) = joined.limit.or_else(|| Some(median_interval(&joined_times)? / 2.0)) else {
             return Err(refuse("its times are all the same".to_owned(), Cure::GiveLimit));
         };
-        let partners = nearest(times, joined_times, limit);
+        let partners = nearest(times, &joined_times, limit);
         let mut uses = vec![0_usize; table.rows];
         partners.rows.iter().flatten().for_each(|&row| uses[row as usize] += 1);
         let several = uses.iter().filter(|&&count| count > 1).count();
@@ -282,38 +363,56 @@ fn read_file(
     }
     (&file).take(Format::BEGINNING).read_to_end(&mut start)?;
     file.rewind()?;
-    match Format::of_arrays(path, &start) {
-        Some((format, read_arrays)) => {
-            let (found, left_out) = read_arrays(file, size, watch)?;
-            numpy::table(path, found, format, left_out, reading)
+    let (found, left_out, format) = match Contents::of(path, &start)? {
+        Contents::Text => return csv_table::read(path, Watched::new(file, size, watch), reading),
+        Contents::OldExcel => return Spreadsheet::Xls.read(path, file, reading, watch),
+        Contents::Zip => {
+            let kind = Spreadsheet::of_zip(&file)?;
+            file.rewind()?;
+            if let Some(kind) = kind {
+                return kind.read(path, file, reading, watch);
+            }
+            let (found, left_out) = numpy::read_archive(BufReader::new(file), watch)?;
+            (found, left_out, Format::Npz)
         }
-        None => csv_table::read(path, Watched::new(file, size, watch), reading),
-    }
+        Contents::Arrays(format, read_arrays) => {
+            let (found, left_out) = read_arrays(file, size, watch)?;
+            (found, left_out, format)
+        }
+    };
+    arrays::table(path, found, format, left_out, reading)
 }
 
 /// Measured samples with a description of their channels.
 #[derive(Clone, Debug)]
 pub struct Recording {
-    /// Samples sorted by time, or in the order of the file; readings and targets in the order of [`Self::inputs`] and
-    /// [`Self::targets`]. Without a group column, each sample is a group of its own.
+    /// Samples of one file after another, within a file sorted by time or in its order; readings and targets in the order of
+    /// [`Self::inputs`] and [`Self::targets`]. Without a group column, each of several files is a group, or each sample of a
+    /// single file.
     pub set: Dataset,
-    /// Names and units of the readings.
+    /// Names and units of the channels of [`Self::set`]: the readings and, with a memory, the values from their past.
     pub inputs: Vec<Channel>,
     /// Names and units of the targets.
     pub targets: Vec<Channel>,
     /// Positions of targets on the skin, for those that have one.
     pub positions: Vec<TargetPosition>,
-    /// Line of each sample in the first file, from 1.
+    /// Description of the readings, the targets and the memory.
+    problem: Problem,
+    /// Readings in order of time, for [other memories](Self::with_memory).
+    pub(super) history: History,
+    /// Index of the first sample of each data file, and the file.
+    pub(super) parts: Vec<(usize, PathBuf)>,
+    /// Line of each sample in its file, from 1.
     pub lines: Vec<u64>,
     /// Time of each sample, if there is a time column.
     pub times: Option<Vec<f64>>,
-    /// `true` if there is a group column.
+    /// `true` if there is a group column, or several files.
     pub has_groups: bool,
     /// Number of rows in the file, including dropped rows.
     pub rows: usize,
     /// Dropped rows, by reason.
     pub dropped: Vec<Dropped>,
-    /// The files read: the first, then those joined.
+    /// The files read: the first, then those joined; then those appended, likewise.
     pub files: Vec<FileReport>,
     /// Warnings for the user.
     pub warnings: Vec<String>,
@@ -363,11 +462,37 @@ pub struct JoinReport {
 impl Recording {
     /// Returns the description of the channels.
     pub fn problem(&self) -> Problem {
-        Problem {
-            inputs: self.inputs.clone(),
-            targets: self.targets.clone(),
-            positions: self.positions.clone(),
-            has_nodes: false,
-        }
+        self.problem.clone()
+    }
+
+    /// Memory whose features are the channels of the samples, with its usual interval.
+    pub fn memory(&self) -> Option<&Memory> {
+        self.problem.memory.as_ref()
+    }
+
+    /// Readings in order of time, from which the features of any memory are computed.
+    pub fn history(&self) -> &History {
+        &self.history
+    }
+
+    /// Returns the recording with another memory, or without one.
+    ///
+    /// # Errors
+    /// If the memory is invalid for the readings, such as one in seconds without times.
+    pub fn with_memory(&self, memory: Option<&Memory>) -> Result<Self, MemoryError> {
+        let memory = memory
+            .filter(|memory| !memory.is_empty())
+            .map(|memory| self.history.resolved(memory));
+        let features = self.history.features(memory.as_ref().unwrap_or(&Memory::default()))?;
+        let problem = Problem {
+            memory,
+            ..self.problem.clone()
+        };
+        Ok(Self {
+            set: self.set.with_readings(features),
+            inputs: problem.features(),
+            problem,
+            ..self.clone()
+        })
     }
 }

@@ -4,20 +4,22 @@ use std::{
 };
 
 use decoupler_core::{
+    dataset::MemoryStream,
     evaluation::Channel,
     text::{CsvFields, number},
 };
 use thiserror::Error;
 
-use super::{InputColumns, InputError, TableError};
+use super::{InputColumns, InputError, OtherColumns, TableError};
 
 /// Parser of a stream of CSV lines with the inputs of a network. Columns are identified by a header or, without one, are
 /// the inputs in their order, after the number of the row-wire if each row-wire has a network.
 #[derive(Debug)]
 pub struct InputLines {
     inputs: Vec<Channel>,
-    /// Name of the column of row-wires.
-    row_wire: Option<String>,
+    others: OtherColumns,
+    /// State of the memory, if there is one.
+    memory: Option<MemoryStream>,
     /// Row-wires of the networks, from 0, if each has one.
     row_wires: Option<Vec<usize>>,
     fields: CsvFields,
@@ -37,7 +39,7 @@ pub enum InputLine<'a> {
     Readings {
         /// Index of the network of its row-wire; 0 if there is one network.
         row_index: usize,
-        /// Readings in the order of the inputs.
+        /// Readings in the order of the inputs; with a memory, their features.
         readings: &'a [f64],
     },
 }
@@ -76,18 +78,28 @@ impl InputLineError {
 }
 
 impl InputLines {
-    /// Returns a parser of `inputs`. `row_wire` is the name of the row-wire column; `row_wires` are the row-wires of the
+    /// Returns a parser of `inputs`. `others` are the names of the other columns; `row_wires` are the row-wires of the
     /// networks, from 0, if each row-wire has one.
-    pub fn new(inputs: Vec<Channel>, row_wire: Option<String>, row_wires: Option<Vec<usize>>) -> Self {
+    pub fn new(inputs: Vec<Channel>, others: OtherColumns, row_wires: Option<Vec<usize>>) -> Self {
         Self {
             inputs,
-            row_wire,
+            others,
+            memory: None,
             row_wires,
             fields: CsvFields::default(),
             columns: None,
             cells: Vec::new(),
             readings: Vec::new(),
         }
+    }
+
+    /// Returns the parser with a memory, whose state continues from `memory`: it has one state for each network.
+    ///
+    /// A line comes at the time in its time column. In a stream without one, a line comes one usual interval of the training
+    /// after the line before, so that a stream is decoded like a file with the same lines, however it arrives.
+    #[must_use]
+    pub fn with_memory(self, memory: Option<MemoryStream>) -> Self {
+        Self { memory, ..self }
     }
 
     /// Parses the line of this number, from 1.
@@ -104,7 +116,6 @@ impl InputLines {
         self.cells.clear();
         self.cells
             .extend(self.fields.iter().map(|field| number(field).unwrap_or(f64::NAN)));
-        let row_wire = self.row_wire.as_deref();
         // Only the first line, or a line with cells that are not numbers, may be a header: other lines need no strings.
         if self.columns.is_none() || self.cells.iter().any(|value| value.is_nan()) {
             let cells: Vec<String> = self
@@ -113,7 +124,7 @@ impl InputLines {
                 .map(|field| String::from_utf8_lossy(field).into_owned())
                 .collect();
             if InputColumns::is_header(&cells, &self.inputs, line == 1) {
-                let columns = InputColumns::of_header(&cells, &self.inputs, row_wire);
+                let columns = InputColumns::of_header(&cells, &self.inputs, &self.others);
                 self.columns = Some(columns.map_err(InputLineError::Header)?);
                 return Ok(InputLine::NoReadings);
             }
@@ -122,7 +133,7 @@ impl InputLines {
         let columns = match &self.columns {
             Some(columns) => columns,
             None => {
-                let columns = InputColumns::unnamed(self.cells.len(), &self.inputs, row_wire, has_rows);
+                let columns = InputColumns::unnamed(self.cells.len(), &self.inputs, &self.others, has_rows);
                 self.columns.insert(columns.map_err(InputLineError::Unnamed)?)
             }
         };
@@ -145,7 +156,7 @@ impl InputLines {
                 index.ok_or(InputLineError::NoNetwork(row))?
             }
             (Some(_), None) => {
-                let name = row_wire.unwrap_or("row").to_owned();
+                let name = self.others.row_wire.clone().unwrap_or_else(|| "row".to_owned());
                 let near = "each row-wire has its own network, which is selected by this column".to_owned();
                 return Err(InputLineError::Header(InputError::Missing { name, near }));
             }
@@ -153,10 +164,12 @@ impl InputLines {
         self.readings.clear();
         self.readings
             .extend(columns.inputs.iter().map(|&column| self.cells[column]));
-        Ok(InputLine::Readings {
-            row_index,
-            readings: &self.readings,
-        })
+        let time_s = columns.time.map(|time| time.unit_s * self.cells[time.column]);
+        let readings = match &mut self.memory {
+            None => &self.readings,
+            Some(memory) => memory.step(row_index, &self.readings, time_s.filter(|time_s| time_s.is_finite())),
+        };
+        Ok(InputLine::Readings { row_index, readings })
     }
 }
 
@@ -228,6 +241,8 @@ pub(super) fn table_error(error: io::Error) -> TableError {
 
 #[cfg(test)]
 mod tests {
+    use decoupler_core::dataset::Memory;
+
     use super::*;
 
     fn channels(names: &[&str]) -> Vec<Channel> {
@@ -247,14 +262,14 @@ mod tests {
 
     #[test]
     fn inputs_are_found_by_name_or_by_order() {
-        let mut lines = InputLines::new(channels(&["u1", "u2"]), None, None);
+        let mut lines = InputLines::new(channels(&["u1", "u2"]), OtherColumns::default(), None);
         assert_eq!(readings(&mut lines, 1, "time,u2,u1"), None);
         assert_eq!(readings(&mut lines, 2, "0.1,2,1"), Some((0, vec![1.0, 2.0])));
         assert_eq!(readings(&mut lines, 3, ""), None);
         let error = lines.parse(4, b"0.2,?,1").unwrap_err();
         assert_eq!(error, InputLineError::NotFinite(2));
         assert!(!error.is_final());
-        let mut unnamed = InputLines::new(channels(&["u1", "u2"]), None, None);
+        let mut unnamed = InputLines::new(channels(&["u1", "u2"]), OtherColumns::default(), None);
         assert_eq!(readings(&mut unnamed, 1, "1,2"), Some((0, vec![1.0, 2.0])));
         let other = unnamed.parse(2, b"1,2,3").unwrap_err();
         assert_eq!(other, InputLineError::Cells { found: 3, expected: 2 });
@@ -264,9 +279,46 @@ mod tests {
 
     #[test]
     fn the_row_wire_selects_the_network() {
-        let mut lines = InputLines::new(channels(&["u"]), Some("row".to_owned()), Some(vec![0, 2]));
+        let others = OtherColumns {
+            row_wire: Some("row".to_owned()),
+            ..OtherColumns::default()
+        };
+        let mut lines = InputLines::new(channels(&["u"]), others, Some(vec![0, 2]));
         assert_eq!(readings(&mut lines, 1, "row,u"), None);
         assert_eq!(readings(&mut lines, 2, "3,5"), Some((1, vec![5.0])));
         assert_eq!(lines.parse(3, b"2,5").unwrap_err(), InputLineError::NoNetwork(2.0));
+    }
+
+    #[test]
+    fn a_memory_continues_from_line_to_line_and_uses_the_time_column() {
+        let memory = Memory {
+            interval_s: Some(0.1),
+            ..Memory::of_averages_s(&[2.0])
+        };
+        let others = OtherColumns {
+            time: Some("t".to_owned()),
+            ..OtherColumns::default()
+        };
+        let new = |stream| InputLines::new(channels(&["u"]), others.clone(), None).with_memory(Some(stream));
+        let start = MemoryStream::new(&memory, 1, 1).unwrap();
+        let mut lines = new(start.clone());
+        let average = |elapsed_s: f64| 1.0 - f64::exp(-elapsed_s / 2.0);
+        let mut check = |line: u64, text: &str, expected: f64| {
+            let (_, found) = readings(&mut lines, line, text).unwrap();
+            assert!((found[1] - expected).abs() < 1e-14, "{text}: {found:?}");
+        };
+        check(1, "0", 0.0);
+        check(2, "1", average(0.1));
+        check(3, "1", average(0.2));
+        let mut timed = new(start.clone());
+        assert_eq!(readings(&mut timed, 1, "u,t (ms)"), None);
+        readings(&mut timed, 2, "0,50");
+        let (_, found) = readings(&mut timed, 3, "1,450").unwrap();
+        assert!((found[1] - average(0.4)).abs() < 1e-14);
+        assert!(timed.parse(4, b"?,500").is_err());
+        let (_, found) = readings(&mut timed, 5, "1,550").unwrap();
+        assert!((found[1] - average(0.5)).abs() < 1e-14, "a bad line is no sample");
+        let (_, found) = readings(&mut timed, 6, "3,90000").unwrap();
+        assert_eq!(found, [3.0, 3.0], "it starts again after a gap");
     }
 }

@@ -1,6 +1,10 @@
 use std::path::Path;
 
-use decoupler_core::{evaluation::Channel, text::clean_name};
+use decoupler_core::{
+    dataset::MemoryStream,
+    evaluation::{Channel, Problem},
+    text::clean_name,
+};
 use ndarray::Array2;
 use thiserror::Error;
 
@@ -9,23 +13,57 @@ use super::{Column, ImportError, Recipe, Table, TableError, Watch, csv_table::na
 /// Inputs of a network, read from a file.
 #[derive(Clone, Debug)]
 pub struct InputTable {
-    /// Samples × inputs.
+    /// Samples × inputs of the network: the readings or, with a memory, their features.
     pub readings: Array2<f64>,
     /// Row-wire of each sample, from 0, if the recipe names a row-wire column and the file has it.
     pub row_wires: Option<Vec<usize>>,
     /// Line of each sample, from 1.
     pub lines: Vec<u64>,
+    /// Columns of the recipe that say when or to what a sample belongs, as far as the file has them: time, group and
+    /// row-wire.
+    pub kept: Vec<KeptColumn>,
+}
+
+/// Column that is copied from an input to the output.
+#[derive(Clone, Debug)]
+pub struct KeptColumn {
+    /// Name, with the unit in brackets if there is one.
+    pub title: String,
+    /// Text of each cell; empty if it is missing.
+    pub cells: Vec<String>,
 }
 
 /// Columns of a table that contain the inputs of a network.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct InputColumns {
     /// Column index of each input, in the order of the network.
     pub inputs: Vec<usize>,
     /// Index of the row-wire column, if there is one.
     pub row_wire: Option<usize>,
+    /// Time column, if there is one.
+    pub time: Option<InputTime>,
     /// Number of columns of the table.
     pub width: usize,
+}
+
+/// Time column of a table.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct InputTime {
+    /// Index of the column.
+    pub column: usize,
+    /// Seconds in the unit of the column.
+    pub unit_s: f64,
+}
+
+/// Names of the columns that contain no inputs of a network.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct OtherColumns {
+    /// Column of row-wires.
+    pub row_wire: Option<String>,
+    /// Time column, which a memory needs.
+    pub time: Option<String>,
+    /// Unit of the times, if the header does not give it.
+    pub time_unit: Option<String>,
 }
 
 /// Reason why the columns of a table are not the inputs of a network.
@@ -61,12 +99,12 @@ pub enum InputError {
 }
 
 impl InputColumns {
-    /// Finds the inputs and the column `row_wire` in the cells of a header.
+    /// Finds the inputs and the `others` in the cells of a header.
     ///
     /// # Errors
     /// If an input has no column of its name, or a column with a different unit.
-    pub fn of_header(header: &[String], inputs: &[Channel], row_wire: Option<&str>) -> Result<Self, InputError> {
-        Self::find(&named(header, header.len()), inputs, row_wire)
+    pub fn of_header(header: &[String], inputs: &[Channel], others: &OtherColumns) -> Result<Self, InputError> {
+        Self::find(&named(header, header.len()), inputs, others)
     }
 
     /// Finds the inputs among `width` columns without names, which are called c1, c2, … as in a recording without a header. If
@@ -78,10 +116,10 @@ impl InputColumns {
     pub fn unnamed(
         width: usize,
         inputs: &[Channel],
-        row_wire: Option<&str>,
+        others: &OtherColumns,
         has_row_wire: bool,
     ) -> Result<Self, InputError> {
-        if let Ok(found) = Self::find(&named(&[], width), inputs, row_wire)
+        if let Ok(found) = Self::find(&named(&[], width), inputs, others)
             && found.row_wire.is_some() >= has_row_wire
         {
             return Ok(found);
@@ -94,6 +132,7 @@ impl InputColumns {
         Ok(Self {
             inputs: (before..width).collect(),
             row_wire: has_row_wire.then_some(0),
+            time: None,
             width,
         })
     }
@@ -107,13 +146,13 @@ impl InputColumns {
             cells.iter().filter(|cell| is_name(cell)).count(),
             cells.iter().filter(is_text).count(),
         );
-        let has_all = names >= inputs.len() && Self::of_header(cells, inputs, None).is_ok();
+        let has_all = names >= inputs.len() && Self::of_header(cells, inputs, &OtherColumns::default()).is_ok();
         has_all
             || (names > 0 && texts > 0)
             || (texts == cells.len() && texts >= inputs.len() && (texts > 1 || is_first_line))
     }
 
-    fn find(columns: &[Column], inputs: &[Channel], row_wire: Option<&str>) -> Result<Self, InputError> {
+    fn find(columns: &[Column], inputs: &[Channel], others: &OtherColumns) -> Result<Self, InputError> {
         let names = Names::of_columns(&[columns], &[]);
         let mut found = Vec::with_capacity(inputs.len());
         for Channel { name, unit } in inputs {
@@ -136,53 +175,65 @@ impl InputColumns {
             }
             found.push(column);
         }
+        let other = |name: &Option<String>| Some(names.find(name.as_ref()?).ok()?.column);
+        let time = other(&others.time).and_then(|column| {
+            let unit = columns[column].unit.as_deref().or(others.time_unit.as_deref());
+            let unit_s = super::selection::seconds(unit)?;
+            Some(InputTime { column, unit_s })
+        });
         Ok(Self {
             inputs: found,
-            row_wire: row_wire.and_then(|name| Some(names.find(name).ok()?.column)),
+            row_wire: other(&others.row_wire),
+            time,
             width: columns.len(),
         })
     }
 }
 
 impl Recipe {
-    /// Reads the inputs from the file at `path`: the columns with their names or, without a header, as many columns as there
-    /// are inputs, after the number of the row-wire if `has_row_wire`.
+    /// Reads the inputs of a network of `problem` from the file at `path`: the columns with their names or, without a header,
+    /// as many columns as there are inputs, after the number of the row-wire if `has_row_wire`. The state of a memory starts
+    /// again where the group changes and at gaps in time, if the file has these columns.
     ///
     /// # Errors
     /// If the file cannot be read, a column is missing or has a different unit, or a cell is missing or not a number.
     pub fn read_inputs(
         &self,
         path: &Path,
-        inputs: &[Channel],
+        problem: &Problem,
         has_row_wire: bool,
         watch: Watch<'_>,
     ) -> Result<InputTable, ImportError> {
+        let (inputs, others) = (&problem.inputs, &self.other_columns(problem));
         let file = (path.to_owned(), self.read(Path::new(""), 0, path, None, watch)?.1);
         let table = &file.1;
         if let Some(line) = table.too_long.first_line {
             return Err(self.uneven(path, line));
         }
         let names = Names::of(&[table], &[]);
-        let has_header = table.dialect().is_none_or(|dialect| dialect.header);
+        // Derived columns have names.
+        let has_header = table.has_header() || !self.derive.is_empty();
         let found = if has_header {
-            InputColumns::find(&table.columns, inputs, self.row_wire.as_deref())
+            InputColumns::find(&table.columns, inputs, others)
         } else {
-            InputColumns::unnamed(table.columns.len(), inputs, self.row_wire.as_deref(), has_row_wire)
+            InputColumns::unnamed(table.columns.len(), inputs, others, has_row_wire)
         };
         let InputColumns {
             inputs: columns,
             row_wire,
+            time,
             ..
         } = found.map_err(|source| ImportError::Inputs {
             path: path.to_owned(),
             source,
         })?;
         let files = [file];
-        for &column in columns.iter().chain(&row_wire) {
+        let time_column = time.map(|time| time.column);
+        for &column in columns.iter().chain(&row_wire).chain(&time_column) {
             super::selection::not_a_number(&files, &names, ColumnId { file: 0, column })?;
         }
         let table = &files[0].1;
-        for &column in columns.iter().chain(&row_wire) {
+        for &column in columns.iter().chain(&row_wire).chain(&time_column) {
             let cells = &table.columns[column].cells;
             if let Some(row) = (0..table.rows).find(|&row| cells.is_missing(row)) {
                 return Err(ImportError::MissingInput {
@@ -195,7 +246,7 @@ impl Recipe {
         let readings = Array2::from_shape_fn((table.rows, columns.len()), |(row, input)| {
             table.columns[columns[input]].cells.number(row)
         });
-        let row_wires = match row_wire {
+        let row_wires: Option<Vec<usize>> = match row_wire {
             None => None,
             Some(column) => {
                 let name = &table.columns[column].name;
@@ -203,11 +254,52 @@ impl Recipe {
                 Some((0..table.rows).map(of).collect::<Result<_, _>>()?)
             }
         };
+        let readings = match &problem.memory {
+            None => readings,
+            Some(memory) => {
+                let group = self.group.as_ref().and_then(|group| names.find(group).ok());
+                let group = group.map(|id| &table.columns[id.column].cells);
+                let states = row_wires.iter().flatten().max().map_or(1, |last| last + 1);
+                let mut stream = MemoryStream::new(memory, columns.len(), states)?;
+                let mut features = Array2::zeros((table.rows, problem.feature_count()));
+                for (row, mut features) in features.rows_mut().into_iter().enumerate() {
+                    if row > 0 && group.is_some_and(|group| group.group(row) != group.group(row - 1)) {
+                        stream.restart();
+                    }
+                    let row_wire = row_wires.as_ref().map_or(0, |row_wires| row_wires[row]);
+                    let time_s = time.map(|time| time.unit_s * table.columns[time.column].cells.number(row));
+                    let of_row = stream.step(row_wire, &readings.row(row).to_vec(), time_s);
+                    features.iter_mut().zip(of_row).for_each(|(to, from)| *to = *from);
+                }
+                features
+            }
+        };
+        let kept = [&self.time, &self.group, &self.row_wire].into_iter().flatten();
+        let kept = kept.filter_map(|name| Some(names.find(name).ok()?.column));
+        let kept = kept.filter(|column| !columns.contains(column)).map(|column| {
+            let Column { name, unit, cells, .. } = &table.columns[column];
+            let (name, unit) = (name.clone(), unit.clone());
+            KeptColumn {
+                title: Channel { name, unit }.title(),
+                cells: (0..table.rows).map(|row| cells.text(row)).collect(),
+            }
+        });
         Ok(InputTable {
             readings,
             row_wires,
             lines: (0..table.rows).map(|row| table.line(row)).collect(),
+            kept: kept.collect(),
         })
+    }
+
+    /// Names of the columns that contain no inputs of a network of `problem`; times are used by a memory only.
+    pub fn other_columns(&self, problem: &Problem) -> OtherColumns {
+        let time = self.time.clone().filter(|_| problem.memory.is_some());
+        OtherColumns {
+            row_wire: self.row_wire.clone(),
+            time_unit: time.as_ref().and_then(|time| self.units.get(time).cloned()),
+            time,
+        }
     }
 
     fn uneven(&self, path: &Path, line: u64) -> ImportError {

@@ -10,6 +10,7 @@ use super::{
     inputs::{ColumnId, Names},
     join::median_interval,
     read_table,
+    sentinel::{Sentinel, is_rounding, rounding_warning},
 };
 
 /// Number of bars of a histogram.
@@ -51,6 +52,11 @@ pub struct ColumnSummary {
     pub max: Option<f64>,
     /// `true` if all numbers are equal.
     pub is_constant: bool,
+    /// `true` if the numbers differ by rounding only: their range is below a hundred-thousandth of their value, or they are up
+    /// to three values within a thousandth.
+    pub is_rounding: bool,
+    /// Number that seems to mean "none".
+    pub sentinel: Option<Sentinel>,
     /// Name of an earlier column with the same cells.
     pub duplicate_of: Option<String>,
     /// Histogram: number of cells in each bin, from the smallest to the largest number.
@@ -116,6 +122,12 @@ impl Inspection {
         };
         let time = chosen.and_then(|(column, is_guessed)| TimeSummary::of(table, column, is_guessed));
         let mut warnings = table.notes.clone();
+        let sentinels = columns
+            .iter()
+            .filter_map(|column| Some(column.sentinel?.warning(&column.name)));
+        warnings.extend(sentinels);
+        let rounded = columns.iter().filter(|column| column.is_rounding);
+        warnings.extend(rounded.map(|column| rounding_warning(&column.name)));
         if let Some(line) = table.too_short.first_line {
             let rows = table.too_short.rows;
             warnings.push(format!(
@@ -169,6 +181,8 @@ impl ColumnSummary {
             min: (count > 0).then_some(min),
             max: (count > 0).then_some(max),
             is_constant: count > 0 && min == max,
+            is_rounding: is_rounding(numbers),
+            sentinel: Sentinel::find(numbers),
             duplicate_of: None,
             histogram: histogram(present(), min, max),
         }

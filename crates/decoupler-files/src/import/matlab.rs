@@ -1,6 +1,6 @@
 //! MAT-files of level 5, which MATLAB writes with `save` as `-v6` and `-v7`:
-//! <https://www.mathworks.com/help/pdf_doc/matlab/matfile_format.pdf>. Numeric and logical arrays are read; other variables are
-//! reported. No existing crate reports the variables it skips and limits the allocation for a corrupt length.
+//! <https://www.mathworks.com/help/pdf_doc/matlab/matfile_format.pdf>. Numeric and logical arrays, and those in
+//! structures, are read; other variables are reported. No existing crate reports the variables it skips and limits the allocation for a corrupt length.
 
 use std::io::Read;
 
@@ -8,7 +8,7 @@ use flate2::read::ZlibDecoder;
 
 use super::{
     TableError,
-    format::{Array, Element, Endian},
+    format::{Array, Element, Endian, written},
     input_lines::table_error,
 };
 
@@ -82,77 +82,177 @@ pub(super) fn read(mut source: impl Read) -> Result<(Vec<Array>, Vec<String>), T
 
 /// Reads one variable.
 fn variable(
-    source: &mut impl Read,
+    source: &mut dyn Read,
     endian: Endian,
     arrays: &mut Vec<Array>,
     left_out: &mut Vec<String>,
 ) -> Result<(), TableError> {
-    let flags = Element::U32.read(&data(source, endian)?.1, endian);
-    let dimensions = Element::I32.read(&data(source, endian)?.1, endian);
-    let name = data(source, endian)?.1;
-    let name: String = name
-        .iter()
-        .copied()
-        .map(char::from)
-        .filter(|letter| !letter.is_control())
-        .collect();
-    let flags = flags.first().copied().unwrap_or(0.0) as u32;
-    let mut leave_out = |what: &str| {
-        // MATLAB stores internal data in variables without a name.
-        if !name.is_empty() {
-            left_out.push(format!("{name} is {what}"));
-        }
-        Ok(())
-    };
-    match flags & 0xff {
-        1 => return leave_out("a cell array"),
-        2 => return leave_out("a structure; save its fields as variables"),
-        4 => return leave_out("text"),
-        5 => return leave_out("sparse; save it as full"),
-        6..=15 if flags & 0x0800 != 0 => return leave_out("complex"),
-        6..=15 => {}
-        _ => return leave_out("an object"),
+    let (name, value) = Value::read(source, endian, 0)?;
+    // MATLAB stores internal data, such as `__function_workspace__`, in variables without a name.
+    if !name.is_empty() {
+        value.add(name, arrays, left_out);
     }
-    let &[rows, width] = &dimensions[..] else {
-        return leave_out(&format!("an array of {} dimensions", dimensions.len()));
-    };
-    if !(rows >= 1.0 && width >= 1.0) {
-        return leave_out("empty");
-    }
-    let (rows, width) = (rows as usize, width as usize);
-    let (kind, bytes) = data(source, endian)?;
-    let element = match kind {
-        1 => Element::I8,
-        2 => Element::U8,
-        3 => Element::I16,
-        4 => Element::U16,
-        5 => Element::I32,
-        6 => Element::U32,
-        7 => Element::F32,
-        9 => Element::F64,
-        12 => Element::I64,
-        13 => Element::U64,
-        _ => {
-            return Err(TableError::array(
-                name,
-                "its numbers have an unknown type; save it with the option -v7",
-            ));
-        }
-    };
-    let found = bytes.len() / element.size();
-    if rows.checked_mul(width) != Some(found) {
-        let reason = format!("it should have {rows} × {width} numbers and has {found}; save or copy it again");
-        return Err(TableError::array(name, reason));
-    }
-    let numbers = element.read(&bytes, endian);
-    // A row vector becomes a column of the table.
-    let (rows, width) = if rows == 1 { (width, 1) } else { (rows, width) };
-    arrays.push(Array::new(name, rows, width, numbers, true)?);
     Ok(())
 }
 
+/// Maximum depth of structures in structures.
+const DEEPEST: usize = 8;
+/// Maximum number of fields times elements of a structure.
+const MOST_FIELDS: usize = 1 << 20;
+
+/// Value of a variable or a field.
+enum Value {
+    /// Numbers, column by column.
+    Numbers { shape: Vec<usize>, numbers: Vec<f64> },
+    /// Structures: the name of each field with its value in each structure.
+    Structures(Vec<(String, Vec<Value>)>),
+    /// Anything else: what it is.
+    Other(String),
+}
+
+impl Value {
+    /// Reads a matrix and its name.
+    fn read(mut source: &mut dyn Read, endian: Endian, depth: usize) -> Result<(String, Self), TableError> {
+        let flags = Element::U32.read(&data(&mut source, endian)?.1, endian);
+        let shape = Element::I32.read(&data(&mut source, endian)?.1, endian);
+        let name = text(&data(&mut source, endian)?.1);
+        let flags = flags.first().copied().unwrap_or(0.0) as u32;
+        let other = |what: &str| Self::Other(what.to_owned());
+        let value = match flags & 0xff {
+            1 => other("a cell array"),
+            2 if depth == DEEPEST => other("a structure within too many others"),
+            2 => return Ok((name, Self::structures(source, endian, &shape, depth)?)),
+            4 => other("text"),
+            5 => other("sparse; save it as full"),
+            6..=15 if flags & 0x0800 != 0 => other("complex"),
+            6..=15 => Self::numbers(source, endian, &name, &shape)?,
+            _ => other("an object"),
+        };
+        Ok((name, value))
+    }
+
+    fn numbers(mut source: &mut dyn Read, endian: Endian, name: &str, shape: &[f64]) -> Result<Self, TableError> {
+        if shape.is_empty() || shape.iter().any(|size| *size < 1.0) {
+            return Ok(Self::Other("empty".to_owned()));
+        }
+        let shape = Vec::from_iter(shape.iter().map(|size| *size as usize));
+        let (kind, bytes) = data(&mut source, endian)?;
+        let element = match kind {
+            1 => Element::I8,
+            2 => Element::U8,
+            3 => Element::I16,
+            4 => Element::U16,
+            5 => Element::I32,
+            6 => Element::U32,
+            7 => Element::F32,
+            9 => Element::F64,
+            12 => Element::I64,
+            13 => Element::U64,
+            _ => {
+                return Err(TableError::array(
+                    name,
+                    "its numbers have an unknown type; save it with the option -v7",
+                ));
+            }
+        };
+        let found = bytes.len() / element.size();
+        let expected = shape.iter().copied().try_fold(1, usize::checked_mul);
+        if expected != Some(found) {
+            let reason = format!(
+                "it should have {} numbers and has {found}; save or copy it again",
+                written(&shape)
+            );
+            return Err(TableError::array(name, reason));
+        }
+        Ok(Self::Numbers {
+            shape,
+            numbers: element.read(&bytes, endian),
+        })
+    }
+
+    /// Reads the fields of `shape` structures.
+    fn structures(mut source: &mut dyn Read, endian: Endian, shape: &[f64], depth: usize) -> Result<Self, TableError> {
+        let length = Element::I32.read(&data(&mut source, endian)?.1, endian);
+        let length = length.first().map_or(0, |length| *length as usize);
+        let names = data(&mut source, endian)?.1;
+        let mut fields = Vec::new();
+        if length > 0 {
+            fields.extend(names.chunks_exact(length).map(|name| (text(name), Vec::new())));
+        }
+        let count: f64 = shape.iter().product();
+        if count * fields.len() as f64 > MOST_FIELDS as f64 {
+            return Ok(Self::Other("a structure with too many fields".to_owned()));
+        }
+        for _ in 0..count as usize {
+            for (_, values) in &mut fields {
+                let tag = Tag::read(&mut source, endian)?.ok_or_else(cut_off)?;
+                let mut limited = (&mut source).take(tag.size as u64);
+                let value = match (tag.kind, tag.size) {
+                    (MATRIX, 1..) => Self::read(&mut limited, endian, depth + 1)?.1,
+                    _ => Self::Other("empty".to_owned()),
+                };
+                drain(&mut limited)?;
+                values.push(value);
+            }
+        }
+        Ok(Self::Structures(fields))
+    }
+
+    /// Adds the numbers as arrays, those of a field named `variable.field`, and notes what is left out.
+    fn add(self, name: String, arrays: &mut Vec<Array>, left_out: &mut Vec<String>) {
+        match self {
+            Self::Other(what) => left_out.push(format!("{name} is {what}")),
+            Self::Numbers { shape, numbers } => {
+                // A row vector becomes a column of the table.
+                let first = shape.iter().position(|&size| size > 1).unwrap_or(shape.len() - 1);
+                match Array::new(name, &shape[first..], numbers, true) {
+                    Ok(array) => arrays.push(array),
+                    Err(error) => left_out.push(error.to_string()),
+                }
+            }
+            Self::Structures(fields) => {
+                for (field, values) in fields {
+                    let name = format!("{name}.{field}");
+                    match stacked(values) {
+                        Some(value) => value.add(name, arrays, left_out),
+                        None => left_out.push(format!("{name} has values of several shapes or kinds")),
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// Stacks the values of a field in several structures: vectors of one length become the rows of a matrix. `None` if their
+/// shapes differ.
+fn stacked(mut values: Vec<Value>) -> Option<Value> {
+    if values.len() == 1 {
+        return values.pop();
+    }
+    let vector = |value| match value {
+        Value::Numbers { shape, numbers } if shape.iter().filter(|size| **size > 1).count() <= 1 => Some(numbers),
+        Value::Numbers { .. } | Value::Structures(_) | Value::Other(_) => None,
+    };
+    let rows: Vec<Vec<f64>> = values.into_iter().map(vector).collect::<Option<_>>()?;
+    let width = rows.first()?.len();
+    if rows.iter().any(|row| row.len() != width) {
+        return None;
+    }
+    let column = |place: usize| rows.iter().map(move |row| row[place]);
+    Some(Value::Numbers {
+        shape: vec![rows.len(), width],
+        numbers: (0..width).flat_map(column).collect(),
+    })
+}
+
+/// Returns the name in `bytes`, which ends at a zero byte.
+fn text(bytes: &[u8]) -> String {
+    let letters = bytes.iter().copied().take_while(|byte| *byte != 0).map(char::from);
+    letters.filter(|letter| !letter.is_control()).collect()
+}
+
 /// Reads the type and data of an element within a variable.
-fn data(source: &mut impl Read, endian: Endian) -> Result<(u32, Vec<u8>), TableError> {
+fn data(source: &mut dyn Read, endian: Endian) -> Result<(u32, Vec<u8>), TableError> {
     let tag = Tag::read(source, endian)?.ok_or_else(cut_off)?;
     if let Some(small) = tag.small {
         return Ok((tag.kind, small[..tag.size].to_vec()));
@@ -172,7 +272,7 @@ fn data(source: &mut impl Read, endian: Endian) -> Result<(u32, Vec<u8>), TableE
 
 impl Tag {
     /// Reads a tag; `None` at the end.
-    fn read(source: &mut impl Read, endian: Endian) -> Result<Option<Self>, TableError> {
+    fn read(source: &mut dyn Read, endian: Endian) -> Result<Option<Self>, TableError> {
         let mut bytes = [0; 8];
         if !fill(source, &mut bytes)? {
             return Ok(None);
@@ -215,7 +315,7 @@ fn cut_off() -> TableError {
 }
 
 /// Fills `buffer`; returns `false` if the source is too short.
-fn fill(source: &mut impl Read, buffer: &mut [u8]) -> Result<bool, TableError> {
+fn fill(source: &mut dyn Read, buffer: &mut [u8]) -> Result<bool, TableError> {
     match source.read_exact(buffer) {
         Ok(()) => Ok(true),
         Err(error) if error.kind() == std::io::ErrorKind::UnexpectedEof => Ok(false),
@@ -223,7 +323,7 @@ fn fill(source: &mut impl Read, buffer: &mut [u8]) -> Result<bool, TableError> {
     }
 }
 
-fn drain(source: &mut impl Read) -> Result<(), TableError> {
+fn drain(source: &mut dyn Read) -> Result<(), TableError> {
     std::io::copy(source, &mut std::io::sink()).map_err(damage)?;
     Ok(())
 }

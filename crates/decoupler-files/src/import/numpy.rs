@@ -2,21 +2,15 @@
 //! The header is one line with three known keys. A parser of all Python literals would not be safe: nested brackets in a
 //! corrupt header would overflow its stack.
 
-use std::{
-    io::{Read, Seek},
-    path::Path,
-};
+use std::io::{Read, Seek};
 
-use decoupler_core::text::clean_name;
 use zip::{ZipArchive, result::ZipError};
 
 use super::{
-    Cells, Column, Fault, Format, Table, TableError, Watch,
-    csv_table::Reading,
-    format::{Array, Element, Endian},
+    TableError, Watch,
+    format::{Array, Element, Endian, written},
     input_lines::{Watched, table_error},
     numpy,
-    table::{Excess, Labels, Lines, stem},
 };
 
 /// Maximum length of a header in bytes.
@@ -33,7 +27,7 @@ struct Header {
     shape: Vec<usize>,
 }
 
-/// Reads a one- or two-dimensional array.
+/// Reads an array: samples × any further dimensions.
 pub(super) fn read(name: &str, mut source: impl Read) -> Result<Array, TableError> {
     let wrong = |reason: String| TableError::array(name, reason);
     let mut start = [0; 8];
@@ -61,25 +55,14 @@ pub(super) fn read(name: &str, mut source: impl Read) -> Result<Array, TableErro
     let mut header = vec![0; length];
     fill(&mut source, &mut header).map_err(|error| error.unwrap_or_else(cut_off))?;
     let header = Header::parse(&String::from_utf8_lossy(&header)).map_err(wrong)?;
-    let (rows, width) = match header.shape[..] {
-        [] => (1, 1),
-        [rows] => (rows, 1),
-        [rows, width] => (rows, width),
-        _ => {
-            let shape = header
-                .shape
-                .iter()
-                .map(ToString::to_string)
-                .collect::<Vec<_>>()
-                .join(" × ");
-            return Err(wrong(format!("it is {shape}; reshape it to samples × columns")));
-        }
-    };
+    let shape = header.shape.as_slice();
     let size = header.element.size();
-    let expected = rows.checked_mul(width).and_then(|count| count.checked_mul(size));
-    let expected = expected.ok_or_else(|| wrong(format!("{rows} × {width} numbers do not fit into memory")))?;
+    let factors = shape.iter().chain(std::iter::once(&size));
+    let expected = factors.copied().try_fold(1, usize::checked_mul);
+    let written = written(shape);
+    let expected = expected.ok_or_else(|| wrong(format!("{written} numbers do not fit into memory")))?;
     if expected == 0 {
-        return Err(wrong(format!("it is empty ({rows} × {width})")));
+        return Err(wrong(format!("it is empty ({written})")));
     }
     let mut numbers = Vec::new();
     let mut left = expected;
@@ -94,13 +77,13 @@ pub(super) fn read(name: &str, mut source: impl Read) -> Result<Array, TableErro
         if block.len() < wanted {
             let found = (expected - left + block.len()) / size;
             return Err(wrong(format!(
-                "it is cut off: its header states {rows} × {width} numbers, but it has {found}; copy it again"
+                "it is cut off: its header states {written} numbers, but it has {found}; copy it again"
             )));
         }
         left -= wanted;
         numbers.extend(header.element.read(&block, header.endian));
     }
-    Array::new(name.to_owned(), rows, width, numbers, header.is_by_column)
+    Array::new(name.to_owned(), shape, numbers, header.is_by_column)
 }
 
 /// Fills `buffer`, or fails with `None` if the source is too short.
@@ -172,91 +155,6 @@ impl Header {
             shape: sizes.collect::<Result<_, _>>()?,
         })
     }
-}
-
-/// Combines the arrays of a file that have as many rows as the longest one into a table. A single array without a name has
-/// the columns c1, c2, …; the columns of an array X are X.c1, X.c2, …, or X if there is only one.
-pub(super) fn table(
-    path: &Path,
-    arrays: Vec<Array>,
-    format: Format,
-    left_out: Vec<String>,
-    reading: &Reading<'_>,
-) -> Result<Table, TableError> {
-    let mut notes: Vec<String> = left_out
-        .into_iter()
-        .map(|what| format!("left out: {}", clean_name(&what)))
-        .collect();
-    let Some(rows) = arrays.iter().map(|array| array.rows).max() else {
-        let found = if notes.is_empty() {
-            "it is empty".to_owned()
-        } else {
-            notes.join("; ")
-        };
-        return Err(TableError::array("there is no array of numbers", found));
-    };
-    let mut columns = Vec::new();
-    for mut array in arrays {
-        array.name = clean_name(&array.name);
-        if array.rows != rows {
-            notes.push(format!("left out: {} has {} rows, not {rows}", array.name, array.rows));
-            continue;
-        }
-        let width = array.columns.len();
-        for (index, numbers) in array.columns.into_iter().enumerate() {
-            let name = match (array.name.as_str(), width) {
-                ("", _) => format!("c{}", index + 1),
-                (name, 1) => name.to_owned(),
-                (name, _) => format!("{name}.c{}", index + 1),
-            };
-            columns.push(column(name, numbers, reading));
-        }
-    }
-    Ok(Table {
-        stem: stem(path),
-        columns,
-        rows,
-        format,
-        notes,
-        too_long: Excess::default(),
-        too_short: Excess::default(),
-        lines: Lines::default(),
-    })
-}
-
-fn column(name: String, mut numbers: Vec<f64>, reading: &Reading<'_>) -> Column {
-    let rules = reading
-        .missing
-        .iter()
-        .filter(|(column, _)| column.as_ref().is_none_or(|column| *column == name));
-    let rules: Vec<_> = rules.map(|(_, rule)| *rule).collect();
-    let mut column = Column {
-        name,
-        ..Column::default()
-    };
-    for (row, number) in numbers.iter_mut().enumerate() {
-        if number.is_nan() || rules.iter().any(|rule| rule.is_number(*number)) {
-            column.missing += 1;
-            *number = f64::NAN;
-        } else if number.is_infinite() {
-            column.faults.count += 1;
-            column.faults.first.get_or_insert(Fault {
-                line: row as u64 + 1,
-                text: number.to_string(),
-            });
-            *number = f64::NAN;
-        }
-    }
-    if reading.labels.contains(&column.name) {
-        let mut labels = Labels::default();
-        for &number in &numbers {
-            labels.push((!number.is_nan()).then_some((&number.to_string(), Some(number))));
-        }
-        column.cells = labels.into_cells();
-    } else {
-        column.cells = Cells::Numbers(numbers);
-    }
-    column
 }
 
 /// Reads the arrays of an archive; returns them and the entries left out.

@@ -3,7 +3,7 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 
 use super::{
-    Cure, ImportError, Joined, Recipe, Recording, Watch,
+    Cure, FileSet, ImportError, Joined, Recipe, Recording, Watch,
     recipe::{restored, stored},
 };
 use decoupler_core::dataset::{Dataset, Division, Seed, Split, SplitBy};
@@ -32,6 +32,25 @@ pub struct TestFiles {
     /// Replace the joined files, in the same order.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub join: Vec<PathBuf>,
+    /// Further test files, whose rows follow.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub append: Vec<FileSet>,
+}
+
+impl TestFiles {
+    /// Returns the test files of these sets; `None` without any.
+    pub fn of(sets: Vec<FileSet>) -> Option<Self> {
+        let mut sets = sets.into_iter();
+        let FileSet { data, join } = sets.next()?;
+        let append = sets.collect();
+        Some(Self { data, join, append })
+    }
+
+    /// Returns all test files.
+    pub fn files(&self) -> impl Iterator<Item = &PathBuf> {
+        let first = std::iter::once(&self.data).chain(&self.join);
+        first.chain(self.append.iter().flat_map(FileSet::files))
+    }
 }
 
 /// Datasets of a run on measured samples.
@@ -74,7 +93,10 @@ impl Plan {
             None => None,
             Some(files) => {
                 self.check_test_files(folder, files)?;
-                Some(self.import.of_test(files)?.import(folder, watch)?)
+                let mut recipe = self.import.of_test(files)?;
+                // Lags in seconds have as many samples as in training.
+                recipe.memory = recording.memory().cloned();
+                Some(recipe.import(folder, watch)?)
             }
         };
         Ok((recording, test_recording))
@@ -84,9 +106,12 @@ impl Plan {
     /// time.
     fn check_test_files(&self, folder: &Path, tests: &TestFiles) -> Result<(), ImportError> {
         let real = |path: &PathBuf| folder.join(path).canonicalize().ok();
-        match (real(&self.import.data), real(&tests.data)) {
-            (Some(trained), Some(tested)) if trained == tested => Err(ImportError::TrainedOn(tests.data.clone())),
-            _ => Ok(()),
+        let trained = Vec::from_iter(self.import.data_files().filter_map(real));
+        let tested = std::iter::once(&tests.data).chain(tests.append.iter().map(|set| &set.data));
+        let is_trained = |path: &&PathBuf| real(path).is_some_and(|path| trained.contains(&path));
+        match { tested }.find(is_trained) {
+            Some(path) => Err(ImportError::TrainedOn(path.clone())),
+            None => Ok(()),
         }
     }
 
@@ -109,7 +134,7 @@ impl Plan {
     /// # Errors
     /// If the files cannot be imported, or there are no groups for a split by group.
     pub fn recording(&self, folder: &Path, watch: Watch<'_>) -> Result<Recording, ImportError> {
-        if self.division.by == SplitBy::Group && self.import.group.is_none() {
+        if self.division.by == SplitBy::Group && !self.import.has_groups() {
             return Err(ImportError::NoColumns("the group, by which the samples are split"));
         }
         self.import.import(folder, watch)
@@ -149,12 +174,10 @@ impl Plan {
     pub fn files(&self) -> impl Iterator<Item = &PathBuf> {
         let import = &self.import;
         let joined = import.join.iter().map(|joined| &joined.file);
-        let tests = self
-            .test
-            .iter()
-            .flat_map(|test| std::iter::once(&test.data).chain(&test.join));
+        let tests = self.test.iter().flat_map(TestFiles::files);
         std::iter::once(&import.data)
             .chain(joined)
+            .chain(import.append.iter().flat_map(FileSet::files))
             .chain(&import.positions)
             .chain(tests)
     }
@@ -185,37 +208,46 @@ impl Plan {
             .iter_mut()
             .for_each(|joined| joined.file = of(&joined.file));
         plan.import.positions.iter_mut().for_each(|file| *file = of(file));
+        let mut sets = Vec::from_iter(&mut plan.import.append);
         if let Some(test) = &mut plan.test {
             test.data = of(&test.data);
             test.join.iter_mut().for_each(|file| *file = of(file));
+            sets.extend(&mut test.append);
         }
+        let files = sets.into_iter().flat_map(FileSet::files_mut);
+        files.for_each(|file| *file = of(file));
         plan
     }
 }
 
 impl Recipe {
-    /// Returns this recipe with other files; the names of the columns stay.
+    /// Returns the recipe of the test files; the names of the columns stay.
     fn of_test(&self, files: &TestFiles) -> Result<Self, ImportError> {
-        if files.join.len() != self.join.len() {
+        Ok(Self {
+            append: files.append.clone(),
+            ..self.of_files(&files.data, &files.join)?
+        })
+    }
+
+    /// Returns this recipe with other files and none appended; the names of the columns stay.
+    pub(super) fn of_files(&self, data: &Path, joined: &[PathBuf]) -> Result<Self, ImportError> {
+        if joined.len() != self.join.len() {
             return Err(ImportError::Join {
-                path: files.data.clone(),
-                reason: format!(
-                    "the test data need {} joined files and have {}",
-                    self.join.len(),
-                    files.join.len()
-                ),
-                cure: Cure::GiveTestFiles,
+                path: data.to_owned(),
+                reason: format!("it needs {} joined files and has {}", self.join.len(), joined.len()),
+                cure: Cure::GiveJoinedFiles,
             });
         }
-        let joined = self.join.iter().zip(&files.join).zip(self.stems());
-        let join = joined.map(|((joined, file), stem)| Joined {
+        let all = self.join.iter().zip(joined).zip(self.stems());
+        let join = all.map(|((joined, file), stem)| Joined {
             file: file.clone(),
             stem: Some(stem),
             ..joined.clone()
         });
         Ok(Self {
-            data: files.data.clone(),
+            data: data.to_owned(),
             join: join.collect(),
+            append: Vec::new(),
             ..self.clone()
         })
     }

@@ -7,10 +7,13 @@ use std::{
     path::{Component, Path, PathBuf},
 };
 
-use decoupler_core::dataset::Dataset;
+use decoupler_core::{
+    dataset::{Dataset, Memory},
+    evaluation::auto::AutoRecord,
+};
 use serde::{Deserialize, Serialize};
 
-use super::{Condition, DialectChoice, ImportError, Missing, Plan, PlannedSets};
+use super::{Condition, Derived, DialectChoice, ImportError, Missing, Plan, PlannedSets};
 
 /// Recipe for importing samples: the files to read and to join, and the meaning of each column.
 ///
@@ -24,6 +27,10 @@ pub struct Recipe {
     /// Files whose rows are joined to those of `data`.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub join: Vec<Joined>,
+    /// Further files of the same experiment, whose rows follow those of `data`. They have the same columns; without a group
+    /// column, each file is a group.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub append: Vec<FileSet>,
     /// Layout of text files, where it should not be detected.
     #[serde(default)]
     pub dialect: DialectChoice,
@@ -40,9 +47,15 @@ pub struct Recipe {
     /// Column with the number of the row-wire, from 1.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub row_wire: Option<String>,
+    /// Inputs from the past: lags and averages of the readings.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub memory: Option<Memory>,
     /// Conditions that every used row must meet.
     #[serde(default, rename = "where", skip_serializing_if = "Vec::is_empty")]
     pub conditions: Vec<Condition>,
+    /// Columns computed from others of the same file.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub derive: Vec<Derived>,
     /// Markers of missing values, in addition to empty cells.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub missing: Vec<Missing>,
@@ -70,6 +83,40 @@ pub struct Joined {
     /// Maximum time difference between joined rows; half the median interval of this file if absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub limit: Option<f64>,
+}
+
+impl Recipe {
+    /// Returns the files whose rows become samples, without those joined to them.
+    pub fn data_files(&self) -> impl Iterator<Item = &PathBuf> {
+        std::iter::once(&self.data).chain(self.append.iter().map(|set| &set.data))
+    }
+
+    /// Returns `true` if samples belong to groups: the values of the group column, or else the files.
+    pub fn has_groups(&self) -> bool {
+        self.group.is_some() || !self.append.is_empty()
+    }
+}
+
+/// Files that take the place of those of a recipe, with the same columns.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct FileSet {
+    /// Takes the place of the first file.
+    pub data: PathBuf,
+    /// Take the places of the joined files, in the same order.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub join: Vec<PathBuf>,
+}
+
+impl FileSet {
+    /// Returns all files of the set.
+    pub fn files(&self) -> impl Iterator<Item = &PathBuf> {
+        std::iter::once(&self.data).chain(&self.join)
+    }
+
+    pub(super) fn files_mut(&mut self) -> impl Iterator<Item = &mut PathBuf> {
+        std::iter::once(&mut self.data).chain(&mut self.join)
+    }
 }
 
 /// Returns the path of a recording as stored in a file in `folder`: relative to the folder. A recording in the user's home
@@ -135,6 +182,9 @@ pub struct Recorded {
     pub files: Vec<FileChecksum>,
     /// CRC-32 of the bits of all readings and targets, as hexadecimal digits.
     pub samples_crc32: String,
+    /// What was tried to choose the settings and the memory, if they were chosen automatically.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub search: Option<AutoRecord>,
 }
 
 /// Checksum of a file.
@@ -167,6 +217,7 @@ impl Recorded {
         Ok(Self {
             files,
             samples_crc32: samples_crc32([&sets.recording.set, &sets.test]),
+            search: None,
             plan,
         })
     }
@@ -207,6 +258,7 @@ impl Recorded {
             files: self.files.iter().map(file).collect(),
             plan: self.plan.with_paths(|path| of(path)),
             samples_crc32: self.samples_crc32.clone(),
+            search: self.search.clone(),
         }
     }
 }

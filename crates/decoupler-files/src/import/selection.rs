@@ -6,7 +6,11 @@ use super::{
     join::Partners,
     suggestion::Meanings,
 };
-use decoupler_core::evaluation::Channel;
+use decoupler_core::{
+    dataset::{History, Memory},
+    evaluation::Channel,
+};
+use ndarray::Array2;
 
 /// Largest number of a row-wire.
 const LAST_ROW_WIRE: f64 = 10_000.0;
@@ -131,6 +135,47 @@ impl Rows<'_> {
         Ok((kept, dropped))
     }
 
+    /// Returns the rows with all readings and a time, including rows that are not samples.
+    pub(super) fn with_readings(&self) -> Vec<usize> {
+        let single = self
+            .meanings
+            .time
+            .into_iter()
+            .chain(self.meanings.row_wire)
+            .chain(self.meanings.group);
+        let used = Vec::from_iter(single.chain(self.meanings.inputs.iter().copied()));
+        let has_row_wire = |id: ColumnId, row: usize| row_wire(self.names.name(id), self.number(id, row)).is_ok();
+        let is_complete = |&row: &usize| {
+            !used.iter().any(|id| self.is_missing(*id, row))
+                && self.meanings.row_wire.is_none_or(|id| has_row_wire(id, row))
+        };
+        (0..self.files[0].1.rows).filter(is_complete).collect()
+    }
+
+    /// Describes the rows `read` in order of time, of which those in `kept` are samples.
+    pub(super) fn past(&self, read: &[usize], kept: &[usize]) -> Result<Past, ImportError> {
+        let mut place = HashMap::with_capacity(read.len());
+        place.extend(read.iter().enumerate().map(|(place, &row)| (row, place)));
+        let times_s = match self.meanings.time {
+            None => None,
+            Some(id) => {
+                let Channel { name, unit } = self.channel(id);
+                let factor = seconds(unit.as_deref());
+                if factor.is_none() && self.recipe.memory.as_ref().is_some_and(Memory::needs_clock) {
+                    let unit = unit.unwrap_or_default();
+                    return Err(ImportError::TimeUnit { name, unit });
+                }
+                factor.map(|factor| read.iter().map(|&row| factor * self.number(id, row)).collect())
+            }
+        };
+        Ok(Past {
+            groups: self.meanings.group.map(|_| self.groups(read).0),
+            row_wires: self.row_wires(read)?,
+            times_s,
+            samples: kept.iter().map(|row| place[row]).collect(),
+        })
+    }
+
     /// Sorts the rows by time; returns a note if they were not in order.
     pub(super) fn put_in_order(&self, time: ColumnId, kept: &mut [usize]) -> Option<String> {
         let falls = |pair: &[usize]| self.number(time, pair[1]) < self.number(time, pair[0]);
@@ -143,18 +188,23 @@ impl Rows<'_> {
         ))
     }
 
-    /// Returns the group of each sample; groups are numbered in order of first occurrence.
-    pub(super) fn groups(&self, kept: &[usize]) -> Vec<usize> {
+    /// Returns the group of each sample, numbered in order of first occurrence, and the name of each group. Without a group
+    /// column, each sample is a group without a name.
+    pub(super) fn groups(&self, kept: &[usize]) -> (Vec<usize>, Vec<String>) {
         let Some(id) = self.meanings.group else {
-            return (0..kept.len()).collect();
+            return ((0..kept.len()).collect(), Vec::new());
         };
-        let mut known = HashMap::new();
+        let (mut known, mut names) = (HashMap::new(), Vec::new());
         let numbers = kept.iter().map(|&row| {
             let next = known.len();
-            let key = self.partner(id.file, row).map(|row| self.column(id).group(row));
-            *known.entry(key).or_insert(next)
+            let partner = self.partner(id.file, row);
+            let key = partner.map(|row| self.column(id).group(row));
+            *known.entry(key).or_insert_with(|| {
+                names.push(partner.map_or_else(String::new, |row| self.column(id).name_of_group(row)));
+                next
+            })
         });
-        numbers.collect()
+        (numbers.collect(), names)
     }
 
     pub(super) fn row_wires(&self, kept: &[usize]) -> Result<Option<Vec<usize>>, ImportError> {
@@ -200,6 +250,34 @@ impl Rows<'_> {
         };
         self.files.iter().enumerate().map(report).collect()
     }
+}
+
+/// Rows of a history, before their readings are moved.
+pub(super) struct Past {
+    groups: Option<Vec<usize>>,
+    row_wires: Option<Vec<usize>>,
+    times_s: Option<Vec<f64>>,
+    samples: Vec<usize>,
+}
+
+impl Past {
+    pub(super) fn with_readings(self, readings: Array2<f64>) -> History {
+        let (groups, row_wires) = (self.groups.as_deref(), self.row_wires.as_deref());
+        History::new(readings, groups, row_wires, self.times_s, self.samples)
+    }
+}
+
+/// Returns the number of seconds in the unit of a time column; times without a unit are in seconds.
+pub(super) fn seconds(unit: Option<&str>) -> Option<f64> {
+    Some(match unit.map(str::trim) {
+        None | Some("" | "s" | "sec" | "secs" | "second" | "seconds") => 1.0,
+        Some("ms" | "msec" | "millisecond" | "milliseconds") => 1e-3,
+        Some("us" | "µs" | "μs" | "usec" | "microsecond" | "microseconds") => 1e-6,
+        Some("ns" | "nanosecond" | "nanoseconds") => 1e-9,
+        Some("min" | "minute" | "minutes") => 60.0,
+        Some("h" | "hour" | "hours") => 3600.0,
+        Some(_) => return None,
+    })
 }
 
 #[derive(Clone, Copy, PartialEq, Eq)]

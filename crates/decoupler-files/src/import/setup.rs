@@ -1,5 +1,6 @@
 use std::{ops::ControlFlow, path::Path, sync::Arc};
 
+use ndarray::{Axis, Slice};
 use thiserror::Error;
 
 use super::{ImportError, Plan, PlannedSets, Progress, Recorded, Recording};
@@ -8,6 +9,7 @@ use decoupler_core::{
         Run, RunError, RunSets, RunSettings, SimulatedSettings, Source,
         experiments::{ExperimentRecording, RecordedSamples, TrialSamples},
     },
+    live::DriftReference,
     training::TrainerState,
 };
 
@@ -145,22 +147,7 @@ impl Setup {
             Err(_) if is_cancelled() => return Ok(None),
             planned => planned?,
         };
-        let recorded = Recorded::of(plan.within(folder).absolute(), &planned)?;
-        let PlannedSets {
-            recording,
-            test_recording,
-            split,
-            test,
-        } = planned;
-        let sets = RunSets::new(split, test).described(recording.problem());
-        Ok(Some(SetupSets {
-            sets,
-            recordings: Some(Recordings {
-                recorded,
-                training: recording,
-                test: test_recording,
-            }),
-        }))
+        Ok(Some(SetupSets::of_plan(plan, folder, planned)?))
     }
 }
 
@@ -203,7 +190,7 @@ impl Setup {
 }
 
 /// Returns a callback that reports progress and cancels the import if `is_cancelled`.
-fn watch(
+pub(super) fn watch(
     is_cancelled: &dyn Fn() -> bool,
     on_progress: &mut dyn FnMut(Progress),
 ) -> impl FnMut(Progress) -> ControlFlow<()> {
@@ -218,6 +205,26 @@ fn watch(
 }
 
 impl SetupSets {
+    /// Returns the datasets of a plan whose paths are relative to `folder`.
+    pub(super) fn of_plan(plan: &Plan, folder: &Path, planned: PlannedSets) -> Result<Self, ImportError> {
+        let recorded = Recorded::of(plan.within(folder).absolute(), &planned)?;
+        let PlannedSets {
+            recording,
+            test_recording,
+            split,
+            test,
+        } = planned;
+        let sets = RunSets::new(split, test).described(recording.problem());
+        Ok(Self {
+            sets,
+            recordings: Some(Recordings {
+                recorded,
+                training: recording,
+                test: test_recording,
+            }),
+        })
+    }
+
     /// Prepares a run of `setup` on these datasets; returns `None` if cancelled.
     ///
     /// # Errors
@@ -237,6 +244,19 @@ impl SetupSets {
         is_cancelled: &dyn Fn() -> bool,
     ) -> Result<Option<Run>, RunError> {
         Run::resume_unless(setup.settings, states, self.sets, is_cancelled)
+    }
+
+    /// Describes the training readings of a recording, by which a later drift is detected; `None` for an array, whose
+    /// readings are checked against its model, if the row-wires are known, or if there are too few independent readings.
+    pub fn drift_reference(&self) -> Option<DriftReference> {
+        let training = &self.sets.split.training;
+        if self.recordings.is_none() || training.row_wires_read().is_some() {
+            return None;
+        }
+        // With a memory, the readings are followed by values from the past, which a monitor does not need.
+        let channels = self.sets.problem.inputs.len();
+        let readings = training.readings();
+        DriftReference::of(readings.slice_axis(Axis(1), Slice::from(..channels)))
     }
 
     /// Checks that recorded samples are those `saved` with a run.

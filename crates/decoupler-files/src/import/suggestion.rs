@@ -3,7 +3,7 @@ use std::{collections::HashMap, fmt, path::Path};
 use decoupler_core::dataset::{Division, SplitBy};
 
 use super::{
-    ColumnKind, ColumnSummary, ImportError, InspectedFile, Joined, Plan, Recipe, TestFiles,
+    ColumnKind, ColumnSummary, FileSet, Format, ImportError, InspectedFile, Joined, Plan, Recipe, TestFiles,
     inputs::{ColumnId, Names},
     missing::Comparison,
     table::stem,
@@ -94,13 +94,50 @@ const GROUP_NAMES: [&str; 11] = [
 /// Constant columns, text and copies of other columns are not used.
 pub fn suggested_plan(files: &[InspectedFile]) -> Plan {
     let (training, test) = apart(files);
-    let mut order: Vec<&InspectedFile> = training;
+    let mut series = series(&training);
     // The file with the readings first: the one that looks least like targets; of equal ones, the widest.
-    order.sort_by_key(|file| (score_of_file(&file.path), usize::MAX - numeric(file).count()));
-    Plan {
-        test,
-        ..plan_of(&order)
+    series.sort_by_key(|files| (score_of_file(&files[0].path), usize::MAX - numeric(files[0]).count()));
+    let mut plan = plan_of(&Vec::from_iter(series.iter().map(|files| files[0])));
+    let path = |files: &Vec<&InspectedFile>, number: usize| files[number].path.clone();
+    plan.import.append = Vec::from_iter((1..series.first().map_or(1, Vec::len)).map(|number| FileSet {
+        data: path(&series[0], number),
+        join: series[1..].iter().map(|files| path(files, number)).collect(),
+    }));
+    if plan.import.has_groups() {
+        plan.division.by = SplitBy::Group;
     }
+    Plan { test, ..plan }
+}
+
+/// Divides files into those of the same kind, such as one per session; all of them single unless there are as many of each
+/// kind.
+fn series<'a>(files: &[&'a InspectedFile]) -> Vec<Vec<&'a InspectedFile>> {
+    let mut series: Vec<Vec<&InspectedFile>> = Vec::new();
+    for &file in files {
+        match series.iter_mut().find(|files| are_alike(files[0], file)) {
+            Some(files) => files.push(file),
+            None => series.push(vec![file]),
+        }
+    }
+    if series.windows(2).all(|pair| pair[0].len() == pair[1].len()) {
+        return series;
+    }
+    files.iter().map(|&file| vec![file]).collect()
+}
+
+/// Returns `true` if two files have the same columns and are of the same kind: their names differ in numbers only, or they
+/// have a header and different numbers of rows, so that they cannot be joined row by row.
+fn are_alike(one: &InspectedFile, other: &InspectedFile) -> bool {
+    let columns =
+        |file: &InspectedFile| Vec::from_iter(file.inspection.columns.iter().map(|column| column.name.clone()));
+    let letters = |file: &InspectedFile| {
+        let name = stem(&file.path).to_lowercase();
+        name.chars().filter(|letter| letter.is_alphabetic()).collect::<String>()
+    };
+    let has_header = matches!(&one.format, Format::Text(dialect) if dialect.header);
+    columns(one) == columns(other)
+        && score_of_file(&one.path) == score_of_file(&other.path)
+        && (letters(one) == letters(other) || (has_header && one.inspection.rows != other.inspection.rows))
 }
 
 /// As [`suggested_plan`], if the first file is known to have the readings and the others are joined to it.
@@ -140,7 +177,9 @@ fn plan_of(order: &[&InspectedFile]) -> Plan {
     add(&mut plan.import, first, &first_meanings, None);
     for (file, stem) in joined.iter().zip(&stems) {
         // Columns of joined files are targets, whatever their names.
-        let meanings = guesses(file, false).into_iter().map(|meaning| match meaning {
+        let meanings = guesses(file, false).into_iter().zip(&file.inspection.columns);
+        let meanings = meanings.map(|(meaning, column)| match meaning {
+            Meaning::Input if column.is_rounding => Meaning::Unused,
             Meaning::Input => Meaning::Target,
             other => other,
         });
@@ -190,7 +229,12 @@ fn apart(files: &[InspectedFile]) -> (Vec<&InspectedFile>, Option<TestFiles>) {
         return (all(), None);
     };
     let data = partners.remove(0);
-    (training, Some(TestFiles { data, join: partners }))
+    let test = TestFiles {
+        data,
+        join: partners,
+        append: Vec::new(),
+    };
+    (training, Some(test))
 }
 
 /// Returns the name of a file without "training", "train" or "test".
@@ -276,7 +320,11 @@ fn guesses(file: &InspectedFile, is_alone: bool) -> Vec<Meaning> {
         }
         // A single file contains both inputs and targets.
         if is_alone && looks_like_target(&name, column.unit.as_deref()) {
-            Meaning::Target
+            if column.is_rounding {
+                Meaning::Unused
+            } else {
+                Meaning::Target
+            }
         } else {
             Meaning::Input
         }

@@ -2,7 +2,7 @@ use std::{collections::HashMap, path::Path};
 
 use decoupler_core::text::clean_name;
 
-use super::{Dialect, Format};
+use super::{Dialect, Format, time_stamp::TimeStamp};
 
 /// Table read from a file: columns of equal length.
 #[derive(Clone, Debug)]
@@ -72,6 +72,15 @@ impl Table {
         self.lines.of(row)
     }
 
+    /// Returns `true` if the columns have names in the file.
+    pub(super) fn has_header(&self) -> bool {
+        match &self.format {
+            Format::Text(dialect) => dialect.header,
+            Format::Sheet { header, .. } => *header,
+            Format::Npy | Format::Npz | Format::Matlab => true,
+        }
+    }
+
     /// Returns the layout of a text file; `None` for other formats.
     pub fn dialect(&self) -> Option<&Dialect> {
         match &self.format {
@@ -100,6 +109,8 @@ pub struct Column {
     pub missing: usize,
     /// Cells that are neither numbers nor missing.
     pub faults: Faults,
+    /// First time stamp of a column of time stamps, whose numbers are the seconds since then.
+    pub(super) start: Option<TimeStamp>,
 }
 
 /// Cells of a column.
@@ -162,6 +173,17 @@ impl Cells {
         }
     }
 
+    /// Returns the cell as text; empty if it is missing. A number reads back bit for bit.
+    pub(super) fn text(&self, row: usize) -> String {
+        match self {
+            Self::Numbers(numbers) if numbers[row].is_nan() => String::new(),
+            Self::Numbers(numbers) => numbers[row].to_string(),
+            Self::Labels { numbers, texts } => {
+                numbers[row].map_or(String::new(), |label| texts[label as usize].0.clone())
+            }
+        }
+    }
+
     /// Returns `true` if the cell is missing.
     pub(super) fn is_missing(&self, row: usize) -> bool {
         match self {
@@ -175,6 +197,17 @@ impl Cells {
         match self {
             Self::Numbers(numbers) => numbers[row].to_bits(),
             Self::Labels { numbers, .. } => numbers[row].map_or(u64::MAX, u64::from),
+        }
+    }
+
+    /// Returns the name of a group: the label or the number.
+    pub(super) fn name_of_group(&self, row: usize) -> String {
+        match self {
+            Self::Numbers(numbers) => numbers[row].to_string(),
+            Self::Labels { numbers, texts } => {
+                let label = numbers[row].map(|label| texts[label as usize].0.clone());
+                label.unwrap_or_default()
+            }
         }
     }
 

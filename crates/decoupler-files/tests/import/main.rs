@@ -2,9 +2,11 @@
 
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
+mod memory;
 mod networks;
 mod positions;
 mod recordings;
 mod samples;
+mod several_files;
 mod suggestions;
 mod test_files;

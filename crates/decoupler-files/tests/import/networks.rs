@@ -141,7 +141,10 @@ fn the_remark_on_a_network_worse_than_ridge_claims_no_cause() {
     );
     file.scores.network = with_rmse(2.0 * ridge.rmse);
     let worse = worse_than_ridge(&file).unwrap();
-    assert!(worse.ends_with(": use ridge, or compare other settings by cross-validation"), "{worse}");
+    assert!(
+        worse.ends_with(": use ridge, or compare other settings by cross-validation"),
+        "{worse}"
+    );
     // Five targets make one sentence that names three.
     let ridge = TestErrors::Targets(vec![ridge; 5]);
     file.problem.targets = vec![file.problem.targets[0].clone(); 5];

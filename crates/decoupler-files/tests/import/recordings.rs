@@ -146,15 +146,139 @@ fn arrays_of_numpy_and_matlab_are_read_as_saved() {
         assert_eq!(found("t"), [0.0, 1.0, 2.0, 3.0, 4.0], "{name}");
     }
     for (name, left_out) in [
-        ("plain.npz", "rate has 1 rows"),
+        ("plain.npz", "rate is one number"),
         ("plain.mat", "who is text"),
-        ("plain.mat", "s is a structure"),
+        ("plain.mat", "s.a is 1 × 1"),
     ] {
         let notes = read(name).unwrap().notes;
         assert!(notes.iter().any(|note| note.contains(left_out)), "{name}: {notes:?}");
     }
     assert!(read("complex.npy").unwrap_err().contains("'<c16' is not supported"));
     assert!(read("level4.mat").unwrap_err().contains("-v7"));
+}
+
+#[test]
+fn variables_of_a_workspace_are_chosen_by_their_columns() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures/import/workspace.mat");
+    let table = read(&path).unwrap();
+    assert_eq!(table.rows, 12, "{:?}", table.notes);
+    let all = names(&table);
+    let column = |name: &str| numbers(&table)[all.iter().position(|other| *other == name).expect(name)].clone();
+    let each = |of: fn(f64) -> f64| Vec::from_iter((0..12).map(|press| of(f64::from(press))));
+    assert_eq!(column("positions.c2"), each(|press| 0.5 * press));
+    // Two rows per press, side by side: the columns of the first row, then those of the second.
+    assert_eq!(column("pairs.c2"), each(|press| 100.0 * press));
+    assert_eq!(column("pairs.c3"), each(|press| 10.0 * press + 1.0));
+    // In the order of MATLAB: the second dimension varies fastest.
+    assert_eq!(column("cube.c4"), each(|press| 100.0 * press + 10.0 + 1.0));
+    assert_eq!(column("log.force"), each(|press| 0.25 * press));
+    assert_eq!(column("log.nested.z"), each(|press| press));
+    assert_eq!(column("records.xy.c2"), each(|press| 2.0 * press));
+    for note in [
+        "log.label is text",
+        "calibration is 5 × 1",
+        "cube is 12 × 2 × 3, read as 12 × 6",
+        "2 rows per sample",
+    ] {
+        assert!(
+            table.notes.iter().any(|found| found.contains(note)),
+            "{note}: {:?}",
+            table.notes
+        );
+    }
+    // The named columns determine the rows: each of a pair is a sample of its own.
+    let recipe = Recipe {
+        data: path.clone(),
+        inputs: vec!["pairs.c1".to_owned()],
+        targets: vec!["pairs.c2".to_owned()],
+        ..Recipe::default()
+    };
+    let set = recipe
+        .import(Path::new(""), &mut |_| ControlFlow::Continue(()))
+        .unwrap()
+        .set;
+    assert_eq!(set.samples(), 24);
+}
+
+#[test]
+fn sheets_are_read_like_the_text_they_are_saved_as() {
+    let fixtures = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures/import");
+    for name in ["press.xlsx", "press.xls", "press.ods"] {
+        let table = read(&fixtures.join(name)).unwrap();
+        assert_eq!(names(&table), ["time", "r1", "force", "note"], "{name}");
+        assert_eq!(table.columns[1].unit.as_deref(), Some("kOhm"), "{name}");
+        let force = Vec::from_iter((0..20).map(|row| 0.1 * f64::from(row)));
+        assert_eq!((numbers(&table)[2].clone(), table.line(0)), (force, 2), "{name}");
+        assert_eq!(table.format.to_string(), "sheet 'Data'");
+        let is_left_out = table.notes.iter().any(|note| note.contains("sheet 'About' is 1 × 1"));
+        assert_eq!(is_left_out, name == "press.xlsx", "{:?}", table.notes);
+    }
+    let table = read(&fixtures.join("stamps.xlsx")).unwrap();
+    let seconds = Vec::from_iter((0..12).map(|row| 0.25 * f64::from(row)));
+    assert_eq!(numbers(&table)[0], seconds);
+}
+
+#[test]
+fn time_stamps_are_seconds_since_the_first_and_join_files_by_moment() {
+    let folder = folder(&[
+        (
+            "sensor.csv",
+            "2026-11-24T12:00:00.0+01:00,1\n2026-11-24T12:00:00.5+01:00,2\n2026-11-24T12:00:01+01:00,3\n",
+        ),
+        (
+            "states.csv",
+            "when,force\n2026-11-24 11:00:00.51Z,20\n2026-11-24 11:00:01.01Z,30\n2026-11-24 11:00:01.5Z,40\n",
+        ),
+        (
+            "mixed.csv",
+            "when,force\n2026-11-24 11:00:00Z,20\n2026-11-24 11:00:01,30\n",
+        ),
+    ]);
+    let table = read(&folder.path().join("sensor.csv")).unwrap();
+    assert_eq!(numbers(&table), [[0.0, 0.5, 1.0], [1.0, 2.0, 3.0]]);
+    assert_eq!(table.columns[0].unit.as_deref(), Some("s"));
+    let recipe = Recipe {
+        data: "sensor.csv".into(),
+        join: vec![Joined {
+            file: "states.csv".into(),
+            time: Some("when".to_owned()),
+            limit: Some(0.1),
+            ..Joined::default()
+        }],
+        inputs: vec!["c2".to_owned()],
+        targets: vec!["states.force".to_owned()],
+        time: Some("c1".to_owned()),
+        ..Recipe::default()
+    };
+    let recording = import(&recipe, &folder).unwrap();
+    assert_eq!(recording.set.readings().column(0).to_vec(), [2.0, 3.0]);
+    assert_eq!(recording.set.targets().column(0).to_vec(), [20.0, 30.0]);
+    let mixed = read(&folder.path().join("mixed.csv")).unwrap();
+    assert_eq!(mixed.columns[0].faults.count, 1, "a time zone is not guessed");
+}
+
+#[test]
+fn files_of_other_kinds_are_refused_by_name() {
+    for (start, expected) in [
+        (
+            &b"\x89HDF\r\n\x1a\n\0\0\0\0\0\0\0\0"[..],
+            "an HDF5 file, which is not read; save it as .npz",
+        ),
+        (b"PAR1\x15\x04\x15", "a Parquet file"),
+        (b"\x89PNG\r\n\x1a\n", "a PNG image"),
+        (b"\x80\x04\x95\x10", "a Python pickle"),
+        (
+            b"\x1f\x8b\x08\x00",
+            "compressed with gzip, which is not read; unpack it",
+        ),
+        (b"%PDF-1.7", "a PDF document"),
+    ] {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("data.csv");
+        std::fs::write(&path, start).unwrap();
+        let error = read(&path).unwrap_err();
+        assert!(error.contains(expected), "{error}");
+    }
 }
 
 #[test]
@@ -365,4 +489,45 @@ fn an_inspection_describes_each_column() {
         ("time", Some(1.0), 1)
     );
     assert_eq!((time.longest, time.longest_after_line), (Some(27.0), Some(5)));
+}
+
+#[test]
+fn derived_columns_are_differences_and_ratios_also_with_the_start_of_the_file() {
+    let text = "t (ms),a (V),b (V),f\n0,2,1,1\n1000,4,0,2\n2000,9,3,3\n3000,6,2,4\n";
+    let folder = folder(&[("data.csv", text)]);
+    let derive = ["d=a-b", "q=a/b", "r=a/start(1s)", "p=a-start(3)"];
+    let recipe = Recipe {
+        derive: derive.iter().map(|text| text.parse().unwrap()).collect(),
+        time: Some("t".to_owned()),
+        ..recipe("d,q,r,p", "f")
+    };
+    let recording = import(&recipe, &folder).unwrap();
+    let readings = &recording.set.readings();
+    // The row with b = 0 has no quotient.
+    assert_eq!(readings.column(0).to_vec(), [1.0, 6.0, 4.0]);
+    assert_eq!(readings.column(1).to_vec(), [2.0, 3.0, 3.0]);
+    assert_eq!(readings.column(2).to_vec(), [2.0 / 3.0, 3.0, 2.0]);
+    assert_eq!(readings.column(3).to_vec(), [-3.0, 4.0, 1.0]);
+    assert_eq!(recording.inputs[0].unit.as_deref(), Some("V"));
+    assert_eq!(recording.inputs[1].unit, None);
+    let problem = recording.problem();
+    let path = folder.path().join("data.csv");
+    let inputs = Recipe {
+        derive: recipe.derive[..1].to_vec(),
+        ..recipe.clone()
+    };
+    let one = decoupler_core::evaluation::Problem {
+        inputs: problem.inputs[..1].to_vec(),
+        ..problem
+    };
+    let found = inputs
+        .read_inputs(&path, &one, false, &mut |_| ControlFlow::Continue(()))
+        .unwrap();
+    assert_eq!(found.readings.column(0).to_vec(), [1.0, 4.0, 6.0, 4.0]);
+    let without_time = Recipe { time: None, ..recipe };
+    let error = import(&without_time, &folder).unwrap_err();
+    assert!(
+        error.contains("r=a / start(1s)") && error.contains("time column"),
+        "{error}"
+    );
 }

@@ -213,3 +213,47 @@ fn a_recipe_is_inspected_with_its_own_meanings_and_missing_cells() {
         .to_string();
     assert!(error.contains("b.force"), "{error}");
 }
+
+#[test]
+fn files_with_the_same_columns_are_appended_and_split_by_file() {
+    let three: &[fn(usize) -> f64] = &[VARYING, OTHER, THIRD];
+    let first = table(None, 30, three);
+    let second = table(None, 40, three);
+    let plan = guessed(&[
+        ("squat_S1.csv", &first),
+        ("squat_S3.csv", &second),
+        ("squat_S5.csv", &first),
+    ]);
+    let appended = Vec::from_iter(plan.import.append.iter().map(|set| set.data.display().to_string()));
+    assert_eq!(
+        (appended, plan.import.join.len()),
+        (vec!["squat_S3.csv".to_owned(), "squat_S5.csv".to_owned()], 0)
+    );
+    assert_eq!(plan.division.by, SplitBy::Group);
+    // Two recordings of a sensor and a probe each.
+    let clocked: &[fn(usize) -> f64] = &[CLOCK, VARYING, OTHER];
+    let (sensor, states) = (table(None, 30, clocked), table(None, 30, &[CLOCK, THIRD]));
+    let plan = guessed(&[
+        ("sensor_1.csv", &sensor),
+        ("states_1.csv", &states),
+        ("sensor_2.csv", &sensor),
+        ("states_2.csv", &states),
+    ]);
+    assert_eq!(
+        (plan.import.data.to_str(), plan.import.join.len()),
+        (Some("sensor_1.csv"), 1)
+    );
+    assert_eq!(plan.import.append[0].data, Path::new("sensor_2.csv"));
+    assert_eq!(plan.import.append[0].join, [Path::new("states_2.csv")]);
+    // Files of different kinds are joined, as before.
+    let plan = guessed(&[("pose.csv", &first), ("force.csv", &first)]);
+    assert_eq!((plan.import.append.len(), plan.import.join.len()), (0, 1));
+}
+
+#[test]
+fn a_constant_with_rounding_errors_is_not_proposed_as_a_target() {
+    const ROUNDED: fn(usize) -> f64 = |row| if row % 2 == 0 { 145.1 } else { 145.100_01 };
+    let text = table(Some("r1,r2,x (mm),force (N)"), 30, &[VARYING, OTHER, ROUNDED, THIRD]);
+    let plan = guessed(&[("data.csv", &text)]);
+    assert_eq!(plan.import.targets, ["force"]);
+}

@@ -362,7 +362,7 @@ impl ExperimentsView {
 /// Returns the approximate size of the finished training of a trial in memory.
 fn bytes_of(trial: &Trial, hidden: usize, problem: Option<&Problem>) -> usize {
     let weights = problem.map_or(0, |problem| {
-        hidden * (problem.inputs.len() + 1) + (hidden + 1) * problem.targets.len()
+        hidden * (problem.feature_count() + 1) + (hidden + 1) * problem.targets.len()
     });
     // Current weights, best weights, and about as many numbers again for the state of the method.
     let of_start = 4 * weights * size_of::<f64>();

@@ -41,8 +41,17 @@ pub fn targets_ui(ui: &mut Ui, whole: Rect, view: &mut LiveView, shared: &Shared
     card_ui(ui, left.with_max_x(left.right() - gap), |ui| {
         scrolled_ui(ui, "live targets", |ui| {
             section_heading_ui(ui, "Targets");
-            for (target, value) in targets.problem.targets.iter().zip(targets.values()) {
-                fact_ui(ui, &target.title(), "Latest decoded value.", &format_number(*value));
+            for (index, (target, value)) in targets.problem.targets.iter().zip(targets.values()).enumerate() {
+                let intervals = targets.network.intervals.as_ref();
+                match intervals.and_then(|intervals| intervals.half_width(index, *value)) {
+                    Some(half_width) => fact_ui(
+                        ui,
+                        &target.title(),
+                        "Latest decoded value ± half-width of its 90 % prediction interval.",
+                        &format!("{} ± {}", format_number(*value), format_number(half_width)),
+                    ),
+                    None => fact_ui(ui, &target.title(), "Latest decoded value.", &format_number(*value)),
+                }
             }
         });
     });
@@ -50,6 +59,7 @@ pub fn targets_ui(ui: &mut Ui, whole: Rect, view: &mut LiveView, shared: &Shared
         scrolled_ui(ui, "live stream", |ui| {
             section_heading_ui(ui, "Confidence");
             outside_ui(ui, &targets);
+            drift_ui(ui, &targets);
             section_heading_ui(ui, "Stream");
             stream_ui(ui, view);
         });
@@ -58,7 +68,8 @@ pub fn targets_ui(ui: &mut Ui, whole: Rect, view: &mut LiveView, shared: &Shared
 
 /// Returns the chart of the values of all targets over time.
 pub fn chart(targets: &LiveTargets) -> PlotFigure {
-    targets_over_time_figure(&targets.problem.targets, &targets.history)
+    let intervals = targets.network.intervals.as_ref();
+    targets_over_time_figure(&targets.problem.targets, &targets.history, intervals)
 }
 
 /// Returns the surface through the latest values; `None` if the targets have no positions.
@@ -134,7 +145,11 @@ fn outside_ui(ui: &mut Ui, targets: &LiveTargets) {
     let readings = match targets.readings_outside {
         None => "readings not known".to_owned(),
         Some(0) if targets.targets_outside == 0 => "none".to_owned(),
-        Some(readings) => format!("{} of {}", counted(readings, "reading"), targets.problem.inputs.len()),
+        Some(readings) => format!(
+            "{} of {}",
+            counted(readings, "reading"),
+            targets.problem.feature_count()
+        ),
     };
     let value = match targets.targets_outside {
         0 => readings,
@@ -144,4 +159,18 @@ fn outside_ui(ui: &mut Ui, targets: &LiveTargets) {
     let palette = Theme::of(ui).palette;
     let colour = if is_outside { palette.warning } else { palette.text };
     coloured_fact_ui(ui, "Outside training", hint, &value, colour);
+}
+
+fn drift_ui(ui: &mut Ui, targets: &LiveTargets) {
+    let Some(is_drifted) = targets.is_drifted else { return };
+    let hint = "Readings that no longer look like those of the training: prediction intervals no longer hold. Re-zero the \
+                sensor, or train with recent samples. In readings like those of the training, a false alarm occurs on \
+                average at most once in 10 000 blocks of readings.";
+    let palette = Theme::of(ui).palette;
+    let (value, colour) = if is_drifted {
+        ("recalibrate", palette.warning)
+    } else {
+        ("none", palette.text)
+    };
+    coloured_fact_ui(ui, "Drift of the readings", hint, value, colour);
 }

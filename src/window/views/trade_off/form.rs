@@ -242,9 +242,7 @@ impl TradeOffForm {
             let mut settings = *base;
             // The method of the Train view keeps its settings.
             if method.short_name() != base.training.method.short_name() {
-                let recorded = Method::recorded_regularization();
-                let is_recorded = method.short_name() == recorded.short_name();
-                settings.training.method = if is_recorded { recorded } else { *method };
+                settings.choose_method(*method);
             }
             if self.thoroughness == Thoroughness::Quick {
                 let stopping = &mut settings.training.stopping;

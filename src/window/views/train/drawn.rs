@@ -203,6 +203,7 @@ mod tests {
             answers: Arc::new(decoupled_mm),
             charts: None,
             remarks: Vec::new(),
+            coverage: Vec::new(),
             frame: None,
             best_epoch: 0,
             defect: None,
@@ -227,7 +228,9 @@ mod tests {
         let mut shared = Shared::new(true);
         shared.run = Some(RunView::new(Began {
             id: RunId::new(),
+            asked: settings.into(),
             setup: settings.into(),
+            search: None,
             problem: Arc::clone(run.problem()),
             weights: 0,
             test: TestSet::of(&run, SplitBy::Time).unwrap(),

@@ -7,14 +7,14 @@ use std::time::Duration;
 use decoupler_core::{
     dataset::SplitBy,
     evaluation::{
-        Baselines, ErrorTable, Errors, NodeAddress, Outlook, Problem, ReferenceNote, Scores, SimulatedSettings, Spread,
-        StartRecord, TestErrors, best_start, error_remarks,
+        Baselines, Combination, ErrorTable, Errors, NodeAddress, Outlook, Problem, ReferenceNote, Scores,
+        SimulatedSettings, Spread, StartRecord, TestErrors, best_start, error_remarks,
     },
     identifiability::Identifiability,
     training::StopReason,
 };
 use decoupler_files::{
-    export::{Cell, Table, TableColumn, format_duration, format_number},
+    export::{Cell, Table, TableColumn, describe_search, format_duration, format_number, search_table},
     figure::frame_time,
 };
 use eframe::egui::{Align, Layout, RichText, Ui, WidgetInfo, accesskit::Role};
@@ -32,7 +32,7 @@ use crate::window::{
         view::TrainView,
     },
     widgets::{
-        Landmark, described_table_ui, dim_ui, fields::capitalised, ghost_button, note_ui, scrolled_ui,
+        Landmark, described_table_ui, dim_ui, fields::capitalised, fold_ui, ghost_button, note_ui, scrolled_ui,
         section_heading_ui,
     },
 };
@@ -71,7 +71,8 @@ pub fn report_ui(ui: &mut Ui, view: &mut TrainView, shared: &Shared, effects: &m
             let asked = decoders_ui(ui, decoders, shared.phase, measured, target, source.as_ref());
             effects.extend(asked.map(Effect::ChooseFile));
             effective_parameters_ui(ui, run, result);
-            spread_ui(ui, &run.problem, &run.starts);
+            spread_ui(ui, &run.problem, run.settings().combine, &run.starts);
+            search_ui(ui, run);
         } else {
             expectation_ui(ui, shared);
         }
@@ -82,6 +83,19 @@ pub fn report_ui(ui: &mut Ui, view: &mut TrainView, shared: &Shared, effects: &m
         if let Some((run, result)) = shown {
             section_heading_ui(ui, "Cost");
             cost_ui(ui, run, run.result.as_ref().unwrap_or(result));
+        }
+    });
+}
+
+/// The candidates from which the settings were chosen, folded.
+fn search_ui(ui: &mut Ui, run: &RunView) {
+    let Some(search) = &run.search else { return };
+    let summary = format!("{} tried", search.tried.len());
+    fold_ui(ui, "Choice of settings", &summary, |ui| {
+        dim_ui(ui, &format!("{}.", describe_search(search)));
+        described_table_ui(ui, "choice of settings", &search_table(search));
+        if let Some(remark) = search.remark() {
+            note_ui(ui, &remark);
         }
     });
 }
@@ -104,6 +118,7 @@ fn expectation_ui(ui: &mut Ui, shared: &Shared) {
         let scores = Scores {
             network: baselines.mean.clone(),
             baselines,
+            coverage: Vec::new(),
         };
         let mut table = ErrorTable::of_scores(&preview.settings.source.problem(), &scores, published.as_ref());
         let rows = table.blocks.iter_mut().flat_map(|block| &mut block.rows);
@@ -316,7 +331,7 @@ pub fn conditioning_ui(ui: &mut Ui, test: &TestView) {
 }
 
 /// Shows the spread of the results of several starts: a strip of dots and three figures. Nothing for one start.
-pub fn spread_ui(ui: &mut Ui, problem: &Problem, starts: &[StartRecord]) {
+pub fn spread_ui(ui: &mut Ui, problem: &Problem, combine: Combination, starts: &[StartRecord]) {
     let Some(best) = best_start(starts).filter(|_| starts.len() > 1) else {
         return;
     };
@@ -341,7 +356,13 @@ pub fn spread_ui(ui: &mut Ui, problem: &Problem, starts: &[StartRecord]) {
     let error = if is_held_out { "validation mse" } else { "training mse" };
     let errors = Spread::of(starts.iter().map(StartRecord::deciding_mse));
     described_table_ui(ui, "spread", &spread_table(&[(of_test, spread), (error, errors)]));
-    let text = format!("Start {} is kept: it has the lowest {error}.", best + 1);
+    let text = match combine {
+        Combination::Best => format!("Start {} is kept: it has the lowest {error}.", best + 1),
+        Combination::Mean => format!(
+            "The mean of all starts is kept; start {} has the lowest {error}.",
+            best + 1
+        ),
+    };
     ui.label(RichText::new(text).size(type_size().note).color(palette.dim));
 }
 

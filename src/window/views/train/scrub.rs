@@ -165,6 +165,7 @@ fn result_at(
         frame: None,
         charts: None,
         remarks: Vec::new(),
+        coverage: Vec::new(),
         best_epoch,
         defect: None,
         epochs_run: epoch,

@@ -173,7 +173,11 @@ impl Determination {
         // Enough decimals to show how far a good R² is from 1.
         let digits = (1.0 - (1.0 - self.r2.value).abs().max(1e-9).log10().floor()).clamp(2.0, 6.0) as usize;
         let Interval { value, low, high } = self.r2;
-        let others = if is_determined { "" } else { "; another decoder may explain more" };
+        let others = if is_determined {
+            ""
+        } else {
+            "; another decoder may explain more"
+        };
         format!("{claim} (R² {value:.digits$}, {low:.digits$} to {high:.digits$}){few}{tails}{others}")
     }
 }

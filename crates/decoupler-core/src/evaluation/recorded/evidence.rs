@@ -14,7 +14,7 @@ use crate::{
 /// Neighbouring samples of a recording are nearly the same, and samples of a group are correlated. The variance of a
 /// sum is therefore estimated from whole groups, or from projections of the series on slow cosines.
 #[derive(Clone, Debug)]
-pub(super) enum Evidence {
+pub(crate) enum Evidence {
     /// Samples of each group.
     Groups(Vec<Vec<usize>>),
     /// Samples in the order of the recording.
@@ -42,7 +42,7 @@ impl SumVariance {
 
 impl Evidence {
     /// Returns the groups of `set` if it is split by group, otherwise the order of its samples.
-    pub(super) fn of(set: &Dataset, by: SplitBy) -> Self {
+    pub(crate) fn of(set: &Dataset, by: SplitBy) -> Self {
         match by {
             SplitBy::Group => Self::Groups(set.snapshots()),
             SplitBy::Time | SplitBy::Random => Self::Order,
@@ -69,6 +69,23 @@ impl Evidence {
                     freedom: tail_freedom(influences).min(cosines as f64).max(MIN_FREEDOM),
                 },
             },
+        }
+    }
+}
+
+impl Evidence {
+    /// Returns the number of independent samples whose mean would be as uncertain as the mean of `values`, at most the
+    /// number of values.
+    pub(crate) fn effective_samples(&self, values: &[f64]) -> f64 {
+        let count = values.len() as f64;
+        let mean = values.iter().sum::<f64>() / count;
+        let off: Vec<f64> = values.iter().map(|value| value - mean).collect();
+        let squares: f64 = off.iter().map(|off| off * off).sum();
+        let variance = self.variance(&off).variance;
+        if variance > squares {
+            count * squares / variance
+        } else {
+            count
         }
     }
 }

@@ -8,13 +8,18 @@
 mod channel_remark;
 mod determination;
 mod evidence;
+mod extrapolation;
 mod hysteresis;
 mod learning_curve;
+mod memory_gain;
 mod split_comparison;
 
 pub use channel_remark::{ChannelImportance, ChannelRemark, channel_importance, channel_remarks};
 pub use determination::{Determinacy, Determination, NonlinearGain, Undetermined};
+pub(crate) use evidence::Evidence;
 pub use evidence::FittedModel;
+pub use extrapolation::Extrapolation;
 pub use hysteresis::{HysteresisLoop, LoopLevel};
 pub use learning_curve::{Doubling, LearningCurve, LearningPoint, PowerLaw};
+pub use memory_gain::MemoryGain;
 pub use split_comparison::{Findings, Interval, SplitComparison, StudyStep, TargetFindings};

@@ -1,6 +1,6 @@
 use std::fmt;
 
-use ndarray::Array2;
+use ndarray::{Array2, ArrayView1};
 
 use super::{
     ChannelImportance, ChannelRemark, Determinacy, Determination, FittedModel, LearningCurve, NonlinearGain,
@@ -25,11 +25,15 @@ pub struct SplitComparison {
     pub random_network: Vec<TargetErrors>,
     /// Errors of ridge regression on random folds.
     pub random_ridge: Vec<TargetErrors>,
+    /// Correlation of each target between successive samples of the recording; `None` for a constant target.
+    pub successive: Vec<Option<f64>>,
 }
 
 impl SplitComparison {
     /// Minimum share of the error hidden by a random split that is reported.
     const MIN_OPTIMISM: f64 = 0.05;
+    /// Minimum correlation of successive targets for which neighbours are called alike.
+    const MIN_CORRELATION: f64 = 0.5;
 
     /// Compares random folds of `set` with folds by group if there are groups, otherwise by `by`, or by time if `by` is
     /// random. `validated` is the cross-validation with `folds` folds by `by`. Returns `None` if cancelled. Takes up to
@@ -58,11 +62,11 @@ impl SplitComparison {
             return Ok(None);
         };
         let random = scores(SplitBy::Random)?;
-        Ok(random.map(|random| Self::of(honest, [of_honest, random])))
+        Ok(random.map(|random| Self::of(set, honest, [of_honest, random])))
     }
 
-    /// Compares the errors of two runs or cross-validations, split by `by` and at random.
-    pub fn of(by: SplitBy, [honest, random]: [Scores; 2]) -> Self {
+    /// Compares the errors of two runs or cross-validations on `set`, split by `by` and at random.
+    pub fn of(set: &Dataset, by: SplitBy, [honest, random]: [Scores; 2]) -> Self {
         let errors =
             |scores: Scores| [&scores.baselines.linear, &scores.network].map(|errors| errors.targets().to_vec());
         let ([ridge, network], [random_ridge, random_network]) = (errors(honest), errors(random));
@@ -72,6 +76,12 @@ impl SplitComparison {
             ridge,
             random_network,
             random_ridge,
+            successive: set
+                .targets()
+                .columns()
+                .into_iter()
+                .map(successive_correlation)
+                .collect(),
         }
     }
 
@@ -86,6 +96,27 @@ impl SplitComparison {
         ratio(&self.random_ridge[target], &self.ridge[target])
     }
 
+    /// Returns a clause on the cause of the optimism, as far as it was measured: alike neighbours leak from the training into
+    /// the test samples; otherwise, the relation of readings and target itself changes.
+    fn cause(&self, target: usize) -> String {
+        let over = match self.by {
+            SplitBy::Group => "from group to group",
+            SplitBy::Time | SplitBy::Random => "over time, as with drift",
+        };
+        match self.successive[target] {
+            Some(correlation) if correlation >= Self::MIN_CORRELATION => {
+                format!(
+                    "; successive values of the target correlate by {correlation:.2}, so that random folds share them"
+                )
+            }
+            Some(correlation) => format!(
+                "; successive values of the target correlate by {correlation:.2} only, so that the relation of readings \
+                 and target must change {over}"
+            ),
+            None => String::new(),
+        }
+    }
+
     /// Returns a sentence on the error that a random split would have reported for the target of this name.
     pub fn sentence(&self, target: usize, name: &str) -> String {
         let (honest, random) = (self.network[target].rmse, self.random_network[target].rmse);
@@ -93,14 +124,24 @@ impl SplitComparison {
         match self.network_ratio(target) {
             Some(ratio) if ratio < 1.0 - Self::MIN_OPTIMISM => format!(
                 "a random split would report an RMSE of {random:.4} for {name}; split by {by} it is {honest:.4}: the random \
-                 split is optimistic by {:.0} %, because neighbouring samples are nearly the same",
-                100.0 * (1.0 - ratio)
+                 split is optimistic by {:.0} %{}",
+                100.0 * (1.0 - ratio),
+                self.cause(target)
             ),
             _ => format!(
                 "a random split is not optimistic here: RMSE {random:.4} for {name}, and {honest:.4} split by {by}"
             ),
         }
     }
+}
+
+/// Correlation of successive values; `None` if they are all equal.
+fn successive_correlation(values: ArrayView1<'_, f64>) -> Option<f64> {
+    let mean = values.mean()?;
+    let variance: f64 = values.iter().map(|value| (value - mean).powi(2)).sum();
+    let pairs = values.iter().zip(values.iter().skip(1));
+    let products: f64 = pairs.map(|(one, next)| (one - mean) * (next - mean)).sum();
+    (variance > 0.0).then(|| products / variance)
 }
 
 fn ratio(random: &TargetErrors, honest: &TargetErrors) -> Option<f64> {
@@ -120,6 +161,8 @@ pub struct Findings {
     pub importance: Vec<ChannelImportance>,
     /// Comparison with a random split; `None` without networks.
     pub comparison: Option<SplitComparison>,
+    /// Steps that were left out, or done by ridge regression in place of the network, because the time was spent.
+    pub left_out: Vec<StudyStep>,
 }
 
 /// Findings on one target.
@@ -169,7 +212,8 @@ impl Findings {
     /// Analyses `set` by cross-validation with `folds` folds by the rule of `division`, whose test samples are used for
     /// the learning curve; returns `None` if cancelled. `model` is fitted without each channel and to fewer samples. By
     /// default it is the network if it is better than ridge regression for a target, otherwise ridge; with ridge, no
-    /// network is trained at all.
+    /// network is trained at all. Once `is_spent` returns `true`, no network is trained any more and no channel left out; ridge
+    /// regression comes first.
     ///
     /// # Errors
     /// If the set cannot be divided, or the settings are invalid.
@@ -179,32 +223,34 @@ impl Findings {
         (division, folds): (&Division, usize),
         model: Option<FittedModel>,
         begin: &dyn Fn(StudyStep),
-        is_cancelled: &dyn Fn() -> bool,
+        [is_cancelled, is_spent]: [&dyn Fn() -> bool; 2],
     ) -> Result<Option<Self>, RunError> {
         let by = division.by;
         let folds_by = |by| Folds::by(set, folds, by, &mut settings.seed.rng(Stream::Split));
-        let validate = |by| -> Result<Option<CrossValidated>, RunError> {
-            CrossValidated::on_folds(settings, set, folds_by(by)?, is_cancelled)
-        };
+        let ends = || is_cancelled() || is_spent();
         begin(StudyStep::Folds);
         let judged = |answers: &Array2<f64>| Determination::measure(set, answers.view(), by);
-        let (network, ridge, gains, comparison);
-        if model == Some(FittedModel::Ridge) {
-            let answers = FittedModel::Ridge.held_out(settings, set, &folds_by(by)?, is_cancelled)?;
-            let Some(answers) = answers else { return Ok(None) };
-            ridge = judged(&answers);
-            (network, gains, comparison) = (vec![None; set.outputs()], vec![None; set.outputs()], None);
-        } else {
-            let Some(validated) = validate(by)? else {
-                return Ok(None);
-            };
-            begin(StudyStep::OtherFolds);
-            let compared = SplitComparison::complete(settings, set, folds, (by, &validated), is_cancelled)?;
-            let Some(compared) = compared else { return Ok(None) };
-            network = judged(&validated.network).into_iter().map(Result::ok).collect();
-            ridge = judged(&validated.linear);
-            gains = NonlinearGain::of_validated(set, &validated, by);
-            comparison = Some(compared);
+        let answers = FittedModel::Ridge.held_out(settings, set, &folds_by(by)?, is_cancelled)?;
+        let Some(answers) = answers else { return Ok(None) };
+        let ridge = judged(&answers);
+        let (mut network, mut gains, mut comparison) = (vec![None; set.outputs()], vec![None; set.outputs()], None);
+        let mut left_out = Vec::new();
+        if model != Some(FittedModel::Ridge) {
+            match CrossValidated::on_folds(settings, set, folds_by(by)?, &ends)? {
+                None => left_out.push(StudyStep::Folds),
+                Some(validated) => {
+                    network = judged(&validated.network).into_iter().map(Result::ok).collect();
+                    gains = NonlinearGain::of_validated(set, &validated, by);
+                    begin(StudyStep::OtherFolds);
+                    comparison = SplitComparison::complete(settings, set, folds, (by, &validated), &ends)?;
+                }
+            }
+            if comparison.is_none() {
+                left_out.push(StudyStep::OtherFolds);
+            }
+        }
+        if is_cancelled() {
+            return Ok(None);
         }
         // If the readings determine nothing, the better answer is only closer to the mean.
         let is_worth_it = gains.iter().zip(&network).any(|(gain, network)| {
@@ -218,16 +264,25 @@ impl Findings {
         } else {
             FittedModel::Ridge
         };
-        let model = model.unwrap_or(best);
-        begin(StudyStep::Channels);
-        let Some(importance) = channel_importance(settings, set, (&folds_by(by)?, by), model, is_cancelled)? else {
-            return Ok(None);
-        };
+        let mut model = model.unwrap_or(best);
         begin(StudyStep::Samples);
         let parts = division.divide(set, &mut settings.seed.rng(Stream::Split))?;
-        let Some(curves) = LearningCurve::measure(settings, set, (&parts, by), model, is_cancelled)? else {
+        let mut curves = LearningCurve::measure(settings, set, (&parts, by), model, &ends)?;
+        if curves.is_none() {
+            left_out.push(StudyStep::Samples);
+            model = FittedModel::Ridge;
+            curves = LearningCurve::measure(settings, set, (&parts, by), model, is_cancelled)?;
+        }
+        let Some(curves) = curves else { return Ok(None) };
+        begin(StudyStep::Channels);
+        let importance = channel_importance(settings, set, (&folds_by(by)?, by), model, &ends)?;
+        if is_cancelled() {
             return Ok(None);
-        };
+        }
+        let importance = importance.unwrap_or_else(|| {
+            left_out.push(StudyStep::Channels);
+            Vec::new()
+        });
         let targets = network.into_iter().zip(ridge).zip(gains).zip(curves);
         let target = |(((network, ridge), gain), curve)| TargetFindings {
             network,
@@ -241,6 +296,7 @@ impl Findings {
             remarks: channel_remarks(set),
             importance,
             comparison,
+            left_out,
         }))
     }
 }

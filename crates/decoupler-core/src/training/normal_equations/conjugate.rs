@@ -377,7 +377,7 @@ mod tests {
         solver.max_iterations = max_iterations;
         let mut products = Products::new(&solver, &ConjugateGradient::cost(shape, 40), 1);
         let mut kept = KeptActivations::new(shape, &examples, 1);
-        products.gather(&solver, &mlp, &examples, &mut kept);
+        products.gather(&solver, &mlp, &[], &examples, &mut kept);
         let (mut elimination, mut right) = (Elimination::new(shape), vec![0.0; shape.hidden_weights()]);
         elimination.factor(products.sums(), PerClass::all(1e-3))?;
         elimination.reduce(products.sums(), &mlp, Decay::NONE, &mut right);

@@ -6,7 +6,7 @@ use ndarray::Array2;
 use crate::{network::Mlp, training::Examples};
 
 /// Returns the errors of [`Mlp::forward`] in the order of the Jacobian's rows.
-pub(super) fn errors(mlp: &Mlp, examples: &Examples) -> Mat<f64> {
+pub(in crate::training) fn errors(mlp: &Mlp, examples: &Examples) -> Mat<f64> {
     let mut errors = Vec::new();
     for block in examples.blocks() {
         let inputs = Array2::from_shape_fn((block.samples(), examples.inputs()), |(s, a)| block.inputs[(s, a)]);
@@ -17,7 +17,7 @@ pub(super) fn errors(mlp: &Mlp, examples: &Examples) -> Mat<f64> {
 }
 
 /// Returns J: one row per sample and output, one column per weight in the order of [`Mlp::weights`].
-pub(super) fn jacobian(mlp: &Mlp, examples: &Examples) -> Mat<f64> {
+pub(in crate::training) fn jacobian(mlp: &Mlp, examples: &Examples) -> Mat<f64> {
     let shape = mlp.shape();
     let (inputs, hidden, outputs) = (shape.inputs, shape.hidden, shape.outputs);
     let (w, v) = (mlp.hidden_layer(), mlp.output_layer());

@@ -8,7 +8,7 @@ use super::{
     conjugate::{ConjugateGradient, HiddenSolver, System},
     factoring_is_cheaper,
     products::{OutputLayer, Products, ridge},
-    schur::{Decay, PerClass, SchurComplement},
+    schur::{Decay, PerClass, SchurComplement, Traces},
 };
 use crate::{
     network::{Mlp, Shape},
@@ -103,13 +103,18 @@ impl NormalEquations<SchurComplement> {
         trace.is_finite().then_some(trace)
     }
 
-    /// Returns the contribution of each class of weights to [`Self::trace_of_inverse`], with one damping per class.
-    pub(in crate::training) fn traces_of_inverse(&mut self, mlp: &Mlp, damping: PerClass) -> Option<PerClass> {
+    /// Returns the contributions of weights to [`Self::trace_of_inverse`], with one damping per class.
+    pub(in crate::training) fn traces_of_inverse(&mut self, mlp: &Mlp, damping: PerClass) -> Option<Traces> {
         let (sums, v) = (self.products.sums(), output_weights(mlp));
         self.elimination.factor(sums, damping)?;
         self.solver.factor(sums, self.elimination.f.as_ref(), v, damping)?;
         let traces = self.solver.traces_of_inverse(&mut self.elimination, v);
-        traces.values().iter().all(|trace| trace.is_finite()).then_some(traces)
+        traces
+            .classes()
+            .values()
+            .iter()
+            .all(|trace| trace.is_finite())
+            .then_some(traces)
     }
 }
 
@@ -135,8 +140,25 @@ impl<S: HiddenSolver + ?Sized> NormalEquations<S> {
 
     /// Gathers all products at the weights of `mlp`.
     pub(in crate::training) fn gather(&mut self, mlp: &Mlp, examples: &Examples) -> Evaluation {
+        self.gather_weighted(mlp, &[], examples)
+    }
+
+    /// As [`Self::gather`], for the equations in which errors and output weights of target t are multiplied by √ρₜ,
+    /// with ρ the `precisions` of the targets, or 1 if there are none. To solve them, pass a network whose output
+    /// weights are multiplied, too.
+    pub(in crate::training) fn gather_weighted(
+        &mut self,
+        mlp: &Mlp,
+        precisions: &[f64],
+        examples: &Examples,
+    ) -> Evaluation {
         self.products
-            .gather(&*self.solver, mlp, examples, &mut self.activations)
+            .gather(&*self.solver, mlp, precisions, examples, &mut self.activations)
+    }
+
+    /// Returns the sum of squared errors of each target at the weights of `mlp`.
+    pub(in crate::training) fn squares_of_targets(&mut self, mlp: &Mlp, examples: &Examples) -> Vec<f64> {
+        self.activations.squares_of_outputs(mlp, examples)
     }
 
     /// Solves for the step at damping `mu` from the products last gathered, at the same `mlp`, and writes it in the

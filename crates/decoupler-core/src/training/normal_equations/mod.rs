@@ -22,7 +22,7 @@ mod products;
 mod schur;
 
 pub(super) use equations::{FactoredEquations, NormalEquations};
-pub(super) use schur::{Decay, PerClass, class_sizes, class_squares};
+pub(super) use schur::{Decay, OutputTraces, PerClass, Traces, class_sizes, class_squares};
 
 use conjugate::{ConjugateGradient, HiddenSolver};
 use schur::SchurComplement;
@@ -109,7 +109,7 @@ impl Cost {
 }
 
 #[cfg(test)]
-mod dense;
+pub(super) mod dense;
 
 #[cfg(test)]
 mod tests {

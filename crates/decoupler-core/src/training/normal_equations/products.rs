@@ -13,7 +13,7 @@ use crate::{
     network::{Mlp, Shape},
     training::{
         Evaluation, Examples,
-        activations::{BlockNow, KeptActivations, multiply, multiply_into, tanh_slopes_into},
+        activations::{BlockNow, KeptActivations, multiply, multiply_into, scale, tanh_slopes_into},
         examples::{BLOCK, PairsBuffer, column, column_mut},
         parallel::{add_product, for_each_part},
     },
@@ -65,22 +65,39 @@ impl Products {
         &self.parts[0].0
     }
 
-    /// Gathers all products at the weights of `mlp`, block by block of samples.
+    /// Gathers all products at the weights of `mlp`, block by block of samples. If `precisions` is not empty, they are
+    /// the products of the equations in which the errors and output weights of target t are multiplied by √ρₜ; only
+    /// Jᵀe depends on it.
     pub(super) fn gather<S: HiddenSolver + ?Sized>(
         &mut self,
         solver: &S,
         mlp: &Mlp,
+        precisions: &[f64],
         examples: &Examples,
         kept: &mut KeptActivations,
     ) -> Evaluation {
         let squares = kept.evaluate(mlp, examples);
+        let (Shape { hidden, outputs, .. }, v) = (mlp.shape(), &mlp.layers().1);
+        let weighted: Vec<f64> = if precisions.is_empty() {
+            Vec::new()
+        } else {
+            v.iter()
+                .zip(precisions.iter().cycle())
+                .map(|(v, precision)| v * precision)
+                .collect()
+        };
+        let v = if precisions.is_empty() { v } else { &weighted[..] };
+        let v = MatRef::from_row_major_slice(v, hidden + 1, outputs).subrows(0, hidden);
         for_each_part(&mut self.parts, |(sums, _)| sums.clear());
         kept.for_each_block(mlp, examples, &mut self.parts, |(sums, buffers), now| {
             sums.add_second_order(solver, now, buffers);
-            sums.add_gradient(now, mlp, buffers);
+            sums.add_gradient(now, v, buffers);
         });
         if let [(sums, _), others @ ..] = self.parts.as_mut_slice() {
             others.iter().for_each(|(other, _)| sums.add(other));
+            for (target, precision) in precisions.iter().enumerate() {
+                scale(column_mut(sums.gradient_v.as_mut(), target), precision.sqrt());
+            }
         }
         let sums = self.sums();
         let length = sums.gradient_w.squared_norm_l2() + sums.gradient_v.squared_norm_l2();
@@ -139,17 +156,15 @@ impl Sums {
         }
     }
 
-    /// Adds a block to Jwᵀe and Jvᵀe; its slopes must still be in their buffer.
-    fn add_gradient(&mut self, now: &BlockNow<'_>, mlp: &Mlp, buffers: &mut BlockBuffers) {
-        let Shape { hidden: h, outputs, .. } = self.shape;
+    /// Adds a block to Jwᵀe, with the weights `v` (h × outputs) from errors to hidden nodes, and to Jvᵀe; its slopes
+    /// must still be in their buffer.
+    fn add_gradient(&mut self, now: &BlockNow<'_>, v: MatRef<'_, f64>, buffers: &mut BlockBuffers) {
         let (hidden, errors, samples) = (now.hidden(), now.errors(), now.block.samples());
-        let v = MatRef::from_row_major_slice(mlp.layers().1, h + 1, outputs);
         add_product(self.gradient_v.as_mut(), hidden.transpose(), errors, 1.0);
         let mut delta = buffers.delta.as_mut().subrows_mut(0, samples);
-        let v_without_bias = v.subrows(0, h).transpose();
-        matmul(delta.as_mut(), Accum::Replace, errors, v_without_bias, 1.0, Par::Seq);
+        matmul(delta.as_mut(), Accum::Replace, errors, v.transpose(), 1.0, Par::Seq);
         let slopes = buffers.slopes.as_ref().subrows(0, samples);
-        for node in 0..h {
+        for node in 0..self.shape.hidden {
             multiply(column_mut(delta.as_mut(), node), column(slopes, node));
         }
         add_product(
@@ -256,7 +271,7 @@ mod tests {
         let cost = S::cost(mlp.shape(), examples.samples());
         let mut products = Products::new(&solver, &cost, 2);
         let mut kept = KeptActivations::new(mlp.shape(), examples, 2);
-        products.gather(&solver, mlp, examples, &mut kept);
+        products.gather(&solver, mlp, &[], examples, &mut kept);
         products
     }
 

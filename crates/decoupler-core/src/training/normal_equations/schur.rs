@@ -154,16 +154,12 @@ impl SchurComplement {
     }
 
     /// As [`Self::trace_of_inverse`], class by class: diagonal entry k is the squared norm of column k of L⁻¹, or of
-    /// Lg⁻¹ and all L⁻¹ Rₜ.
-    pub(super) fn traces_of_inverse(&mut self, elimination: &mut Elimination, v: MatRef<'_, f64>) -> PerClass {
-        let Shape {
-            inputs,
-            hidden,
-            outputs,
-        } = self.shape;
+    /// Lg⁻¹ and L⁻¹ Rₜ.
+    pub(super) fn traces_of_inverse(&mut self, elimination: &mut Elimination, v: MatRef<'_, f64>) -> Traces {
+        let Shape { inputs, hidden, .. } = self.shape;
         let inverse = self.invert(elimination);
         let squares = |values: &[f64]| values.iter().map(|value| value * value).sum::<f64>();
-        let mut traces = PerClass::all(0.0);
+        let mut traces = Traces::default();
         for index in 0..inverse.s.ncols() {
             let square = squares(&column(inverse.s.as_ref(), index)[index..]);
             if index % (inputs + 1) == inputs {
@@ -172,16 +168,16 @@ impl SchurComplement {
                 traces.hidden_weights += square;
             }
         }
-        let mut of_nodes: Vec<f64> = (0..=hidden)
-            .map(|node| outputs as f64 * squares(&column(inverse.g.as_ref(), node)[node..]))
+        let of_node: Vec<f64> = (0..=hidden)
+            .map(|node| squares(&column(inverse.g.as_ref(), node)[node..]))
             .collect();
         self.for_each_output(elimination, v, |r| {
-            for (node, sum) in of_nodes.iter_mut().enumerate() {
-                *sum += squares(column(r, node));
-            }
+            let of_node = |node| of_node[node] + squares(column(r, node));
+            traces.outputs.push(OutputTraces {
+                weights: (0..hidden).map(of_node).sum(),
+                bias: of_node(hidden),
+            });
         });
-        traces.output_biases = of_nodes[hidden];
-        traces.output_weights = of_nodes[..hidden].iter().sum();
         traces
     }
 
@@ -212,6 +208,34 @@ impl SchurComplement {
             fill(r.as_mut(), |index, column| v[(index / n1, output)] * f[(index, column)]);
             solve_lower_triangular_in_place(self.s.as_ref(), r.as_mut(), Par::Seq);
             add(r.as_ref());
+        }
+    }
+}
+
+/// Contributions of weights to the trace of an inverse.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(in crate::training) struct Traces {
+    pub(in crate::training) hidden_weights: f64,
+    pub(in crate::training) hidden_biases: f64,
+    /// Of the weights of each output.
+    pub(in crate::training) outputs: Vec<OutputTraces>,
+}
+
+/// Contributions of the weights of one output to the trace of an inverse.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(in crate::training) struct OutputTraces {
+    pub(in crate::training) weights: f64,
+    pub(in crate::training) bias: f64,
+}
+
+impl Traces {
+    /// Sums over the weights of each class.
+    pub(in crate::training) fn classes(&self) -> PerClass {
+        PerClass {
+            hidden_weights: self.hidden_weights,
+            hidden_biases: self.hidden_biases,
+            output_weights: self.outputs.iter().map(|output| output.weights).sum(),
+            output_biases: self.outputs.iter().map(|output| output.bias).sum(),
         }
     }
 }

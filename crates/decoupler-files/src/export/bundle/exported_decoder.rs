@@ -1,5 +1,5 @@
 use decoupler_core::{
-    dataset::{Dataset, PerRow, Seed, Stream},
+    dataset::{Dataset, Memory, PerRow, Seed, Stream},
     decoupling::{CompiledNetworks, Decoder, DecoderKind, Description, Layer, Precision, decode_set},
     evaluation::{
         Channel, DecoderSet, Problem, RunError, RunSets, RunSettings, SimulatedSettings, TargetErrors, TestErrors,
@@ -89,18 +89,33 @@ impl<'a> ExportedDecoder<'a> {
         &self.fitted.description
     }
 
+    /// Memory whose features the decoder takes, if it has one.
+    pub(super) fn memory(&self) -> Option<&Memory> {
+        self.origin.problem.memory.as_ref()
+    }
+
     pub(super) fn meaning(&self) -> Meaning {
         match self.origin.settings.simulated() {
             Some(settings) => Meaning::Array(settings.source.sensor.scale),
             None => Meaning::Own {
-                inputs: self.origin.problem.inputs.clone(),
+                inputs: self.origin.problem.features(),
+                has_memory: self.memory().is_some(),
                 targets: self.origin.problem.targets.clone(),
                 row_wires: match (&self.origin.row_wires, self.fitted.reading_ranges.len()) {
                     (Some(row_wires), 2..) => row_wires.clone(),
                     _ => Vec::new(),
                 },
+                half_widths: self.half_widths(),
             },
         }
+    }
+
+    /// Half-width of the 90 % prediction interval of each target of the network, as far as they were calibrated.
+    fn half_widths(&self) -> Vec<Option<f64>> {
+        let file = self.file.filter(|_| self.fitted.kind.is_network());
+        let intervals = file.and_then(|file| file.intervals.as_ref());
+        let targets = intervals.iter().flat_map(|intervals| &intervals.targets);
+        targets.map(|target| Some(target.as_ref()?.constant)).collect()
     }
 
     /// Ranges of the readings in training: one for all row-wires, or one for each if the row is an argument.
@@ -186,8 +201,10 @@ impl<'a> ExportedDecoder<'a> {
             Some(settings) => of_array(&self.origin, &settings, portable, errors),
             None => of_recording(&self.origin, portable, errors),
         };
+        let half_widths = self.half_widths();
+        let intervals = (!half_widths.is_empty()).then(|| json!({ "half_widths_90": half_widths }));
         let mut fields = Metadata::new();
-        for part in [Some(common), network, Some(own)] {
+        for part in [Some(common), network, Some(own), intervals] {
             if let Some(Value::Object(part)) = part {
                 fields.extend(part);
             }
@@ -254,7 +271,8 @@ fn of_recording(origin: &Origin, portable: &Portable, errors: &TestErrors) -> Va
         "trained_by": origin.program,
         "files": origin.files,
         "row_numbers": portable.takes_row().then(|| row_wires.collect::<Vec<_>>()),
-        "inputs": columns(&origin.problem.inputs),
+        "inputs": columns(&origin.problem.features()),
+        "memory": origin.problem.memory,
         "outputs": columns(&origin.problem.targets),
         "method": origin.settings.training.method.short_name(),
         "seed": origin.settings.seed,

@@ -6,6 +6,7 @@ use super::{
     exported_decoder::{ExportedDecoder, Metadata},
     fixed_point::{FixedNetworks, HiddenWidth, USUAL_BOUND},
     folder::{AtomicFolder, Draft, deviation, identifier},
+    memory::ExportedMemory,
     portable::Portable,
     report::{BundleCheck, BundleError, BundleReport, VectorCounts, readme},
     vectors::{Deviation, Tolerance, Vectors, golden_csv},
@@ -25,7 +26,7 @@ pub fn export_bundle<'a>(
     precision: BundlePrecision,
     path: &Path,
 ) -> Result<BundleReport, BundleError> {
-    let exported = decoder.into();
+    let mut exported = decoder.into();
     format.check_for(exported.kind(), precision)?;
     if format == BundleFormat::Json && exported.kind().is_network() {
         return export_network_file(&exported, path);
@@ -33,14 +34,22 @@ pub fn export_bundle<'a>(
     if format == BundleFormat::Json && fs::symlink_metadata(path).is_ok() {
         return Err(BundleError::Exists(path.to_owned()));
     }
+    if let (Some(memory), Some(unsupported)) = (exported.memory(), unsupported(format, precision)) {
+        return Err(BundleError::Memory(unsupported, memory.clone()));
+    }
     let folder = AtomicFolder::create(path)?;
     let portable = Portable::of(&exported)?;
+    let memory = exported.memory().cloned();
+    let memory = memory
+        .map(|memory| ExportedMemory::of(&memory, &mut exported, &portable))
+        .transpose()?;
     let mut bundle = Bundle {
         name: identifier(path),
         format,
         precision,
         metadata: exported.metadata(&portable, precision),
         exported,
+        memory,
         portable,
         folder,
         remarks: Vec::new(),
@@ -57,6 +66,16 @@ pub fn export_bundle<'a>(
             let arithmetic = single_arithmetic(&bundle.portable, &vectors);
             bundle.export_floating(path, arithmetic, &vectors)
         }
+    }
+}
+
+/// Bundles in which a memory cannot be written: its state needs double precision.
+fn unsupported(format: BundleFormat, precision: BundlePrecision) -> Option<&'static str> {
+    match (format, precision) {
+        (BundleFormat::Json, _) => Some("this decoder as JSON"),
+        (_, BundlePrecision::Fixed16) => Some("fixed point"),
+        (_, BundlePrecision::Single) => Some("single precision"),
+        (_, BundlePrecision::Double) => None,
     }
 }
 
@@ -131,6 +150,7 @@ fn single_arithmetic(portable: &Portable, vectors: &Vectors) -> Arithmetic {
 /// An unfinished bundle.
 struct Bundle<'a> {
     exported: ExportedDecoder<'a>,
+    memory: Option<ExportedMemory>,
     name: String,
     format: BundleFormat,
     precision: BundlePrecision,
@@ -211,7 +231,10 @@ impl Bundle<'_> {
             metadata: &self.metadata,
             remarks: &mut self.remarks,
         };
-        let checks = (self.format.writer().export)(&mut draft)?;
+        let mut checks = (self.format.writer().export)(&mut draft)?;
+        if let Some(memory) = &self.memory {
+            checks.extend(memory.export(self.format, &mut draft)?);
+        }
         self.finish(path, vectors, checks, limits, None)
     }
 
@@ -302,8 +325,11 @@ impl Bundle<'_> {
         let metadata = serde_json::to_string_pretty(&metadata)
             .map_err(|error| BundleError::read_back("metadata.json", error.to_string()))?;
         self.folder.write("metadata.json", metadata + "\n")?;
-        self.folder
-            .write("README.txt", readme(&self.name, portable, fixed, &report))?;
+        let mut text = readme(&self.name, portable, fixed, &report);
+        if let Some(memory) = &self.memory {
+            text += &memory.call(self.format, &self.name);
+        }
+        self.folder.write("README.txt", text)?;
         report.files = self.folder.sizes()?;
         self.folder.commit()?;
         Ok(report)

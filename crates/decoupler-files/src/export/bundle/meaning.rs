@@ -1,5 +1,7 @@
 use decoupler_core::{evaluation::Channel, sensor::ArrayScale, text::is_unprintable};
 
+use crate::export::format_number;
+
 /// Meaning of the readings and outputs of an exported network, and the words for them in its files.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Meaning {
@@ -9,15 +11,22 @@ pub(super) enum Meaning {
     Own {
         inputs: Vec<Channel>,
         targets: Vec<Channel>,
+        /// The inputs are features of a memory, not readings.
+        has_memory: bool,
         /// Row-wires that have a network each, from 0, in their order; empty if one network serves all.
         row_wires: Vec<usize>,
+        /// Half-width of the 90 % prediction interval of each target that has one; empty if none has.
+        half_widths: Vec<Option<f64>>,
     },
 }
 
 impl Meaning {
     /// Identifier of the readings in code and graphs.
     pub(super) fn readings(&self) -> &'static str {
-        self.either("resistances_ohm", "readings")
+        match self {
+            Self::Own { has_memory: true, .. } => "features",
+            _ => self.either("resistances_ohm", "readings"),
+        }
     }
 
     /// Identifier of the outputs.
@@ -99,13 +108,23 @@ impl Meaning {
         }
     }
 
+    /// Half-widths of the 90 % prediction intervals, if every target has one.
+    pub(super) fn half_widths(&self) -> Option<Vec<f64>> {
+        match self {
+            Self::Own { half_widths, .. } if !half_widths.is_empty() => half_widths.iter().copied().collect(),
+            _ => None,
+        }
+    }
+
     /// Sentences with the names and units of own data, in lines of at most 100 characters that fit into a comment of
     /// any language; none for an array.
     pub(super) fn legend(&self) -> Vec<String> {
         let Self::Own {
             inputs,
             targets,
+            has_memory,
             row_wires,
+            half_widths,
         } = self
         else {
             return Vec::new();
@@ -114,7 +133,10 @@ impl Meaning {
             let titles: Vec<String> = channels.iter().map(|channel| comment(&channel.title())).collect();
             format!("{what}, in this order: {}.", titles.join(", "))
         };
-        let mut sentences = vec![list("Readings", inputs), list("Targets", targets)];
+        let mut sentences = vec![
+            list(if *has_memory { "Features" } else { "Readings" }, inputs),
+            list("Targets", targets),
+        ];
         // The usual numbering is not mentioned.
         if row_wires.iter().enumerate().any(|(index, &row_wire)| index != row_wire) {
             let rows = row_wires.iter().enumerate();
@@ -122,6 +144,16 @@ impl Meaning {
                 .map(|(index, row_wire)| format!("{} is row-wire {}", index + 1, row_wire + 1))
                 .collect();
             sentences.push(format!("Rows: {}.", rows.join(", ")));
+        }
+        let half_widths = targets.iter().zip(half_widths);
+        let half_widths: Vec<String> = half_widths
+            .filter_map(|(target, half_width)| {
+                let half_width = format_number((*half_width)?);
+                Some(format!("{} +/- {half_width}", comment(&target.title())))
+            })
+            .collect();
+        if !half_widths.is_empty() {
+            sentences.push(format!("90 % prediction intervals: {}.", half_widths.join(", ")));
         }
         sentences.iter().flat_map(|sentence| wrapped(sentence)).collect()
     }
@@ -174,16 +206,19 @@ mod tests {
         let meaning = Meaning::Own {
             inputs: odd.iter().map(channel).collect(),
             targets: vec![channel(&"x")],
+            has_memory: false,
             row_wires: vec![0, 4],
+            half_widths: vec![Some(1.5)],
         };
         let text = meaning.legend().join("\n");
         for forbidden in ["*/", "/*", "??", "\u{202e}", "\u{7}"] {
             assert!(!text.contains(forbidden), "{forbidden}: {text}");
         }
         assert!(
-            text.contains("µT") && text.ends_with("Rows: 1 is row-wire 1, 2 is row-wire 5."),
+            text.contains("µT") && text.contains("Rows: 1 is row-wire 1, 2 is row-wire 5."),
             "{text}"
         );
+        assert!(text.ends_with("+/- 1.50."), "{text}");
         assert!(text.lines().all(|line| line.chars().count() <= 100), "{text}");
     }
 

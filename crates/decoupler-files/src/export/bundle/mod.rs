@@ -16,6 +16,7 @@ mod folder;
 mod iteration;
 mod matlab;
 mod meaning;
+mod memory;
 mod numpy;
 mod onnx;
 mod portable;

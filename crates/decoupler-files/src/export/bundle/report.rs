@@ -1,6 +1,7 @@
 use std::{fmt::Write, path::PathBuf};
 
 use decoupler_core::{
+    dataset::Memory,
     decoupling::NotDescribed,
     evaluation::{Channel, RunError},
 };
@@ -236,6 +237,14 @@ pub enum BundleError {
         /// The cause.
         reason: NotDescribed,
     },
+    /// A memory is exported in double precision only.
+    #[error("a network with a memory ({1}) cannot be exported in {0}: give --precision f64, or train without a memory")]
+    Memory(&'static str, Memory),
+    /// The lag is too long for a graph.
+    #[error(
+        "a lag of {0} samples is too long for an ONNX graph, which copies its state for each sample: export as c99, numpy or matlab"
+    )]
+    LongLag(usize),
     /// Rows whose equations have no unique solution.
     #[error(
         "{decoder} cannot be exported: the equations of {open} of {rows} rows drawn in the scene have no solution or more than one; take another decoder"

@@ -183,7 +183,9 @@ fn own_data(array: &Portable) -> Portable {
         meaning: Meaning::Own {
             inputs: channels(array.channels),
             targets: channels(array.outputs),
+            has_memory: false,
             row_wires: Vec::new(),
+            half_widths: Vec::new(),
         },
         ..array.clone()
     }

@@ -2,9 +2,9 @@
 
 use std::{fmt, path::Path};
 
-use crate::import::{DialectChoice, Plan, Recipe, Setup};
+use crate::import::{DialectChoice, FileSet, Plan, Recipe, Setup};
 use decoupler_core::{
-    dataset::{Division, SplitBy},
+    dataset::{Division, Span, SplitBy},
     evaluation::{Measured, RunSettings, SimulatedSettings},
     scene::{Loading, Movement, NoisySets, RowModel},
     sensor::SensorModel,
@@ -165,13 +165,17 @@ impl Command {
             None => self.import(&plan.import),
         }
         if let Some(test) = &plan.test {
-            self.add("test-data", test.data.display());
-            test.join.iter().for_each(|file| self.add("test-join", file.display()));
+            let sets = std::iter::once((&test.data, &test.join));
+            let sets = sets.chain(test.append.iter().map(|set| (&set.data, &set.join)));
+            for (data, join) in sets {
+                self.add("test-data", data.display());
+                join.iter().for_each(|file| self.add("test-join", file.display()));
+            }
         }
         let (division, default) = (plan.division, Division::default());
-        let by_default = match plan.import.group {
-            Some(_) => SplitBy::Group,
-            None => default.by,
+        let by_default = match plan.import.has_groups() {
+            true => SplitBy::Group,
+            false => default.by,
         };
         // The recipe may have another division.
         if recipe.is_some() || division.by != by_default || division.by != default.by {
@@ -189,19 +193,26 @@ impl Command {
         let Recipe {
             data,
             join,
+            append,
             dialect,
             inputs,
             targets,
             time,
             group,
             row_wire,
+            memory,
             conditions,
+            derive,
             missing,
             units,
             positions,
         } = recipe;
         self.add("data", data.display());
         join.iter().for_each(|joined| self.add("join", joined.file.display()));
+        for FileSet { data, join } in append {
+            self.add("data", data.display());
+            join.iter().for_each(|file| self.add("join", file.display()));
+        }
         let times = Vec::from_iter(join.iter().filter_map(|joined| joined.time.as_deref()));
         // One for all, or one for each.
         let is_one = times.windows(2).all(|pair| pair[0] == pair[1]);
@@ -215,7 +226,19 @@ impl Command {
         for (name, column) in [("time", time), ("group", group), ("row-wire", row_wire)] {
             column.iter().for_each(|column| self.add(name, column));
         }
+        if let Some(memory) = memory {
+            for (name, spans) in [("lags", &memory.lags), ("memory", &memory.averages)] {
+                let spans = Vec::from_iter(spans.iter().map(Span::to_string));
+                if !spans.is_empty() {
+                    self.add(name, spans.join(","));
+                }
+            }
+            if memory.differences {
+                self.0 += " --differences";
+            }
+        }
         conditions.iter().for_each(|condition| self.add("where", condition));
+        derive.iter().for_each(|derived| self.add("derive", derived));
         missing.iter().for_each(|missing| self.add("missing", missing));
         units
             .iter()
@@ -239,6 +262,8 @@ impl Command {
     /// Adds the options of the network and its training.
     fn training(&mut self, settings: &RunSettings, default: &RunSettings) {
         self.option("starts", settings.starts, default.starts);
+        self.option("begin", settings.initialization, default.initialization);
+        self.option("combine", settings.combine, default.combine);
         let (mut method, mut usual_method) = (settings.training.method, default.training.method);
         self.option("method", method.short_name(), usual_method.short_name());
         let is_usual = method.short_name() == usual_method.short_name();
@@ -254,7 +279,9 @@ impl Command {
                 self.add("set", format!("{}={}", setting.name.replace(' ', "-"), setting.value));
             }
         }
-        let (rules, usual) = (settings.training.stopping, default.training.stopping);
+        let mut usual = *default;
+        usual.choose_method(settings.training.method);
+        let (rules, usual) = (settings.training.stopping, usual.training.stopping);
         self.option("epochs", rules.epochs, usual.epochs);
         self.option("goal", rules.goal_mse, usual.goal_mse);
         self.option("max-fail", rules.max_fail, usual.max_fail);

@@ -19,8 +19,8 @@ use super::{
 use crate::{
     export::{
         Cell, NetworkFile, Table, TableColumn, WriteError, atomic_write, decoder_table, describe_determinacy,
-        describe_worse_than_ridge, document::PROGRAM, error_table, figures::dark_style, format_duration,
-        format_percent, unfinished::folder_of,
+        describe_search, describe_worse_than_ridge, document::PROGRAM, error_table, figures::dark_style,
+        format_duration, format_percent, search_table, unfinished::folder_of,
     },
     import::{Plan, Setup},
 };
@@ -110,6 +110,12 @@ impl RunReport<'_> {
         });
         if file.training.starts.len() > 1 {
             html.section("Starts", |html| html.table(&self.starts_table(), ""));
+        }
+        if let Some(search) = file.recorded.as_ref().and_then(|recorded| recorded.search.as_ref()) {
+            html.section("Choice of settings", |html| {
+                html.element("p", "dim", &format!("{}.", describe_search(search)));
+                html.table(&search_table(search), "");
+            });
         }
         html.section("Settings", |html| match (setup.simulated(), &file.recorded) {
             (Some(settings), _) => {
@@ -223,12 +229,7 @@ impl RunReport<'_> {
     fn recording_remarks(&self, plan: &Plan, answers: &ndarray::Array2<f64>) -> Vec<String> {
         let measured = Determination::measure(self.test, answers.view(), plan.division.by);
         let mut remarks = describe_determinacy(&self.file.problem.targets, &measured);
-        let NetworkFile {
-            problem,
-            scores,
-            settings,
-            ..
-        } = self.file;
+        let NetworkFile { problem, scores, .. } = self.file;
         remarks.extend(describe_worse_than_ridge(problem, scores));
         if plan.is_optimistic() {
             let text = "test samples are drawn at random, which is optimistic where neighbouring rows are similar; split \

@@ -6,7 +6,7 @@ use crate::{
 };
 use decoupler_core::{
     dataset::Dataset,
-    evaluation::{Channel, SimulatedSettings},
+    evaluation::{Channel, Combination, SimulatedSettings},
     scene::{Loading, Movement, Noise, NoisySets, RowModel},
     text::counted,
 };
@@ -85,19 +85,26 @@ pub(super) fn recording_facts(file: &NetworkFile, recorded: &Recorded, test: &Da
     for joined in &import.join {
         facts.push(("Joined file", joined.file.display().to_string()));
     }
+    for set in &import.append {
+        facts.push(("Appended", set.data.display().to_string()));
+    }
     if let Some(time) = &import.time {
         facts.push(("Time", time.clone()));
     }
     if let Some(group) = &import.group {
         facts.push(("Group", group.clone()));
     }
+    for derived in &import.derive {
+        facts.push(("Derived column", derived.to_string()));
+    }
     for condition in &import.conditions {
         facts.push(("Rows used", condition.to_string()));
     }
-    facts.extend([
-        ("Readings", names(&file.problem.inputs)),
-        ("Targets", names(&file.problem.targets)),
-    ]);
+    facts.push(("Readings", names(&file.problem.inputs)));
+    if let Some(memory) = &file.problem.memory {
+        facts.push(("Memory", memory.to_string()));
+    }
+    facts.push(("Targets", names(&file.problem.targets)));
     let samples = counted(test.samples(), "test sample");
     facts.push((
         "Split",
@@ -147,7 +154,13 @@ fn training_facts(file: &NetworkFile) -> Vec<(&'static str, String)> {
         facts.push(("Method", format!("{from}{}", stage.method)));
     }
     facts.extend([
-        ("Starts", file.settings.starts.to_string()),
+        (
+            "Starts",
+            match file.settings.combine {
+                Combination::Best => file.settings.starts.to_string(),
+                Combination::Mean => format!("{}, whose mean is the network", file.settings.starts),
+            },
+        ),
         (
             "Ends",
             format!(

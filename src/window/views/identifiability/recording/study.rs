@@ -234,7 +234,8 @@ fn find(
     let division = (&plan.division, folds);
     let begin = |stage| report.send(StudyEvent::Began(stage));
     let is_cancelled = || report.is_cancelled();
-    let found = Findings::measure(setup.settings(), &recording.set, division, model, &begin, &is_cancelled);
+    let ends: [&dyn Fn() -> bool; 2] = [&is_cancelled, &|| false];
+    let found = Findings::measure(setup.settings(), &recording.set, division, model, &begin, ends);
     if let Some(findings) = found.map_err(|error| error.to_string())? {
         report.send(StudyEvent::Found(Box::new(RecordingFindings {
             setup,

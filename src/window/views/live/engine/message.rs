@@ -157,6 +157,10 @@ impl LiveShown {
 pub struct LiveTargets {
     /// Description of the targets.
     pub problem: Arc<Problem>,
+    /// The network, which may have prediction intervals.
+    pub network: Arc<NetworkFile>,
+    /// True once the readings no longer look like those of the training; `None` if that is not checked.
+    pub is_drifted: Option<bool>,
     /// Surface through the targets, if they have positions.
     pub surface: Option<Arc<TargetSurface>>,
     /// Smallest and largest value of each target so far.

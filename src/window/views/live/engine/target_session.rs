@@ -10,7 +10,7 @@ use std::{
 use decoupler_core::{
     decoupling::{CompiledNetworks, Decoder},
     evaluation::Problem,
-    live::{Recording, Source},
+    live::{DriftMonitor, Recording, Source},
 };
 use decoupler_files::{
     export::NetworkFile,
@@ -46,6 +46,7 @@ pub(super) struct TargetSession {
     history: VecDeque<(f64, Arc<[f64]>)>,
     ranges: Vec<(f64, f64)>,
     outside: (Option<usize>, usize),
+    drift: Option<DriftMonitor>,
     has_events: bool,
 }
 
@@ -62,11 +63,12 @@ impl TargetSession {
             compiled: CompiledNetworks::new(&network.network, network.network.values().len()),
             source,
             tally: Tally::new(Instant::now()),
-            sample: vec![0.0; 1 + problem.inputs.len()],
+            sample: vec![0.0; 1 + problem.feature_count()],
             answer: vec![0.0; problem.targets.len()],
             history: VecDeque::new(),
             ranges: vec![(f64::INFINITY, f64::NEG_INFINITY); problem.targets.len()],
             outside: (None, 0),
+            drift: network.drift.clone().map(DriftMonitor::new),
             has_events: false,
             surface: surface.map(Arc::new),
             network,
@@ -82,6 +84,9 @@ impl TargetSession {
             let reason = "readings so far from the training range that the network has no answer";
             self.tally.bad(format!("sample at {:.3} s: {reason}", arrived.time_s));
             return;
+        }
+        if let Some(drift) = &mut self.drift {
+            drift.take(readings);
         }
         let network = self.network.network.at(row_index);
         let inputs = network.inputs();
@@ -165,6 +170,8 @@ impl LiveSession for TargetSession {
             frame: None,
             targets: latest.map(|_| LiveTargets {
                 problem: Arc::clone(&self.problem),
+                network: Arc::clone(&self.network),
+                is_drifted: self.drift.as_ref().map(DriftMonitor::is_drifted),
                 surface: self.surface.clone(),
                 ranges: self.ranges.clone(),
                 history: self.history.iter().cloned().collect(),
@@ -247,8 +254,10 @@ fn read(file: &NetworkFile, path: &Path, is_wanted: &dyn Fn() -> bool) -> Result
             ControlFlow::Break(())
         }
     };
-    let (inputs, has_rows) = (&file.problem.inputs, file.network.only().is_none());
-    let table = recipe.unwrap_or_default().read_inputs(path, inputs, has_rows, watch);
+    let has_rows = file.network.only().is_none();
+    let table = recipe
+        .unwrap_or_default()
+        .read_inputs(path, &file.problem, has_rows, watch);
     let table = table.map_err(|error| error.to_string())?;
     let mut samples = Vec::with_capacity(table.readings.len() + table.readings.nrows());
     for (sample, readings) in table.readings.rows().into_iter().enumerate() {
@@ -276,7 +285,7 @@ fn read(file: &NetworkFile, path: &Path, is_wanted: &dyn Fn() -> bool) -> Result
         samples.push(row_index as f64);
         samples.extend(readings);
     }
-    let shape = (table.readings.nrows(), 1, 1 + inputs.len());
+    let shape = (table.readings.nrows(), 1, 1 + table.readings.ncols());
     let samples = Array3::from_shape_vec(shape, samples).expect("each sample has its row and all inputs");
     Recording::at_rate(samples, RATE_WITHOUT_TIMES).map_err(|error| format!("'{}': {error}", path.display()))
 }

@@ -6,13 +6,13 @@ use decoupler_core::{
     scene::{Loading, Movement, RowModel, Rows, Scene},
     sensor::{Geometry, SensorModel},
     text::counted,
-    training::TrainingSettings,
+    training::{StoppingRules, TrainingSettings},
 };
 use eframe::egui::{RichText, Ui};
 
 use super::scene_section::{
-    array_choice_ui, hidden_choice_ui, outlook_notes_ui, samples_section_ui, scene_choice_ui, scene_section_ui,
-    workload_ui,
+    array_choice_ui, hidden_choice_ui, outlook_notes_ui, recorded_workload_ui, samples_section_ui, scene_choice_ui,
+    scene_section_ui, workload_ui,
 };
 use crate::window::{
     glossary,
@@ -110,7 +110,7 @@ fn array_ui(ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) -> Option<P
             array_inputs_ui(ui, &mut draft);
         });
     });
-    training_ui(ui, &mut draft, shared.phase);
+    training_ui(ui, &mut draft, StoppingRules::default(), shared.phase);
     ui.add_enabled_ui(!is_busy && shared.phase != Phase::Died, |ui| {
         fold_ui(ui, "Figures of the paper", "", |ui| picked = paper_section_ui(ui));
     });
@@ -135,9 +135,26 @@ fn recording_ui(ui: &mut Ui, recording: &mut RecordingEditor, shared: &Shared, e
     ui.add_space(space(2));
     ui.separator();
     ui.add_enabled_ui(!is_busy, |ui| {
+        let mut is_auto = shared.recording.is_auto;
+        let hint = glossary::AUTO.hint;
+        if ui
+            .checkbox(&mut is_auto, "Choose settings automatically")
+            .on_hover_text(hint)
+            .changed()
+        {
+            effects.push(Effect::ChooseAutomatically(is_auto));
+        }
         hidden_choice_ui(ui, &mut settings.hidden, recording.channels());
     });
+    let before = settings;
     method_ui(ui, &mut settings, shared.phase);
+    if settings.training.method.short_name() != before.training.method.short_name() {
+        let chosen = std::mem::replace(&mut settings, before).training.method;
+        settings.choose_method(chosen);
+    }
+    if let Some(size) = recording.training_size(&settings) {
+        recorded_workload_ui(ui, &settings, size);
+    }
     Landmark::Choices.stands_at(ui, ui.min_rect().with_min_y(top));
     ui.add_space(space(2));
     ui.separator();
@@ -148,7 +165,8 @@ fn recording_ui(ui: &mut Ui, recording: &mut RecordingEditor, shared: &Shared, e
             recording_inputs_ui(ui, &mut settings, recording.channels(), has_row_wires);
         });
     });
-    training_ui(ui, &mut settings, shared.phase);
+    let rules = StoppingRules::recorded(&settings.training.method);
+    training_ui(ui, &mut settings, rules, shared.phase);
     let usual = RunSettings::from(Measured { rows: RowModel::Shared });
     let hint = "Bayesian regularisation for recordings, 12 hidden nodes, 300 epochs";
     reset_ui(ui, "Reset to the default settings", hint, &mut settings, usual, is_busy);
@@ -165,19 +183,14 @@ fn method_ui<S>(ui: &mut Ui, settings: &mut RunSettings<S>, phase: Phase) {
     });
 }
 
-/// The folded settings of the training.
-fn training_ui<S>(ui: &mut Ui, settings: &mut RunSettings<S>, phase: Phase) {
+/// The folded settings of the training; `usual` are the default stopping rules.
+fn training_ui<S>(ui: &mut Ui, settings: &mut RunSettings<S>, usual: StoppingRules, phase: Phase) {
     ui.add_enabled_ui(!phase.is_busy() || phase == Phase::Paused, |ui| {
         fold_ui(ui, "When to stop", &of_stopping(&settings.training), |ui| {
-            stopping_ui(ui, &mut settings.training.stopping);
+            stopping_ui(ui, &mut settings.training.stopping, usual);
         });
         fold_ui(ui, "Method settings", &of_method(settings), |ui| {
-            method_settings_ui(
-                ui,
-                &mut settings.training.method,
-                &mut settings.starts,
-                !phase.is_busy(),
-            );
+            method_settings_ui(ui, settings, !phase.is_busy());
         });
     });
 }
@@ -274,6 +287,8 @@ pub fn applied(preset: Preset, draft: &SimulatedSettings) -> SimulatedSettings {
         },
         hidden: draft.hidden,
         starts: draft.starts,
+        combine: draft.combine,
+        initialization: draft.initialization,
         seed: draft.seed,
         ..settings
     }

@@ -1,12 +1,12 @@
 use decoupler_core::{
     dataset::LARGEST_SAMPLES,
-    evaluation::{Outlook, SimulatedSettings, Workload},
+    evaluation::{Outlook, RecordedSize, RunSettings, SimulatedSettings, Workload},
     network::{HiddenSuggestions, LARGEST_HIDDEN},
     scene::{Indenter, IndenterShape, Loading, Movement, Noise, NoisySets, Rows, Scene},
     sensor::ArrayScale,
     text::counted,
 };
-use decoupler_files::export::{describe_workload, format_number};
+use decoupler_files::export::{describe_recorded_workload, describe_workload, format_number};
 use eframe::egui::{CollapsingHeader, RichText, Slider, Stroke, Ui};
 
 use crate::window::{
@@ -433,6 +433,14 @@ pub fn workload_ui(ui: &mut Ui, draft: &SimulatedSettings) {
         let warning = Theme::of(ui).palette.warning;
         let text = capitalised(&describe_workload(&workload));
         ui.label(RichText::new(text).size(type_size().note).color(warning));
+    }
+}
+
+/// Notes the time of a training on a recording that takes long.
+pub fn recorded_workload_ui(ui: &mut Ui, settings: &RunSettings, size: RecordedSize) {
+    if let Some(text) = describe_recorded_workload(settings, size) {
+        let warning = Theme::of(ui).palette.warning;
+        ui.label(RichText::new(capitalised(&text)).size(type_size().note).color(warning));
     }
 }
 

@@ -61,13 +61,18 @@ impl RecordingEditor {
             ui.add_space(space(2));
             ui.scope(|ui| {
                 ui.set_max_width(space(120));
-                let text = "Readings of a sensor with the targets measured at the same time, such as forces: one file, or \
-                            several that share a time. CSV and other text, .npy, .npz and .mat. The meaning of each \
+                let text = "Readings of a sensor with the targets measured at the same time, such as forces: one file, \
+                            several that share a time, or several with the same columns. CSV and other text, Excel, \
+                            .npy, .npz and .mat. The meaning of each \
                             column is suggested by its name and numbers, and can be changed.";
                 ui.label(RichText::new(text).color(dim));
             });
             ui.add_space(space(3));
-            if ui.add(primary_button("Open files…")).on_hover_text(FILES.description).clicked() {
+            if ui
+                .add(primary_button("Open files…"))
+                .on_hover_text(FILES.description)
+                .clicked()
+            {
                 effects.push(Effect::ChooseFile(self.open_task()));
             }
         });
@@ -219,7 +224,7 @@ pub(super) fn in_window(error: &ImportError) -> String {
         Cure::NameTimes => "make the columns of their times “time” in both".to_owned(),
         Cure::NameJoinedTime => "make the column of its times “time”".to_owned(),
         Cure::GiveLimit => "give the limit under “Joined files”".to_owned(),
-        Cure::GiveTestFiles => "open the joined files of the test too".to_owned(),
+        Cure::GiveJoinedFiles => "open the joined files of each recording and of the test too".to_owned(),
         other => other.to_string(),
     })
 }

@@ -7,8 +7,8 @@ use std::{
     sync::Arc,
 };
 
-use decoupler_core::dataset::SplitBy;
-use decoupler_files::import::{Condition, InspectedFile, Joined, Meaning, Missing, Plan, TestFiles};
+use decoupler_core::dataset::{Memory, Span, SpanError, SplitBy};
+use decoupler_files::import::{Condition, FileSet, InspectedFile, Joined, Meaning, Missing, Plan, TestFiles};
 
 use super::columns_card::Renaming;
 
@@ -26,6 +26,8 @@ pub(super) struct Draft {
     pub(super) conditions: String,
     /// Cells that mean missing, as typed, with commas between them.
     pub(super) missing: String,
+    /// Inputs from the past, as typed.
+    pub(super) memory: MemoryTexts,
     /// Meanings chosen by the user or a recipe, including columns hidden by the current layout.
     chosen: BTreeMap<ColumnKey, Meaning>,
     /// Units given by the user or a recipe, likewise.
@@ -34,6 +36,8 @@ pub(super) struct Draft {
     split: Option<SplitBy>,
     /// Files of test samples, by the recording that each one replaces.
     tests: BTreeMap<PathBuf, PathBuf>,
+    /// Further test files, which the window does not change.
+    more_tests: Vec<FileSet>,
     /// The plan of the recipe as read, and the same plan as this import writes it.
     of_recipe: Option<Box<[Plan; 2]>>,
     cache: RefCell<PlanCache>,
@@ -44,6 +48,7 @@ impl Draft {
     pub(super) fn new(mut plan: Plan, files: Vec<InspectedFile>) -> Self {
         let import = &mut plan.import;
         let (conditions, missing) = (joined(&import.conditions, " and "), joined(&import.missing, ", "));
+        let memory = MemoryTexts::from(&import.memory.take().unwrap_or_default());
         let mut units = BTreeMap::new();
         for file in &files {
             for (column, summary) in file.inspection.columns.iter().enumerate() {
@@ -52,10 +57,10 @@ impl Draft {
                 }
             }
         }
-        let of_tests = plan.test.take();
-        let of_tests = of_tests
-            .iter()
-            .flat_map(|test| std::iter::once(&test.data).chain(&test.join));
+        let (of_tests, more_tests) = plan.test.take().map_or_else(Default::default, |test| {
+            let first = Vec::from_iter(std::iter::once(test.data).chain(test.join));
+            (first, test.append)
+        });
         // The meanings of the columns are kept with the columns.
         (import.time, import.group, import.row_wire) = (None, None, None);
         (import.inputs, import.targets) = (Vec::new(), Vec::new());
@@ -63,7 +68,9 @@ impl Draft {
         Self {
             conditions,
             missing,
-            tests: paths.zip(of_tests.cloned()).collect(),
+            memory,
+            tests: paths.zip(of_tests).collect(),
+            more_tests,
             files,
             plan,
             chosen: BTreeMap::new(),
@@ -96,6 +103,7 @@ impl Draft {
         let renaming = Renaming::new(&older.files, stems);
         self.conditions = renaming.conditions(&older.conditions);
         self.missing = renaming.missing(&older.missing);
+        self.memory.clone_from(&older.memory);
         for (name, unit) in &older.plan.import.units {
             self.plan
                 .import
@@ -135,7 +143,7 @@ impl Draft {
 
     /// Gives a column a meaning; if only one column can have it, the previous one loses it.
     pub(super) fn choose(&mut self, file: usize, column: usize, meaning: Meaning) {
-        let had_group = self.has(Meaning::Group);
+        let had_group = self.has_groups();
         for path in self.give(file, column, meaning) {
             self.chosen.insert(path, Meaning::Unused);
         }
@@ -193,7 +201,7 @@ impl Draft {
 
     /// Returns the rule of division: that of the user, or by group if there are any groups.
     fn settle_split(&mut self) {
-        self.plan.division.by = match (self.split, self.has(Meaning::Group)) {
+        self.plan.division.by = match (self.split, self.has_groups()) {
             (Some(SplitBy::Group), false) | (None, false) => SplitBy::Time,
             (None, true) => SplitBy::Group,
             (Some(by), _) => by,
@@ -203,6 +211,17 @@ impl Draft {
     /// Returns `true` if a column of any file has this meaning.
     pub(super) fn has(&self, meaning: Meaning) -> bool {
         self.files.iter().any(|file| file.meanings.contains(&meaning))
+    }
+
+    /// Returns `true` if samples belong to groups, by a column or by several files of one experiment.
+    pub(super) fn has_groups(&self) -> bool {
+        self.has(Meaning::Group) || !self.plan.import.append.is_empty()
+    }
+
+    /// Closes one of the files whose rows follow those of the first, with the files joined to it.
+    pub(super) fn close_appended(&mut self, number: usize) {
+        self.plan.import.append.remove(number);
+        self.settle_split();
     }
 
     /// Returns the number of columns of this meaning.
@@ -283,6 +302,7 @@ impl Draft {
 
     /// Closes the file that replaces this recording for the test.
     pub(super) fn close_test_file(&mut self, recording: &Path) {
+        self.more_tests.clear();
         self.tests.remove(recording);
     }
 
@@ -303,6 +323,7 @@ impl Draft {
             text => vec![text.parse::<Condition>().map_err(|error| error.to_string())?],
         };
         import.missing = missing(&self.missing);
+        import.memory = self.memory.parsed()?;
         let of = |meaning: Meaning| -> Vec<String> {
             let of_file = |file: &InspectedFile| -> Vec<String> {
                 let columns = file.meanings.iter().enumerate().filter(|(_, other)| **other == meaning);
@@ -357,6 +378,7 @@ impl Draft {
         Ok(files.next().map(|data| TestFiles {
             data,
             join: files.collect(),
+            append: self.more_tests.clone(),
         }))
     }
 
@@ -365,6 +387,7 @@ impl Draft {
         MadeOf {
             plan: self.plan.clone(),
             texts: [self.conditions.clone(), self.missing.clone()],
+            memory: self.memory.clone(),
             units: self.units.clone(),
             tests: self.tests.clone(),
             meanings: self.files.iter().map(|file| file.meanings.clone()).collect(),
@@ -376,6 +399,7 @@ impl Draft {
         let MadeOf {
             plan,
             texts,
+            memory,
             units,
             tests,
             meanings,
@@ -383,7 +407,7 @@ impl Draft {
         let [conditions, missing] = texts;
         let now = self.files.iter().map(|file| &file.meanings);
         (&self.plan, &self.conditions, &self.missing) == (plan, conditions, missing)
-            && (&self.units, &self.tests) == (units, tests)
+            && (&self.memory, &self.units, &self.tests) == (memory, units, tests)
             && now.eq(meanings)
     }
 
@@ -406,6 +430,48 @@ impl Draft {
 }
 
 /// Returns `true` if a column of the same file or of another one must give up a meaning that a column gets.
+/// Inputs from the past, as typed: spans with commas between them.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(super) struct MemoryTexts {
+    pub(super) averages: String,
+    pub(super) lags: String,
+    pub(super) differences: bool,
+}
+
+impl From<&Memory> for MemoryTexts {
+    fn from(memory: &Memory) -> Self {
+        Self {
+            averages: joined(&memory.averages, ", "),
+            lags: joined(&memory.lags, ", "),
+            differences: memory.differences,
+        }
+    }
+}
+
+impl MemoryTexts {
+    /// Returns the memory; `None` if there is none.
+    ///
+    /// # Errors
+    /// If a span cannot be understood.
+    pub(super) fn parsed(&self) -> Result<Option<Memory>, String> {
+        let memory = Memory {
+            averages: spans(&self.averages)?,
+            lags: spans(&self.lags)?,
+            differences: self.differences,
+            interval_s: None,
+        };
+        Ok(Some(memory).filter(|memory| !memory.is_empty()))
+    }
+}
+
+/// Returns the spans in a text with commas between them.
+pub(super) fn spans(text: &str) -> Result<Vec<Span>, String> {
+    let texts = text.split(',').map(str::trim).filter(|text| !text.is_empty());
+    texts
+        .map(|text| text.parse().map_err(|error: SpanError| error.to_string()))
+        .collect()
+}
+
 fn is_taken(meaning: Meaning, is_same_file: bool) -> bool {
     match meaning {
         Meaning::Time => is_same_file,
@@ -448,6 +514,7 @@ pub(super) fn file_name(path: &Path) -> String {
 pub(super) struct MadeOf {
     pub(super) plan: Plan,
     pub(super) texts: [String; 2],
+    pub(super) memory: MemoryTexts,
     pub(super) units: BTreeMap<ColumnKey, String>,
     pub(super) tests: BTreeMap<PathBuf, PathBuf>,
     /// Meanings and units of the columns of each file.

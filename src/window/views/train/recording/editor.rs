@@ -17,7 +17,7 @@ use crate::window::{
     training_worker::RunId,
 };
 use decoupler_core::{
-    evaluation::{Measured, RunSettings, SimulatedSettings},
+    evaluation::{Measured, RecordedSize, RunSettings, SimulatedSettings},
     scene::RowModel,
 };
 use decoupler_files::{
@@ -157,6 +157,12 @@ impl RecordingEditor {
         let Some(draft) = &mut self.draft else { return };
         let mut paths = draft.paths();
         paths.remove(file);
+        let append = &mut draft.plan.import.append;
+        if file == 0 && !append.is_empty() {
+            paths = append.remove(0).files().cloned().collect();
+        } else if let Some(joined) = file.checked_sub(1) {
+            append.iter_mut().for_each(|set| drop(set.join.remove(joined)));
+        }
         if paths.is_empty() {
             self.close_all();
         } else {
@@ -373,6 +379,19 @@ impl RecordingEditor {
         let draft = self.draft.as_ref()?;
         let channels = (draft.count(Meaning::Input), draft.count(Meaning::Target));
         (channels.0 > 0 && channels.1 > 0).then_some(channels)
+    }
+
+    /// Returns the size of a training with one network, once the import is checked.
+    pub fn training_size(&self, settings: &RunSettings) -> Option<RecordedSize> {
+        let checked = self.checking.checked.as_ref()?.as_ref().ok()?;
+        let (inputs, targets) = checked.channels;
+        let is_shared = settings.source.row_model() == RowModel::Shared;
+        is_shared.then_some(RecordedSize {
+            samples: checked.samples[0],
+            inputs,
+            targets,
+            networks: 1,
+        })
     }
 
     /// Returns true if a column contains the row numbers.

@@ -24,9 +24,22 @@ use crate::window::{
 /// Files that can be opened.
 pub(super) const FILES: FileWords = FileWords {
     kind: "recording",
-    description: "A table of readings and targets (CSV or other text, .npy, .npz, .mat), a recipe, a network or a \
+    description: "A table of readings and targets (CSV or other text, Excel, .npy, .npz, .mat), a recipe, a network or a \
                   checkpoint.",
-    extensions: &["csv", "txt", "tsv", "dat", "npy", "npz", "mat", "json", "checkpoint"],
+    extensions: &[
+        "csv",
+        "txt",
+        "tsv",
+        "dat",
+        "npy",
+        "npz",
+        "mat",
+        "xlsx",
+        "xls",
+        "ods",
+        "json",
+        "checkpoint",
+    ],
 };
 
 /// An open file by its use.
@@ -34,6 +47,8 @@ pub(super) const FILES: FileWords = FileWords {
 enum OpenFile {
     /// A recording by its number: the first, or one that is joined to it.
     Recording(usize),
+    /// A file whose rows follow those of the first, by its number.
+    Appended(usize),
     /// A file for the test, by the recording that it replaces.
     Test(PathBuf),
     /// Positions of targets.
@@ -113,6 +128,7 @@ impl RecordingEditor {
     fn close_file(&mut self, file: OpenFile) {
         match (file, &mut self.draft) {
             (OpenFile::Recording(number), _) => self.close(number),
+            (OpenFile::Appended(number), Some(draft)) => draft.close_appended(number),
             (OpenFile::Test(recording), Some(draft)) => draft.close_test_file(&recording),
             (OpenFile::Positions, Some(draft)) => draft.plan.import.positions = None,
             (_, None) => {}
@@ -193,11 +209,14 @@ fn open_files_ui(ui: &mut Ui, draft: &Draft) -> Option<OpenFile> {
     let tests = tests.map(|(recording, test)| (OpenFile::Test(recording.to_owned()), test.to_owned()));
     let positions = draft.plan.import.positions.iter();
     let positions = positions.map(|path| (OpenFile::Positions, path.clone()));
-    for (file, path) in recordings.chain(tests).chain(positions) {
+    let appended = draft.plan.import.append.iter().enumerate();
+    let appended = appended.map(|(number, set)| (OpenFile::Appended(number), set.data.clone()));
+    for (file, path) in recordings.chain(appended).chain(tests).chain(positions) {
         let name = file_name(&path);
         let what = match &file {
             OpenFile::Recording(0) => String::new(),
             OpenFile::Recording(_) => ", joined".to_owned(),
+            OpenFile::Appended(_) => ", appended".to_owned(),
             OpenFile::Test(recording) if draft.files.len() > 1 => {
                 format!(", for the test of {}", file_name(recording))
             }
@@ -298,6 +317,7 @@ impl From<Plan> for Reopened {
         Self::from(Recorded {
             files: plan.files().map(unknown).collect(),
             samples_crc32: String::new(),
+            search: None,
             plan,
         })
     }

@@ -1,4 +1,4 @@
-//! The folded parts of an import: division of the samples, filter of rows, positions, joins and the layout of text files.
+//! The folded parts of an import: division of the samples, filter of rows, memory, positions, joins and the layout of text files.
 
 use decoupler_core::{dataset::SplitBy, evaluation::RunSettings};
 use decoupler_files::import::{Condition, Decimal, DialectChoice, Encoding, Format, Meaning, Separator};
@@ -6,7 +6,7 @@ use eframe::egui::{Id, Response, TextEdit, Ui, WidgetInfo, accesskit::Role};
 
 use super::{
     columns_card::bias,
-    draft::{Draft, file_name, missing},
+    draft::{Draft, MemoryTexts, file_name, missing, spans},
     editor::RecordingEditor,
     files_section::FILES,
 };
@@ -218,6 +218,7 @@ impl RecordingEditor {
         fold_ui(ui, "Filter", &filter_summary(draft), |ui| {
             reads_again |= filter_ui(ui, draft);
         });
+        fold_ui(ui, "Memory", &memory_summary(draft), |ui| memory_ui(ui, draft));
         fold_ui(ui, "Positions", &positions_summary(draft), |ui| {
             positions_ui(ui, positions_task, effects);
         });
@@ -249,7 +250,7 @@ fn samples_summary(draft: &Draft, settings: &RunSettings) -> String {
 
 fn split_ui(ui: &mut Ui, draft: &mut Draft, usual_validation: f64, task: FileTask, effects: &mut Vec<Effect>) {
     let needs_validation = usual_validation > 0.0;
-    let (has_group, is_given) = (draft.has(Meaning::Group), draft.has_tests());
+    let (has_group, is_given) = (draft.has_groups(), draft.has_tests());
     let options = [
         (
             SplitBy::Time,
@@ -344,6 +345,45 @@ fn filter_ui(ui: &mut Ui, draft: &mut Draft) -> bool {
         draft.plan.import.missing = missing(&draft.missing);
     }
     is_left
+}
+
+fn memory_summary(draft: &Draft) -> String {
+    match draft.memory.parsed() {
+        Ok(memory) => memory.unwrap_or_default().to_string(),
+        Err(reason) => reason,
+    }
+}
+
+fn memory_ui(ui: &mut Ui, draft: &mut Draft) {
+    dim_ui(
+        ui,
+        "Sensors with hysteresis, creep or drift: the inputs of the network also contain what the readings were before, \
+         within a group and across no gap in time.",
+    );
+    let MemoryTexts {
+        averages,
+        lags,
+        differences,
+    } = &mut draft.memory;
+    let hint = "Exponential averages of the readings with these time constants, as further inputs: 0.1s, 1s, 10s need a \
+                column “time”; 20, 100 are numbers of samples.";
+    let fields = [
+        ("Averages", hint, "0.1s, 1s, 10s", averages),
+        (
+            "Lags",
+            "Readings so many samples, or seconds, before each sample, as further inputs.",
+            "5, 10, 20",
+            lags,
+        ),
+    ];
+    for (name, hint, example, text) in fields {
+        let response = text_ui(ui, name, hint, example, text);
+        if let (false, Err(error)) = (response.has_focus(), spans(text)) {
+            note_ui(ui, &error);
+        }
+    }
+    let hint = "The past enters as its difference from the present reading; without averages and lags, from the sample before.";
+    ui.checkbox(differences, "Differences").on_hover_text(hint);
 }
 
 /// A text with its name above.

@@ -10,13 +10,16 @@ use std::{
 
 use decoupler_core::{
     dataset::{Dataset, Seed},
-    evaluation::{Simulation, recorded::channel_remarks},
+    evaluation::{
+        Simulation,
+        recorded::{Extrapolation, channel_remarks},
+    },
 };
 use decoupler_files::{
     export::{CheckpointFile, DocumentKind, NetworkFile, RecipeFile, RecipeSource, describe_positions},
     import::{
-        Dropped, FileReport, InspectedFile, Joined, Plan, Progress, Recipe, Recording, Watch, holds_positions,
-        suggested_plan, suggested_plan_in_order,
+        Dropped, FileReport, FileSet, Format, InspectedFile, Joined, Plan, Progress, Recipe, Recording, Watch,
+        holds_positions, suggested_plan, suggested_plan_in_order,
     },
 };
 
@@ -168,7 +171,10 @@ fn open(to_open: ToOpen, report: &Report<OpeningEvent>) -> Result<Opened, String
             new: vec![write_sample(&folder)?],
             ..Files::default()
         },
-        ToOpen::Files(files) => files,
+        ToOpen::Files(mut files) => {
+            files.new = with_tables_of_folders(files.new)?;
+            files
+        }
     };
     for path in &files.new {
         match (DocumentKind::of_file(path), files.new.len()) {
@@ -209,7 +215,12 @@ fn open(to_open: ToOpen, report: &Report<OpeningEvent>) -> Result<Opened, String
         return Ok(Opened::Positions(path.clone()));
     }
     let is_same_files = recordings.is_empty();
+    let appended = files.older.as_ref().map(|older| older.plan.import.append.clone());
+    let appended = appended.unwrap_or_default();
     let mut paths = files.open;
+    if !is_same_files {
+        paths.extend(appended.iter().flat_map(FileSet::files).cloned());
+    }
     for path in recordings {
         if !paths.contains(&path) {
             paths.push(path);
@@ -220,11 +231,14 @@ fn open(to_open: ToOpen, report: &Report<OpeningEvent>) -> Result<Opened, String
     let inspected_files = inspected_files.map_err(|error| in_window(&error))?;
     // The file with the readings is guessed only if the set of files has changed.
     let mut plan = if is_same_files {
-        suggested_plan_in_order(&inspected_files)
+        let mut plan = suggested_plan_in_order(&inspected_files);
+        plan.import.append = appended;
+        plan
     } else {
         suggested_plan(&inspected_files)
     };
     plan.import.dialect = recipe.dialect;
+    plan.import.derive.clone_from(&recipe.derive);
     plan.import.missing = match &files.older {
         Some(older) => {
             let stems = plan.import.stems();
@@ -237,6 +251,24 @@ fn open(to_open: ToOpen, report: &Report<OpeningEvent>) -> Result<Opened, String
     };
     plan.import.positions = positions;
     Ok(Opened::Recordings(inspected(plan, Draft::new, &mut watch)?))
+}
+
+/// Replaces folders by the tables in them.
+fn with_tables_of_folders(paths: Vec<PathBuf>) -> Result<Vec<PathBuf>, String> {
+    let mut files = Vec::new();
+    for path in paths {
+        if path.is_dir() {
+            let found = Format::tables_in(&path);
+            let mut found = found.map_err(|error| format!("cannot read '{}': {error}", path.display()))?;
+            if found.is_empty() {
+                return Err(format!("'{}' is a folder without tables: open a file", path.display()));
+            }
+            files.append(&mut found);
+        } else {
+            files.push(path);
+        }
+    }
+    Ok(files)
 }
 
 /// Returns the recipe for the first inspection of recordings, with the layout and stems of an older import. Missing-cell
@@ -258,6 +290,7 @@ fn to_look_at(paths: Vec<PathBuf>, older: Option<&Draft>) -> Recipe {
             })
             .collect(),
         dialect: older.map(|older| older.plan.import.dialect).unwrap_or_default(),
+        derive: older.map(|older| older.plan.import.derive.clone()).unwrap_or_default(),
         missing: missing.into_iter().filter(|missing| missing.column.is_none()).collect(),
         ..Recipe::default()
     }
@@ -327,6 +360,8 @@ fn missing_of_checkpoint(path: &Path) -> Result<Opened, String> {
 pub(super) struct Checked {
     /// Number of samples for training, validation and test.
     pub(super) samples: [usize; 3],
+    /// Numbers of inputs, with those from the past, and targets.
+    pub(super) channels: (usize, usize),
     /// Number of rows of the files, dropped ones included.
     pub(super) rows: usize,
     /// Rows that are not samples, by reason.
@@ -410,9 +445,15 @@ fn check(plan: &Plan, seed: Seed, report: &Report<CheckingEvent>) -> Result<Box<
         .flat_map(|recording| recording.warnings.iter().cloned())
         .collect();
     warnings.extend(channels(&sets.recording));
+    let outside = Extrapolation::measure(&sets.split.training, &sets.test);
+    warnings.extend(outside.warning(&sets.recording.inputs, &sets.recording.targets));
     let validation = sets.split.validation.as_ref().map_or(0, Dataset::samples);
     Ok(Box::new(Checked {
         samples: [sets.split.training.samples(), validation, sets.test.samples()],
+        channels: (
+            sets.split.training.readings().ncols(),
+            sets.split.training.targets().ncols(),
+        ),
         rows: recordings().map(|recording| recording.rows).sum(),
         dropped: recordings()
             .flat_map(|recording| recording.dropped.iter().cloned())

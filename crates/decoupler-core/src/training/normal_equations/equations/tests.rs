@@ -120,7 +120,7 @@ fn every_class_of_weights_decays_at_its_own_rate() {
     assert!(distance(&ours, &expected) < 1e-11, "{:e}", distance(&ours, &expected));
     let length = equations.gradient_length(&mlp, decay);
     assert!((length / right.norm_l2() - 1.0).abs() < 1e-12, "{length}");
-    let traces = equations.traces_of_inverse(&mlp, damping).unwrap().values();
+    let traces = equations.traces_of_inverse(&mlp, damping).unwrap().classes().values();
     let mut expected = [0.0; 4];
     (0..ours.len()).for_each(|index| expected[class(index)] += inverse[(index, index)]);
     for (ours, expected) in traces.iter().zip(expected) {
@@ -130,6 +130,7 @@ fn every_class_of_weights_decays_at_its_own_rate() {
     let parts: f64 = equations
         .traces_of_inverse(&mlp, PerClass::all(0.7))
         .unwrap()
+        .classes()
         .values()
         .iter()
         .sum();

@@ -118,10 +118,18 @@ impl Header<'_> {
             text,
             "#define {upper}_CHANNELS {channels}\n\
              #define {upper}_OUTPUTS {outputs}\n\n\
-             {definitions}\
+             {definitions}{half_widths}\
              #ifdef __cplusplus\nextern \"C\" {{\n#endif\n\n\
              /* What the functions return. */\n\
              enum {{\n    {upper}_OK = 0,\n    {upper}_NO_SUCH_ROW = -1,\n    {upper}_BAD_READING = -2{not_explained}\n}};\n\n",
+            half_widths = portable.meaning.half_widths().map_or_else(String::new, |half_widths| {
+                let half_widths: Vec<String> = half_widths.iter().map(|value| format!("{value:?}")).collect();
+                format!(
+                    "/* Half-widths of the 90 % prediction intervals in the units of the targets, to initialise an array. */\n\
+                     #define {upper}_HALF_WIDTHS_90 {{{}}}\n\n",
+                    half_widths.join(", ")
+                )
+            }),
             not_explained = match &portable.equations {
                 Some(equations) if equations.seeks_solution => format!(",\n    {upper}_NOT_EXPLAINED = 1"),
                 _ => String::new(),
@@ -148,9 +156,7 @@ impl Header<'_> {
             },
             overflow = match self.reading {
                 "int32_t" => String::new(),
-                _ => format!(
-                    " Readings so extreme that the sums overflow give {upper}_BAD_READING."
-                ),
+                _ => format!(" Readings so extreme that the sums overflow give {upper}_BAD_READING."),
             },
         );
         if portable.known_ranges().is_some() {

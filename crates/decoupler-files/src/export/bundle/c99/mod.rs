@@ -186,6 +186,14 @@ pub(in crate::export::bundle) enum Compiled {
 /// # Errors
 /// The compiler refuses the source, or the self-test fails.
 pub(in crate::export::bundle) fn run_self_test(folder: &Path, name: &str) -> Result<Compiled, BundleError> {
+    run_sources(folder, &["decode", "selftest"].map(|part| format!("{name}_{part}.c")))
+}
+
+/// Compiles a source and its self-test in `folder` and runs the self-test; no files are left there.
+///
+/// # Errors
+/// The compiler refuses the source, or the self-test fails.
+pub(in crate::export::bundle) fn run_sources(folder: &Path, sources: &[String; 2]) -> Result<Compiled, BundleError> {
     let failed = |step: &'static str, reason: String| BundleError::SelfTest { step, reason };
     let home = tempfile::tempdir().map_err(|error| failed("compiling the C source", error.to_string()))?;
     let program = home.path().join("selftest");
@@ -203,7 +211,7 @@ pub(in crate::export::bundle) fn run_self_test(folder: &Path, name: &str) -> Res
             ));
         }
     }
-    let sources = ["decode", "selftest"].map(|part| folder.join(format!("{name}_{part}.c")));
+    let sources = sources.each_ref().map(|source| folder.join(source));
     let output = compile(&[&sources[0], &sources[1]], &program);
     let output = output.map_err(|error| failed("compiling the C source", error.to_string()))?;
     if !output.status.success() {

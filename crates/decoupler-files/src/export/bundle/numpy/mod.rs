@@ -137,7 +137,7 @@ pub(super) fn write_program(portable: &Portable, arithmetic: Arithmetic) -> Stri
 import numpy as np
 
 MAPS = dict(np.load(pathlib.Path(__file__).with_name("{noun}.npz")))
-
+{half_widths}
 def decode_by(index, r):
     """Decodes readings with the map of this index."""
     w = {{name: array[index] for name, array in MAPS.items() if name not in {not_of_maps}}}
@@ -160,6 +160,9 @@ def decode_by(index, r):
 "#,
         channels = portable.channels,
         noun = portable.decoder,
+        half_widths = meaning.half_widths().map_or_else(String::new, |half_widths| {
+            format!("# Half-widths of the 90 % prediction intervals, in the units of the targets.\nHALF_WIDTHS_90 = np.array({half_widths:?})\n")
+        }),
         centre = meaning.centre(),
         not_of_maps = format_args!("(\"{}\", \"{}\")", meaning.limits()[0], meaning.limits()[1]),
         steps = steps(portable, arithmetic),

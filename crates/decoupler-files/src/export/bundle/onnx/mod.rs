@@ -12,6 +12,7 @@
 
 mod evaluator;
 mod schema;
+mod stream;
 mod writer;
 
 use prost::Message;
@@ -27,7 +28,10 @@ use super::{
 use decoupler_core::network::Quantity;
 use evaluator::{Tensor, Values};
 
-pub(super) use self::writer::write;
+pub(super) use self::{
+    stream::{StreamGraph, StreamParts},
+    writer::write,
+};
 
 /// A graph that was read back.
 pub(super) struct OnnxGraph {

@@ -26,6 +26,11 @@ pub(in crate::export::bundle) fn write(
     metadata: &Metadata,
     notes: &[String],
 ) -> Vec<u8> {
+    model(portable, weights, metadata, notes).encode_to_vec()
+}
+
+/// The graph of `weights` with its description.
+pub(super) fn model(portable: &Portable, weights: &Weights, metadata: &Metadata, notes: &[String]) -> Model {
     let properties = metadata.iter().map(|(key, value)| Property {
         key: key.clone(),
         value: value.as_str().map_or_else(|| value.to_string(), str::to_owned),
@@ -45,7 +50,7 @@ pub(in crate::export::bundle) fn write(
         }
     };
     let notes = notes.iter().map(|note| format!(" Note: {note}."));
-    let model = Model {
+    Model {
         ir_version: IR_VERSION,
         producer_name: "decoupler".to_owned(),
         producer_version: env!("CARGO_PKG_VERSION").to_owned(),
@@ -56,8 +61,7 @@ pub(in crate::export::bundle) fn write(
             version: OPSET,
         }],
         metadata_props: properties.collect(),
-    };
-    model.encode_to_vec()
+    }
 }
 
 fn graph(portable: &Portable, weights: &Weights) -> Graph {

@@ -1,0 +1,203 @@
+use ndarray::{Array2, ArrayView2};
+use rayon::prelude::*;
+
+use super::{
+    super::{
+        Initialization, RunError, RunSettings,
+        cross_validation::{nth_seed, scatter},
+        linear_start::LinearStart,
+    },
+    FoldErrors,
+    fold_errors::variances,
+};
+use crate::{
+    dataset::{Dataset, Folds},
+    network::{Inputs, MinMax, Shape, nguyen_widrow},
+    scene::NoiseSource,
+    training::{Examples, Problem, StoppingRules, Trainer, TrainingSettings},
+};
+
+/// Committees trained on all folds but one, for each fold, which advance together epoch by epoch: the epoch at which to
+/// stop is that with the lowest error over all folds.
+pub(super) struct FoldedTraining<'a> {
+    folds: &'a Folds,
+    variances: Vec<f64>,
+    parts: Vec<Part>,
+    /// Epoch of the latest weights.
+    epoch: usize,
+    /// Number of multiplications of one epoch of all trainings.
+    epoch_multiplications: f64,
+    best: Option<BestEpoch>,
+}
+
+/// Errors and answers at the epoch with the lowest error so far.
+#[derive(Clone, Debug)]
+pub(super) struct BestEpoch {
+    pub(super) epoch: usize,
+    pub(super) errors: FoldErrors,
+    /// Held-out answers to all samples: samples × targets.
+    pub(super) answers: Array2<f64>,
+}
+
+/// Trainings without one fold.
+struct Part {
+    trainers: Vec<Trainer>,
+    /// Scaled inputs of the held-out samples.
+    inputs: Array2<f64>,
+    outputs: MinMax,
+    targets: Array2<f64>,
+    answers: Array2<f64>,
+    squares: Vec<f64>,
+}
+
+/// Costs of a hidden node beside those of its weights, for the tanh, in multiplications.
+const TANH: usize = 12;
+
+impl<'a> FoldedTraining<'a> {
+    /// Prepares trainings with `settings` on every `stride`th sample of `set` outside each fold.
+    pub(super) fn new(
+        settings: &RunSettings,
+        set: &Dataset,
+        folds: &'a Folds,
+        stride: usize,
+    ) -> Result<Self, RunError> {
+        let parts = (0..folds.count()).into_par_iter().map(|fold| {
+            let thinned: Vec<usize> = folds.without(&[fold]).into_iter().step_by(stride).collect();
+            Part::new(settings, &set.select(&thinned), &set.select(folds.test(fold)), fold)
+        });
+        let parts: Vec<Part> = parts.collect::<Result<_, _>>()?;
+        let of_part = |part: &Part| {
+            let shape = part.trainers[0].present().shape();
+            let training = settings
+                .training
+                .method
+                .epoch_multiplications(shape, part.trainers[0].samples());
+            let answers = part.inputs.nrows() * (shape.weights() + TANH * shape.hidden);
+            settings.starts as f64 * (training + answers as f64)
+        };
+        Ok(Self {
+            folds,
+            variances: variances(set.targets()),
+            epoch_multiplications: parts.iter().map(of_part).sum(),
+            parts,
+            epoch: 0,
+            best: None,
+        })
+    }
+
+    /// Number of multiplications of one epoch of all trainings, from the shapes alone.
+    pub(super) fn epoch_multiplications(&self) -> f64 {
+        self.epoch_multiplications
+    }
+
+    /// Runs one epoch of all trainings.
+    pub(super) fn step(&mut self) {
+        self.parts.par_iter_mut().for_each(Part::step);
+        self.epoch += 1;
+        let squares: Vec<Vec<f64>> = self.parts.iter().map(|part| part.squares.clone()).collect();
+        let errors = FoldErrors::new(&squares, &self.variances, self.folds);
+        let is_best = |best: &BestEpoch| errors.relative() < best.errors.relative();
+        if errors.relative().is_finite() && self.best.as_ref().is_none_or(is_best) {
+            let samples = (0..self.folds.count()).map(|fold| self.folds.test(fold).len()).sum();
+            let mut answers = Array2::zeros((samples, self.variances.len()));
+            for (fold, part) in self.parts.iter().enumerate() {
+                scatter(&mut answers, self.folds.test(fold), &part.answers);
+            }
+            self.best = Some(BestEpoch {
+                epoch: self.epoch,
+                errors,
+                answers,
+            });
+        }
+    }
+
+    /// Returns `true` if further epochs are unlikely to be better: as many epochs as the best took, and some more, have
+    /// passed since, or all trainings have ended.
+    pub(super) fn has_passed_its_best(&self) -> bool {
+        /// Epochs to wait in any case.
+        const PATIENCE: usize = 15;
+        let best = self.best.as_ref().map_or(0, |best| best.epoch);
+        let mut trainers = self.parts.iter().flat_map(|part| &part.trainers);
+        self.epoch >= 2 * best + PATIENCE || trainers.all(|trainer| trainer.stop_reason().is_some())
+    }
+
+    /// Epoch of the latest weights.
+    pub(super) fn epoch(&self) -> usize {
+        self.epoch
+    }
+
+    /// Returns the best epoch; `None` if no epoch had finite answers.
+    pub(super) fn best(self) -> Option<BestEpoch> {
+        self.best
+    }
+}
+
+impl Part {
+    fn new(settings: &RunSettings, training: &Dataset, test: &Dataset, fold: usize) -> Result<Self, RunError> {
+        let inputs = Inputs::fit(settings.inputs, training.readings(), NoiseSource::default())?;
+        let outputs = MinMax::fit(training.targets())?;
+        let scaled = |readings: ArrayView2<'_, f64>| inputs.of(readings);
+        let (x, y) = (scaled(training.readings()), outputs.scale(training.targets()));
+        let linear = match settings.initialization {
+            Initialization::Random => None,
+            Initialization::Ridge => LinearStart::fit(x.view(), y.view(), LinearStart::nodes(settings.hidden)),
+        };
+        let examples = Examples::new(x.view(), y.view());
+        let shape = Shape {
+            inputs: examples.inputs(),
+            hidden: settings.hidden,
+            outputs: examples.outputs(),
+        };
+        let problem = Problem {
+            training: examples,
+            validation: None,
+            test: None,
+        };
+        let rules = TrainingSettings {
+            method: settings.training.method,
+            stopping: StoppingRules {
+                epochs: StoppingRules::MAX_EPOCHS,
+                ..settings.training.stopping
+            },
+        };
+        let seed = nth_seed(settings.seed, fold);
+        let trainers = (0..settings.starts).map(|start| {
+            let mut mlp = nguyen_widrow(shape, &mut seed.start_rng(start));
+            if let Some(linear) = &linear {
+                linear.apply(&mut mlp);
+            }
+            Trainer::new(mlp, problem.clone(), rules)
+        });
+        Ok(Self {
+            trainers: trainers.collect::<Result<_, _>>()?,
+            inputs: scaled(test.readings()),
+            outputs,
+            targets: test.targets().to_owned(),
+            answers: Array2::zeros(test.targets().dim()),
+            squares: vec![f64::INFINITY; test.outputs()],
+        })
+    }
+
+    fn step(&mut self) {
+        let mut sum: Option<Array2<f64>> = None;
+        for trainer in &mut self.trainers {
+            trainer.step();
+            let scaled = trainer.present().forward(self.inputs.view());
+            sum = Some(match sum {
+                Some(sum) => sum + scaled,
+                None => scaled,
+            });
+        }
+        let count = self.trainers.len() as f64;
+        let Some(sum) = sum else { return };
+        self.answers = self.outputs.restore((sum / count).view());
+        for (target, square) in self.squares.iter_mut().enumerate() {
+            let (answers, targets) = (self.answers.column(target), self.targets.column(target));
+            let errors = answers
+                .iter()
+                .zip(targets)
+                .map(|(answer, target)| (answer - target).powi(2));
+            *square = errors.sum();
+        }
+    }
+}

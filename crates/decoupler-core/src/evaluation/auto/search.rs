@@ -1,0 +1,589 @@
+use super::{
+    super::{Combination, Initialization, RunError, RunSettings, ridge_path::RidgePath},
+    AutoChoice, AutoFixed, AutoProgress, AutoRecord, AutoSamples, MULTIPLICATIONS_PER_SECOND, Tried, TriedModel,
+    describe_features, describe_network,
+    fold_errors::{FoldErrors, variances},
+    folded_training::{BestEpoch, FoldedTraining},
+    spans::memories,
+};
+use crate::{
+    dataset::{Dataset, Folds, Memory, Seed, SplitBy, Stream},
+    network::{InputChoice, InputScaling, Inputs, LARGEST_HIDDEN, Quantity, ScalingChoice, Shape},
+    training::{Damping, Method, RegularizationSettings, TrainingError},
+};
+
+/// Number of blocks or sets of groups in the cross-validation.
+const FOLDS: usize = 4;
+/// Networks of a committee.
+const COMMITTEE: usize = 5;
+/// Networks of a committee while settings are compared.
+const SCREENED: usize = 2;
+/// Numbers of hidden nodes to try, in ascending order.
+const HIDDEN: [usize; 6] = [2, 4, 8, 16, 32, 64];
+/// Hidden nodes with which features are compared.
+const FIRST_HIDDEN: usize = 4;
+/// Maximum number of epochs.
+const MAX_EPOCHS: usize = 400;
+/// Feature sets that networks try, next to the plain readings.
+const FEATURE_SETS: usize = 2;
+/// Candidates that are compared again as committees.
+const FINALISTS: usize = 2;
+
+/// A network with its features.
+#[derive(Clone, Debug, PartialEq)]
+struct Candidate {
+    memory: Memory,
+    inputs: InputChoice,
+    hidden: usize,
+    method: Method,
+    starts: usize,
+}
+
+/// A candidate that was cross-validated.
+struct Measured {
+    candidate: Candidate,
+    /// Index of its record.
+    place: usize,
+    best: BestEpoch,
+    /// Number of weights of one network.
+    weights: usize,
+}
+
+/// A search in progress.
+pub(super) struct Search<'a> {
+    base: RunSettings,
+    fixed: &'a AutoFixed,
+    samples: &'a AutoSamples<'a>,
+    folds: Folds,
+    budget_s: f64,
+    /// Multiplications used so far.
+    work: f64,
+    tried: Vec<Tried>,
+    networks: Vec<Measured>,
+    /// Number of candidates still expected.
+    expected: usize,
+    is_cancelled: &'a dyn Fn() -> bool,
+    on_progress: &'a mut dyn FnMut(AutoProgress),
+}
+
+/// A search that was cancelled.
+struct Cancelled;
+
+/// End of a search before its result.
+enum End {
+    Cancelled,
+    Failed(RunError),
+}
+
+impl From<Cancelled> for End {
+    fn from(Cancelled: Cancelled) -> Self {
+        Self::Cancelled
+    }
+}
+
+impl From<RunError> for End {
+    fn from(error: RunError) -> Self {
+        Self::Failed(error)
+    }
+}
+
+impl<'a> Search<'a> {
+    pub(super) fn new(
+        base: &RunSettings,
+        fixed: &'a AutoFixed,
+        samples: &'a AutoSamples<'a>,
+        budget_s: f64,
+        is_cancelled: &'a dyn Fn() -> bool,
+        on_progress: &'a mut dyn FnMut(AutoProgress),
+    ) -> Result<Self, RunError> {
+        let folds = folds(samples, base.seed)?;
+        Ok(Self {
+            base: RunSettings {
+                initialization: Initialization::Ridge,
+                ..*base
+            },
+            fixed,
+            samples,
+            folds,
+            budget_s,
+            work: 0.0,
+            tried: Vec::new(),
+            networks: Vec::new(),
+            expected: 0,
+            is_cancelled,
+            on_progress,
+        })
+    }
+
+    pub(super) fn run(mut self) -> Result<Option<AutoChoice>, RunError> {
+        match self.stages() {
+            Ok(chosen) => Ok(Some(self.choice(chosen))),
+            Err(End::Cancelled) => Ok(None),
+            Err(End::Failed(error)) => Err(error),
+        }
+    }
+
+    /// Runs all stages; returns the index of the choice in [`Self::networks`].
+    fn stages(&mut self) -> Result<usize, End> {
+        // Shares of the budget at the end of each stage.
+        let [features, nodes, refined, all] = [0.35, 0.7, 0.85, 1.0];
+        let feature_sets = self.screen_features()?;
+        let hidden = self.fixed.hidden.unwrap_or(FIRST_HIDDEN);
+        let method = self.fixed.method.unwrap_or_else(|| regularized(0.0));
+        let starts = self.fixed.starts.unwrap_or(SCREENED).min(SCREENED);
+        let first: Vec<Candidate> = feature_sets
+            .into_iter()
+            .map(|(memory, inputs)| Candidate {
+                memory,
+                inputs,
+                hidden,
+                method,
+                starts,
+            })
+            .collect();
+        let count = first.len();
+        for (number, candidate) in first.into_iter().enumerate() {
+            self.expected = count - number + 4 + 3 + FINALISTS;
+            self.try_network(candidate, features, count - number)?;
+        }
+        if self.fixed.hidden.is_none() {
+            self.vary_hidden(nodes)?;
+        }
+        self.refine(refined)?;
+        self.decide(all)
+    }
+
+    /// Compares features by ridge regression; returns the plain readings and the best others.
+    fn screen_features(&mut self) -> Result<Vec<(Memory, InputChoice)>, End> {
+        let plain = InputChoice {
+            quantity: Quantity::Raw,
+            scaling: self.fixed.scaling.unwrap_or_default(),
+        };
+        let all_memories = match &self.fixed.memory {
+            Some(memory) => vec![memory.clone()],
+            None if self.samples.by == SplitBy::Random => vec![Memory::default()],
+            None => std::iter::once(Memory::default())
+                .chain(memories(self.samples))
+                .collect(),
+        };
+        let first = all_memories.first().cloned().unwrap_or_default();
+        let mut sets: Vec<(Memory, InputChoice)> = all_memories.into_iter().map(|memory| (memory, plain)).collect();
+        for quantity in [Quantity::LogResistance, Quantity::Conductance] {
+            if self.suits(quantity) {
+                sets.push((first.clone(), InputChoice { quantity, ..plain }));
+            }
+        }
+        let count = sets.len();
+        let mut measured: Vec<(f64, (Memory, InputChoice))> = Vec::new();
+        for (number, (memory, inputs)) in sets.into_iter().enumerate() {
+            self.expected = count - number + FEATURE_SETS + 1 + 4 + 3 + FINALISTS;
+            let width = memory.features(self.samples.set.channels());
+            let work = RidgePath::multiplications(self.samples.set.samples(), width, self.folds.count());
+            if number > 0 && self.work + work > 0.2 * self.budget() {
+                continue;
+            }
+            let name = format!("{}, ridge", describe_features(&memory, inputs));
+            self.announce(name)?;
+            let Some(set) = self.samples.with_memory(&memory) else {
+                continue;
+            };
+            let values = set.readings().mapv(|reading| inputs.quantity.of(reading));
+            self.work += work;
+            let path = RidgePath::new(values.view(), set.targets(), &self.folds);
+            let error = match path {
+                Some(path) => {
+                    let errors = FoldErrors::new(path.squares(), &variances(set.targets()), &self.folds);
+                    self.record(&memory, inputs, TriedModel::Ridge, &errors, work);
+                    errors.relative()
+                }
+                None => f64::INFINITY,
+            };
+            // The plain readings are always tried.
+            let rank = if number == 0 { -1.0 } else { error };
+            measured.push((rank, (memory, inputs)));
+        }
+        measured.sort_by(|(one, _), (other, _)| one.total_cmp(other));
+        measured.truncate(1 + FEATURE_SETS);
+        let mut sets: Vec<(Memory, InputChoice)> = Vec::new();
+        for (_, (memory, inputs)) in measured {
+            // To ridge regression, averages and their differences from the readings are the same; not to a network.
+            let can_differ = self.fixed.memory.is_none() && !memory.is_empty() && inputs.quantity == Quantity::Raw;
+            let differences = Memory {
+                differences: true,
+                ..memory.clone()
+            };
+            sets.extend(can_differ.then_some((differences, inputs)));
+            sets.push((memory, inputs));
+        }
+        Ok(sets)
+    }
+
+    /// Returns `true` if the quantity is defined for all readings and clearly not linear in them.
+    fn suits(&self, quantity: Quantity) -> bool {
+        /// Ratio of the largest to the smallest reading of a channel.
+        const RATIO: f64 = 3.0;
+        let readings = self.samples.set.readings();
+        let is_curved = |column: ndarray::ArrayView1<'_, f64>| {
+            let (low, high) = column.iter().fold((f64::INFINITY, 0.0_f64), |(low, high), &value| {
+                (low.min(value), high.max(value))
+            });
+            high > RATIO * low
+        };
+        readings.iter().all(|&reading| quantity.accepts(reading)) && readings.columns().into_iter().any(is_curved)
+    }
+
+    /// Tries more hidden nodes on the best features while it helps, fewer if it does not, and then the second best features
+    /// with the number found.
+    fn vary_hidden(&mut self, share: f64) -> Result<(), End> {
+        let Some(best) = self.best().cloned() else {
+            return Ok(());
+        };
+        let first = HIDDEN.iter().position(|&hidden| hidden == FIRST_HIDDEN).unwrap_or(0);
+        for place in first + 1..HIDDEN.len() {
+            self.expected = HIDDEN.len() - place + 1 + 3 + FINALISTS;
+            if !self.improves(&best, HIDDEN[place], share)? {
+                break;
+            }
+        }
+        if self.best().is_some_and(|candidate| candidate.hidden == FIRST_HIDDEN) {
+            for place in (0..first).rev() {
+                self.expected = place + 2 + 3 + FINALISTS;
+                if !self.improves(&best, HIDDEN[place], share)? {
+                    break;
+                }
+            }
+        }
+        let hidden = self.best().map_or(FIRST_HIDDEN, |candidate| candidate.hidden);
+        let ranked = self.ranked();
+        let others = ranked.iter().map(|&place| &self.networks[place].candidate);
+        let second = others
+            .clone()
+            .find(|candidate| !same_features(&best, candidate))
+            .cloned();
+        if let Some(second) = second {
+            self.expected = 1 + 3 + FINALISTS;
+            self.try_network(Candidate { hidden, ..second }, share, 1)?;
+        }
+        Ok(())
+    }
+
+    /// Tries `base` with this many hidden nodes; returns `true` if it is the best so far.
+    fn improves(&mut self, base: &Candidate, hidden: usize, share: f64) -> Result<bool, End> {
+        let before = self.best_error();
+        let candidate = Candidate { hidden, ..base.clone() };
+        let error = self.try_network(candidate, share, 2)?;
+        Ok(error.zip(before).is_some_and(|(error, before)| error < before))
+    }
+
+    /// Returns the best candidate so far.
+    fn best(&self) -> Option<&Candidate> {
+        self.ranked().first().map(|&place| &self.networks[place].candidate)
+    }
+
+    fn best_error(&self) -> Option<f64> {
+        self.ranked()
+            .first()
+            .map(|&place| self.networks[place].best.errors.relative())
+    }
+
+    /// Varies scaling, regularisation and method of the best network.
+    fn refine(&mut self, share: f64) -> Result<(), End> {
+        let Some(best) = self
+            .ranked()
+            .first()
+            .map(|&place| self.networks[place].candidate.clone())
+        else {
+            return Ok(());
+        };
+        let mut variants: Vec<Candidate> = Vec::new();
+        if self.fixed.scaling.is_none() {
+            let scaling = ScalingChoice::Whitening;
+            let inputs = InputChoice { scaling, ..best.inputs };
+            variants.push(Candidate { inputs, ..best.clone() });
+        }
+        if self.fixed.method.is_none() {
+            for method in [regularized(CORRELATION_EPOCH), Method::LevenbergMarquardt(DAMPING)] {
+                variants.push(Candidate { method, ..best.clone() });
+            }
+        }
+        let count = variants.len();
+        for (number, variant) in variants.into_iter().enumerate() {
+            self.expected = count - number + FINALISTS;
+            self.try_network(variant, share, count - number)?;
+        }
+        Ok(())
+    }
+
+    /// Cross-validates the best candidates again as committees, and decides.
+    fn decide(&mut self, share: f64) -> Result<usize, End> {
+        let wanted = self.fixed.starts.unwrap_or(COMMITTEE);
+        let ranked = self.ranked().into_iter().take(FINALISTS);
+        let best: Vec<(Candidate, usize)> = ranked
+            .map(|place| &self.networks[place])
+            .map(|network| (network.candidate.clone(), network.best.epoch))
+            .collect();
+        for (number, (candidate, epochs)) in best.iter().enumerate() {
+            /// Epochs beyond the best.
+            const BEYOND: usize = 5;
+            self.expected = best.len() - number;
+            let committee = Candidate {
+                starts: wanted.min(LARGEST_HIDDEN / candidate.hidden).max(1),
+                ..candidate.clone()
+            };
+            self.try_for(committee, share, best.len() - number, epochs + BEYOND)?;
+        }
+        // A committee is compared with a smaller one where it was too expensive: it would hardly be worse.
+        let error = |place: usize| self.networks[place].best.errors.relative();
+        let best = (0..self.networks.len())
+            .min_by(|&one, &other| error(one).total_cmp(&error(other)))
+            .ok_or_else(|| RunError::from(TrainingError::NothingVaries))?;
+        let errors = &self.networks[best].best.errors;
+        let smallest = (0..self.networks.len())
+            .filter(|&place| self.networks[place].best.errors.is_as_good_as(errors))
+            .min_by(|&one, &other| {
+                let weights = |place: usize| self.networks[place].weights;
+                weights(one)
+                    .cmp(&weights(other))
+                    .then(error(one).total_cmp(&error(other)))
+            });
+        Ok(smallest.unwrap_or(best))
+    }
+
+    /// Cross-validates a network within its part of the budget: what is left until `share`, divided by the number of
+    /// candidates still to come in this stage. Returns its error; `None` if it was too expensive.
+    fn try_network(&mut self, candidate: Candidate, share: f64, to_come: usize) -> Result<Option<f64>, End> {
+        self.try_for(candidate, share, to_come, MIN_EPOCHS)
+    }
+
+    /// As [`Self::try_network`], unless this many epochs are too expensive.
+    fn try_for(&mut self, candidate: Candidate, share: f64, to_come: usize, needed: usize) -> Result<Option<f64>, End> {
+        if let Some(place) = self.networks.iter().position(|network| network.candidate == candidate) {
+            return Ok(Some(self.networks[place].best.errors.relative()));
+        }
+        let is_first = self.networks.is_empty();
+        let limit = (share * self.budget() - self.work).max(0.0) / to_come.max(1) as f64;
+        let name = format!(
+            "{}, {}",
+            describe_features(&candidate.memory, candidate.inputs),
+            describe_network(candidate.hidden, &candidate.method, candidate.starts)
+        );
+        let Some(set) = self.samples.with_memory(&candidate.memory) else {
+            return Ok(None);
+        };
+        let mut settings = RunSettings {
+            inputs: candidate.inputs,
+            hidden: candidate.hidden,
+            starts: candidate.starts,
+            ..self.base
+        };
+        settings.training.method = candidate.method;
+        let stride = self.stride(&settings, &set, limit, needed);
+        let Some(stride) = stride.or(is_first.then_some(self.largest_stride())) else {
+            return Ok(None);
+        };
+        self.announce(name)?;
+        let mut training = match FoldedTraining::new(&settings, &set, &self.folds, stride) {
+            Ok(training) => training,
+            Err(_) if !is_first => return Ok(None),
+            Err(error) => return Err(error.into()),
+        };
+        let weights = Shape {
+            inputs: set.channels(),
+            hidden: candidate.hidden,
+            outputs: set.outputs(),
+        }
+        .weights();
+        let epoch = training.epoch_multiplications();
+        let max_epochs = self.fixed.epochs.unwrap_or(MAX_EPOCHS);
+        let mut used = 0.0;
+        while training.epoch() < max_epochs && !training.has_passed_its_best() {
+            if used + epoch > limit && training.epoch() >= MIN_EPOCHS {
+                break;
+            }
+            if (self.is_cancelled)() {
+                return Err(End::Cancelled);
+            }
+            training.step();
+            used += epoch;
+        }
+        self.work += used;
+        let Some(best) = training.best() else { return Ok(None) };
+        let error = best.errors.relative();
+        let model = TriedModel::Network {
+            hidden: candidate.hidden,
+            method: candidate.method,
+            starts: candidate.starts,
+            epochs: self.fixed.epochs.unwrap_or(best.epoch),
+        };
+        self.record(&candidate.memory, candidate.inputs, model, &best.errors, used);
+        self.networks.push(Measured {
+            weights,
+            place: self.tried.len() - 1,
+            candidate,
+            best,
+        });
+        Ok(Some(error))
+    }
+
+    /// Returns the smallest number such that, with every so manieth sample, trainings of [`TYPICAL_EPOCHS`] stay within
+    /// `limit` multiplications; `None` if too few samples would be left, even for the `needed` epochs.
+    fn stride(&self, settings: &RunSettings, set: &Dataset, limit: f64, needed: usize) -> Option<usize> {
+        let inputs = match settings.inputs.scaling {
+            ScalingChoice::MinMax => set.channels(),
+            ScalingChoice::Whitening => {
+                let inputs = Inputs::fit(settings.inputs, set.readings(), crate::scene::NoiseSource::default()).ok()?;
+                match inputs.scaling() {
+                    InputScaling::Whitening(whitening) => whitening.components(),
+                    InputScaling::MinMax(_) => set.channels(),
+                }
+            }
+        };
+        let shape = Shape {
+            inputs,
+            hidden: settings.hidden,
+            outputs: set.outputs(),
+        };
+        let samples = set.samples() * (self.folds.count() - 1) / self.folds.count();
+        let epoch = |stride: usize| {
+            let method = &settings.training.method;
+            let trainings = (self.folds.count() * settings.starts) as f64;
+            trainings * method.epoch_multiplications(shape, samples.div_ceil(stride))
+        };
+        let largest = self.largest_stride();
+        let fits = |epochs: usize| (1..=largest).find(|&stride| epoch(stride) * epochs as f64 <= limit);
+        fits(TYPICAL_EPOCHS.max(needed)).or_else(|| fits(needed))
+    }
+
+    /// Largest number such that enough samples are left when every so manieth is kept.
+    fn largest_stride(&self) -> usize {
+        /// Minimum number of samples after thinning.
+        const ENOUGH: usize = 3000;
+        (self.samples.set.samples() / ENOUGH).clamp(1, 20)
+    }
+
+    /// Budget in multiplications.
+    fn budget(&self) -> f64 {
+        self.budget_s * MULTIPLICATIONS_PER_SECOND
+    }
+
+    fn announce(&mut self, name: String) -> Result<(), Cancelled> {
+        if (self.is_cancelled)() {
+            return Err(Cancelled);
+        }
+        let best = self
+            .ranked()
+            .first()
+            .map(|&place| self.networks[place].best.errors.relative());
+        let candidate = self.tried.len() + 1;
+        let share = (self.work / self.budget()).min(1.0);
+        (self.on_progress)(AutoProgress {
+            candidate,
+            candidates: candidate + self.expected.saturating_sub(1),
+            name,
+            best,
+            share,
+        });
+        Ok(())
+    }
+
+    fn record(&mut self, memory: &Memory, inputs: InputChoice, model: TriedModel, errors: &FoldErrors, work: f64) {
+        self.tried.push(Tried {
+            memory: memory.clone(),
+            inputs,
+            model,
+            error: errors.relative(),
+            standard_error: errors.standard_error(),
+            seconds: work / MULTIPLICATIONS_PER_SECOND,
+        });
+    }
+
+    /// Indices of the networks, best first.
+    fn ranked(&self) -> Vec<usize> {
+        let error = |place: usize| self.networks[place].best.errors.relative();
+        let mut places = Vec::from_iter(0..self.networks.len());
+        places.sort_by(|&one, &other| error(one).total_cmp(&error(other)));
+        places
+    }
+
+    fn choice(mut self, chosen: usize) -> AutoChoice {
+        let Measured {
+            candidate, place, best, ..
+        } = self.networks.swap_remove(chosen);
+        let mut settings = RunSettings {
+            inputs: candidate.inputs,
+            hidden: candidate.hidden,
+            starts: self
+                .fixed
+                .starts
+                .unwrap_or(COMMITTEE)
+                .min(LARGEST_HIDDEN / candidate.hidden)
+                .max(1),
+            combine: Combination::Mean,
+            ..self.base
+        };
+        settings.training.method = candidate.method;
+        settings.training.stopping.epochs = self.fixed.epochs.unwrap_or(best.epoch);
+        AutoChoice {
+            settings,
+            memory: candidate.memory,
+            record: AutoRecord {
+                budget_s: self.budget_s,
+                folds: self.folds.count(),
+                by: self.samples.by,
+                tried: self.tried,
+                chosen: place,
+            },
+            folds: self.folds,
+            answers: best.answers,
+        }
+    }
+}
+
+/// Divides the samples by their rule; a part without enough groups is divided in time.
+fn folds(samples: &AutoSamples<'_>, seed: Seed) -> Result<Folds, RunError> {
+    let mut rng = seed.rng(Stream::Folds);
+    let (set, groups) = (samples.set, samples.set.snapshots().len());
+    match samples.by {
+        SplitBy::Random => Ok(Folds::by(set, FOLDS, SplitBy::Random, &mut rng)?),
+        SplitBy::Group if groups >= 2 => Ok(Folds::by(set, FOLDS.min(groups), SplitBy::Group, &mut rng)?),
+        SplitBy::Time if groups >= 2 * FOLDS => Ok(Folds::by(set, FOLDS, SplitBy::Time, &mut rng)?),
+        SplitBy::Time | SplitBy::Group => {
+            let ungrouped = set.ungrouped();
+            Ok(Folds::by(&ungrouped, FOLDS, SplitBy::Time, &mut rng)?)
+        }
+    }
+}
+
+/// Minimum number of epochs of a candidate.
+const MIN_EPOCHS: usize = 10;
+/// Number of epochs for which samples are thinned out.
+const TYPICAL_EPOCHS: usize = 30;
+/// Epoch after which the correlation of errors is measured, if it is.
+const CORRELATION_EPOCH: f64 = 20.0;
+
+/// Initial damping, and its factor after each epoch. Gauss-Newton steps without damping fit noise within an epoch or two
+/// where weights are many; with damping that falls gradually, the number of epochs regularises.
+const DAMPING: Damping = Damping {
+    mu: 1e3,
+    mu_decrease: 0.3,
+    mu_increase: 10.0,
+    mu_max: 1e10,
+};
+
+/// Ratio of the damping of Bayesian regularisation, which is relative to the noise, to that of Levenberg-Marquardt.
+const PER_NOISE: f64 = 100.0;
+
+/// Bayesian regularisation for recordings.
+fn regularized(correlation_epoch: f64) -> Method {
+    let usual = RegularizationSettings::recorded();
+    Method::BayesianRegularization(RegularizationSettings {
+        mu: PER_NOISE * DAMPING.mu,
+        mu_decrease: DAMPING.mu_decrease,
+        correlation_epoch,
+        ..usual
+    })
+}
+
+fn same_features(one: &Candidate, other: &Candidate) -> bool {
+    one.memory == other.memory && one.inputs == other.inputs
+}

@@ -1,0 +1,85 @@
+use crate::dataset::{Memory, Span};
+
+use super::AutoSamples;
+
+/// Shortest time constant in samples.
+const SHORTEST: f64 = 2.0;
+
+/// Returns memories to try: exponential averages with time constants around the correlation time T of the targets, the
+/// lag at which their autocorrelation falls to 1/e. Sensors that forget within a sample, or drift over the whole
+/// recording, are covered by the shortest and the longest.
+pub(super) fn memories(samples: &AutoSamples<'_>) -> Vec<Memory> {
+    let Some(past) = &samples.past else {
+        return Vec::new();
+    };
+    let longest = samples.set.samples() as f64 / 10.0;
+    let correlation = correlation_time(samples).clamp(2.0 * SHORTEST, longest.max(2.0 * SHORTEST));
+    let interval_s = past.history.interval_s();
+    let span = |length: f64| match interval_s {
+        Some(interval_s) => Span::Seconds(rounded(length * interval_s)),
+        None => Span::Samples(length.round()),
+    };
+    let factors: [&[f64]; 4] = [&[0.25, 1.0], &[1.0, 4.0], &[4.0, 16.0], &[0.125, 0.5, 2.0]];
+    let mut memories: Vec<Memory> = Vec::new();
+    for factors in factors {
+        let mut lengths: Vec<f64> = factors
+            .iter()
+            .map(|factor| (factor * correlation).clamp(SHORTEST, longest.max(SHORTEST)))
+            .collect();
+        lengths.dedup();
+        let memory = Memory {
+            averages: lengths.into_iter().map(span).collect(),
+            interval_s,
+            ..Memory::default()
+        };
+        if !memories.contains(&memory) {
+            memories.push(memory);
+        }
+    }
+    memories
+}
+
+/// Rounds to two significant digits.
+fn rounded(value: f64) -> f64 {
+    let unit = 10.0_f64.powf(value.log10().floor() - 1.0);
+    // Division by a power of ten gives the nearest double of the decimal.
+    if unit >= 1.0 {
+        (value / unit).round() * unit
+    } else {
+        (value / unit).round() / (1.0 / unit).round()
+    }
+}
+
+/// Median over the targets of the lag in samples at which the autocorrelation within stretches falls to 1/e.
+fn correlation_time(samples: &AutoSamples<'_>) -> f64 {
+    let Some(past) = &samples.past else { return 1.0 };
+    let stretch = |sample: usize| past.history.stretches()[past.history.samples()[past.samples[sample]]];
+    let stretches: Vec<usize> = (0..samples.set.samples()).map(stretch).collect();
+    let count = samples.set.samples();
+    let mut times: Vec<f64> = Vec::new();
+    for column in samples.set.targets().columns() {
+        let mean = column.sum() / count as f64;
+        let values: Vec<f64> = column.iter().map(|value| value - mean).collect();
+        let variance = values.iter().map(|value| value * value).sum::<f64>() / count as f64;
+        if variance.sqrt() <= 1e-12 * mean.abs() {
+            continue;
+        }
+        let correlation = |lag: usize| {
+            let (mut sum, mut pairs) = (0.0, 0_usize);
+            for sample in lag..count {
+                if stretches[sample] == stretches[sample - lag] {
+                    sum += values[sample] * values[sample - lag];
+                    pairs += 1;
+                }
+            }
+            sum / pairs.max(1) as f64 / variance
+        };
+        let mut lag = 1;
+        while lag < count / 4 && correlation(lag) > (-1.0_f64).exp() {
+            lag += 1 + lag / 5;
+        }
+        times.push(lag as f64);
+    }
+    times.sort_by(f64::total_cmp);
+    times.get(times.len() / 2).copied().unwrap_or(1.0)
+}

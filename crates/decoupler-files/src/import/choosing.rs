@@ -1,0 +1,141 @@
+use std::path::Path;
+
+use decoupler_core::{
+    dataset::{Memory, Seed, Stream},
+    evaluation::auto::{AutoChoice, AutoFixed, AutoProgress, AutoSamples, SamplePast, choose_settings},
+    scene::RowModel,
+};
+
+use super::{ImportError, Plan, PlannedSets, Progress, Recording, Setup, SetupError, SetupSets, setup::watch};
+
+/// Setup whose settings were chosen from its training samples.
+#[derive(Clone, Debug)]
+pub struct ChosenSetup {
+    /// Setup with the chosen settings and memory.
+    pub setup: Setup,
+    /// Its datasets, with the chosen features.
+    pub sets: SetupSets,
+    /// The choice and its held-out answers; `None` if there were too few samples to choose, so that the settings are as
+    /// given.
+    pub choice: Option<AutoChoice>,
+}
+
+/// Progress of a choice of settings.
+#[derive(Clone, Debug, PartialEq)]
+pub enum ChoosingProgress {
+    /// Reading the files.
+    Reading(Progress),
+    /// Trying candidates.
+    Trying(AutoProgress),
+}
+
+/// Minimum number of training samples to choose settings for.
+const MIN_SAMPLES: usize = 40;
+
+impl Setup {
+    /// Returns `true` if settings can be chosen: for a recording with one network for all rows.
+    pub fn can_choose(&self) -> bool {
+        self.plan().is_some() && self.settings().source.row_model() == RowModel::Shared
+    }
+
+    /// Reads the recording, whose paths are relative to `folder`, and chooses settings by cross-validation on its training
+    /// samples, within `budget_s` seconds of one core; see [`choose_settings`]. A memory of the recipe is kept. Returns
+    /// `None` if `is_cancelled`, which is polled throughout, returns `true`.
+    ///
+    /// # Errors
+    /// If the files cannot be read, or their samples cannot be split or scaled.
+    ///
+    /// # Panics
+    /// If the setup is not that of a recording.
+    pub fn choose(
+        &self,
+        fixed: &AutoFixed,
+        budget_s: f64,
+        folder: &Path,
+        is_cancelled: &dyn Fn() -> bool,
+        on_progress: &mut dyn FnMut(ChoosingProgress),
+    ) -> Result<Option<ChosenSetup>, SetupError> {
+        let plan = self.plan().expect("settings are chosen for a recording");
+        let mut on_reading = |progress| on_progress(ChoosingProgress::Reading(progress));
+        let read = plan.recordings(folder, &mut watch(is_cancelled, &mut on_reading));
+        let (recording, test_recording) = match read {
+            Err(_) if is_cancelled() => return Ok(None),
+            read => read?,
+        };
+        let raw = recording.with_memory(None).map_err(ImportError::from)?;
+        let mut rng = self.settings().seed.rng(Stream::Split);
+        let divided = match test_recording {
+            None => plan.division.divide(&raw.set, &mut rng),
+            Some(_) => plan.division.divide_for_training(&raw.set, &mut rng),
+        };
+        let training = divided.map_err(ImportError::from)?.training;
+        let choice = if training.len() < MIN_SAMPLES {
+            None
+        } else {
+            let set = raw.set.select(&training);
+            let samples = AutoSamples {
+                set: &set,
+                past: Some(SamplePast {
+                    history: raw.history(),
+                    samples: &training,
+                }),
+                by: plan.division.by,
+            };
+            let fixed = AutoFixed {
+                memory: plan.import.memory.clone().or_else(|| fixed.memory.clone()),
+                ..fixed.clone()
+            };
+            let mut on_trying = |progress| on_progress(ChoosingProgress::Trying(progress));
+            let chosen = choose_settings(
+                self.settings(),
+                &fixed,
+                &samples,
+                budget_s,
+                is_cancelled,
+                &mut on_trying,
+            )?;
+            let Some(choice) = chosen else { return Ok(None) };
+            Some(choice)
+        };
+        let mut plan = plan.clone();
+        let mut settings = *self.settings();
+        if let Some(choice) = &choice {
+            settings = choice.settings;
+            plan.import.memory = Some(choice.memory.clone()).filter(|memory| !memory.is_empty());
+        }
+        let memory = plan.import.memory.clone();
+        let planned = planned(&plan, &raw, test_recording.as_ref(), memory.as_ref(), settings.seed)?;
+        let mut sets = SetupSets::of_plan(&plan, folder, planned)?;
+        if let (Some(recordings), Some(choice)) = (&mut sets.recordings, &choice) {
+            recordings.recorded.search = Some(choice.record.clone());
+        }
+        Ok(Some(ChosenSetup {
+            setup: Self::recording(settings, plan),
+            sets,
+            choice,
+        }))
+    }
+}
+
+/// Divides the recordings with the features of `memory`.
+fn planned(
+    plan: &Plan,
+    raw: &Recording,
+    test: Option<&Recording>,
+    memory: Option<&Memory>,
+    seed: Seed,
+) -> Result<PlannedSets, ImportError> {
+    let recording = raw.with_memory(memory)?;
+    // Lags in seconds have as many samples as in training.
+    let test_recording = match test {
+        None => None,
+        Some(test) => Some(test.with_memory(recording.memory())?),
+    };
+    let (split, test) = plan.divide(&recording, test_recording.as_ref(), seed)?;
+    Ok(PlannedSets {
+        recording,
+        test_recording,
+        split,
+        test,
+    })
+}

@@ -1,0 +1,180 @@
+//! Sheets of Excel and OpenDocument files. A sheet is read as the text that a spreadsheet program saves as CSV, so that
+//! headers, units, missing cells and time stamps mean the same in both.
+
+use std::{
+    fs::File,
+    io::{BufReader, Cursor, Read, Seek},
+    path::Path,
+};
+
+use calamine::{Data, Ods, Range, Reader, Xls, Xlsx, open_workbook_from_rs};
+use zip::ZipArchive;
+
+use super::{
+    Decimal, DialectChoice, Encoding, Format, Separator, Table, TableError, Watch,
+    csv_table::{self, Reading},
+    input_lines::Watched,
+};
+
+/// Kind of spreadsheet.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Spreadsheet {
+    /// Excel since 2007.
+    Xlsx,
+    /// Excel up to 2003.
+    Xls,
+    /// OpenDocument.
+    Ods,
+}
+
+impl Spreadsheet {
+    /// Returns the kind of a zip archive, or `None` if it has arrays or cannot be read.
+    ///
+    /// # Errors
+    /// If it has neither sheets nor arrays.
+    pub(super) fn of_zip(file: &File) -> Result<Option<Self>, TableError> {
+        let Ok(archive) = ZipArchive::new(BufReader::new(file)) else {
+            return Ok(None);
+        };
+        let has = |is_it: &dyn Fn(&str) -> bool| archive.file_names().any(|name| name.is_ok_and(|name| is_it(&name)));
+        if has(&|name| name.starts_with("xl/")) {
+            return Ok(Some(Self::Xlsx));
+        }
+        if has(&|name| name == "mimetype") && has(&|name| name == "content.xml") {
+            return Ok(Some(Self::Ods));
+        }
+        if archive.is_empty() || has(&|name| name.ends_with(".npy")) {
+            return Ok(None);
+        }
+        Err(TableError::OtherKind {
+            what: "a zip archive without .npy arrays",
+            cure: "unpack it",
+        })
+    }
+
+    /// Reads the sheet with most numbers.
+    ///
+    /// # Errors
+    /// If the file is damaged or no sheet has cells.
+    pub(super) fn read(
+        self,
+        path: &Path,
+        file: File,
+        reading: &Reading<'_>,
+        watch: Watch<'_>,
+    ) -> Result<Table, TableError> {
+        let source = BufReader::new(file);
+        let sheets = match self {
+            Self::Xlsx => sheets::<Xlsx<_>, _>(source),
+            Self::Xls => sheets::<Xls<_>, _>(source),
+            Self::Ods => sheets::<Ods<_>, _>(source),
+        }?;
+        let numbers = |range: &Range<Data>| {
+            let is_number = |(_, _, cell): &(usize, usize, &Data)| matches!(cell, Data::Int(_) | Data::Float(_));
+            range.used_cells().filter(is_number).count()
+        };
+        // Of equal ones, the first.
+        let chosen = sheets.iter().rev().max_by_key(|(_, range)| numbers(range));
+        let Some((name, range)) = chosen.filter(|(_, range)| !range.is_empty()) else {
+            return Err(TableError::Empty);
+        };
+        let text = text_of(range);
+        let size = text.len() as u64;
+        let reading = Reading {
+            choice: DialectChoice {
+                encoding: Some(Encoding::Utf8),
+                separator: Some(Separator::Comma),
+                decimal: Some(Decimal::Point),
+                ..reading.choice
+            },
+            ..reading.clone()
+        };
+        let mut table = csv_table::read(path, Watched::new(Cursor::new(text), Some(size), watch), &reading)?;
+        let others = sheets
+            .iter()
+            .filter(|(other, range)| other != name && !range.is_empty());
+        table.notes.extend(others.map(|(other, range)| {
+            let (rows, width) = range.get_size();
+            format!("left out: sheet '{other}' is {rows} × {width}; save it as its own file to use it")
+        }));
+        table.format = Format::Sheet {
+            name: name.clone(),
+            header: table.has_header(),
+        };
+        Ok(table)
+    }
+}
+
+fn sheets<R, S>(source: S) -> Result<Vec<(String, Range<Data>)>, TableError>
+where
+    R: Reader<S>,
+    S: Read + Seek,
+    R::Error: std::fmt::Display,
+{
+    let damaged = |error: R::Error| TableError::array("spreadsheet", format!("{error}; save it again, or as CSV"));
+    let mut workbook: R = open_workbook_from_rs(source).map_err(damaged)?;
+    let names = workbook.sheet_names();
+    let sheet = |name: String| {
+        let range = workbook.worksheet_range(&name).map_err(damaged)?;
+        Ok((name, range))
+    };
+    names.into_iter().map(sheet).collect()
+}
+
+/// Writes a sheet as CSV; its first line is row 1 of the sheet.
+fn text_of(range: &Range<Data>) -> String {
+    let before = range.start().map_or(0, |(row, _)| row as usize);
+    let mut text = "\n".repeat(before);
+    for row in range.rows() {
+        let is_empty = row.iter().all(|cell| matches!(cell, Data::Empty));
+        for (place, cell) in row.iter().enumerate().filter(|_| !is_empty) {
+            if place > 0 {
+                text.push(',');
+            }
+            write_cell(cell, &mut text);
+        }
+        text.push('\n');
+    }
+    text
+}
+
+fn write_cell(cell: &Data, text: &mut String) {
+    let written = match cell {
+        Data::Empty => return,
+        Data::Bool(is_true) => u8::from(*is_true).to_string(),
+        Data::Int(number) => number.to_string(),
+        Data::Float(number) => number.to_string(),
+        // A time of day or a duration, in days.
+        Data::DateTime(moment) if moment.is_duration() || moment.as_f64() < 1.0 => {
+            ((moment.as_f64() * 86_400e6).round() / 1e6).to_string()
+        }
+        Data::DateTime(moment) => {
+            let (year, month, day, hour, minute, second, milli) = moment.to_ymd_hms_milli();
+            format!("{year:04}-{month:02}-{day:02}T{hour:02}:{minute:02}:{second:02}.{milli:03}")
+        }
+        Data::String(text) | Data::DateTimeIso(text) | Data::DurationIso(text) => text.clone(),
+        Data::Error(error) => error.to_string(),
+    };
+    if written.contains([',', '"', '\n', '\r']) {
+        text.push('"');
+        text.push_str(&written.replace('"', "\"\""));
+        text.push('"');
+    } else {
+        text.push_str(&written);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_sheet_is_written_as_csv_with_its_row_numbers() {
+        let mut range = Range::new((2, 1), (4, 2));
+        range.set_value((2, 1), Data::String("force (N)".to_owned()));
+        range.set_value((2, 2), Data::String("note, \"if any\"".to_owned()));
+        range.set_value((4, 1), Data::Float(0.1));
+        range.set_value((4, 2), Data::Bool(true));
+        assert_eq!(text_of(&range), "\n\nforce (N),\"note, \"\"if any\"\"\"\n\n0.1,1\n");
+    }
+}

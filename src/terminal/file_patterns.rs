@@ -1,0 +1,90 @@
+//! Files given as arguments: several, a pattern such as `runs/*.csv`, or a folder.
+
+use std::path::PathBuf;
+
+use decoupler_files::import::{FileSet, Format};
+
+use super::failure::Failure;
+
+/// Returns the files given by `argument`: a folder means the tables in it, and a pattern the files that match, sorted by name.
+///
+/// # Errors
+/// If a folder has no table, or a pattern matches none or is invalid.
+pub(super) fn expanded(argument: &str, given: &[PathBuf]) -> Result<Vec<PathBuf>, Failure> {
+    let mut files = Vec::new();
+    for path in given {
+        let text = path.to_string_lossy();
+        let refuse = |reason: &str| Failure::Arguments(format!("{argument}: '{text}' {reason}"));
+        let is_pattern = text.contains(['*', '?', '[']);
+        if path.is_dir() {
+            let mut found = Format::tables_in(path).map_err(|error| refuse(&format!("cannot be read: {error}")))?;
+            if found.is_empty() {
+                let endings = Format::EXTENSIONS.join(", .");
+                return Err(refuse(&format!("is a folder without tables (.{endings})")));
+            }
+            files.append(&mut found);
+        } else if is_pattern && !path.exists() {
+            let found = glob::glob(&text).map_err(|error| refuse(&format!("is not a valid pattern: {error}")))?;
+            let before = files.len();
+            files.extend(found.filter_map(Result::ok).filter(|path| path.is_file()));
+            if files.len() == before {
+                return Err(refuse("matches no file"));
+            }
+        } else {
+            files.push(path.clone());
+        }
+    }
+    Ok(files)
+}
+
+/// Divides the joined files among the data files, in order; `kind` is "test-" for those of the test.
+///
+/// # Errors
+/// If the data files do not get the same number of joined files.
+pub(super) fn file_sets(kind: &str, data: Vec<PathBuf>, join: Vec<PathBuf>) -> Result<Vec<FileSet>, Failure> {
+    if join.len() % data.len().max(1) != 0 {
+        return Err(Failure::Arguments(format!(
+            "--{kind}join: {} joined files cannot be divided among the {} files of --{kind}data; give as many for each, in their order",
+            join.len(),
+            data.len()
+        )));
+    }
+    let each = join.len() / data.len().max(1);
+    let mut join = join.into_iter();
+    let set = |data| FileSet {
+        data,
+        join: join.by_ref().take(each).collect(),
+    };
+    Ok(data.into_iter().map(set).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn folders_and_patterns_are_the_tables_that_they_hold() {
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name);
+        for name in ["b.csv", "a.csv", "notes.md", "c.NPY"] {
+            std::fs::write(at(name), "1").unwrap();
+        }
+        let found = expanded("--data", &[folder.path().to_owned()]).unwrap();
+        assert_eq!(found, [at("a.csv"), at("b.csv"), at("c.NPY")]);
+        let found = expanded("--data", &[at("*.csv"), at("missing.csv")]).unwrap();
+        assert_eq!(found, [at("a.csv"), at("b.csv"), at("missing.csv")]);
+        let error = expanded("--data", &[at("*.mat")]).unwrap_err().to_string();
+        assert!(error.contains("matches no file"), "{error}");
+    }
+
+    #[test]
+    fn joined_files_go_with_the_data_files_in_order() {
+        let paths = |names: &[&str]| Vec::from_iter(names.iter().map(PathBuf::from));
+        let sets = file_sets("", paths(&["a", "b"]), paths(&["a1", "a2", "b1", "b2"])).unwrap();
+        assert_eq!((&sets[1].data, &sets[1].join), (&"b".into(), &paths(&["b1", "b2"])));
+        let error = file_sets("test-", paths(&["a", "b"]), paths(&["a1"]))
+            .unwrap_err()
+            .to_string();
+        assert!(error.contains("--test-join"), "{error}");
+    }
+}

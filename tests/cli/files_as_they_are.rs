@@ -1,0 +1,137 @@
+//! Recordings as people have them: several files, patterns and folders, derived columns, wide ranges, many channels.
+
+use std::{fmt::Write as _, fs, path::Path};
+
+use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
+use tempfile::TempDir;
+
+use crate::{printed::json, terminal::decoupler};
+
+/// Three files of a session each: two readings that differ by the force and a common drift; the third file goes further.
+fn sessions() -> TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    let mut rng = ChaCha8Rng::seed_from_u64(5);
+    for session in 1..=3 {
+        let mut text = "t,u1,u2,force\n".to_owned();
+        for row in 0..60 {
+            let most = if session == 3 { 4.0 } else { 1.0 };
+            let (force, drift): (f64, f64) = (rng.random_range(0.0..most), rng.random_range(-1.0..1.0));
+            writeln!(
+                text,
+                "{},{},{},{force}",
+                0.1 * f64::from(row),
+                drift + force,
+                drift - force
+            )
+            .unwrap();
+        }
+        fs::write(folder.path().join(format!("press_{session}.csv")), text).unwrap();
+    }
+    folder
+}
+
+const TRAIN: &str = "--inputs u1,u2 --targets force --hidden 3 --epochs 15 --starts 1 --seed 1 --json";
+
+fn warnings(report: &serde_json::Value) -> String {
+    report["warnings"].to_string()
+}
+
+fn failure(arguments: &str, folder: &Path) -> String {
+    let output = decoupler(arguments, folder);
+    assert!(!output.status.success(), "{arguments}");
+    String::from_utf8_lossy(&output.stderr).into_owned()
+}
+
+#[test]
+fn a_pattern_or_a_folder_is_one_experiment_split_by_file() {
+    let folder = sessions();
+    let report = json(
+        &format!("train --data press_?.csv {TRAIN} --save-recipe recipe.json"),
+        folder.path(),
+    );
+    assert_eq!(
+        (&report["split"], report["files"].as_array().unwrap().len()),
+        (&"group".into(), 3)
+    );
+    assert_eq!(report["test_samples"], 60);
+    let same = json(
+        "train --recipe recipe.json --hidden 3 --epochs 15 --starts 1 --seed 1 --json",
+        folder.path(),
+    );
+    assert_eq!(same["targets"], report["targets"]);
+    fs::create_dir(folder.path().join("all")).unwrap();
+    for session in 1..=3 {
+        let name = format!("press_{session}.csv");
+        fs::copy(folder.path().join(&name), folder.path().join("all").join(&name)).unwrap();
+    }
+    let of_folder = json(&format!("train --data all {TRAIN}"), folder.path());
+    assert_eq!(of_folder["targets"], report["targets"]);
+    let message = failure(&format!("train --data nothing_*.csv {TRAIN}"), folder.path());
+    assert!(message.contains("matches no file"), "{message}");
+}
+
+#[test]
+fn test_samples_outside_the_training_range_are_reported() {
+    let folder = sessions();
+    let data = "train --data press_1.csv --data press_2.csv --test-data press_3.csv";
+    let report = json(&format!("{data} {TRAIN}"), folder.path());
+    let share = report["test_outside_training"].as_f64().unwrap();
+    assert!((0.6..0.9).contains(&share), "{share}");
+    assert!(warnings(&report).contains("targets force in "), "{report}");
+    let inside = json(
+        &format!("train --data press_1.csv --test-data press_2.csv {TRAIN}"),
+        folder.path(),
+    );
+    assert!(!warnings(&inside).contains("outside the range"), "{inside}");
+}
+
+#[test]
+fn derived_columns_are_inputs_that_decode_computes_again() {
+    let folder = sessions();
+    let derived =
+        "--derive d=u1-u2 --inputs d --targets force --hidden 2 --epochs 30 --starts 1 --out network.json --json";
+    let report = json(
+        &format!("train --data press_1.csv --data press_2.csv {derived}"),
+        folder.path(),
+    );
+    // The difference of the readings is twice the force.
+    assert!(report["targets"][0]["rmse"].as_f64().unwrap() < 0.01, "{report}");
+    let decoded = decoupler("decode --network network.json --input press_1.csv", folder.path());
+    let decoded = String::from_utf8(decoded.stdout).unwrap();
+    let first: f64 = decoded
+        .lines()
+        .nth(1)
+        .unwrap()
+        .split(',')
+        .next()
+        .unwrap()
+        .parse()
+        .unwrap();
+    let text = fs::read_to_string(folder.path().join("press_1.csv")).unwrap();
+    let force: f64 = text
+        .lines()
+        .nth(1)
+        .unwrap()
+        .rsplit(',')
+        .next()
+        .unwrap()
+        .parse()
+        .unwrap();
+    assert!((first - force).abs() < 0.05, "{first} for {force}");
+}
+
+#[test]
+fn an_analysis_without_time_for_networks_says_what_was_left_out() {
+    let folder = sessions();
+    let inspect = "inspect --data press_1.csv --inputs u1,u2 --targets force --hidden 3 --json";
+    let report = json(&format!("{inspect} --budget 0"), folder.path());
+    assert!(
+        report["targets"][0]["r2_ridge"]["value"].as_f64().unwrap() > 0.99,
+        "{report}"
+    );
+    assert!(report["targets"][0]["r2_network"].is_null(), "{report}");
+    assert!(
+        warnings(&report).contains("the budget of 0 s was spent, so these were left out: the network"),
+        "{report}"
+    );
+}
