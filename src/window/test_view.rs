@@ -40,7 +40,11 @@ impl TestSet {
     pub fn of(run: &Run, order: SplitBy) -> Result<Self, TestViewError> {
         Ok(match run.settings().simulated() {
             Some(settings) => Self::Array(TestView::of(&settings, Arc::clone(run.test()))?),
-            None => Self::Recording(RecordedTest::new(Arc::clone(run.test()), Arc::clone(run.problem()), order)),
+            None => Self::Recording(RecordedTest::new(
+                Arc::clone(run.test()),
+                Arc::clone(run.problem()),
+                order,
+            )),
         })
     }
 

@@ -210,11 +210,18 @@ fn the_hysteresis_of_decoded_values_is_reported() {
         assert!((0.4..0.6).contains(&rmse), "{branch}: {found}");
     }
     let text = String::from_utf8(decoupler(arguments, folder.path()).stdout).unwrap();
-    for expected in ["network, loading", "network, unloading", "hysteresis of the decoded values"] {
+    for expected in [
+        "network, loading",
+        "network, unloading",
+        "hysteresis of the decoded values",
+    ] {
         assert!(text.contains(expected), "{expected}: {text}");
     }
     // Samples drawn at random have lost their order in time.
-    let report = json(&format!("{arguments} --split random --json").replace("--split time ", ""), folder.path());
+    let report = json(
+        &format!("{arguments} --split random --json").replace("--split time ", ""),
+        folder.path(),
+    );
     assert!(report["hysteresis"][0].is_null(), "{report}");
 }
 

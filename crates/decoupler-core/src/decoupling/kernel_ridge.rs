@@ -64,7 +64,13 @@ impl KernelRidge {
             (centres, gains)
         };
         let count = centres.nrows();
-        let coefficient = |(row, output): (usize, usize)| if row < count { gains[(row, output)] } else { means[output] };
+        let coefficient = |(row, output): (usize, usize)| {
+            if row < count {
+                gains[(row, output)]
+            } else {
+                means[output]
+            }
+        };
         Ok(Self {
             coefficients: Array2::from_shape_fn((count + 1, means.len()), coefficient),
             centres,
@@ -95,12 +101,19 @@ fn centred(units: &Units) -> (Mat<f64>, Vec<f64>) {
 /// Returns the weighted mean of each output over `samples`.
 fn means(units: &Units, samples: &[usize]) -> Vec<f64> {
     let total: f64 = samples.iter().map(|&sample| units.weights[sample]).sum();
-    let of = |output: usize| samples.iter().map(|&s| units.weights[s] * units.y[[s, output]]).sum::<f64>();
+    let of = |output: usize| {
+        samples
+            .iter()
+            .map(|&s| units.weights[s] * units.y[[s, output]])
+            .sum::<f64>()
+    };
     (0..units.y.ncols()).map(|output| of(output) / total).collect()
 }
 
 fn offsets(units: &Units, samples: &[usize], means: &[f64]) -> Mat<f64> {
-    Mat::from_fn(samples.len(), means.len(), |row, output| units.y[[samples[row], output]] - means[output])
+    Mat::from_fn(samples.len(), means.len(), |row, output| {
+        units.y[[samples[row], output]] - means[output]
+    })
 }
 
 /// Width, and penalty of each output.
@@ -150,13 +163,17 @@ impl Choice {
     /// Returns the coefficients (units × outputs) of Gaussians around all units for the centred outputs `y`.
     fn at_all(&self, units: &Units, y: &Mat<f64>) -> Mat<f64> {
         let mut kernel = gaussians(distances2(&units.x).as_ref(), self.sharpness);
-        self.solve(y.ncols(), |penalty, outputs| {
-            for (sample, weight) in units.weights.iter().enumerate() {
-                kernel[(sample, sample)] = 1.0 + penalty / weight;
-            }
-            let right = Mat::from_fn(y.nrows(), outputs.len(), |row, place| y[(row, outputs[place])]);
-            Some(kernel.llt(Side::Lower).ok()?.solve(&right))
-        }, units.x.nrows())
+        self.solve(
+            y.ncols(),
+            |penalty, outputs| {
+                for (sample, weight) in units.weights.iter().enumerate() {
+                    kernel[(sample, sample)] = 1.0 + penalty / weight;
+                }
+                let right = Mat::from_fn(y.nrows(), outputs.len(), |row, place| y[(row, outputs[place])]);
+                Some(kernel.llt(Side::Lower).ok()?.solve(&right))
+            },
+            units.x.nrows(),
+        )
     }
 
     /// Returns the coefficients (centres × outputs) of Gaussians around `centres`, fitted to `units`.
@@ -181,14 +198,18 @@ impl Choice {
         let kernel = gaussians(distances2(centres).as_ref(), self.sharpness);
         // Gram matrix and kernel both lose half of the digits.
         let rounding = f64::EPSILON * units.weights.iter().sum::<f64>() * count as f64;
-        self.solve(means.len(), |penalty, outputs| {
-            let mut matrix = &gram + faer::Scale(penalty) * &kernel;
-            for centre in 0..count {
-                matrix[(centre, centre)] += rounding;
-            }
-            let right = Mat::from_fn(count, outputs.len(), |row, place| right[(row, outputs[place])]);
-            Some(matrix.llt(Side::Lower).ok()?.solve(&right))
-        }, count)
+        self.solve(
+            means.len(),
+            |penalty, outputs| {
+                let mut matrix = &gram + faer::Scale(penalty) * &kernel;
+                for centre in 0..count {
+                    matrix[(centre, centre)] += rounding;
+                }
+                let right = Mat::from_fn(count, outputs.len(), |row, place| right[(row, outputs[place])]);
+                Some(matrix.llt(Side::Lower).ok()?.solve(&right))
+            },
+            count,
+        )
     }
 
     /// Solves for the outputs of each penalty together; a penalty at which the matrix is numerically singular is raised.
@@ -199,7 +220,9 @@ impl Choice {
         rows: usize,
     ) -> Mat<f64> {
         let mut gains = Mat::zeros(rows, outputs);
-        let mut left: Vec<usize> = (0..outputs).filter(|&output| self.penalties[output].is_finite()).collect();
+        let mut left: Vec<usize> = (0..outputs)
+            .filter(|&output| self.penalties[output].is_finite())
+            .collect();
         while let Some(&first) = left.first() {
             let penalty = self.penalties[first];
             let (same, others) = left.into_iter().partition(|&output| self.penalties[output] == penalty);
@@ -315,7 +338,9 @@ fn distances2(x: &Array2<f64>) -> Mat<f64> {
 }
 
 fn gaussians(distances2: MatRef<'_, f64>, sharpness: f64) -> Mat<f64> {
-    Mat::from_fn(distances2.nrows(), distances2.ncols(), |i, j| (-sharpness * distances2[(i, j)]).exp())
+    Mat::from_fn(distances2.nrows(), distances2.ncols(), |i, j| {
+        (-sharpness * distances2[(i, j)]).exp()
+    })
 }
 
 #[cfg(test)]
@@ -397,7 +422,8 @@ mod tests {
                         penalties: vec![penalty; 2],
                     };
                     let gains = choice.at_all(&training, &y);
-                    let coefficients = |(row, output): (usize, usize)| if row < 500 { gains[(row, output)] } else { means[output] };
+                    let coefficients =
+                        |(row, output): (usize, usize)| if row < 500 { gains[(row, output)] } else { means[output] };
                     let fit = KernelRidge {
                         centres: training.x.clone(),
                         sharpness,
@@ -435,7 +461,10 @@ mod tests {
             weights: vec![2.0; 60],
             ..units(60, 0.2, 6)
         };
-        let (gains, of_copies) = (choice.at_all(&weighted, &centred(&weighted).0), choice.at_all(&twice, &centred(&twice).0));
+        let (gains, of_copies) = (
+            choice.at_all(&weighted, &centred(&weighted).0),
+            choice.at_all(&twice, &centred(&twice).0),
+        );
         for sample in 0..60 {
             let sum = of_copies[(2 * sample, 0)] + of_copies[(2 * sample + 1, 0)];
             assert!((gains[(sample, 0)] - sum).abs() < 1e-10);

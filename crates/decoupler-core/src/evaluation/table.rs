@@ -1,7 +1,8 @@
 use std::time::{Duration, Instant};
 
 use super::{
-    Channel, Coverage, Errors, Problem, PublishedErrors, Run, Scores, TargetErrors, TestErrors, recorded::HysteresisLoop,
+    Channel, Coverage, Errors, Problem, PublishedErrors, Run, Scores, TargetErrors, TestErrors,
+    recorded::HysteresisLoop,
 };
 use crate::{
     dataset::Dataset,

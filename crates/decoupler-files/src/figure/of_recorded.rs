@@ -35,7 +35,10 @@ pub fn hysteresis_figure(found: &HysteresisLoop, target: &Channel) -> PlotFigure
     let title = target.title();
     let [loading, unloading] = [found.loading.rmse, found.unloading.rmse].map(format_number);
     PlotFigure {
-        keys: series.iter().map(|series| Key::new(&series.name, series.look)).collect(),
+        keys: series
+            .iter()
+            .map(|series| Key::new(&series.name, series.look))
+            .collect(),
         plots: vec![Plot {
             has_equal_scales: true,
             ..Plot::new(
@@ -259,7 +262,9 @@ mod tests {
         let decoded = Array2::from_shape_fn((400, 1), |(sample, _)| {
             actual[[sample, 0]] + if rises(sample) { -0.1 } else { 0.1 }
         });
-        let found = HysteresisLoop::measure(actual.view(), decoded.view(), &[0; 400]).remove(0).unwrap();
+        let found = HysteresisLoop::measure(actual.view(), decoded.view(), &[0; 400])
+            .remove(0)
+            .unwrap();
         let force = Channel {
             name: "force".to_owned(),
             unit: Some("N".to_owned()),
@@ -271,7 +276,10 @@ mod tests {
         assert!(equal.points.len() > 15, "{equal:?}");
         for place in 0..equal.points.len() {
             let [low, middle, high] = [loading, equal, unloading].map(|series| series.points[place].y);
-            assert!((middle - low - 0.1).abs() < 0.02 && (high - middle - 0.1).abs() < 0.02, "{low} {middle} {high}");
+            assert!(
+                (middle - low - 0.1).abs() < 0.02 && (high - middle - 0.1).abs() < 0.02,
+                "{low} {middle} {high}"
+            );
         }
         assert!(figure.notes[0].starts_with("Hysteresis 10"), "{:?}", figure.notes);
     }

@@ -1,7 +1,7 @@
 use decoupler_files::figure::{
     ErrorBins, Figure, HeatMap, Hue, LineAt, LineStyle, PlotFigure, ReferenceLine, error_histogram_figure,
-    hysteresis_figure, loss_figure, node_figure, regression_figure, sample_figure, target_histogram_figure, target_regression_figure,
-    training_state_figure,
+    hysteresis_figure, loss_figure, node_figure, regression_figure, sample_figure, target_histogram_figure,
+    target_regression_figure, training_state_figure,
 };
 use eframe::egui::{Key, Modifiers, Ui, UiBuilder};
 

@@ -180,7 +180,11 @@ fn directions_of(actual: &[f64], range: f64) -> Vec<Option<Direction>> {
         let has_fallen = actual[highest] - value >= reversal && direction != Some(Direction::Unloading);
         if has_risen || has_fallen {
             turning_points.push(if has_risen { lowest } else { highest });
-            direction = Some(if has_risen { Direction::Loading } else { Direction::Unloading });
+            direction = Some(if has_risen {
+                Direction::Loading
+            } else {
+                Direction::Unloading
+            });
             (lowest, highest) = (sample, sample);
         }
     }
@@ -193,7 +197,11 @@ fn directions_of(actual: &[f64], range: f64) -> Vec<Option<Direction>> {
     let mut directions = vec![None; actual.len()];
     for pair in turning_points.windows(2) {
         let (from, to) = (actual[pair[0]], actual[pair[1]]);
-        let direction = if to > from { Direction::Loading } else { Direction::Unloading };
+        let direction = if to > from {
+            Direction::Loading
+        } else {
+            Direction::Unloading
+        };
         for sample in pair[0]..=pair[1] {
             let is_at_rest = (actual[sample] - from).abs() < rest || (actual[sample] - to).abs() < rest;
             directions[sample] = (!is_at_rest).then_some(direction);
@@ -222,7 +230,9 @@ mod tests {
     /// Cycles of a sine between 0 and 10 that begin and end in the middle of an excursion.
     fn cycles(per_cycle: usize) -> Vec<f64> {
         let phase = |sample: usize| std::f64::consts::TAU * sample as f64 / per_cycle as f64;
-        (0..5 * per_cycle + per_cycle / 3).map(|sample| 5.0 + 5.0 * phase(sample).sin()).collect()
+        (0..5 * per_cycle + per_cycle / 3)
+            .map(|sample| 5.0 + 5.0 * phase(sample).sin())
+            .collect()
     }
 
     /// The play operator: the output follows the input at a distance of at most `radius`.
@@ -244,7 +254,11 @@ mod tests {
             let expected = 20.0 * radius;
             assert!((found.percent_of_range - expected).abs() < 1e-9, "{found:?}");
             // In the middle of each excursion the play is used up: the error is the radius on either side.
-            let middle = found.levels.iter().find(|level| (level.actual - 7.25).abs() < 1e-9).unwrap();
+            let middle = found
+                .levels
+                .iter()
+                .find(|level| (level.actual - 7.25).abs() < 1e-9)
+                .unwrap();
             assert!((middle.actual - middle.loading - radius).abs() < 1e-9, "{middle:?}");
             assert!((middle.unloading - middle.actual - radius).abs() < 1e-9, "{middle:?}");
         }
@@ -257,7 +271,10 @@ mod tests {
         let decoded = |(sample, value): (usize, &f64)| if rises(sample) { value + 0.3 } else { value - 0.1 };
         let decoded: Vec<f64> = actual.iter().enumerate().map(decoded).collect();
         let found = measure(&actual, &decoded).unwrap();
-        assert!((found.loading.rmse - 0.3).abs() < 1e-9 && (found.unloading.rmse - 0.1).abs() < 1e-9, "{found:?}");
+        assert!(
+            (found.loading.rmse - 0.3).abs() < 1e-9 && (found.unloading.rmse - 0.1).abs() < 1e-9,
+            "{found:?}"
+        );
         assert!((found.percent_of_range - 4.0).abs() < 1e-9, "{found:?}");
         assert!(found.sentence("force").contains("4.0 % of the range"));
     }
@@ -266,8 +283,14 @@ mod tests {
     fn noise_without_hysteresis_leaves_little() {
         let mut rng = ChaCha8Rng::seed_from_u64(1);
         // The target jitters as well.
-        let actual: Vec<f64> = cycles(400).iter().map(|value| value + 0.05 * standard_normal(&mut rng)).collect();
-        let decoded: Vec<f64> = actual.iter().map(|value| value + 0.2 * standard_normal(&mut rng)).collect();
+        let actual: Vec<f64> = cycles(400)
+            .iter()
+            .map(|value| value + 0.05 * standard_normal(&mut rng))
+            .collect();
+        let decoded: Vec<f64> = actual
+            .iter()
+            .map(|value| value + 0.2 * standard_normal(&mut rng))
+            .collect();
         let found = measure(&actual, &decoded).unwrap();
         assert!(found.percent_of_range < 2.0, "{found:?}");
         assert!((found.loading.rmse - 0.2).abs() < 0.02, "{found:?}");
@@ -288,7 +311,11 @@ mod tests {
             actual.extend([0.0; 200]);
         }
         for &value in &actual {
-            decoded.push(if value == 0.0 || value == 1.0 { value + 5.0 } else { value });
+            decoded.push(if value == 0.0 || value == 1.0 {
+                value + 5.0
+            } else {
+                value
+            });
         }
         let found = measure(&actual, &decoded).unwrap();
         assert_eq!((found.loading.worst, found.unloading.worst), (0.0, 0.0), "{found:?}");

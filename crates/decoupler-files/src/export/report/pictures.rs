@@ -56,7 +56,12 @@ pub(super) fn pictures(
         );
         Some((caption, hysteresis_figure(found.as_ref()?, target).into()))
     });
-    surfaces.into_iter().chain(of_training).chain(of_errors).chain(of_loops).collect()
+    surfaces
+        .into_iter()
+        .chain(of_training)
+        .chain(of_errors)
+        .chain(of_loops)
+        .collect()
 }
 
 /// Errors of the nodes of an array.
