@@ -10,7 +10,6 @@ use decoupler_core::{
     dataset::{Division, Seed, SplitBy},
     evaluation::{Measured, Run, RunSettings, SimulatedSettings, Simulation, TargetErrors, TestErrors},
     scene::RowModel,
-    training::Method,
 };
 use decoupler_files::{
     export::{
