@@ -76,7 +76,7 @@ impl ExportedMemory {
              for k = 1:numel(per_second)\n        \
              weight = -expm1(-(max(interval_s(sample), 0) * per_second(k) + per_sample(k)));\n        \
              state({last} + k, :) = state({last} + k, :) + weight * (now - state({last} + k, :));\n    end\n    \
-             past = state([{lags} {last} + (1:numel(per_second))], :);\n    \
+             past = state([{lags}, {last} + (1:numel(per_second))], :);\n    \
              {difference}\
              features(sample, :) = [now, reshape(past', 1, [])];\n\
              end\nend\n",
