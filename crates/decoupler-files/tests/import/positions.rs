@@ -56,14 +56,7 @@ fn positions_are_matched_to_their_targets_in_any_order_and_layout() {
         assert_eq!(lattice.places(), [3, 1, 2, 0]);
     }
     // A force alone also has one unit.
-<<<<<<< HEAD
-    let alone = imported(&folder, "target,x,y\nforce,1,2\n")
-        .unwrap()
-        .positions
-        .to_vec();
-=======
     let alone = imported(&folder, "target,x,y\nforce,1,2\n").unwrap().positions;
->>>>>>> i29-memory
     assert_eq!(alone, [at(4, 1.0, 2.0)]);
 }
 
