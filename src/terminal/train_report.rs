@@ -19,7 +19,7 @@ use decoupler_core::{
         SimulatedSettings, StartRecord, TestErrors,
         auto::AutoRecord,
         best_start, error_remarks,
-        recorded::{Determination, Extrapolation, Undetermined},
+        recorded::{Determination, Extrapolation, HysteresisLoop, Undetermined},
     },
     network::InputChoice,
     scene::{Noise, NoisySets, Scene},
@@ -109,6 +109,8 @@ struct RecordingFigures<'a> {
     test_outside_training: f64,
     targets: Vec<Target<'a>>,
     baselines: BTreeMap<&'static str, Vec<Target<'a>>>,
+    /// Errors of loading and unloading for each target; none if it does not rise and fall, or the order in time is lost.
+    hysteresis: Vec<Option<HysteresisLoop>>,
 }
 
 #[derive(Serialize)]
@@ -233,6 +235,7 @@ impl<'a> Trained<'a> {
                         targets(&file.problem.targets, &scores.baselines.linear, &[], &[]),
                     ),
                 ]),
+                hysteresis: self.loops(),
             })),
             (None, Some(settings)) => SourceReport::Array(Box::new(ArrayReport::new(file, &settings, self.remarks())?)),
             (None, None) => unreachable!("sets are recorded or simulated"),
@@ -264,6 +267,15 @@ impl<'a> Trained<'a> {
         };
         let by = recordings.recorded.plan.division.by;
         Determination::measure(self.run.test(), self.run.decouple_test().view(), by)
+    }
+
+    /// Errors of loading and unloading for each target of a recording.
+    fn loops(&self) -> Vec<Option<HysteresisLoop>> {
+        let Some(recordings) = &self.sets.recordings else {
+            return Vec::new();
+        };
+        let by = recordings.recorded.plan.test_order();
+        HysteresisLoop::of_test(self.run.test(), self.run.decouple_test().view(), by)
     }
 
     /// Test samples of a recording outside the range of its training samples.
@@ -354,7 +366,13 @@ impl<'a> Trained<'a> {
             )?;
             writeln!(out)?;
         }
-        write!(out, "{}", error_table(&file.error_table()).aligned())?;
+        let loops = self.loops();
+        write!(out, "{}", error_table(&file.error_table().with_loops(&loops)).aligned())?;
+        for (target, found) in file.problem.targets.iter().zip(&loops) {
+            if let Some(found) = found {
+                writeln!(out, "{}", found.sentence(&target.name))?;
+            }
+        }
         write_warnings(&self.warnings(&self.determined()), out)?;
         write_warnings(&self.remarks(), out)?;
         self.write_decoders(out)?;

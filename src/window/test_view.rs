@@ -3,8 +3,10 @@
 use std::{ops::RangeInclusive, sync::Arc};
 
 use decoupler_core::{
-    dataset::Dataset,
-    evaluation::{Channel, NodeAddress, Outlook, Pressed, Problem, Run, RunError, SimulatedSettings},
+    dataset::{Dataset, SplitBy},
+    evaluation::{
+        Channel, NodeAddress, Outlook, Pressed, Problem, Run, RunError, SimulatedSettings, recorded::HysteresisLoop,
+    },
     scene::Touch,
     sensor::SensorModel,
     surface::{SurfaceError, SurfaceMap},
@@ -31,14 +33,18 @@ pub enum TestSet {
 }
 
 impl TestSet {
-    /// Prepares the test set of `run`.
+    /// Prepares the test set of `run`; recorded samples are in the order of a division by `order`.
     ///
     /// # Errors
     /// If no surface can be interpolated through the nodes of the array.
-    pub fn of(run: &Run) -> Result<Self, TestViewError> {
+    pub fn of(run: &Run, order: SplitBy) -> Result<Self, TestViewError> {
         Ok(match run.settings().simulated() {
             Some(settings) => Self::Array(TestView::of(&settings, Arc::clone(run.test()))?),
-            None => Self::Recording(RecordedTest::new(Arc::clone(run.test()), Arc::clone(run.problem()))),
+            None => Self::Recording(RecordedTest::new(
+                Arc::clone(run.test()),
+                Arc::clone(run.problem()),
+                order,
+            )),
         })
     }
 
@@ -319,6 +325,8 @@ pub struct RecordedTest {
     pub ranges: Arc<[(f64, f64)]>,
     /// Positions of targets.
     pub positions: Positions,
+    /// Rule of the division, which determines the order of the samples.
+    order: SplitBy,
 }
 
 /// Positions of targets on the skin.
@@ -337,6 +345,8 @@ pub enum Positions {
 pub struct TargetCharts {
     /// Regression lines through the actual and decoded values of each target.
     pub lines: Vec<RegressionLine>,
+    /// Errors of loading and unloading for each target that rises and falls.
+    pub loops: Vec<Option<HysteresisLoop>>,
     /// Error over the position, or the reason why there is none.
     pub error_map: Result<Arc<HeatMap>, &'static str>,
 }
@@ -354,8 +364,8 @@ impl Positions {
 }
 
 impl RecordedTest {
-    /// Prepares the test samples `set`, whose channels are those of `problem`.
-    pub fn new(set: Arc<Dataset>, problem: Arc<Problem>) -> Self {
+    /// Prepares the test samples `set`, whose channels are those of `problem`, in the order of a division by `order`.
+    pub fn new(set: Arc<Dataset>, problem: Arc<Problem>, order: SplitBy) -> Self {
         let range = |target| {
             let values = set.targets();
             let extreme = |pick: fn(f64, f64) -> f64, none| values.column(target).iter().copied().fold(none, pick);
@@ -366,6 +376,7 @@ impl RecordedTest {
             positions: Positions::of(&problem),
             set,
             problem,
+            order,
         }
     }
 
@@ -377,6 +388,7 @@ impl RecordedTest {
         };
         TargetCharts {
             lines: (0..self.set.outputs()).map(line).collect(),
+            loops: HysteresisLoop::of_test(&self.set, answers.view(), self.order),
             error_map: match &self.positions {
                 // Targets that have positions are not positions themselves.
                 Positions::None => error_map(&self.set, answers, &self.problem.targets),

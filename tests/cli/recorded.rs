@@ -188,6 +188,43 @@ fn the_optimism_of_a_random_split_is_reported() {
     }
 }
 
+/// Readings that follow the target with a play of ±0.5 in a range of 10: the best answer without memory is the reading, which
+/// is 0.5 too low while the target rises and as much too high while it falls.
+#[test]
+fn the_hysteresis_of_decoded_values_is_reported() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut reading = 5.0_f64;
+    let lines = (0..2000).map(|frame| {
+        let target = 5.0 + 5.0 * (std::f64::consts::TAU * f64::from(frame) / 200.0).sin();
+        reading = reading.clamp(target - 0.5, target + 0.5);
+        format!("{reading},{target}\n")
+    });
+    fs::write(folder.path().join("r.csv"), lines.collect::<String>()).unwrap();
+    let arguments = "train --data r.csv --inputs c1 --targets c2 --split time --hidden 2 --epochs 30";
+    let report = json(&format!("{arguments} --json"), folder.path());
+    let found = &report["hysteresis"][0];
+    let percent = found["percent_of_range"].as_f64().unwrap();
+    assert!((9.0..13.0).contains(&percent), "{found}");
+    for branch in ["loading", "unloading"] {
+        let rmse = found[branch]["rmse"].as_f64().unwrap();
+        assert!((0.4..0.6).contains(&rmse), "{branch}: {found}");
+    }
+    let text = String::from_utf8(decoupler(arguments, folder.path()).stdout).unwrap();
+    for expected in [
+        "network, loading",
+        "network, unloading",
+        "hysteresis of the decoded values",
+    ] {
+        assert!(text.contains(expected), "{expected}: {text}");
+    }
+    // Samples drawn at random have lost their order in time.
+    let report = json(
+        &format!("{arguments} --split random --json").replace("--split time ", ""),
+        folder.path(),
+    );
+    assert!(report["hysteresis"][0].is_null(), "{report}");
+}
+
 /// Ten presses in random order, whose readings identify the press but do not determine the target, which differs between
 /// presses.
 fn presses() -> TempDir {

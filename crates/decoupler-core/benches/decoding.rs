@@ -17,7 +17,7 @@ use decoupler_core::{
     dataset::{Dataset, PerRow, Seed, Stream},
     decoupling::{
         AffineMap, CompiledNetworks, Decoder, NewtonDecoder, NewtonRules, PolishedDecoder, Posterior, PosteriorDecoder,
-        RadialBasisNetwork, RadialBasisSettings, TakagiSugeno, TrainingMean,
+        RadialBasisNetwork, TakagiSugeno, TrainingMean,
     },
     network::{InputChoice, Quantity, ScalingChoice, tanh_in_place, tanh_in_place_single},
     scene::{Noise, NoiseSource, RowModel, Rows, Scene},
@@ -162,8 +162,7 @@ fn print_scale(scale: ArrayScale) {
             "radial basis, 100 centres".into(),
             Box::new(
                 PerRow::fit(&training, RowModel::Each, |set| {
-                    let settings = RadialBasisSettings::default();
-                    RadialBasisNetwork::fit(set, InputChoice::BEST, NoiseSource::default(), settings, &mut rng)
+                    RadialBasisNetwork::fit(set, InputChoice::BEST, NoiseSource::default(), &mut rng)
                 })
                 .unwrap(),
             ),

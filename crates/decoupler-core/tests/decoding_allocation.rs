@@ -6,7 +6,7 @@ use decoupler_core::{
     dataset::{Dataset, PerRow, Seed, Stream},
     decoupling::{
         AffineMap, CompiledNetworks, Decoder, NewtonDecoder, NewtonRules, PolishedDecoder, RadialBasisNetwork,
-        RadialBasisSettings, TakagiSugeno,
+        TakagiSugeno,
     },
     live::{
         Diagnosis, FaultCause, FaultMonitor, FaultyWire, Latencies, LeftOutDecoder, LineParser, ParsedLine, Simulated,
@@ -92,10 +92,7 @@ fn a_frame_is_decoded_by_radial_basis_and_newton_without_allocating() {
     let rows: Vec<usize> = (0..10).collect();
     let mut polished = PolishedDecoder::new(first, &model, &scene, &rows, 1, &mut rng).unwrap();
     let mut newton = NewtonDecoder::new(&model, &scene, &rows, NewtonRules::default()).unwrap();
-    let basis = |set: &Dataset| {
-        let settings = RadialBasisSettings::default();
-        RadialBasisNetwork::fit(set, InputChoice::BEST, no_noise, settings, &mut rng)
-    };
+    let basis = |set: &Dataset| RadialBasisNetwork::fit(set, InputChoice::BEST, no_noise, &mut rng);
     let mut basis = PerRow::fit(&set, RowModel::Each, basis).unwrap();
     let mut coordinates_mm = vec![0.0; 180];
     let frames = set.frames().unwrap();

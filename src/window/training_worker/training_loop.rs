@@ -19,6 +19,7 @@ use crate::window::{
     test_view::{TestSet, TestViewError},
 };
 use decoupler_core::{
+    dataset::SplitBy,
     evaluation::{
         PastNetworks, Run, RunError, Scores, TestErrors,
         auto::{AutoFixed, DEFAULT_BUDGET_S},
@@ -29,7 +30,7 @@ use decoupler_core::{
 };
 use decoupler_files::{
     export::{CheckpointFile, NetworkFile, describe_determinacy, describe_worse_than_ridge},
-    import::{ChoosingProgress, Progress, Setup, SetupSets},
+    import::{ChoosingProgress, Plan, Progress, Setup, SetupSets},
 };
 
 /// Minimum time between two progress reports. Each makes the window draw a frame; the time in between keeps the window
@@ -188,9 +189,9 @@ impl<'a> TrainingLoop<'a> {
             let (fixed, folder) = (AutoFixed::default(), Path::new(""));
             let chosen = setup.choose(&fixed, DEFAULT_BUDGET_S, folder, is_cancelled, &mut on_choosing)?;
             let Some(chosen) = chosen else { return Ok(None) };
-            let recorded = chosen.sets.recorded().cloned();
+            let (recorded, drift) = (chosen.sets.recorded().cloned(), chosen.sets.drift_reference());
             let run = chosen.sets.run(&chosen.setup, is_cancelled)?;
-            Ok(run.map(|run| TrainedRun { run, recorded }))
+            Ok(run.map(|run| TrainedRun { run, recorded, drift }))
         })
     }
 
@@ -380,6 +381,7 @@ const REPLACED: &str = "the file was not written, because another training has r
 fn begun(trained: TrainedRun) -> Result<(TrainedRun, Box<Began>), TestViewError> {
     let run = &trained.run;
     let plan = trained.recorded.as_ref().map(|recorded| recorded.plan.clone());
+    let order = plan.as_ref().map_or(SplitBy::Time, Plan::test_order);
     let setup = Setup::of(*run.settings(), plan).expect("a recorded run has its plan");
     let began = Began {
         id: RunId::new(),
@@ -388,7 +390,7 @@ fn begun(trained: TrainedRun) -> Result<(TrainedRun, Box<Began>), TestViewError>
         search: trained.recorded.as_ref().and_then(|recorded| recorded.search.clone()),
         problem: Arc::clone(run.problem()),
         weights: run.leader().weights(),
-        test: TestSet::of(run)?,
+        test: TestSet::of(run, order)?,
         baselines: run
             .baselines()
             .cloned()

@@ -5,7 +5,7 @@ use thiserror::Error;
 
 use super::{
     AffineMap, CompiledNetworks, Decoder, NewtonDecoder, PolishedDecoder, Posterior, PosteriorDecoder,
-    RadialBasisNetwork, RadialBasisSettings, TakagiSugeno, TrainingMean,
+    RadialBasisNetwork, TakagiSugeno, TrainingMean,
 };
 use crate::{
     dataset::{Dataset, PerRow, Seed, Stream},
@@ -111,7 +111,7 @@ impl DecoderKind {
             Self::RadialBasis => Entry {
                 word: "rbf",
                 name: "Radial basis",
-                meaning: "A radial-basis network: Gaussians around centres among the training samples, fitted by least squares",
+                meaning: "A radial-basis network by kernel ridge regression: Gaussians around all training samples, or around 1000 of more than 4000, their width and penalties chosen on blocks of samples",
                 needs: Needs::Nothing,
                 fit: fit_radial_basis,
             },
@@ -263,8 +263,8 @@ fn fit_ridge(problem: &FitProblem<'_>) -> Fit {
 }
 
 fn fit_radial_basis(problem: &FitProblem<'_>) -> Fit {
-    let (settings, mut rng) = (RadialBasisSettings::default(), problem.rng());
-    problem.of_samples(|set| RadialBasisNetwork::fit(set, problem.inputs, problem.unseen, settings, &mut rng))
+    let mut rng = problem.rng();
+    problem.of_samples(|set| RadialBasisNetwork::fit(set, problem.inputs, problem.unseen, &mut rng))
 }
 
 fn fit_fuzzy(problem: &FitProblem<'_>) -> Fit {

@@ -24,6 +24,7 @@ mod decoder;
 mod description;
 mod equation_decoders;
 mod gauss_newton;
+mod kernel_ridge;
 mod kind;
 mod least_squares;
 mod newton;
@@ -45,7 +46,7 @@ pub use kind::{DecoderKind, DecoderKindError, Fit, FitError, FitProblem, Precisi
 pub use newton::{LARGEST_ERROR, Newton, NewtonReport, NewtonRules, NewtonStop, Solution};
 pub(crate) use posterior::SampledPosterior;
 pub use posterior::{Posterior, PosteriorReport};
-pub use radial_basis::{Centres, RadialBasisNetwork, RadialBasisSettings};
+pub use radial_basis::RadialBasisNetwork;
 pub(crate) use row_problem::{GaussianPrior, Range, ranges};
 pub use row_problem::{RowChoice, RowProblemDescription};
 pub use takagi_sugeno::TakagiSugeno;

@@ -123,7 +123,7 @@ mod tests {
 
     use crate::{
         dataset::{Seed, Stream},
-        decoupling::{AffineMap, Decoder, RadialBasisNetwork, RadialBasisSettings, TakagiSugeno, decode_set},
+        decoupling::{AffineMap, Decoder, RadialBasisNetwork, TakagiSugeno, decode_set},
         network::{InputChoice, Quantity},
         scene::standard_normal,
     };
@@ -172,8 +172,7 @@ mod tests {
             let ridge = r2(&mut AffineMap::ridge(&training, choice, none).unwrap(), &test);
             assert!((ridge - r2_ridge).abs() < 2e-3, "{name}: ridge {ridge}, {r2_ridge}");
             let mut rng = Seed(0).rng(Stream::Expectation);
-            let basis = RadialBasisSettings::default();
-            let mut basis = RadialBasisNetwork::fit(&training, choice, none, basis, &mut rng).unwrap();
+            let mut basis = RadialBasisNetwork::fit(&training, choice, none, &mut rng).unwrap();
             let mut fuzzy = TakagiSugeno::fit(&training, Quantity::Raw, none, &mut rng).unwrap();
             for (decoder, ours) in [("basis", r2(&mut basis, &test)), ("fuzzy", r2(&mut fuzzy, &test))] {
                 assert!(

@@ -1,6 +1,9 @@
 use std::time::{Duration, Instant};
 
-use super::{Channel, Coverage, Errors, Problem, PublishedErrors, Run, Scores, TargetErrors, TestErrors};
+use super::{
+    Channel, Coverage, Errors, Problem, PublishedErrors, Run, Scores, TargetErrors, TestErrors,
+    recorded::HysteresisLoop,
+};
 use crate::{
     dataset::Dataset,
     decoupling::{CompiledNetworks, DecodeError, Decoder},
@@ -236,6 +239,23 @@ impl ErrorTable {
             });
         }
         table
+    }
+
+    /// Adds rows for the errors of the network while each target rises and while it falls; `loops` are in the order of
+    /// the targets, `None` for those that do not rise and fall.
+    #[must_use]
+    pub fn with_loops(mut self, loops: &[Option<HysteresisLoop>]) -> Self {
+        for (block, found) in self.blocks.iter_mut().zip(loops) {
+            let Some(HysteresisLoop { loading, unloading, .. }) = found else {
+                continue;
+            };
+            let rows = [("network, loading", loading), ("network, unloading", unloading)];
+            block.rows.extend(rows.map(|(name, errors)| ErrorRow {
+                name,
+                errors: self.measures.iter().map(|measure| measure.of_target(errors)).collect(),
+            }));
+        }
+        self
     }
 
     /// Adds the measures of the intervals of the network, target by target.

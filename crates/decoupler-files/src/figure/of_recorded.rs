@@ -4,7 +4,7 @@
 use std::{ops::RangeInclusive, sync::Arc};
 
 use decoupler_core::{
-    evaluation::{Channel, TargetPosition},
+    evaluation::{Channel, TargetPosition, recorded::HysteresisLoop},
     surface::{SurfaceError, SurfaceMap},
     text::{counted, format_number},
 };
@@ -12,10 +12,47 @@ use glam::DVec3;
 use ndarray::{Array2, ArrayView2};
 
 use super::{
+    Hue, Key, LineStyle, Look,
     axis::{PlotAxis, step_for, tick_text},
     colour_map::{HeatMap, SequentialMap},
+    plot::{Plot, PlotFigure, Series},
     surface::{Quantity, Surface, ViewMode},
 };
+
+/// Mean decoded against actual values of `target` while it rises and while it falls, with the line on which they would be
+/// equal.
+pub fn hysteresis_figure(found: &HysteresisLoop, target: &Channel) -> PlotFigure {
+    let branch = |name: &str, hue, style, of: &dyn Fn(f64, f64, f64) -> f64| {
+        let levels = found.levels.iter();
+        let points = levels.map(|level| [level.actual, of(level.actual, level.loading, level.unloading)]);
+        Series::new(name, Look::line(hue, style), points)
+    };
+    let series = vec![
+        branch("equal", Hue::Ink, LineStyle::Dashed, &|actual, _, _| actual),
+        branch("loading", Hue::Blue, LineStyle::Solid, &|_, loading, _| loading),
+        branch("unloading", Hue::Orange, LineStyle::Solid, &|_, _, unloading| unloading),
+    ];
+    let title = target.title();
+    let [loading, unloading] = [found.loading.rmse, found.unloading.rmse].map(format_number);
+    PlotFigure {
+        keys: series
+            .iter()
+            .map(|series| Key::new(&series.name, series.look))
+            .collect(),
+        plots: vec![Plot {
+            has_equal_scales: true,
+            ..Plot::new(
+                PlotAxis::linear(format!("actual {title}")),
+                PlotAxis::linear(format!("decoded {title}")),
+                series,
+            )
+        }],
+        notes: vec![
+            format!("Hysteresis {:.1} % of the range", found.percent_of_range),
+            format!("RMSE {loading} loading, {unloading} unloading"),
+        ],
+    }
+}
 
 /// Maximum number of cells along an axis of a map, not counting cells added by rounding its limits.
 const CELLS: usize = 16;
@@ -217,6 +254,35 @@ mod tests {
     use ndarray::array;
 
     use super::*;
+
+    #[test]
+    fn a_loop_has_a_branch_on_either_side_of_the_diagonal() {
+        let actual = Array2::from_shape_fn((400, 1), |(sample, _)| (0.0628 * sample as f64).sin());
+        let rises = |sample: usize| (0.0628 * sample as f64).cos() > 0.0;
+        let decoded = Array2::from_shape_fn((400, 1), |(sample, _)| {
+            actual[[sample, 0]] + if rises(sample) { -0.1 } else { 0.1 }
+        });
+        let found = HysteresisLoop::measure(actual.view(), decoded.view(), &[0; 400])
+            .remove(0)
+            .unwrap();
+        let force = Channel {
+            name: "force".to_owned(),
+            unit: Some("N".to_owned()),
+        };
+        let figure = hysteresis_figure(&found, &force);
+        let [equal, loading, unloading] = &figure.plots[0].series[..] else {
+            panic!("{figure:?}");
+        };
+        assert!(equal.points.len() > 15, "{equal:?}");
+        for place in 0..equal.points.len() {
+            let [low, middle, high] = [loading, equal, unloading].map(|series| series.points[place].y);
+            assert!(
+                (middle - low - 0.1).abs() < 0.02 && (high - middle - 0.1).abs() < 0.02,
+                "{low} {middle} {high}"
+            );
+        }
+        assert!(figure.notes[0].starts_with("Hysteresis 10"), "{:?}", figure.notes);
+    }
 
     #[test]
     fn a_cell_has_the_root_mean_square_distance_of_its_samples() {

@@ -154,6 +154,16 @@ impl Plan {
         self.with_paths(|path| restored(path, folder))
     }
 
+    /// Returns the rule that determines the order of the test samples: by time in files of their own, whose rows are all
+    /// test samples.
+    pub fn test_order(&self) -> SplitBy {
+        if self.test.is_some() {
+            SplitBy::Time
+        } else {
+            self.division.by
+        }
+    }
+
     /// Returns `true` if the test samples are a random part of the recording: errors on them are optimistic if neighbouring
     /// rows are similar.
     pub fn is_optimistic(&self) -> bool {

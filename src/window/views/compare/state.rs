@@ -131,7 +131,11 @@ fn recorded_test(
              file, or train again."
         ));
     }
-    let test = RecordedTest::new(Arc::clone(&sets.sets.test), Arc::new(file.problem.clone()));
+    let test = RecordedTest::new(
+        Arc::clone(&sets.sets.test),
+        Arc::new(file.problem.clone()),
+        recorded.plan.test_order(),
+    );
     Ok(Some(test))
 }
 

@@ -1,7 +1,7 @@
 use decoupler_files::figure::{
-    ErrorBins, Figure, HeatMap, Hue, LineAt, LineStyle, PlotFigure, ReferenceLine, error_histogram_figure, loss_figure,
-    node_figure, regression_figure, sample_figure, target_histogram_figure, target_regression_figure,
-    training_state_figure,
+    ErrorBins, Figure, HeatMap, Hue, LineAt, LineStyle, PlotFigure, ReferenceLine, error_histogram_figure,
+    hysteresis_figure, loss_figure, node_figure, regression_figure, sample_figure, target_histogram_figure,
+    target_regression_figure, training_state_figure,
 };
 use eframe::egui::{Key, Modifiers, Ui, UiBuilder};
 
@@ -115,7 +115,7 @@ fn has_choice(view: &TrainView, shared: &Shared) -> bool {
     shared.result().is_some()
         && match view.tab {
             BottomTab::Nodes => true,
-            BottomTab::ErrorHistogram | BottomTab::Regression => of_target(),
+            BottomTab::ErrorHistogram | BottomTab::Regression | BottomTab::Hysteresis => of_target(),
             _ => false,
         }
 }
@@ -239,6 +239,10 @@ fn hint_of_empty_chart(tab: BottomTab, source: SourceKind) -> &'static str {
         (BottomTab::Regression, SourceKind::Recording) => {
             "Decoded against actual values of each target in the test set appear here."
         }
+        (BottomTab::Hysteresis, _) => {
+            "Mean decoded against actual values appear here, loading and unloading apart, for a target that rises and \
+             falls."
+        }
         (BottomTab::Sample | BottomTab::ErrorMap | BottomTab::Nodes | BottomTab::Section | BottomTab::Readings, _) => {
             ""
         }
@@ -312,6 +316,12 @@ fn figure(view: &TrainView, shared: &Shared) -> Option<PlotFigure> {
                 }
             }
         }
+        BottomTab::Hysteresis => {
+            let test = shared.recorded_test()?;
+            let target = view.target_of(test);
+            let found = view.result(shared)?.charts.as_ref()?.loops.get(target)?;
+            hysteresis_figure(found.as_ref()?, test.problem.targets.get(target)?)
+        }
         BottomTab::Sample => all_targets_figure(view, shared)?,
         BottomTab::Nodes => {
             let nodes_per_row = shared.test().map_or(1, |test| test.sensor.scale.nodes_per_row());
@@ -348,6 +358,8 @@ pub enum BottomTab {
     ErrorHistogram,
     /// Decoupled against actual z, or decoded against actual values of a target.
     Regression,
+    /// Mean decoded against actual values of a target of a recording, loading and unloading.
+    Hysteresis,
     /// All targets of a sample of a recording, if surfaces are shown above.
     Sample,
     /// Error over the position, if targets of a recording are a position.
@@ -368,6 +380,7 @@ impl BottomTab {
             Self::TrainingState => "training-state",
             Self::ErrorHistogram => "histogram",
             Self::Regression => "regression",
+            Self::Hysteresis => "hysteresis",
             Self::Sample => "sample",
             Self::ErrorMap => "error-map",
             Self::Nodes => "nodes",
@@ -386,11 +399,12 @@ impl BottomTab {
         (Self::Readings, "Readings"),
     ];
 
-    const OF_RECORDING: [(Self, &'static str); 6] = [
+    const OF_RECORDING: [(Self, &'static str); 7] = [
         (Self::Loss, "Loss"),
         (Self::TrainingState, "Training state"),
         (Self::ErrorHistogram, "Histogram"),
         (Self::Regression, "Regression"),
+        (Self::Hysteresis, "Hysteresis"),
         (Self::Sample, "Sample"),
         (Self::ErrorMap, "Error map"),
     ];
@@ -406,6 +420,7 @@ impl BottomTab {
             // Without surfaces the sample takes their place.
             Self::Sample => has_target_surface(shared),
             Self::ErrorMap => has_error_map(shared),
+            Self::Hysteresis => has_loop(shared),
             _ => true,
         };
         all.iter().copied().filter(|(tab, _)| is_offered(*tab)).collect()
@@ -415,6 +430,12 @@ impl BottomTab {
 fn has_error_map(shared: &Shared) -> bool {
     let charts = shared.result().and_then(|result| result.charts.as_ref());
     charts.is_some_and(|charts| charts.error_map.is_ok())
+}
+
+/// Returns true if a target rises and falls in the test samples.
+fn has_loop(shared: &Shared) -> bool {
+    let charts = shared.result().and_then(|result| result.charts.as_ref());
+    charts.is_some_and(|charts| charts.loops.iter().any(Option::is_some))
 }
 
 /// Returns true if a surface goes through the displayed targets of the recording.

@@ -191,7 +191,10 @@ mod tests {
         test_view::TestSet,
         training_worker::{Began, RunId},
     };
-    use decoupler_core::evaluation::{Run, SimulatedSettings};
+    use decoupler_core::{
+        dataset::SplitBy,
+        evaluation::{Run, SimulatedSettings},
+    };
 
     fn result(run: &Run) -> RunResult {
         let decoupled_mm = run.decouple_test();
@@ -230,7 +233,7 @@ mod tests {
             search: None,
             problem: Arc::clone(run.problem()),
             weights: 0,
-            test: TestSet::of(&run).unwrap(),
+            test: TestSet::of(&run, SplitBy::Time).unwrap(),
             baselines: run.baselines().unwrap().clone(),
         }));
         let mut drawn = Drawn::default();

@@ -105,7 +105,11 @@ pub fn with_lights(mut figure: PlotFigure, view: &TrainView, shared: &Shared) ->
             }
             figure
         }
-        BottomTab::Loss | BottomTab::TrainingState | BottomTab::ErrorMap | BottomTab::Readings => figure,
+        BottomTab::Loss
+        | BottomTab::TrainingState
+        | BottomTab::Hysteresis
+        | BottomTab::ErrorMap
+        | BottomTab::Readings => figure,
     }
 }
 
@@ -148,7 +152,11 @@ pub fn take_pointed(view: &mut TrainView, tab: BottomTab, plots: &[DrawnPlot<'_>
                 view.lights.bar = plot.clicked.filter(|_| plot.clicked != view.lights.bar);
             }
         }
-        BottomTab::Loss | BottomTab::TrainingState | BottomTab::ErrorMap | BottomTab::Readings => {}
+        BottomTab::Loss
+        | BottomTab::TrainingState
+        | BottomTab::Hysteresis
+        | BottomTab::ErrorMap
+        | BottomTab::Readings => {}
     }
 }
 

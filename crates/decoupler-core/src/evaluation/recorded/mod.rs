@@ -1,5 +1,5 @@
-//! Analysis of recordings: how well the readings determine each target, the importance of each channel, and the gain
-//! from more samples.
+//! Analysis of recordings: how well the readings determine each target, the importance of each channel, the gain from
+//! more samples, and the errors of loading and unloading.
 //!
 //! Every figure is computed from held-out answers, such as those of a [`CrossValidated`](super::CrossValidated), and
 //! has a 95 % confidence interval from independent stretches or groups of samples, because neighbouring samples of a
@@ -9,6 +9,7 @@ mod channel_remark;
 mod determination;
 mod evidence;
 mod extrapolation;
+mod hysteresis;
 mod learning_curve;
 mod memory_gain;
 mod split_comparison;
@@ -18,6 +19,7 @@ pub use determination::{Determinacy, Determination, NonlinearGain, Undetermined}
 pub(crate) use evidence::Evidence;
 pub use evidence::FittedModel;
 pub use extrapolation::Extrapolation;
+pub use hysteresis::{HysteresisLoop, LoopLevel};
 pub use learning_curve::{Doubling, LearningCurve, LearningPoint, PowerLaw};
 pub use memory_gain::MemoryGain;
 pub use split_comparison::{Findings, Interval, SplitComparison, StudyStep, TargetFindings};

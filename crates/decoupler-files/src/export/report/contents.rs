@@ -4,7 +4,7 @@ use decoupler_core::{
     dataset::Dataset,
     evaluation::{
         DecoderReport, Outlook, ReferenceNote, RunDefect, SimulatedSettings, StartRecord, TestErrors, error_remarks,
-        recorded::Determination,
+        recorded::{Determination, HysteresisLoop},
     },
     sensor::Geometry,
     text::counted,
@@ -61,6 +61,9 @@ impl RunReport<'_> {
         let Self { file, decoders, .. } = *self;
         let setup = self.setup(folder);
         let answers = file.network.decouple(self.test);
+        let loops = setup.plan().map_or_else(Vec::new, |plan| {
+            HysteresisLoop::of_test(self.test, answers.view(), plan.test_order())
+        });
         let title = self.title();
         let mut html = Html::default();
         html.element("h1", "", &title);
@@ -69,7 +72,7 @@ impl RunReport<'_> {
             html.element("p", "warning", &remark);
         }
         html.section("Errors on the test set", |html| {
-            html.table(&error_table(&file.error_table()), "network");
+            html.table(&error_table(&file.error_table().with_loops(&loops)), "network");
             let text = match setup.plan() {
                 None => {
                     "Means of |error|, in percent of the coordinate as in the paper, in mm, or in percent of the stroke. \
@@ -101,7 +104,7 @@ impl RunReport<'_> {
             });
         }
         html.section("Figures", |html| {
-            for (number, (caption, figure)) in pictures(file, self.test, &answers).into_iter().enumerate() {
+            for (number, (caption, figure)) in pictures(file, self.test, &answers, &loops).into_iter().enumerate() {
                 html.figure(&caption, &figure.draw().inline_svg(number, &caption));
             }
         });

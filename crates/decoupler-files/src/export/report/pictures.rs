@@ -8,22 +8,28 @@ use ndarray::{Array2, ArrayView2};
 use crate::{
     export::NetworkFile,
     figure::{
-        Figure, RegressionLine, SequentialMap, TargetSurface, error_histogram_figure, loss_figure, regression_figure,
+        Figure, RegressionLine, SequentialMap, TargetSurface, error_histogram_figure, hysteresis_figure, loss_figure,
+        regression_figure,
         surface::{OrbitCamera, Quantity, Surface, SurfaceFigure, ViewMode},
         target_histogram_figure, target_pairs, target_regression_figure, training_state_figure, z_pairs_mm,
     },
 };
 use decoupler_core::{
     dataset::Dataset,
-    evaluation::{Channel, NodeAddress, SimulatedSettings},
+    evaluation::{Channel, NodeAddress, SimulatedSettings, recorded::HysteresisLoop},
     surface::SurfaceMap,
 };
 
 /// Maximum number of targets of a recording that have their own figures.
 const MAX_TARGETS: usize = 8;
 
-/// Captions and figures of a run; `answers` are the outputs of its network for `test`.
-pub(super) fn pictures(file: &NetworkFile, test: &Dataset, answers: &Array2<f64>) -> Vec<(String, Figure)> {
+/// Captions and figures of a run; `answers` are the outputs of its network for `test`, and `loops` those of its targets.
+pub(super) fn pictures(
+    file: &NetworkFile,
+    test: &Dataset,
+    answers: &Array2<f64>,
+    loops: &[Option<HysteresisLoop>],
+) -> Vec<(String, Figure)> {
     let training = &file.training;
     let of_training = [
         (
@@ -42,7 +48,20 @@ pub(super) fn pictures(file: &NetworkFile, test: &Dataset, answers: &Array2<f64>
         ),
         _ => (target_surfaces(file, test, answers), target_errors(file, test, answers)),
     };
-    surfaces.into_iter().chain(of_training).chain(of_errors).collect()
+    let targets = file.problem.targets.iter().zip(loops).take(MAX_TARGETS);
+    let of_loops = targets.filter_map(|(target, found)| {
+        let caption = format!(
+            "Mean decoded against actual values of {} in the test set, loading and unloading.",
+            target.name
+        );
+        Some((caption, hysteresis_figure(found.as_ref()?, target).into()))
+    });
+    surfaces
+        .into_iter()
+        .chain(of_training)
+        .chain(of_errors)
+        .chain(of_loops)
+        .collect()
 }
 
 /// Errors of the nodes of an array.

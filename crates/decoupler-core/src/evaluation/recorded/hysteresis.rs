@@ -1,0 +1,335 @@
+use ndarray::ArrayView2;
+use serde::Serialize;
+
+use crate::{
+    dataset::{Dataset, SplitBy},
+    evaluation::TargetErrors,
+};
+
+/// Errors of decoded values while a target rises (loading) and while it falls (unloading), and the hysteresis that is
+/// left in them.
+///
+/// Loading and unloading are the rising and falling excursions of the target between turning points. A turning point
+/// counts if the target then reverses by at least 10 % of its range, so that noise and jitter do not; this needs no
+/// clock. Samples within 2 % of the range of a turning point are at rest there and are left out.
+///
+/// Each excursion is divided into levels of the target. The branches are the mean decoded values at each level while
+/// loading and while unloading, and the hysteresis is the largest difference of the branches in percent of the target's
+/// range. Noise of the decoded values with standard deviation s adds up to about 2·s/√n with n samples on a level.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct HysteresisLoop {
+    /// Errors while loading.
+    pub loading: TargetErrors,
+    /// Errors while unloading.
+    pub unloading: TargetErrors,
+    /// Number of samples in [`Self::loading`] and [`Self::unloading`].
+    pub samples: [usize; 2],
+    /// Largest difference of the branches, in percent of the range of the target.
+    pub percent_of_range: f64,
+    /// Branches at increasing levels, where both have enough samples.
+    pub levels: Vec<LoopLevel>,
+}
+
+/// Mean decoded values at one level of a target.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct LoopLevel {
+    /// Middle of the level.
+    pub actual: f64,
+    /// Mean decoded value while loading, at the middle of the level.
+    pub loading: f64,
+    /// Mean decoded value while unloading.
+    pub unloading: f64,
+}
+
+#[derive(Clone, Copy, PartialEq)]
+enum Direction {
+    Loading,
+    Unloading,
+}
+
+impl HysteresisLoop {
+    /// Reversal that makes a turning point, relative to the range.
+    const REVERSAL: f64 = 0.1;
+    /// Distance to a turning point that counts as rest, relative to the range.
+    const REST: f64 = 0.02;
+    /// Number of levels.
+    const LEVELS: usize = 20;
+    /// Minimum number of samples of each branch on a level, and minimum number of such levels.
+    const MIN_SAMPLES: usize = 3;
+    const MIN_LEVELS: usize = 5;
+
+    /// Measures `answers` against `targets` (both samples × outputs), target by target. Samples are in order of time
+    /// within each stretch, whose number is in `stretches` (one for each sample). `None` for a target that does not
+    /// rise and fall through enough levels.
+    ///
+    /// # Panics
+    /// If the shapes differ.
+    pub fn measure(
+        targets: ArrayView2<'_, f64>,
+        answers: ArrayView2<'_, f64>,
+        stretches: &[usize],
+    ) -> Vec<Option<Self>> {
+        assert_eq!(targets.dim(), answers.dim());
+        assert_eq!(targets.nrows(), stretches.len());
+        let pairs = targets.columns().into_iter().zip(answers.columns());
+        pairs
+            .map(|(targets, answers)| Self::of_one(&targets.to_vec(), &answers.to_vec(), stretches))
+            .collect()
+    }
+
+    /// Measures `answers` (samples × outputs) to a test set that was divided by `by`: its groups are the stretches, or
+    /// all of it by time. `None` for all targets if samples were drawn at random, which loses their order in time.
+    ///
+    /// # Panics
+    /// If the shapes differ.
+    pub fn of_test(test: &Dataset, answers: ArrayView2<'_, f64>, by: SplitBy) -> Vec<Option<Self>> {
+        let stretches = match by {
+            SplitBy::Time => vec![0; test.samples()],
+            SplitBy::Group => test.groups().to_vec(),
+            SplitBy::Random => return vec![None; test.outputs()],
+        };
+        Self::measure(test.targets(), answers, &stretches)
+    }
+
+    fn of_one(actual: &[f64], decoded: &[f64], stretches: &[usize]) -> Option<Self> {
+        let lowest = actual.iter().copied().fold(f64::INFINITY, f64::min);
+        let range = actual.iter().copied().fold(f64::NEG_INFINITY, f64::max) - lowest;
+        if !(range > 0.0 && range.is_finite()) {
+            return None;
+        }
+        let samples: Vec<usize> = (0..actual.len()).collect();
+        let mut directions = vec![None; actual.len()];
+        for stretch in samples.chunk_by(|&one, &next| stretches[one] == stretches[next]) {
+            let first = stretch[0];
+            let of_stretch = directions_of(&actual[first..first + stretch.len()], range);
+            directions[first..first + stretch.len()].copy_from_slice(&of_stretch);
+        }
+        let branches = [Direction::Loading, Direction::Unloading].map(|direction| {
+            let is_of_branch = |&sample: &usize| directions[sample] == Some(direction);
+            samples.iter().copied().filter(is_of_branch).collect::<Vec<_>>()
+        });
+        let levels_of = branches.each_ref().map(|samples| {
+            let mut levels = vec![(0, 0.0); Self::LEVELS];
+            for &sample in samples {
+                let level = ((actual[sample] - lowest) / range * Self::LEVELS as f64) as usize;
+                let (count, sum) = &mut levels[level.min(Self::LEVELS - 1)];
+                *count += 1;
+                // The mean error does not depend on where the samples are within the level.
+                *sum += decoded[sample] - actual[sample];
+            }
+            levels
+        });
+        let [loading, unloading] = levels_of;
+        let levels = loading.iter().zip(&unloading).enumerate();
+        let levels: Vec<LoopLevel> = levels
+            .filter(|(_, (loading, unloading))| loading.0.min(unloading.0) >= Self::MIN_SAMPLES)
+            .map(|(level, (loading, unloading))| {
+                let actual = lowest + range * (level as f64 + 0.5) / Self::LEVELS as f64;
+                LoopLevel {
+                    actual,
+                    loading: actual + loading.1 / loading.0 as f64,
+                    unloading: actual + unloading.1 / unloading.0 as f64,
+                }
+            })
+            .collect();
+        if levels.len() < Self::MIN_LEVELS {
+            return None;
+        }
+        let apart = levels.iter().map(|level| (level.loading - level.unloading).abs());
+        let errors = branches.each_ref().map(|samples| {
+            let column = |values: &[f64]| samples.iter().map(|&sample| values[sample]).collect::<Vec<_>>();
+            let of = |values: Vec<f64>| ndarray::Array2::from_shape_vec((samples.len(), 1), values).ok();
+            let (targets, answers) = (of(column(actual))?, of(column(decoded))?);
+            TargetErrors::measure(targets.view(), answers.view()).into_iter().next()
+        });
+        let [loading, unloading] = errors;
+        Some(Self {
+            loading: loading?,
+            unloading: unloading?,
+            samples: branches.each_ref().map(Vec::len),
+            percent_of_range: 100.0 * apart.fold(0.0, f64::max) / range,
+            levels,
+        })
+    }
+
+    /// Returns a sentence on the hysteresis of the target of this name.
+    pub fn sentence(&self, name: &str) -> String {
+        format!(
+            "{name}: RMSE {:.4} while it rises and {:.4} while it falls; hysteresis of the decoded values {:.1} % of the \
+             range",
+            self.loading.rmse, self.unloading.rmse, self.percent_of_range
+        )
+    }
+}
+
+/// Returns the direction of each sample of one stretch; `None` at rest, and before the first and after the last turning
+/// point that are certain.
+fn directions_of(actual: &[f64], range: f64) -> Vec<Option<Direction>> {
+    let (reversal, rest) = (HysteresisLoop::REVERSAL * range, HysteresisLoop::REST * range);
+    let mut turning_points = Vec::new();
+    let (mut lowest, mut highest) = (0, 0);
+    let mut direction = None;
+    for (sample, &value) in actual.iter().enumerate() {
+        if value < actual[lowest] {
+            lowest = sample;
+        }
+        if value > actual[highest] {
+            highest = sample;
+        }
+        let has_risen = value - actual[lowest] >= reversal && direction != Some(Direction::Loading);
+        let has_fallen = actual[highest] - value >= reversal && direction != Some(Direction::Unloading);
+        if has_risen || has_fallen {
+            turning_points.push(if has_risen { lowest } else { highest });
+            direction = Some(if has_risen {
+                Direction::Loading
+            } else {
+                Direction::Unloading
+            });
+            (lowest, highest) = (sample, sample);
+        }
+    }
+    // The last excursion ends at its extreme.
+    turning_points.extend(match direction {
+        Some(Direction::Loading) => Some(highest),
+        Some(Direction::Unloading) => Some(lowest),
+        None => None,
+    });
+    let mut directions = vec![None; actual.len()];
+    for pair in turning_points.windows(2) {
+        let (from, to) = (actual[pair[0]], actual[pair[1]]);
+        let direction = if to > from {
+            Direction::Loading
+        } else {
+            Direction::Unloading
+        };
+        for sample in pair[0]..=pair[1] {
+            let is_at_rest = (actual[sample] - from).abs() < rest || (actual[sample] - to).abs() < rest;
+            directions[sample] = (!is_at_rest).then_some(direction);
+        }
+    }
+    directions
+}
+
+#[cfg(test)]
+mod tests {
+    use ndarray::Array2;
+    use rand::{SeedableRng, rngs::ChaCha8Rng};
+
+    use super::*;
+    use crate::scene::standard_normal;
+
+    fn column(values: &[f64]) -> Array2<f64> {
+        Array2::from_shape_vec((values.len(), 1), values.to_vec()).unwrap()
+    }
+
+    fn measure(actual: &[f64], decoded: &[f64]) -> Option<HysteresisLoop> {
+        let stretches = vec![0; actual.len()];
+        HysteresisLoop::measure(column(actual).view(), column(decoded).view(), &stretches).remove(0)
+    }
+
+    /// Cycles of a sine between 0 and 10 that begin and end in the middle of an excursion.
+    fn cycles(per_cycle: usize) -> Vec<f64> {
+        let phase = |sample: usize| std::f64::consts::TAU * sample as f64 / per_cycle as f64;
+        (0..5 * per_cycle + per_cycle / 3)
+            .map(|sample| 5.0 + 5.0 * phase(sample).sin())
+            .collect()
+    }
+
+    /// The play operator: the output follows the input at a distance of at most `radius`.
+    fn play(input: &[f64], radius: f64) -> Vec<f64> {
+        let mut state = input[0];
+        let follow = |&value: &f64| {
+            state = state.clamp(value - radius, value + radius);
+            state
+        };
+        input.iter().map(follow).collect()
+    }
+
+    #[test]
+    fn the_play_operator_has_the_hysteresis_of_its_width() {
+        for (per_cycle, radius) in [(60, 0.5), (1000, 0.25)] {
+            let actual = cycles(per_cycle);
+            let found = measure(&actual, &play(&actual, radius)).unwrap();
+            // 2 · radius of a range of 10.
+            let expected = 20.0 * radius;
+            assert!((found.percent_of_range - expected).abs() < 1e-9, "{found:?}");
+            // In the middle of each excursion the play is used up: the error is the radius on either side.
+            let middle = found
+                .levels
+                .iter()
+                .find(|level| (level.actual - 7.25).abs() < 1e-9)
+                .unwrap();
+            assert!((middle.actual - middle.loading - radius).abs() < 1e-9, "{middle:?}");
+            assert!((middle.unloading - middle.actual - radius).abs() < 1e-9, "{middle:?}");
+        }
+    }
+
+    #[test]
+    fn the_branches_have_their_own_errors() {
+        let actual = cycles(200);
+        let rises = |sample: usize| sample > 0 && actual[sample] > actual[sample - 1];
+        let decoded = |(sample, value): (usize, &f64)| if rises(sample) { value + 0.3 } else { value - 0.1 };
+        let decoded: Vec<f64> = actual.iter().enumerate().map(decoded).collect();
+        let found = measure(&actual, &decoded).unwrap();
+        assert!(
+            (found.loading.rmse - 0.3).abs() < 1e-9 && (found.unloading.rmse - 0.1).abs() < 1e-9,
+            "{found:?}"
+        );
+        assert!((found.percent_of_range - 4.0).abs() < 1e-9, "{found:?}");
+        assert!(found.sentence("force").contains("4.0 % of the range"));
+    }
+
+    #[test]
+    fn noise_without_hysteresis_leaves_little() {
+        let mut rng = ChaCha8Rng::seed_from_u64(1);
+        // The target jitters as well.
+        let actual: Vec<f64> = cycles(400)
+            .iter()
+            .map(|value| value + 0.05 * standard_normal(&mut rng))
+            .collect();
+        let decoded: Vec<f64> = actual
+            .iter()
+            .map(|value| value + 0.2 * standard_normal(&mut rng))
+            .collect();
+        let found = measure(&actual, &decoded).unwrap();
+        assert!(found.percent_of_range < 2.0, "{found:?}");
+        assert!((found.loading.rmse - 0.2).abs() < 0.02, "{found:?}");
+    }
+
+    #[test]
+    fn rest_between_cycles_is_left_out() {
+        // A ramp up, a long hold, a ramp down, a long hold; while holding, the decoded value creeps far away.
+        let (mut actual, mut decoded) = (Vec::new(), Vec::new());
+        for _ in 0..4 {
+            for sample in 0..50 {
+                actual.push(f64::from(sample) / 50.0);
+            }
+            actual.extend([1.0; 200]);
+            for sample in 0..50 {
+                actual.push(1.0 - f64::from(sample) / 50.0);
+            }
+            actual.extend([0.0; 200]);
+        }
+        for &value in &actual {
+            decoded.push(if value == 0.0 || value == 1.0 {
+                value + 5.0
+            } else {
+                value
+            });
+        }
+        let found = measure(&actual, &decoded).unwrap();
+        assert_eq!((found.loading.worst, found.unloading.worst), (0.0, 0.0), "{found:?}");
+    }
+
+    #[test]
+    fn a_jump_between_stretches_is_no_excursion() {
+        let rising: Vec<f64> = (0..100).map(f64::from).collect();
+        let actual = [rising.clone(), rising].concat();
+        let stretches: Vec<usize> = (0..200).map(|sample| sample / 100).collect();
+        let targets = column(&actual);
+        let found = HysteresisLoop::measure(targets.view(), targets.view(), &stretches);
+        assert_eq!(found, [None], "it never falls");
+        assert!(measure(&[1.0; 50], &[1.0; 50]).is_none(), "constant");
+        assert!(measure(&[], &[]).is_none());
+    }
+}
