@@ -42,7 +42,7 @@ pub(super) fn expanded(argument: &str, given: &[PathBuf]) -> Result<Vec<PathBuf>
 /// # Errors
 /// If the data files do not get the same number of joined files.
 pub(super) fn file_sets(kind: &str, data: Vec<PathBuf>, join: Vec<PathBuf>) -> Result<Vec<FileSet>, Failure> {
-    if join.len() % data.len().max(1) != 0 {
+    if !join.len().is_multiple_of(data.len().max(1)) {
         return Err(Failure::Arguments(format!(
             "--{kind}join: {} joined files cannot be divided among the {} files of --{kind}data; give as many for each, in their order",
             join.len(),

@@ -26,6 +26,7 @@ pub struct RecipeFile;
 /// Source of samples in a recipe.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
+#[allow(clippy::large_enum_variant, reason = "there is one at a time")]
 pub enum RecipeSource {
     /// Simulated array: its sensor, the scene, and the numbers of samples.
     Simulated(Simulation),

@@ -52,7 +52,7 @@ pub struct ColumnSummary {
     pub max: Option<f64>,
     /// `true` if all numbers are equal.
     pub is_constant: bool,
-    /// `true` if the numbers differ by rounding only: their range is below a hundred-thousandth of their value, or they are up
+    /// `true` if the numbers differ by rounding only: they are few and within a hundred-thousandth of their value, or up
     /// to three values within a thousandth.
     pub is_rounding: bool,
     /// Number that seems to mean "none".

@@ -119,7 +119,9 @@ pub(super) fn is_rounding(numbers: &[f64]) -> bool {
         return false;
     };
     let (range, value) = (max - min, min.abs().max(max.abs()));
-    range <= FRACTION * value || (range <= FRACTION_OF_FEW * value && distinct(numbers, FEW) <= FEW)
+    // A clock that counts from 1970 has many values.
+    (range <= FRACTION * value && distinct(numbers, MAX_LEVELS) <= MAX_LEVELS)
+        || (range <= FRACTION_OF_FEW * value && distinct(numbers, FEW) <= FEW)
 }
 
 /// Returns a warning about a column whose numbers differ by rounding only.
@@ -184,6 +186,7 @@ mod tests {
             (vec![20.0, 20.01, 20.02], true),
             (vec![20.0, 20.01, 20.02, 20.005], false),
             (vec![0.0, 1e-9], false),
+            ((0..50).map(|row| 1.7e9 + f64::from(row)).collect(), false),
         ];
         for (numbers, expected) in cases {
             assert_eq!(is_rounding(&numbers), expected, "{numbers:?}");

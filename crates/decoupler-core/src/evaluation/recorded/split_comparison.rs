@@ -236,7 +236,7 @@ impl Findings {
         let (mut network, mut gains, mut comparison) = (vec![None; set.outputs()], vec![None; set.outputs()], None);
         let mut left_out = Vec::new();
         if model != Some(FittedModel::Ridge) {
-            match CrossValidated::on_folds(settings, set, folds_by(by)?, &ends)? {
+            match CrossValidated::on_folds(settings, set, folds_by(by)?, ends)? {
                 None => left_out.push(StudyStep::Folds),
                 Some(validated) => {
                     network = judged(&validated.network).into_iter().map(Result::ok).collect();
