@@ -68,7 +68,7 @@ fn check_positions(path: &Path, recording: &Path) {
     };
     if let Ok(read) = recipe.import(Path::new(""), &mut |_| ControlFlow::Continue(())) {
         let at = |place: &TargetPosition| (place.target, place.x_mm.is_finite() && place.y_mm.is_finite());
-        let places = Vec::from_iter(read.positions().iter().map(at));
+        let places = Vec::from_iter(read.positions.iter().map(at));
         assert!(
             [
                 &[(0, true)][..],
@@ -78,7 +78,7 @@ fn check_positions(path: &Path, recording: &Path) {
             ]
             .contains(&&places[..])
         );
-        TargetPosition::lattice(read.positions());
+        TargetPosition::lattice(&read.positions);
     }
 }
 

@@ -64,9 +64,13 @@ impl Driver {
         self.settle();
     }
 
-    /// Presses Train and waits for the end.
+    /// Presses Train and waits for the end; settings are those of the form.
     #[track_caller]
     pub(crate) fn train_recording(&mut self) {
+        if self.state().recording.is_auto {
+            self.click("Choose settings automatically");
+            self.settle();
+        }
         self.click("▶ Train");
         self.wait("the end of the training", |driver| {
             let result = driver.state().result();

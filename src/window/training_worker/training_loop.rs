@@ -189,9 +189,9 @@ impl<'a> TrainingLoop<'a> {
             let (fixed, folder) = (AutoFixed::default(), Path::new(""));
             let chosen = setup.choose(&fixed, DEFAULT_BUDGET_S, folder, is_cancelled, &mut on_choosing)?;
             let Some(chosen) = chosen else { return Ok(None) };
-            let recorded = chosen.sets.recorded().cloned();
+            let (recorded, drift) = (chosen.sets.recorded().cloned(), chosen.sets.drift_reference());
             let run = chosen.sets.run(&chosen.setup, is_cancelled)?;
-            Ok(run.map(|run| TrainedRun { run, recorded }))
+            Ok(run.map(|run| TrainedRun { run, recorded, drift }))
         })
     }
 

@@ -53,7 +53,7 @@ impl LinearStart {
             };
             let square: f64 = inputs.rows().into_iter().map(|row| project(row).powi(2)).sum();
             let deviation = (square / samples as f64).sqrt();
-            if !(deviation > 1e-12) {
+            if deviation.is_nan() || deviation <= 1e-12 {
                 continue;
             }
             let scale = DEVIATION / deviation;

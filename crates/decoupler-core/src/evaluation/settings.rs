@@ -611,4 +611,43 @@ mod tests {
             assert!(message.contains(&format!("GB of memory, and {memory}")), "{message}");
         }
     }
+
+    #[test]
+    fn a_method_chosen_for_a_recording_brings_its_settings_and_rules_unless_the_user_set_others() {
+        let measured = || RunSettings::from(Measured { rows: RowModel::Shared });
+        let scg = Method::ScaledConjugateGradient(ScaledConjugateGradientSettings::default());
+        let mut settings = measured();
+        settings.choose_method(scg);
+        let rules = settings.training.stopping;
+        assert_eq!((rules.epochs, rules.max_fail), (2000, 100));
+        settings.choose_method(Method::bayesian_regularization());
+        assert_eq!(settings, measured());
+        settings.training.stopping.epochs = 50;
+        settings.choose_method(scg);
+        let rules = settings.training.stopping;
+        assert_eq!((rules.epochs, rules.max_fail), (50, 100));
+        let mut simulated = RunSettings::from(SimulatedSettings::default());
+        simulated.choose_method(scg);
+        assert_eq!(simulated.training.stopping, StoppingRules::default());
+    }
+
+    #[test]
+    fn wide_inputs_make_a_training_on_a_recording_long_and_conjugate_gradients_faster() {
+        let settings = RunSettings::from(Measured { rows: RowModel::Shared });
+        let size = RecordedSize {
+            samples: 5000,
+            inputs: 192,
+            targets: 3,
+            networks: 1,
+        };
+        let workload = Workload::of_recording(&settings, size);
+        let small = Workload::of_recording(&settings, RecordedSize { inputs: 6, ..size });
+        assert!(workload.epoch_multiplications > 100.0 * small.epoch_multiplications);
+        let faster = workload.faster_methods(&settings, size);
+        assert!(
+            faster.iter().any(|(method, _)| method.short_name() == "scg"),
+            "{faster:?}"
+        );
+        assert!(!workload.draws_samples());
+    }
 }

@@ -122,6 +122,7 @@ fn the_state_continues_into_the_test_samples_and_test_files_have_the_intervals_o
     plan.test = Some(TestFiles {
         data: "slow.csv".into(),
         join: Vec::new(),
+        append: Vec::new(),
     });
     let sets = plan
         .sets(folder.path(), Seed(0), &mut |_| ControlFlow::Continue(()))

@@ -49,14 +49,17 @@ fn positions_are_matched_to_their_targets_in_any_order_and_layout() {
         "\u{feff}target;x (mm);y [mm]\r\nd4;2,5;0\r\nd1;0;0\r\nd3;2,5;-1\r\nd2;0;-1\r\n",
         "y\ttarget\tx\n0\t d4 \t2.5\n0\td1\t0\n-1\td3\t2.5\n-1\td2\t0\n",
     ] {
-        let found = imported(&folder, text).unwrap().positions;
+        let found = imported(&folder, text).unwrap().positions().to_vec();
         assert_eq!(found, expected, "{text}");
         let lattice = TargetPosition::lattice(&found).unwrap();
         assert_eq!((lattice.x_mm(), lattice.y_mm()), (&[0.0, 2.5][..], &[-1.0, 0.0][..]));
         assert_eq!(lattice.places(), [3, 1, 2, 0]);
     }
     // A force alone also has one unit.
-    let alone = imported(&folder, "target,x,y\nforce,1,2\n").unwrap().positions;
+    let alone = imported(&folder, "target,x,y\nforce,1,2\n")
+        .unwrap()
+        .positions()
+        .to_vec();
     assert_eq!(alone, [at(4, 1.0, 2.0)]);
 }
 
@@ -89,11 +92,11 @@ fn invalid_files_are_refused_with_line_and_cause() {
         ),
         (
             "target,x,y\nd1,0,0\nd2,1,0,5\n",
-            "line 3: it has more cells than there are columns",
+            "line 3: the row has more cells than there are columns",
         ),
         (
             "target,x,y\nd1,0,0\nforce,1,0\n",
-            "d1 (mm) and force (N) have positions and not the same unit",
+            "d1 (mm) and force (N) have positions but different units",
         ),
         ("target,x,y\n", "it has no rows"),
         ("", "it has no rows"),
@@ -143,7 +146,7 @@ fn a_recipe_keeps_the_file_relative_to_its_folder() {
     let again = loaded
         .recording(Path::new(""), &mut |_| ControlFlow::Continue(()))
         .unwrap();
-    assert_eq!(again.positions.len(), 2);
+    assert_eq!(again.positions().len(), 2);
 }
 
 #[test]

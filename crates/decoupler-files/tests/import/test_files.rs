@@ -24,6 +24,7 @@ fn training_rows_are_refused_as_test_rows() {
             test: Some(TestFiles {
                 data: data.into(),
                 join: Vec::new(),
+                append: Vec::new(),
             }),
             ..Plan::default()
         };

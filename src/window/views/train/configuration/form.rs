@@ -152,7 +152,9 @@ fn recording_ui(ui: &mut Ui, recording: &mut RecordingEditor, shared: &Shared, e
         let chosen = std::mem::replace(&mut settings, before).training.method;
         settings.choose_method(chosen);
     }
-    if let Some(size) = recording.training_size(&settings) {
+    if !shared.recording.is_auto
+        && let Some(size) = recording.training_size(&settings)
+    {
         recorded_workload_ui(ui, &settings, size);
     }
     Landmark::Choices.stands_at(ui, ui.min_rect().with_min_y(top));
