@@ -31,7 +31,7 @@ const PENALTIES: [f64; 10] = [1.0, 1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-
 /// Number of blocks that are left out in turn.
 const BLOCKS: usize = 4;
 /// Maximum number of samples from which width and penalties are chosen.
-const MAX_SEARCHED: usize = 1200;
+const MAX_SEARCHED: usize = 900;
 /// Products of sharpness and total variance of the inputs that are compared, as powers of 2.
 const SHARPNESS_EXPONENTS: Range<f64> = -9.0..7.0;
 /// Exponent at which the search begins.
@@ -147,8 +147,7 @@ impl Choice {
         };
         let mut at = FIRST_EXPONENT;
         let mut best = judge(at);
-        // Whole octaves up or down, then half an octave.
-        for step in [1.0, -1.0, 0.5, -0.5] {
+        for step in [1.0, -1.0] {
             while SHARPNESS_EXPONENTS.contains(&(at + step)) {
                 let next = judge(at + step);
                 if next.0 >= best.0 {
