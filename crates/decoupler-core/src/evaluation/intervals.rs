@@ -235,8 +235,6 @@ impl HalfWidth {
     }
 
     fn coverage(&self, pairs: Vec<(f64, f64)>, evidence: &Evidence) -> Coverage {
-        /// 0.5 and 99.5 % quantiles of the standard normal distribution.
-        const SIGMAS: f64 = 2.576;
         let count = pairs.len() as f64;
         let is_outside = |&(truth, answer): &(f64, f64)| {
             let is_inside = (answer - truth).abs() <= self.at(answer);
@@ -247,15 +245,10 @@ impl HalfWidth {
         // The samples are at least as dependent as the calibration samples were found to be.
         let like_calibration = count * self.effective_samples / self.samples as f64;
         let effective = evidence.effective_samples(&outside).min(like_calibration).max(1.0);
-        let of_both = 1.0 / effective + 1.0 / (self.effective_samples + 2.0);
-        let deviation = SIGMAS * (Intervals::NOMINAL * (1.0 - Intervals::NOMINAL) * of_both).sqrt();
         Coverage {
             share: 1.0 - outside.iter().sum::<f64>() / count,
             half_width: mean(&|&(_, answer)| self.at(answer)),
-            expected: [
-                (Intervals::NOMINAL - deviation).max(0.0),
-                (Intervals::NOMINAL + deviation).min(1.0),
-            ],
+            expected: expected_shares(effective, self.effective_samples),
             bias: mean(&|&(truth, answer)| answer - truth),
         }
     }
@@ -265,6 +258,35 @@ impl Coverage {
     /// Returns `true` if the coverage is significantly too low.
     pub fn is_too_low(&self) -> bool {
         self.share < self.expected[0]
+    }
+}
+
+/// Returns the lowest and the highest share of `test` effective samples within intervals that were calibrated on
+/// `calibration` effective samples, with 99 % confidence.
+///
+/// The coverage of conformal intervals has a beta distribution, so the number of samples within them is beta-binomial
+/// (Vovk 2012, arXiv:1209.2673). Its skewness matters for few samples.
+fn expected_shares(test: f64, calibration: f64) -> [f64; 2] {
+    const TAIL: f64 = 0.005;
+    /// More samples do not change the shares noticeably.
+    const MOST_SAMPLES: f64 = 10_000.0;
+    let samples = test.floor().clamp(1.0, MOST_SAMPLES);
+    let inside = Intervals::NOMINAL * (calibration + 1.0);
+    let outside = calibration + 1.0 - inside;
+    let ln_beta = |a: f64, b: f64| libm::lgamma(a) + libm::lgamma(b) - libm::lgamma(a + b);
+    let mut ln_probability = ln_beta(inside, outside + samples) - ln_beta(inside, outside);
+    let (mut cumulative, mut lowest, mut count) = (ln_probability.exp(), None, 0.0);
+    loop {
+        if cumulative >= TAIL {
+            lowest.get_or_insert(count);
+        }
+        if cumulative >= 1.0 - TAIL || count >= samples {
+            return [lowest.unwrap_or(count) / samples, count / samples];
+        }
+        let left = samples - count;
+        ln_probability += (left / (count + 1.0) * (inside + count) / (outside + left - 1.0)).ln();
+        cumulative += ln_probability.exp();
+        count += 1.0;
     }
 }
 
@@ -453,6 +475,26 @@ mod tests {
         for answer in [0.4, 1.0, 1.6] {
             let ratio = growing.half_width(0, answer).unwrap() / (0.1645 * (1.0 + 2.5 * answer));
             assert!((ratio - 1.0).abs() < 0.2, "{answer}: {ratio}");
+        }
+    }
+
+    #[test]
+    fn expected_shares_are_quantiles_of_the_beta_binomial_distribution() {
+        // From scipy.stats.betabinom(test, 0.9 (n + 1), 0.1 (n + 1)).ppf([0.005, 0.995]) / test.
+        for (test, calibration, expected) in [
+            (10.0, 40.0, [0.5, 1.0]),
+            (50.0, 200.0, [0.76, 1.0]),
+            (400.0, 60.0, [0.77, 0.9775]),
+            (2000.0, 3000.0, [0.877, 0.9215]),
+        ] {
+            let found = expected_shares(test, calibration);
+            assert!(
+                found
+                    .iter()
+                    .zip(expected)
+                    .all(|(found, expected)| (found - expected).abs() < 1e-12),
+                "{test} {calibration}: {found:?}"
+            );
         }
     }
 
