@@ -44,10 +44,11 @@ fn refused(arguments: &str, folder: &Path) -> String {
     String::from_utf8(output.stderr).unwrap()
 }
 
-/// First column of a table.
+/// Decoded target of a table, whose first column may be the time.
 fn answers(text: &str) -> Vec<f64> {
-    let first = |line: &str| line.split(',').next().unwrap().parse().unwrap();
-    text.lines().skip(1).map(first).collect()
+    let column = text.split([',', '\n']).position(|name| name.starts_with("force"));
+    let answer = |line: &str| line.split(',').nth(column.unwrap()).unwrap().parse().unwrap();
+    text.lines().skip(1).map(answer).collect()
 }
 
 #[test]
