@@ -10,9 +10,9 @@ use clap::{
     builder::{PossibleValuesParser, TypedValueParser},
 };
 use decoupler_core::{
-    dataset::{Dataset, Memory, Seed, SplitBy},
+    dataset::{Dataset, Folds, Memory, Seed, SplitBy, Stream},
     evaluation::{
-        Channel, Measured, RunSettings, TargetErrors,
+        Channel, Measured, RunError, RunSettings, TargetErrors,
         recorded::{
             ChannelImportance, Determinacy, Determination, Findings, FittedModel, Interval, LearningCurve, MemoryGain,
             StudyStep,
@@ -100,6 +100,8 @@ impl StudyArguments {
         settings.seed = self.seed.map_or(settings.seed, Seed);
         let by = plan.division.by;
         let folds = import.folds.unwrap_or_else(|| by.folds_of(&recording.set, FOLDS));
+        // Before the first step is announced.
+        Folds::by(&recording.set, folds, by, &mut settings.seed.rng(Stream::Split)).map_err(RunError::from)?;
         let bar = progress_bar(is_json, 4, "{bar:20} {msg}");
         let begun = Instant::now();
         let begin = |stage: StudyStep| {

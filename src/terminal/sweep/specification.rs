@@ -414,6 +414,8 @@ mod tests {
             ("array", "10x6_3x18", ""),
             ("hidden", "7", ""),
             ("starts", "3", ""),
+            ("combine", "mean", ""),
+            ("begin", "ridge", ""),
             ("method", "gdm", ""),
             ("set", "mu=0.3", ""),
             ("epochs", "17", ""),

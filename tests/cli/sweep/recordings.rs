@@ -79,7 +79,7 @@ fn a_trial_has_the_output_of_train() {
         let (hidden, seed) = (&options["hidden"], &options["seed"]);
         let method = options["method"].as_str().unwrap();
         let of_trial = format!("--epochs 8 --hidden {hidden} --method {method} --seed {seed}");
-        let train = format!("train --data press.csv --inputs a..c --targets fx,fz {of_trial} --json");
+        let train = format!("train --data press.csv --inputs a..c --targets fx,fz --intervals never {of_trial} --json");
         let printed: Value = serde_json::from_str(&success(&train, folder)).unwrap();
         for field in ["targets", "baselines", "starts", "samples", "warnings"] {
             assert_eq!(trial["result"][field], printed[field], "{field}, {options}");

@@ -47,7 +47,7 @@ fn an_invalid_specification_is_refused_with_option_place_and_remedy() {
         (
             r#"{"axes": {"hidden": [3, 0]}}"#,
             2,
-            "axes.hidden, value 2: invalid value '0' for '--hidden <N>': give a whole number from 1 to 512",
+            "axes.hidden, value 2: invalid value '0' for '--hidden <N|auto>': give a whole number from 1 to 512",
         ),
         (
             r#"{"axes": {"hidden": [3, null]}}"#,

@@ -188,7 +188,7 @@ fn a_network_no_better_than_ridge_is_reported_as_such() {
     };
     let linear = gain(&set(400, 3, 7, |c, rng| c[0] + c[1] + normal(rng)));
     let remark = linear.remark("y").unwrap();
-    assert!(remark.contains("found little more than a linear map"), "{remark}");
+    assert!(remark.contains("no better than ridge"), "{remark}");
     let curved = gain(&set(400, 3, 8, |c, rng| c[0] + c[1] * c[1] + 0.2 * normal(rng)));
     assert!(curved.is_supported() && curved.remark("y").is_none(), "{curved:?}");
 }

@@ -65,7 +65,9 @@ impl TimeStamp {
 
     /// Seconds since another stamp.
     pub(super) fn seconds_since(self, other: Self) -> f64 {
-        (self.nanoseconds - other.nanoseconds) as f64 / SECOND as f64
+        let nanoseconds = self.nanoseconds - other.nanoseconds;
+        // As one number, the nanoseconds of decades would be rounded first.
+        (nanoseconds / SECOND) as f64 + (nanoseconds % SECOND) as f64 / SECOND as f64
     }
 }
 

@@ -4,7 +4,7 @@ use decoupler_core::{
     dataset::Division,
     decoupling::DecoderKind,
     evaluation::{
-        RunSettings, Simulation, Source,
+        Combination, Initialization, RunSettings, Simulation, Source,
         experiments::{Axis, AxisKind, Experiment},
     },
     scene::{NoisySets, RowModel, Rows},
@@ -232,6 +232,13 @@ pub fn train_options(settings: &RunSettings, decoders: &[DecoderKind]) -> TrialO
         ("min-gradient".to_owned(), number(rules.min_gradient)),
         ("seed".to_owned(), Value::from(settings.seed.0)),
     ]);
+    // Left out at their defaults, so that trials keep the names they had before these options existed.
+    if settings.combine != Combination::default() {
+        options.insert("combine".to_owned(), text(&settings.combine));
+    }
+    if settings.initialization != Initialization::default() {
+        options.insert("begin".to_owned(), text(&settings.initialization));
+    }
     match &settings.source {
         Source::Simulated(source) => {
             options.insert("inputs".to_owned(), text(&settings.inputs.quantity));
