@@ -226,7 +226,6 @@ mod tests {
             ("'|O'", "(2,)", "'|O' is not supported"),
             ("'<c16'", "(1,)", "'<c16' is not supported"),
             ("[('x', '<f8')]", "(2,)", "named fields"),
-            ("'<f8'", "(1, 1, 1, 2)", "1 × 1 × 1 × 2"),
             ("'<f8'", "(18446744073709551615, 2)", "do not fit into memory"),
             (
                 "'<f8'",
