@@ -289,7 +289,7 @@ impl Worker {
     pub fn ask(&self, request: Request) {
         match request {
             Request::Train(_) | Request::Choose(_) | Request::Open(_) | Request::TakeUp(..) => {
-                self.requested.set(self.requested.get() + 1)
+                self.requested.set(self.requested.get() + 1);
             }
             Request::Stop => self.cancelled.store(self.requested.get(), Ordering::Relaxed),
             _ => {}

@@ -239,9 +239,9 @@ impl<'a> Search<'a> {
             return Ok(());
         };
         let first = HIDDEN.iter().position(|&hidden| hidden == FIRST_HIDDEN).unwrap_or(0);
-        for place in first + 1..HIDDEN.len() {
+        for (place, &hidden) in HIDDEN.iter().enumerate().skip(first + 1) {
             self.expected = HIDDEN.len() - place + 1 + 3 + FINALISTS;
-            if !self.improves(&best, HIDDEN[place], share)? {
+            if !self.improves(&best, hidden, share)? {
                 break;
             }
         }

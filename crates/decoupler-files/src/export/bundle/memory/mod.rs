@@ -108,7 +108,7 @@ impl ExportedMemory {
                 let sources = ["", "_selftest"].map(|part| format!("{name}_memory{part}.c"));
                 match run_sources(draft.folder.path(), &sources)? {
                     Compiled::Ran { deviation } => {
-                        checks.push(BundleCheck::of("memory in C, compiled and run", deviation))
+                        checks.push(BundleCheck::of("memory in C, compiled and run", deviation));
                     }
                     Compiled::NoCompiler(reason) => draft
                         .remarks
