@@ -264,7 +264,7 @@ fn a_file_being_written_is_finished_before_the_window_closes() {
     driver.click_button("Save");
     assert!(!close(&mut driver));
     driver.harness().step();
-    assert!(driver.has("Finishing files") && driver.says("pipe. The window closes by itself"));
+    assert!(driver.has("Finishing files") && driver.says("pipe. The window will close afterwards"));
     driver.click_button("Stay");
     assert!(!driver.has("Finishing files"));
     assert!(!close(&mut driver));

@@ -66,8 +66,21 @@ fn from_the_first_start_a_dropped_file_is_an_onnx_network_after_three_clicks() {
     let path = written(&folder, "press.csv", &recording(60));
     let mut driver = Driver::open_first(vec2(1440.0, 900.0));
     driver.drop_files(&[&path]);
-    driver.wait("the plan", |driver| driver.state().setup().is_ok());
-    driver.train_recording();
+    driver.wait("the plan", |driver| {
+        driver.state().source == SourceKind::Recording && driver.state().setup().is_ok()
+    });
+    driver.settle();
+    // On the screen without scrolling, between the files and the number of hidden nodes.
+    let place = |driver: &Driver, text: &str| driver.get(text).rect();
+    let choice = place(&driver, "Choose settings automatically");
+    let nodes = place(&driver, "Hidden nodes");
+    assert!(
+        choice.bottom() <= nodes.top() && nodes.bottom() < 900.0,
+        "{choice} {nodes}"
+    );
+    assert!(driver.state().recording.is_auto);
+    driver.click("▶ Train");
+    driver.wait_for_training();
     driver.click_button("Export");
     driver.click_button("ONNX, f32");
     let onnx = folder.path().join("network");

@@ -168,7 +168,7 @@ fn re_zero_removes_a_drift_and_its_gains_are_saved() {
     start(&mut driver);
     driver.click_button("Re-zero");
     driver.wait("the reason", |driver| {
-        driver.says("Not re-zeroed: ") && driver.says("and 25 are needed")
+        driver.says("Not re-zeroed: ") && driver.says("of 25 frames have been received")
     });
     driver.click("■ Stop");
     driver.enter("Frames per second", "50");

@@ -72,6 +72,12 @@ impl Driver {
             self.settle();
         }
         self.click("▶ Train");
+        self.wait_for_training();
+    }
+
+    /// Waits for the end of the training of a recording, and for its results.
+    #[track_caller]
+    pub(crate) fn wait_for_training(&mut self) {
         self.wait("the end of the training", |driver| {
             let result = driver.state().result();
             matches!(driver.state().phase, Phase::Ended(_)) && result.is_some_and(|result| result.is_idle)

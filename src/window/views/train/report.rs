@@ -8,13 +8,14 @@ use decoupler_core::{
     dataset::SplitBy,
     evaluation::{
         Baselines, Combination, ErrorTable, Errors, NodeAddress, Outlook, Problem, ReferenceNote, Scores,
-        SimulatedSettings, Spread, StartRecord, TestErrors, best_start, error_remarks,
+        SimulatedSettings, Spread, StartRecord, TestErrors, auto::Tried, best_start, error_remarks,
     },
     identifiability::Identifiability,
+    text::counted,
     training::StopReason,
 };
 use decoupler_files::{
-    export::{Cell, Table, TableColumn, describe_search, format_duration, format_number, search_table},
+    export::{Cell, Table, TableColumn, describe_search, format_duration, format_number},
     figure::frame_time,
 };
 use eframe::egui::{Align, Layout, RichText, Ui, WidgetInfo, accesskit::Role};
@@ -93,11 +94,38 @@ fn search_ui(ui: &mut Ui, run: &RunView) {
     let summary = format!("{} tried", search.tried.len());
     fold_ui(ui, "Choice of settings", &summary, |ui| {
         dim_ui(ui, &format!("{}.", describe_search(search)));
-        described_table_ui(ui, "choice of settings", &search_table(search));
+        dim_ui(
+            ui,
+            "Cross-validation error, % of the targets' standard deviation, best first:",
+        );
+        let mut candidates: Vec<(usize, &Tried)> = search.tried.iter().enumerate().collect();
+        candidates.sort_by(|(_, one), (_, other)| one.error.total_cmp(&other.error));
+        for (place, tried) in candidates {
+            ui.scope(|ui| tried_ui(ui, tried, place == search.chosen));
+        }
         if let Some(remark) = search.remark() {
             note_ui(ui, &remark);
         }
     });
+}
+
+/// A candidate in two lines that fit the card: model and error, inputs and epochs.
+fn tried_ui(ui: &mut Ui, tried: &Tried, is_chosen: bool) {
+    let palette = Theme::of(ui).palette;
+    let mark = if is_chosen { "* " } else { "" };
+    let colour = if is_chosen { palette.accent } else { palette.text };
+    let error = format!("{:.1} ± {:.1} %", 100.0 * tried.error, 100.0 * tried.standard_error);
+    ui.spacing_mut().item_spacing.y = 0.0;
+    ui.spacing_mut().interact_size.y = space(5);
+    ui.horizontal(|ui| {
+        ui.label(RichText::new(format!("{mark}{}", tried.model())).color(colour));
+        ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
+            ui.label(RichText::new(error).color(colour));
+        });
+    });
+    let epochs = tried.epochs().map(|epochs| format!("; {}", counted(epochs, "epoch")));
+    dim_ui(ui, &format!("{}{}", tried.features(), epochs.unwrap_or_default()));
+    ui.add_space(space(1));
 }
 
 /// The table with the network's row still empty.

@@ -155,6 +155,10 @@ impl Determination {
         let claim = match self.determinacy() {
             Determinacy::Determined => format!("the readings determine {name}"),
             Determinacy::WeaklyDetermined => format!("{} little of {name}", explains(tried)),
+            // Good answers whose interval is wide.
+            Determinacy::NotDetermined if self.r2.value >= 0.5 => {
+                format!("it is uncertain whether {} anything of {name}", explains(tried))
+            }
             Determinacy::NotDetermined => format!("{} nothing of {name}", explains(tried)),
         };
         let few = if self.units < Self::FEW_UNITS {

@@ -1,7 +1,7 @@
 //! The configuration form, with a short summary of each folded part.
 
 use decoupler_core::{
-    evaluation::{Measured, Outlook, Preset, RunSettings, SimulatedSettings, Simulation},
+    evaluation::{Measured, Outlook, Preset, RunSettings, SimulatedSettings, Simulation, auto::AutoRecord},
     network::{InputChoice, Quantity, ScalingChoice, Shape},
     scene::{Loading, Movement, RowModel, Rows, Scene},
     sensor::{Geometry, SensorModel},
@@ -144,6 +144,9 @@ fn recording_ui(ui: &mut Ui, recording: &mut RecordingEditor, shared: &Shared, e
         {
             effects.push(Effect::ChooseAutomatically(is_auto));
         }
+        if shared.recording.is_auto {
+            dim_ui(ui, &automatic_note(shared));
+        }
         hidden_choice_ui(ui, &mut settings.hidden, recording.channels());
     });
     let before = settings;
@@ -174,6 +177,15 @@ fn recording_ui(ui: &mut Ui, recording: &mut RecordingEditor, shared: &Shared, e
     reset_ui(ui, "Reset to the default settings", hint, &mut settings, usual, is_busy);
     if settings != shared.recording.settings {
         effects.push(Effect::ConfigureRecording(Box::new(settings)));
+    }
+}
+
+/// Returns what takes the place of the settings below while they are chosen automatically.
+fn automatic_note(shared: &Shared) -> String {
+    let search = shared.run.as_ref().and_then(|run| run.search.as_ref());
+    match search.and_then(AutoRecord::choice) {
+        Some(choice) => format!("Chosen: {}; {}.", choice.model(), choice.features()),
+        None => "Train tries several settings and keeps the best instead of those below.".to_owned(),
     }
 }
 
