@@ -5,13 +5,13 @@ use ndarray::{Array2, ArrayView2, Axis};
 use super::{Memory, MemoryError, MemoryState};
 
 /// Number of usual intervals after which a memory starts again.
-const GAP: f64 = 5.0;
+const GAP: f64 = 50.0;
 
 /// Everything that a sensor has read in order of time, including rows that are not samples because a target is missing:
 /// the past, from which the features of a [`Memory`] are computed.
 ///
 /// Rows are divided into *stretches*, within which they follow each other. A stretch ends with its group, and where two
-/// times are more than five usual intervals apart. Row-wires have stretches of their own.
+/// times are more than fifty usual intervals apart. Row-wires have stretches of their own.
 #[derive(Clone, Debug, PartialEq)]
 pub struct History {
     /// Rows × channels.
@@ -170,7 +170,7 @@ fn follows(elapsed_s: f64, interval_s: Option<f64>) -> bool {
 }
 
 /// Features of a stream of readings with a [`Memory`]: one state for each row-wire, which starts again where the time goes
-/// backwards or jumps by more than five usual intervals.
+/// backwards or jumps by more than fifty usual intervals.
 ///
 /// A row without a time comes one usual interval after the row before, that of the training.
 #[derive(Clone, Debug)]
@@ -230,7 +230,7 @@ mod tests {
 
     #[test]
     fn a_stretch_ends_with_its_group_and_at_a_gap_in_time() {
-        let times_s = vec![0.0, 0.1, 0.2, 0.3, 0.7, 1.3, 1.4, 1.5];
+        let times_s = vec![0.0, 0.1, 0.2, 0.3, 0.7, 6.3, 6.4, 6.5];
         let history = History::new(counting(8), None, None, Some(times_s), vec![0, 1, 4, 5, 6]);
         assert_eq!(history.stretches(), [0, 0, 0, 0, 0, 1, 1, 1]);
         assert!((history.interval_s().unwrap() - 0.1).abs() < 1e-12);

@@ -4,8 +4,9 @@
 //! The search goes from cheap to dear. Ridge regression screens the features (quantity, memory); small networks try the
 //! best of them; then hidden nodes, then scaling, method and regularisation are varied; last, the best few are
 //! cross-validated again as the committees that would be trained. Every network is judged by the lowest point of its
-//! mean error over epochs, which is also when its training will stop. Among finalists, the smallest wins that is not
-//! worse than the best by more than the standard error of the difference (Breiman et al. 1984).
+//! mean error over epochs, which is also when its training will stop. Among networks with the
+//! features of the best, the smallest wins that is not worse by more than the standard error of the difference (Breiman et
+//! al. 1984).
 //!
 //! The budget counts estimated multiplications, never seconds of a clock, so that the same samples and seed give the same
 //! choice on every machine. Test samples take no part.

@@ -37,6 +37,7 @@ struct Candidate {
     hidden: usize,
     method: Method,
     starts: usize,
+    initialization: Initialization,
 }
 
 /// A candidate that was cross-validated.
@@ -98,10 +99,7 @@ impl<'a> Search<'a> {
     ) -> Result<Self, RunError> {
         let folds = folds(samples, base.seed)?;
         Ok(Self {
-            base: RunSettings {
-                initialization: Initialization::Ridge,
-                ..*base
-            },
+            base: *base,
             fixed,
             samples,
             folds,
@@ -133,12 +131,18 @@ impl<'a> Search<'a> {
         let starts = self.fixed.starts.unwrap_or(SCREENED).min(SCREENED);
         let first: Vec<Candidate> = feature_sets
             .into_iter()
-            .map(|(memory, inputs)| Candidate {
-                memory,
-                inputs,
-                hidden,
-                method,
-                starts,
+            .flat_map(|(memory, inputs)| {
+                // A regression on many averages that overlap may be worse to begin with than random weights.
+                let random = (!memory.is_empty()).then_some(Initialization::Random);
+                let with = move |initialization| Candidate {
+                    memory: memory.clone(),
+                    inputs,
+                    hidden,
+                    method,
+                    starts,
+                    initialization,
+                };
+                std::iter::once(Initialization::Ridge).chain(random).map(with)
             })
             .collect();
         let count = first.len();
@@ -212,8 +216,7 @@ impl<'a> Search<'a> {
                 differences: true,
                 ..memory.clone()
             };
-            sets.extend(can_differ.then_some((differences, inputs)));
-            sets.push((memory, inputs));
+            sets.push((if can_differ { differences } else { memory }, inputs));
         }
         Ok(sets)
     }
@@ -337,8 +340,10 @@ impl<'a> Search<'a> {
         let best = (0..self.networks.len())
             .min_by(|&one, &other| error(one).total_cmp(&error(other)))
             .ok_or_else(|| RunError::from(TrainingError::NothingVaries))?;
-        let errors = &self.networks[best].best.errors;
+        let (errors, features) = (&self.networks[best].best.errors, &self.networks[best].candidate);
+        // A few folds do not show that features are dispensable: only networks with the same are compared.
         let smallest = (0..self.networks.len())
+            .filter(|&place| same_features(&self.networks[place].candidate, features))
             .filter(|&place| self.networks[place].best.errors.is_as_good_as(errors))
             .min_by(|&one, &other| {
                 let weights = |place: usize| self.networks[place].weights;
@@ -374,6 +379,7 @@ impl<'a> Search<'a> {
             inputs: candidate.inputs,
             hidden: candidate.hidden,
             starts: candidate.starts,
+            initialization: candidate.initialization,
             ..self.base
         };
         settings.training.method = candidate.method;
@@ -519,6 +525,7 @@ impl<'a> Search<'a> {
                 .min(LARGEST_HIDDEN / candidate.hidden)
                 .max(1),
             combine: Combination::Mean,
+            initialization: candidate.initialization,
             ..self.base
         };
         settings.training.method = candidate.method;
