@@ -254,7 +254,7 @@ mod tests {
     fn the_past_of_one_file_is_not_that_of_the_next() {
         let times_s = |from: f64| Some(Vec::from_iter((0..4).map(|row| from + 0.1 * f64::from(row))));
         let mut history = History::new(counting(4), None, None, times_s(0.0), vec![1, 3]);
-        // The second file goes on where the first ended, with the same clock.
+        // The second file continues where the first ended, with the same clock.
         history.append(&History::new(counting(4), None, None, times_s(0.4), vec![0, 2]));
         assert_eq!(history.stretches(), [0, 0, 0, 0, 1, 1, 1, 1]);
         assert_eq!(history.samples(), [1, 3, 4, 6]);

@@ -12,10 +12,10 @@ pub const LARGEST_LAG: usize = 100_000;
 const MAX_FEATURES: usize = 20_000;
 const MAX_STATE: usize = 10_000_000;
 
-/// Inputs from the past: a network for a sensor with hysteresis, creep or drift sees, next to the present readings, what
-/// they were before.
+/// Inputs from the past: a network for a sensor with hysteresis, creep or drift sees, next to the current readings,
+/// earlier ones.
 ///
-/// With n channels, the *features* of a sample are its n readings, then for each lag the n readings of so many samples
+/// With n channels, the *features* of a sample are its n readings, then for each lag the n readings that many samples
 /// before, then for each exponential average its n values: (1 + lags + averages)·n in all. An average with the time
 /// constant τ follows the reading x by
 ///
@@ -26,18 +26,18 @@ const MAX_STATE: usize = 10_000_000;
 /// which is exact for a reading that is constant over the interval Δt since the sample before, whatever that interval is.
 /// The first sample of a stretch sets all lags and averages to its own readings.
 ///
-/// With [`Self::differences`], the past enters as its difference from the present: x minus the lagged reading, x minus the
+/// With [`Self::differences`], the past enters as its difference from the current reading: x minus the lagged reading, x minus the
 /// average (a high-pass filter). Without lags and averages it is the difference from the sample before.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Memory {
-    /// Lags: readings of so long ago, in whole samples. Seconds are rounded to samples at [`Self::interval_s`].
+    /// Lags in whole samples. Seconds are rounded to samples at [`Self::interval_s`].
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub lags: Vec<Span>,
     /// Time constants of exponential averages.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub averages: Vec<Span>,
-    /// The past as difference from the present reading.
+    /// The past as difference from the current reading.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub differences: bool,
     /// Usual interval between samples in seconds, for spans in seconds where a sample has no time of its own. An import
@@ -90,7 +90,7 @@ impl Memory {
         }
     }
 
-    /// Memory of the readings so many samples before.
+    /// Memory of the readings the given numbers of samples before.
     pub fn of_lags(samples: &[usize]) -> Self {
         Self {
             lags: samples.iter().map(|&lag| Span::Samples(lag as f64)).collect(),
@@ -229,7 +229,7 @@ pub struct MemoryConstants {
     pub lags: Vec<usize>,
     /// Time constants of the averages.
     pub averages: Vec<Span>,
-    /// The past enters as difference from the present reading.
+    /// The past enters as difference from the current reading.
     pub differences: bool,
     /// Usual interval in seconds; 1 if no span is in seconds.
     pub interval_s: f64,

@@ -186,7 +186,7 @@ impl HalfWidth {
     const MIN_GAIN: f64 = 0.03;
     /// Number of effective samples for each point of a half-width that varies with the answer.
     const SAMPLES_PER_POINT: f64 = 20.0;
-    const MOST_POINTS: usize = 6;
+    const MAX_POINTS: usize = 6;
 
     /// Calibrates on answers and their absolute errors.
     fn calibrate(answers: &[f64], errors: &[f64], folds: Option<&Folds>, evidence: &Evidence) -> Option<Self> {
@@ -196,7 +196,7 @@ impl HalfWidth {
         let (constant, effective_samples) = conformal_quantile(errors, evidence)?;
         let points = (effective_samples / Self::SAMPLES_PER_POINT) as usize;
         let scaled = folds.and_then(|folds| {
-            let spreads = held_out_spreads(answers, errors, folds, points.min(Self::MOST_POINTS))?;
+            let spreads = held_out_spreads(answers, errors, folds, points.min(Self::MAX_POINTS))?;
             let scores: Vec<f64> = errors
                 .iter()
                 .zip(&spreads)
@@ -208,7 +208,7 @@ impl HalfWidth {
             let is_narrower =
                 nth_smallest(&scores, rank) * mean_spread < (1.0 - Self::MIN_GAIN) * nth_smallest(errors, rank);
             let all: Vec<usize> = (0..errors.len()).collect();
-            let points = spread_points(answers, errors, &all, points.min(Self::MOST_POINTS))?;
+            let points = spread_points(answers, errors, &all, points.min(Self::MAX_POINTS))?;
             let (factor, effective_samples) = conformal_quantile(&scores, evidence).filter(|_| is_narrower)?;
             let points: Points = points
                 .into_iter()
@@ -269,8 +269,8 @@ impl Coverage {
 fn expected_shares(test: f64, calibration: f64) -> [f64; 2] {
     const TAIL: f64 = 0.005;
     /// More samples do not change the shares noticeably.
-    const MOST_SAMPLES: f64 = 10_000.0;
-    let samples = test.floor().clamp(1.0, MOST_SAMPLES);
+    const MAX_SAMPLES: f64 = 10_000.0;
+    let samples = test.floor().clamp(1.0, MAX_SAMPLES);
     let inside = Intervals::NOMINAL * (calibration + 1.0);
     let outside = calibration + 1.0 - inside;
     let ln_beta = |a: f64, b: f64| libm::lgamma(a) + libm::lgamma(b) - libm::lgamma(a + b);

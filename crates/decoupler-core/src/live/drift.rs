@@ -90,18 +90,18 @@ impl Metric {
 
 impl DriftReference {
     /// Minimum number of training blocks.
-    const FEWEST_BLOCKS: usize = 30;
+    const MIN_BLOCKS: usize = 30;
     /// Length of a block in integrated autocorrelation times.
     const TIMES: f64 = 5.0;
     /// Number of parts of the training set; the distances in each are measured with a metric fitted to the others.
     const PARTS: usize = 5;
-    const MOST_CHANNELS: usize = 512;
+    const MAX_CHANNELS: usize = 512;
 
     /// Describes the training `readings` (samples × channels, in the order of time). Returns `None` if they contain fewer
     /// than 30 independent blocks, more than 512 channels, or values that are not finite.
     pub fn of(readings: ArrayView2<'_, f64>) -> Option<Self> {
         let (samples, channels) = readings.dim();
-        if samples < Self::FEWEST_BLOCKS || channels > Self::MOST_CHANNELS {
+        if samples < Self::MIN_BLOCKS || channels > Self::MAX_CHANNELS {
             return None;
         }
         if !readings.iter().all(|reading| reading.is_finite()) {
@@ -114,10 +114,10 @@ impl DriftReference {
             let metric = Metric::fit(readings, range.clone())?;
             distances.extend(range.map(|sample| metric.distance(readings.row(sample).iter().copied(), &mut scratch)));
         }
-        let longest = samples as f64 / (Self::FEWEST_BLOCKS as f64 * Self::TIMES);
+        let longest = samples as f64 / (Self::MIN_BLOCKS as f64 * Self::TIMES);
         let block = (Self::TIMES * autocorrelation_time(&distances, longest)).ceil() as usize;
         let blocks = distances.chunks_exact(block);
-        if blocks.len() < Self::FEWEST_BLOCKS {
+        if blocks.len() < Self::MIN_BLOCKS {
             return None;
         }
         let mut distances: Vec<f64> = blocks
@@ -159,7 +159,7 @@ impl DriftReference {
             && numbers.clone().all(|number| number.is_finite())
             && diagonal.clone().all(|place| factor[place] > 0.0)
             && self.block > 0
-            && self.distances.len() >= Self::FEWEST_BLOCKS
+            && self.distances.len() >= Self::MIN_BLOCKS
             && self.distances.is_sorted()
     }
 }

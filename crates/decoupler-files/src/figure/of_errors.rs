@@ -248,6 +248,11 @@ fn regression(
         Some(unit) => format!("{name} ({unit})"),
         None => name.to_owned(),
     };
+    decoded_against_actual(&title, answer, series, notes)
+}
+
+/// One plot of `series` with equal scales: decoded values, called `answer`, against actual values of the quantity `title`.
+pub(super) fn decoded_against_actual(title: &str, answer: &str, series: Vec<Series>, notes: Vec<String>) -> PlotFigure {
     PlotFigure {
         keys: series
             .iter()

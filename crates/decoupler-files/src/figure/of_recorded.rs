@@ -12,10 +12,11 @@ use glam::DVec3;
 use ndarray::{Array2, ArrayView2};
 
 use super::{
-    Hue, Key, LineStyle, Look,
+    Hue, LineStyle, Look,
     axis::{PlotAxis, step_for, tick_text},
     colour_map::{HeatMap, SequentialMap},
-    plot::{Plot, PlotFigure, Series},
+    of_errors::decoded_against_actual,
+    plot::{PlotFigure, Series},
     surface::{Quantity, Surface, ViewMode},
 };
 
@@ -32,26 +33,12 @@ pub fn hysteresis_figure(found: &HysteresisLoop, target: &Channel) -> PlotFigure
         branch("loading", Hue::Blue, LineStyle::Solid, &|_, loading, _| loading),
         branch("unloading", Hue::Orange, LineStyle::Solid, &|_, _, unloading| unloading),
     ];
-    let title = target.title();
     let [loading, unloading] = [found.loading.rmse, found.unloading.rmse].map(format_number);
-    PlotFigure {
-        keys: series
-            .iter()
-            .map(|series| Key::new(&series.name, series.look))
-            .collect(),
-        plots: vec![Plot {
-            has_equal_scales: true,
-            ..Plot::new(
-                PlotAxis::linear(format!("actual {title}")),
-                PlotAxis::linear(format!("decoded {title}")),
-                series,
-            )
-        }],
-        notes: vec![
-            format!("Hysteresis {:.1} % of the range", found.percent_of_range),
-            format!("RMSE {loading} loading, {unloading} unloading"),
-        ],
-    }
+    let notes = vec![
+        format!("Hysteresis {:.1} % of the range", found.percent_of_range),
+        format!("RMSE {loading} loading, {unloading} unloading"),
+    ];
+    decoded_against_actual(&target.title(), "decoded", series, notes)
 }
 
 /// Maximum number of cells along an axis of a map, not counting cells added by rounding its limits.

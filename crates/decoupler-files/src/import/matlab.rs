@@ -98,7 +98,7 @@ fn variable(
 /// Maximum depth of structures in structures.
 const DEEPEST: usize = 8;
 /// Maximum number of fields times elements of a structure.
-const MOST_FIELDS: usize = 1 << 20;
+const MAX_FIELDS: usize = 1 << 20;
 
 /// Value of a variable or a field.
 enum Value {
@@ -180,7 +180,7 @@ impl Value {
             fields.extend(names.chunks_exact(length).map(|name| (text(name), Vec::new())));
         }
         let count: f64 = shape.iter().product();
-        if count * fields.len() as f64 > MOST_FIELDS as f64 {
+        if count * fields.len() as f64 > MAX_FIELDS as f64 {
             return Ok(Self::Other("a structure with too many fields".to_owned()));
         }
         for _ in 0..count as usize {

@@ -50,7 +50,7 @@ struct Part {
     squares: Vec<f64>,
 }
 
-/// Costs of a hidden node beside those of its weights, for the tanh, in multiplications.
+/// Cost of the tanh of a hidden node, in multiplications.
 const TANH: usize = 12;
 
 impl<'a> FoldedTraining<'a> {
