@@ -4,11 +4,11 @@ use std::io::{Write, stderr};
 
 use clap::ValueEnum;
 use decoupler_core::{
-    evaluation::{Channel, Coverage, Intervals, NoIntervals, Run, RunError},
+    evaluation::{Intervals, NoIntervals, Run, RunError},
     live::DriftMonitor,
 };
 use decoupler_files::{
-    export::{NetworkFile, format_duration, format_number},
+    export::{NetworkFile, format_duration},
     import::SetupSets,
 };
 
@@ -73,37 +73,6 @@ pub(super) fn calibrate(
 fn note(message: &str) {
     // There is no one to report to if this fails.
     let _ = writeln!(stderr(), "{message}");
-}
-
-/// Warns of the targets whose intervals contain significantly fewer test samples than stated, with cause and remedy.
-pub(super) fn describe_coverage(targets: &[Channel], coverage: &[Option<Coverage>]) -> Vec<String> {
-    let low = targets
-        .iter()
-        .zip(coverage)
-        .filter_map(|(target, coverage)| Some((target, coverage.as_ref().filter(|of| of.is_too_low())?)));
-    let describe = |(target, coverage): (&Channel, &Coverage)| {
-        let percent = |share: f64| format!("{:.0}", 100.0 * share);
-        let cause = if coverage.bias.abs() > 0.5 * coverage.half_width {
-            format!(
-                "the test part is offset from the training part (mean error {}, half-width {}): re-zero the sensor, or \
-                 record training data closer to the time of use",
-                format_number(coverage.bias),
-                format_number(coverage.half_width)
-            )
-        } else {
-            "the test part differs from the training part: record training data that cover its conditions, or split by \
-             group"
-                .to_owned()
-        };
-        format!(
-            "the 90 % intervals of {} contain {} % of the test samples (expected {} to {} %): {cause}",
-            target.name,
-            percent(coverage.share),
-            percent(coverage.expected[0]),
-            percent(coverage.expected[1])
-        )
-    };
-    low.map(describe).collect()
 }
 
 /// Monitor of the readings of a decoded input, which warns on standard error.
