@@ -15,6 +15,7 @@ mod habits;
 mod identifying;
 mod import_choices;
 mod importing;
+mod intervals;
 mod live;
 mod looking;
 mod newcomer;
