@@ -6,7 +6,7 @@ use eframe::egui::{Id, Response, TextEdit, Ui, WidgetInfo, accesskit::Role};
 
 use super::{
     columns_card::bias,
-    draft::{Draft, MemoryTexts, file_name, missing, spans},
+    draft::{Draft, MemoryTexts, derived, file_name, joined, missing, spans},
     editor::RecordingEditor,
     files_section::FILES,
 };
@@ -218,6 +218,9 @@ impl RecordingEditor {
         fold_ui(ui, "Filter", &filter_summary(draft), |ui| {
             reads_again |= filter_ui(ui, draft);
         });
+        fold_ui(ui, "Derived columns", &derived_summary(draft), |ui| {
+            reads_again |= derived_ui(ui, draft);
+        });
         fold_ui(ui, "Memory", &memory_summary(draft, shared), |ui| {
             memory_ui(ui, draft, shared.recording.is_automatic());
         });
@@ -347,6 +350,39 @@ fn filter_ui(ui: &mut Ui, draft: &mut Draft) -> bool {
         draft.plan.import.missing = missing(&draft.missing);
     }
     is_left
+}
+
+fn derived_summary(draft: &Draft) -> String {
+    match &draft.plan.import.derive[..] {
+        [] => "none".to_owned(),
+        derive => joined(&Vec::from_iter(derive.iter().map(|derived| &derived.name)), ", "),
+    }
+}
+
+/// Returns true if the files must be read again.
+fn derived_ui(ui: &mut Ui, draft: &mut Draft) -> bool {
+    dim_ui(
+        ui,
+        "Columns computed from others of the same file, such as a difference, a ratio, or the change since the start. They \
+         are computed wherever the network decodes.",
+    );
+    let hint = "With commas between them: d=c1-c2 is a difference, q=c1/c2 a ratio; r=c1/start(2s) and r=c1-start(100) compare \
+                with the mean of the first 2 seconds or 100 rows. Columns have their names in the table.";
+    let response = text_ui(ui, "Columns", hint, "d=c1-c2, r=c1/start(2s)", &mut draft.derived);
+    if response.has_focus() {
+        return false;
+    }
+    match derived(&draft.derived) {
+        Ok(derive) if derive != draft.plan.import.derive => {
+            draft.plan.import.derive = derive;
+            true
+        }
+        Ok(_) => false,
+        Err(error) => {
+            note_ui(ui, &error);
+            false
+        }
+    }
 }
 
 fn memory_summary(draft: &Draft, shared: &Shared) -> String {
