@@ -2,6 +2,7 @@
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 mod accessibility;
+mod automatic;
 mod closing;
 mod comparing;
 mod configuring;
