@@ -36,6 +36,7 @@ mod surface_view;
 mod trading;
 mod training;
 mod typing;
+mod variables;
 
 #[path = "../support/folders.rs"]
 mod folders;
