@@ -2,7 +2,7 @@
 
 use std::{
     fmt,
-    io::{Write, stderr},
+    io::Write,
     path::Path,
     sync::{
         Arc,
@@ -31,6 +31,7 @@ use super::{
     follow_report::{Answers, Form, Report},
     interruption::Graceful,
     number,
+    output::messages,
 };
 
 // Decoding of live frames.
@@ -412,5 +413,5 @@ impl Faults {
 
 fn warn(message: &str) {
     // There is no one to report to if this fails.
-    let _ = writeln!(stderr(), "warning: {message}");
+    let _ = writeln!(messages(), "warning: {message}");
 }

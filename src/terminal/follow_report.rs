@@ -1,6 +1,6 @@
 use std::{
     fmt::Display,
-    io::{self, BufWriter, StdoutLock, Write, stderr, stdout},
+    io::{self, BufWriter, StdoutLock, Write, stdout},
     time::{Duration, Instant},
 };
 
@@ -17,6 +17,7 @@ use super::{
     decode::{OutsideTraining, rows_read, with_half_widths, write_heading},
     failure::Failure,
     intervals::Drift,
+    output::messages,
 };
 
 /// Counts of decoded and bad lines, and messages on standard error.
@@ -70,7 +71,7 @@ impl Report {
             return;
         }
         self.last_reported = Instant::now();
-        let mut stderr = stderr().lock();
+        let mut stderr = messages();
         // There is no one to report to if writing fails.
         let _ = match self.unreported {
             0 => writeln!(stderr, "warning: {reason}"),
@@ -121,7 +122,7 @@ impl Report {
         let (rate, bad, latencies) = (decoded as f64 / seconds.max(1e-9), self.bad, &self.latencies);
         // There is no one to report to if this fails.
         let _ = writeln!(
-            stderr(),
+            messages(),
             "{decoded} lines decoded in {seconds:.1} s ({rate:.0} per second), {bad} bad, {dropped} dropped; {latencies}"
         );
     }

@@ -1,9 +1,6 @@
 //! Calibration of prediction intervals and of the drift monitor after a training on a recording.
 
-use std::{
-    io::{Write, stderr},
-    time::Duration,
-};
+use std::{io::Write, time::Duration};
 
 use clap::ValueEnum;
 use decoupler_core::{
@@ -15,7 +12,7 @@ use decoupler_files::{
     import::SetupSets,
 };
 
-use super::interruption::Graceful;
+use super::{interruption::Graceful, output::messages};
 
 /// When to calibrate 90 % prediction intervals.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
@@ -88,7 +85,7 @@ pub(super) fn calibrate(run: &mut Run, sets: &SetupSets, when: WhenCalibrated) -
 
 fn note(message: &str) {
     // There is no one to report to if this fails.
-    let _ = writeln!(stderr(), "{message}");
+    let _ = writeln!(messages(), "{message}");
 }
 
 /// Warns of the targets whose intervals contain significantly fewer test samples than stated, with cause and remedy.

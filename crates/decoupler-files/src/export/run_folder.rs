@@ -256,7 +256,12 @@ pub(super) fn pinned_path(folder: &Path) -> PathBuf {
 pub(super) fn ids(folder: &Path) -> io::Result<Vec<u64>> {
     let mut ids = Vec::new();
     for entry in fs::read_dir(folder)? {
-        let name = entry?.file_name();
+        let entry = entry?;
+        let name = entry.file_name();
+        // Opening a pipe would wait for a program that writes to it.
+        if !fs::metadata(entry.path()).is_ok_and(|found| found.is_file()) {
+            continue;
+        }
         let id = name.to_str().and_then(|name| {
             let id = name.strip_prefix("run-")?.strip_suffix(".json")?.parse().ok()?;
             // Excludes "run-007.json", which no program writes.
@@ -279,6 +284,9 @@ pub(super) fn write(path: &Path, value: &impl Serialize) -> Result<(), WriteErro
 /// # Errors
 /// The file cannot be read, is of another kind or version, or is damaged.
 pub(super) fn read<T: DeserializeOwned>(path: &Path) -> Result<Option<T>, DocumentError> {
+    if fs::metadata(path).is_ok_and(|found| !found.is_file()) {
+        return Err(KIND.damaged(path, "it is not a file".to_owned()));
+    }
     let bytes = match KIND.read(path) {
         Ok(bytes) => bytes,
         Err(DocumentError::Read { source, .. }) if source.kind() == io::ErrorKind::NotFound => return Ok(None),

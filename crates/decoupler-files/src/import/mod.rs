@@ -33,6 +33,7 @@ mod selection;
 mod sentinel;
 mod setup;
 mod sheet;
+mod sheet_claims;
 mod suggestion;
 mod table;
 mod time_stamp;

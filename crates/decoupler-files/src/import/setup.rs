@@ -10,6 +10,7 @@ use decoupler_core::{
         experiments::{ExperimentRecording, RecordedSamples, TrialSamples},
     },
     live::DriftReference,
+    text::clean_name,
     training::TrainerState,
 };
 
@@ -113,13 +114,7 @@ impl Setup {
     /// Returns the name of the source: the array scale, or the stem of the first file.
     pub fn source_name(&self) -> String {
         match (&self.plan, &self.settings.source) {
-            (Some(plan), _) => plan
-                .import
-                .data
-                .file_stem()
-                .unwrap_or_default()
-                .to_string_lossy()
-                .into_owned(),
+            (Some(plan), _) => clean_name(&plan.import.data.file_stem().unwrap_or_default().to_string_lossy()),
             (None, Source::Simulated(simulation)) => simulation.sensor.scale.to_string(),
             (None, Source::Measured(_)) => String::new(),
         }

@@ -232,8 +232,9 @@ pub(super) struct Labels {
 }
 
 impl Labels {
-    /// Adds a cell: its text and its value, if it is a number.
-    pub(super) fn push(&mut self, label: Option<(&str, Option<f64>)>) {
+    /// Adds a cell: its text and its value, if it is a number. Returns `true` if the label is new.
+    pub(super) fn push(&mut self, label: Option<(&str, Option<f64>)>) -> bool {
+        let known = self.texts.len();
         let number = label.map(|(text, value)| {
             self.known.get(text).copied().unwrap_or_else(|| {
                 let number = self.texts.len() as u32;
@@ -243,6 +244,7 @@ impl Labels {
             })
         });
         self.numbers.push(number);
+        self.texts.len() > known
     }
 
     pub(super) fn into_cells(self) -> Cells {
