@@ -29,7 +29,7 @@ use decoupler_files::{
 use super::{
     failure::Failure,
     follow_report::{Answers, Form, Report},
-    interruption::Graceful,
+    interruption::{Graceful, STATUS, TERMINATED},
     number,
     output::messages,
 };
@@ -88,6 +88,9 @@ impl Follow {
         // Without the signal there are still reports at intervals and at the end.
         #[cfg(unix)]
         let _ = signal_hook::flag::register(signal_hook::consts::SIGUSR1, Arc::clone(&asked));
+        let terminated = Arc::new(AtomicBool::new(false));
+        #[cfg(unix)]
+        let _ = signal_hook::flag::register(signal_hook::consts::SIGTERM, Arc::clone(&terminated));
         let opened = source.open().map_err(Failure::Source)?;
         let spawned = Lines::spawn(opened, source.keeping(), source.begins_anywhere());
         let mut lines = spawned.map_err(Failure::Reader)?;
@@ -100,11 +103,17 @@ impl Follow {
                 report.print(lines.dropped());
             }
             if graceful.is_end_requested() {
-                break Err(Failure::InterruptedFollow);
+                break Err(Failure::InterruptedFollow { status: STATUS });
+            }
+            if terminated.load(Ordering::SeqCst) {
+                break Err(Failure::InterruptedFollow { status: TERMINATED });
             }
             let line = match lines.next(WAIT) {
                 NextLine::Line(line) => line,
-                NextLine::None => continue,
+                NextLine::None => {
+                    report.waiting(lines.unended());
+                    continue;
+                }
                 NextLine::End(Some(error)) => {
                     let input = report.source().clone();
                     break Err(Failure::Lost { input, source: error });

@@ -29,6 +29,8 @@ pub(super) struct Report {
     bad: u64,
     /// Error in the first bad line.
     first_bad: Option<String>,
+    /// True once it was reported that no line ends.
+    has_warned_of_ends: bool,
     /// Number of bad lines since the last message.
     unreported: u64,
     last_reported: Instant,
@@ -48,6 +50,7 @@ impl Report {
             latencies: Latencies::default(),
             bad: 0,
             first_bad: None,
+            has_warned_of_ends: false,
             unreported: 0,
             last_reported: now,
         }
@@ -90,6 +93,22 @@ impl Report {
                 "warning: none of the first {MAX_REPORTED} lines is a frame: does the device send at {baud} baud?"
             );
         }
+    }
+
+    /// Reports once that bytes arrive but no line ends; `unended` bytes have arrived since the last line.
+    pub(super) fn waiting(&mut self, unended: usize) {
+        /// More than the time between two lines of any device.
+        const PATIENCE: Duration = Duration::from_secs(2);
+        let has_lines = self.latencies.count() > 0 || self.bad > 0;
+        if has_lines || unended == 0 || self.has_warned_of_ends || self.begin.elapsed() < PATIENCE {
+            return;
+        }
+        self.has_warned_of_ends = true;
+        // There is no one to report to if this fails.
+        let _ = writeln!(
+            messages(),
+            "warning: {unended} bytes have arrived, but no line has ended: does the sender end lines with LF or CR LF?"
+        );
     }
 
     /// Returns `true` once per interval.

@@ -19,6 +19,9 @@ use super::{failure::Failure, output::messages};
 /// Exit status of a command ended by Ctrl-C: 128 plus the number of the signal, as in shells.
 pub(super) const STATUS: u8 = 130;
 
+/// Exit status after SIGTERM: 128 plus the number of the signal, as in shells.
+pub(super) const TERMINATED: u8 = 143;
+
 /// True while the running command checks [`REQUESTED`] itself.
 static GRACEFUL: AtomicBool = AtomicBool::new(false);
 /// True once Ctrl-C was pressed while [`GRACEFUL`] was set.

@@ -98,7 +98,7 @@ pub fn run<A: Into<OsString> + Clone>(arguments: impl IntoIterator<Item = A>, wi
                 | Failure::InterruptedTrials { .. }
                 | Failure::InterruptedTrade { .. }
                 | Failure::InterruptedSweep { .. }
-                | Failure::InterruptedFollow => {
+                | Failure::InterruptedFollow { .. } => {
                     writeln!(messages(), "{failure}")
                 }
                 _ => writeln!(messages(), "error: {}", without_long_words(&failure.to_string())),

@@ -107,8 +107,10 @@ fn read_columns(file: &NetworkFile, recipe: &Recipe, input: &Path) -> Result<Rea
         readings,
         row_wires,
         lines,
+        torn_line,
         kept,
     } = table;
+    warn_if_torn(input, torn_line);
     let row_indices = match (row_wires, &file.row_wires) {
         _ if !has_rows => vec![0; lines.len()],
         (Some(of_lines), Some(read)) => {
@@ -135,6 +137,18 @@ fn read_columns(file: &NetworkFile, recipe: &Recipe, input: &Path) -> Result<Rea
         row_indices,
         kept,
     })
+}
+
+/// Reports a last line that is cut off, as by a full disk, and was left out.
+fn warn_if_torn(input: &Path, line: Option<u64>) {
+    if let Some(line) = line {
+        let input = input.display();
+        // There is no one to report to if this fails.
+        let _ = writeln!(
+            messages(),
+            "warning: '{input}': line {line}, the last, is cut off and left out"
+        );
+    }
 }
 
 /// Reads a CSV file of the resistances of an array. Lines without a row number form whole snapshots.
@@ -199,7 +213,8 @@ fn read_resistances(
     if is_empty {
         return Err(unreadable(ReadError::Empty));
     }
-    if !lines_in_turn.is_multiple_of(read.len()) {
+    warn_if_torn(input, reader.torn_line());
+    if reader.torn_line().is_none() && !lines_in_turn.is_multiple_of(read.len()) {
         return Err(Failure::PartOfSnapshot {
             path: input.to_owned(),
             lines: lines_in_turn,

@@ -5,6 +5,8 @@
 mod calibrate;
 mod causes;
 mod commands;
+#[cfg(unix)]
+mod ends;
 mod export;
 mod files;
 mod files_as_they_are;

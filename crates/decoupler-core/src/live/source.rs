@@ -144,6 +144,18 @@ impl Source {
         matches!(self, Self::Serial { .. })
     }
 
+    /// Returns the message on an error that ends the reading of this source.
+    pub fn lost(&self, error: &io::Error) -> String {
+        let cause = match (self, error.kind()) {
+            // The system reports an unplugged device like a pipe without a reader.
+            (Self::Serial { .. }, io::ErrorKind::BrokenPipe | io::ErrorKind::NotFound) => {
+                "the device was unplugged or switched off".to_owned()
+            }
+            _ => system_cause(error),
+        };
+        format!("{self} is lost: {cause}; connect it again")
+    }
+
     /// Opens the source. Reading from a device or socket times out regularly, so that the reader can be stopped.
     ///
     /// # Errors

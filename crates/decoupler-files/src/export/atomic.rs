@@ -298,12 +298,12 @@ pub(super) fn read_limited(path: &Path) -> io::Result<Vec<u8>> {
         let claimed = budget.claim(bytes.saturating_mul(MEMORY_OF_BYTE));
         claimed.map_err(|over| io::Error::new(ErrorKind::FileTooLarge, over))
     };
+    claim(length)?;
     let mut bytes = Vec::new();
     (&file).take(BEGINNING).read_to_end(&mut bytes)?;
     if matches!(Heading::read(&bytes), Err(NoHeading::NotJson(_) | NoHeading::Other)) {
         return Ok(bytes);
     }
-    claim(length)?;
     // The length of a pipe or device is unknown.
     loop {
         let before = bytes.len() as u64;

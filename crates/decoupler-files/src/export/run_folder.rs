@@ -80,9 +80,29 @@ impl RunFolder {
         &self.kept
     }
 
+    /// Number of runs that exist only in memory, since they could not be written.
+    pub fn unwritten(&self) -> usize {
+        self.unwritten.len()
+    }
+
+    /// Tries again to write the runs that exist only in memory.
+    fn write_unwritten(&mut self) {
+        let Some(folder) = &self.path else { return };
+        let runs = &self.kept.runs;
+        self.unwritten.retain(|&id| {
+            let Some(run) = runs.iter().find(|run| run.id == id) else {
+                return false;
+            };
+            let written = run.file.save_by(&run_path(folder, id), AtomicFile::commit_new);
+            let named = written.and_then(|()| Ok(write(&name_path(folder, id), &run.name)?));
+            named.is_err() && !run_path(folder, id).exists()
+        });
+    }
+
     /// Reads what other programs have changed: new runs, names, the pair that is compared, removals. Returns the files
-    /// that cannot be read, each once; they are left as they are.
+    /// that cannot be read, each once; they are left as they are. Runs that could not be written are tried again.
     pub fn look(&mut self) -> Vec<String> {
+        self.write_unwritten();
         let Some(path) = &self.path else { return Vec::new() };
         let mut problems = Vec::new();
         let ids = match ids(path) {

@@ -75,7 +75,11 @@ fn read_rows(
     }
     let mut body = Body::new(dialect, reading, budget);
     while rows.advance()? {
-        body.push(&rows, &headers)?;
+        if body.is_torn(&rows, &headers) {
+            body.torn_line = Some(rows.line());
+        } else {
+            body.push(&rows, &headers)?;
+        }
     }
     body.finish(path, headers)
 }
@@ -92,6 +96,7 @@ struct Body<'a> {
     lines: Lines,
     too_long: Excess,
     too_short: Excess,
+    torn_line: Option<u64>,
 }
 
 struct Builder<'a> {
@@ -115,7 +120,28 @@ impl<'a> Body<'a> {
             lines: Lines::default(),
             too_long: Excess::default(),
             too_short: Excess::default(),
+            torn_line: None,
         }
+    }
+
+    /// Returns `true` if the row is the last of a file that is cut off, as when the disk was full: it ends without a line
+    /// break, before the last column or within its number.
+    fn is_torn<R: Read>(&self, rows: &Rows<R>, headers: &[String]) -> bool {
+        if rows.is_ended() || self.rows + self.first.len() == 0 {
+            return false;
+        }
+        let width = match (self.builders.len(), headers.len()) {
+            (0, 0) => commonest(self.first.iter().map(|(_, cells)| cells.len())),
+            (0, _) => return false,
+            (width, _) => width,
+        };
+        let is_text = |cell: &[u8]| parse(cell, self.dialect.decimal) == Cell::Text;
+        let has_numbers = |builder: &Builder<'_>| builder.has_numbers && builder.column.faults.count == 0;
+        let is_within_number = || {
+            let of_numbers = self.builders.last().is_some_and(has_numbers);
+            of_numbers && rows.len() == width && rows.cells().last().is_some_and(is_text)
+        };
+        rows.len() < width || is_within_number()
     }
 
     fn push<R: Read>(&mut self, rows: &Rows<R>, headers: &[String]) -> Result<(), TableError> {
@@ -193,12 +219,18 @@ impl<'a> Body<'a> {
             columns: self.builders.into_iter().map(Builder::finish).collect(),
             rows: self.rows,
             format: Format::Text(self.dialect),
-            notes: Vec::new(),
+            notes: self.torn_line.map(torn).into_iter().collect(),
+            torn_line: self.torn_line,
             too_long: self.too_long,
             too_short: self.too_short,
             lines: self.lines,
         })
     }
+}
+
+/// Returns the note on a last line that is cut off.
+fn torn(line: u64) -> String {
+    format!("line {line}, the last, is cut off and left out")
 }
 
 impl<'a> Builder<'a> {

@@ -37,6 +37,7 @@ mod sheet_claims;
 mod suggestion;
 mod table;
 mod time_stamp;
+mod xls_claims;
 
 pub use choosing::{ChoosingProgress, ChosenSetup};
 pub use derived::Derived;

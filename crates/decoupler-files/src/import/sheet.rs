@@ -15,7 +15,7 @@ use super::{
     Decimal, DialectChoice, Encoding, Format, Progress, Separator, Table, TableError, Watch,
     csv_table::{self, Reading},
     input_lines::Watched,
-    sheet_claims,
+    sheet_claims, xls_claims,
 };
 
 /// Kind of spreadsheet.
@@ -66,8 +66,9 @@ impl Spreadsheet {
         budget: &mut ReadingBudget,
         watch: Watch<'_>,
     ) -> Result<Table, TableError> {
-        if self != Self::Xls {
-            sheet_claims::claim(BufReader::new(&file), budget, watch)?;
+        match self {
+            Self::Xls => xls_claims::claim(&file, budget)?,
+            Self::Xlsx | Self::Ods => sheet_claims::claim(BufReader::new(&file), budget, watch)?,
         }
         (&file).rewind()?;
         let source = BufReader::new(file);

@@ -72,8 +72,7 @@ fn claim_part(xml: BufReader<impl Read>, budget: &mut ReadingBudget) -> Result<(
 /// Rectangle of a sheet, or of one table of an OpenDocument file.
 #[derive(Default)]
 struct Sheet {
-    /// First and last row and column with a value.
-    bounds: Option<[[u64; 2]; 2]>,
+    rectangle: Rectangle,
     /// Row and column after the last cell.
     next: [u64; 2],
     /// Number of rows that the current row repeats.
@@ -117,7 +116,7 @@ impl Sheet {
             "c" => {
                 let reference = element.try_get_attribute("r").ok().flatten();
                 self.next = reference.and_then(|r| place(&r.value)).unwrap_or(self.next);
-                self.include(self.next, [1, 1]);
+                self.rectangle.include(self.next, [1, 1]);
                 budget.claim(OF_CELL)?;
                 self.next[1] += 1;
             }
@@ -140,7 +139,7 @@ impl Sheet {
                     .iter()
                     .any(|name| matches!(element.try_get_attribute(name), Ok(Some(_))))
                 {
-                    self.include(self.next, [self.row_repeats, self.repeats]);
+                    self.rectangle.include(self.next, [self.row_repeats, self.repeats]);
                     let width = (self.next[1] + self.repeats).min(LARGEST[1]);
                     budget.claim(OF_CELL.saturating_mul(width.saturating_sub(self.claimed)))?;
                     self.claimed = self.claimed.max(width);
@@ -151,8 +150,22 @@ impl Sheet {
         Ok(())
     }
 
-    /// Includes a number of rows and columns from `first` in the rectangle.
-    fn include(&mut self, first: [u64; 2], counts: [u64; 2]) {
+    /// Claims the rectangle.
+    fn end(&self, budget: &mut ReadingBudget) -> Result<(), OverBudget> {
+        budget.claim(self.rectangle.memory())
+    }
+}
+
+/// Rectangle between the first and the last cell with a value.
+#[derive(Default)]
+pub(super) struct Rectangle {
+    /// First and last row and column.
+    bounds: Option<[[u64; 2]; 2]>,
+}
+
+impl Rectangle {
+    /// Includes a number of rows and columns from `first`.
+    pub(super) fn include(&mut self, first: [u64; 2], counts: [u64; 2]) {
         let bounds = self.bounds.get_or_insert([first, first]);
         for axis in 0..2 {
             bounds[0][axis] = bounds[0][axis].min(first[axis]);
@@ -161,13 +174,11 @@ impl Sheet {
         }
     }
 
-    /// Claims the rectangle.
-    fn end(&self, budget: &mut ReadingBudget) -> Result<(), OverBudget> {
-        let Some([first, last]) = self.bounds else {
-            return Ok(());
-        };
+    /// Returns its memory in bytes.
+    pub(super) fn memory(&self) -> u64 {
+        let Some([first, last]) = self.bounds else { return 0 };
         let [rows, columns] = [0, 1].map(|axis| last[axis] - first[axis] + 1);
-        budget.claim(rows.saturating_mul(columns).saturating_mul(OF_PLACE))
+        rows.saturating_mul(columns).saturating_mul(OF_PLACE)
     }
 }
 

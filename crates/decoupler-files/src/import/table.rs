@@ -17,6 +17,8 @@ pub struct Table {
     pub format: Format,
     /// Notes for the user: rows of unusual length, arrays left out.
     pub notes: Vec<String>,
+    /// Last line of a text file, if it is cut off and therefore left out.
+    pub torn_line: Option<u64>,
     /// Rows that were left out because they have more cells than there are columns.
     pub too_long: Excess,
     /// Rows that end before the last column; their other cells are missing.

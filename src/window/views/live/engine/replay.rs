@@ -174,7 +174,11 @@ pub(super) fn read_replay(
         .split(|&byte| byte == b',')
         .any(|name| name.trim_ascii() == b"time_s");
     let recording = if has_times {
-        Recording::read(reader, read, scale.rows(), scale.columns()).map_err(|error| error.to_string())
+        let recording = Recording::read(reader, read, scale.rows(), scale.columns());
+        if let Some(line) = recording.as_ref().ok().and_then(Recording::torn_line) {
+            tally.bad(format!("line {line}, the last, is cut off and left out"));
+        }
+        recording.map_err(|error| error.to_string())
     } else {
         read_lines(reader, scale, rows, read.len(), tally)
     };
@@ -324,6 +328,33 @@ mod tests {
                 ndarray::array![[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]]
             );
         }
+    }
+
+    #[test]
+    fn a_recording_cut_off_by_a_full_disk_is_replayed_and_the_line_reported() {
+        let mut recorded = Vec::new();
+        let mut recorder = Recorder::new(&mut recorded, &[0, 1], 3).unwrap();
+        for time_s in [0.5, 0.75] {
+            recorder.record(time_s, &[1.0, 2.0, 3.0, 4.0, 5.0, 6.5]).unwrap();
+        }
+        let (recording, tally) = read(&recorded[..recorded.len() - 3], Rows::Known);
+        assert_eq!(recording.unwrap().times_s(), [0.5]);
+        let reason = tally.counts().last_bad.unwrap();
+        assert!(reason.contains("line 5, the last, is cut off"), "{reason}");
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn what_is_no_file_is_refused_before_it_is_opened() {
+        let mut tally = Tally::new(Instant::now());
+        let refused = read_replay(
+            Path::new("/dev/zero"),
+            "2x1_1x3".parse().unwrap(),
+            Rows::Known,
+            &[0, 1],
+            &mut tally,
+        );
+        assert!(refused.unwrap_err().contains("it is not a file"));
     }
 
     #[test]
