@@ -301,25 +301,6 @@ fn a_stream_without_line_ends_is_reported() {
 }
 
 #[test]
-fn a_device_that_is_unplugged_is_reported_as_such() {
-    let folder = trained("--rows known");
-    let (mut device, port) = TTYPort::pair().unwrap();
-    let name = port.name().unwrap();
-    let held = fs::File::open(&name).unwrap();
-    drop(port);
-    let arguments = format!("decode --network n.json --follow --input {name}:115200");
-    let mut running = Running::new(&arguments, &folder);
-    let lines = device_lines(&folder);
-    device.write_all(b"3,4\n").unwrap();
-    device.write_all(lines[..2].concat().as_bytes()).unwrap();
-    (0..3).for_each(|_| drop(running.line()));
-    drop((device, held));
-    assert_eq!(running.child.wait().unwrap().code(), Some(1));
-    let report = running.stderr();
-    assert!(report.contains("is lost: the device was unplugged"), "{report}");
-}
-
-#[test]
 fn a_closed_output_ends_the_program_silently() {
     let folder = trained("--rows known");
     let lines = device_lines(&folder).concat();

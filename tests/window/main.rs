@@ -11,6 +11,8 @@ mod driver;
 mod experiments;
 mod exporting;
 mod extremes;
+#[cfg(target_os = "linux")]
+mod faults;
 mod habits;
 mod identifying;
 mod import_choices;
@@ -37,3 +39,6 @@ mod typing;
 
 #[path = "../support/folders.rs"]
 mod folders;
+#[cfg(target_os = "linux")]
+#[path = "../support/faults.rs"]
+mod preloaded;

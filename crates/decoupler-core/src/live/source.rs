@@ -426,6 +426,19 @@ mod tests {
     use crate::scene::Noise;
 
     #[test]
+    fn an_unplugged_device_is_no_pipe_without_a_reader() {
+        let broken = io::Error::from(io::ErrorKind::BrokenPipe);
+        let (path, baud) = ("/dev/ttyUSB0".to_owned(), 9600);
+        let device = Source::Serial { path, baud }.lost(&broken);
+        assert_eq!(
+            device,
+            "'/dev/ttyUSB0:9600' is lost: the device was unplugged or switched off; connect it again"
+        );
+        let socket = Source::Tcp("host:1".to_owned()).lost(&broken);
+        assert!(socket.contains("the program that reads it has ended"), "{socket}");
+    }
+
+    #[test]
     fn sources_are_distinguished_by_their_names() {
         let serial = |path: &str, baud| Source::Serial {
             path: path.to_owned(),

@@ -4,6 +4,7 @@
 use std::{
     fs::File,
     io::{BufReader, Cursor, Read, Seek},
+    panic::{AssertUnwindSafe, catch_unwind},
     path::Path,
 };
 
@@ -72,11 +73,16 @@ impl Spreadsheet {
         }
         (&file).rewind()?;
         let source = BufReader::new(file);
-        let sheets = match self {
+        // The reader of spreadsheets may panic on a file whose parts contradict each other.
+        let read = catch_unwind(AssertUnwindSafe(|| match self {
             Self::Xlsx => Sheets::read::<Xlsx<_>, _>(source, watch),
             Self::Xls => Sheets::read::<Xls<_>, _>(source, watch),
             Self::Ods => Sheets::read::<Ods<_>, _>(source, watch),
-        }?;
+        }));
+        let sheets = read.unwrap_or_else(|_| {
+            let reason = "its parts contradict each other; save it again, or as CSV";
+            Err(TableError::damaged("the spreadsheet", reason))
+        })?;
         let Some((name, range)) = sheets.chosen.filter(|(_, range)| !range.is_empty()) else {
             return Err(TableError::Empty);
         };

@@ -1,6 +1,6 @@
-/* Preloaded into the program: operations that write to the folder FAULT_FOLDER are counted, and the one with number FAULT_AT
- * fails as FAULT_KIND says: "short" (half is written, then the disk is full), or the number of an error. The count is written
- * to the file FAULT_COUNT at the end. */
+/* Preloaded into a program: of its operations that write to the folder FAULT_FOLDER, counted since the file FAULT_PLAN was
+ * written, the one that this file names fails. Its contents are the number of the operation and a kind: "short" (half is
+ * written, then the disk is full), or the number of an error. It is removed when the operation has failed. */
 
 #define _GNU_SOURCE
 #include <dlfcn.h>
@@ -13,10 +13,13 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
+#include <time.h>
 #include <unistd.h>
 
+/* Operations since the plan was written, and the plan that they are counted for. */
 static atomic_long count;
 static atomic_int disk_is_full;
+static struct timespec plan_time;
 
 static const char *setting(const char *name)
 {
@@ -48,12 +51,27 @@ static int is_watched_file(int file)
     return is_watched(path);
 }
 
-/* Returns 0, or the error with which this operation fails. */
+/* Returns 0, or the error with which this operation fails: -1 for a short write. */
 static int fault(void)
 {
-    if (atomic_fetch_add(&count, 1) + 1 != atol(setting("FAULT_AT")))
+    struct stat plan;
+    if (stat(setting("FAULT_PLAN"), &plan) != 0)
         return 0;
-    const char *kind = setting("FAULT_KIND");
+    if (memcmp(&plan.st_mtim, &plan_time, sizeof plan_time) != 0) {
+        plan_time = plan.st_mtim;
+        atomic_store(&count, 0);
+        atomic_store(&disk_is_full, 0);
+    }
+    long at = 0;
+    char kind[16] = "";
+    FILE *file = fopen(setting("FAULT_PLAN"), "r");
+    if (!file)
+        return 0;
+    int read = fscanf(file, "%ld %15s", &at, kind);
+    fclose(file);
+    if (read != 2 || atomic_fetch_add(&count, 1) + 1 != at)
+        return 0;
+    unlink(setting("FAULT_PLAN"));
     if (strcmp(kind, "short") == 0) {
         atomic_store(&disk_is_full, 1);
         return -1;
@@ -95,11 +113,11 @@ ssize_t write(int file, const void *bytes, size_t length)
 {
     ssize_t (*next)(int, const void *, size_t) = dlsym(RTLD_NEXT, "write");
     if (is_watched_file(file)) {
-        if (atomic_load(&disk_is_full)) {
+        int error = fault();
+        if (error == 0 && atomic_load(&disk_is_full)) {
             errno = ENOSPC;
             return -1;
         }
-        int error = fault();
         if (error < 0)
             return next(file, bytes, length > 1 ? length / 2 : length);
         if (error > 0) {
@@ -136,13 +154,4 @@ int rename(const char *from, const char *to)
     if (is_watched(to) && fails())
         return -1;
     return next(from, to);
-}
-
-__attribute__((destructor)) static void report(void)
-{
-    FILE *file = fopen(setting("FAULT_COUNT"), "w");
-    if (file) {
-        fprintf(file, "%ld", atomic_load(&count));
-        fclose(file);
-    }
 }
