@@ -299,11 +299,6 @@ impl Network {
     ) -> PyResult<Bound<'py, PyDict>> {
         let format: BundleFormat = format.parse().map_err(value_error)?;
         let precision: BundlePrecision = precision.parse().map_err(value_error)?;
-        if format == BundleFormat::Json && self.file.is_none() {
-            return Err(PyValueError::new_err(
-                "format json is a network file, which names the recording: save the estimator with save instead",
-            ));
-        }
         let record = &self.record;
         let report = detached(py, || match &self.file {
             Some(file) => export_bundle(file, format, precision, &path),

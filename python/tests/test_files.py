@@ -171,7 +171,7 @@ def test_numpy_files_agree_with_the_network(tmp_path, curve):
         ({"format": "keras"}, "'keras' is not a format: give onnx, c99"),
         ({"precision": "f16"}, "'f16' is not a precision"),
         ({"format": "matlab", "precision": "f32"}, "matlab has no precision f32"),
-        ({"format": "json"}, "names the recording"),
+        ({"format": "json"}, "trained on samples in memory"),
     ],
 )
 def test_exports_that_are_not_possible_leave_nothing_behind(tmp_path, curve, arguments, message):
