@@ -242,6 +242,14 @@ impl Parser {
             Self::Array(parser) => parser.parse(line, text).map_err(ParseError::Array),
             Self::Columns(parser) => match parser.parse(line, text) {
                 Ok(InputLine::NoReadings) => Ok(ParsedLine::NoReadings),
+                Ok(InputLine::Start { is_first }) => {
+                    if is_first {
+                        warn(&format!(
+                            "line {line}: the lines at the start give the means of derived columns and are not decoded"
+                        ));
+                    }
+                    Ok(ParsedLine::NoReadings)
+                }
                 Ok(InputLine::Readings { row_index, readings }) => Ok(ParsedLine::Row {
                     row_index: Some(row_index),
                     readings_ohm: readings,

@@ -98,6 +98,38 @@ fn a_memory_removes_creep_and_goes_with_the_network() {
 }
 
 #[test]
+fn a_stream_is_decoded_like_a_file_with_derived_columns_and_a_memory() {
+    let folder = creeping();
+    let derive = "--derive d=u-start(1s) --derive q=u/start(5)";
+    succeed(
+        &format!(
+            "{} {derive} --memory 0.5s --out n.json",
+            TRAIN.replace("--inputs u", "--inputs d,q")
+        ),
+        folder.path(),
+    );
+    let decode = "decode --network n.json --input readings.csv";
+    succeed(&format!("{decode} --output decoded.csv"), folder.path());
+    let decoded = answers(&fs::read_to_string(folder.path().join("decoded.csv")).unwrap());
+    let output = decoupler(&format!("{decode} --follow"), folder.path());
+    let warnings = String::from_utf8(output.stderr).unwrap();
+    assert!(
+        warnings.contains("line 2: the lines at the start give the means"),
+        "{warnings}"
+    );
+    let streamed = answers(&String::from_utf8(output.stdout).unwrap());
+    // The rows of the first second, which are over with that at 1.05 s.
+    assert_eq!((decoded.len(), streamed.len()), (600, 579));
+    for (found, expected) in streamed.iter().zip(&decoded[21..]) {
+        assert!((found - expected).abs() < 1e-9, "{found} {expected}");
+    }
+    // A stream without one of the columns is refused with the reason.
+    fs::write(folder.path().join("other.csv"), "t,v\n0,1\n").unwrap();
+    let message = refused("decode --network n.json --follow --input other.csv", folder.path());
+    assert!(message.contains("there is no column 'd'"), "{message}");
+}
+
+#[test]
 fn memories_are_kept_in_recipes_and_refused_where_they_are_not_possible() {
     let folder = creeping();
     succeed(

@@ -127,6 +127,7 @@ fn the_source_selects_the_form_and_keeps_the_settings_of_the_other() {
         "{:?}",
         driver.notice()
     );
+    driver.choose_by_hand();
     driver.enter("Hidden nodes", "5");
     driver.unfold_to("Network inputs", "Whitening");
     driver.click_button("Whitening");
@@ -142,6 +143,7 @@ fn the_source_selects_the_form_and_keeps_the_settings_of_the_other() {
 #[test]
 fn a_network_file_brings_back_its_settings_its_recording_and_its_run() {
     let (mut driver, path, folder) = opened(60);
+    driver.choose_by_hand();
     driver.enter("Hidden nodes", "4");
     driver.limit_epochs("3");
     driver.train_recording();
@@ -265,6 +267,7 @@ fn the_recording_is_open_again_at_the_next_start() {
     let mut driver = Driver::open_remembering(&file);
     driver.open_recordings(&[&path]);
     driver.mean("y", "unused");
+    driver.choose_by_hand();
     driver.enter("Hidden nodes", "7");
     let setup = driver.state().setup().unwrap();
     drop(driver);
@@ -340,6 +343,7 @@ fn the_method_decides_what_is_held_out_until_the_user_does() {
             .validation_fraction
     };
     assert_eq!(held_out(&driver), 0.0);
+    driver.choose_by_hand();
     crate::configuring::choose_method(&mut driver, "Levenberg-Marquardt");
     driver.settle();
     assert_eq!(held_out(&driver), 0.2);

@@ -2,6 +2,7 @@
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 mod accessibility;
+mod automatic;
 mod closing;
 mod comparing;
 mod configuring;
@@ -15,6 +16,7 @@ mod habits;
 mod identifying;
 mod import_choices;
 mod importing;
+mod intervals;
 mod live;
 mod looking;
 mod newcomer;

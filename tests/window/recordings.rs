@@ -67,12 +67,19 @@ impl Driver {
     /// Presses Train and waits for the end; settings are those of the form.
     #[track_caller]
     pub(crate) fn train_recording(&mut self) {
+        self.choose_by_hand();
+        self.click("▶ Train");
+        self.wait_for_training();
+    }
+
+    /// Enables the settings of the form.
+    #[track_caller]
+    pub(crate) fn choose_by_hand(&mut self) {
         if self.state().recording.is_auto {
             self.click("Choose settings automatically");
             self.settle();
+            assert!(!self.state().recording.is_auto);
         }
-        self.click("▶ Train");
-        self.wait_for_training();
     }
 
     /// Waits for the end of the training of a recording, and for its results.
@@ -97,6 +104,7 @@ impl Driver {
     /// Limits the training to this many epochs.
     #[track_caller]
     pub(crate) fn limit_epochs(&mut self, epochs: &str) {
+        self.choose_by_hand();
         self.unfold_to("When to stop", "Epochs");
         self.enter("Epochs", epochs);
     }

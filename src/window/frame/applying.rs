@@ -15,7 +15,7 @@ use crate::window::{
     training_worker::{Inspection, LOST, Request, Worker},
     views::CHECKPOINT,
 };
-use decoupler_core::evaluation::SimulatedSettings;
+use decoupler_core::evaluation::{RunSettings, SimulatedSettings};
 use decoupler_files::{figure::SequentialMap, import::Setup};
 
 impl DecouplerWindow {
@@ -25,12 +25,18 @@ impl DecouplerWindow {
         match effect {
             Effect::Configure(draft) => self.configure(*draft),
             Effect::ConfigureRecording(settings) => {
-                // Settings that the user gives are not chosen.
-                shared.recording.is_auto &= *settings == shared.recording.settings;
+                // Settings that the user gives are not chosen, except for those that a choice keeps.
+                let RunSettings { source, seed, .. } = *settings;
+                let kept = RunSettings {
+                    source,
+                    seed,
+                    ..shared.recording.settings
+                };
+                shared.recording.is_auto &= *settings == kept;
                 shared.recording.settings = *settings;
                 self.notices.settle(Matter::Settings);
             }
-            Effect::ChooseAutomatically(is_auto) => shared.recording.is_auto = is_auto,
+            Effect::ChooseAutomatically(is_auto) => self.choose_automatically(is_auto),
             Effect::Import(plan) => shared.recording.plan = plan,
             Effect::ChooseSource(source) if !shared.phase.is_busy() => self.choose_source(source),
             Effect::ChooseSource(_) => {}
@@ -39,7 +45,7 @@ impl DecouplerWindow {
             Effect::Train => {
                 self.opened = None;
                 match shared.setup() {
-                    Ok(setup) if setup.can_choose() && shared.recording.is_auto => {
+                    Ok(setup) if shared.source == SourceKind::Recording && shared.recording.is_automatic() => {
                         self.prepare(Request::Choose(Box::new(setup)));
                     }
                     Ok(setup) => self.prepare(Request::Train(Box::new(setup))),
@@ -107,6 +113,19 @@ impl DecouplerWindow {
         self.notices.settle(Matter::Training);
         self.notices.settle(Matter::Settings);
         self.worker.ask(request);
+    }
+
+    /// Chooses settings automatically from now on, or begins with those that were chosen.
+    fn choose_automatically(&mut self, is_auto: bool) {
+        let chosen = self.shared.chosen_run().map(|run| run.setup.clone());
+        self.shared.recording.is_auto = is_auto;
+        if let (false, Some(setup)) = (is_auto, chosen) {
+            self.take_setup(&setup);
+            // Given by hand, these settings would have had the same result.
+            if let Some(run) = &mut self.shared.run {
+                run.asked = setup;
+            }
+        }
     }
 
     /// Opens the training saved in this checkpoint.

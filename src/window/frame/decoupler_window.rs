@@ -115,7 +115,9 @@ impl DecouplerWindow {
             window.shared.draft = draft;
         }
         if let Some(settings) = window.remembered.recording {
-            window.shared.recording.is_auto &= settings == window.shared.recording.settings;
+            // Files of older versions do not say it: settings that the user gave are not chosen.
+            let is_usual = settings == window.shared.recording.settings;
+            window.shared.recording.is_auto = window.remembered.is_auto.unwrap_or(is_usual);
             window.shared.recording.settings = settings;
         }
         window.shared.source = window.remembered.source.unwrap_or_default();

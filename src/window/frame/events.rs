@@ -130,12 +130,15 @@ impl DecouplerWindow {
                 }
             }
             Event::Continued(Ok(settings)) => {
-                let training = shared.settings().training;
+                // Settings that were chosen were not asked for.
+                let asked = shared.chosen_run().is_none().then(|| shared.settings().training);
                 if let Some(run) = &mut shared.run {
-                    run.asked = run.asked.with_settings(RunSettings {
-                        training,
-                        ..*run.asked.settings()
-                    });
+                    if let Some(training) = asked {
+                        run.asked = run.asked.with_settings(RunSettings {
+                            training,
+                            ..*run.asked.settings()
+                        });
+                    }
                     run.setup = run.setup.with_settings(*settings);
                     run.is_saved = false;
                     run.stop_reason = None;
@@ -154,6 +157,8 @@ impl DecouplerWindow {
             Event::Progressed(progress) => {
                 if let Some(reason) = progress.stop_reason {
                     shared.phase = Phase::Ended(reason);
+                } else if progress.is_calibrating {
+                    shared.phase = Phase::Calibrating;
                 }
                 if let Some(run) = &mut shared.run {
                     run.progress(*progress);

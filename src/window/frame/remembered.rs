@@ -51,6 +51,9 @@ pub(super) struct Remembered {
     /// Settings of the next training on a recording.
     #[serde(deserialize_with = "if_readable")]
     pub(super) recording: Option<RunSettings>,
+    /// Whether they are chosen automatically.
+    #[serde(deserialize_with = "if_readable")]
+    pub(super) is_auto: Option<bool>,
     /// Plan of the recording that is open, with absolute paths.
     #[serde(deserialize_with = "if_readable")]
     pub(super) plan: Option<Plan>,
@@ -199,6 +202,7 @@ impl DecouplerWindow {
         self.remembered.draft = Some(self.shared.draft);
         self.remembered.source = Some(self.shared.source);
         self.remembered.recording = Some(self.shared.recording.settings);
+        self.remembered.is_auto = Some(self.shared.recording.is_auto);
         match &self.shared.recording.plan {
             Ok(plan) if self.remembered.plan.as_ref() != Some(&**plan) => {
                 self.remembered.plan = Some(Plan::clone(plan));

@@ -69,6 +69,17 @@ pub struct RecordingDraft {
 impl RecordingDraft {
     /// Reason why there is no plan before a file is opened.
     pub const NOTHING_OPEN: &str = "Open a recording first: drop files on the window.";
+
+    /// Returns true if the settings of the next training are chosen automatically, which needs one network for all row-wires.
+    pub fn is_automatic(&self) -> bool {
+        self.is_auto && self.settings.source.row_model() == RowModel::Shared
+    }
+
+    /// Returns true if `setup` is that of these settings and files.
+    fn is_setup(&self, setup: &Setup) -> bool {
+        let plan = self.plan.as_ref().ok().map(|plan| &**plan);
+        plan.is_some() && (setup.plan(), setup.settings()) == (plan, &self.settings)
+    }
 }
 
 impl Default for RecordingDraft {
@@ -92,6 +103,8 @@ pub enum Phase {
     Training,
     /// Paused.
     Paused,
+    /// Calibrating the intervals after the last epoch.
+    Calibrating,
     /// Ended, and why.
     Ended(StopReason),
     /// The worker is gone.
@@ -101,7 +114,10 @@ pub enum Phase {
 impl Phase {
     /// Returns true while a training is running or paused; its settings cannot change then.
     pub fn is_busy(self) -> bool {
-        matches!(self, Self::Preparing | Self::Training | Self::Paused)
+        matches!(
+            self,
+            Self::Preparing | Self::Training | Self::Paused | Self::Calibrating
+        )
     }
 }
 
@@ -145,8 +161,17 @@ impl Shared {
     pub fn settings(&self) -> RunSettings {
         match self.source {
             SourceKind::Array => self.draft.into(),
-            SourceKind::Recording => self.recording.settings,
+            SourceKind::Recording => match self.chosen_run() {
+                Some(run) => *run.settings(),
+                None => self.recording.settings,
+            },
         }
+    }
+
+    /// Returns the current training if its settings were chosen automatically for what the next one would be chosen for.
+    pub fn chosen_run(&self) -> Option<&RunView> {
+        let run = self.shown_run().filter(|run| run.search.is_some())?;
+        (self.recording.is_automatic() && self.recording.is_setup(&run.asked)).then_some(run)
     }
 
     /// Sets the training settings of the next training.
@@ -206,7 +231,7 @@ impl Shared {
     pub fn can_continue(&self) -> bool {
         let Some(run) = self.shown_run() else { return false };
         let may_continue = match self.phase {
-            Phase::Paused => self.settings().training != run.asked.settings().training,
+            Phase::Paused => self.chosen_run().is_none() && self.settings().training != run.asked.settings().training,
             Phase::Ended(reason) => reason != StopReason::Diverged,
             _ => false,
         };

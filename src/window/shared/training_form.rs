@@ -57,18 +57,22 @@ pub fn method_settings_ui<S>(ui: &mut Ui, settings: &mut RunSettings<S>, is_new:
     ui.add_enabled_ui(is_new, |ui| {
         count_ui(ui, "Starts", &hint, &mut settings.starts, usually(1, 1..=MAX_STARTS));
         let label = ui.label("Combine starts").on_hover_text(glossary::COMBINE.hint);
-        let name = |combine: Combination| match combine {
-            Combination::Best => "keep the best",
-            Combination::Mean => "average their answers",
-        };
-        let combo = ComboBox::from_id_salt("combine").selected_text(name(settings.combine));
+        let combo = ComboBox::from_id_salt("combine").selected_text(combination_name(settings.combine));
         let shown = combo.show_ui(ui, |ui| {
             for option in Combination::ALL {
-                ui.selectable_value(&mut settings.combine, option, name(option));
+                ui.selectable_value(&mut settings.combine, option, combination_name(option));
             }
         });
         shown.response.labelled_by(label.id);
     });
+}
+
+/// Name of a way to combine starts.
+pub fn combination_name(combine: Combination) -> &'static str {
+    match combine {
+        Combination::Best => "keep the best",
+        Combination::Mean => "average their answers",
+    }
 }
 
 /// The rules that end a training, whose defaults are `usual`; changes `stopping`.

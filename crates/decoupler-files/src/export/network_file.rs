@@ -118,7 +118,9 @@ impl NetworkFile {
             MemoryStream::new(memory, self.problem.inputs.len(), networks)
                 .expect("reading and writing check the memory")
         });
-        InputLines::new(self.problem.inputs.clone(), others, row_wires).with_memory(memory)
+        let derive = import.map(|import| import.derive.clone()).unwrap_or_default();
+        let lines = InputLines::new(self.problem.inputs.clone(), others, row_wires);
+        lines.with_derived(derive).with_memory(memory)
     }
 
     /// Setup of the run.

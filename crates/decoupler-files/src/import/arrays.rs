@@ -5,7 +5,7 @@ use std::{collections::BTreeMap, path::Path};
 use decoupler_core::text::clean_name;
 
 use super::{
-    Cells, Column, Fault, Format, Table, TableError,
+    Cells, Column, Fault, Format, Table, TableError, Variable,
     csv_table::Reading,
     format::Array,
     table::{Excess, Labels, Lines, stem},
@@ -43,13 +43,20 @@ pub(super) fn table(
         };
         return Err(TableError::array("there is no array of numbers", found));
     };
-    let mut columns = Vec::new();
+    let (mut columns, mut variables) = (Vec::new(), Vec::new());
     for array in arrays {
+        let (name, shape, first) = (array.name.clone(), array.shape.clone(), columns.len());
+        let variable = |end| Variable {
+            name,
+            shape,
+            columns: first..end,
+        };
         if array.rows % rows != 0 || array.rows / rows > MAX_ROWS_PER_SAMPLE {
             notes.push(format!(
                 "left out: {} is {}, and a sample is one of {rows} rows; name its columns to use it instead",
                 array.name, array.shape
             ));
+            variables.push(variable(first));
             continue;
         }
         let each = array.rows / rows;
@@ -72,10 +79,13 @@ pub(super) fn table(
             };
             columns.push(column(name, numbers, reading));
         }
+        variables.push(variable(columns.len()));
     }
+    variables.retain(|variable| !variable.name.is_empty());
     Ok(Table {
         stem: stem(path),
         columns,
+        variables,
         rows,
         format,
         notes,

@@ -166,6 +166,7 @@ impl<'a> Body<'a> {
             return Err(TableError::Empty);
         }
         Ok(Table {
+            variables: Vec::new(),
             stem: stem(path),
             columns: self.builders.into_iter().map(Builder::finish).collect(),
             rows: self.rows,

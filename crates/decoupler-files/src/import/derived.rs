@@ -1,4 +1,4 @@
-//! Columns computed from others of the same file.
+//! Columns computed from others of the same file, in tables and in [streams](super::derived_stream).
 
 use std::{fmt, str::FromStr};
 
@@ -48,96 +48,211 @@ impl Derived {
         std::iter::once(&self.column).chain(other)
     }
 
-    /// Adds the column to a table, unless the table has its name already or does not have its first column. `own` returns the
-    /// name of a column within the file, and `time` is the time column there.
+    /// Returns `true` if it needs a time column.
+    pub(super) fn needs_time(&self) -> bool {
+        matches!(self.reference, Reference::Seconds(_))
+    }
+
+    /// Finds its columns among `columns`; `None` if they have its name already or do not have its first column. `own` returns
+    /// the name of a column within the file, and `time` is the time column there.
     ///
     /// # Errors
-    /// If the other column is missing, a cell is not a number, or the mean cannot be computed.
+    /// If the other column or the time column is missing, or the times have no unit of time.
+    pub(super) fn located(
+        &self,
+        columns: &[Column],
+        own: impl Fn(&str) -> Option<String>,
+        time: Option<TimeColumn<'_>>,
+    ) -> Result<Option<LocatedDerived>, ImportError> {
+        let find = |name: &str| columns.iter().position(|column| column.name == name);
+        let Some(column) = own(&self.column).and_then(|name| find(&name)) else {
+            return Ok(None);
+        };
+        let Some(name) = own(&self.name).filter(|name| find(name).is_none()) else {
+            return Ok(None);
+        };
+        let (reference, unit) = match &self.reference {
+            Reference::Column(other) => {
+                let found = own(other).and_then(|name| find(&name));
+                let other =
+                    found.ok_or_else(|| self.refused(format!("there is no column '{other}' in the same file")))?;
+                (LocatedReference::Column(other), &columns[other].unit)
+            }
+            Reference::Rows(rows) => (LocatedReference::Rows(*rows), &columns[column].unit),
+            Reference::Seconds(limit_s) => {
+                let found = time.and_then(|time| Some((find(time.name)?, time.given_unit)));
+                let (time, given_unit) = found
+                    .ok_or_else(|| self.refused("seconds need the time column; give a number of rows".to_owned()))?;
+                let of_times = given_unit.or(columns[time].unit.as_deref());
+                let unit_s = seconds(of_times)
+                    .ok_or_else(|| self.refused(format!("'{}' has no unit of time", columns[time].name)))?;
+                let reference = LocatedReference::Seconds {
+                    time,
+                    unit_s,
+                    limit_s: *limit_s,
+                };
+                (reference, &columns[column].unit)
+            }
+        };
+        let is_same_unit = columns[column].unit == *unit;
+        let unit = match self.operator {
+            Operator::Minus => columns[column].unit.clone().filter(|_| is_same_unit),
+            Operator::Over if is_same_unit => None,
+            Operator::Over => {
+                let units = columns[column].unit.as_ref().zip(unit.as_ref());
+                units.map(|(one, other)| format!("{one}/{other}"))
+            }
+        };
+        Ok(Some(LocatedDerived {
+            name,
+            unit,
+            column,
+            operator: self.operator,
+            reference,
+        }))
+    }
+
+    /// Adds the column to a table, unless the table has its name already or does not have its first column; `own` and `time`
+    /// are as for [`Self::located`].
+    ///
+    /// # Errors
+    /// If another column is missing, a cell is not a number, or the mean cannot be computed.
     pub(super) fn add_to(
         &self,
         table: &mut Table,
         own: impl Fn(&str) -> Option<String>,
-        time: Option<&str>,
+        time: Option<TimeColumn<'_>>,
     ) -> Result<(), ImportError> {
-        let find = |name: &str| table.columns.iter().find(|column| column.name == name);
-        let Some(column) = own(&self.column).and_then(|name| find(&name)) else {
+        let Some(located) = self.located(&table.columns, own, time)? else {
             return Ok(());
         };
-        let Some(name) = own(&self.name).filter(|name| find(name).is_none()) else {
-            return Ok(());
-        };
-        let refuse = |reason: String| ImportError::Derived {
-            text: self.to_string(),
-            reason,
-        };
-        let numbers = |column: &Column| match &column.cells {
-            Cells::Numbers(_) if column.faults.count > 0 => Err(refuse(format!("'{}' has text", column.name))),
-            Cells::Numbers(numbers) => Ok(numbers.clone()),
-            Cells::Labels { .. } => Err(refuse(format!("'{}' is the group", column.name))),
-        };
-        let values = numbers(column)?;
-        let (references, unit) = match &self.reference {
-            Reference::Column(other) => {
-                let found = own(other).and_then(|name| find(&name));
-                let other = found.ok_or_else(|| refuse(format!("there is no column '{other}' in the same file")))?;
-                (numbers(other)?, other.unit.clone())
+        for place in located.columns() {
+            let column = &table.columns[place];
+            match &column.cells {
+                Cells::Numbers(_) if column.faults.count > 0 => {
+                    return Err(self.refused(format!("'{}' has text", column.name)));
+                }
+                Cells::Numbers(_) => {}
+                Cells::Labels { .. } => return Err(self.refused(format!("'{}' is the group", column.name))),
             }
-            Reference::Rows(rows) => (
-                vec![mean(&values[..values.len().min(*rows)]); values.len()],
-                column.unit.clone(),
-            ),
-            Reference::Seconds(limit_s) => {
-                let time = time.and_then(find);
-                let time =
-                    time.ok_or_else(|| refuse("seconds need the time column; give a number of rows".to_owned()))?;
-                let factor = seconds(time.unit.as_deref());
-                let factor = factor.ok_or_else(|| refuse(format!("'{}' has no unit of time", time.name)))?;
-                let times = numbers(time)?;
-                let start = times.iter().copied().fold(f64::INFINITY, f64::min);
-                let at_start = times.iter().zip(&values);
-                let at_start = at_start.filter(|(time, _)| factor * (**time - start) <= *limit_s);
-                let values_at_start = Vec::from_iter(at_start.map(|(_, value)| *value));
-                (vec![mean(&values_at_start); values.len()], column.unit.clone())
-            }
-        };
-        if references.iter().all(|reference| reference.is_nan()) {
-            return Err(refuse("no cell at the start is a number".to_owned()));
         }
-        let pairs = values.iter().zip(&references);
-        let derived = Vec::from_iter(pairs.map(|(value, reference)| {
-            let derived = match self.operator {
-                Operator::Minus => value - reference,
-                Operator::Over => value / reference,
-            };
-            // A quotient by zero is no number.
-            if derived.is_finite() { derived } else { f64::NAN }
-        }));
-        let is_same_unit = column.unit == unit;
-        let unit = match self.operator {
-            Operator::Minus => column.unit.clone().filter(|_| is_same_unit),
-            Operator::Over if is_same_unit => None,
-            Operator::Over => column
-                .unit
-                .as_ref()
-                .zip(unit.as_ref())
-                .map(|(one, other)| format!("{one}/{other}")),
-        };
+        let cell = |row: usize, column: usize| table.columns[column].cells.number(row);
+        let mean = located.mean_at_start(table.rows, cell);
+        if mean.is_some_and(f64::is_nan) {
+            return Err(self.refused(NOTHING_AT_START.to_owned()));
+        }
+        let of_row = |row| located.value(|column| cell(row, column), mean);
+        let derived = Vec::from_iter((0..table.rows).map(of_row));
         table.columns.push(Column {
-            name,
-            unit,
             missing: derived.iter().filter(|value| value.is_nan()).count(),
             cells: Cells::Numbers(derived),
             faults: Faults::default(),
-            ..Column::default()
+            ..located.column_of()
         });
         Ok(())
     }
+
+    pub(super) fn refused(&self, reason: String) -> ImportError {
+        ImportError::Derived {
+            text: self.to_string(),
+            reason,
+        }
+    }
 }
 
-/// Mean of the numbers that are not missing; NaN without any.
-fn mean(values: &[f64]) -> f64 {
-    let present = || values.iter().filter(|value| !value.is_nan());
-    present().sum::<f64>() / present().count() as f64
+/// Reason why there is no mean at the start.
+pub(super) const NOTHING_AT_START: &str = "no cell at the start is a number";
+
+/// Time column of a file.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct TimeColumn<'a> {
+    /// Name within the file.
+    pub(super) name: &'a str,
+    /// Unit given by the recipe instead of the header.
+    pub(super) given_unit: Option<&'a str>,
+}
+
+/// Derived column with the places of its columns in a table or in the lines of a stream.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct LocatedDerived {
+    name: String,
+    unit: Option<String>,
+    column: usize,
+    operator: Operator,
+    reference: LocatedReference,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum LocatedReference {
+    Column(usize),
+    Rows(usize),
+    Seconds { time: usize, unit_s: f64, limit_s: f64 },
+}
+
+impl LocatedDerived {
+    /// Name and unit of the new column, without cells.
+    pub(super) fn column_of(&self) -> Column {
+        Column {
+            name: self.name.clone(),
+            unit: self.unit.clone(),
+            ..Column::default()
+        }
+    }
+
+    /// Places of the columns from which it is computed.
+    pub(super) fn columns(&self) -> impl Iterator<Item = usize> + use<> {
+        let other = match self.reference {
+            LocatedReference::Column(other) => Some(other),
+            LocatedReference::Seconds { time, .. } => Some(time),
+            LocatedReference::Rows(_) => None,
+        };
+        std::iter::once(self.column).chain(other)
+    }
+
+    /// Returns `true` if `rows` rows are the whole start, or all of it and more; `cell` returns a cell by row and column.
+    pub(super) fn has_start(&self, rows: usize, cell: impl Fn(usize, usize) -> f64) -> bool {
+        match self.reference {
+            LocatedReference::Column(_) => true,
+            LocatedReference::Rows(needed) => rows >= needed,
+            LocatedReference::Seconds { time, unit_s, limit_s } => {
+                let elapsed = |row| unit_s * (cell(row, time) - cell(0, time));
+                rows > 0 && elapsed(rows - 1) > limit_s
+            }
+        }
+    }
+
+    /// Mean of its first column at the start of `rows` rows, NaN if no cell there is a number; `None` if it needs none. `cell`
+    /// returns a cell by row and column.
+    pub(super) fn mean_at_start(&self, rows: usize, cell: impl Fn(usize, usize) -> f64) -> Option<f64> {
+        let mean = |start: &mut dyn Iterator<Item = usize>| {
+            let present = start.map(|row| cell(row, self.column)).filter(|value| !value.is_nan());
+            let (sum, count) = present.fold((0.0, 0_u32), |(sum, count), value| (sum + value, count + 1));
+            sum / f64::from(count)
+        };
+        match self.reference {
+            LocatedReference::Column(_) => None,
+            LocatedReference::Rows(limit) => Some(mean(&mut (0..rows.min(limit)))),
+            LocatedReference::Seconds { time, unit_s, limit_s } => {
+                let first = (0..rows).map(|row| cell(row, time)).fold(f64::INFINITY, f64::min);
+                let is_at_start = |row: &usize| unit_s * (cell(*row, time) - first) <= limit_s;
+                Some(mean(&mut (0..rows).filter(is_at_start)))
+            }
+        }
+    }
+
+    /// Value in a row; NaN if it is no number, such as a quotient by zero. `cell` returns a cell of the row by column, and
+    /// `mean` is the mean at the start.
+    pub(super) fn value(&self, cell: impl Fn(usize) -> f64, mean: Option<f64>) -> f64 {
+        let reference = match self.reference {
+            LocatedReference::Column(other) => cell(other),
+            LocatedReference::Rows(_) | LocatedReference::Seconds { .. } => mean.unwrap_or(f64::NAN),
+        };
+        let value = match self.operator {
+            Operator::Minus => cell(self.column) - reference,
+            Operator::Over => cell(self.column) / reference,
+        };
+        if value.is_finite() { value } else { f64::NAN }
+    }
 }
 
 impl FromStr for Derived {

@@ -15,6 +15,7 @@ use super::{
     Cells, Cure, Derived, DialectChoice, Excess, FileSet, Format, ImportError, Joined, Missing, Recipe, Table,
     TableError, Watch, arrays,
     csv_table::{self, Reading},
+    derived::TimeColumn,
     format::Contents,
     input_lines::Watched,
     inputs::{ColumnId, Names},
@@ -178,6 +179,18 @@ impl Recipe {
         prefix: Option<&String>,
         watch: Watch<'_>,
     ) -> Result<(PathBuf, Table), ImportError> {
+        self.read_using(&[], folder, (number, file, prefix), watch)
+    }
+
+    /// As [`Self::read`] for the file with this number, path and prefix; columns or variables with the names `more` are used,
+    /// too.
+    pub(super) fn read_using(
+        &self,
+        more: &[String],
+        folder: &Path,
+        (number, file, prefix): (usize, &Path, Option<&String>),
+        watch: Watch<'_>,
+    ) -> Result<(PathBuf, Table), ImportError> {
         let own_name = |full: &str| match prefix {
             None => Some(full.trim().to_owned()),
             Some(stem) => full.trim().strip_prefix(stem)?.strip_prefix('.').map(str::to_owned),
@@ -193,7 +206,11 @@ impl Recipe {
         let path = folder.join(file);
         let columns = self.inputs.iter().chain(&self.targets);
         let columns = columns.chain(self.derive.iter().flat_map(Derived::columns));
-        let used = columns.chain(&self.time).chain(&self.group).chain(&self.row_wire);
+        let used = columns
+            .chain(&self.time)
+            .chain(&self.group)
+            .chain(&self.row_wire)
+            .chain(more);
         let reading = Reading {
             choice: self.dialect,
             missing,
@@ -205,8 +222,16 @@ impl Recipe {
             Some(joined) => joined.time.clone().or_else(|| self.time.clone()),
             None => self.time.clone(),
         };
+        let time = time.as_deref().map(|name| TimeColumn {
+            name,
+            given_unit: match prefix {
+                None => self.units.get(name),
+                Some(stem) => self.units.get(&format!("{stem}.{name}")),
+            }
+            .map(String::as_str),
+        });
         for derived in &self.derive {
-            derived.add_to(&mut table, own_name, time.as_deref())?;
+            derived.add_to(&mut table, own_name, time)?;
         }
         if number == 0 {
             table.stem = stem(file);

@@ -10,7 +10,10 @@ use decoupler_core::{
 };
 use thiserror::Error;
 
-use super::{InputColumns, InputError, OtherColumns, TableError};
+use super::{
+    Derived, InputColumns, InputError, OtherColumns, TableError,
+    derived_stream::{self, DerivedStream},
+};
 
 /// Parser of a stream of CSV lines with the inputs of a network. Columns are identified by a header or, without one, are
 /// the inputs in their order, after the number of the row-wire if each row-wire has a network.
@@ -18,6 +21,12 @@ use super::{InputColumns, InputError, OtherColumns, TableError};
 pub struct InputLines {
     inputs: Vec<Channel>,
     others: OtherColumns,
+    /// Columns computed from others.
+    derive: Vec<Derived>,
+    /// Channels by which a header is recognised: the inputs, and the columns from which derived inputs are computed.
+    read: Vec<Channel>,
+    /// The derived columns, once the columns of the lines are known.
+    derived: Option<DerivedStream>,
     /// State of the memory, if there is one.
     memory: Option<MemoryStream>,
     /// Row-wires of the networks, from 0, if each has one.
@@ -35,6 +44,11 @@ pub struct InputLines {
 pub enum InputLine<'a> {
     /// Header, or an empty line.
     NoReadings,
+    /// Line at the start of the stream, from which the mean of a derived column is computed: there are no inputs before that.
+    Start {
+        /// `true` for the first of them.
+        is_first: bool,
+    },
     /// Inputs of the network.
     Readings {
         /// Index of the network of its row-wire; 0 if there is one network.
@@ -65,6 +79,9 @@ pub enum InputLineError {
     /// A cell that is not a finite number.
     #[error("cell {0} is not a finite number")]
     NotFinite(usize),
+    /// A derived column without a value, such as a quotient by zero.
+    #[error("the derived column '{0}' has no value")]
+    NoValue(String),
     /// A row-wire without a network.
     #[error("there is no network for row {0}")]
     NoNetwork(f64),
@@ -82,8 +99,11 @@ impl InputLines {
     /// networks, from 0, if each row-wire has one.
     pub fn new(inputs: Vec<Channel>, others: OtherColumns, row_wires: Option<Vec<usize>>) -> Self {
         Self {
+            read: inputs.clone(),
             inputs,
             others,
+            derive: Vec::new(),
+            derived: None,
             memory: None,
             row_wires,
             fields: CsvFields::default(),
@@ -91,6 +111,23 @@ impl InputLines {
             cells: Vec::new(),
             readings: Vec::new(),
         }
+    }
+
+    /// Returns the parser with columns computed from others as in a file with the same lines. The first lines, from which means
+    /// at the start are computed, have no inputs.
+    #[must_use]
+    pub fn with_derived(self, derive: Vec<Derived>) -> Self {
+        let is_derived = |name: &String| derive.iter().any(|derived| derived.name == *name);
+        let inputs = self.inputs.iter().map(|input| &input.name);
+        let names = inputs.chain(derive.iter().flat_map(Derived::columns));
+        let mut read: Vec<Channel> = Vec::new();
+        for name in names.filter(|name| !is_derived(name)) {
+            if read.iter().all(|channel| channel.name != *name) {
+                let (name, unit) = (name.clone(), None);
+                read.push(Channel { name, unit });
+            }
+        }
+        Self { read, derive, ..self }
     }
 
     /// Returns the parser with a memory, whose state continues from `memory`: it has one state for each network.
@@ -123,53 +160,110 @@ impl InputLines {
                 .iter()
                 .map(|field| String::from_utf8_lossy(field).into_owned())
                 .collect();
-            if InputColumns::is_header(&cells, &self.inputs, line == 1) {
-                let columns = InputColumns::of_header(&cells, &self.inputs, &self.others);
-                self.columns = Some(columns.map_err(InputLineError::Header)?);
+            if InputColumns::is_header(&cells, &self.read, line == 1) {
+                self.find_columns(&cells).map_err(InputLineError::Header)?;
                 return Ok(InputLine::NoReadings);
             }
         }
-        let has_rows = self.row_wires.is_some();
-        let columns = match &self.columns {
-            Some(columns) => columns,
-            None => {
-                let columns = InputColumns::unnamed(self.cells.len(), &self.inputs, &self.others, has_rows);
-                self.columns.insert(columns.map_err(InputLineError::Unnamed)?)
-            }
+        if self.columns.is_none() {
+            self.find_columns(&[]).map_err(InputLineError::Unnamed)?;
+        }
+        let Some(columns) = &self.columns else {
+            return Ok(InputLine::NoReadings);
         };
-        if self.cells.len() != columns.width {
-            let (found, expected) = (self.cells.len(), columns.width);
+        let width = columns.width;
+        if self.cells.len() != width {
+            let (found, expected) = (self.cells.len(), width);
             return Err(InputLineError::Cells { found, expected });
         }
-        let used = columns
-            .inputs
-            .iter()
-            .chain(columns.row_wire.iter().filter(|_| has_rows));
-        if let Some(column) = used.copied().find(|&column| !self.cells[column].is_finite()) {
+        let has_rows = self.row_wires.is_some();
+        let rows = columns.row_wire.into_iter().filter(|_| has_rows);
+        let read = columns.inputs.iter().copied().filter(|&column| column < width);
+        let needed = self.derived.iter().flat_map(|derived| derived.needed(width));
+        if let Some(column) = read
+            .chain(rows)
+            .chain(needed)
+            .find(|&column| !self.cells[column].is_finite())
+        {
             return Err(InputLineError::NotFinite(column + 1));
         }
-        let row_index = match (&self.row_wires, columns.row_wire) {
-            (None, _) => 0,
+        let row_index = self.row_index(columns, &self.cells)?;
+        if let Some(derived) = &mut self.derived {
+            let taken = derived.take(&mut self.cells);
+            match taken.map_err(|error| InputLineError::Header(InputError::Derived(error.to_string())))? {
+                derived_stream::Progress::Start { is_first } => return Ok(InputLine::Start { is_first }),
+                derived_stream::Progress::Complete(start) => self.remember(&start),
+            }
+        }
+        let (Some(columns), derived) = (&self.columns, &self.derived) else {
+            return Ok(InputLine::NoReadings);
+        };
+        if let Some(column) = columns.inputs.iter().find(|&&column| !self.cells[column].is_finite()) {
+            let name = derived.as_ref().map_or("", |derived| derived.name(column - width));
+            return Err(InputLineError::NoValue(name.to_owned()));
+        }
+        columns.gather(&self.cells, &mut self.readings);
+        let readings = match &mut self.memory {
+            None => &self.readings,
+            Some(memory) => memory.step(row_index, &self.readings, columns.time_s(&self.cells)),
+        };
+        Ok(InputLine::Readings { row_index, readings })
+    }
+
+    /// Takes the lines of the start into the memory; those without all inputs are no samples.
+    fn remember(&mut self, start: &[Vec<f64>]) {
+        let (Some(columns), Some(mut memory)) = (&self.columns, self.memory.take()) else {
+            return;
+        };
+        for cells in start {
+            columns.gather(cells, &mut self.readings);
+            if let (true, Ok(row_index)) = (
+                self.readings.iter().all(|reading| reading.is_finite()),
+                self.row_index(columns, cells),
+            ) {
+                memory.step(row_index, &self.readings, columns.time_s(cells));
+            }
+        }
+        self.memory = Some(memory);
+    }
+
+    /// Index of the network of a line.
+    fn row_index(&self, columns: &InputColumns, cells: &[f64]) -> Result<usize, InputLineError> {
+        match (&self.row_wires, columns.row_wire) {
+            (None, _) => Ok(0),
             (Some(read), Some(column)) => {
-                let row = self.cells[column];
+                let row = cells[column];
                 let index = read.iter().position(|read| (*read + 1) as f64 == row);
-                index.ok_or(InputLineError::NoNetwork(row))?
+                index.ok_or(InputLineError::NoNetwork(row))
             }
             (Some(_), None) => {
                 let name = self.others.row_wire.clone().unwrap_or_else(|| "row".to_owned());
                 let near = "each row-wire has its own network, which is selected by this column".to_owned();
-                return Err(InputLineError::Header(InputError::Missing { name, near }));
+                Err(InputLineError::Header(InputError::Missing { name, near }))
             }
+        }
+    }
+
+    /// Finds the inputs in the cells of a header; it is empty for lines without one.
+    fn find_columns(&mut self, header: &[String]) -> Result<(), InputError> {
+        let has_rows = self.row_wires.is_some();
+        let width = self.cells.len();
+        let (columns, derived) = if self.derive.is_empty() {
+            let columns = match header {
+                [] => InputColumns::unnamed(width, &self.inputs, &self.others, has_rows)?,
+                header => InputColumns::of_header(header, &self.inputs, &self.others)?,
+            };
+            (columns, None)
+        } else {
+            // Derived columns have names.
+            let found = InputColumns::with_derived(header, width, &self.inputs, &self.others, &self.derive)?;
+            (found.0, Some(found.1))
         };
-        self.readings.clear();
-        self.readings
-            .extend(columns.inputs.iter().map(|&column| self.cells[column]));
-        let time_s = columns.time.map(|time| time.unit_s * self.cells[time.column]);
-        let readings = match &mut self.memory {
-            None => &self.readings,
-            Some(memory) => memory.step(row_index, &self.readings, time_s.filter(|time_s| time_s.is_finite())),
-        };
-        Ok(InputLine::Readings { row_index, readings })
+        // The header of a device that starts again does not begin another start.
+        if self.columns.as_ref() != Some(&columns) {
+            (self.columns, self.derived) = (Some(columns), derived);
+        }
+        Ok(())
     }
 }
 

@@ -8,7 +8,10 @@ use decoupler_core::{
 use ndarray::Array2;
 use thiserror::Error;
 
-use super::{Column, ImportError, Recipe, Table, TableError, Watch, csv_table::named, table::name_and_unit};
+use super::{
+    Column, Derived, ImportError, Recipe, Table, TableError, Watch, csv_table::named, derived::TimeColumn,
+    derived_stream::DerivedStream, table::name_and_unit,
+};
 
 /// Inputs of a network, read from a file.
 #[derive(Clone, Debug)]
@@ -60,7 +63,7 @@ pub struct InputTime {
 pub struct OtherColumns {
     /// Column of row-wires.
     pub row_wire: Option<String>,
-    /// Time column, which a memory needs.
+    /// Time column, which a memory and derived columns need.
     pub time: Option<String>,
     /// Unit of the times, if the header does not give it.
     pub time_unit: Option<String>,
@@ -88,6 +91,9 @@ pub enum InputError {
         /// Unit of the input.
         expected: String,
     },
+    /// A derived column cannot be computed.
+    #[error("{0}")]
+    Derived(String),
     /// There is no header, and the number of columns is wrong.
     #[error("{found} cells where {expected} are needed; give the inputs of the network in their order, or a header")]
     Count {
@@ -105,6 +111,29 @@ impl InputColumns {
     /// If an input has no column of its name, or a column with a different unit.
     pub fn of_header(header: &[String], inputs: &[Channel], others: &OtherColumns) -> Result<Self, InputError> {
         Self::find(&named(header, header.len()), inputs, others)
+    }
+
+    /// Finds the inputs among `width` columns with these names, or without names, and those of `derive`, whose cells follow
+    /// those of a line.
+    ///
+    /// # Errors
+    /// If an input has no column of its name, or a derived column cannot be computed from the others.
+    pub(super) fn with_derived(
+        header: &[String],
+        width: usize,
+        inputs: &[Channel],
+        others: &OtherColumns,
+        derive: &[Derived],
+    ) -> Result<(Self, DerivedStream), InputError> {
+        let mut columns = named(header, width);
+        let time = others.time.as_deref().map(|name| TimeColumn {
+            name,
+            given_unit: others.time_unit.as_deref(),
+        });
+        let derived =
+            DerivedStream::new(derive, &mut columns, time).map_err(|error| InputError::Derived(error.to_string()))?;
+        let found = Self::find(&columns, inputs, others)?;
+        Ok((Self { width, ..found }, derived))
     }
 
     /// Finds the inputs among `width` columns without names, which are called c1, c2, … as in a recording without a header. If
@@ -150,6 +179,18 @@ impl InputColumns {
         has_all
             || (names > 0 && texts > 0)
             || (texts == cells.len() && texts >= inputs.len() && (texts > 1 || is_first_line))
+    }
+
+    /// Replaces `readings` by the inputs of a line.
+    pub(super) fn gather(&self, cells: &[f64], readings: &mut Vec<f64>) {
+        readings.clear();
+        readings.extend(self.inputs.iter().map(|&column| cells[column]));
+    }
+
+    /// Time of a line in seconds; `None` without a time.
+    pub(super) fn time_s(&self, cells: &[f64]) -> Option<f64> {
+        let time_s = self.time.map(|time| time.unit_s * cells[time.column]);
+        time_s.filter(|time_s| time_s.is_finite())
     }
 
     fn find(columns: &[Column], inputs: &[Channel], others: &OtherColumns) -> Result<Self, InputError> {
@@ -292,9 +333,11 @@ impl Recipe {
         })
     }
 
-    /// Names of the columns that contain no inputs of a network of `problem`; times are used by a memory only.
+    /// Names of the columns that contain no inputs of a network of `problem`; times are used only by a memory and by derived
+    /// columns.
     pub fn other_columns(&self, problem: &Problem) -> OtherColumns {
-        let time = self.time.clone().filter(|_| problem.memory.is_some());
+        let needs_time = problem.memory.is_some() || self.derive.iter().any(Derived::needs_time);
+        let time = self.time.clone().filter(|_| needs_time);
         OtherColumns {
             row_wire: self.row_wire.clone(),
             time_unit: time.as_ref().and_then(|time| self.units.get(time).cloned()),

@@ -6,7 +6,7 @@ use std::{
 use serde::Serialize;
 
 use super::{
-    Cells, Column, DialectChoice, Format, ImportError, Meaning, Recipe, Table, Watch,
+    Cells, Column, DialectChoice, Format, ImportError, Meaning, Recipe, Table, Variable, Watch,
     inputs::{ColumnId, Names},
     join::median_interval,
     read_table,
@@ -25,6 +25,9 @@ pub struct Inspection {
     pub rows: usize,
     /// Columns.
     pub columns: Vec<ColumnSummary>,
+    /// Named arrays of numbers in the file, such as the variables of a workspace.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub variables: Vec<Variable>,
     /// Intervals of the time column, if there is one.
     pub time: Option<TimeSummary>,
     /// Warnings for the user.
@@ -143,6 +146,7 @@ impl Inspection {
         Ok(Self {
             rows: table.rows,
             columns,
+            variables: table.variables.clone(),
             time,
             warnings,
         })
@@ -295,11 +299,17 @@ impl InspectedFile {
 }
 
 impl Recipe {
-    /// Reads the files, whose paths are relative to `folder`, and summarises each column; the recipe need not be complete.
+    /// Reads the files, whose paths are relative to `folder`, and summarises each column; the recipe need not be complete. The
+    /// rows of `variables`, with their full names, are samples, as are those of the variables whose columns the recipe uses.
     ///
     /// # Errors
     /// If a file cannot be read, the recipe names a column that does not exist, or `watch` breaks.
-    pub fn inspect(&self, folder: &Path, watch: Watch<'_>) -> Result<Vec<InspectedFile>, ImportError> {
+    pub fn inspect(
+        &self,
+        folder: &Path,
+        variables: &[String],
+        watch: Watch<'_>,
+    ) -> Result<Vec<InspectedFile>, ImportError> {
         // Group labels are summarised like any other cells.
         let plain = Self {
             group: None,
@@ -315,7 +325,7 @@ impl Recipe {
         );
         let (mut tables, mut inspected) = (Vec::new(), Vec::new());
         for (number, (path, stem)) in files.enumerate() {
-            let (_, mut table) = plain.read(folder, number, path, stem, watch)?;
+            let (_, mut table) = plain.read_using(variables, folder, (number, path, stem), watch)?;
             inspected.push(InspectedFile {
                 path: path.clone(),
                 stem: stem.cloned(),

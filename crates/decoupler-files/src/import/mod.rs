@@ -12,6 +12,7 @@ mod arrays;
 mod choosing;
 mod csv_table;
 mod derived;
+mod derived_stream;
 mod detection;
 mod dialect;
 mod error;
@@ -53,4 +54,4 @@ pub use recipe::{FileChecksum, FileSet, Joined, Recipe, Recorded, file_crc32, st
 pub use sentinel::Sentinel;
 pub use setup::{Recordings, Setup, SetupError, SetupSets};
 pub use suggestion::{Meaning, suggested_plan, suggested_plan_in_order};
-pub use table::{Cells, Column, Excess, Fault, Faults, Table};
+pub use table::{Cells, Column, Excess, Fault, Faults, Table, Variable};

@@ -1,6 +1,8 @@
-use std::{collections::HashMap, path::Path};
+use std::{collections::HashMap, ops::Range, path::Path};
 
 use decoupler_core::text::clean_name;
+
+use serde::Serialize;
 
 use super::{Dialect, Format, time_stamp::TimeStamp};
 
@@ -11,6 +13,8 @@ pub struct Table {
     pub stem: String,
     /// Columns.
     pub columns: Vec<Column>,
+    /// Named arrays of numbers in the file, such as the variables of a workspace; none in other formats.
+    pub variables: Vec<Variable>,
     /// Number of rows.
     pub rows: usize,
     /// Format of the file.
@@ -22,6 +26,17 @@ pub struct Table {
     /// Rows that end before the last column; their other cells are missing.
     pub too_short: Excess,
     pub(super) lines: Lines,
+}
+
+/// Named array of numbers in a file.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct Variable {
+    /// Name.
+    pub name: String,
+    /// Shape in the file, as text: `2000 × 3`.
+    pub shape: String,
+    /// Indices of its columns; empty if it is left out, because its rows are not those of the samples.
+    pub columns: Range<usize>,
 }
 
 /// Rows of unusual length.

@@ -24,7 +24,7 @@ fn guessed(files: &[(&str, &str)]) -> Plan {
     };
     suggested_plan(
         &recipe
-            .inspect(folder.path(), &mut |_| ControlFlow::Continue(()))
+            .inspect(folder.path(), &[], &mut |_| ControlFlow::Continue(()))
             .unwrap(),
     )
 }
@@ -189,7 +189,7 @@ fn a_recipe_is_inspected_with_its_own_meanings_and_missing_cells() {
         ..Recipe::default()
     };
     let files = recipe
-        .inspect(folder.path(), &mut |_| ControlFlow::Continue(()))
+        .inspect(folder.path(), &[], &mut |_| ControlFlow::Continue(()))
         .unwrap();
     assert_eq!(
         files[0].meanings,
@@ -208,7 +208,7 @@ fn a_recipe_is_inspected_with_its_own_meanings_and_missing_cells() {
         ..recipe
     };
     let error = wrong
-        .inspect(folder.path(), &mut |_| ControlFlow::Continue(()))
+        .inspect(folder.path(), &[], &mut |_| ControlFlow::Continue(()))
         .unwrap_err()
         .to_string();
     assert!(error.contains("b.force"), "{error}");

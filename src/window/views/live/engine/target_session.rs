@@ -316,7 +316,7 @@ impl TargetLines {
             Err(next) => return next,
         };
         match self.parser.parse(number, text) {
-            Ok(InputLine::NoReadings) => Next::Nothing,
+            Ok(InputLine::NoReadings | InputLine::Start { .. }) => Next::Nothing,
             Ok(InputLine::Readings { row_index, readings }) => {
                 sample[0] = row_index as f64;
                 sample[1..].copy_from_slice(readings);

@@ -1,15 +1,17 @@
 //! The configuration form, with a short summary of each folded part.
 
 use decoupler_core::{
-    evaluation::{Measured, Outlook, Preset, RunSettings, SimulatedSettings, Simulation, auto::AutoRecord},
+    evaluation::{Measured, Outlook, Preset, RunSettings, SimulatedSettings, Simulation},
     network::{InputChoice, Quantity, ScalingChoice, Shape},
     scene::{Loading, Movement, RowModel, Rows, Scene},
     sensor::{Geometry, SensorModel},
     text::counted,
     training::{StoppingRules, TrainingSettings},
 };
+use decoupler_files::import::Setup;
 use eframe::egui::{RichText, Ui};
 
+use super::automatic::{automatic_choice_ui, chosen_inputs_ui, chosen_network_ui, chosen_training_ui};
 use super::scene_section::{
     array_choice_ui, hidden_choice_ui, outlook_notes_ui, recorded_workload_ui, samples_section_ui, scene_choice_ui,
     scene_section_ui, workload_ui,
@@ -134,44 +136,50 @@ fn recording_ui(ui: &mut Ui, recording: &mut RecordingEditor, shared: &Shared, e
     recording.columns_button_ui(ui, shared);
     ui.add_space(space(2));
     ui.separator();
-    ui.add_enabled_ui(!is_busy, |ui| {
-        let mut is_auto = shared.recording.is_auto;
-        let hint = glossary::AUTO.hint;
-        if ui
-            .checkbox(&mut is_auto, "Choose settings automatically")
-            .on_hover_text(hint)
-            .changed()
-        {
-            effects.push(Effect::ChooseAutomatically(is_auto));
+    let has_one_network = settings.source.row_model() == RowModel::Shared;
+    automatic_choice_ui(ui, shared, has_one_network, effects);
+    let is_automatic = shared.recording.is_automatic();
+    let chosen = shared.chosen_run().map(|run| &run.setup);
+    if is_automatic {
+        chosen_network_ui(ui, chosen);
+    } else {
+        ui.add_enabled_ui(!is_busy, |ui| {
+            hidden_choice_ui(ui, &mut settings.hidden, recording.channels())
+        });
+        recorded_method_ui(ui, &mut settings, shared.phase);
+        if let Some(size) = recording.training_size(&settings) {
+            recorded_workload_ui(ui, &settings, size);
         }
-        if shared.recording.is_auto {
-            dim_ui(ui, &automatic_note(shared));
-        }
-        hidden_choice_ui(ui, &mut settings.hidden, recording.channels());
-    });
-    let before = settings;
-    method_ui(ui, &mut settings, shared.phase);
-    if settings.training.method.short_name() != before.training.method.short_name() {
-        let chosen = std::mem::replace(&mut settings, before).training.method;
-        settings.choose_method(chosen);
-    }
-    if !shared.recording.is_auto
-        && let Some(size) = recording.training_size(&settings)
-    {
-        recorded_workload_ui(ui, &settings, size);
     }
     Landmark::Choices.stands_at(ui, ui.min_rect().with_min_y(top));
     ui.add_space(space(2));
     ui.separator();
     ui.add_enabled_ui(!is_busy, |ui| {
-        recording.folds_ui(ui, &mut settings, effects);
-        fold_ui(ui, "Network inputs", &of_inputs(&settings.inputs), |ui| {
-            let has_row_wires = recording.has_row_wires();
-            recording_inputs_ui(ui, &mut settings, recording.channels(), has_row_wires);
+        recording.folds_ui(ui, &mut settings, shared, effects);
+        let summary = match (is_automatic, chosen) {
+            (false, _) => of_inputs(&settings.inputs),
+            (true, Some(chosen)) => of_inputs(&chosen.settings().inputs),
+            (true, None) => "automatic".to_owned(),
+        };
+        fold_ui(ui, "Network inputs", &summary, |ui| {
+            if is_automatic {
+                chosen_inputs_ui(ui, chosen.map(Setup::settings));
+            } else {
+                scaling_ui(ui, &mut settings.inputs.scaling);
+            }
+            recording_rows_ui(ui, &mut settings, recording.has_row_wires());
+            let is_one = settings.source.row_model() == RowModel::Shared;
+            if let (false, true, Some(channels)) = (is_automatic, is_one, recording.channels()) {
+                weights_ui(ui, &settings, channels, 1);
+            }
         });
     });
-    let rules = StoppingRules::recorded(&settings.training.method);
-    training_ui(ui, &mut settings, rules, shared.phase);
+    if is_automatic {
+        chosen_training_ui(ui, chosen.map(Setup::settings));
+    } else {
+        let rules = StoppingRules::recorded(&settings.training.method);
+        training_ui(ui, &mut settings, rules, shared.phase);
+    }
     let usual = RunSettings::from(Measured { rows: RowModel::Shared });
     let hint = "Bayesian regularisation for recordings, 12 hidden nodes, 300 epochs";
     reset_ui(ui, "Reset to the default settings", hint, &mut settings, usual, is_busy);
@@ -180,12 +188,13 @@ fn recording_ui(ui: &mut Ui, recording: &mut RecordingEditor, shared: &Shared, e
     }
 }
 
-/// Returns what takes the place of the settings below while they are chosen automatically.
-fn automatic_note(shared: &Shared) -> String {
-    let search = shared.run.as_ref().and_then(|run| run.search.as_ref());
-    match search.and_then(AutoRecord::choice) {
-        Some(choice) => format!("Chosen: {}; {}.", choice.model(), choice.features()),
-        None => "Train tries several settings and keeps the best instead of those below.".to_owned(),
+/// The method of a recording; another one comes with the settings that suit recordings.
+fn recorded_method_ui(ui: &mut Ui, settings: &mut RunSettings, phase: Phase) {
+    let before = *settings;
+    method_ui(ui, settings, phase);
+    if settings.training.method.short_name() != before.training.method.short_name() {
+        let chosen = std::mem::replace(settings, before).training.method;
+        settings.choose_method(chosen);
     }
 }
 
@@ -485,31 +494,23 @@ pub fn array_inputs_ui(ui: &mut Ui, draft: &mut SimulatedSettings) {
     weights_ui(ui, draft, channels, size.networks);
 }
 
-/// The inputs of the network of a recording with these numbers of inputs and targets, and its size; changes `settings`. One
-/// network per row-wire is offered if a column contains the row numbers.
-pub fn recording_inputs_ui(
-    ui: &mut Ui,
-    settings: &mut RunSettings,
-    channels: Option<(usize, usize)>,
-    has_row_wires: bool,
-) {
-    scaling_ui(ui, &mut settings.inputs.scaling);
-    let rows = settings.source.row_model();
-    if has_row_wires {
-        let options = [
-            (RowModel::Shared, "All", "One network for all row-wires."),
-            (
-                RowModel::Each,
-                "Known",
-                "One network per row-wire, for electronics that know which row they address.",
-            ),
-        ];
-        if let Some(rows) = options_ui(ui, "Rows", glossary::ROWS.hint, &options, rows) {
-            settings.source = Measured { rows }.into();
-        }
+/// The row model of a recording: one network per row-wire is offered if a column contains the row numbers. Changes
+/// `settings`.
+fn recording_rows_ui(ui: &mut Ui, settings: &mut RunSettings, has_row_wires: bool) {
+    if !has_row_wires {
+        return;
     }
-    if let (Some(channels), RowModel::Shared) = (channels, rows) {
-        weights_ui(ui, settings, channels, 1);
+    let options = [
+        (RowModel::Shared, "All", "One network for all row-wires."),
+        (
+            RowModel::Each,
+            "Known",
+            "One network per row-wire, for electronics that know which row they address.",
+        ),
+    ];
+    let rows = settings.source.row_model();
+    if let Some(rows) = options_ui(ui, "Rows", glossary::ROWS.hint, &options, rows) {
+        settings.source = Measured { rows }.into();
     }
 }
 

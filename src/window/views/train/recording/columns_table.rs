@@ -7,7 +7,7 @@ use std::{cell::Cell, rc::Rc};
 use decoupler_files::{
     export::format_number,
     figure::tick_text,
-    import::{ColumnKind, ColumnSummary, InspectedFile, Meaning},
+    import::{ColumnKind, ColumnSummary, InspectedFile, Meaning, Variable},
 };
 use eframe::egui::{
     Color32, ComboBox, FontId, Label, Rect, Response, RichText, Sense, TextEdit, Ui, WidgetInfo, accesskit::Role, pos2,
@@ -40,6 +40,7 @@ const COLUMNS: [TableColumn<'_>; 7] = [
 #[derive(Clone, Copy)]
 enum Line {
     File(usize),
+    Variable(usize, usize),
     Column(usize, usize),
 }
 
@@ -47,6 +48,7 @@ enum Line {
 enum Change {
     Meaning(usize, usize, Meaning),
     All(usize, Meaning),
+    Variable(usize, usize, Meaning),
     Unit(usize, usize, String),
 }
 
@@ -60,6 +62,11 @@ impl RecordingEditor {
             None => return,
             Some(Change::Meaning(file, column, meaning)) => draft.choose(file, column, meaning),
             Some(Change::All(file, meaning)) => draft.choose_all(file, meaning),
+            Some(Change::Variable(file, variable, meaning)) => {
+                if draft.choose_variable(file, variable, meaning) {
+                    self.read_again();
+                }
+            }
             Some(Change::Unit(file, column, unit)) => draft.set_unit(file, column, &unit),
         }
         ui.request_repaint();
@@ -67,10 +74,8 @@ impl RecordingEditor {
 }
 
 fn table_ui(ui: &mut Ui, draft: &Draft) -> Option<Change> {
-    let of_file = |(file, inspected): (usize, &InspectedFile)| {
-        let columns = (0..inspected.meanings.len()).map(move |column| Line::Column(file, column));
-        std::iter::once(Line::File(file)).chain(columns)
-    };
+    let of_file =
+        |(file, inspected): (usize, &InspectedFile)| std::iter::once(Line::File(file)).chain(lines_of(file, inspected));
     let lines: Vec<Line> = draft.files.iter().enumerate().flat_map(of_file).collect();
     let palette = Theme::of(ui).palette;
     let change = Cell::new(None);
@@ -81,11 +86,76 @@ fn table_ui(ui: &mut Ui, draft: &Draft) -> Option<Change> {
     };
     let row = |place: usize| match lines[place] {
         Line::File(file) => file_row(draft, file, &palette, &request),
+        Line::Variable(file, variable) => variable_row(draft, (file, variable), &palette, &request),
         Line::Column(file, column) => column_row(draft, (file, column), &palette, &request),
     };
     let table = TableView::new("columns", &COLUMNS).row_height(ROW_HEIGHT);
     table.show(ui, lines.len(), row);
     change.take()
+}
+
+/// Lines of the columns of a file; those of a variable follow its heading, which a variable with one column does not need.
+fn lines_of(file: usize, inspected: &InspectedFile) -> Vec<Line> {
+    let variables = &inspected.inspection.variables;
+    let mut lines = Vec::new();
+    for column in 0..inspected.meanings.len() {
+        let starts =
+            |(_, variable): &(usize, &Variable)| variable.columns.start == column && variable.columns.len() > 1;
+        lines.extend(
+            variables
+                .iter()
+                .enumerate()
+                .find(starts)
+                .map(|(place, _)| Line::Variable(file, place)),
+        );
+        lines.push(Line::Column(file, column));
+    }
+    let left_out = variables
+        .iter()
+        .enumerate()
+        .filter(|(_, variable)| variable.columns.is_empty());
+    lines.extend(left_out.map(|(place, _)| Line::Variable(file, place)));
+    lines
+}
+
+/// The heading of a variable with its shape and a choice for all of its columns. Choosing one that is left out makes its rows
+/// the samples.
+fn variable_row<'a>(
+    draft: &'a Draft,
+    (file, variable): (usize, usize),
+    palette: &Palette,
+    request: &'a dyn Fn(Option<Change>),
+) -> TableRow<'a> {
+    let inspected = &draft.files[file];
+    let Variable { name, shape, columns } = &inspected.inspection.variables[variable];
+    let is_left_out = columns.is_empty();
+    let of_all = move |ui: &mut Ui| {
+        let label = format!("Meaning of variable {name}");
+        let combo = ComboBox::from_id_salt(("variable", file, variable))
+            .selected_text(if is_left_out { "left out" } else { "set all…" })
+            .width(MEANING_WIDTH - space(3));
+        let shown = combo.show_ui(ui, |ui| {
+            for meaning in [Meaning::Input, Meaning::Target, Meaning::Unused] {
+                let is_offered = meaning != Meaning::Unused || !is_left_out;
+                if is_offered && ui.selectable_label(false, format!("all {meaning}")).clicked() {
+                    request(Some(Change::Variable(file, variable, meaning)));
+                }
+            }
+        });
+        let response = shown.response;
+        response.widget_info(|| WidgetInfo::labeled(Role::ComboBox, true, &label));
+        if is_left_out {
+            let rows = inspected.inspection.rows;
+            response.on_hover_text(format!(
+                "Left out, because a sample is one of {rows} rows. Choose its meaning to make its rows the samples."
+            ));
+        }
+    };
+    let colour = if is_left_out { palette.dim } else { palette.text };
+    let mut cells = vec![TableCell::new(name.clone()).colour(colour), TableCell::controls(of_all)];
+    cells.extend((0..4).map(|_| TableCell::default()));
+    cells.push(TableCell::new(shape.clone()).colour(palette.dim));
+    TableRow::new(cells)
 }
 
 /// The heading of a file, with a choice for all of its columns.

@@ -3,12 +3,15 @@
 use std::{
     cell::RefCell,
     collections::BTreeMap,
+    ops::Range,
     path::{Path, PathBuf},
     sync::Arc,
 };
 
 use decoupler_core::dataset::{Memory, Span, SpanError, SplitBy};
-use decoupler_files::import::{Condition, FileSet, InspectedFile, Joined, Meaning, Missing, Plan, TestFiles};
+use decoupler_files::import::{
+    Condition, Derived, FileSet, ImportError, InspectedFile, Joined, Meaning, Missing, Plan, Recipe, TestFiles,
+};
 
 use super::columns_card::Renaming;
 
@@ -28,6 +31,11 @@ pub(super) struct Draft {
     pub(super) missing: String,
     /// Inputs from the past, as typed.
     pub(super) memory: MemoryTexts,
+    /// Columns computed from others, as typed, with commas between them.
+    pub(super) derived: String,
+    /// Variables of files with several, such as workspaces, whose rows are the samples, each with the meaning that its columns
+    /// get.
+    pub(super) variables: BTreeMap<PathBuf, (String, Meaning)>,
     /// Meanings chosen by the user or a recipe, including columns hidden by the current layout.
     chosen: BTreeMap<ColumnKey, Meaning>,
     /// Units given by the user or a recipe, likewise.
@@ -49,6 +57,7 @@ impl Draft {
         let import = &mut plan.import;
         let (conditions, missing) = (joined(&import.conditions, " and "), joined(&import.missing, ", "));
         let memory = MemoryTexts::from(&import.memory.take().unwrap_or_default());
+        let derived = joined(&import.derive, ", ");
         let mut units = BTreeMap::new();
         for file in &files {
             for (column, summary) in file.inspection.columns.iter().enumerate() {
@@ -69,6 +78,8 @@ impl Draft {
             conditions,
             missing,
             memory,
+            derived,
+            variables: BTreeMap::new(),
             tests: paths.zip(of_tests).collect(),
             more_tests,
             files,
@@ -104,6 +115,8 @@ impl Draft {
         self.conditions = renaming.conditions(&older.conditions);
         self.missing = renaming.missing(&older.missing);
         self.memory.clone_from(&older.memory);
+        self.derived.clone_from(&older.derived);
+        self.variables.clone_from(&older.variables);
         for (name, unit) in &older.plan.import.units {
             self.plan
                 .import
@@ -135,10 +148,59 @@ impl Draft {
                 self.give(file, column, *meaning);
             }
         }
+        for (path, (name, meaning)) in &older.variables {
+            if older
+                .variable_columns(path, name)
+                .is_none_or(|columns| columns.is_empty())
+            {
+                self.give_variable(path, name, *meaning);
+            }
+        }
         self.plan.division = older.plan.division;
         self.split = older.split;
         self.settle_split();
         self
+    }
+
+    /// Columns of a variable of a file; `None` if the file does not have it.
+    fn variable_columns(&self, path: &Path, name: &str) -> Option<Range<usize>> {
+        let file = self.files.iter().find(|file| file.path == path)?;
+        let mut variables = file.inspection.variables.iter();
+        Some(variables.find(|variable| variable.name == name)?.columns.clone())
+    }
+
+    fn give_variable(&mut self, path: &Path, name: &str, meaning: Meaning) {
+        let file = self.files.iter().position(|file| file.path == path);
+        if let (Some(file), Some(columns)) = (file, self.variable_columns(path, name)) {
+            columns.for_each(|column| self.choose(file, column, meaning));
+        }
+    }
+
+    /// Gives the columns of a variable this meaning. Returns true if the file must be read again, because its rows become the
+    /// samples.
+    pub(super) fn choose_variable(&mut self, file: usize, variable: usize, meaning: Meaning) -> bool {
+        let path = self.files[file].path.clone();
+        let name = self.files[file].inspection.variables[variable].name.clone();
+        let is_left_out = self.files[file].inspection.variables[variable].columns.is_empty();
+        if is_left_out {
+            self.variables.insert(path, (name, meaning));
+        } else {
+            self.give_variable(&path, &name, meaning);
+        }
+        is_left_out
+    }
+
+    /// Full names of the variables whose rows are the samples, if files are read in this order with these stems.
+    pub(super) fn variable_names(&self, recipe: &Recipe) -> Vec<String> {
+        let stems = recipe.stems();
+        let joined = recipe.join.iter().zip(&stems);
+        let files =
+            std::iter::once((&recipe.data, None)).chain(joined.map(|(joined, stem)| (&joined.file, Some(stem))));
+        let named = files.filter_map(|(path, stem)| {
+            let (name, _) = self.variables.get(path)?;
+            Some(stem.map_or_else(|| name.clone(), |stem| format!("{stem}.{name}")))
+        });
+        named.collect()
     }
 
     /// Gives a column a meaning; if only one column can have it, the previous one loses it.
@@ -490,6 +552,17 @@ fn time(file: &InspectedFile) -> Option<String> {
 pub(super) fn missing(text: &str) -> Vec<Missing> {
     let texts = text.split(',').map(str::trim).filter(|text| !text.is_empty());
     texts.map(|text| Missing::from(text.to_owned())).collect()
+}
+
+/// Returns the columns computed from others in a text with commas between them.
+///
+/// # Errors
+/// If one of them cannot be understood; the message says what to write.
+pub(super) fn derived(text: &str) -> Result<Vec<Derived>, String> {
+    let texts = text.split(',').map(str::trim).filter(|text| !text.is_empty());
+    texts
+        .map(|text| text.parse().map_err(|error: ImportError| error.to_string()))
+        .collect()
 }
 
 /// The items as typed.

@@ -6,13 +6,13 @@ use eframe::egui::{Id, Response, TextEdit, Ui, WidgetInfo, accesskit::Role};
 
 use super::{
     columns_card::bias,
-    draft::{Draft, MemoryTexts, file_name, missing, spans},
+    draft::{Draft, MemoryTexts, derived, file_name, joined, missing, spans},
     editor::RecordingEditor,
     files_section::FILES,
 };
 use crate::window::{
     glossary,
-    shared::{Effect, FileTask, FileWords},
+    shared::{Effect, FileTask, FileWords, Shared},
     widgets::{
         dim_ui,
         fields::{count_ui, input_text, list_ui, options_ui, percent_ui, quantity_ui, seed_ui},
@@ -206,7 +206,7 @@ const TEST_FILES: FileWords = FileWords {
 
 impl RecordingEditor {
     /// Shows the folded parts of the import; changes the seed of `settings`.
-    pub fn folds_ui(&mut self, ui: &mut Ui, settings: &mut RunSettings, effects: &mut Vec<Effect>) {
+    pub fn folds_ui(&mut self, ui: &mut Ui, settings: &mut RunSettings, shared: &Shared, effects: &mut Vec<Effect>) {
         let task = self.tests.task(TEST_FILES, String::new());
         let positions_task = self.positions.task(POSITIONS, String::new());
         let Some(draft) = &mut self.draft else { return };
@@ -218,7 +218,12 @@ impl RecordingEditor {
         fold_ui(ui, "Filter", &filter_summary(draft), |ui| {
             reads_again |= filter_ui(ui, draft);
         });
-        fold_ui(ui, "Memory", &memory_summary(draft), |ui| memory_ui(ui, draft));
+        fold_ui(ui, "Derived columns", &derived_summary(draft), |ui| {
+            reads_again |= derived_ui(ui, draft);
+        });
+        fold_ui(ui, "Memory", &memory_summary(draft, shared), |ui| {
+            memory_ui(ui, draft, shared.recording.is_automatic());
+        });
         fold_ui(ui, "Positions", &positions_summary(draft), |ui| {
             positions_ui(ui, positions_task, effects);
         });
@@ -347,19 +352,63 @@ fn filter_ui(ui: &mut Ui, draft: &mut Draft) -> bool {
     is_left
 }
 
-fn memory_summary(draft: &Draft) -> String {
-    match draft.memory.parsed() {
-        Ok(memory) => memory.unwrap_or_default().to_string(),
-        Err(reason) => reason,
+fn derived_summary(draft: &Draft) -> String {
+    match &draft.plan.import.derive[..] {
+        [] => "none".to_owned(),
+        derive => joined(&Vec::from_iter(derive.iter().map(|derived| &derived.name)), ", "),
     }
 }
 
-fn memory_ui(ui: &mut Ui, draft: &mut Draft) {
+/// Returns true if the files must be read again.
+fn derived_ui(ui: &mut Ui, draft: &mut Draft) -> bool {
+    dim_ui(
+        ui,
+        "Columns computed from others of the same file, such as a difference, a ratio, or the change since the start. They \
+         are computed wherever the network decodes.",
+    );
+    let hint = "With commas between them: d=c1-c2 is a difference, q=c1/c2 a ratio; r=c1/start(2s) and r=c1-start(100) compare \
+                with the mean of the first 2 seconds or 100 rows. Columns have their names in the table.";
+    let response = text_ui(ui, "Columns", hint, "d=c1-c2, r=c1/start(2s)", &mut draft.derived);
+    if response.has_focus() {
+        return false;
+    }
+    match derived(&draft.derived) {
+        Ok(derive) if derive != draft.plan.import.derive => {
+            draft.plan.import.derive = derive;
+            true
+        }
+        Ok(_) => false,
+        Err(error) => {
+            note_ui(ui, &error);
+            false
+        }
+    }
+}
+
+fn memory_summary(draft: &Draft, shared: &Shared) -> String {
+    let is_automatic = shared.recording.is_automatic();
+    let chosen = shared.chosen_run().and_then(|run| run.setup.plan());
+    match (draft.memory.parsed(), is_automatic, chosen) {
+        (Err(reason), ..) => reason,
+        (Ok(None), true, None) => "automatic".to_owned(),
+        (Ok(None), true, Some(plan)) => plan.import.memory.clone().unwrap_or_default().to_string(),
+        (Ok(Some(memory)), true, _) => format!("{memory}, fixed"),
+        (Ok(memory), false, _) => memory.unwrap_or_default().to_string(),
+    }
+}
+
+fn memory_ui(ui: &mut Ui, draft: &mut Draft, is_automatic: bool) {
     dim_ui(
         ui,
         "Sensors with hysteresis, creep or drift: the inputs of the network also contain what the readings were before, \
          within a group and across no gap in time.",
     );
+    if is_automatic {
+        dim_ui(
+            ui,
+            "Chosen automatically while these fields are empty; what is given here is kept.",
+        );
+    }
     let MemoryTexts {
         averages,
         lags,

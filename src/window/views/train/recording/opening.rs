@@ -227,7 +227,12 @@ fn open(to_open: ToOpen, report: &Report<OpeningEvent>) -> Result<Opened, String
         }
     }
     let recipe = to_look_at(paths, files.older.as_deref());
-    let inspected_files = recipe.inspect(Path::new(""), &mut watch);
+    let variables = files
+        .older
+        .as_ref()
+        .map(|older| older.variable_names(&recipe))
+        .unwrap_or_default();
+    let inspected_files = recipe.inspect(Path::new(""), &variables, &mut watch);
     let inspected_files = inspected_files.map_err(|error| in_window(&error))?;
     // The file with the readings is guessed only if the set of files has changed.
     let mut plan = if is_same_files {
@@ -250,7 +255,11 @@ fn open(to_open: ToOpen, report: &Report<OpeningEvent>) -> Result<Opened, String
         None => recipe.missing,
     };
     plan.import.positions = positions;
-    Ok(Opened::Recordings(inspected(plan, Draft::new, &mut watch)?))
+    let variables = files
+        .older
+        .map(|older| older.variable_names(&plan.import))
+        .unwrap_or_default();
+    Ok(Opened::Recordings(inspected(plan, &variables, Draft::new, &mut watch)?))
 }
 
 /// Replaces folders by the tables in them.
@@ -291,14 +300,20 @@ fn to_look_at(paths: Vec<PathBuf>, older: Option<&Draft>) -> Recipe {
             .collect(),
         dialect: older.map(|older| older.plan.import.dialect).unwrap_or_default(),
         derive: older.map(|older| older.plan.import.derive.clone()).unwrap_or_default(),
+        time: older.and_then(|older| older.made_plan().ok()?.import.time),
         missing: missing.into_iter().filter(|missing| missing.column.is_none()).collect(),
         ..Recipe::default()
     }
 }
 
 /// Inspects the files of a plan.
-fn inspected(plan: Plan, draft: fn(Plan, Vec<InspectedFile>) -> Draft, watch: Watch<'_>) -> Result<Box<Draft>, String> {
-    let files = plan.import.inspect(Path::new(""), watch);
+fn inspected(
+    plan: Plan,
+    variables: &[String],
+    draft: fn(Plan, Vec<InspectedFile>) -> Draft,
+    watch: Watch<'_>,
+) -> Result<Box<Draft>, String> {
+    let files = plan.import.inspect(Path::new(""), variables, watch);
     Ok(Box::new(draft(plan, files.map_err(|error| in_window(&error))?)))
 }
 
@@ -308,7 +323,7 @@ fn reopen(mut reopened: Reopened, watch: Watch<'_>) -> Result<Opened, String> {
         return Ok(Opened::Missing(Box::new(reopened)));
     }
     reopened.compare()?;
-    let draft = inspected(reopened.recorded.plan.clone(), Draft::of_recipe, watch)?;
+    let draft = inspected(reopened.recorded.plan.clone(), &[], Draft::of_recipe, watch)?;
     Ok(Opened::Import(draft, Box::new(reopened)))
 }
 

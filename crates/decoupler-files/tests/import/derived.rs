@@ -1,0 +1,128 @@
+//! Derived columns of a stream of lines, compared with those of a file with the same lines.
+
+use std::{fmt::Write as _, fs, ops::ControlFlow, path::Path};
+
+use decoupler_core::{
+    dataset::{Memory, MemoryStream, Span},
+    evaluation::Problem,
+};
+use decoupler_files::import::{InputLine, InputLines, Recipe};
+use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
+
+/// A recipe with every kind of derived column, one of them computed from another, and the inputs that it has.
+fn recipe(derive: &[&str], inputs: &[&str]) -> Recipe {
+    Recipe {
+        data: "data.csv".into(),
+        derive: derive.iter().map(|text| text.parse().unwrap()).collect(),
+        inputs: inputs.iter().map(|name| (*name).to_owned()).collect(),
+        targets: vec!["y".to_owned()],
+        time: Some("t".to_owned()),
+        ..Recipe::default()
+    }
+}
+
+/// Rows at 50 Hz with times in milliseconds.
+fn text(rows: usize) -> String {
+    let mut rng = ChaCha8Rng::seed_from_u64(5);
+    let mut text = "t (ms),a (V),b (V),y\n".to_owned();
+    for row in 0..rows {
+        let [a, b, y]: [f64; 3] = std::array::from_fn(|_| rng.random_range(1.0..3.0));
+        writeln!(text, "{},{a},{b},{y}", 20 * row).unwrap();
+    }
+    text
+}
+
+fn lines(recipe: &Recipe, problem: &Problem) -> InputLines {
+    let memory = problem.memory.as_ref();
+    let memory = memory.map(|memory| MemoryStream::new(memory, problem.inputs.len(), 1).unwrap());
+    InputLines::new(problem.inputs.clone(), recipe.other_columns(problem), None)
+        .with_derived(recipe.derive.clone())
+        .with_memory(memory)
+}
+
+fn imported(recipe: &Recipe, folder: &Path) -> Problem {
+    let imported = recipe.import(folder, &mut |_| ControlFlow::Continue(()));
+    imported.unwrap().problem()
+}
+
+#[test]
+fn a_stream_has_the_derived_columns_of_a_file_bit_for_bit_once_the_start_is_over() {
+    let derive = ["d=a-b", "q=a/b", "r=a/start(7)", "p=r-start(0.3s)"];
+    let memory = Memory {
+        lags: vec![Span::Samples(20.0)],
+        ..Memory::of_averages_s(&[1.0])
+    };
+    // Rows of the start: one of the columns needs the first 0.3 s, which are over after 16 rows.
+    for (derive, memory, start) in [
+        (&derive[..2], None, 0),
+        (&derive[..3], None, 6),
+        (&derive[..], None, 16),
+        (&derive[..], Some(memory), 16),
+    ] {
+        let folder = tempfile::tempdir().unwrap();
+        let text = text(60);
+        let path = folder.path().join("data.csv");
+        fs::write(&path, &text).unwrap();
+        let names = ["d", "q", "r", "p"];
+        let mut recipe = recipe(derive, &names[..derive.len()]);
+        recipe.memory = memory;
+        recipe.inputs.push("b".to_owned());
+        let problem = imported(&recipe, folder.path());
+        let watch = &mut |_| ControlFlow::Continue(());
+        let expected = recipe.read_inputs(&path, &problem, false, watch).unwrap().readings;
+        let mut lines = lines(&recipe, &problem);
+        let mut found = Vec::new();
+        for (number, line) in (1..).zip(text.lines()) {
+            match lines.parse(number, line.as_bytes()).unwrap() {
+                InputLine::NoReadings => assert_eq!(number, 1),
+                InputLine::Start { .. } => found.push(None),
+                InputLine::Readings { readings, .. } => found.push(Some(readings.to_vec())),
+            }
+        }
+        assert_eq!(found.len(), 60);
+        for (row, (found, expected)) in found.iter().zip(expected.outer_iter()).enumerate() {
+            match found {
+                None => assert!(row < start, "row {row} of {start}"),
+                Some(found) => assert!(row >= start && *found == expected.to_vec(), "row {row}: {found:?}"),
+            }
+        }
+    }
+}
+
+#[test]
+fn lines_without_a_derived_value_or_a_column_are_refused_with_the_reason() {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("data.csv"), text(20)).unwrap();
+    let recipe = recipe(&["q=a/b", "r=a-start(0.1s)"], &["q", "r"]);
+    let problem = imported(&recipe, folder.path());
+    let parsed = |texts: &[&str]| {
+        let mut lines = lines(&recipe, &problem);
+        let parse = |(number, text): (u64, &&str)| match lines.parse(number, text.as_bytes()) {
+            Ok(InputLine::Readings { readings, .. }) => Ok(readings.to_vec()),
+            Ok(_) => Ok(Vec::new()),
+            Err(error) => Err((error.is_final(), error.to_string())),
+        };
+        (1..).zip(texts).map(parse).last().unwrap()
+    };
+    let header = "a,b,t (s)";
+    assert_eq!(parsed(&[header, "4,2,0", "6,2,0.1", "9,3,0.2"]), Ok(vec![3.0, 4.0]));
+    // A header in the middle, of a device that starts again, does not begin another start.
+    assert_eq!(
+        parsed(&[header, "4,2,0", "9,3,0.2", header, "9,3,0.3"]),
+        Ok(vec![3.0, 5.0])
+    );
+    for (texts, is_final, reason) in [
+        (&[header, "4,2,0", "9,3,0.2", "9,0,0.3"][..], false, "'q' has no value"),
+        (&[header, "4,x,0"][..], false, "cell 2 is not a finite number"),
+        (&["a,t (s)", "4,0"][..1], true, "q=a / b"),
+        (&["a,b", "4,2"][..1], true, "seconds need the time column"),
+        (&["a,b,t (V)"][..], true, "'t' has no unit of time"),
+        (&["4,2,0"][..], false, "there is no column 'q'"),
+    ] {
+        let (found_final, found) = parsed(texts).unwrap_err();
+        assert!(
+            found_final == is_final && found.contains(reason),
+            "{texts:?}: {found_final} {found}"
+        );
+    }
+}
