@@ -61,7 +61,8 @@ pub(super) struct Train {
     budget: Option<f64>,
     /// When to calibrate the 90 % prediction intervals of a recording's targets. After a choice of settings (--hidden
     /// auto), this takes no time; otherwise the training samples are cross-validated, which takes four times as long as the
-    /// training: auto if that is at most a minute
+    /// training: auto if that is at most a minute. Simulated arrays have none: theirs would hold for the scene, not for a
+    /// sensor, and the errors of each node and the reference already describe the scene
     #[arg(long, value_name = "WHEN", default_value = "auto")]
     pub(super) intervals: WhenCalibrated,
     /// Print one JSON object instead of text and progress

@@ -36,13 +36,17 @@ pub fn targets_ui(ui: &mut Ui, whole: Rect, view: &mut LiveView, shared: &Shared
         });
         upper = right;
     }
-    card_ui(ui, upper, |ui| titled_plots_ui(ui, "Decoded values", &chart(&targets)));
+    let intervals = targets.network.intervals.as_ref();
+    let title = match intervals {
+        Some(_) => "Decoded values with their 90 % intervals",
+        None => "Decoded values",
+    };
+    card_ui(ui, upper, |ui| titled_plots_ui(ui, title, &chart(&targets)));
     let (left, right) = lower.split_left_right_at_x(lower.center().x);
     card_ui(ui, left.with_max_x(left.right() - gap), |ui| {
         scrolled_ui(ui, "live targets", |ui| {
             section_heading_ui(ui, "Targets");
             for (index, (target, value)) in targets.problem.targets.iter().zip(targets.values()).enumerate() {
-                let intervals = targets.network.intervals.as_ref();
                 match intervals.and_then(|intervals| intervals.half_width(index, *value)) {
                     Some(half_width) => fact_ui(
                         ui,
@@ -162,11 +166,17 @@ fn outside_ui(ui: &mut Ui, targets: &LiveTargets) {
 }
 
 fn drift_ui(ui: &mut Ui, targets: &LiveTargets) {
-    let Some(is_drifted) = targets.is_drifted else { return };
+    let palette = Theme::of(ui).palette;
+    let Some(is_drifted) = targets.is_drifted else {
+        let hint = "Drift is not monitored: the training readings have fewer than 30 independent blocks, or the network has \
+                    inputs by row-wire or was saved by an older version.";
+        coloured_fact_ui(ui, "Drift of the readings", hint, "not monitored", palette.dim);
+        return;
+    };
     let hint = "Readings that no longer look like those of the training: prediction intervals no longer hold. Re-zero the \
                 sensor, or train with recent samples. In readings like those of the training, a false alarm occurs on \
-                average at most once in 10 000 blocks of readings.";
-    let palette = Theme::of(ui).palette;
+                average at most once in 10 000 blocks of readings, each five times as long as neighbouring readings are \
+                correlated.";
     let (value, colour) = if is_drifted {
         ("recalibrate", palette.warning)
     } else {
