@@ -1,7 +1,7 @@
 //! Decoding of files, and frames of known presses, in the terminal.
 
 use std::{
-    io::{self, Write, stderr},
+    io::{self, Write},
     path::{Path, PathBuf},
 };
 
@@ -32,7 +32,7 @@ use super::{
     follow::Follow,
     import_arguments::ImportArguments,
     intervals::Drift,
-    output::{Readings, print, print_object, progress_bar, read},
+    output::{Readings, messages, print, print_object, progress_bar, read},
     samples::{with_bar, working_folder},
 };
 
@@ -48,7 +48,8 @@ use super::{
 /// .npz or .mat, and writes its targets under their names, after the time, group and row columns of the input. The column
 /// TARGET_half_width_90 has the half-width of the 90 % prediction interval: the true value is within TARGET ± this half-width
 /// with a probability of 90 %, as long as the readings are like those of the training. A warning says from which line on they
-/// no longer are.
+/// no longer are. In readings that are, a false warning occurs on average at most once in 10 000 blocks, and in n blocks with
+/// a probability of at most n / 10 000; a block is five times as long as neighbouring readings are correlated.
 #[derive(Args)]
 pub(super) struct Decode {
     /// Network saved by train --out or by the window
@@ -403,7 +404,7 @@ impl<'a> OutsideTraining<'a> {
         if *outside == 0 {
             return;
         }
-        let mut stderr = stderr().lock();
+        let mut stderr = messages();
         for line in listed {
             // There is no one to report to if this fails.
             let _ = writeln!(stderr, "warning: {line}");

@@ -33,7 +33,7 @@ use super::{
     failure::Failure,
     import_arguments::ImportArguments,
     inspect::{FileFound, files, write_files, write_warnings},
-    output::{print, print_object, progress_bar},
+    output::{messages, print, print_object, progress_bar},
     samples::{with_bar, working_folder},
     seed,
 };
@@ -110,7 +110,7 @@ impl StudyArguments {
             // The bar is not shown in a log.
             if !stderr().is_terminal() {
                 // There is no one to report to if this fails.
-                let _ = writeln!(stderr(), "{:.0} s: {stage}", begun.elapsed().as_secs_f64());
+                let _ = writeln!(messages(), "{:.0} s: {stage}", begun.elapsed().as_secs_f64());
             }
         };
         let divided = (&plan.division, folds);

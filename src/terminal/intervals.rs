@@ -1,23 +1,20 @@
 //! Calibration of prediction intervals and of the drift monitor after a training on a recording.
 
-use std::{
-    io::{Write, stderr},
-    time::Duration,
-};
+use std::io::Write;
 
 use clap::ValueEnum;
 use decoupler_core::{
-    evaluation::{Channel, Coverage, Intervals, Run, RunError},
+    evaluation::{Intervals, NoIntervals, Run, RunError},
     live::DriftMonitor,
 };
 use decoupler_files::{
-    export::{NetworkFile, format_duration, format_number},
+    export::{NetworkFile, format_duration},
     import::SetupSets,
 };
 
-use super::interruption::Graceful;
+use super::{interruption::Graceful, output::messages};
 
-/// When to calibrate 90 % prediction intervals.
+/// When to calibrate 90 % prediction intervals by cross-validation.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
 pub(super) enum WhenCalibrated {
     /// If it takes at most a minute.
@@ -27,99 +24,55 @@ pub(super) enum WhenCalibrated {
     Never,
 }
 
-/// Longest estimated time in seconds for which intervals are calibrated without being requested.
-const MAX_SECONDS: f64 = 60.0;
-
-/// Calibrates the intervals of a finished `run` on a recording, by cross-validation of its training samples. Ctrl-C
-/// leaves them out.
-pub(super) fn calibrate(run: &mut Run, sets: &SetupSets, when: WhenCalibrated) -> Result<(), RunError> {
+/// Sets the intervals of a finished `run` on a recording: those that its choice of settings has already given, or
+/// otherwise by cross-validation of its training samples. Ctrl-C leaves them out.
+pub(super) fn calibrate(
+    run: &mut Run,
+    sets: &SetupSets,
+    chosen: Option<Result<Intervals, NoIntervals>>,
+    when: WhenCalibrated,
+) -> Result<(), RunError> {
     let Some(recordings) = &sets.recordings else {
         return Ok(());
     };
     if when == WhenCalibrated::Never || run.intervals().is_some() {
         return Ok(());
     }
-    // Each of the folds trains on the share (k − 1) / k of the samples.
-    let seconds = run
-        .wall_time()
-        .map(|time| (Intervals::FOLDS - 1) as f64 * time.as_secs_f64());
-    let describe = |seconds| format_duration(Duration::try_from_secs_f64(seconds).unwrap_or_default());
-    if let Some(seconds) = seconds.filter(|seconds| when == WhenCalibrated::Auto && *seconds > MAX_SECONDS) {
-        note(&format!(
-            "No prediction intervals: they take about {}; give --intervals always",
-            describe(seconds)
-        ));
-        return Ok(());
-    }
-    if let Some(seconds) = seconds.filter(|seconds| *seconds > 2.0) {
-        let seconds = describe(seconds);
-        note(&format!(
-            "Calibrating the prediction intervals by cross-validation takes about {seconds}"
-        ));
-    }
     let by = recordings.recorded.plan.division.by;
-    let graceful = Graceful::begin();
-    let is_cancelled = || graceful.is_end_requested();
-    let training = &sets.sets.split.training;
-    match Intervals::cross_validate(run.settings(), training, by, &is_cancelled) {
-        Ok(Some(intervals)) if intervals.is_empty() => {
-            note(
-                "No prediction intervals: there are fewer than 9 independent training samples (their errors are \
-                 correlated in time or within groups)",
-            );
-            Ok(())
+    // A training that failed is not one of those that gave the held-out answers.
+    let calibrated = match chosen.filter(|_| run.defect().is_none()) {
+        Some(calibrated) => calibrated,
+        None => {
+            let time = Intervals::time(run);
+            if let Some(time) = time.filter(|time| when == WhenCalibrated::Auto && *time > Intervals::MAX_TIME) {
+                note(&format!(
+                    "No prediction intervals: they take about {}; give --intervals always",
+                    format_duration(time)
+                ));
+                return Ok(());
+            }
+            if let Some(time) = time.filter(|time| time.as_secs_f64() > 2.0) {
+                note(&format!(
+                    "Calibrating the prediction intervals by cross-validation takes about {}",
+                    format_duration(time)
+                ));
+            }
+            let graceful = Graceful::begin();
+            let is_cancelled = || graceful.is_end_requested();
+            Intervals::cross_validate(run.settings(), &sets.sets.split.training, by, &is_cancelled)
         }
-        Ok(Some(intervals)) => {
-            run.set_intervals(intervals, by);
-            Ok(())
-        }
-        Ok(None) => {
-            note("No prediction intervals: interrupted");
-            Ok(())
-        }
-        // Too few groups for a cross-validation.
-        Err(RunError::Folds(error)) => {
-            note(&format!("No prediction intervals: {error}"));
-            Ok(())
-        }
-        Err(error) => Err(error),
+    };
+    match calibrated {
+        Ok(intervals) => run.set_intervals(intervals, by),
+        Err(NoIntervals::Run(error)) => return Err(error),
+        Err(reason) => note(&format!("No prediction intervals: {reason}")),
     }
+    Ok(())
 }
 
 fn note(message: &str) {
     // There is no one to report to if this fails.
-    let _ = writeln!(stderr(), "{message}");
-}
-
-/// Warns of the targets whose intervals contain significantly fewer test samples than stated, with cause and remedy.
-pub(super) fn describe_coverage(targets: &[Channel], coverage: &[Option<Coverage>]) -> Vec<String> {
-    let low = targets
-        .iter()
-        .zip(coverage)
-        .filter_map(|(target, coverage)| Some((target, coverage.as_ref().filter(|of| of.is_too_low())?)));
-    let describe = |(target, coverage): (&Channel, &Coverage)| {
-        let percent = |share: f64| format!("{:.0}", 100.0 * share);
-        let cause = if coverage.bias.abs() > 0.5 * coverage.half_width {
-            format!(
-                "the test part is offset from the training part (mean error {}, half-width {}): re-zero the sensor, or \
-                 record training data closer to the time of use",
-                format_number(coverage.bias),
-                format_number(coverage.half_width)
-            )
-        } else {
-            "the test part differs from the training part: record training data that cover its conditions, or split by \
-             group"
-                .to_owned()
-        };
-        format!(
-            "the 90 % intervals of {} contain {} % of the test samples (expected {} to {} %): {cause}",
-            target.name,
-            percent(coverage.share),
-            percent(coverage.expected[0]),
-            percent(coverage.expected[1])
-        )
-    };
-    low.map(describe).collect()
+    let _ = writeln!(messages(), "{message}");
 }
 
 /// Monitor of the readings of a decoded input, which warns on standard error.

@@ -1,5 +1,5 @@
 use std::{
-    io::{Write, stderr},
+    io::Write,
     path::{Path, PathBuf},
 };
 
@@ -11,7 +11,7 @@ use super::{
     import_arguments::ImportArguments,
     interruption::{CheckpointArguments, Checkpointing, Graceful},
     intervals::{WhenCalibrated, calibrate},
-    output::progress_bar,
+    output::{messages, progress_bar},
     samples::{announce, announce_recording, following, sets, working_folder},
     train_report::Trained,
     training_arguments::TrainingArguments,
@@ -26,7 +26,7 @@ use decoupler_files::{
         CheckpointFile, NetworkFile, SensorFile, check_writable, format_number, is_same,
         report::{RunReport, quoted},
     },
-    import::{ChoosingProgress, Setup, SetupError, SetupSets},
+    import::{ChoosingProgress, ChosenSetup, Setup, SetupError, SetupSets},
 };
 
 /// Train a network and print its errors
@@ -59,8 +59,9 @@ pub(super) struct Train {
     /// same choice on every machine [default: 60]
     #[arg(long, value_name = "SECONDS", value_parser = budget)]
     budget: Option<f64>,
-    /// When to calibrate the 90 % prediction intervals of a recording's targets, by cross-validation of the training
-    /// samples, which takes four times as long as the training: auto if that is at most a minute
+    /// When to calibrate the 90 % prediction intervals of a recording's targets. After a choice of settings (--hidden
+    /// auto), this takes no time; otherwise the training samples are cross-validated, which takes four times as long as the
+    /// training: auto if that is at most a minute
     #[arg(long, value_name = "WHEN", default_value = "auto")]
     pub(super) intervals: WhenCalibrated,
     /// Print one JSON object instead of text and progress
@@ -73,8 +74,11 @@ impl Train {
         self.checkpoint.check()?;
         self.check_paths()?;
         let resumed = self.checkpoint.checkpoint.as_ref().filter(|_| self.checkpoint.resume);
-        let (mut run, sets) = match resumed {
-            Some(path) => self.resume(path)?,
+        let (mut run, sets, intervals) = match resumed {
+            Some(path) => {
+                let (run, sets) = self.resume(path)?;
+                (run, sets, None)
+            }
             None => {
                 let setup = self.setup()?;
                 if let Some(folds) = self.import.folds {
@@ -82,22 +86,26 @@ impl Train {
                         .refuse_auto("--folds measures the same settings in every fold")?;
                     return self.cross_validate(&setup, folds);
                 }
-                let (setup, sets) = match self.chooses(&setup)? {
-                    true => self.choose(&setup)?,
+                let (setup, sets, intervals) = match self.chooses(&setup)? {
+                    true => {
+                        let chosen = self.choose(&setup)?;
+                        let intervals = chosen.intervals();
+                        (chosen.setup, chosen.sets, intervals)
+                    }
                     false => {
                         let sets = sets(&setup, self.json)?;
-                        (setup, sets)
+                        (setup, sets, None)
                     }
                 };
                 self.import.save_recipe(&setup)?;
                 announce_recording(&setup, &sets);
                 let run = sets.run(&setup, &|| false)?.expect("nothing cancels it");
-                (run, sets)
+                (run, sets, intervals)
             }
         };
         let mut end = self.train(&mut run, self.checkpoint.checkpointing(sets.recorded()));
         if end.is_ok()
-            && let Err(error) = calibrate(&mut run, &sets, self.intervals)
+            && let Err(error) = calibrate(&mut run, &sets, intervals, self.intervals)
         {
             end = Err(error.into());
         }
@@ -169,7 +177,7 @@ impl Train {
     }
 
     /// Chooses the settings of `setup`, with a progress bar of the budget.
-    fn choose(&self, setup: &Setup) -> Result<(Setup, SetupSets), Failure> {
+    fn choose(&self, setup: &Setup) -> Result<ChosenSetup, Failure> {
         let bar = progress_bar(self.json, 100, "{bar:20} {msg}");
         let chosen = setup.choose(
             &self.training.fixed(setup.settings()),
@@ -185,8 +193,7 @@ impl Train {
             },
         );
         bar.finish_and_clear();
-        let chosen = chosen?.expect("nothing cancels it");
-        Ok((chosen.setup, chosen.sets))
+        Ok(chosen?.expect("nothing cancels it"))
     }
 
     /// Decoders to measure: those given, by default all for a simulated array and none for a recording.
@@ -340,7 +347,7 @@ fn first_failure(ends: impl IntoIterator<Item = Result<(), Failure>>) -> Result<
     let Some(first) = failures.next() else { return Ok(()) };
     for other in failures {
         // There is no one to report to if this fails.
-        let _ = writeln!(stderr(), "{other}");
+        let _ = writeln!(messages(), "{other}");
     }
     Err(first)
 }

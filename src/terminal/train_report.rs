@@ -10,7 +10,6 @@ use super::{
     errors_report::{ErrorsReport, Target, targets, write_starts},
     failure::Failure,
     inspect::{RecordingReport, import_warnings, write_warnings},
-    intervals::describe_coverage,
     output::{print, print_object},
 };
 use decoupler_core::{
@@ -29,8 +28,8 @@ use decoupler_core::{
 };
 use decoupler_files::{
     export::{
-        NetworkFile, TrainingRecord, decoder_table, describe_determinacy, describe_search, describe_worse_than_ridge,
-        error_table, format_duration, search_table,
+        NetworkFile, TrainingRecord, decoder_table, describe_coverage, describe_determinacy, describe_search,
+        describe_worse_than_ridge, error_table, format_duration, search_table,
     },
     import::{Recording, SetupSets},
 };

@@ -6,6 +6,8 @@ mod automatic;
 mod calibrate;
 mod causes;
 mod commands;
+#[cfg(unix)]
+mod ends;
 mod export;
 mod files;
 mod files_as_they_are;

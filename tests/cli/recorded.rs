@@ -6,6 +6,8 @@ use std::{
     process::{Command, Stdio},
 };
 
+use decoupler_core::{dataset::SplitBy, evaluation::Intervals};
+use decoupler_files::export::NetworkFile;
 use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
 use serde_json::Value;
 use tempfile::TempDir;
@@ -157,6 +159,32 @@ fn answers_have_calibrated_intervals_and_drift_is_reported() {
     );
     let exported = fs::read_to_string(folder.path().join("bundle")).unwrap();
     assert!(exported.contains("\"intervals\""));
+}
+
+#[test]
+fn a_choice_of_settings_gives_the_intervals() {
+    let folder = recording();
+    let train = "train --data r.csv --inputs a,b --targets x,y --hidden auto --budget 1 --json --out n.json";
+    let output = decoupler(train, folder.path());
+    let report: Value = serde_json::from_slice(&output.stdout).unwrap();
+    for (target, half_width) in [(0, 0.045), (1, 0.9)] {
+        let found = report["targets"][target]["interval"]["half_width"].as_f64().unwrap();
+        assert!((found / half_width - 1.0).abs() < 0.2, "{target}: {found}");
+    }
+    // The held-out answers of the choice were used: the networks of a cross-validation have a seed of their own.
+    let file = NetworkFile::load(&folder.path().join("n.json")).unwrap();
+    let sets = file
+        .setup()
+        .sets(folder.path(), &|| false, &mut |_| ())
+        .unwrap()
+        .unwrap();
+    let (training, by) = (&sets.sets.split.training, SplitBy::Time);
+    let by_cross_validation = Intervals::cross_validate(&file.settings, training, by, &|| false).unwrap();
+    assert_ne!(file.intervals, Some(by_cross_validation));
+    assert_eq!(
+        file.intervals.unwrap().targets[0].as_ref().unwrap().samples,
+        training.samples()
+    );
 }
 
 #[test]

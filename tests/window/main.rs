@@ -12,10 +12,13 @@ mod driver;
 mod experiments;
 mod exporting;
 mod extremes;
+#[cfg(target_os = "linux")]
+mod faults;
 mod habits;
 mod identifying;
 mod import_choices;
 mod importing;
+mod intervals;
 mod live;
 mod looking;
 mod newcomer;
@@ -39,3 +42,6 @@ mod variables;
 
 #[path = "../support/folders.rs"]
 mod folders;
+#[cfg(target_os = "linux")]
+#[path = "../support/faults.rs"]
+mod preloaded;

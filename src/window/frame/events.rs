@@ -157,6 +157,8 @@ impl DecouplerWindow {
             Event::Progressed(progress) => {
                 if let Some(reason) = progress.stop_reason {
                     shared.phase = Phase::Ended(reason);
+                } else if progress.is_calibrating {
+                    shared.phase = Phase::Calibrating;
                 }
                 if let Some(run) = &mut shared.run {
                     run.progress(*progress);

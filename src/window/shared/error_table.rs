@@ -2,21 +2,24 @@ use eframe::egui::Ui;
 
 use crate::window::{
     glossary,
-    theme::Theme,
-    widgets::{TableColumn, TableRow, TableView},
+    theme::{Theme, space},
+    widgets::{TableCell, TableColumn, TableRow, TableView},
 };
 use decoupler_core::{
     decoupling::DecoderKind,
-    evaluation::{ErrorMeasure, ErrorRow, ErrorTable},
+    evaluation::{ErrorBlock, ErrorMeasure, ErrorRow, ErrorTable},
 };
 use decoupler_files::export::format_number;
 
 /// Name of the network's row.
 const NETWORK: &str = "network";
 
-/// Measures of error that the table shows: all but the worst node, which is shown below.
+/// Measures of intervals, which have a table of their own.
+const OF_INTERVALS: [ErrorMeasure; 2] = [ErrorMeasure::HalfWidth, ErrorMeasure::CoveragePercent];
+
+/// Measures of error that the table shows: all but the worst node, which is shown below, and the intervals.
 fn is_in_table(measure: ErrorMeasure) -> bool {
-    measure != ErrorMeasure::WorstMm
+    measure != ErrorMeasure::WorstMm && !OF_INTERVALS.contains(&measure)
 }
 
 fn column(measure: ErrorMeasure) -> TableColumn<'static> {
@@ -38,7 +41,8 @@ fn column(measure: ErrorMeasure) -> TableColumn<'static> {
     }
 }
 
-/// Lays out an error table: rows of baselines, network, reference and published figures, for recordings target by target.
+/// Lays out an error table: rows of baselines, network, reference and published figures, for recordings target by target;
+/// below, the intervals of the network, if they were calibrated.
 pub fn error_table_ui(ui: &mut Ui, table: &ErrorTable) {
     let palette = Theme::of(ui).palette;
     let shown = Vec::from_iter((0..table.measures.len()).filter(|&place| is_in_table(table.measures[place])));
@@ -77,6 +81,33 @@ pub fn error_table_ui(ui: &mut Ui, table: &ErrorTable) {
         rows.extend(block.rows.iter().map(row));
     }
     TableView::new("errors", &columns).show_all(ui, rows);
+    intervals_ui(ui, table);
+}
+
+/// The half-width of the interval of each target, and its coverage on the test set.
+fn intervals_ui(ui: &mut Ui, table: &ErrorTable) {
+    let places = OF_INTERVALS.map(|measure| table.measures.iter().position(|found| *found == measure));
+    let [Some(half_width), Some(coverage)] = places else {
+        return;
+    };
+    let row = |block: &ErrorBlock| {
+        let network = block.rows.iter().find(|row| row.name == NETWORK)?;
+        let figures = [half_width, coverage].map(|place| network.errors.get(place).copied().flatten());
+        let title = block.target.as_ref()?.title();
+        let cells = [title.clone()].into_iter().chain(figures.map(format_number));
+        figures
+            .iter()
+            .any(Option::is_some)
+            .then(|| TableRow::new(cells.map(TableCell::new)).named(title))
+    };
+    let columns = [
+        TableColumn::text("90 % interval"),
+        TableColumn::figure("half-width ±").meaning(ErrorMeasure::HalfWidth.definition()),
+        TableColumn::figure("coverage, %").meaning(ErrorMeasure::CoveragePercent.definition()),
+    ];
+    ui.add_space(space(2));
+    let rows = table.blocks.iter().filter_map(row).collect();
+    TableView::new("intervals", &columns).show_all(ui, rows);
 }
 
 /// Definition of a row of the error table.

@@ -129,6 +129,7 @@ impl RunView {
             starts,
             past,
             result,
+            is_calibrating: _,
             stop_reason,
         } = progress;
         self.stop_reason = stop_reason;
@@ -276,6 +277,7 @@ fn phase_in_words(shared: &Shared, palette: &Palette) -> (Color32, String) {
         Phase::Preparing => (palette.accent, "Drawing samples".to_owned()),
         Phase::Training => (palette.accent, "Training".to_owned()),
         Phase::Paused => (palette.warning, "Paused".to_owned()),
+        Phase::Calibrating => (palette.accent, "Calibrating the 90 % intervals".to_owned()),
         Phase::Ended(StopReason::Stopped) => (palette.dim, format!("Ended: {}", StopReason::Stopped)),
         Phase::Ended(reason) if reason.was_successful() => (palette.good, format!("Finished: {reason}")),
         Phase::Ended(reason) => (palette.bad, format!("Ended: {reason}")),

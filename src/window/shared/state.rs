@@ -103,6 +103,8 @@ pub enum Phase {
     Training,
     /// Paused.
     Paused,
+    /// Calibrating the intervals after the last epoch.
+    Calibrating,
     /// Ended, and why.
     Ended(StopReason),
     /// The worker is gone.
@@ -112,7 +114,10 @@ pub enum Phase {
 impl Phase {
     /// Returns true while a training is running or paused; its settings cannot change then.
     pub fn is_busy(self) -> bool {
-        matches!(self, Self::Preparing | Self::Training | Self::Paused)
+        matches!(
+            self,
+            Self::Preparing | Self::Training | Self::Paused | Self::Calibrating
+        )
     }
 }
 

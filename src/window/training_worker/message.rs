@@ -25,7 +25,7 @@ use decoupler_files::{
 };
 use ndarray::Array2;
 
-use super::training_loop::TrainingLoop;
+use super::{calibration::Calibration, training_loop::TrainingLoop};
 use crate::window::{
     job::{Job, JobError, Wake},
     test_view::{Frame, TargetCharts, TestSet, TestViewError},
@@ -90,6 +90,8 @@ pub struct TrainedRun {
     pub recorded: Option<Recorded>,
     /// Training readings of a recording, by which a later drift is detected.
     pub drift: Option<DriftReference>,
+    /// Calibration of its intervals when it has ended; `None` for a simulated array.
+    pub calibration: Option<Calibration>,
 }
 
 impl Inspection {
@@ -156,6 +158,8 @@ pub struct Progress {
     pub past: PastNetworks,
     /// Result so far.
     pub result: RunResult,
+    /// True if the training has run its epochs, and its intervals are being calibrated.
+    pub is_calibrating: bool,
     /// Reason why the training has ended, if it has.
     pub stop_reason: Option<StopReason>,
 }

@@ -1,6 +1,7 @@
 //! Training worker: one named thread that trains networks and writes their files. It receives requests and sends events;
 //! each event wakes the window.
 
+mod calibration;
 mod message;
 mod training_loop;
 

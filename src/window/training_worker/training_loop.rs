@@ -1,4 +1,5 @@
 use std::{
+    cell::RefCell,
     path::Path,
     sync::{
         Arc,
@@ -11,7 +12,8 @@ use std::{
 use ndarray::Array2;
 
 use super::{
-    Began, Event, Progress as Advance, Request, RunId, RunResult, TrainedRun,
+    Began, Event, Inspection, Progress as Advance, Request, RunId, RunResult, TrainedRun,
+    calibration::Calibration,
     message::{continue_run, furthest_epoch},
 };
 use crate::window::{
@@ -29,7 +31,7 @@ use decoupler_core::{
     training::TrainingSettings,
 };
 use decoupler_files::{
-    export::{CheckpointFile, NetworkFile, describe_determinacy, describe_worse_than_ridge},
+    export::{CheckpointFile, NetworkFile, describe_coverage, describe_determinacy, describe_worse_than_ridge},
     import::{ChoosingProgress, Plan, Progress, Setup, SetupSets},
 };
 
@@ -57,6 +59,9 @@ pub(super) struct TrainingLoop<'a> {
     /// Identity of the training `run`.
     id: Option<RunId>,
     is_paused: bool,
+    is_calibrating: bool,
+    /// Reason why the training that has ended has no intervals.
+    no_intervals: Option<String>,
     /// True if the result of a finished run has been sent to the window.
     is_kept: bool,
     /// Start of the last report, and its number of reported epochs.
@@ -77,6 +82,8 @@ impl<'a> TrainingLoop<'a> {
             past: PastNetworks::default(),
             id: None,
             is_paused: false,
+            is_calibrating: false,
+            no_intervals: None,
             is_kept: false,
             reported: (0, 0),
             next_report: Instant::now(),
@@ -94,7 +101,7 @@ impl<'a> TrainingLoop<'a> {
             };
             match request {
                 Ok(request) => self.answer(request),
-                Err(TryRecvError::Empty) => self.train_one_epoch(),
+                Err(TryRecvError::Empty) => self.train_one_epoch(requests),
                 Err(TryRecvError::Disconnected) => return,
             }
         }
@@ -149,16 +156,21 @@ impl<'a> TrainingLoop<'a> {
             Request::Stop => {
                 if let Some(trained) = self.run.as_mut().filter(|trained| trained.run.stop_reason().is_none()) {
                     trained.run.stop();
-                    self.report_progress();
+                    // Nothing is calibrated for it.
+                    self.end(&|_| true);
                 }
             }
-            Request::Inspect(id, inspection) => inspection.inspect(match &self.run {
-                Some(run) if self.id == Some(id) => Ok(run),
-                Some(_) => Err(REPLACED),
-                // The window offers no export before the first training, so a training was lost.
-                None => Err(LOST),
-            }),
+            Request::Inspect(id, inspection) => self.inspect(id, inspection),
         }
+    }
+
+    fn inspect(&self, id: RunId, inspection: Inspection) {
+        inspection.inspect(match &self.run {
+            Some(run) if self.id == Some(id) => Ok(run),
+            Some(_) => Err(REPLACED),
+            // The window offers no export before the first training, so a training was lost.
+            None => Err(LOST),
+        });
     }
 
     /// Draws or reads the samples of `setup` and initialises its networks; returns `None` if cancelled.
@@ -171,8 +183,14 @@ impl<'a> TrainingLoop<'a> {
             let Some(sets) = setup.sets(Path::new(""), is_cancelled, on_progress)? else {
                 return Ok(None);
             };
-            let (recorded, drift) = (sets.recorded().cloned(), sets.drift_reference());
-            Ok(run(sets, is_cancelled)?.map(|run| TrainedRun { run, recorded, drift }))
+            let (recorded, drift, calibration) =
+                (sets.recorded().cloned(), sets.drift_reference(), Calibration::of(&sets));
+            Ok(run(sets, is_cancelled)?.map(|run| TrainedRun {
+                run,
+                recorded,
+                drift,
+                calibration,
+            }))
         })
     }
 
@@ -189,9 +207,11 @@ impl<'a> TrainingLoop<'a> {
             let (fixed, folder) = (AutoFixed::default(), Path::new(""));
             let chosen = setup.choose(&fixed, DEFAULT_BUDGET_S, folder, is_cancelled, &mut on_choosing)?;
             let Some(chosen) = chosen else { return Ok(None) };
-            let (recorded, drift) = (chosen.sets.recorded().cloned(), chosen.sets.drift_reference());
             let run = chosen.sets.run(&chosen.setup, is_cancelled)?;
-            Ok(run.map(|run| TrainedRun { run, recorded, drift }))
+            Ok(run.map(|run| TrainedRun {
+                calibration: Calibration::of_choice(&chosen),
+                ..TrainedRun::new(run, &chosen.sets)
+            }))
         })
     }
 
@@ -228,6 +248,7 @@ impl<'a> TrainingLoop<'a> {
         self.past.record(&trained.run);
         (self.run, self.id, self.test) = (Some(trained), Some(began.id), Some(began.test.clone()));
         self.is_paused = is_paused;
+        self.no_intervals = None;
         self.reported = (0, 0);
         self.next_starts = Instant::now();
         self.report.send(event(Ok(began)));
@@ -236,28 +257,78 @@ impl<'a> TrainingLoop<'a> {
 
     fn continue_training(&mut self, training: TrainingSettings) {
         let continued = match &mut self.run {
-            Some(TrainedRun { run, .. }) => continue_run(run, training)
-                .map(|()| *run.settings())
+            Some(TrainedRun { run, calibration, .. }) => continue_run(run, training)
+                .map(|()| {
+                    if let Some(calibration) = calibration {
+                        calibration.forget_choice();
+                    }
+                    *run.settings()
+                })
                 .map_err(|error| error.to_string()),
             None => Err(LOST.to_owned()),
         };
         let has_failed = continued.is_err();
         self.report.send(Event::Continued(continued.map(Box::new)));
         if !has_failed {
-            (self.is_paused, self.is_kept) = (false, false);
+            (self.is_paused, self.is_kept, self.no_intervals) = (false, false, None);
             self.report_progress();
         }
     }
 
-    fn train_one_epoch(&mut self) {
+    fn train_one_epoch(&mut self, requests: &Receiver<Request>) {
         let Some(TrainedRun { run, .. }) = &mut self.run else {
             return;
         };
         let ended = run.step().is_some();
         self.past.record(run);
-        if ended || Instant::now() >= self.next_report {
+        if ended {
+            self.calibrate(requests);
+        } else if Instant::now() >= self.next_report {
             self.report_progress();
         }
+    }
+
+    /// Calibrates the intervals of the training that has ended, and reports its end. Any request but an inspection ends
+    /// the calibration and is answered.
+    fn calibrate(&mut self, requests: &Receiver<Request>) {
+        self.is_calibrating = self.run.as_ref().is_some_and(|trained| trained.calibration.is_some());
+        if self.is_calibrating {
+            self.report_progress();
+        }
+        let pending = RefCell::new(None);
+        let is_cancelled = |worker: &Self| {
+            while pending.borrow().is_none() {
+                match requests.try_recv() {
+                    Ok(Request::Inspect(id, inspection)) => worker.inspect(id, inspection),
+                    Ok(request) => *pending.borrow_mut() = Some(request),
+                    Err(TryRecvError::Empty) => return worker.report.is_cancelled(),
+                    Err(TryRecvError::Disconnected) => return true,
+                }
+            }
+            true
+        };
+        self.end(&is_cancelled);
+        if let Some(request) = pending.into_inner() {
+            self.answer(request);
+        }
+    }
+
+    /// Reports the end of the training, with intervals unless `is_cancelled`.
+    fn end(&mut self, is_cancelled: &dyn Fn(&Self) -> bool) {
+        let calibrated = self.run.as_ref().and_then(|TrainedRun { run, calibration, .. }| {
+            let calibration = calibration.as_ref()?;
+            let calibrated = calibration.calibrate(run, &|| is_cancelled(self));
+            Some((calibrated, calibration.by()))
+        });
+        self.no_intervals = None;
+        if let (Some(trained), Some((calibrated, by))) = (&mut self.run, calibrated) {
+            match calibrated {
+                Ok(intervals) => trained.run.set_intervals(intervals, by),
+                Err(reason) => self.no_intervals = Some(reason),
+            }
+        }
+        self.is_calibrating = false;
+        self.report_progress();
     }
 
     fn report_progress(&mut self) {
@@ -280,7 +351,8 @@ impl<'a> TrainingLoop<'a> {
             .map(|test| Arc::new(test.charts(&answers)));
         let cost = begun.elapsed();
         let has_several = run.trainers().len() > 1;
-        let is_idle = self.is_paused || run.stop_reason().is_some();
+        let stop_reason = run.stop_reason().filter(|_| !self.is_calibrating);
+        let is_idle = self.is_paused || stop_reason.is_some();
         let starts = (has_several && (is_idle || begun >= self.next_starts)).then(|| run.starts());
         if starts.is_some() {
             // Uses at most a tenth of the time.
@@ -319,7 +391,8 @@ impl<'a> TrainingLoop<'a> {
                 is_idle,
                 networks: Arc::new(networks),
             },
-            stop_reason: run.stop_reason(),
+            is_calibrating: self.is_calibrating,
+            stop_reason,
         });
         self.report.progress(Event::Progressed(progress), |older, newer| {
             if let (Event::Progressed(older), Event::Progressed(newer)) = (older, newer) {
@@ -329,7 +402,9 @@ impl<'a> TrainingLoop<'a> {
         self.reported = (number, trainer.history().len());
         // Decoding a large test set takes long; it may use at most a fifth of the time.
         self.next_report = Instant::now() + REPORT_INTERVAL.max(4 * cost);
-        self.report_finished();
+        if !self.is_calibrating {
+            self.report_finished();
+        }
     }
 
     /// Returns the remarks on the decoded test samples of a recording.
@@ -352,6 +427,8 @@ impl<'a> TrainingLoop<'a> {
             };
             remarks.extend(describe_worse_than_ridge(run.problem(), &scores));
         }
+        remarks.extend(describe_coverage(&run.problem().targets, run.coverage()));
+        remarks.extend(self.no_intervals.clone());
         remarks
     }
 
@@ -405,6 +482,7 @@ impl TrainedRun {
             run,
             recorded: sets.recorded().cloned(),
             drift: sets.drift_reference(),
+            calibration: Calibration::of(sets),
         }
     }
 

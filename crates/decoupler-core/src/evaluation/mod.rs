@@ -32,7 +32,7 @@ pub use baselines::{Baselines, PublishedErrors, Scores, published_errors};
 pub use cross_validation::{CrossValidated, CrossValidation, Effort};
 pub use decoder_set::{DecoderCost, DecoderReport, DecoderSet};
 pub use errors::{Errors, NodeAddress, Spread, TargetErrors, TestErrors, node_rms_mm};
-pub use intervals::{Coverage, HalfWidth, Intervals, IntervalsDefect};
+pub use intervals::{Coverage, HalfWidth, Intervals, IntervalsDefect, NoIntervals};
 pub use past_networks::{PastNetwork, PastNetworks};
 pub use pressed::{Pressed, PressedAnswer, fine_tune, press_limits, pressed_rows, rebased};
 pub use reference::{NoReference, ReferenceNote, reference_errors};

@@ -155,7 +155,10 @@ impl ErrorMeasure {
             }
             Self::Worst => "Largest absolute error, in the unit of the target",
             Self::RangePercent => "Mean absolute error in percent of the range of the target",
-            Self::CoveragePercent => "Share of the test samples whose target is within its 90 % interval, in percent",
+            Self::CoveragePercent => {
+                "Share of the test samples whose target is within its 90 % interval, in percent: about 90 if they are like the \
+                 training samples"
+            }
             Self::HalfWidth => "Mean half-width of the 90 % intervals, in the unit of the target",
         }
     }

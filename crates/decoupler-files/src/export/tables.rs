@@ -2,8 +2,8 @@ use std::io::{self, Write};
 
 use decoupler_core::{
     evaluation::{
-        Channel, DecoderReport, ErrorBlock, ErrorMeasure, ErrorRow, ErrorTable, Errors, Problem, Scores, TargetErrors,
-        TargetPosition, TestErrors,
+        Channel, Coverage, DecoderReport, ErrorBlock, ErrorMeasure, ErrorRow, ErrorTable, Errors, Problem, Scores,
+        TargetErrors, TargetPosition, TestErrors,
         recorded::{Determinacy, Determination, Findings, FittedModel, TargetFindings, Undetermined},
     },
     training::EpochRecord,
@@ -220,6 +220,37 @@ pub fn describe_determinacy(targets: &[Channel], measured: &[Result<Determinatio
             .then(|| measured.sentence(&target.name, &[FittedModel::Network])),
     };
     targets.iter().zip(measured).filter_map(of).collect()
+}
+
+/// Warns of the targets whose intervals contain significantly fewer test samples than stated, with cause and remedy.
+pub fn describe_coverage(targets: &[Channel], coverage: &[Option<Coverage>]) -> Vec<String> {
+    let low = targets
+        .iter()
+        .zip(coverage)
+        .filter_map(|(target, coverage)| Some((target, coverage.as_ref().filter(|of| of.is_too_low())?)));
+    let describe = |(target, coverage): (&Channel, &Coverage)| {
+        let percent = |share: f64| format!("{:.0}", 100.0 * share);
+        let cause = if coverage.bias.abs() > 0.5 * coverage.half_width {
+            format!(
+                "the test part is offset from the training part (mean error {}, half-width {}): re-zero the sensor, or \
+                 record training data closer to the time of use",
+                format_number(coverage.bias),
+                format_number(coverage.half_width)
+            )
+        } else {
+            "the test part differs from the training part: record training data that cover its conditions, or split by \
+             group"
+                .to_owned()
+        };
+        format!(
+            "the 90 % intervals of {} contain {} % of the test samples (expected {} to {} %): {cause}",
+            target.name,
+            percent(coverage.share),
+            percent(coverage.expected[0]),
+            percent(coverage.expected[1])
+        )
+    };
+    low.map(describe).collect()
 }
 
 /// Describes the positions of targets: their number, and the grid if they form one; `None` if no target has a position.

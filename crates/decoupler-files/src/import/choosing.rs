@@ -2,7 +2,10 @@ use std::path::Path;
 
 use decoupler_core::{
     dataset::{Memory, Seed, Stream},
-    evaluation::auto::{AutoChoice, AutoFixed, AutoProgress, AutoSamples, SamplePast, choose_settings},
+    evaluation::{
+        Intervals, NoIntervals,
+        auto::{AutoChoice, AutoFixed, AutoProgress, AutoSamples, SamplePast, choose_settings},
+    },
     scene::RowModel,
 };
 
@@ -18,6 +21,21 @@ pub struct ChosenSetup {
     /// The choice and its held-out answers; `None` if there were too few samples to choose, so that the settings are as
     /// given.
     pub choice: Option<AutoChoice>,
+}
+
+impl ChosenSetup {
+    /// Calibrates the intervals of the network that will be trained on the held-out answers of the choice; `None` if
+    /// nothing was chosen.
+    ///
+    /// The answers are those of committees with the chosen settings, each trained without the fold that it answers to.
+    /// Epochs and settings were chosen for these same answers, which makes their errors slightly too small; that they come
+    /// from fewer training samples, and for large recordings from every nth of them or smaller committees, makes them too
+    /// large, which weighs more.
+    pub fn intervals(&self) -> Option<Result<Intervals, NoIntervals>> {
+        let (choice, plan) = (self.choice.as_ref()?, self.setup.plan()?);
+        let training = &self.sets.sets.split.training;
+        Some(Intervals::calibrate(training, choice.answers.view(), plan.division.by).checked())
+    }
 }
 
 /// Progress of a choice of settings.
@@ -105,7 +123,11 @@ impl Setup {
         }
         let memory = plan.import.memory.clone();
         let planned = planned(&plan, &raw, test_recording.as_ref(), memory.as_ref(), settings.seed)?;
-        let mut sets = SetupSets::of_plan(&plan, folder, planned)?;
+        let read = SetupSets::of_plan(&plan, folder, planned, &mut watch(is_cancelled, &mut |_| {}));
+        let mut sets = match read {
+            Err(_) if is_cancelled() => return Ok(None),
+            read => read?,
+        };
         if let (Some(recordings), Some(choice)) = (&mut sets.recordings, &choice) {
             recordings.recorded.search = Some(choice.record.clone());
         }

@@ -107,7 +107,7 @@ pub(super) fn train_exports<'a>(view: &'a TrainView, shared: &'a Shared) -> Vec<
     ));
     exports.extend(copy_exports("Decoder table", decoders));
     let standing = run.and_then(|run| match shared.phase {
-        Phase::Paused | Phase::Ended(_) => Ok(run),
+        Phase::Paused | Phase::Calibrating | Phase::Ended(_) => Ok(run),
         Phase::Died => Err("The training was lost with its thread: train again.".to_owned()),
         _ => Err("A training under way cannot be saved: pause it first.".to_owned()),
     });

@@ -196,7 +196,7 @@ fn unfinished_training(shared: &Shared) -> Option<Unfinished> {
             };
             Some(training(progress.to_owned(), None))
         }
-        Phase::Training | Phase::Paused => {
+        Phase::Training | Phase::Paused | Phase::Calibrating => {
             let run = run.filter(|run| !run.is_saved)?;
             let epochs = run.settings().training.stopping.epochs;
             let epoch = run.latest().map_or(0, |latest| latest.epoch);

@@ -51,6 +51,12 @@ impl FoldErrors {
         standard_error(&self.of_folds) / (2.0 * self.relative()).max(f64::MIN_POSITIVE)
     }
 
+    /// Relative error plus its standard error. Candidates are ranked by it: of two that are alike on average, the one
+    /// that is steadier from fold to fold is the safer choice for data yet to come.
+    pub(super) fn upper(&self) -> f64 {
+        self.relative() + self.standard_error()
+    }
+
     /// Returns `true` if these errors exceed those of `other` on the same folds by no more than the standard error of
     /// the difference.
     pub(super) fn is_as_good_as(&self, other: &Self) -> bool {

@@ -28,6 +28,8 @@ pub(super) struct FoldedTraining<'a> {
     /// Number of multiplications of one epoch of all trainings.
     epoch_multiplications: f64,
     best: Option<BestEpoch>,
+    /// Last epoch that lowered the error noticeably, and the error then.
+    gain: (usize, f64),
 }
 
 /// Errors and answers at the epoch with the lowest error so far.
@@ -50,6 +52,8 @@ struct Part {
     squares: Vec<f64>,
 }
 
+/// Factor by which an error must fall for the epochs since the last such fall to count as worth their time.
+const NOTICEABLE: f64 = 0.99;
 /// Cost of the tanh of a hidden node, in multiplications.
 const TANH: usize = 12;
 
@@ -82,6 +86,7 @@ impl<'a> FoldedTraining<'a> {
             parts,
             epoch: 0,
             best: None,
+            gain: (0, f64::INFINITY),
         })
     }
 
@@ -96,7 +101,10 @@ impl<'a> FoldedTraining<'a> {
         self.epoch += 1;
         let squares: Vec<Vec<f64>> = self.parts.iter().map(|part| part.squares.clone()).collect();
         let errors = FoldErrors::new(&squares, &self.variances, self.folds);
-        let is_best = |best: &BestEpoch| errors.relative() < best.errors.relative();
+        if errors.upper() < NOTICEABLE * self.gain.1 {
+            self.gain = (self.epoch, errors.upper());
+        }
+        let is_best = |best: &BestEpoch| errors.upper() < best.errors.upper();
         if errors.relative().is_finite() && self.best.as_ref().is_none_or(is_best) {
             let samples = (0..self.folds.count()).map(|fold| self.folds.test(fold).len()).sum();
             let mut answers = Array2::zeros((samples, self.variances.len()));
@@ -111,14 +119,14 @@ impl<'a> FoldedTraining<'a> {
         }
     }
 
-    /// Returns `true` if further epochs are unlikely to be better: as many epochs as the best took, and some more, have
-    /// passed since, or all trainings have ended.
+    /// Returns `true` if further epochs are unlikely to be noticeably better: half as many epochs as the last noticeable
+    /// gain took, and some more, have passed since, or all trainings have ended.
     pub(super) fn has_passed_its_best(&self) -> bool {
         /// Epochs to wait in any case.
         const PATIENCE: usize = 15;
-        let best = self.best.as_ref().map_or(0, |best| best.epoch);
+        let (gain, _) = self.gain;
         let mut trainers = self.parts.iter().flat_map(|part| &part.trainers);
-        self.epoch >= 2 * best + PATIENCE || trainers.all(|trainer| trainer.stop_reason().is_some())
+        self.epoch >= gain + gain / 2 + PATIENCE || trainers.all(|trainer| trainer.stop_reason().is_some())
     }
 
     /// Epoch of the latest weights.

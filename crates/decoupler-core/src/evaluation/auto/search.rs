@@ -127,7 +127,7 @@ impl<'a> Search<'a> {
         let [features, nodes, refined, all] = [0.35, 0.7, 0.85, 1.0];
         let feature_sets = self.screen_features()?;
         let hidden = self.fixed.hidden.unwrap_or(FIRST_HIDDEN);
-        let method = self.fixed.method.unwrap_or_else(|| regularized(0.0));
+        let method = self.fixed.method.unwrap_or(Method::LevenbergMarquardt(DAMPING));
         let starts = self.fixed.starts.unwrap_or(SCREENED).min(SCREENED);
         let first: Vec<Candidate> = feature_sets
             .into_iter()
@@ -235,33 +235,28 @@ impl<'a> Search<'a> {
         readings.iter().all(|&reading| quantity.accepts(reading)) && readings.columns().into_iter().any(is_curved)
     }
 
-    /// Tries more hidden nodes on the best features while it helps, fewer if it does not, and then the second best features
-    /// with the number found.
+    /// Tries other numbers of hidden nodes on the best features and on the plain readings, which need more of them, and
+    /// then the second best features with the number found.
     fn vary_hidden(&mut self, share: f64) -> Result<(), End> {
         let Some(best) = self.best().cloned() else {
             return Ok(());
         };
-        let first = HIDDEN.iter().position(|&hidden| hidden == FIRST_HIDDEN).unwrap_or(0);
-        for (place, &hidden) in HIDDEN.iter().enumerate().skip(first + 1) {
-            self.expected = HIDDEN.len() - place + 1 + 3 + FINALISTS;
-            if !self.improves(&best, hidden, share)? {
-                break;
-            }
-        }
-        if self.best().is_some_and(|candidate| candidate.hidden == FIRST_HIDDEN) {
-            for place in (0..first).rev() {
-                self.expected = place + 2 + 3 + FINALISTS;
-                if !self.improves(&best, HIDDEN[place], share)? {
-                    break;
-                }
-            }
+        let plain = self
+            .ranked()
+            .into_iter()
+            .map(|place| &self.networks[place].candidate)
+            .find(|candidate| candidate.memory.is_empty() && !same_features(&best, candidate))
+            .cloned();
+        self.vary_hidden_of(&best, share)?;
+        if let Some(plain) = plain {
+            self.vary_hidden_of(&plain, share)?;
         }
         let hidden = self.best().map_or(FIRST_HIDDEN, |candidate| candidate.hidden);
         let ranked = self.ranked();
         let others = ranked.iter().map(|&place| &self.networks[place].candidate);
         let second = others
             .clone()
-            .find(|candidate| !same_features(&best, candidate))
+            .find(|candidate| !same_features(&best, candidate) && !candidate.memory.is_empty())
             .cloned();
         if let Some(second) = second {
             self.expected = 1 + 3 + FINALISTS;
@@ -270,9 +265,35 @@ impl<'a> Search<'a> {
         Ok(())
     }
 
-    /// Tries `base` with this many hidden nodes; returns `true` if it is the best so far.
+    /// Tries `base` with more hidden nodes while it helps, and with fewer if it does not.
+    fn vary_hidden_of(&mut self, base: &Candidate, share: f64) -> Result<(), End> {
+        let first = HIDDEN.iter().position(|&hidden| hidden == FIRST_HIDDEN).unwrap_or(0);
+        let mut has_improved = false;
+        for (place, &hidden) in HIDDEN.iter().enumerate().skip(first + 1) {
+            self.expected = HIDDEN.len() - place + 1 + 3 + FINALISTS;
+            if !self.improves(base, hidden, share)? {
+                break;
+            }
+            has_improved = true;
+        }
+        for place in (0..first).rev() {
+            self.expected = place + 2 + 3 + FINALISTS;
+            if has_improved || !self.improves(base, HIDDEN[place], share)? {
+                break;
+            }
+        }
+        Ok(())
+    }
+
+    /// Tries `base` with this many hidden nodes; returns `true` if it is the best so far of those with the same features.
     fn improves(&mut self, base: &Candidate, hidden: usize, share: f64) -> Result<bool, End> {
-        let before = self.best_error();
+        let alike = self
+            .networks
+            .iter()
+            .filter(|network| same_features(&network.candidate, base));
+        let before = alike
+            .map(|network| network.best.errors.relative())
+            .min_by(f64::total_cmp);
         let candidate = Candidate { hidden, ..base.clone() };
         let error = self.try_network(candidate, share, 2)?;
         Ok(error.zip(before).is_some_and(|(error, before)| error < before))
@@ -281,12 +302,6 @@ impl<'a> Search<'a> {
     /// Returns the best candidate so far.
     fn best(&self) -> Option<&Candidate> {
         self.ranked().first().map(|&place| &self.networks[place].candidate)
-    }
-
-    fn best_error(&self) -> Option<f64> {
-        self.ranked()
-            .first()
-            .map(|&place| self.networks[place].best.errors.relative())
     }
 
     /// Varies scaling, regularisation and method of the best network.
@@ -305,14 +320,23 @@ impl<'a> Search<'a> {
             variants.push(Candidate { inputs, ..best.clone() });
         }
         if self.fixed.method.is_none() {
-            for method in [regularized(CORRELATION_EPOCH), Method::LevenbergMarquardt(DAMPING)] {
-                variants.push(Candidate { method, ..best.clone() });
-            }
+            variants.push(Candidate {
+                method: regularized(0.0),
+                ..best.clone()
+            });
         }
         let count = variants.len();
         for (number, variant) in variants.into_iter().enumerate() {
-            self.expected = count - number + FINALISTS;
-            self.try_network(variant, share, count - number)?;
+            self.expected = count + 1 - number + FINALISTS;
+            self.try_network(variant, share, count + 1 - number)?;
+        }
+        let is_regularized = |network: &&Measured| {
+            network.candidate.method == regularized(0.0) && network.best.epoch > CORRELATION_EPOCH as usize
+        };
+        let measured = self.networks.last().filter(is_regularized);
+        if let Some(candidate) = measured.map(|network| network.candidate.clone()) {
+            let method = regularized(CORRELATION_EPOCH);
+            self.try_network(Candidate { method, ..candidate }, share, 1)?;
         }
         Ok(())
     }
@@ -336,7 +360,7 @@ impl<'a> Search<'a> {
             self.try_for(committee, share, best.len() - number, epochs + BEYOND)?;
         }
         // A committee is compared with a smaller one where it was too expensive: it would hardly be worse.
-        let error = |place: usize| self.networks[place].best.errors.relative();
+        let error = |place: usize| self.networks[place].best.errors.upper();
         let best = (0..self.networks.len())
             .min_by(|&one, &other| error(one).total_cmp(&error(other)))
             .ok_or_else(|| RunError::from(TrainingError::NothingVaries))?;
@@ -361,17 +385,18 @@ impl<'a> Search<'a> {
     }
 
     /// As [`Self::try_network`], unless this many epochs are too expensive.
-    fn try_for(&mut self, candidate: Candidate, share: f64, to_come: usize, needed: usize) -> Result<Option<f64>, End> {
+    fn try_for(
+        &mut self,
+        mut candidate: Candidate,
+        share: f64,
+        to_come: usize,
+        needed: usize,
+    ) -> Result<Option<f64>, End> {
         if let Some(place) = self.networks.iter().position(|network| network.candidate == candidate) {
             return Ok(Some(self.networks[place].best.errors.relative()));
         }
         let is_first = self.networks.is_empty();
         let limit = (share * self.budget() - self.work).max(0.0) / to_come.max(1) as f64;
-        let name = format!(
-            "{}, {}",
-            describe_features(&candidate.memory, candidate.inputs),
-            describe_network(candidate.hidden, &candidate.method, candidate.starts)
-        );
         let Some(set) = self.samples.with_memory(&candidate.memory) else {
             return Ok(None);
         };
@@ -383,10 +408,23 @@ impl<'a> Search<'a> {
             ..self.base
         };
         settings.training.method = candidate.method;
+        // Fewer samples would call for fewer hidden nodes; one start instead of two only makes the comparison less certain.
+        if candidate.starts == SCREENED
+            && self.fixed.starts.is_none()
+            && self.stride(&settings, &set, limit, needed) != Some(1)
+        {
+            settings.starts = 1;
+            candidate.starts = 1;
+        }
         let stride = self.stride(&settings, &set, limit, needed);
         let Some(stride) = stride.or(is_first.then_some(self.largest_stride())) else {
             return Ok(None);
         };
+        let name = format!(
+            "{}, {}",
+            describe_features(&candidate.memory, candidate.inputs),
+            describe_network(candidate.hidden, &candidate.method, candidate.starts)
+        );
         self.announce(name)?;
         let mut training = match FoldedTraining::new(&settings, &set, &self.folds, stride) {
             Ok(training) => training,
@@ -506,7 +544,7 @@ impl<'a> Search<'a> {
 
     /// Indices of the networks, best first.
     fn ranked(&self) -> Vec<usize> {
-        let error = |place: usize| self.networks[place].best.errors.relative();
+        let error = |place: usize| self.networks[place].best.errors.upper();
         let mut places = Vec::from_iter(0..self.networks.len());
         places.sort_by(|&one, &other| error(one).total_cmp(&error(other)));
         places
@@ -566,7 +604,7 @@ fn folds(samples: &AutoSamples<'_>, seed: Seed) -> Result<Folds, RunError> {
 const MIN_EPOCHS: usize = 10;
 /// Number of epochs for which samples are thinned out.
 const TYPICAL_EPOCHS: usize = 30;
-/// Epoch after which the correlation of errors is measured, if it is.
+/// Epoch after which the correlation of errors is measured, if it is: not for trainings that end before.
 const CORRELATION_EPOCH: f64 = 20.0;
 
 /// Initial damping, and its factor after each epoch. Gauss-Newton steps without damping fit noise within an epoch or two

@@ -53,13 +53,17 @@ fn rounded(value: f64) -> f64 {
 /// Median over the targets of the lag in samples at which the autocorrelation within stretches falls to 1/e.
 fn correlation_time(samples: &AutoSamples<'_>) -> f64 {
     let Some(past) = &samples.past else { return 1.0 };
-    let stretch = |sample: usize| past.history.stretches()[past.history.samples()[past.samples[sample]]];
-    let stretches: Vec<usize> = (0..samples.set.samples()).map(stretch).collect();
+    let row = |sample: usize| past.history.samples()[past.samples[sample]];
+    let stretch = |sample: usize| past.history.stretches()[row(sample)];
+    // Rows of groups whose times overlap are interleaved.
+    let mut order = Vec::from_iter(0..samples.set.samples());
+    order.sort_by_key(|&sample| (stretch(sample), row(sample)));
+    let stretches: Vec<usize> = order.iter().map(|&sample| stretch(sample)).collect();
     let count = samples.set.samples();
     let mut times: Vec<f64> = Vec::new();
     for column in samples.set.targets().columns() {
         let mean = column.sum() / count as f64;
-        let values: Vec<f64> = column.iter().map(|value| value - mean).collect();
+        let values: Vec<f64> = order.iter().map(|&sample| column[sample] - mean).collect();
         let variance = values.iter().map(|value| value * value).sum::<f64>() / count as f64;
         if variance.sqrt() <= 1e-12 * mean.abs() {
             continue;

@@ -75,15 +75,18 @@ impl Evidence {
 
 impl Evidence {
     /// Returns the number of independent samples whose mean would be as uncertain as the mean of `values`, at most the
-    /// number of values.
+    /// number of values; 1 for a single group, which says nothing about others.
     pub(crate) fn effective_samples(&self, values: &[f64]) -> f64 {
+        if matches!(self, Self::Groups(groups) if groups.len() < 2) {
+            return 1.0;
+        }
         let count = values.len() as f64;
         let mean = values.iter().sum::<f64>() / count;
         let off: Vec<f64> = values.iter().map(|value| value - mean).collect();
-        let squares: f64 = off.iter().map(|off| off * off).sum();
+        let independent = of_independent(&off).variance;
         let variance = self.variance(&off).variance;
-        if variance > squares {
-            count * squares / variance
+        if variance > independent {
+            count * independent / variance
         } else {
             count
         }

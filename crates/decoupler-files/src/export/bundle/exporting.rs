@@ -12,7 +12,10 @@ use super::{
     vectors::{Deviation, Tolerance, Vectors, golden_csv},
     weights::{self, Arithmetic, Weights},
 };
-use crate::export::{NetworkFile, WriteError};
+use crate::export::{
+    NetworkFile, WriteError,
+    unfinished::{UnfinishedFolder, folder_of},
+};
 
 /// Writes a decoder as a bundle at `path`: a folder, or for [`BundleFormat::Json`] a file. The files are read back and
 /// compared with the decoder before they are moved into place.
@@ -84,11 +87,9 @@ fn export_network_file(exported: &ExportedDecoder<'_>, path: &Path) -> Result<Bu
     if fs::symlink_metadata(path).is_ok() {
         return Err(BundleError::Exists(path.to_owned()));
     }
-    let trial = tempfile::tempdir().map_err(|error| WriteError::io(path, error))?;
+    let file = exported.file().ok_or(BundleError::NoFile)?;
+    let trial = UnfinishedFolder::begin(folder_of(path)).map_err(|error| WriteError::io(path, error))?;
     let copy = trial.path().join("network.json");
-    let file = exported
-        .file()
-        .expect("a network comes from its file: a decoder fitted to samples is not the network");
     file.save(&copy)?;
     let read = NetworkFile::load(&copy)?;
     if (&read.network, &read.settings) != (&file.network, &file.settings) {

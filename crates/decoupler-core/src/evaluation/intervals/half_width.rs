@@ -1,0 +1,151 @@
+use serde::{Deserialize, Serialize};
+
+use super::{
+    Coverage, Intervals,
+    conformal::{conformal_quantile, expected_shares, quantile},
+};
+use crate::{dataset::Folds, evaluation::recorded::Evidence};
+
+/// Half-width of the interval of one target.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct HalfWidth {
+    /// Half-width that is valid for all answers together, in the unit of the target.
+    pub constant: f64,
+    /// Half-width that varies with the answer, if that makes the intervals narrower on average at equal coverage:
+    /// points (answer, half-width) with ascending answers, interpolated linearly and constant beyond the ends. Empty
+    /// otherwise.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub by_answer: Vec<[f64; 2]>,
+    /// Number of held-out samples.
+    pub samples: usize,
+    /// Number of independent samples that contain as much information.
+    pub effective_samples: f64,
+}
+
+/// Points (answer, spread of the error) of a piecewise linear function; one point is a constant.
+type Points = Vec<[f64; 2]>;
+
+impl HalfWidth {
+    /// Minimum gain in the mean half-width for which the half-width varies with the answer.
+    const MIN_GAIN: f64 = 0.03;
+    /// Number of effective samples for each point of a half-width that varies with the answer.
+    const SAMPLES_PER_POINT: f64 = 20.0;
+    const MAX_POINTS: usize = 6;
+
+    /// Calibrates on answers and their absolute errors; `folds` are those of a cross-validation of the varying half-width.
+    pub(super) fn calibrate(
+        answers: &[f64],
+        errors: &[f64],
+        folds: Option<&Folds>,
+        evidence: &Evidence,
+    ) -> Option<Self> {
+        if errors.iter().any(|error| !error.is_finite()) {
+            return None;
+        }
+        let (constant, effective_samples) = conformal_quantile(errors, evidence)?;
+        let points = (effective_samples / Self::SAMPLES_PER_POINT) as usize;
+        let points = points.min(Self::MAX_POINTS);
+        let all = Vec::from_iter(0..errors.len());
+        let scaled = folds.and_then(|folds| {
+            let spreads = held_out_spreads(answers, errors, folds, points)?;
+            let scores: Vec<f64> = errors
+                .iter()
+                .zip(&spreads)
+                .map(|(error, spread)| error / spread)
+                .collect();
+            // Mean half-widths at a coverage that is exactly the nominal one on the held-out samples.
+            let mean_spread = spreads.iter().sum::<f64>() / spreads.len() as f64;
+            let is_narrower = quantile(&scores, Intervals::NOMINAL) * mean_spread
+                < (1.0 - Self::MIN_GAIN) * quantile(errors, Intervals::NOMINAL);
+            let points = spread_points(answers, errors, &all, points)?;
+            let (factor, effective_samples) = conformal_quantile(&scores, evidence).filter(|_| is_narrower)?;
+            let points: Points = points
+                .into_iter()
+                .map(|[answer, spread]| [answer, factor * spread])
+                .collect();
+            Some((points, effective_samples))
+        });
+        let (by_answer, effective_samples) = scaled.unwrap_or((Points::new(), effective_samples));
+        Some(Self {
+            constant,
+            by_answer,
+            samples: errors.len(),
+            effective_samples,
+        })
+    }
+
+    /// Half-width at this answer, in the unit of the target.
+    pub fn at(&self, answer: f64) -> f64 {
+        if self.by_answer.is_empty() {
+            self.constant
+        } else {
+            interpolate(&self.by_answer, answer)
+        }
+    }
+
+    /// Measures the coverage of pairs (truth, answer) of test samples.
+    pub(super) fn coverage(&self, pairs: Vec<(f64, f64)>, evidence: &Evidence) -> Coverage {
+        let count = pairs.len() as f64;
+        let is_outside = |&(truth, answer): &(f64, f64)| {
+            let is_inside = (answer - truth).abs() <= self.at(answer);
+            f64::from(u8::from(!is_inside))
+        };
+        let outside: Vec<f64> = pairs.iter().map(is_outside).collect();
+        let mean = |of: &dyn Fn(&(f64, f64)) -> f64| pairs.iter().map(of).sum::<f64>() / count;
+        // The samples are at least as dependent as the calibration samples were found to be.
+        let like_calibration = count * self.effective_samples / self.samples as f64;
+        let effective = evidence.effective_samples(&outside).min(like_calibration).max(1.0);
+        Coverage {
+            share: 1.0 - outside.iter().sum::<f64>() / count,
+            half_width: mean(&|&(_, answer)| self.at(answer)),
+            expected: expected_shares(effective, self.effective_samples),
+            bias: mean(&|&(truth, answer)| answer - truth),
+        }
+    }
+}
+
+/// Returns the spread at each sample from a model that was fitted without its fold; `None` if a model cannot be fitted.
+fn held_out_spreads(answers: &[f64], errors: &[f64], folds: &Folds, points: usize) -> Option<Vec<f64>> {
+    let mut spreads = vec![0.0; errors.len()];
+    for fold in 0..folds.count() {
+        let points = spread_points(answers, errors, &folds.without(&[fold]), points)?;
+        for &sample in folds.test(fold) {
+            spreads[sample] = interpolate(&points, answers[sample]);
+        }
+    }
+    Some(spreads)
+}
+
+/// Fits the mean absolute error as a function of the answer on `samples` (locally weighted conformal prediction: Lei,
+/// G'Sell, Rinaldo, Tibshirani and Wasserman 2018, doi:10.1080/01621459.2017.1307116): the mean of each of `points`
+/// parts of the samples with ascending answers, at least a tenth of the mean of all. Returns `None` for fewer than two
+/// points, or if all errors are 0.
+fn spread_points(answers: &[f64], errors: &[f64], samples: &[usize], points: usize) -> Option<Points> {
+    let mut samples = samples.to_vec();
+    samples.sort_by(|&one, &other| answers[one].total_cmp(&answers[other]));
+    let mean = |part: &[usize], of: &[f64]| part.iter().map(|&sample| of[sample]).sum::<f64>() / part.len() as f64;
+    let least = 0.1 * mean(&samples, errors);
+    if points < 2 || samples.len() < points || least == 0.0 {
+        return None;
+    }
+    let parts = samples.chunks(samples.len().div_ceil(points));
+    let mut found: Points = parts
+        .map(|part| [mean(part, answers), mean(part, errors).max(least)])
+        .collect();
+    found.dedup_by(|next, point| next[0] <= point[0]);
+    (found.len() >= 2).then_some(found)
+}
+
+/// Interpolates linearly between `points`, constant beyond the ends.
+fn interpolate(points: &[[f64; 2]], at: f64) -> f64 {
+    let next = points.partition_point(|point| point[0] < at);
+    if next == 0 {
+        return points[0][1];
+    }
+    if next == points.len() {
+        return points[next - 1][1];
+    }
+    let ([x0, y0], [x1, y1]) = (points[next - 1], points[next]);
+    y0 + (y1 - y0) * (at - x0) / (x1 - x0)
+}

@@ -1,0 +1,74 @@
+use decoupler_core::{
+    dataset::{Dataset, SplitBy},
+    evaluation::{Intervals, NoIntervals, Run},
+    training::StopReason,
+};
+use decoupler_files::{
+    export::format_duration,
+    import::{ChosenSetup, SetupSets},
+};
+
+/// Calibration of the prediction intervals of a training on a recording, when it has ended.
+pub struct Calibration {
+    training: Dataset,
+    /// Rule by which samples are held out.
+    by: SplitBy,
+    /// Intervals from the held-out answers of the choice of settings; `None` if they were not chosen.
+    chosen: Option<Result<Intervals, NoIntervals>>,
+}
+
+impl Calibration {
+    /// Prepares the calibration of a training on `sets`; `None` for a simulated array, whose decoders are compared with the
+    /// error that is possible in its scene.
+    pub fn of(sets: &SetupSets) -> Option<Self> {
+        let by = sets.recorded()?.plan.division.by;
+        Some(Self {
+            training: sets.sets.split.training.clone(),
+            by,
+            chosen: None,
+        })
+    }
+
+    /// Prepares the calibration of a training with chosen settings.
+    pub fn of_choice(chosen: &ChosenSetup) -> Option<Self> {
+        Some(Self {
+            chosen: chosen.intervals(),
+            ..Self::of(&chosen.sets)?
+        })
+    }
+
+    /// Rule by which samples are held out.
+    pub fn by(&self) -> SplitBy {
+        self.by
+    }
+
+    /// Forgets the choice of settings, because the training continues with others.
+    pub fn forget_choice(&mut self) {
+        self.chosen = None;
+    }
+
+    /// Calibrates the intervals of `run`, which has ended, without further trainings if its settings were chosen.
+    /// `is_cancelled` is polled in every epoch.
+    ///
+    /// # Errors
+    /// The reason why there are none.
+    pub fn calibrate(&self, run: &Run, is_cancelled: &dyn Fn() -> bool) -> Result<Intervals, String> {
+        let calibrated = match &self.chosen {
+            _ if run.stop_reason() == Some(StopReason::Stopped) => {
+                return Err("no 90 % intervals: the training was stopped before its end".to_owned());
+            }
+            _ if run.defect().is_some() => return Err("no 90 % intervals: the training has failed".to_owned()),
+            Some(chosen) => chosen.clone(),
+            None => {
+                if let Some(time) = Intervals::time(run).filter(|time| *time > Intervals::MAX_TIME) {
+                    return Err(format!(
+                        "no 90 % intervals: calibrating them takes about {}; train in a terminal with --intervals always",
+                        format_duration(time)
+                    ));
+                }
+                Intervals::cross_validate(run.settings(), &self.training, self.by, is_cancelled)
+            }
+        };
+        calibrated.map_err(|reason| format!("no 90 % intervals: {reason}"))
+    }
+}

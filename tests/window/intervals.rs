@@ -1,0 +1,76 @@
+//! Prediction intervals of a training on a recording.
+
+use std::{fmt::Write as _, path::Path};
+
+use decoupler::window::Phase;
+use decoupler_core::{
+    dataset::SplitBy,
+    evaluation::{Coverage, Intervals},
+    training::StopReason,
+};
+use decoupler_files::export::{NetworkFile, format_number};
+use rand::{RngExt as _, SeedableRng as _, rngs::ChaCha8Rng};
+
+use crate::{driver::Driver, recordings::opened_text};
+
+/// Readings of two channels and a target that they determine but for noise.
+fn noisy(rows: usize) -> String {
+    let mut rng = ChaCha8Rng::seed_from_u64(8);
+    let mut text = "u1 (V),u2 (V),x (mm)\n".to_owned();
+    for _ in 0..rows {
+        let [u1, u2, noise]: [f64; 3] = std::array::from_fn(|_| rng.random_range(-1.0..1.0));
+        writeln!(text, "{u1},{u2},{}", u1 + 0.3 * u2 + 0.1 * noise).unwrap();
+    }
+    text
+}
+
+fn kept(driver: &Driver) -> &NetworkFile {
+    &driver.state().runs.workspace.runs[0].file
+}
+
+#[test]
+fn intervals_are_calibrated_at_the_end_of_a_training() {
+    let (mut driver, _, _folder) = opened_text(&noisy(300));
+    driver.limit_epochs("10");
+    driver.train_recording();
+
+    let setup = driver.state().run.as_ref().unwrap().setup.clone();
+    let sets = setup.sets(Path::new(""), &|| false, &mut |_| ()).unwrap().unwrap();
+    let training = &sets.sets.split.training;
+    let expected = Intervals::cross_validate(setup.settings(), training, SplitBy::Time, &|| false).unwrap();
+    assert_eq!(kept(&driver).intervals.as_ref(), Some(&expected));
+    let coverage: Coverage = driver.state().result().unwrap().coverage[0].unwrap();
+    // 90 % of the noise is within 0.09.
+    assert!((coverage.half_width / 0.09 - 1.0).abs() < 0.2, "{coverage:?}");
+    driver.assert_shows(&[
+        format!("x (mm), half-width ±: {}", format_number(coverage.half_width)),
+        format!("x (mm), coverage, %: {}", format_number(100.0 * coverage.share)),
+    ]);
+
+    // Another epoch makes them invalid; they are calibrated again at its end.
+    driver.limit_epochs("1");
+    driver.click_button("Continue");
+    driver.wait("the second end", |driver| {
+        let result = driver.state().result();
+        result.is_some_and(|result| result.is_idle && result.epochs_run == 11)
+    });
+    let again = driver.state().result().unwrap().coverage[0].unwrap();
+    assert_ne!(again, coverage);
+}
+
+#[test]
+fn stopping_a_calibration_keeps_the_network_without_intervals() {
+    let (mut driver, _, _folder) = opened_text(&noisy(300));
+    driver.limit_epochs("3000");
+    if driver.state().recording.is_auto {
+        driver.click("Choose settings automatically");
+    }
+    driver.click("▶ Train");
+    driver.wait("the calibration", |driver| driver.state().phase == Phase::Calibrating);
+    assert!(driver.says("Calibrating the 90 % intervals"));
+    driver.click("■ Stop");
+    driver.wait_for_training();
+    assert_ne!(driver.state().phase, Phase::Ended(StopReason::Stopped));
+    assert!(driver.has("No 90 % intervals: interrupted."));
+    assert_eq!(kept(&driver).intervals, None);
+}
