@@ -201,6 +201,7 @@ fn ask(driver: &mut Driver) {
 #[test]
 fn a_training_on_a_recording_is_saved_at_closing() {
     let (mut driver, _path, folder) = opened(60);
+    driver.choose_by_hand();
     choose_method(&mut driver, "Momentum, Eq. (11)");
     driver.limit_epochs("1000000");
     driver.click("▶ Train");

@@ -16,29 +16,48 @@ use super::{
     axis::{PlotAxis, step_for, tick_text},
     colour_map::{HeatMap, SequentialMap},
     of_errors::decoded_against_actual,
-    plot::{PlotFigure, Series},
+    plot::{Plot, PlotFigure, Series},
     surface::{Quantity, Surface, ViewMode},
 };
 
 /// Mean decoded against actual values of `target` while it rises and while it falls, with the line on which they would be
-/// equal.
+/// equal; next to it their differences from the actual values, which show a narrow loop.
 pub fn hysteresis_figure(found: &HysteresisLoop, target: &Channel) -> PlotFigure {
     let branch = |name: &str, hue, style, of: &dyn Fn(f64, f64, f64) -> f64| {
         let levels = found.levels.iter();
         let points = levels.map(|level| [level.actual, of(level.actual, level.loading, level.unloading)]);
         Series::new(name, Look::line(hue, style), points)
     };
-    let series = vec![
-        branch("equal", Hue::Ink, LineStyle::Dashed, &|actual, _, _| actual),
-        branch("loading", Hue::Blue, LineStyle::Solid, &|_, loading, _| loading),
-        branch("unloading", Hue::Orange, LineStyle::Solid, &|_, _, unloading| unloading),
-    ];
+    let branches = |is_difference: bool| {
+        let less = move |value: f64, actual: f64| if is_difference { value - actual } else { value };
+        vec![
+            branch("equal", Hue::Ink, LineStyle::Dashed, &|actual, _, _| {
+                less(actual, actual)
+            }),
+            branch("loading", Hue::Blue, LineStyle::Solid, &|actual, loading, _| {
+                less(loading, actual)
+            }),
+            branch("unloading", Hue::Orange, LineStyle::Solid, &|actual, _, unloading| {
+                less(unloading, actual)
+            }),
+        ]
+    };
     let [loading, unloading] = [found.loading.rmse, found.unloading.rmse].map(format_number);
-    let notes = vec![
-        format!("Hysteresis {:.1} % of the range", found.percent_of_range),
-        format!("RMSE {loading} loading, {unloading} unloading"),
-    ];
-    decoded_against_actual(&target.title(), "decoded", series, notes)
+    let note = format!(
+        "Hysteresis {:.1} % of the range, RMSE {loading} loading, {unloading} unloading",
+        found.percent_of_range
+    );
+    let mut figure = decoded_against_actual(&target.title(), "decoded", branches(false), vec![note]);
+    let unit = target
+        .unit
+        .as_ref()
+        .map_or_else(String::new, |unit| format!(" ({unit})"));
+    figure.plots.push(Plot::new(
+        PlotAxis::linear(format!("actual {}", target.title())),
+        PlotAxis::linear(format!("decoded − actual{unit}")),
+        branches(true),
+    ));
+    figure
 }
 
 /// Maximum number of cells along an axis of a map, not counting cells added by rounding its limits.
@@ -257,6 +276,15 @@ mod tests {
             unit: Some("N".to_owned()),
         };
         let figure = hysteresis_figure(&found, &force);
+        let [_, differences] = &figure.plots[..] else {
+            panic!("{figure:?}");
+        };
+        for (series, expected) in differences.series.iter().zip([0.0, -0.1, 0.1]) {
+            assert!(
+                series.points.iter().all(|point| (point.y - expected).abs() < 0.02),
+                "{series:?}"
+            );
+        }
         let [equal, loading, unloading] = &figure.plots[0].series[..] else {
             panic!("{figure:?}");
         };
