@@ -82,6 +82,11 @@ enum Command {
 /// Runs the command in `arguments` (program name first), and returns the exit status. Without a command it opens
 /// `window`.
 pub fn run<A: Into<OsString> + Clone>(arguments: impl IntoIterator<Item = A>, window: Window) -> ExitCode {
+    run_for_status(arguments, window).into()
+}
+
+/// As [`run`], for a program that passes the status on as a number.
+pub fn run_for_status<A: Into<OsString> + Clone>(arguments: impl IntoIterator<Item = A>, window: Window) -> u8 {
     let done = match Arguments::try_parse_from(arguments) {
         Ok(arguments) => arguments.run(window),
         // Help and version are not errors; a closed output needs neither.
@@ -103,9 +108,9 @@ pub fn run<A: Into<OsString> + Clone>(arguments: impl IntoIterator<Item = A>, wi
                 }
                 _ => writeln!(messages(), "error: {}", without_long_words(&failure.to_string())),
             };
-            ExitCode::from(failure.status())
+            failure.status()
         }
-        _ => ExitCode::SUCCESS,
+        _ => 0,
     }
 }
 

@@ -38,6 +38,7 @@ mod surface_view;
 mod trading;
 mod training;
 mod typing;
+mod variables;
 
 #[path = "../support/folders.rs"]
 mod folders;

@@ -1,6 +1,7 @@
 use faer::{Mat, Side, linalg::solvers::Solve};
 use glam::DVec3;
 use ndarray::{Array1, Array2, ArrayView2, Axis, Slice};
+use serde::{Deserialize, Serialize};
 
 use super::{
     AffineLayer, DecodeError, Decoder, Description, Layer, LayeredMap, NotDescribed, least_squares::fit_least_squares,
@@ -14,7 +15,7 @@ use crate::{
 };
 
 /// An affine map from readings to targets, with the input and output scalings folded into its matrix.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct AffineMap {
     quantity: Quantity,
     /// Centre of each channel, subtracted from its values.

@@ -3,6 +3,7 @@
 use ndarray::{Array1, Array2, Axis};
 use pulp::{Simd, WithSimd};
 use rand::Rng;
+use serde::{Deserialize, Serialize};
 
 use super::{
     AffineLayer, DecodeError, Decoder, Description, Layer, LayeredMap, NotDescribed,
@@ -24,7 +25,7 @@ use crate::{
 /// scaled to [−1, 1] are divided by their standard deviation.
 ///
 /// The scalings are folded into the layers, and decoding does not allocate.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct RadialBasisNetwork {
     quantity: Quantity,
     /// Centre of each channel, subtracted from its values.
@@ -43,7 +44,7 @@ pub struct RadialBasisNetwork {
 }
 
 /// Buffers for one row.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 struct Buffers {
     channels: Vec<f64>,
     inputs: Vec<f64>,
@@ -198,7 +199,7 @@ impl WithSimd for Decoding<'_> {
 }
 
 /// Gaussians of equal width around centres, laid out with centres side by side in vector registers.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub(super) struct Gaussians {
     /// Number of centres, padded to a multiple of [`LANES`].
     width: usize,

@@ -153,6 +153,16 @@ impl Run {
         }))
     }
 
+    /// Prepares a run without a test set, baselines and reference, for programs that need only its networks. Their
+    /// training is bit-identical to that of [`Self::on_sets`].
+    ///
+    /// # Errors
+    /// As [`Self::on_sets`].
+    pub fn on_split(settings: RunSettings, split: Split) -> Result<Self, RunError> {
+        let none = split.training.select(&[]);
+        Self::of_networks_on_sets(settings, split, none)
+    }
+
     /// As [`Self::with_baselines`], without baselines and reference, for settings and sets that were checked.
     fn of_networks(
         settings: RunSettings,
@@ -275,13 +285,16 @@ impl Task {
             }
         };
         let examples = |set: &Dataset| {
-            let (x, y) = scaled(set);
-            Examples::new(x.view(), y.view())
+            Examples::scaled(
+                (set.readings(), |readings| inputs.of(readings)),
+                (set.targets(), |targets| outputs.scale(targets)),
+            )
         };
         let problem = Problem {
             training: examples(training),
             validation: validation.map(examples),
-            test: Some(examples(test)),
+            // The error on no samples is undefined.
+            test: (test.samples() > 0).then(|| examples(test)),
         };
         let shape = Shape {
             inputs: problem.training.inputs(),
@@ -342,6 +355,8 @@ pub(super) fn unseen_noise(source: &Source) -> Result<NoiseSource, RunError> {
 mod tests {
     use std::cell::Cell;
 
+    use ndarray::{Axis, Slice};
+
     use super::*;
     use crate::{evaluation::SimulatedSettings, network::InputChoice, scene::Noise};
 
@@ -353,6 +368,45 @@ mod tests {
             polls.get() > poll
         });
         (run, polls.get())
+    }
+
+    #[test]
+    fn a_run_without_a_test_set_trains_the_same_network() {
+        let mut settings = SimulatedSettings::default();
+        settings.source.sensor.scale = "4x4_2x12".parse().unwrap();
+        (settings.hidden, settings.training.stopping.epochs) = (3, 5);
+        // More than one block of samples, the last with a single one.
+        (settings.source.samples, settings.source.validation_samples) = (1028, 4);
+        for inputs in [InputChoice::PAPER, InputChoice::BEST] {
+            settings.inputs = inputs;
+            let (split, test) = settings.draw().unwrap();
+            let split_of_one = Split {
+                training: split.training.select(&Vec::from_iter(0..1025)),
+                validation: split.validation,
+            };
+            let mut with_test = Run::on_sets(settings.into(), split_of_one.clone(), test).unwrap();
+            let mut without = Run::on_split(settings.into(), split_of_one).unwrap();
+            while with_test.step().is_none() {}
+            while without.step().is_none() {}
+            assert_eq!(with_test.network(), without.network());
+            assert_eq!(without.leader().latest().test_mse, None);
+        }
+    }
+
+    #[test]
+    fn blocks_are_scaled_like_all_samples_at_once() {
+        let mut settings = SimulatedSettings::default();
+        settings.source.samples = 1030;
+        let (split, _) = settings.draw().unwrap();
+        for choice in [InputChoice::PAPER, InputChoice::BEST] {
+            let whole = Inputs::fit(choice, split.training.readings(), NoiseSource::default()).unwrap();
+            let all = whole.of(split.training.readings());
+            for samples in [1, 2, 3, 7, 512, 513, 825] {
+                let some = split.training.select(&Vec::from_iter(0..samples));
+                let of_some = whole.of(some.readings());
+                assert_eq!(of_some, all.slice_axis(Axis(0), Slice::from(..samples)), "{samples}");
+            }
+        }
     }
 
     #[test]

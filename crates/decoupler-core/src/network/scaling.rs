@@ -53,6 +53,16 @@ pub enum ScalingError {
         /// Largest value of the channel.
         maximum: f64,
     },
+    /// The range of a channel is so narrow that its reciprocal overflows.
+    #[error("channel {} ranges from {minimum:?} to {maximum:?}: too narrow to scale; use a smaller unit", .channel + 1)]
+    Narrow {
+        /// Index of the channel, from 0.
+        channel: usize,
+        /// Smallest value of the channel.
+        minimum: f64,
+        /// Largest value of the channel.
+        maximum: f64,
+    },
     /// A decomposition did not converge, or sums overflowed.
     #[error(
         "the equations of the fit or of the principal components have no finite solution: look for extreme values in the \
@@ -68,7 +78,7 @@ impl MinMax {
     /// Fits the ranges of `values` (samples × channels).
     ///
     /// # Errors
-    /// If there are no samples, a value is not finite, or a range overflows.
+    /// If there are no samples, a value is not finite, or a range or its reciprocal overflows.
     pub fn fit(values: ArrayView2<'_, f64>) -> Result<Self, ScalingError> {
         if values.nrows() == 0 {
             return Err(ScalingError::Empty);
@@ -88,6 +98,13 @@ impl MinMax {
         for (channel, (&minimum, &maximum)) in minimum.iter().zip(&maximum).enumerate() {
             if !(maximum - minimum).is_finite() {
                 return Err(ScalingError::Range {
+                    channel,
+                    minimum,
+                    maximum,
+                });
+            }
+            if minimum < maximum && !(0.5 * (maximum - minimum)).recip().is_finite() {
+                return Err(ScalingError::Narrow {
                     channel,
                     minimum,
                     maximum,
@@ -298,6 +315,9 @@ mod tests {
         ));
         let wide = MinMax::fit(array![[-1e308], [1e308]].view()).unwrap_err();
         assert!(matches!(wide, ScalingError::Range { channel: 0, .. }));
+        let narrow = MinMax::fit(array![[1.0, 0.0], [2.0, 1e-309]].view()).unwrap_err();
+        assert!(matches!(narrow, ScalingError::Narrow { channel: 1, .. }));
+        assert!(MinMax::fit(array![[0.0], [1e-307]].view()).is_ok());
         assert_eq!(MinMax::fit(Array2::zeros((0, 3)).view()), Err(ScalingError::Empty));
     }
 

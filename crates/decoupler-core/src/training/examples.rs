@@ -3,11 +3,12 @@
 
 use std::{
     fmt::Debug,
+    ops::Range,
     sync::{Arc, OnceLock},
 };
 
 use faer::{Mat, MatMut, MatRef};
-use ndarray::{ArrayView2, Axis, Slice};
+use ndarray::{Array2, ArrayView2, Axis, Slice};
 
 use super::activations::scale_into;
 
@@ -62,19 +63,52 @@ impl Examples {
     /// If the numbers of samples differ.
     pub fn new(inputs: ArrayView2<'_, f64>, targets: ArrayView2<'_, f64>) -> Self {
         assert_eq!(inputs.nrows(), targets.nrows());
-        let (samples, n) = inputs.dim();
-        let cut = |first: usize| {
-            let chunk = Slice::from(first..samples.min(first + BLOCK));
+        let shape = (inputs.nrows(), inputs.ncols(), targets.ncols());
+        Self::from_blocks(shape, |samples| {
+            let chunk = Slice::from(samples);
             Block::new(inputs.slice_axis(Axis(0), chunk), targets.slice_axis(Axis(0), chunk))
+        })
+    }
+
+    /// Scales readings and targets (both with one row for each sample) block by block, so that scaled values of all
+    /// samples are never held twice: `inputs` returns samples × n, `targets` samples × m.
+    ///
+    /// # Panics
+    /// If the numbers of samples differ.
+    pub fn scaled(
+        (readings, inputs): (ArrayView2<'_, f64>, impl Fn(ArrayView2<'_, f64>) -> Array2<f64>),
+        (values, targets): (ArrayView2<'_, f64>, impl Fn(ArrayView2<'_, f64>) -> Array2<f64>),
+    ) -> Self {
+        assert_eq!(readings.nrows(), values.nrows());
+        let scaled = |samples: Range<usize>| {
+            let chunk = Slice::from(samples);
+            (
+                inputs(readings.slice_axis(Axis(0), chunk)),
+                targets(values.slice_axis(Axis(0), chunk)),
+            )
         };
+        let (x, y) = scaled(0..0);
+        let shape = (readings.nrows(), x.ncols(), y.ncols());
+        Self::from_blocks(shape, |samples| {
+            let (x, y) = scaled(samples);
+            Block::new(x.view(), y.view())
+        })
+    }
+
+    /// Collects the blocks of samples × inputs and samples × outputs.
+    fn from_blocks(
+        (samples, inputs, outputs): (usize, usize, usize),
+        mut block: impl FnMut(Range<usize>) -> Block,
+    ) -> Self {
+        let firsts = (0..samples).step_by(BLOCK);
         Self {
             data: Arc::new(Data {
-                blocks: (0..samples).step_by(BLOCK).map(cut).collect(),
+                blocks: firsts.map(|first| block(first..samples.min(first + BLOCK))).collect(),
                 input_pairs: OnceLock::new(),
             }),
             samples,
-            inputs: n,
-            outputs: targets.ncols(),
+            inputs,
+            outputs,
         }
     }
 

@@ -164,6 +164,42 @@ impl NetworkFile {
 
     /// As [`Self::save`]; `commit` puts the file in its place.
     pub(super) fn save_by(&self, path: &Path, commit: Commit) -> Result<(), DocumentError> {
+        let run = self.run_record(path, |recorded| recorded.relative_to(folder_of(path)))?;
+        Ok(Sealed::new(KIND, &self.program, &run).save(path, commit)?)
+    }
+
+    /// Text of the file with the paths as they are, for a program that stores it elsewhere than in a file.
+    ///
+    /// # Errors
+    /// The network has values that could not be read back.
+    pub fn to_text(&self) -> Result<String, DocumentError> {
+        let place = Path::new(Self::TEXT);
+        let run = self.run_record(place, Recorded::clone)?;
+        serde_json::to_string(&Sealed::new(KIND, &self.program, &run)).map_err(|error| DocumentError::Unsound {
+            path: place.to_owned(),
+            defect: error.to_string(),
+        })
+    }
+
+    /// Reads the text of [`Self::to_text`].
+    ///
+    /// # Errors
+    /// The text is damaged.
+    pub fn from_text(text: &str) -> Result<Self, DocumentError> {
+        let read = Self::parse(text.as_bytes(), Path::new(""));
+        let checked = read.and_then(|file| defect(&file).map_or(Ok(file), Err));
+        checked.map_err(|defect| KIND.damaged(Path::new(Self::TEXT), defect))
+    }
+
+    /// Name of a network file that is only text, in messages.
+    const TEXT: &str = "network in memory";
+
+    /// Returns the part of the file that the checksum covers, with the paths of `located`.
+    fn run_record(
+        &self,
+        path: &Path,
+        located: impl FnOnce(&Recorded) -> Recorded,
+    ) -> Result<Box<RawValue>, DocumentError> {
         let unsound = |defect: String| DocumentError::Unsound {
             path: path.to_owned(),
             defect,
@@ -172,7 +208,7 @@ impl NetworkFile {
             return Err(unsound(defect));
         }
         let Self {
-            program,
+            program: _,
             settings,
             recorded,
             problem,
@@ -185,7 +221,7 @@ impl NetworkFile {
         } = self.clone();
         let document = Document {
             settings,
-            recorded: recorded.map(|recorded| recorded.relative_to(folder_of(path))),
+            recorded: recorded.as_ref().map(located),
             problem,
             row_wires,
             network,
@@ -194,8 +230,7 @@ impl NetworkFile {
             intervals,
             drift,
         };
-        let run = to_raw_value(&document).map_err(|error| unsound(error.to_string()))?;
-        Ok(Sealed::new(KIND, &program, &run).save(path, commit)?)
+        to_raw_value(&document).map_err(|error| unsound(error.to_string()))
     }
 
     /// Reads the file at `path`.

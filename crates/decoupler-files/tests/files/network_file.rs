@@ -52,6 +52,20 @@ fn networks_round_trip_bit_for_bit() {
 }
 
 #[test]
+fn the_text_of_a_file_is_read_back_and_damage_is_reported() {
+    let file = trained();
+    let text = file.to_text().unwrap();
+    assert_eq!(NetworkFile::from_text(&text).unwrap(), file);
+    let damaged = text.replacen("\"seed\":18446744073709551615", "\"seed\":1", 1);
+    assert_ne!(damaged, text);
+    let message = NetworkFile::from_text(&damaged).unwrap_err().to_string();
+    assert!(
+        message.contains("'network in memory' is damaged: its checksum"),
+        "{message}"
+    );
+}
+
+#[test]
 fn a_training_in_progress_can_be_saved() {
     let (_folder, path) = place();
     let mut run = Run::prepare(SimulatedSettings::default()).unwrap();

@@ -1,6 +1,7 @@
 use std::ops::{Add, Div, Mul};
 
 use ndarray::{Array2, Axis, Slice};
+use serde::{Deserialize, Serialize};
 
 use crate::network::{DecouplingNetwork, Quantity, tanh_in_place, tanh_in_place_single};
 
@@ -114,7 +115,7 @@ impl<T: Real> FoldedNetwork<T> {
 pub(super) const LANES: usize = 4;
 
 /// An affine layer in double precision.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub(in crate::decoupling) struct PaddedLayer {
     outputs: usize,
     padded_outputs: usize,

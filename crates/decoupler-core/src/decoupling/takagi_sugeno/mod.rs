@@ -5,6 +5,7 @@ mod selection;
 
 use ndarray::{Array2, Axis, Slice};
 use rand::Rng;
+use serde::{Deserialize, Serialize};
 
 use super::{
     AffineLayer, DecodeError, Decoder, Description, Layer, LayeredMap, NotDescribed,
@@ -30,7 +31,7 @@ use selection::{Antecedents, normalise};
 /// held-out error of a known row-wire is 0.011 % with 10 components, 0.026 % with 15, and 0.040 % with 30 or 3, and
 /// that of one map for all row-wires 0.45 % with 3 components and 0.71 % with 11; narrower memberships were never
 /// clearly better.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct TakagiSugeno {
     quantity: Quantity,
     /// Value subtracted from each channel.

@@ -75,6 +75,29 @@ impl<'a> ExportedDecoder<'a> {
         })
     }
 
+    /// Exports networks that were trained on samples in memory, with the description of their channels and the row-wires
+    /// with a network each. Without test samples the bundle contains no errors.
+    pub fn of_networks(
+        networks: &Networks,
+        settings: RunSettings,
+        problem: Problem,
+        row_wires: Option<Vec<usize>>,
+    ) -> Self {
+        let none = TestErrors::Targets(Vec::new());
+        Self {
+            file: None,
+            origin: Origin {
+                program: PROGRAM.to_owned(),
+                settings,
+                problem,
+                row_wires,
+                files: Vec::new(),
+                errors_of_linear: none.clone(),
+            },
+            fitted: FittedDecoder::of_networks(networks, none),
+        }
+    }
+
     /// Kind of decoder.
     pub fn kind(&self) -> BundleDecoder {
         self.fitted.kind

@@ -87,11 +87,9 @@ fn export_network_file(exported: &ExportedDecoder<'_>, path: &Path) -> Result<Bu
     if fs::symlink_metadata(path).is_ok() {
         return Err(BundleError::Exists(path.to_owned()));
     }
+    let file = exported.file().ok_or(BundleError::NoFile)?;
     let trial = UnfinishedFolder::begin(folder_of(path)).map_err(|error| WriteError::io(path, error))?;
     let copy = trial.path().join("network.json");
-    let file = exported
-        .file()
-        .expect("a network comes from its file: a decoder fitted to samples is not the network");
     // The user does not know the name of the copy.
     let of_target = |error| match error {
         DocumentError::Write(WriteError::Io { source, .. }) | DocumentError::Read { source, .. } => {

@@ -209,8 +209,8 @@ pub(super) fn readme(name: &str, portable: &Portable, fixed: Option<&FixedNetwor
     text + &format!(
         "\ngolden.csv has readings in double precision with the {output}s that the {decoder} gives to them, for a test of your\n\
          own: convert the readings as you would your own.\n\
-         metadata.json has {subject}, the errors of the {decoder}, the range of the readings in training,\n\
-         the seed and the version of the program.\n",
+         metadata.json has {subject}, the errors of the {decoder} on test samples, if there were any, the range of the\n\
+         readings in training, the seed and the version of the program.\n",
         output = meaning.output(),
         decoder = portable.decoder,
     )
@@ -229,6 +229,9 @@ pub enum BundleError {
     /// The decoder needs a network, and none was trained.
     #[error("{0} needs a trained network: train one first")]
     NoNetwork(BundleDecoder),
+    /// The network was trained on samples in memory and has no network file.
+    #[error("json is the network file, and a network trained on samples in memory has none: give another format")]
+    NoFile,
     /// No other program can compute what the decoder does.
     #[error("{decoder} cannot be exported: {reason}")]
     NotDescribed {

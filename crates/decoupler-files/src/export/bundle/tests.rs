@@ -24,9 +24,9 @@ use crate::export::NetworkFile;
 use decoupler_core::{
     decoupling::Layer,
     evaluation::Channel,
-    evaluation::{Run, SimulatedSettings},
+    evaluation::{Measured, Problem, Run, RunSettings, SimulatedSettings},
     network::{InputChoice, Quantity, ScalingChoice},
-    scene::{Noise, Rows},
+    scene::{Noise, RowModel, Rows},
 };
 
 /// A network of a small array after little training.
@@ -280,6 +280,25 @@ fn every_format_and_precision_is_written_verified_and_complete() {
             }
         }
     }
+}
+
+#[test]
+fn networks_of_samples_in_memory_are_exported_without_errors() {
+    let home = tempfile::tempdir().unwrap();
+    let network = trained(Rows::All, Quantity::Resistance, ScalingChoice::MinMax, 1e-3).network;
+    let settings = RunSettings::from(Measured { rows: RowModel::Shared });
+    let problem = Problem::unnamed(6, network.at(0).outputs().channels());
+    let decoder = || ExportedDecoder::of_networks(&network, settings, problem.clone(), None);
+    let path = home.path().join("bundle");
+    let report = export_bundle(decoder(), BundleFormat::Onnx, BundlePrecision::Double, &path).unwrap();
+    assert!(report.deviation() <= report.limit);
+    let metadata = fs::read_to_string(path.join("metadata.json")).unwrap();
+    let metadata: serde_json::Value = serde_json::from_str(&metadata).unwrap();
+    assert_eq!(metadata["errors"], serde_json::json!([]));
+    assert_eq!(metadata["inputs"]["names"][5], "c6");
+    let other = home.path().join("network.json");
+    let refused = export_bundle(decoder(), BundleFormat::Json, BundlePrecision::Double, &other);
+    assert!(matches!(refused, Err(BundleError::NoFile)), "{refused:?}");
 }
 
 #[test]

@@ -1,0 +1,108 @@
+//! Samples of a simulated array.
+
+use decoupler_core::{
+    dataset::{Dataset, Seed},
+    evaluation::{Preset, SimulatedSettings, Workload},
+    scene::{Loading, Movement, Noise, NoisySets, Rows},
+};
+use numpy::ToPyArray;
+use pyo3::{prelude::*, types::PyDict};
+
+use crate::{
+    sensor::Sensor,
+    work::{detached, value_error},
+};
+
+/// Settings of a simulation, under the names of the arguments in Python; `None` for the value of the preset.
+#[derive(FromPyObject)]
+#[pyo3(from_item_all)]
+struct Settings {
+    preset: String,
+    samples: Option<usize>,
+    validation_samples: Option<usize>,
+    test_samples: Option<usize>,
+    rows: Option<String>,
+    axes: Option<String>,
+    loading: Option<String>,
+    noise: f64,
+    noise_ohm: f64,
+    adc_bits: Option<u8>,
+    drift: f64,
+    noise_in: String,
+    seed: u64,
+}
+
+impl Settings {
+    /// Settings as the program makes them from the same values.
+    fn simulated(&self, sensor: &Sensor) -> PyResult<SimulatedSettings> {
+        let noise = Noise {
+            relative: self.noise,
+            additive_ohm: self.noise_ohm,
+            converter_bits: self.adc_bits,
+            drift: self.drift,
+            sets: match self.noise_in.as_str() {
+                "both" => NoisySets::Both,
+                "training" => NoisySets::Training,
+                "test" => NoisySets::Test,
+                other => return Err(value_error(format!("noise_in: '{other}': give both, training or test"))),
+            },
+        };
+        let preset: Preset = self.preset.parse().map_err(value_error)?;
+        let mut settings = preset.settings_in(noise);
+        settings.source.sensor = sensor.0;
+        settings.seed = Seed(self.seed);
+        let source = &mut settings.source;
+        source.samples = self.samples.unwrap_or(source.samples);
+        source.validation_samples = self.validation_samples.unwrap_or(source.validation_samples);
+        source.test_samples = self.test_samples.unwrap_or(source.test_samples);
+        let scene = &mut source.scene;
+        if let Some(rows) = &self.rows {
+            scene.rows = rows.parse::<Rows>().map_err(value_error)?;
+        }
+        if let Some(axes) = &self.axes {
+            scene.movement = axes.parse::<Movement>().map_err(value_error)?;
+        }
+        if let Some(loading) = &self.loading {
+            scene.loading = loading.parse::<Loading>().map_err(value_error)?;
+        }
+        scene.check().map_err(value_error)?;
+        Ok(settings)
+    }
+}
+
+/// Arrays of a set: readings, targets, row-wires and snapshots, both from 0.
+pub fn arrays<'py>(py: Python<'py>, set: &Dataset) -> PyResult<Bound<'py, PyDict>> {
+    let arrays = PyDict::new(py);
+    arrays.set_item("X", set.readings().to_pyarray(py))?;
+    arrays.set_item("y", set.targets().to_pyarray(py))?;
+    let row_wires: Option<Vec<i64>> = (0..set.samples())
+        .map(|sample| set.row_wire(sample).map(|row_wire| row_wire as i64))
+        .collect();
+    arrays.set_item("rows", row_wires.map(|row_wires| row_wires.to_pyarray(py)))?;
+    let groups = Vec::from_iter(set.groups().iter().map(|&group| group as i64));
+    arrays.set_item("groups", groups.to_pyarray(py))?;
+    Ok(arrays)
+}
+
+/// Draws the sets of a run: training, validation (or `None`) and test samples.
+#[pyfunction]
+#[allow(clippy::type_complexity, reason = "the parts of a Python tuple")]
+pub fn simulate<'py>(
+    py: Python<'py>,
+    sensor: &Sensor,
+    settings: &Bound<'py, PyAny>,
+) -> PyResult<(Bound<'py, PyDict>, Option<Bound<'py, PyDict>>, Bound<'py, PyDict>, f64)> {
+    let settings = settings.extract::<Settings>()?.simulated(sensor)?;
+    settings.check_counts().map_err(value_error)?;
+    Workload::of(&settings)
+        .and_then(|workload| workload.check_memory())
+        .map_err(value_error)?;
+    let sets = detached(py, || settings.draw_sets())?;
+    let validation = sets.split.validation.as_ref();
+    Ok((
+        arrays(py, &sets.split.training)?,
+        validation.map(|set| arrays(py, set)).transpose()?,
+        arrays(py, &sets.test)?,
+        settings.source.stroke_mm(),
+    ))
+}

@@ -1,0 +1,328 @@
+//! Training of networks.
+
+use std::sync::{Mutex, PoisonError};
+
+use decoupler_core::{
+    dataset::{Dataset, Seed, Split, SplitBy},
+    evaluation::{
+        Channel, Combination, Initialization, Intervals, Measured, Problem, RecordedSize, Run, RunError, RunSettings,
+        Workload,
+    },
+    network::{Quantity, ScalingChoice},
+    scene::RowModel,
+    training::{EpochRecord, Method, StoppingRules},
+};
+use numpy::{IntoPyArray, PyArray1};
+use pyo3::{exceptions::PyValueError, prelude::*, types::PyDict};
+
+use crate::{
+    arrays::{Matrix, Samples},
+    network::Network,
+    saving::{Origin, division, samples_crc32},
+    work::{detached, value_error},
+};
+
+/// Settings of a training, under the names of the estimator's parameters.
+#[derive(FromPyObject)]
+#[pyo3(from_item_all)]
+struct Settings {
+    hidden_nodes: usize,
+    method: String,
+    method_settings: Option<Vec<(String, f64)>>,
+    epochs: usize,
+    restarts: usize,
+    combine: String,
+    initialization: String,
+    goal: f64,
+    min_gradient: f64,
+    max_fail: usize,
+    validation_fraction: Option<f64>,
+    split: String,
+    inputs: String,
+    scaling: String,
+    intervals: String,
+    seed: u64,
+    /// Names of the readings, where known.
+    input_names: Option<Vec<String>>,
+    /// Names of the targets, where known.
+    target_names: Option<Vec<String>>,
+}
+
+impl Settings {
+    /// Settings of a run on measured samples, as the program makes them from the same values.
+    fn run(&self, has_row_wires: bool) -> PyResult<RunSettings> {
+        let rows = if has_row_wires {
+            RowModel::Each
+        } else {
+            RowModel::Shared
+        };
+        let mut settings = RunSettings::from(Measured { rows });
+        settings.choose_method(self.method()?);
+        let method = &mut settings.training.method;
+        for (name, value) in self.method_settings.iter().flatten() {
+            set(method, name, *value)?;
+        }
+        settings.training.stopping = StoppingRules {
+            epochs: self.epochs,
+            goal_mse: self.goal,
+            min_gradient: self.min_gradient,
+            max_fail: self.max_fail,
+        };
+        settings.training.check().map_err(value_error)?;
+        settings.hidden = self.hidden_nodes;
+        settings.starts = self.restarts;
+        settings.combine = self.combine.parse::<Combination>().map_err(value_error)?;
+        settings.initialization = self.initialization.parse::<Initialization>().map_err(value_error)?;
+        settings.inputs.quantity = quantity(&self.inputs)?;
+        settings.inputs.scaling = self.scaling.parse::<ScalingChoice>().map_err(value_error)?;
+        settings.seed = Seed(self.seed);
+        settings.check_network().map_err(value_error)?;
+        Ok(settings)
+    }
+
+    fn method(&self) -> PyResult<Method> {
+        let all = Method::all();
+        let found = all.into_iter().find(|method| method.short_name() == self.method);
+        found.ok_or_else(|| {
+            let names = all.map(|method| method.short_name()).join(", ");
+            value_error(format!(
+                "'{}' is not a training method: give one of {names}",
+                self.method
+            ))
+        })
+    }
+
+    /// `true` if intervals are to be calibrated.
+    fn calibrates(&self) -> PyResult<bool> {
+        match self.intervals.as_str() {
+            "always" => Ok(true),
+            "never" => Ok(false),
+            other => Err(value_error(format!(
+                "intervals: '{other}' is not a choice: give always or never"
+            ))),
+        }
+    }
+
+    /// Description of the channels by their names, or by numbers where there are none.
+    fn problem(&self, set: &Dataset) -> Problem {
+        let mut problem = Problem::unnamed(set.channels(), set.outputs());
+        let rename = |channels: &mut Vec<Channel>, names: &Option<Vec<String>>| {
+            for (channel, name) in channels.iter_mut().zip(names.iter().flatten()) {
+                channel.name.clone_from(name);
+            }
+        };
+        rename(&mut problem.inputs, &self.input_names);
+        rename(&mut problem.targets, &self.target_names);
+        problem
+    }
+}
+
+/// Parses the quantity computed from each reading.
+pub fn quantity(name: &str) -> PyResult<Quantity> {
+    if name == "raw" {
+        return Ok(Quantity::Raw);
+    }
+    name.parse::<Quantity>().map_err(|_| {
+        value_error(format!(
+            "inputs: '{name}' is not a quantity: give raw, resistance, conductance or log"
+        ))
+    })
+}
+
+/// Changes a setting of a method by its name, with spaces, dashes or underscores.
+fn set(method: &mut Method, name: &str, value: f64) -> PyResult<()> {
+    let underscored = |name: &str| name.replace([' ', '-'], "_");
+    let short_name = method.short_name();
+    let mut settings = method.settings();
+    let names = Vec::from_iter(settings.iter().map(|setting| underscored(setting.name)));
+    match settings
+        .iter_mut()
+        .find(|setting| underscored(setting.name) == underscored(name))
+    {
+        Some(setting) => {
+            *setting.value = value;
+            Ok(())
+        }
+        None => Err(value_error(format!(
+            "method_settings: {short_name} has no setting '{name}'; it has {}",
+            names.join(", ")
+        ))),
+    }
+}
+
+/// Result of a training.
+#[pyclass(frozen, module = "decoupler._native")]
+pub struct Training {
+    /// Best networks.
+    #[pyo3(get)]
+    network: Py<Network>,
+    history: Vec<EpochRecord>,
+    /// Number of epochs of the best start.
+    #[pyo3(get)]
+    epochs: usize,
+    /// Epoch of the best network.
+    #[pyo3(get)]
+    best_epoch: usize,
+    /// Reason why the training ended.
+    #[pyo3(get)]
+    stop_reason: String,
+    /// Defect of the training with its remedy, if there is one.
+    #[pyo3(get)]
+    warning: Option<String>,
+    /// Exception that ended the training: `KeyboardInterrupt`, or one that the callback raised.
+    #[pyo3(get)]
+    interruption: Option<Py<PyAny>>,
+}
+
+#[pymethods]
+impl Training {
+    /// Training error after each epoch, that of the start first.
+    #[getter]
+    fn loss_curve<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        let losses = self.history.iter().map(|record| record.training_mse);
+        Vec::from_iter(losses).into_pyarray(py)
+    }
+
+    /// Validation error after each epoch, that of the start first; `None` if nothing is held out.
+    #[getter]
+    fn validation_loss_curve<'py>(&self, py: Python<'py>) -> Option<Bound<'py, PyArray1<f64>>> {
+        let losses = self.history.iter().map(|record| record.validation_mse);
+        Some(losses.collect::<Option<Vec<f64>>>()?.into_pyarray(py))
+    }
+}
+
+/// Validation samples: readings, targets, and the row-wire of each.
+type Validation<'py> = (Matrix<'py>, Matrix<'py>, Option<Vec<usize>>);
+
+/// Trains networks on readings (samples × channels) and targets (samples × outputs).
+#[pyfunction]
+#[pyo3(signature = (readings, targets, settings, *, row_wires = None, groups = None, validation = None, callback = None))]
+#[allow(clippy::too_many_arguments, reason = "one for each argument in Python")]
+pub fn train(
+    py: Python<'_>,
+    readings: Matrix<'_>,
+    targets: Matrix<'_>,
+    settings: &Bound<'_, PyAny>,
+    row_wires: Option<Vec<usize>>,
+    groups: Option<Vec<usize>>,
+    validation: Option<Validation<'_>>,
+    callback: Option<Bound<'_, PyAny>>,
+) -> PyResult<Training> {
+    let settings: Settings = settings.extract()?;
+    let run_settings = settings.run(row_wires.is_some())?;
+    let calibrates = settings.calibrates()?;
+    let by: SplitBy = settings.split.parse().map_err(value_error)?;
+    if by == SplitBy::Group && groups.is_none() && validation.is_none() {
+        return Err(PyValueError::new_err(
+            "split=\"group\": give the group of each sample with groups",
+        ));
+    }
+    let samples = Samples {
+        readings: readings.view(),
+        targets: targets.view(),
+        row_wires,
+        groups,
+    };
+    let usual = run_settings.validation_fraction();
+    let division = division(by, settings.validation_fraction.unwrap_or(usual));
+    let split = match &validation {
+        None => samples.split(division, run_settings.seed)?,
+        Some((readings, targets, row_wires)) => {
+            let held_out = Samples {
+                readings: readings.view(),
+                targets: targets.view(),
+                row_wires: row_wires.clone(),
+                groups: None,
+            };
+            let training = samples.dataset()?;
+            let read = training.row_wires_read().unwrap_or_default();
+            Split {
+                validation: Some(held_out.dataset()?.among_rows(read).map_err(value_error)?),
+                training,
+            }
+        }
+    };
+    let row_wires = split.training.row_wires_read().map(<[usize]>::to_vec);
+    let problem = settings.problem(&split.training);
+    let crc32 = samples_crc32(&split.training);
+    let calibration = calibrates.then(|| split.training.clone());
+    let size = RecordedSize::of(&run_settings, &split.training);
+    Workload::of_recording(&run_settings, size)
+        .check_memory()
+        .map_err(value_error)?;
+    let mut run = detached(py, move || Run::on_split(run_settings, split))?;
+    let mut interruption = step_to_the_end(py, &mut run, callback.as_ref());
+    run.stop();
+    let intervals = match calibration.filter(|_| interruption.is_none()) {
+        Some(set) => match calibrate(py, &run_settings, &set, by) {
+            Ok(intervals) => intervals,
+            Err(error) => {
+                interruption = Some(error);
+                None
+            }
+        },
+        None => None,
+    };
+    let origin = Origin::of(&run, validation.is_none().then_some(division), crc32);
+    let network = Network::trained(run.network(), row_wires, problem, run_settings, intervals, origin);
+    let leader = run.leader();
+    Ok(Training {
+        network: Py::new(py, network)?,
+        history: leader.history().to_vec(),
+        epochs: leader.latest().epoch,
+        best_epoch: leader.best_epoch(),
+        stop_reason: run.stop_reason().map_or_else(String::new, |reason| reason.to_string()),
+        warning: run.defect().map(|defect| defect.to_string()),
+        interruption: interruption.map(|error| error.into_value(py).into_any()),
+    })
+}
+
+/// Trains to the end, to a signal, or until the callback asks for the end. Returns the exception that ended it, if any;
+/// the run keeps its best networks.
+fn step_to_the_end(py: Python<'_>, run: &mut Run, callback: Option<&Bound<'_, PyAny>>) -> Option<PyErr> {
+    while run.stop_reason().is_none() {
+        let stepped = detached(py, || {
+            run.step();
+            Ok::<_, String>(())
+        });
+        if let Err(error) = stepped.and_then(|()| py.check_signals()) {
+            return Some(error);
+        }
+        match callback.map(|callback| report(run, callback)).transpose() {
+            Err(error) => return Some(error),
+            Ok(Some(true)) => return None,
+            Ok(_) => {}
+        }
+    }
+    None
+}
+
+/// Calls `callback(epoch, losses)` with the errors of the best start. Returns `true` if it asks for the end.
+fn report(run: &Run, callback: &Bound<'_, PyAny>) -> PyResult<bool> {
+    let latest = run.leader().latest();
+    let losses = PyDict::new(callback.py());
+    losses.set_item("training", latest.training_mse)?;
+    losses.set_item("validation", latest.validation_mse)?;
+    callback.call1((latest.epoch, losses))?.is_truthy()
+}
+
+/// Calibrates prediction intervals by cross-validation of the training samples.
+fn calibrate(py: Python<'_>, settings: &RunSettings, set: &Dataset, by: SplitBy) -> PyResult<Option<Intervals>> {
+    let interruption = Mutex::new(None);
+    let calibrated = detached(py, || {
+        let is_cancelled = || {
+            let signal = Python::attach(|py| py.check_signals()).err();
+            let mut interruption = interruption.lock().unwrap_or_else(PoisonError::into_inner);
+            if interruption.is_none() {
+                *interruption = signal;
+            }
+            interruption.is_some()
+        };
+        let intervals = Intervals::cross_validate(settings, set, by, &is_cancelled)?;
+        Ok::<_, RunError>(intervals)
+    })?;
+    match interruption.into_inner().unwrap_or_else(PoisonError::into_inner) {
+        Some(signal) => Err(signal),
+        None => Ok(calibrated),
+    }
+}
