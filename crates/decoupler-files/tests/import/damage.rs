@@ -16,8 +16,11 @@ fn fixture(name: &str) -> Vec<u8> {
     .unwrap()
 }
 
+/// Names of columns, bits of their numbers, and notes.
+type Content = (Vec<String>, Vec<Vec<u64>>, Vec<String>);
+
 /// Reads `bytes` as a file of this name; returns everything of the table that is used or shown.
-fn read(bytes: &[u8], path: &Path) -> Result<(Vec<String>, Vec<Vec<u64>>, Vec<String>), String> {
+fn read(bytes: &[u8], path: &Path) -> Result<Content, String> {
     fs::write(path, bytes).unwrap();
     let read = read_table(path, DialectChoice::default(), &mut |_| ControlFlow::Continue(()));
     let Table { columns, notes, .. } = read.map_err(|error| error.to_string())?;
