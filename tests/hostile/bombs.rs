@@ -200,7 +200,7 @@ const BOMBS: [Bomb; 16] = [
                 r#"<row><c><v>1</v></c></row>"#,
                 r#"<sst uniqueCount="100000000000"></sst>"#,
                 0,
-            )
+            );
         },
         OVER_BUDGET,
     ),

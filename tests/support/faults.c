@@ -48,7 +48,8 @@ static int is_watched_file(int file)
     if (length < 0)
         return 0;
     path[length] = 0;
-    return is_watched(path);
+    /* A pipe has no path. */
+    return path[0] == '/' && is_watched(path);
 }
 
 /* Returns 0, or the error with which this operation fails: -1 for a short write. */

@@ -166,12 +166,12 @@ pub(super) struct Rectangle {
 impl Rectangle {
     /// Includes a number of rows and columns from `first`.
     pub(super) fn include(&mut self, first: [u64; 2], counts: [u64; 2]) {
-        let bounds = self.bounds.get_or_insert([first, first]);
-        for axis in 0..2 {
-            bounds[0][axis] = bounds[0][axis].min(first[axis]);
-            let last = first[axis].saturating_add(counts[axis].saturating_sub(1));
-            bounds[1][axis] = bounds[1][axis].max(last);
-        }
+        let last = [0, 1].map(|axis| first[axis].saturating_add(counts[axis].saturating_sub(1)));
+        let [before, after] = self.bounds.unwrap_or([first, last]);
+        self.bounds = Some([
+            [0, 1].map(|axis| before[axis].min(first[axis])),
+            [0, 1].map(|axis| after[axis].max(last[axis])),
+        ]);
     }
 
     /// Returns its memory in bytes.

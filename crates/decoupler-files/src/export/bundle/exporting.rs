@@ -13,7 +13,7 @@ use super::{
     weights::{self, Arithmetic, Weights},
 };
 use crate::export::{
-    NetworkFile, WriteError,
+    DocumentError, NetworkFile, WriteError,
     unfinished::{UnfinishedFolder, folder_of},
 };
 
@@ -90,8 +90,15 @@ fn export_network_file(exported: &ExportedDecoder<'_>, path: &Path) -> Result<Bu
     let file = exported.file().ok_or(BundleError::NoFile)?;
     let trial = UnfinishedFolder::begin(folder_of(path)).map_err(|error| WriteError::io(path, error))?;
     let copy = trial.path().join("network.json");
-    file.save(&copy)?;
-    let read = NetworkFile::load(&copy)?;
+    // The user does not know the name of the copy.
+    let of_target = |error| match error {
+        DocumentError::Write(WriteError::Io { source, .. }) | DocumentError::Read { source, .. } => {
+            WriteError::io(path, source).into()
+        }
+        error => error,
+    };
+    file.save(&copy).map_err(of_target)?;
+    let read = NetworkFile::load(&copy).map_err(of_target)?;
     if (&read.network, &read.settings) != (&file.network, &file.settings) {
         return Err(BundleError::ReadBack {
             file: path.display().to_string(),
