@@ -5,8 +5,8 @@ use std::sync::{Mutex, PoisonError};
 use decoupler_core::{
     dataset::{Dataset, Seed, Split, SplitBy},
     evaluation::{
-        Channel, Combination, Initialization, Intervals, Measured, NoIntervals, Problem, RecordedSize, Run, RunError, RunSettings,
-        Workload,
+        Channel, Combination, Initialization, Intervals, Measured, NoIntervals, Problem, RecordedSize, Run, RunError,
+        RunSettings, Workload,
     },
     network::{Quantity, ScalingChoice},
     scene::RowModel,
