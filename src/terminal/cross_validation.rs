@@ -1,10 +1,6 @@
 //! Errors on every sample by cross-validation, and the optimism of random test samples.
 
-use std::{
-    collections::BTreeMap,
-    io::{Write, stderr},
-    iter::once,
-};
+use std::{collections::BTreeMap, io::Write, iter::once};
 
 use serde::Serialize;
 
@@ -13,7 +9,7 @@ use super::{
     failure::Failure,
     inspect::{FileFound, files, write_files, write_warnings},
     interruption::Graceful,
-    output::{print, print_object, progress_bar},
+    output::{messages, print, print_object, progress_bar},
     samples::{with_bar, working_folder},
     train::Train,
 };
@@ -143,7 +139,7 @@ impl Train {
 fn announce_comparison(by: SplitBy) {
     // There is no one to report to if this fails.
     let _ = writeln!(
-        stderr(),
+        messages(),
         "training again on a split by {by}, to measure how optimistic random test samples are; Ctrl-C skips this"
     );
 }

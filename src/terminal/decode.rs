@@ -1,7 +1,7 @@
 //! Decoding of files, and frames of known presses, in the terminal.
 
 use std::{
-    io::{self, Write, stderr},
+    io::{self, Write},
     path::{Path, PathBuf},
 };
 
@@ -32,7 +32,7 @@ use super::{
     follow::Follow,
     import_arguments::ImportArguments,
     intervals::Drift,
-    output::{Readings, print, print_object, progress_bar, read},
+    output::{Readings, messages, print, print_object, progress_bar, read},
     samples::{with_bar, working_folder},
 };
 
@@ -404,7 +404,7 @@ impl<'a> OutsideTraining<'a> {
         if *outside == 0 {
             return;
         }
-        let mut stderr = stderr().lock();
+        let mut stderr = messages();
         for line in listed {
             // There is no one to report to if this fails.
             let _ = writeln!(stderr, "warning: {line}");

@@ -1,5 +1,5 @@
 use std::{
-    io::{Write, stdout},
+    io::Write,
     path::{Path, PathBuf},
 };
 
@@ -11,7 +11,11 @@ use decoupler_files::export::{
 };
 use serde::Serialize;
 
-use super::{failure::Failure, samples::sets};
+use super::{
+    failure::Failure,
+    output::{print, print_object},
+    samples::sets,
+};
 
 /// Write a decoder for other programs, and verify it
 ///
@@ -164,9 +168,7 @@ pub(super) fn print_json(report: &BundleReport) -> Result<(), Failure> {
         error_bounds: bounds.filter(|_| !is_array).collect(),
         remarks: &report.remarks,
     };
-    let mut stdout = stdout().lock();
-    serde_json::to_writer(&mut stdout, &printed).map_err(|error| Failure::Output(error.into()))?;
-    writeln!(stdout).map_err(Failure::Output)
+    print_object(&printed)
 }
 
 /// Prints the files, and the deviations from the network.
@@ -207,5 +209,5 @@ pub(super) fn print_text(report: &BundleReport) -> Result<(), Failure> {
     for remark in &report.remarks {
         text += &format!("Note: {remark}.\n");
     }
-    stdout().lock().write_all(text.as_bytes()).map_err(Failure::Output)
+    print(|output| output.write_all(text.as_bytes()))
 }

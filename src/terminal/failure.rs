@@ -71,7 +71,7 @@ pub(super) enum Failure {
     #[error("interrupted after {done} points")]
     InterruptedTrade { done: usize },
     #[error("interrupted")]
-    InterruptedFollow,
+    InterruptedFollow { status: u8 },
     #[error(transparent)]
     Specification(#[from] SpecificationError),
     #[error("interrupted after {done} of {trials} trials; the same command trains the rest")]
@@ -80,18 +80,19 @@ pub(super) enum Failure {
     FailedTrials { failed: usize, trials: usize },
     #[error(transparent)]
     SweepFolder(#[from] SweepFolderError),
-    #[error("'{}' lacks trials: {missing} missing, {conflicting} conflicting, {unreadable} files unreadable; run the sweep again for missing ones, and delete the wrong file of those that conflict", .out.display())]
+    #[error("'{}' lacks trials: {missing} missing, {conflicting} conflicting, {unreadable} files unreadable; run the sweep again for missing ones, and delete the wrong file of those that conflict{}", .out.display(), if *.is_kept { "; the table there has more trials and is left as it is" } else { "" })]
     IncompleteSweep {
         missing: usize,
         conflicting: usize,
         unreadable: usize,
         out: PathBuf,
+        is_kept: bool,
     },
     #[error(transparent)]
     Source(SourceError),
     #[error("cannot start reading: {}", system_cause(.0))]
     Reader(io::Error),
-    #[error("{input} is lost: {}; connect it again", system_cause(.source))]
+    #[error("{}", .input.lost(.source))]
     Lost { input: Source, source: io::Error },
     #[error("{0}: {1}")]
     Line(Source, LineError),
@@ -202,7 +203,7 @@ impl Failure {
             Self::Arguments(_) | Self::Bundle(BundleError::Choice(_)) => 2,
             Self::Specification(SpecificationError::Read { .. }) => 1,
             Self::Specification(_) => 2,
-            Self::InterruptedSweep { status, .. } => *status,
+            Self::InterruptedSweep { status, .. } | Self::InterruptedFollow { status } => *status,
             Self::Import(
                 ImportError::Unknown { .. }
                 | ImportError::Ambiguous { .. }
@@ -218,8 +219,7 @@ impl Failure {
             Self::Interrupted(_)
             | Self::InterruptedComparison { .. }
             | Self::InterruptedTrials { .. }
-            | Self::InterruptedTrade { .. }
-            | Self::InterruptedFollow => interruption::STATUS,
+            | Self::InterruptedTrade { .. } => interruption::STATUS,
             _ => 1,
         }
     }

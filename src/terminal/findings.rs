@@ -2,7 +2,7 @@
 
 use std::{
     io::{self, IsTerminal as _, Write, stderr},
-    time::Instant,
+    time::{Duration, Instant},
 };
 
 use clap::{
@@ -12,7 +12,7 @@ use clap::{
 use decoupler_core::{
     dataset::{Dataset, Folds, Memory, Seed, SplitBy, Stream},
     evaluation::{
-        Channel, Measured, RunError, RunSettings, TargetErrors,
+        Channel, Measured, RecordedSize, RunError, RunSettings, TargetErrors, Workload,
         recorded::{
             ChannelImportance, Determinacy, Determination, Findings, FittedModel, Interval, LearningCurve, MemoryGain,
             StudyStep,
@@ -23,7 +23,7 @@ use decoupler_core::{
     text::capitalised,
 };
 use decoupler_files::{
-    export::{Cell, Table, describe_target, describe_warnings, format_number},
+    export::{Cell, Table, describe_target, describe_warnings, format_duration, format_number},
     import::{Dropped, ImportError, Plan, Recording},
 };
 use serde::Serialize;
@@ -33,7 +33,7 @@ use super::{
     failure::Failure,
     import_arguments::ImportArguments,
     inspect::{FileFound, files, write_files, write_warnings},
-    output::{print, print_object, progress_bar},
+    output::{messages, print, print_object, progress_bar},
     samples::{with_bar, working_folder},
     seed,
 };
@@ -51,8 +51,8 @@ pub(super) struct StudyArguments {
     /// it is better]
     #[arg(long, value_name = "ridge|network", value_parser = model())]
     model: Option<FittedModel>,
-    /// Time in seconds after which no more networks are trained and no more channels left out, for recordings of many
-    /// channels [default: 30; with --model, none]
+    /// Time in seconds after which no more steps are begun; ridge regression comes first, and networks that would take much
+    /// longer are not trained. What was left out is reported [default: 30; with --model, none]
     #[arg(long, value_name = "SECONDS", value_parser = seconds)]
     budget: Option<f64>,
     /// Seed of all random numbers [default: 0]
@@ -102,7 +102,7 @@ impl StudyArguments {
         let folds = import.folds.unwrap_or_else(|| by.folds_of(&recording.set, FOLDS));
         // Before the first step is announced.
         Folds::by(&recording.set, folds, by, &mut settings.seed.rng(Stream::Split)).map_err(RunError::from)?;
-        let bar = progress_bar(is_json, 4, "{bar:20} {msg}");
+        let bar = progress_bar(is_json, 5, "{bar:20} {msg}");
         let begun = Instant::now();
         let begin = |stage: StudyStep| {
             bar.inc(1);
@@ -110,29 +110,61 @@ impl StudyArguments {
             // The bar is not shown in a log.
             if !stderr().is_terminal() {
                 // There is no one to report to if this fails.
-                let _ = writeln!(stderr(), "{:.0} s: {stage}", begun.elapsed().as_secs_f64());
+                let _ = writeln!(messages(), "{:.0} s: {stage}", begun.elapsed().as_secs_f64());
             }
         };
         let divided = (&plan.division, folds);
         let budget_s = self.budget.or(self.model.is_none().then_some(BUDGET_S));
         let is_spent = || budget_s.is_some_and(|budget_s| begun.elapsed().as_secs_f64() > budget_s);
         let ends: [&dyn Fn() -> bool; 2] = [&|| false, &is_spent];
-        let found = Findings::measure(&settings, &recording.set, divided, self.model, &begin, ends);
+        // Steps of ridge regression first.
+        begin(StudyStep::Memory);
+        let gain = memory_gain(&settings, &recording, (by, folds), &is_spent)?;
+        let time_of_networks = time_of_networks(&settings, &recording.set, folds);
+        let affords_networks = budget_s.is_none_or(|budget_s| time_of_networks.as_secs_f64() <= LONGEST * budget_s);
+        let model = self.model.or((!affords_networks).then_some(FittedModel::Ridge));
+        let found = Findings::measure(&settings, &recording.set, divided, model, &begin, ends);
         bar.finish_and_clear();
         let Some(findings) = found? else { return Ok(()) };
-        let gain = memory_gain(&settings, &recording, (by, folds))?;
-        let mut report = Report::new(&plan, &recording, &settings, folds, (&findings, gain.as_ref()));
-        if !findings.left_out.is_empty() {
-            let steps = Vec::from_iter(findings.left_out.iter().map(|step| left_out(*step)));
+        let measured = gain.as_ref().and_then(|gain| gain.as_ref().ok());
+        let mut report = Report::new(&plan, &recording, &settings, folds, (&findings, measured));
+        let mut steps = Vec::new();
+        if !affords_networks && self.model.is_none() {
+            let time = format_duration(time_of_networks);
+            steps.push(format!("networks, of which {folds} take about {time} on one thread"));
+        }
+        let is_memory_left_out = matches!(gain, Some(Err(Spent)));
+        let left_out_steps = findings.left_out.iter().copied();
+        let left_out_steps = left_out_steps.chain(is_memory_left_out.then_some(StudyStep::Memory));
+        steps.extend(left_out_steps.map(|step| left_out(step).to_owned()));
+        if !steps.is_empty() {
             report.warnings.push(format!(
-                "the budget of {} s was spent, so these were left out: {}; --budget SECONDS changes it, and --model ridge \
-                 needs no networks",
+                "the budget of {} s does not suffice, so these were left out: {}; --budget SECONDS changes it, and --model \
+                 ridge needs no networks",
                 format_number(budget_s),
                 steps.join("; ")
             ));
         }
         report.print(is_json)
     }
+}
+
+/// Time of the networks of a cross-validation on one thread, as a multiple of the budget, up to which they are begun: there may
+/// be several threads, and most trainings end before their last epoch.
+const LONGEST: f64 = 4.0;
+
+/// Returns the estimated time of the networks of a cross-validation on one thread.
+fn time_of_networks(settings: &RunSettings, set: &Dataset, folds: usize) -> Duration {
+    let size = RecordedSize {
+        samples: set.samples() - set.samples() / folds.max(1),
+        inputs: set.channels(),
+        targets: set.outputs(),
+        networks: 1,
+    };
+    Workload::of_recording(settings, size)
+        .time()
+        .all_epochs
+        .saturating_mul(folds as u32)
 }
 
 /// Describes a step of the study that was left out.
@@ -142,9 +174,13 @@ fn left_out(step: StudyStep) -> &'static str {
         StudyStep::OtherFolds => "the comparison with a random split",
         StudyStep::Samples => "networks trained on fewer samples (ridge regression instead)",
         StudyStep::Channels => "the importance of channels",
+        StudyStep::Memory => "whether the past helps",
         _ => "another step",
     }
 }
+
+/// The budget was spent before a step had ended.
+struct Spent;
 
 /// Measures whether the memory of the recording, or the usual one, reduces the held-out error of ridge regression; `None` for
 /// a recording that is too short for a memory.
@@ -152,7 +188,8 @@ fn memory_gain(
     settings: &RunSettings,
     recording: &Recording,
     divided: (SplitBy, usize),
-) -> Result<Option<MemoryGain>, Failure> {
+    is_spent: &dyn Fn() -> bool,
+) -> Result<Option<Result<MemoryGain, Spent>>, Failure> {
     let history = recording.history();
     let given = recording.memory().cloned();
     let memory = given.unwrap_or_else(|| MemoryGain::usual_memory(history));
@@ -164,13 +201,8 @@ fn memory_gain(
         Ok(recording.set.with_readings(features))
     };
     let (without, with) = (set(&Memory::default())?, set(&memory)?);
-    Ok(MemoryGain::measure(
-        settings,
-        &memory,
-        [&without, &with],
-        divided,
-        &|| false,
-    )?)
+    let measured = MemoryGain::measure(settings, &memory, [&without, &with], divided, is_spent)?;
+    Ok(Some(measured.ok_or(Spent)))
 }
 
 /// The object printed by `inspect --targets --json`.

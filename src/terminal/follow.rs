@@ -2,7 +2,7 @@
 
 use std::{
     fmt,
-    io::{Write, stderr},
+    io::Write,
     path::Path,
     sync::{
         Arc,
@@ -29,8 +29,9 @@ use decoupler_files::{
 use super::{
     failure::Failure,
     follow_report::{Answers, Form, Report},
-    interruption::Graceful,
+    interruption::{Graceful, STATUS, TERMINATED},
     number,
+    output::messages,
 };
 
 // Decoding of live frames.
@@ -87,6 +88,9 @@ impl Follow {
         // Without the signal there are still reports at intervals and at the end.
         #[cfg(unix)]
         let _ = signal_hook::flag::register(signal_hook::consts::SIGUSR1, Arc::clone(&asked));
+        let terminated = Arc::new(AtomicBool::new(false));
+        #[cfg(unix)]
+        let _ = signal_hook::flag::register(signal_hook::consts::SIGTERM, Arc::clone(&terminated));
         let opened = source.open().map_err(Failure::Source)?;
         let spawned = Lines::spawn(opened, source.keeping(), source.begins_anywhere());
         let mut lines = spawned.map_err(Failure::Reader)?;
@@ -99,11 +103,17 @@ impl Follow {
                 report.print(lines.dropped());
             }
             if graceful.is_end_requested() {
-                break Err(Failure::InterruptedFollow);
+                break Err(Failure::InterruptedFollow { status: STATUS });
+            }
+            if terminated.load(Ordering::SeqCst) {
+                break Err(Failure::InterruptedFollow { status: TERMINATED });
             }
             let line = match lines.next(WAIT) {
                 NextLine::Line(line) => line,
-                NextLine::None => continue,
+                NextLine::None => {
+                    report.waiting(lines.unended());
+                    continue;
+                }
                 NextLine::End(Some(error)) => {
                     let input = report.source().clone();
                     break Err(Failure::Lost { input, source: error });
@@ -420,5 +430,5 @@ impl Faults {
 
 fn warn(message: &str) {
     // There is no one to report to if this fails.
-    let _ = writeln!(stderr(), "warning: {message}");
+    let _ = writeln!(messages(), "warning: {message}");
 }

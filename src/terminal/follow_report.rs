@@ -1,6 +1,6 @@
 use std::{
     fmt::Display,
-    io::{self, BufWriter, StdoutLock, Write, stderr, stdout},
+    io::{self, BufWriter, StdoutLock, Write, stdout},
     time::{Duration, Instant},
 };
 
@@ -17,6 +17,7 @@ use super::{
     decode::{OutsideTraining, rows_read, with_half_widths, write_heading},
     failure::Failure,
     intervals::Drift,
+    output::messages,
 };
 
 /// Counts of decoded and bad lines, and messages on standard error.
@@ -28,6 +29,8 @@ pub(super) struct Report {
     bad: u64,
     /// Error in the first bad line.
     first_bad: Option<String>,
+    /// True once it was reported that no line ends.
+    has_warned_of_ends: bool,
     /// Number of bad lines since the last message.
     unreported: u64,
     last_reported: Instant,
@@ -47,6 +50,7 @@ impl Report {
             latencies: Latencies::default(),
             bad: 0,
             first_bad: None,
+            has_warned_of_ends: false,
             unreported: 0,
             last_reported: now,
         }
@@ -70,7 +74,7 @@ impl Report {
             return;
         }
         self.last_reported = Instant::now();
-        let mut stderr = stderr().lock();
+        let mut stderr = messages();
         // There is no one to report to if writing fails.
         let _ = match self.unreported {
             0 => writeln!(stderr, "warning: {reason}"),
@@ -89,6 +93,22 @@ impl Report {
                 "warning: none of the first {MAX_REPORTED} lines is a frame: does the device send at {baud} baud?"
             );
         }
+    }
+
+    /// Reports once that bytes arrive but no line ends; `unended` bytes have arrived since the last line.
+    pub(super) fn waiting(&mut self, unended: usize) {
+        /// More than the time between two lines of any device.
+        const PATIENCE: Duration = Duration::from_secs(2);
+        let has_lines = self.latencies.count() > 0 || self.bad > 0;
+        if has_lines || unended == 0 || self.has_warned_of_ends || self.begin.elapsed() < PATIENCE {
+            return;
+        }
+        self.has_warned_of_ends = true;
+        // There is no one to report to if this fails.
+        let _ = writeln!(
+            messages(),
+            "warning: {unended} bytes have arrived, but no line has ended: does the sender end lines with LF or CR LF?"
+        );
     }
 
     /// Returns `true` once per interval.
@@ -121,7 +141,7 @@ impl Report {
         let (rate, bad, latencies) = (decoded as f64 / seconds.max(1e-9), self.bad, &self.latencies);
         // There is no one to report to if this fails.
         let _ = writeln!(
-            stderr(),
+            messages(),
             "{decoded} lines decoded in {seconds:.1} s ({rate:.0} per second), {bad} bad, {dropped} dropped; {latencies}"
         );
     }

@@ -1,6 +1,6 @@
 use std::{
     fmt,
-    io::{Write, stderr},
+    io::Write,
     path::PathBuf,
     sync::atomic::{AtomicBool, Ordering},
     time::{Duration, Instant},
@@ -14,10 +14,13 @@ use decoupler_files::{
     import::Recorded,
 };
 
-use super::failure::Failure;
+use super::{failure::Failure, output::messages};
 
 /// Exit status of a command ended by Ctrl-C: 128 plus the number of the signal, as in shells.
 pub(super) const STATUS: u8 = 130;
+
+/// Exit status after SIGTERM: 128 plus the number of the signal, as in shells.
+pub(super) const TERMINATED: u8 = 143;
 
 /// True while the running command checks [`REQUESTED`] itself.
 static GRACEFUL: AtomicBool = AtomicBool::new(false);
@@ -31,10 +34,10 @@ pub(super) fn install() {
     let _ = ctrlc::try_set_handler(|| {
         // There is no one to report to if writing fails.
         if GRACEFUL.load(Ordering::SeqCst) && !REQUESTED.swap(true, Ordering::SeqCst) {
-            let _ = writeln!(stderr(), "stopping; press Ctrl-C again to end at once");
+            let _ = writeln!(messages(), "stopping; press Ctrl-C again to end at once");
             return;
         }
-        let _ = writeln!(stderr(), "interrupted");
+        let _ = writeln!(messages(), "interrupted");
         exit_leaving_nothing(i32::from(STATUS));
     });
 }
@@ -160,7 +163,7 @@ impl Checkpointing {
         {
             self.has_warned = true;
             // There is no one to report to if this fails.
-            let _ = writeln!(stderr(), "warning: {error}; training continues");
+            let _ = writeln!(messages(), "warning: {error}; training continues");
         }
         self.next = Instant::now() + self.interval.max(LARGEST_SHARE * begun.elapsed());
     }

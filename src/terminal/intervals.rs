@@ -1,6 +1,6 @@
 //! Calibration of prediction intervals and of the drift monitor after a training on a recording.
 
-use std::io::{Write, stderr};
+use std::io::Write;
 
 use clap::ValueEnum;
 use decoupler_core::{
@@ -12,7 +12,7 @@ use decoupler_files::{
     import::SetupSets,
 };
 
-use super::interruption::Graceful;
+use super::{interruption::Graceful, output::messages};
 
 /// When to calibrate 90 % prediction intervals by cross-validation.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
@@ -72,7 +72,7 @@ pub(super) fn calibrate(
 
 fn note(message: &str) {
     // There is no one to report to if this fails.
-    let _ = writeln!(stderr(), "{message}");
+    let _ = writeln!(messages(), "{message}");
 }
 
 /// Monitor of the readings of a decoded input, which warns on standard error.

@@ -33,21 +33,16 @@ mod training_arguments;
 
 pub use decoupler_files::export::exit_leaving_nothing;
 
-use std::{
-    borrow::Cow,
-    error::Error,
-    ffi::OsString,
-    io::{Write, stderr},
-    ops::RangeInclusive,
-    process::ExitCode,
-};
+use std::{error::Error, ffi::OsString, io::Write, ops::RangeInclusive, process::ExitCode};
 
 use calibrate::Calibrate;
 use clap::{Parser, Subcommand, error::ErrorKind};
 use decode::{Decode, FineTune};
+use decoupler_core::machine::MachineMemory;
 use export::Export;
 use failure::Failure;
 use inspect::Inspect;
+use output::messages;
 use reproduce::Reproduce;
 use samples::Simulate;
 use sweep::Sweep;
@@ -65,6 +60,9 @@ pub type Window = fn() -> Result<(), Box<dyn Error>>;
 struct Arguments {
     #[command(subcommand)]
     command: Option<Command>,
+    /// Memory that trainings may use, and reading a file, in GB [default: that of the machine, and half of the free memory]
+    #[arg(long, value_name = "GB", global = true, value_parser = gigabytes)]
+    memory_limit: Option<f64>,
 }
 
 #[derive(Subcommand)]
@@ -105,10 +103,10 @@ pub fn run_for_status<A: Into<OsString> + Clone>(arguments: impl IntoIterator<It
                 | Failure::InterruptedTrials { .. }
                 | Failure::InterruptedTrade { .. }
                 | Failure::InterruptedSweep { .. }
-                | Failure::InterruptedFollow => {
-                    writeln!(stderr(), "{failure}")
+                | Failure::InterruptedFollow { .. } => {
+                    writeln!(messages(), "{failure}")
                 }
-                _ => writeln!(stderr(), "error: {failure}"),
+                _ => writeln!(messages(), "error: {}", without_long_words(&failure.to_string())),
             };
             failure.status()
         }
@@ -120,6 +118,9 @@ impl Arguments {
     fn run(self, window: Window) -> Result<(), Failure> {
         if self.command.is_some() {
             interruption::install();
+        }
+        if let Some(gigabytes) = self.memory_limit {
+            MachineMemory::limit(gigabytes);
         }
         match self.command {
             Some(Command::Train(train)) => train.run(),
@@ -158,6 +159,12 @@ pub(super) fn number(text: &str) -> Result<f64, String> {
     number.ok_or_else(|| "give a number from 0, for example 1e-7".to_owned())
 }
 
+/// Parses a size in GB.
+fn gigabytes(text: &str) -> Result<f64, String> {
+    let size = text.parse().ok().filter(|size: &f64| size.is_finite() && *size > 0.0);
+    size.ok_or_else(|| "give a number of GB above 0, for example 16".to_owned())
+}
+
 /// Parses a seed.
 pub(super) fn seed(text: &str) -> Result<u64, String> {
     text.parse()
@@ -177,18 +184,22 @@ pub(super) fn one_line(error: &clap::Error) -> String {
     });
     let line = messages.collect::<Vec<_>>().join("; ");
     let line = line.strip_prefix("error: ").unwrap_or(&line);
-    line.split(' ').map(shortened).collect::<Vec<_>>().join(" ")
+    without_long_words(line)
 }
 
-/// Returns a word, truncated if it is too long.
-fn shortened(word: &str) -> Cow<'_, str> {
-    const LONGEST: usize = 200;
-    const BEGINNING: usize = 40;
-    if word.chars().count() <= LONGEST {
-        return Cow::Borrowed(word);
-    }
-    let beginning: String = word.chars().take(BEGINNING).collect();
-    Cow::Owned(format!("{beginning}…"))
+/// Returns a message without the middle of long words, such as arguments and names that it quotes.
+fn without_long_words(message: &str) -> String {
+    const LONGEST: usize = 300;
+    const BEGINNING: usize = 150;
+    const END: usize = 100;
+    let shortened = |word: &str| match word.chars().count() {
+        length if length > LONGEST => {
+            let end = word.chars().skip(length - END);
+            word.chars().take(BEGINNING).chain(['…']).chain(end).collect()
+        }
+        _ => word.to_owned(),
+    };
+    message.split(' ').map(shortened).collect::<Vec<_>>().join(" ")
 }
 
 #[cfg(test)]

@@ -2,7 +2,7 @@
 
 use std::{
     fs::File,
-    io::{self, BufReader, Write, stdout},
+    io::{self, BufReader, Stderr, Write, stderr, stdout},
     path::Path,
     time::Duration,
 };
@@ -11,7 +11,7 @@ use decoupler_core::{
     dataset::SimulationError,
     evaluation::Simulation,
     scene::RowModel,
-    text::{ReadError, Reading, ResistanceReader},
+    text::{ReadError, Reading, ResistanceReader, is_unprintable, printable},
 };
 use decoupler_files::{
     export::NetworkFile,
@@ -25,15 +25,39 @@ use super::{failure::Failure, samples::with_bar};
 
 /// Prints one JSON object on standard output.
 pub(super) fn print_object(object: &impl Serialize) -> Result<(), Failure> {
-    print(|output| {
-        serde_json::to_writer(&mut *output, object)?;
-        writeln!(output)
-    })
+    let mut output = stdout().lock();
+    let written = serde_json::to_writer(&mut output, object).map_err(io::Error::from);
+    written.and_then(|()| writeln!(output)).map_err(Failure::Output)
 }
 
 /// Prints the output of `write` on standard output.
-pub(super) fn print(write: impl FnOnce(&mut io::StdoutLock) -> io::Result<()>) -> Result<(), Failure> {
-    write(&mut stdout().lock()).map_err(Failure::Output)
+pub(super) fn print(write: impl FnOnce(&mut Printable<io::StdoutLock>) -> io::Result<()>) -> Result<(), Failure> {
+    write(&mut Printable(stdout().lock())).map_err(Failure::Output)
+}
+
+/// Returns standard error for messages.
+pub(super) fn messages() -> Printable<Stderr> {
+    Printable(stderr())
+}
+
+/// Output for people, which may quote names of files: control characters, which could drive the terminal, are escaped.
+#[derive(Debug)]
+pub(super) struct Printable<W>(W);
+
+impl<W: Write> Write for Printable<W> {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        match std::str::from_utf8(bytes) {
+            Ok(text) if text.contains(|c| is_unprintable(c) && !"\n\t".contains(c)) => {
+                self.0.write_all(printable(text).as_bytes())?;
+            }
+            _ => self.0.write_all(bytes)?,
+        }
+        Ok(bytes.len())
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.0.flush()
+    }
 }
 
 /// Progress bar of `steps` with this template; hidden with JSON output and if standard error is not a terminal.
@@ -83,8 +107,10 @@ fn read_columns(file: &NetworkFile, recipe: &Recipe, input: &Path) -> Result<Rea
         readings,
         row_wires,
         lines,
+        torn_line,
         kept,
     } = table;
+    warn_if_torn(input, torn_line);
     let row_indices = match (row_wires, &file.row_wires) {
         _ if !has_rows => vec![0; lines.len()],
         (Some(of_lines), Some(read)) => {
@@ -111,6 +137,18 @@ fn read_columns(file: &NetworkFile, recipe: &Recipe, input: &Path) -> Result<Rea
         row_indices,
         kept,
     })
+}
+
+/// Reports a last line that is cut off, as by a full disk, and was left out.
+fn warn_if_torn(input: &Path, line: Option<u64>) {
+    if let Some(line) = line {
+        let input = input.display();
+        // There is no one to report to if this fails.
+        let _ = writeln!(
+            messages(),
+            "warning: '{input}': line {line}, the last, is cut off and left out"
+        );
+    }
 }
 
 /// Reads a CSV file of the resistances of an array. Lines without a row number form whole snapshots.
@@ -175,7 +213,8 @@ fn read_resistances(
     if is_empty {
         return Err(unreadable(ReadError::Empty));
     }
-    if !lines_in_turn.is_multiple_of(read.len()) {
+    warn_if_torn(input, reader.torn_line());
+    if reader.torn_line().is_none() && !lines_in_turn.is_multiple_of(read.len()) {
         return Err(Failure::PartOfSnapshot {
             path: input.to_owned(),
             lines: lines_in_turn,

@@ -1,7 +1,7 @@
 //! Samples of a run: drawn after an estimate of the work is printed, or read with a progress bar.
 
 use std::{
-    io::{BufWriter, Write, stderr, stdout},
+    io::{BufWriter, Write, stdout},
     ops::ControlFlow,
     path::{Path, PathBuf},
 };
@@ -23,7 +23,13 @@ use decoupler_files::{
     import::{Progress, Setup, SetupError, SetupSets},
 };
 
-use super::{count, failure::Failure, output::progress_bar, scene_arguments::SceneArguments, seed};
+use super::{
+    count,
+    failure::Failure,
+    output::{messages, progress_bar},
+    scene_arguments::SceneArguments,
+    seed,
+};
 
 /// Draws or reads the samples of `setup`.
 pub(super) fn sets(setup: &Setup, is_json: bool) -> Result<SetupSets, Failure> {
@@ -84,7 +90,7 @@ pub(super) fn announce_recording(setup: &Setup, sets: &SetupSets) {
         && let Some(text) = describe_recorded_workload(settings, size)
     {
         // There is no one to report to if this fails.
-        let _ = writeln!(stderr(), "{text}");
+        let _ = writeln!(messages(), "{text}");
     }
 }
 
@@ -96,7 +102,7 @@ pub(super) fn announce_workload(workload: &Workload) -> Result<(), RunError> {
     workload.check_memory()?;
     if workload.is_large() {
         // There is no one to report to if this fails.
-        let _ = writeln!(stderr(), "{}", describe_workload(workload));
+        let _ = writeln!(messages(), "{}", describe_workload(workload));
     }
     Ok(())
 }

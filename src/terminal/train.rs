@@ -1,5 +1,5 @@
 use std::{
-    io::{Write, stderr},
+    io::Write,
     path::{Path, PathBuf},
 };
 
@@ -11,7 +11,7 @@ use super::{
     import_arguments::ImportArguments,
     interruption::{CheckpointArguments, Checkpointing, Graceful},
     intervals::{WhenCalibrated, calibrate},
-    output::progress_bar,
+    output::{messages, progress_bar},
     samples::{announce, announce_recording, following, sets, working_folder},
     train_report::Trained,
     training_arguments::TrainingArguments,
@@ -347,7 +347,7 @@ fn first_failure(ends: impl IntoIterator<Item = Result<(), Failure>>) -> Result<
     let Some(first) = failures.next() else { return Ok(()) };
     for other in failures {
         // There is no one to report to if this fails.
-        let _ = writeln!(stderr(), "{other}");
+        let _ = writeln!(messages(), "{other}");
     }
     Err(first)
 }

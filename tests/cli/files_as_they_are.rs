@@ -136,7 +136,18 @@ fn an_analysis_without_time_for_networks_says_what_was_left_out() {
     );
     assert!(report["targets"][0]["r2_network"].is_null(), "{report}");
     assert!(
-        warnings(&report).contains("the budget of 0 s was spent, so these were left out: the network"),
+        warnings(&report)
+            .contains("the budget of 0 s does not suffice, so these were left out: networks, of which 5 take"),
+        "{report}"
+    );
+    assert!(
+        warnings(&report).contains("whether the past helps") && report["targets"][0]["with_memory"].is_null(),
+        "{report}"
+    );
+    // With time for all steps, nothing is left out.
+    let report = json(&format!("{inspect} --budget 600"), folder.path());
+    assert!(
+        !warnings(&report).contains("left out") && !report["targets"][0]["with_memory"].is_null(),
         "{report}"
     );
 }

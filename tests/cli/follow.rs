@@ -261,6 +261,46 @@ fn answers_are_immediate_and_signals_are_handled() {
 }
 
 #[test]
+fn a_terminated_program_prints_its_report() {
+    let folder = trained("--rows known");
+    let lines = device_lines(&folder);
+    let mut running = Running::new("decode --network n.json --follow", &folder);
+    running.input.write_all(lines[0].as_bytes()).unwrap();
+    running.line();
+    running.line();
+    running.signal("-TERM");
+    assert_eq!(running.child.wait().unwrap().code(), Some(143));
+    let report = running.stderr();
+    assert!(report.contains("1 lines decoded"), "{report}");
+}
+
+#[test]
+fn a_stream_without_line_ends_is_reported() {
+    let folder = trained("--rows known");
+    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+    let arguments = format!(
+        "decode --network n.json --follow --input tcp:{}",
+        listener.local_addr().unwrap()
+    );
+    let mut running = Running::new(&arguments, &folder);
+    let (mut stream, _) = listener.accept().unwrap();
+    let with_returns = device_lines(&folder).concat().replace('\n', "\r");
+    stream.write_all(with_returns.as_bytes()).unwrap();
+    let mut warning = String::new();
+    let mut stderr = BufReader::new(running.child.stderr.take().unwrap());
+    while !warning.contains("no line has ended") {
+        warning.clear();
+        assert!(stderr.read_line(&mut warning).unwrap() > 0);
+    }
+    assert!(
+        warning.starts_with(&format!("warning: {} bytes", with_returns.len())),
+        "{warning}"
+    );
+    running.signal("-INT");
+    assert_eq!(running.child.wait().unwrap().code(), Some(130));
+}
+
+#[test]
 fn a_closed_output_ends_the_program_silently() {
     let folder = trained("--rows known");
     let lines = device_lines(&folder).concat();

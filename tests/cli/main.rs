@@ -2,9 +2,12 @@
 
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
+mod automatic;
 mod calibrate;
 mod causes;
 mod commands;
+#[cfg(unix)]
+mod ends;
 mod export;
 mod files;
 mod files_as_they_are;

@@ -11,7 +11,7 @@ const TRAIN: &str = "train --data press.csv --time t --inputs u --targets force 
 
 /// A reading that creeps: it follows the force by half at once, and by half with a time constant of 1 s. Of its 600 rows
 /// at 20 Hz, which are also in readings.csv without the force, the last 120 are for testing.
-fn creeping() -> TempDir {
+pub(crate) fn creeping() -> TempDir {
     let folder = tempfile::tempdir().unwrap();
     let (mut text, mut readings) = ("t,u,force\n".to_owned(), "t,u\n".to_owned());
     let (mut crept, weight) = (0.0, 1.0 - f64::exp(-0.05));
@@ -28,7 +28,7 @@ fn creeping() -> TempDir {
     folder
 }
 
-fn succeed(arguments: &str, folder: &Path) -> String {
+pub(crate) fn succeed(arguments: &str, folder: &Path) -> String {
     let output = decoupler(arguments, folder);
     assert!(
         output.status.success(),

@@ -1,8 +1,7 @@
 //! Settings of a recording that are chosen automatically.
 
 use decoupler::window::SourceKind;
-use eframe::egui::accesskit::Role;
-use egui_kittest::kittest::{By, NodeT as _, Queryable as _};
+use egui_kittest::kittest::NodeT as _;
 
 use crate::{
     driver::Driver,
@@ -121,9 +120,7 @@ fn one_network_per_row_wire_is_set_by_hand() {
     driver.mean("row", "row-wire");
     driver.unfold_to("Network inputs", "Inputs and scaling");
     assert!(driver.is_enabled("Choose settings automatically"));
-    let known = By::new().role(Role::Button).label("Known");
-    driver.harness().get(known).click();
-    driver.harness().run_steps(2);
+    driver.click_button("Known");
     driver.settle();
     assert!(!driver.is_enabled("Choose settings automatically"));
     assert!(driver.is_enabled("Hidden nodes") && driver.is_enabled("Method"));

@@ -90,6 +90,35 @@ fn an_unfinished_training_is_asked_about_once_and_continues_if_the_user_stays() 
 }
 
 #[test]
+fn runs_that_could_not_be_written_are_asked_about_and_written_later() {
+    let home = tempfile::tempdir().unwrap();
+    let runs = home.path().join("runs");
+    let mut driver = Driver::open_keeping(&runs);
+    driver.configure_small();
+    driver.wait("the folder", |driver| driver.state().runs.path.is_some());
+    // As on a full disk: no file can be created there.
+    fs::remove_dir(&runs).unwrap();
+    fs::write(&runs, "").unwrap();
+    driver.train();
+    driver.wait("the failure", |driver| driver.state().runs.unwritten == 1);
+    assert!(!close(&mut driver));
+    driver.harness().step();
+    assert!(
+        driver.has(QUESTION) && driver.has("Run list: Unwritten runs"),
+        "{:#?}",
+        driver.texts()
+    );
+    driver.click_button("Stay");
+    fs::remove_file(&runs).unwrap();
+    fs::create_dir(&runs).unwrap();
+    driver.harness().event(eframe::egui::Event::WindowFocused(true));
+    driver.harness().step();
+    driver.wait("the run in the folder", |driver| driver.state().runs.unwritten == 0);
+    assert!(files_in(&runs).iter().any(|name| name.starts_with("run-")));
+    assert!(close(&mut driver));
+}
+
+#[test]
 fn a_training_saved_on_closing_resumes_where_it_stopped() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("kept.checkpoint");

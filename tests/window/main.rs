@@ -12,6 +12,8 @@ mod driver;
 mod experiments;
 mod exporting;
 mod extremes;
+#[cfg(target_os = "linux")]
+mod faults;
 mod habits;
 mod identifying;
 mod import_choices;
@@ -36,6 +38,10 @@ mod surface_view;
 mod trading;
 mod training;
 mod typing;
+mod variables;
 
 #[path = "../support/folders.rs"]
 mod folders;
+#[cfg(target_os = "linux")]
+#[path = "../support/faults.rs"]
+mod preloaded;

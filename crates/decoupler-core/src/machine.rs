@@ -1,15 +1,19 @@
 //! The machine that the program runs on: its memory and speed, from which the memory and time of a run are estimated
 //! before it starts.
 
+mod budget;
+
 use std::{env, fmt, fs, hint::black_box, sync::OnceLock, time::Instant};
+
+pub use budget::{OverBudget, ReadingBudget};
 
 use faer::{Accum, Mat, Par, linalg::matmul::matmul};
 use glam::DVec3;
 
 use crate::sensor::{ArrayScale, SensorModel};
 
-/// Memory available to trainings: that of the machine, or the limit of its container, or the value of
-/// [`Self::VARIABLE`]. [`Self::ASSUMED_BYTES`] if none is known.
+/// Memory available to trainings: that of the machine, or the limit of its container, or the limit given by the user.
+/// [`Self::ASSUMED_BYTES`] if none is known.
 ///
 /// Only Linux reports its memory in a file. Other systems would need `unsafe` calls, or a crate of thousands of lines
 /// for one number; use the variable there, or to use less than the memory of the machine.
@@ -26,21 +30,28 @@ pub struct MachineMemory {
 pub enum MemorySource {
     /// The system.
     System,
-    /// The user, by [`MachineMemory::VARIABLE`].
+    /// The user, by [`MachineMemory::limit`] or [`MachineMemory::VARIABLE`].
     User,
     /// Assumed, since neither is known.
     Assumed,
 }
 
+static MEMORY: OnceLock<MachineMemory> = OnceLock::new();
+
 impl MachineMemory {
     /// Memory that is assumed if the system does not report it: that of an ordinary machine.
     pub const ASSUMED_BYTES: u64 = 8_000_000_000;
-    /// Environment variable with the memory available to trainings, in GB (10⁹ bytes).
+    /// Environment variable with the memory that the program may use, in GB (10⁹ bytes).
     pub const VARIABLE: &str = "DECOUPLER_MEMORY_GB";
+
+    /// Limits the memory that the program may use, instead of [`Self::VARIABLE`]. Without effect after the first call of
+    /// [`Self::of_this_machine`].
+    pub fn limit(gigabytes: f64) {
+        MEMORY.get_or_init(|| Self::from_texts(Some(&gigabytes.to_string()), None, None));
+    }
 
     /// Returns the memory of this machine, which is read on the first call.
     pub fn of_this_machine() -> Self {
-        static MEMORY: OnceLock<MachineMemory> = OnceLock::new();
         *MEMORY.get_or_init(|| {
             let given = env::var(Self::VARIABLE).ok();
             let meminfo = fs::read_to_string("/proc/meminfo").ok();
@@ -78,7 +89,7 @@ impl fmt::Display for MachineMemory {
         let (gigabytes, variable) = (self.bytes as f64 * 1e-9, Self::VARIABLE);
         match self.source {
             MemorySource::System => write!(f, "the machine has {gigabytes:.1} GB"),
-            MemorySource::User => write!(f, "{variable} allows {gigabytes:.1} GB"),
+            MemorySource::User => write!(f, "--memory-limit or {variable} allows {gigabytes:.1} GB"),
             MemorySource::Assumed => write!(
                 f,
                 "{gigabytes:.1} GB are assumed, since the system does not report its memory (set the environment variable \
@@ -191,7 +202,10 @@ mod tests {
     fn the_variable_overrides_the_memory() {
         let memory = |given| MachineMemory::from_texts(Some(given), Some(MEMINFO), Some("1000000"));
         assert_eq!(memory("64").bytes, 64_000_000_000);
-        assert_eq!(memory(" 0.5\n").to_string(), "DECOUPLER_MEMORY_GB allows 0.5 GB");
+        assert_eq!(
+            memory(" 0.5\n").to_string(),
+            "--memory-limit or DECOUPLER_MEMORY_GB allows 0.5 GB"
+        );
         assert_eq!(memory("inf").bytes, u64::MAX);
         for refused in ["", "much", "0", "-3", "NaN"] {
             assert_eq!(memory(refused).bytes, 1_000_000, "{refused}");

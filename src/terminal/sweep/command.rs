@@ -27,7 +27,7 @@ use crate::terminal::{
     count,
     failure::Failure,
     import_arguments::ImportArguments,
-    interruption::{Graceful, STATUS},
+    interruption::{Graceful, STATUS, TERMINATED},
     output::{print, print_object, progress_bar},
     seed,
 };
@@ -185,7 +185,10 @@ impl Sweep {
         })?;
         check_writable(out)?;
         let merged = MergedSweep::read(&self.merge)?;
-        atomic_write(out, |writer| format.write(&merged, writer))?;
+        let is_kept = !merged.is_whole() && format.trials_in(out) > merged.trials.len();
+        if !is_kept {
+            atomic_write(out, |writer| format.write(&merged, writer))?;
+        }
         if self.json {
             print_object(&merged)?;
         } else {
@@ -214,12 +217,10 @@ impl Sweep {
             conflicting: merged.conflicting.len(),
             unreadable: merged.damaged.len(),
             out: out.clone(),
+            is_kept,
         })
     }
 }
-
-/// Exit status after SIGTERM: 128 plus the number of the signal, as in shells.
-const TERMINATED: u8 = 143;
 
 /// Requests to stop: Ctrl-C, SIGTERM (by which clusters announce that a job must end), or a failure of another thread.
 pub(super) struct Stop {

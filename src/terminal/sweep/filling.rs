@@ -1,6 +1,6 @@
 use std::{
     collections::VecDeque,
-    io::{Write, stderr},
+    io::Write,
     num::NonZero,
     panic::resume_unwind,
     path::Path,
@@ -20,7 +20,7 @@ use super::{
     specification::TrainOptions,
     trials::{Trials, train},
 };
-use crate::terminal::failure::Failure;
+use crate::terminal::{failure::Failure, output::messages};
 use decoupler_core::evaluation::experiments::ExperimentError;
 use decoupler_files::export::WriteError;
 
@@ -97,7 +97,7 @@ pub(super) fn fill(
                         trials.describe(position)
                     );
                     // There is no one to report to if this fails.
-                    bar.suspend(|| drop(writeln!(stderr(), "{message}")));
+                    bar.suspend(|| drop(writeln!(messages(), "{message}")));
                 }
                 Event::Ended(failure) => {
                     stop.fail();

@@ -1,6 +1,7 @@
 use std::{
     collections::HashMap,
     env,
+    ops::ControlFlow,
     path::{self, Path, PathBuf},
     sync::{Mutex, PoisonError},
     time::{Duration, Instant},
@@ -119,10 +120,7 @@ impl Trials {
         let of_file = |path: &PathBuf| match checksums.get(path) {
             Some(crc32) => Ok(crc32.clone()),
             None => {
-                let crc32 = file_crc32(path).map_err(|source| ImportError::Read {
-                    path: path.clone(),
-                    source,
-                })?;
+                let crc32 = file_crc32(path, &mut |_| ControlFlow::Continue(()))?;
                 checksums.insert(path.clone(), crc32.clone());
                 Ok(crc32)
             }

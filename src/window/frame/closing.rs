@@ -2,6 +2,8 @@ use std::path::{Path, PathBuf};
 
 use eframe::egui::{Align, Color32, Frame, Id, Layout, Margin, Modal, RichText, ScrollArea, Ui, ViewportCommand, vec2};
 
+use decoupler_core::text::counted;
+
 use super::DecouplerWindow;
 use crate::window::{
     shared::{Effect, FileTask, Matter, Unfinished},
@@ -185,6 +187,17 @@ impl DecouplerWindow {
             is_kept: true,
         };
         lines.extend(self.files.paths().map(file));
+        let runs = &self.shared.runs;
+        if runs.path.is_some() && runs.unwritten > 0 {
+            let count = counted(runs.unwritten as u64, "run");
+            let unwritten = Unfinished {
+                work: "Unwritten runs",
+                progress: format!("{count} could not be written to the folder of runs"),
+                saving: None,
+                is_kept: true,
+            };
+            lines.push(Line::of("Run list", unwritten));
+        }
         lines
     }
 

@@ -88,8 +88,12 @@ impl WindowFile {
 
 impl Remembered {
     fn read(path: &Path) -> Self {
-        let text = fs::read_to_string(path).unwrap_or_default();
-        let mut read: Self = serde_json::from_str(&text).unwrap_or_default();
+        /// Much more than the program writes.
+        const LARGEST_BYTES: u64 = 1 << 20;
+        // Opening a pipe would wait for a program that writes to it.
+        let is_ours = fs::metadata(path).is_ok_and(|found| found.is_file() && found.len() <= LARGEST_BYTES);
+        let text = is_ours.then(|| fs::read_to_string(path).ok()).flatten();
+        let mut read: Self = serde_json::from_str(&text.unwrap_or_default()).unwrap_or_default();
         read.draft = read.draft.filter(is_within_limits);
         read
     }

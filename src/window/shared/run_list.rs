@@ -47,6 +47,8 @@ pub(super) struct Listed {
     pub(super) runs: KeptRuns,
     /// Folder in which they are kept, if any.
     pub(super) path: Option<PathBuf>,
+    /// Number of runs that could not be written.
+    pub(super) unwritten: usize,
     /// Files that cannot be read or written.
     pub(super) problems: Vec<String>,
 }
@@ -160,6 +162,7 @@ fn answer(request: RunsRequest, folder: &mut RunFolder) -> Listed {
     Listed {
         runs: folder.runs().clone(),
         path: folder.path().map(PathBuf::from),
+        unwritten: folder.unwritten(),
         problems,
     }
 }
@@ -178,6 +181,8 @@ pub struct RunList {
     pub workspace: KeptRuns,
     /// Folder in which runs are kept; `None` while they are not.
     pub path: Option<PathBuf>,
+    /// Number of runs that exist only in memory, since they could not be written to the folder.
+    pub unwritten: usize,
 }
 
 impl RunList {
@@ -198,8 +203,13 @@ impl RunList {
         let mut notice = None;
         while let Some(event) = worker.next_event() {
             match event {
-                RunsEvent::Listed(Listed { runs, path, problems }) => {
-                    self.path = path;
+                RunsEvent::Listed(Listed {
+                    runs,
+                    path,
+                    unwritten,
+                    problems,
+                }) => {
+                    (self.path, self.unwritten) = (path, unwritten);
                     // A list from before the last change would undo it: a run removed meanwhile would be back.
                     if worker.is_up_to_date() {
                         self.workspace = runs;

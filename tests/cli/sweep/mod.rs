@@ -1,6 +1,6 @@
 //! Sweeps in the terminal: divided, repeated, killed, run by several programs at once, and merged.
 
-mod driver;
+pub(crate) mod driver;
 mod filling;
 #[cfg(target_os = "linux")]
 mod job_scripts;

@@ -102,7 +102,7 @@ pub enum Initialization {
 pub struct InitializationError(String);
 
 impl Initialization {
-    fn is_random(&self) -> bool {
+    pub(super) fn is_random(&self) -> bool {
         *self == Self::Random
     }
 }

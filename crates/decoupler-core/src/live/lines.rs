@@ -66,6 +66,8 @@ struct State {
     kept: usize,
     waiting: Batch,
     dropped: u64,
+    /// Bytes that have arrived since the last end of a line.
+    unended: usize,
     end: Option<Option<io::Error>>,
     /// True once the [`Lines`] are dropped.
     is_abandoned: bool,
@@ -94,6 +96,7 @@ impl Lines {
                 kept: 1,
                 waiting: Batch::default(),
                 dropped: 0,
+                unended: 0,
                 end: None,
                 is_abandoned: false,
             }),
@@ -121,6 +124,11 @@ impl Lines {
     /// Number of lines dropped so far.
     pub fn dropped(&self) -> u64 {
         self.shared.lock().dropped
+    }
+
+    /// Number of bytes that have arrived since the last end of a line.
+    pub fn unended(&self) -> usize {
+        self.shared.lock().unended
     }
 
     /// Returns `true` if no line is waiting.
@@ -218,6 +226,10 @@ impl Shared {
                 return Ok(());
             }
             splitter.split(&chunk[..count], read_at, &mut state.waiting);
+            state.unended = match chunk[..count].iter().rposition(|&byte| byte == b'\n') {
+                Some(end) => count - end - 1,
+                None => state.unended + count,
+            };
             if state.keeping == Keeping::Latest {
                 let kept = state.kept;
                 state.dropped += state.waiting.drop_old(read_at, kept);

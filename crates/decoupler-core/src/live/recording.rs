@@ -19,6 +19,8 @@ pub struct Recorder<W: Write> {
     rows: Vec<usize>,
     channels: usize,
     writer: W,
+    /// Bytes of the header and of the frames written completely.
+    whole_bytes: u64,
 }
 
 impl<W: Write> Recorder<W> {
@@ -35,6 +37,7 @@ impl<W: Write> Recorder<W> {
         writer.write_all(&text)?;
         writer.flush()?;
         Ok(Self {
+            whole_bytes: text.len() as u64,
             text,
             rows: rows.to_vec(),
             channels,
@@ -42,10 +45,15 @@ impl<W: Write> Recorder<W> {
         })
     }
 
+    /// Length of the file up to the last frame written completely.
+    pub fn whole_bytes(&self) -> u64 {
+        self.whole_bytes
+    }
+
     /// Writes a frame, rows × channels in ohm, with its time in seconds.
     ///
     /// # Errors
-    /// If the writer fails.
+    /// If the writer fails; a part of the frame may then be written after [`Self::whole_bytes`].
     ///
     /// # Panics
     /// If the frame has the wrong length.
@@ -60,7 +68,9 @@ impl<W: Write> Recorder<W> {
             self.text.push(b'\n');
         }
         self.writer.write_all(&self.text)?;
-        self.writer.flush()
+        self.writer.flush()?;
+        self.whole_bytes += self.text.len() as u64;
+        Ok(())
     }
 }
 
@@ -71,6 +81,8 @@ pub struct Recording {
     times_s: Vec<f64>,
     /// Frames × rows × channels in ohm.
     frames_ohm: Array3<f64>,
+    /// Last line, if it is cut off.
+    torn_line: Option<u64>,
 }
 
 /// Error in a recording.
@@ -98,12 +110,12 @@ pub enum RecordingError {
 
 impl Recording {
     /// Reads a file written by [`Recorder`] for these row-wires of an array with `array_rows` row-wires. An incomplete
-    /// last frame is ignored.
+    /// last frame is ignored, and so is a last line without its line break, whose last number may be cut off.
     ///
     /// # Errors
     /// If the file cannot be read, is malformed, or has no complete frame.
     pub fn read(
-        source: impl BufRead,
+        mut source: impl BufRead,
         rows: &[usize],
         array_rows: usize,
         channels: usize,
@@ -111,9 +123,17 @@ impl Recording {
         let mut fields = CsvFields::default();
         let mut columns: Option<(ResistanceColumns, usize)> = None;
         let (mut times_s, mut readings_ohm): (Vec<f64>, Vec<f64>) = (Vec::new(), Vec::new());
-        let mut lines = 0;
-        for (text, number) in source.split(b'\n').zip(1..) {
-            let text = text.map_err(ReadError::from)?;
+        let (mut lines, mut torn_line) = (0, None);
+        let mut text = Vec::new();
+        for number in 1.. {
+            text.clear();
+            if source.read_until(b'\n', &mut text).map_err(ReadError::from)? == 0 {
+                break;
+            }
+            if !text.ends_with(b"\n") && columns.is_some() {
+                torn_line = Some(number).filter(|_| !text.trim_ascii().is_empty());
+                break;
+            }
             if text.trim_ascii().is_empty() {
                 continue;
             }
@@ -154,6 +174,7 @@ impl Recording {
         Ok(Self {
             times_s,
             frames_ohm: Array3::from_shape_vec(shape, readings_ohm).expect("every line has all channels"),
+            torn_line,
         })
     }
 
@@ -169,7 +190,13 @@ impl Recording {
         Ok(Self {
             times_s: (0..frames).map(|frame| frame as f64 / frames_per_second).collect(),
             frames_ohm,
+            torn_line: None,
         })
+    }
+
+    /// Returns the number of the last line if it is cut off, as when the disk was full, and therefore ignored.
+    pub fn torn_line(&self) -> Option<u64> {
+        self.torn_line
     }
 
     /// Returns the times of the frames in seconds, in ascending order.
@@ -316,6 +343,57 @@ mod tests {
         let lines: Vec<&[u8]> = bytes.split_inclusive(|&byte| byte == b'\n').collect();
         assert_eq!(read(&lines[..6].concat()).unwrap().times_s().len(), 2);
         assert!(matches!(read(&lines[..2].concat()), Err(RecordingError::Empty)));
+    }
+
+    #[test]
+    fn a_recording_cut_off_anywhere_keeps_its_complete_frames() {
+        let bytes = recorded();
+        let ends: Vec<usize> = (0..bytes.len()).filter(|&place| bytes[place] == b'\n').collect();
+        for length in ends[2] + 1..bytes.len() {
+            let recording = read(&bytes[..length]).unwrap();
+            let whole = ends.iter().filter(|&&end| end < length).count() - 1;
+            assert_eq!(recording.times_s().len(), whole / 2, "{length}");
+            let is_torn = bytes[length - 1] != b'\n';
+            assert_eq!(recording.torn_line(), is_torn.then_some(whole as u64 + 2), "{length}");
+            assert_eq!(
+                recording.frame_ohm(0),
+                ndarray::array![[0.1, 1.1, 2.1], [3.1, 4.1, 5.1]]
+            );
+        }
+    }
+
+    #[test]
+    fn a_failed_writer_leaves_a_length_of_whole_frames() {
+        /// A disk with room for some more bytes.
+        struct Full(Vec<u8>, usize);
+        impl Write for Full {
+            fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+                let room = bytes.len().min(self.1 - self.0.len());
+                self.0.extend_from_slice(&bytes[..room]);
+                if room == 0 {
+                    Err(io::ErrorKind::StorageFull.into())
+                } else {
+                    Ok(room)
+                }
+            }
+            fn flush(&mut self) -> io::Result<()> {
+                Ok(())
+            }
+        }
+        let whole = recorded();
+        for room in 30..whole.len() {
+            let mut disk = Full(Vec::new(), room);
+            let mut recorder = Recorder::new(&mut disk, &[0, 2], 3).unwrap();
+            let frame = |frame: u32| (0..6).map(|k| 0.1 + f64::from(10 * frame + k)).collect::<Vec<_>>();
+            let failed = (0..4).find(|&k| recorder.record(0.1 * f64::from(k), &frame(k)).is_err());
+            let bytes = recorder.whole_bytes() as usize;
+            let recording = read(&whole[..bytes]);
+            assert_eq!(
+                recording.map_or(0, |read| read.times_s().len()) as u32,
+                failed.unwrap(),
+                "{room}"
+            );
+        }
     }
 
     #[test]

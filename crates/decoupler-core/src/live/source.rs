@@ -144,6 +144,18 @@ impl Source {
         matches!(self, Self::Serial { .. })
     }
 
+    /// Returns the message on an error that ends the reading of this source.
+    pub fn lost(&self, error: &io::Error) -> String {
+        let cause = match (self, error.kind()) {
+            // The system reports an unplugged device like a pipe without a reader.
+            (Self::Serial { .. }, io::ErrorKind::BrokenPipe | io::ErrorKind::NotFound) => {
+                "the device was unplugged or switched off".to_owned()
+            }
+            _ => system_cause(error),
+        };
+        format!("{self} is lost: {cause}; connect it again")
+    }
+
     /// Opens the source. Reading from a device or socket times out regularly, so that the reader can be stopped.
     ///
     /// # Errors
@@ -412,6 +424,19 @@ impl PressPath {
 mod tests {
     use super::*;
     use crate::scene::Noise;
+
+    #[test]
+    fn an_unplugged_device_is_no_pipe_without_a_reader() {
+        let broken = io::Error::from(io::ErrorKind::BrokenPipe);
+        let (path, baud) = ("/dev/ttyUSB0".to_owned(), 9600);
+        let device = Source::Serial { path, baud }.lost(&broken);
+        assert_eq!(
+            device,
+            "'/dev/ttyUSB0:9600' is lost: the device was unplugged or switched off; connect it again"
+        );
+        let socket = Source::Tcp("host:1".to_owned()).lost(&broken);
+        assert!(socket.contains("the program that reads it has ended"), "{socket}");
+    }
 
     #[test]
     fn sources_are_distinguished_by_their_names() {

@@ -84,10 +84,21 @@ pub fn counted<N: fmt::Display + PartialEq + From<u8>>(count: N, noun: &str) -> 
     format!("{count} {noun}{}", if is_one { "" } else { "s" })
 }
 
+/// Maximum length of a name in characters.
+const LONGEST_NAME: usize = 200;
+
 /// Returns a name from a file without special characters: control characters, which could drive a terminal or break
 /// XML, characters that change the direction of the text around them, and the apostrophe with which [`inert`]
-/// protects spreadsheets.
+/// protects spreadsheets. A name of more than 200 characters is cut.
 pub fn clean_name(name: &str) -> String {
+    let name = printable_name(name);
+    match name.char_indices().nth(LONGEST_NAME) {
+        None => name,
+        Some(_) => name.chars().take(LONGEST_NAME - 1).chain(['…']).collect(),
+    }
+}
+
+fn printable_name(name: &str) -> String {
     let name = match name.strip_prefix('\'') {
         Some(rest) if begins_formula(rest) => rest,
         _ => name,
@@ -118,6 +129,19 @@ pub fn begins_formula(text: &str) -> bool {
 pub fn is_unprintable(c: char) -> bool {
     c.is_control()
         || matches!(c, '\u{200e}' | '\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2066}'..='\u{2069}' | '\u{feff}' | '\u{fffe}' | '\u{ffff}')
+}
+
+/// Returns a text for a terminal, in which unprintable characters, for example of the name of a file, are escaped.
+pub fn printable(text: &str) -> String {
+    let mut escaped = String::with_capacity(text.len());
+    for letter in text.chars() {
+        if is_unprintable(letter) && !"\n\t".contains(letter) {
+            escaped.extend(letter.escape_unicode());
+        } else {
+            escaped.push(letter);
+        }
+    }
+    escaped
 }
 
 /// Reads a name and cleans it.
@@ -253,6 +277,17 @@ mod tests {
             assert_eq!(clean_name(name), expected);
             assert_eq!(clean_name(&clean_name(name)), expected);
         }
+    }
+
+    #[test]
+    fn long_names_are_cut_and_texts_for_a_terminal_escaped() {
+        let long = "ü".repeat(100_000);
+        let name = clean_name(&long);
+        assert_eq!(name.chars().count(), 200);
+        assert!(name.ends_with("ü…") && clean_name(&name) == name);
+        assert_eq!(clean_name(&"x".repeat(200)), "x".repeat(200));
+        let text = printable("cannot read '/a/b\u{1b}[2J\u{9b}c': \tno\nmore");
+        assert_eq!(text, "cannot read '/a/b\\u{1b}[2J\\u{9b}c': \tno\nmore");
     }
 
     #[test]

@@ -17,6 +17,10 @@ pub struct ResistanceReader<R> {
     row_wires: Option<usize>,
     /// `true` if the current row was already read while looking for column names.
     waiting: bool,
+    /// `true` once a row of resistances was read.
+    has_rows: bool,
+    /// Last line, if it is cut off.
+    torn_line: Option<u64>,
 }
 
 /// Rows of a CSV file with their line numbers.
@@ -161,6 +165,8 @@ impl<R: BufRead> ResistanceReader<R> {
             columns,
             row_wires: None,
             waiting: !has_names,
+            has_rows: false,
+            torn_line: None,
         })
     }
 
@@ -171,6 +177,12 @@ impl<R: BufRead> ResistanceReader<R> {
             row_wires: Some(row_wires),
             ..self
         }
+    }
+
+    /// Returns the number of the last line if it is cut off: malformed and without a line break. It is ignored, unless it is
+    /// the only row.
+    pub fn torn_line(&self) -> Option<u64> {
+        self.torn_line
     }
 
     /// Reads at most `most` further rows; returns `None` at the end.
@@ -185,11 +197,23 @@ impl<R: BufRead> ResistanceReader<R> {
         while lines.len() < most && (self.waiting || self.rows.advance()?) {
             self.waiting = false;
             let Rows { line, ref fields, .. } = self.rows;
-            self.columns.read(line, fields, &mut resistances_ohm)?;
-            lines.push(line);
-            if let Some((row_wires, rows)) = row_wires.as_mut().zip(of_array) {
-                row_wires.extend(self.columns.row_wire(line, fields, rows)?);
+            let whole = resistances_ohm.len();
+            let read = self.columns.read(line, fields, &mut resistances_ohm).and_then(|()| {
+                if let Some((row_wires, rows)) = row_wires.as_mut().zip(of_array) {
+                    row_wires.extend(self.columns.row_wire(line, fields, rows)?);
+                }
+                Ok(())
+            });
+            if let Err(error) = read {
+                if self.rows.text.ends_with(b"\n") || !self.has_rows {
+                    return Err(error);
+                }
+                resistances_ohm.truncate(whole);
+                self.torn_line = Some(line);
+                break;
             }
+            lines.push(line);
+            self.has_rows = true;
         }
         if lines.is_empty() {
             return Ok(None);
@@ -435,6 +459,26 @@ mod tests {
         assert!(matches!(read(&long), Err(ReadError::Endless(2))));
         let with_note = format!("r_1,r_2,note\n1,2,{}\n", "x".repeat(1 << 19));
         assert_eq!(read(&with_note).unwrap().lines, [2]);
+    }
+
+    #[test]
+    fn a_last_line_that_is_cut_off_is_ignored_and_reported() {
+        for (text, rows, torn) in [
+            ("r_1,r_2\n1,2\n3,4\n5", 2, Some(4)),
+            ("1,2\n3,4\n5,", 2, Some(3)),
+            ("1,2\n3,4\n5,6e-", 2, Some(3)),
+            ("1,2\n3,4\n5,6", 3, None),
+        ] {
+            let mut reader = ResistanceReader::new(text.as_bytes(), 2).unwrap();
+            let mut lines = 0;
+            while let Some(block) = reader.read(2).unwrap() {
+                lines += block.lines.len();
+            }
+            assert_eq!((lines, reader.torn_line()), (rows, torn), "{text}");
+        }
+        for refused in ["1,2\n3\n5,6", "1,2\n3\n", "r_1,r_2\n1"] {
+            assert!(matches!(read(refused), Err(ReadError::Width { .. })), "{refused}");
+        }
     }
 
     #[test]

@@ -6,7 +6,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use decoupler_core::text::system_cause;
+use decoupler_core::{machine::ReadingBudget, text::system_cause};
 use thiserror::Error;
 
 use super::{
@@ -274,32 +274,49 @@ fn is_same_on_disk(_one: &Path, _other: &Path) -> bool {
     false
 }
 
+/// Memory that a byte of JSON may take once it is read: short arrays of short numbers.
+const MEMORY_OF_BYTE: u64 = 8;
 /// Largest JSON file that is read or written, in bytes: 1 GiB.
 pub(super) const LARGEST_BYTES: u64 = 1 << 30;
+/// Number of bytes that are read at once.
+const BLOCK: u64 = 1 << 20;
 /// Number of bytes that are read first, to decide whether to read the rest.
 const BEGINNING: u64 = 1 << 16;
 
 /// Reads the JSON file at `path`. If its beginning shows that Decoupler did not write it, returns only the beginning.
 ///
 /// # Errors
-/// The operating system refuses, or the file does not end within [`LARGEST_BYTES`].
+/// The operating system refuses, or the file does not end within [`LARGEST_BYTES`], or it needs too much memory.
 pub(super) fn read_limited(path: &Path) -> io::Result<Vec<u8>> {
     let file = File::open(path)?;
     let length = file.metadata()?.len();
     if length > LARGEST_BYTES {
         return Err(too_large());
     }
+    let mut budget = ReadingBudget::now();
+    let mut claim = |bytes: u64| {
+        let claimed = budget.claim(bytes.saturating_mul(MEMORY_OF_BYTE));
+        claimed.map_err(|over| io::Error::new(ErrorKind::FileTooLarge, over))
+    };
+    claim(length)?;
     let mut bytes = Vec::new();
     (&file).take(BEGINNING).read_to_end(&mut bytes)?;
     if matches!(Heading::read(&bytes), Err(NoHeading::NotJson(_) | NoHeading::Other)) {
         return Ok(bytes);
     }
     // The length of a pipe or device is unknown.
-    (&file).take(LARGEST_BYTES + 1 - BEGINNING).read_to_end(&mut bytes)?;
-    if bytes.len() as u64 > LARGEST_BYTES {
-        return Err(too_large());
+    loop {
+        let before = bytes.len() as u64;
+        (&file).take(BLOCK).read_to_end(&mut bytes)?;
+        let read = bytes.len() as u64;
+        if read == before {
+            return Ok(bytes);
+        }
+        if read > LARGEST_BYTES {
+            return Err(too_large());
+        }
+        claim(read.saturating_sub(before.max(length)))?;
     }
-    Ok(bytes)
 }
 
 pub(super) fn too_large() -> io::Error {

@@ -80,9 +80,29 @@ impl RunFolder {
         &self.kept
     }
 
+    /// Number of runs that exist only in memory, since they could not be written.
+    pub fn unwritten(&self) -> usize {
+        self.unwritten.len()
+    }
+
+    /// Tries again to write the runs that exist only in memory.
+    fn write_unwritten(&mut self) {
+        let Some(folder) = &self.path else { return };
+        let runs = &self.kept.runs;
+        self.unwritten.retain(|&id| {
+            let Some(run) = runs.iter().find(|run| run.id == id) else {
+                return false;
+            };
+            let written = run.file.save_by(&run_path(folder, id), AtomicFile::commit_new);
+            let named = written.and_then(|()| Ok(write(&name_path(folder, id), &run.name)?));
+            named.is_err() && !run_path(folder, id).exists()
+        });
+    }
+
     /// Reads what other programs have changed: new runs, names, the pair that is compared, removals. Returns the files
-    /// that cannot be read, each once; they are left as they are.
+    /// that cannot be read, each once; they are left as they are. Runs that could not be written are tried again.
     pub fn look(&mut self) -> Vec<String> {
+        self.write_unwritten();
         let Some(path) = &self.path else { return Vec::new() };
         let mut problems = Vec::new();
         let ids = match ids(path) {
@@ -256,7 +276,12 @@ pub(super) fn pinned_path(folder: &Path) -> PathBuf {
 pub(super) fn ids(folder: &Path) -> io::Result<Vec<u64>> {
     let mut ids = Vec::new();
     for entry in fs::read_dir(folder)? {
-        let name = entry?.file_name();
+        let entry = entry?;
+        let name = entry.file_name();
+        // Opening a pipe would wait for a program that writes to it.
+        if !fs::metadata(entry.path()).is_ok_and(|found| found.is_file()) {
+            continue;
+        }
         let id = name.to_str().and_then(|name| {
             let id = name.strip_prefix("run-")?.strip_suffix(".json")?.parse().ok()?;
             // Excludes "run-007.json", which no program writes.
@@ -279,6 +304,9 @@ pub(super) fn write(path: &Path, value: &impl Serialize) -> Result<(), WriteErro
 /// # Errors
 /// The file cannot be read, is of another kind or version, or is damaged.
 pub(super) fn read<T: DeserializeOwned>(path: &Path) -> Result<Option<T>, DocumentError> {
+    if fs::metadata(path).is_ok_and(|found| !found.is_file()) {
+        return Err(KIND.damaged(path, "it is not a file".to_owned()));
+    }
     let bytes = match KIND.read(path) {
         Ok(bytes) => bytes,
         Err(DocumentError::Read { source, .. }) if source.kind() == io::ErrorKind::NotFound => return Ok(None),

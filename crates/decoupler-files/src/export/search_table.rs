@@ -12,6 +12,8 @@ pub fn search_table(record: &AutoRecord) -> Table {
         TableColumn::new("features", "inputs", "").meaning("Quantity, memory and scaling of the inputs."),
         TableColumn::new("model", "model", "")
             .meaning("Ridge regression, or networks × hidden nodes of a committee and their training method."),
+        TableColumn::new("begin", "begins at", "")
+            .meaning("Weights with which the trainings begin: random, or ridge regression with random weights added."),
         TableColumn::new("error_percent", "error", "%").meaning(
             "Root mean square error of held-out answers in cross-validation, relative to the standard deviation of each \
              target: 100 % for always answering the mean.",
@@ -26,6 +28,9 @@ pub fn search_table(record: &AutoRecord) -> Table {
             if place == record.chosen { "*".into() } else { "".into() },
             tried.features().into(),
             tried.model().into(),
+            tried
+                .begin()
+                .map_or_else(|| "".into(), |begin| begin.to_string().into()),
             (100.0 * tried.error).into(),
             (100.0 * tried.standard_error).into(),
             tried.epochs().map_or_else(|| "".into(), Cell::from),

@@ -55,15 +55,12 @@ impl Unfinished {
             builder.permissions(Permissions::from_mode(0o666));
         }
         let mut all = all();
-        let file = loop {
+        let file = not_swept(|| {
             let file = builder.tempfile_in(folder).map_err(plain)?;
             // Some file systems have no locks; nothing is swept there.
             let _ = file.as_file().lock();
-            // Another program may have swept it before it was locked.
-            if file.path().exists() {
-                break file;
-            }
-        };
+            Ok(file.path().try_exists()?.then_some(file))
+        })?;
         all.insert(file.path().to_owned());
         let listed = Listed(file.path().to_owned());
         Ok(Self { file, listed })
@@ -97,6 +94,20 @@ impl Unfinished {
     }
 }
 
+/// Calls `create` until what it has created still exists: another program may have swept it before it was locked.
+fn not_swept<T>(mut create: impl FnMut() -> io::Result<Option<T>>) -> io::Result<T> {
+    /// A program sweeps a folder once, so that more attempts mean another fault.
+    const ATTEMPTS: usize = 10;
+    for _ in 0..ATTEMPTS {
+        if let Some(created) = create()? {
+            return Ok(created);
+        }
+    }
+    Err(io::Error::other(
+        "temporary files vanish as soon as they are created; give another place",
+    ))
+}
+
 /// Returns the system's error: the default one contains the temporary name, which the user does not know.
 fn plain(error: io::Error) -> io::Error {
     error.raw_os_error().map_or(error, io::Error::from_raw_os_error)
@@ -125,14 +136,11 @@ impl UnfinishedFolder {
             builder.permissions(Permissions::from_mode(0o777));
         }
         let mut all = all();
-        let (folder, lock) = loop {
+        let (folder, lock) = not_swept(|| {
             let folder = builder.tempdir_in(parent).map_err(plain)?;
             let lock = locked_folder(folder.path());
-            // Another program may have swept it before it was locked.
-            if folder.path().exists() {
-                break (folder, lock);
-            }
-        };
+            Ok(folder.path().try_exists()?.then_some((folder, lock)))
+        })?;
         all.insert(folder.path().to_owned());
         let listed = Listed(folder.path().to_owned());
         Ok(Self { folder, listed, lock })
@@ -214,13 +222,27 @@ fn is_our_name(name: &OsStr) -> bool {
     random.is_some_and(|random| random.len() == RANDOM && random.bytes().all(|byte| byte.is_ascii_alphanumeric()))
 }
 
+/// Removes a folder to which another thread may be writing.
+fn remove_folder(path: &Path) -> io::Result<()> {
+    /// Each attempt fails only if a file was created while it removed the others.
+    const ATTEMPTS: usize = 1000;
+    let mut removed = fs::remove_dir_all(path);
+    for _ in 1..ATTEMPTS {
+        if removed.is_ok() || !path.exists() {
+            break;
+        }
+        removed = fs::remove_dir_all(path);
+    }
+    removed
+}
+
 /// Ends the program with this exit status, from any thread, after removing unfinished files.
 pub fn exit_leaving_nothing(status: i32) -> ! {
     // Held until the end, so no other thread can add an entry.
     let all = all();
     for path in all.iter() {
         // It may have been renamed or removed just now.
-        let _ = std::fs::remove_file(path).or_else(|_| std::fs::remove_dir_all(path));
+        let _ = fs::remove_file(path).or_else(|_| remove_folder(path));
     }
     std::process::exit(status)
 }
@@ -228,6 +250,32 @@ pub fn exit_leaving_nothing(status: i32) -> ! {
 #[cfg(all(test, unix))]
 mod tests {
     use super::*;
+
+    #[test]
+    fn attempts_are_limited() {
+        let mut attempts = 0;
+        let vanished = not_swept(|| {
+            attempts += 1;
+            Ok(None::<()>)
+        });
+        assert!(vanished.is_err() && attempts == 10, "{attempts}");
+        assert_eq!(not_swept(|| Ok(Some(1))).unwrap(), 1);
+    }
+
+    #[test]
+    fn a_folder_is_removed_while_another_thread_fills_it() {
+        let home = tempfile::tempdir().unwrap();
+        for round in 0..20 {
+            let folder = home.path().join(round.to_string());
+            fs::create_dir(&folder).unwrap();
+            std::thread::scope(|scope| {
+                let filling = scope.spawn(|| (0..).find(|k| fs::write(folder.join(format!("{k}")), "x").is_err()));
+                let _ = remove_folder(&folder);
+                assert!(!folder.exists());
+                filling.join().unwrap();
+            });
+        }
+    }
 
     #[test]
     fn a_folder_in_use_stays_and_one_that_was_left_is_removed() {

@@ -89,6 +89,7 @@ pub(super) fn table(
         rows,
         format,
         notes,
+        torn_line: None,
         too_long: Excess::default(),
         too_short: Excess::default(),
         lines: Lines::default(),

@@ -123,7 +123,11 @@ impl Setup {
         }
         let memory = plan.import.memory.clone();
         let planned = planned(&plan, &raw, test_recording.as_ref(), memory.as_ref(), settings.seed)?;
-        let mut sets = SetupSets::of_plan(&plan, folder, planned)?;
+        let read = SetupSets::of_plan(&plan, folder, planned, &mut watch(is_cancelled, &mut |_| {}));
+        let mut sets = match read {
+            Err(_) if is_cancelled() => return Ok(None),
+            read => read?,
+        };
         if let (Some(recordings), Some(choice)) = (&mut sets.recordings, &choice) {
             recordings.recorded.search = Some(choice.record.clone());
         }

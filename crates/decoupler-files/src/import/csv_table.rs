@@ -14,10 +14,14 @@ use super::{
     table::{Excess, Labels, Lines, name_and_unit, stem},
     time_stamp::TimeStamp,
 };
-use decoupler_core::text::clean_name;
+use decoupler_core::{machine::ReadingBudget, text::clean_name};
 
 /// Maximum number of rows; ten hours at 1 kHz are fewer.
 const LARGEST_ROWS: usize = 50_000_000;
+/// Memory of a number in bytes, in a vector that has just doubled.
+const NUMBER: u64 = 2 * size_of::<f64>() as u64;
+/// Memory of a short text in bytes, without its letters.
+const TEXT: u64 = 64;
 /// Number of rows that determine the number of columns, by their most common length, if there is no header.
 const FIRST_ROWS: usize = 500;
 
@@ -33,8 +37,13 @@ pub(super) struct Reading<'a> {
     pub(super) used: Vec<String>,
 }
 
-/// Reads a table from text.
-pub(super) fn read(path: &Path, mut source: impl Read, reading: &Reading<'_>) -> Result<Table, TableError> {
+/// Reads a table from text. `budget` limits its memory.
+pub(super) fn read(
+    path: &Path,
+    mut source: impl Read,
+    reading: &Reading<'_>,
+    budget: &mut ReadingBudget,
+) -> Result<Table, TableError> {
     let mut beginning = Vec::new();
     (&mut source)
         .take(BEGINNING as u64)
@@ -43,24 +52,34 @@ pub(super) fn read(path: &Path, mut source: impl Read, reading: &Reading<'_>) ->
     let dialect = detect(&beginning, beginning.len() < BEGINNING, &reading.choice)?;
     let whole = Cursor::new(beginning).chain(source);
     match dialect.encoding {
-        Encoding::Utf8 | Encoding::Latin1 => read_rows(path, whole, dialect, reading),
+        Encoding::Utf8 | Encoding::Latin1 => read_rows(path, whole, dialect, reading, budget),
         Encoding::Utf16Le | Encoding::Utf16Be => {
             let text = utf8_of_utf16(whole, dialect.encoding == Encoding::Utf16Le);
-            read_rows(path, text, dialect, reading)
+            read_rows(path, text, dialect, reading, budget)
         }
     }
 }
 
-fn read_rows(path: &Path, text: impl Read, dialect: Dialect, reading: &Reading<'_>) -> Result<Table, TableError> {
+fn read_rows(
+    path: &Path,
+    text: impl Read,
+    dialect: Dialect,
+    reading: &Reading<'_>,
+    budget: &mut ReadingBudget,
+) -> Result<Table, TableError> {
     let mut rows = Rows::new(text, dialect.separator, dialect.carriage_returns);
     rows.skip(dialect.skipped_lines + usize::from(dialect.sep_line))?;
     let mut headers = Vec::new();
     if dialect.header && rows.advance()? {
         headers = rows.cells().map(|cell| text_of(cell, dialect.encoding)).collect();
     }
-    let mut body = Body::new(dialect, reading);
+    let mut body = Body::new(dialect, reading, budget);
     while rows.advance()? {
-        body.push(&rows, &headers)?;
+        if body.is_torn(&rows, &headers) {
+            body.torn_line = Some(rows.line());
+        } else {
+            body.push(&rows, &headers)?;
+        }
     }
     body.finish(path, headers)
 }
@@ -69,6 +88,7 @@ fn read_rows(path: &Path, text: impl Read, dialect: Dialect, reading: &Reading<'
 struct Body<'a> {
     dialect: Dialect,
     reading: &'a Reading<'a>,
+    budget: &'a mut ReadingBudget,
     /// Rows buffered until the number of columns is known, with their line numbers.
     first: Vec<(u64, Vec<Vec<u8>>)>,
     builders: Vec<Builder<'a>>,
@@ -76,6 +96,7 @@ struct Body<'a> {
     lines: Lines,
     too_long: Excess,
     too_short: Excess,
+    torn_line: Option<u64>,
 }
 
 struct Builder<'a> {
@@ -88,22 +109,46 @@ struct Builder<'a> {
 }
 
 impl<'a> Body<'a> {
-    fn new(dialect: Dialect, reading: &'a Reading<'a>) -> Self {
+    fn new(dialect: Dialect, reading: &'a Reading<'a>, budget: &'a mut ReadingBudget) -> Self {
         Self {
             dialect,
             reading,
+            budget,
             first: Vec::new(),
             builders: Vec::new(),
             rows: 0,
             lines: Lines::default(),
             too_long: Excess::default(),
             too_short: Excess::default(),
+            torn_line: None,
         }
+    }
+
+    /// Returns `true` if the row is the last of a file that is cut off, as when the disk was full: it ends without a line
+    /// break, before the last column or within its number.
+    fn is_torn<R: Read>(&self, rows: &Rows<R>, headers: &[String]) -> bool {
+        if rows.is_ended() || self.rows + self.first.len() == 0 {
+            return false;
+        }
+        let width = match (self.builders.len(), headers.len()) {
+            (0, 0) => commonest(self.first.iter().map(|(_, cells)| cells.len())),
+            (0, _) => return false,
+            (width, _) => width,
+        };
+        let is_text = |cell: &[u8]| parse(cell, self.dialect.decimal) == Cell::Text;
+        let has_numbers = |builder: &Builder<'_>| builder.has_numbers && builder.column.faults.count == 0;
+        let is_within_number = || {
+            let of_numbers = self.builders.last().is_some_and(has_numbers);
+            of_numbers && rows.len() == width && rows.cells().last().is_some_and(is_text)
+        };
+        rows.len() < width || is_within_number()
     }
 
     fn push<R: Read>(&mut self, rows: &Rows<R>, headers: &[String]) -> Result<(), TableError> {
         if self.builders.is_empty() {
             if headers.is_empty() && self.first.len() < FIRST_ROWS {
+                let texts = rows.cells().map(|cell| cell.len() as u64).sum::<u64>();
+                self.budget.claim(texts + TEXT * rows.len() as u64)?;
                 self.first
                     .push((rows.line(), rows.cells().map(<[u8]>::to_vec).collect()));
                 return Ok(());
@@ -150,8 +195,12 @@ impl<'a> Body<'a> {
         if self.rows == LARGEST_ROWS {
             return Err(TableError::Long(LARGEST_ROWS));
         }
+        self.budget.claim(NUMBER * width as u64)?;
         for builder in &mut self.builders {
-            builder.push(line, cells.next().unwrap_or_default(), &self.dialect);
+            let added = builder.push(line, cells.next().unwrap_or_default(), &self.dialect);
+            if let Some(length) = added {
+                self.budget.claim(2 * (length as u64 + TEXT))?;
+            }
         }
         self.lines.push(self.rows, line);
         self.rows += 1;
@@ -171,12 +220,18 @@ impl<'a> Body<'a> {
             columns: self.builders.into_iter().map(Builder::finish).collect(),
             rows: self.rows,
             format: Format::Text(self.dialect),
-            notes: Vec::new(),
+            notes: self.torn_line.map(torn).into_iter().collect(),
+            torn_line: self.torn_line,
             too_long: self.too_long,
             too_short: self.too_short,
             lines: self.lines,
         })
     }
+}
+
+/// Returns the note on a last line that is cut off.
+fn torn(line: u64) -> String {
+    format!("line {line}, the last, is cut off and left out")
 }
 
 impl<'a> Builder<'a> {
@@ -195,7 +250,8 @@ impl<'a> Builder<'a> {
         }
     }
 
-    fn push(&mut self, line: u64, cell: &[u8], dialect: &Dialect) {
+    /// Adds a cell; returns the length of its text if that is a new label.
+    fn push(&mut self, line: u64, cell: &[u8], dialect: &Dialect) -> Option<usize> {
         let found = parse(cell, dialect.decimal);
         let is_missing = found == Cell::Missing || self.missing.iter().any(|missing| missing.is(cell, found));
         self.column.missing += usize::from(is_missing);
@@ -205,8 +261,8 @@ impl<'a> Builder<'a> {
                 Cell::Number(number) => Some(number),
                 _ => None,
             };
-            labels.push((!is_missing).then_some((&text, number)));
-            return;
+            let is_new = labels.push((!is_missing).then_some((&text, number)));
+            return is_new.then_some(text.len());
         }
         let number = match found {
             Cell::Number(number) if !is_missing && self.column.start.is_none() => {
@@ -229,6 +285,7 @@ impl<'a> Builder<'a> {
             },
         };
         self.numbers.push(number);
+        None
     }
 
     /// Returns the seconds since the first time stamp of a column; `None` unless all of its cells are time stamps, all with or

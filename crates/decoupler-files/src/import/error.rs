@@ -5,6 +5,7 @@ use std::{
 
 use decoupler_core::{
     dataset::{DatasetError, DivisionError, MemoryError},
+    machine::OverBudget,
     text::system_cause,
 };
 use thiserror::Error;
@@ -290,6 +291,17 @@ pub enum TableError {
     /// The file has too many rows.
     #[error("it has more than {0} rows; use every second row, or a part of the file")]
     Long(usize),
+    /// Reading it needs too much memory.
+    #[error(transparent)]
+    OverBudget(#[from] OverBudget),
+    /// The contents do not match a checksum or a length stated in the file.
+    #[error("{what} is damaged: {reason}")]
+    Damaged {
+        /// The array or part of the file.
+        what: String,
+        /// Cause and cure.
+        reason: String,
+    },
     /// A NumPy or MATLAB file is invalid, or contains data of an unsupported type.
     #[error("{what}: {reason}")]
     Array {
@@ -301,6 +313,13 @@ pub enum TableError {
 }
 
 impl TableError {
+    pub(super) fn damaged(what: impl Into<String>, reason: impl Into<String>) -> Self {
+        Self::Damaged {
+            what: what.into(),
+            reason: reason.into(),
+        }
+    }
+
     pub(super) fn array(what: impl Into<String>, reason: impl Into<String>) -> Self {
         Self::Array {
             what: what.into(),

@@ -7,6 +7,8 @@ use std::{
     path::{Path, PathBuf},
 };
 
+use decoupler_core::machine::ReadingBudget;
+
 use super::{Decimal, Dialect, TableError, Watch, input_lines::Watched, matlab, numpy};
 
 /// File format.
@@ -80,8 +82,9 @@ const PICKLE: &str = "load it in Python and save the arrays with numpy.savez";
 const UNPACK: &str = "unpack it";
 const TABLE: &str = "give a table of numbers";
 
-/// Reads the arrays of a file of this size; returns them and the names of the items that are not arrays of numbers.
-type ReadArrays = fn(File, Option<u64>, Watch<'_>) -> Result<(Vec<Array>, Vec<String>), TableError>;
+/// Reads the arrays of a file of this size within a budget; returns them and the names of the items that are not arrays of
+/// numbers.
+type ReadArrays = fn(File, Option<u64>, &mut ReadingBudget, Watch<'_>) -> Result<(Vec<Array>, Vec<String>), TableError>;
 
 impl Format {
     /// Names of all formats, for messages and help.
@@ -124,8 +127,8 @@ impl Contents {
             return Err(TableError::OtherKind { what, cure });
         }
         Ok(match beginning {
-            [0x93, b'N', b'U', b'M', b'P', b'Y', ..] => Self::Arrays(Format::Npy, |file, size, watch| {
-                let array = numpy::read("", BufReader::new(Watched::new(file, size, watch)));
+            [0x93, b'N', b'U', b'M', b'P', b'Y', ..] => Self::Arrays(Format::Npy, |file, size, budget, watch| {
+                let array = numpy::read("", BufReader::new(Watched::new(file, size, watch)), budget);
                 let array = array.map_err(|error| match error {
                     TableError::Array { reason, .. } => TableError::array("NumPy array", reason),
                     error => error,
@@ -135,8 +138,8 @@ impl Contents {
             [b'P', b'K', 3 | 5, ..] => Self::Zip,
             [0xd0, 0xcf, 0x11, 0xe0, ..] => Self::OldExcel,
             _ if has_extension("mat") || beginning.starts_with(b"MATLAB") => {
-                Self::Arrays(Format::Matlab, |file, size, watch| {
-                    matlab::read(BufReader::new(Watched::new(file, size, watch)))
+                Self::Arrays(Format::Matlab, |file, size, budget, watch| {
+                    matlab::read(BufReader::new(Watched::new(file, size, watch)), budget)
                 })
             }
             _ => Self::Text,

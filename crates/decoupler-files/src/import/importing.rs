@@ -8,6 +8,7 @@ use std::{
 use decoupler_core::{
     dataset::{Dataset, History, Memory, MemoryError},
     evaluation::{Channel, Problem, TargetPosition},
+    machine::ReadingBudget,
 };
 use serde::Serialize;
 
@@ -382,26 +383,27 @@ fn read_file(
     watch: Watch<'_>,
 ) -> Result<Table, TableError> {
     let mut start = Vec::new();
+    let budget = &mut ReadingBudget::now();
     if size.is_none() {
         // A pipe can be read only once.
-        return csv_table::read(path, Watched::new(file, None, watch), reading);
+        return csv_table::read(path, Watched::new(file, None, watch), reading, budget);
     }
     (&file).take(Format::BEGINNING).read_to_end(&mut start)?;
     file.rewind()?;
     let (found, left_out, format) = match Contents::of(path, &start)? {
-        Contents::Text => return csv_table::read(path, Watched::new(file, size, watch), reading),
-        Contents::OldExcel => return Spreadsheet::Xls.read(path, file, reading, watch),
+        Contents::Text => return csv_table::read(path, Watched::new(file, size, watch), reading, budget),
+        Contents::OldExcel => return Spreadsheet::Xls.read(path, file, reading, budget, watch),
         Contents::Zip => {
             let kind = Spreadsheet::of_zip(&file)?;
             file.rewind()?;
             if let Some(kind) = kind {
-                return kind.read(path, file, reading, watch);
+                return kind.read(path, file, reading, budget, watch);
             }
-            let (found, left_out) = numpy::read_archive(BufReader::new(file), watch)?;
+            let (found, left_out) = numpy::read_archive(BufReader::new(file), budget, watch)?;
             (found, left_out, Format::Npz)
         }
         Contents::Arrays(format, read_arrays) => {
-            let (found, left_out) = read_arrays(file, size, watch)?;
+            let (found, left_out) = read_arrays(file, size, budget, watch)?;
             (found, left_out, format)
         }
     };

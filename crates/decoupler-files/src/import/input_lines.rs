@@ -349,7 +349,7 @@ mod tests {
 
     fn readings(lines: &mut InputLines, line: u64, text: &str) -> Option<(usize, Vec<f64>)> {
         match lines.parse(line, text.as_bytes()).unwrap() {
-            InputLine::NoReadings => None,
+            InputLine::NoReadings | InputLine::Start { .. } => None,
             InputLine::Readings { row_index, readings } => Some((row_index, readings.to_vec())),
         }
     }

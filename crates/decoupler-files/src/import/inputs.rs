@@ -22,6 +22,8 @@ pub struct InputTable {
     pub row_wires: Option<Vec<usize>>,
     /// Line of each sample, from 1.
     pub lines: Vec<u64>,
+    /// Last line of a text file, if it is cut off and therefore left out.
+    pub torn_line: Option<u64>,
     /// Columns of the recipe that say when or to what a sample belongs, as far as the file has them: time, group and
     /// row-wire.
     pub kept: Vec<KeptColumn>,
@@ -329,6 +331,7 @@ impl Recipe {
             readings,
             row_wires,
             lines: (0..table.rows).map(|row| table.line(row)).collect(),
+            torn_line: table.torn_line,
             kept: kept.collect(),
         })
     }

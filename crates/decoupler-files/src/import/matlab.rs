@@ -4,6 +4,7 @@
 
 use std::io::Read;
 
+use decoupler_core::machine::ReadingBudget;
 use flate2::read::ZlibDecoder;
 
 use super::{
@@ -25,8 +26,8 @@ struct Tag {
     small: Option<[u8; 4]>,
 }
 
-/// Reads the numeric arrays of a file; returns them and the variables left out.
-pub(super) fn read(mut source: impl Read) -> Result<(Vec<Array>, Vec<String>), TableError> {
+/// Reads the numeric arrays of a file; returns them and the variables left out. `budget` limits their memory.
+pub(super) fn read(mut source: impl Read, budget: &mut ReadingBudget) -> Result<(Vec<Array>, Vec<String>), TableError> {
     let mut header = [0; 128];
     if !fill(&mut source, &mut header)? {
         return Err(wrong("it is cut off; copy it again"));
@@ -57,24 +58,30 @@ pub(super) fn read(mut source: impl Read) -> Result<(Vec<Array>, Vec<String>), T
                     size,
                 }) = Tag::read(&mut inflated, endian)?
                 {
-                    variable(
-                        &mut (&mut inflated).take(size as u64),
-                        endian,
-                        &mut arrays,
-                        &mut left_out,
-                    )?;
+                    let mut matrix = (&mut inflated).take(size as u64);
+                    variable(&mut matrix, endian, budget, &mut arrays, &mut left_out)?;
+                    drain(&mut matrix)?;
                 }
-                drain(&mut limited)?;
+                // The checksum is verified at the end of the data.
+                if fill(&mut inflated, &mut [0])? {
+                    let reason = "it has more data than it states; copy it again";
+                    return Err(TableError::damaged("a variable", reason));
+                }
+                if inflated.total_in() != tag.size as u64 {
+                    return Err(TableError::damaged("a variable", "its length is wrong; copy it again"));
+                }
             }
             (MATRIX, None) => {
                 let padding = tag.size.next_multiple_of(8) - tag.size;
                 let mut limited = (&mut source).take(tag.size as u64);
-                variable(&mut limited, endian, &mut arrays, &mut left_out)?;
+                variable(&mut limited, endian, budget, &mut arrays, &mut left_out)?;
                 drain(&mut limited)?;
+                if limited.limit() > 0 {
+                    return Err(cut_off());
+                }
                 drain(&mut (&mut source).take(padding as u64))?;
             }
-            (_, Some(_)) => {}
-            (_, None) => drain(&mut (&mut source).take(tag.size.next_multiple_of(8) as u64))?,
+            _ => return Err(TableError::damaged("a variable", "its kind is unknown; copy it again")),
         }
     }
     Ok((arrays, left_out))
@@ -84,10 +91,11 @@ pub(super) fn read(mut source: impl Read) -> Result<(Vec<Array>, Vec<String>), T
 fn variable(
     source: &mut dyn Read,
     endian: Endian,
+    budget: &mut ReadingBudget,
     arrays: &mut Vec<Array>,
     left_out: &mut Vec<String>,
 ) -> Result<(), TableError> {
-    let (name, value) = Value::read(source, endian, 0)?;
+    let (name, value) = Value::read(source, endian, budget, 0)?;
     // MATLAB stores internal data, such as `__function_workspace__`, in variables without a name.
     if !name.is_empty() {
         value.add(name, arrays, left_out);
@@ -99,6 +107,10 @@ fn variable(
 const DEEPEST: usize = 8;
 /// Maximum number of fields times elements of a structure.
 const MAX_FIELDS: usize = 1 << 20;
+/// Memory of a field of a structure in bytes, without its numbers.
+const FIELD: u64 = 128;
+/// Maximum length of names, shapes and flags in bytes.
+const LONGEST: usize = 1 << 16;
 
 /// Value of a variable or a field.
 enum Value {
@@ -112,31 +124,42 @@ enum Value {
 
 impl Value {
     /// Reads a matrix and its name.
-    fn read(mut source: &mut dyn Read, endian: Endian, depth: usize) -> Result<(String, Self), TableError> {
-        let flags = Element::U32.read(&data(&mut source, endian)?.1, endian);
-        let shape = Element::I32.read(&data(&mut source, endian)?.1, endian);
-        let name = text(&data(&mut source, endian)?.1);
+    fn read(
+        mut source: &mut dyn Read,
+        endian: Endian,
+        budget: &mut ReadingBudget,
+        depth: usize,
+    ) -> Result<(String, Self), TableError> {
+        let flags = Element::U32.read(&short_data(&mut source, endian)?, endian);
+        let shape = Element::I32.read(&short_data(&mut source, endian)?, endian);
+        let name = text(&short_data(&mut source, endian)?);
         let flags = flags.first().copied().unwrap_or(0.0) as u32;
         let other = |what: &str| Self::Other(what.to_owned());
         let value = match flags & 0xff {
             1 => other("a cell array"),
             2 if depth == DEEPEST => other("a structure within too many others"),
-            2 => return Ok((name, Self::structures(source, endian, &shape, depth)?)),
+            2 => return Ok((name, Self::structures(source, endian, &shape, budget, depth)?)),
             4 => other("text"),
             5 => other("sparse; save it as full"),
             6..=15 if flags & 0x0800 != 0 => other("complex"),
-            6..=15 => Self::numbers(source, endian, &name, &shape)?,
+            6..=15 => Self::numbers(source, endian, &name, &shape, budget)?,
             _ => other("an object"),
         };
         Ok((name, value))
     }
 
-    fn numbers(mut source: &mut dyn Read, endian: Endian, name: &str, shape: &[f64]) -> Result<Self, TableError> {
+    fn numbers(
+        mut source: &mut dyn Read,
+        endian: Endian,
+        name: &str,
+        shape: &[f64],
+        budget: &mut ReadingBudget,
+    ) -> Result<Self, TableError> {
         if shape.is_empty() || shape.iter().any(|size| *size < 1.0) {
             return Ok(Self::Other("empty".to_owned()));
         }
         let shape = Vec::from_iter(shape.iter().map(|size| *size as usize));
-        let (kind, bytes) = data(&mut source, endian)?;
+        let (kind, bytes) = data(&mut source, endian, budget)?;
         let element = match kind {
             1 => Element::I8,
             2 => Element::U8,
@@ -164,31 +187,40 @@ impl Value {
             );
             return Err(TableError::array(name, reason));
         }
-        Ok(Self::Numbers {
-            shape,
-            numbers: element.read(&bytes, endian),
-        })
+        // The numbers in the order of the file are freed once they are copied to their columns.
+        budget.claim((found as u64).saturating_mul(2 * size_of::<f64>() as u64))?;
+        let numbers = element.read(&bytes, endian);
+        budget.release(bytes.len() as u64);
+        Ok(Self::Numbers { shape, numbers })
     }
 
     /// Reads the fields of `shape` structures.
-    fn structures(mut source: &mut dyn Read, endian: Endian, shape: &[f64], depth: usize) -> Result<Self, TableError> {
-        let length = Element::I32.read(&data(&mut source, endian)?.1, endian);
+    fn structures(
+        mut source: &mut dyn Read,
+        endian: Endian,
+        shape: &[f64],
+        budget: &mut ReadingBudget,
+        depth: usize,
+    ) -> Result<Self, TableError> {
+        let length = Element::I32.read(&short_data(&mut source, endian)?, endian);
         let length = length.first().map_or(0, |length| *length as usize);
-        let names = data(&mut source, endian)?.1;
+        let (_, names) = data(&mut source, endian, budget)?;
+        let count: f64 = shape.iter().product();
+        let width = names.len().checked_div(length).unwrap_or(0);
+        if count.max(1.0) * width as f64 > MAX_FIELDS as f64 {
+            return Ok(Self::Other("a structure with too many fields".to_owned()));
+        }
+        budget.claim((count.max(1.0) * width as f64) as u64 * FIELD)?;
         let mut fields = Vec::new();
         if length > 0 {
             fields.extend(names.chunks_exact(length).map(|name| (text(name), Vec::new())));
-        }
-        let count: f64 = shape.iter().product();
-        if count * fields.len() as f64 > MAX_FIELDS as f64 {
-            return Ok(Self::Other("a structure with too many fields".to_owned()));
         }
         for _ in 0..count as usize {
             for (_, values) in &mut fields {
                 let tag = Tag::read(&mut source, endian)?.ok_or_else(cut_off)?;
                 let mut limited = (&mut source).take(tag.size as u64);
                 let value = match (tag.kind, tag.size) {
-                    (MATRIX, 1..) => Self::read(&mut limited, endian, depth + 1)?.1,
+                    (MATRIX, 1..) => Self::read(&mut limited, endian, budget, depth + 1)?.1,
                     _ => Self::Other("empty".to_owned()),
                 };
                 drain(&mut limited)?;
@@ -252,8 +284,22 @@ fn text(bytes: &[u8]) -> String {
 }
 
 /// Reads the type and data of an element within a variable.
-fn data(source: &mut dyn Read, endian: Endian) -> Result<(u32, Vec<u8>), TableError> {
+fn data(source: &mut dyn Read, endian: Endian, budget: &mut ReadingBudget) -> Result<(u32, Vec<u8>), TableError> {
     let tag = Tag::read(source, endian)?.ok_or_else(cut_off)?;
+    budget.claim(tag.size as u64)?;
+    contents(source, tag)
+}
+
+/// Reads the data of a name, a shape or flags.
+fn short_data(source: &mut dyn Read, endian: Endian) -> Result<Vec<u8>, TableError> {
+    match Tag::read(source, endian)?.ok_or_else(cut_off)? {
+        tag if tag.size > LONGEST => Err(wrong("an element has an invalid length; copy it again")),
+        tag => Ok(contents(source, tag)?.1),
+    }
+}
+
+/// Reads the data of the element with this tag.
+fn contents(source: &mut dyn Read, tag: Tag) -> Result<(u32, Vec<u8>), TableError> {
     if let Some(small) = tag.small {
         return Ok((tag.kind, small[..tag.size].to_vec()));
     }
@@ -314,13 +360,17 @@ fn cut_off() -> TableError {
     wrong("it is cut off; copy it again")
 }
 
-/// Fills `buffer`; returns `false` if the source is too short.
+/// Fills `buffer`; returns `false` at the end of the source.
 fn fill(source: &mut dyn Read, buffer: &mut [u8]) -> Result<bool, TableError> {
-    match source.read_exact(buffer) {
-        Ok(()) => Ok(true),
-        Err(error) if error.kind() == std::io::ErrorKind::UnexpectedEof => Ok(false),
-        Err(error) => Err(damage(error)),
+    let mut filled = 0;
+    while filled < buffer.len() {
+        match source.read(&mut buffer[filled..]).map_err(damage)? {
+            0 if filled == 0 => return Ok(false),
+            0 => return Err(cut_off()),
+            read => filled += read,
+        }
     }
+    Ok(true)
 }
 
 fn drain(source: &mut dyn Read) -> Result<(), TableError> {
@@ -332,8 +382,9 @@ fn drain(source: &mut dyn Read) -> Result<(), TableError> {
 fn damage(error: std::io::Error) -> TableError {
     match error.kind() {
         std::io::ErrorKind::InvalidInput | std::io::ErrorKind::InvalidData => {
-            wrong("its compressed data is corrupt; copy it again")
+            TableError::damaged("a variable", "its compressed data is corrupt; copy it again")
         }
+        std::io::ErrorKind::UnexpectedEof => cut_off(),
         _ => table_error(error),
     }
 }

@@ -34,9 +34,11 @@ mod selection;
 mod sentinel;
 mod setup;
 mod sheet;
+mod sheet_claims;
 mod suggestion;
 mod table;
 mod time_stamp;
+mod xls_claims;
 
 pub use choosing::{ChoosingProgress, ChosenSetup};
 pub use derived::Derived;

@@ -2,8 +2,9 @@
 //! The header is one line with three known keys. A parser of all Python literals would not be safe: nested brackets in a
 //! corrupt header would overflow its stack.
 
-use std::io::{Read, Seek};
+use std::io::{self, Read, Seek, SeekFrom};
 
+use decoupler_core::machine::ReadingBudget;
 use zip::{ZipArchive, result::ZipError};
 
 use super::{
@@ -15,6 +16,8 @@ use super::{
 
 /// Maximum length of a header in bytes.
 const LONGEST_HEADER: usize = 1 << 16;
+/// Memory of a number in bytes.
+const NUMBER: u64 = size_of::<f64>() as u64;
 /// Number of bytes read at once, so that a corrupt header allocates little memory.
 const BLOCK: usize = 1 << 20;
 
@@ -27,8 +30,8 @@ struct Header {
     shape: Vec<usize>,
 }
 
-/// Reads an array: samples × any further dimensions.
-pub(super) fn read(name: &str, mut source: impl Read) -> Result<Array, TableError> {
+/// Reads an array: samples × any further dimensions. `budget` limits its memory.
+pub(super) fn read(name: &str, mut source: impl Read, budget: &mut ReadingBudget) -> Result<Array, TableError> {
     let wrong = |reason: String| TableError::array(name, reason);
     let mut start = [0; 8];
     fill(&mut source, &mut start)
@@ -64,6 +67,9 @@ pub(super) fn read(name: &str, mut source: impl Read) -> Result<Array, TableErro
     if expected == 0 {
         return Err(wrong(format!("it is empty ({written})")));
     }
+    let count = (expected / size) as u64;
+    // The numbers in the order of the file are freed once they are copied to their columns.
+    budget.claim(count.saturating_mul(2 * NUMBER))?;
     let mut numbers = Vec::new();
     let mut left = expected;
     let mut block = Vec::new();
@@ -83,7 +89,9 @@ pub(super) fn read(name: &str, mut source: impl Read) -> Result<Array, TableErro
         left -= wanted;
         numbers.extend(header.element.read(&block, header.endian));
     }
-    Array::new(name.to_owned(), shape, numbers, header.is_by_column)
+    let array = Array::new(name.to_owned(), shape, numbers, header.is_by_column)?;
+    budget.release(count * NUMBER);
+    Ok(array)
 }
 
 /// Fills `buffer`, or fails with `None` if the source is too short.
@@ -157,11 +165,14 @@ impl Header {
     }
 }
 
-/// Reads the arrays of an archive; returns them and the entries left out.
+/// Reads the arrays of an archive; returns them and the entries left out. Each entry is read to its end, where its checksum is
+/// verified, since a damaged header can make an array look like something to leave out.
 pub(super) fn read_archive(
-    source: impl Read + Seek,
+    mut source: impl Read + Seek,
+    budget: &mut ReadingBudget,
     watch: Watch<'_>,
 ) -> Result<(Vec<Array>, Vec<String>), TableError> {
+    check_names(&mut source)?;
     let mut archive = ZipArchive::new(source).map_err(|error| defect("the archive", error))?;
     let mut arrays = Vec::new();
     let mut left_out = Vec::new();
@@ -173,20 +184,70 @@ pub(super) fn read_archive(
             continue;
         };
         let size = entry.size();
-        match numpy::read(&name, Watched::new(entry, Some(size), watch)) {
+        let mut entry = Watched::new(entry, Some(size), watch);
+        let array = numpy::read(&name, &mut entry, budget);
+        let rest = match array {
+            // Without its end, a part of a damaged entry may be larger than memory or endless.
+            Err(TableError::Cancelled | TableError::OverBudget(_)) => 0,
+            _ => io::copy(&mut entry, &mut io::sink()).map_err(|error| damage(&name, error))?,
+        };
+        match array {
+            Ok(_) if rest > 0 => {
+                let reason = format!("it has {rest} bytes more than its header states; copy it again");
+                return Err(TableError::damaged(name, reason));
+            }
             Ok(array) => arrays.push(array),
             // A text or a scalar next to the arrays does not make the file invalid.
             Err(TableError::Array { what, reason }) => left_out.push(format!("{what}: {reason}")),
+            Err(TableError::Io(error)) => return Err(damage(&name, error)),
             Err(error) => return Err(error),
         }
     }
     Ok((arrays, left_out))
 }
 
+/// Checks that the name of each entry is the same at its data and in the directory at the end of the archive, so that a damaged
+/// name does not become the name of a column.
+fn check_names(source: &mut (impl Read + Seek)) -> Result<(), TableError> {
+    /// Length of a header before the name of its entry.
+    const HEADER: usize = 30;
+    let mut archive = ZipArchive::new(&mut *source).map_err(|error| defect("the archive", error))?;
+    let mut entries = Vec::new();
+    for index in 0..archive.len() {
+        let entry = archive
+            .by_index_raw(index)
+            .map_err(|error| defect("the archive", error))?;
+        entries.push((entry.header_start(), entry.name_raw().to_vec()));
+    }
+    drop(archive);
+    for (start, name) in entries {
+        let mut header = vec![0; HEADER + name.len()];
+        source.seek(SeekFrom::Start(start))?;
+        source.read_exact(&mut header)?;
+        let length = usize::from(u16::from_le_bytes([header[26], header[27]]));
+        if length != name.len() || header[HEADER..] != name {
+            let reason = "an entry has two names; copy it again";
+            return Err(TableError::damaged("the archive", reason));
+        }
+    }
+    source.rewind()?;
+    Ok(())
+}
+
+/// Returns the error of reading the entry `name` of an archive.
+fn damage(name: &str, error: io::Error) -> TableError {
+    match error.kind() {
+        io::ErrorKind::InvalidData | io::ErrorKind::InvalidInput | io::ErrorKind::UnexpectedEof => {
+            TableError::damaged(name, "its contents do not match its checksum; copy it again")
+        }
+        _ => table_error(error),
+    }
+}
+
 fn defect(what: &str, error: ZipError) -> TableError {
     match error {
-        ZipError::Io(error) => super::input_lines::table_error(error),
-        error => TableError::array(what, format!("{error}; save it again with numpy.savez")),
+        ZipError::Io(error) => table_error(error),
+        error => TableError::damaged(what, format!("{error}; save it again with numpy.savez")),
     }
 }
 
@@ -220,7 +281,9 @@ mod tests {
             bytes.extend((header.len() as u16).to_le_bytes());
             bytes.extend(header.bytes());
             bytes.extend([0; 16]);
-            read("a", &bytes[..]).unwrap_err().to_string()
+            read("a", &bytes[..], &mut ReadingBudget::of(u64::MAX, true))
+                .unwrap_err()
+                .to_string()
         };
         for (descr, shape, cause) in [
             ("'|O'", "(2,)", "'|O' is not supported"),

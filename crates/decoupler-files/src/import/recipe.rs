@@ -3,7 +3,7 @@
 use std::{
     collections::BTreeMap,
     fs::File,
-    io::{self, Read as _},
+    io::Read as _,
     path::{Component, Path, PathBuf},
 };
 
@@ -13,7 +13,10 @@ use decoupler_core::{
 };
 use serde::{Deserialize, Serialize};
 
-use super::{Condition, Derived, DialectChoice, ImportError, Missing, Plan, PlannedSets};
+use super::{
+    Condition, Derived, DialectChoice, ImportError, Missing, Plan, PlannedSets, TableError, Watch,
+    input_lines::{Watched, table_error},
+};
 
 /// Recipe for importing samples: the files to read and to join, and the meaning of each column.
 ///
@@ -199,15 +202,15 @@ pub struct FileChecksum {
 
 impl Recorded {
     /// Describes the samples read by `plan`, whose paths must not depend on the working folder.
-    pub(super) fn of(plan: Plan, sets: &PlannedSets) -> Result<Self, ImportError> {
+    pub(super) fn of(plan: Plan, sets: &PlannedSets, watch: Watch<'_>) -> Result<Self, ImportError> {
         let checksum = |path: &PathBuf| {
             // A pipe can be read only once, and is empty now.
             let is_file = path.is_file();
-            let crc32 = if is_file { file_crc32(path) } else { Ok(String::new()) };
-            let crc32 = crc32.map_err(|source| ImportError::Read {
-                path: path.clone(),
-                source,
-            })?;
+            let crc32 = if is_file {
+                file_crc32(path, watch)?
+            } else {
+                String::new()
+            };
             Ok(FileChecksum {
                 path: path.clone(),
                 crc32,
@@ -266,13 +269,22 @@ impl Recorded {
 /// Returns the CRC-32 of the bytes of a file, as hexadecimal digits.
 ///
 /// # Errors
-/// If the file cannot be read.
-pub fn file_crc32(path: &Path) -> io::Result<String> {
+/// If the file cannot be read, or `watch` breaks.
+pub fn file_crc32(path: &Path, watch: Watch<'_>) -> Result<String, ImportError> {
+    let refused = |source| match table_error(source) {
+        TableError::Io(source) => ImportError::Read {
+            path: path.to_owned(),
+            source,
+        },
+        _ => ImportError::Cancelled,
+    };
     let mut hasher = crc32fast::Hasher::new();
-    let mut file = File::open(path)?;
+    let file = File::open(path).map_err(refused)?;
+    let size = file.metadata().map_err(refused)?.len();
+    let mut file = Watched::new(file, Some(size), watch);
     let mut block = vec![0; 1 << 16];
     loop {
-        match file.read(&mut block)? {
+        match file.read(&mut block).map_err(refused)? {
             0 => return Ok(format!("{:08x}", hasher.finalize())),
             read => hasher.update(&block[..read]),
         }

@@ -20,6 +20,8 @@ pub(super) struct Rows<R> {
     separator: Separator,
     line_break: u8,
     text: Vec<u8>,
+    /// `true` if the current row ends with a line break.
+    is_ended: bool,
     /// Line on which the current row starts, from 1.
     line: u64,
     /// Number of lines read.
@@ -44,6 +46,7 @@ impl<R: Read> Rows<R> {
             separator,
             line_break: if has_carriage_returns { b'\r' } else { b'\n' },
             text: Vec::new(),
+            is_ended: false,
             line: 0,
             lines: 0,
             cells: Cells::default(),
@@ -88,6 +91,7 @@ impl<R: Read> Rows<R> {
                 }
                 quotes += count_quotes(&self.text[before..]);
             }
+            self.is_ended = self.text.last() == Some(&self.line_break);
             while self.text.last().is_some_and(|byte| b"\r\n".contains(byte)) {
                 self.text.pop();
             }
@@ -119,6 +123,11 @@ impl<R: Read> Rows<R> {
             return Err(TableError::Binary { line: self.lines });
         }
         Ok(read > 0)
+    }
+
+    /// Returns `true` if the current row ends with a line break.
+    pub(super) fn is_ended(&self) -> bool {
+        self.is_ended
     }
 
     /// Line on which the current row starts, from 1.

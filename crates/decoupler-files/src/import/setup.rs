@@ -3,13 +3,14 @@ use std::{ops::ControlFlow, path::Path, sync::Arc};
 use ndarray::{Axis, Slice};
 use thiserror::Error;
 
-use super::{ImportError, Plan, PlannedSets, Progress, Recorded, Recording};
+use super::{ImportError, Plan, PlannedSets, Progress, Recorded, Recording, Watch};
 use decoupler_core::{
     evaluation::{
         Run, RunError, RunSets, RunSettings, SimulatedSettings, Source,
         experiments::{ExperimentRecording, RecordedSamples, TrialSamples},
     },
     live::DriftReference,
+    text::clean_name,
     training::TrainerState,
 };
 
@@ -113,13 +114,7 @@ impl Setup {
     /// Returns the name of the source: the array scale, or the stem of the first file.
     pub fn source_name(&self) -> String {
         match (&self.plan, &self.settings.source) {
-            (Some(plan), _) => plan
-                .import
-                .data
-                .file_stem()
-                .unwrap_or_default()
-                .to_string_lossy()
-                .into_owned(),
+            (Some(plan), _) => clean_name(&plan.import.data.file_stem().unwrap_or_default().to_string_lossy()),
             (None, Source::Simulated(simulation)) => simulation.sensor.scale.to_string(),
             (None, Source::Measured(_)) => String::new(),
         }
@@ -143,11 +138,11 @@ impl Setup {
             return Ok(sets.map(|sets| SetupSets { sets, recordings: None }));
         };
         let watch = &mut watch(is_cancelled, on_progress);
-        let planned = match plan.sets(folder, self.settings.seed, watch) {
-            Err(_) if is_cancelled() => return Ok(None),
-            planned => planned?,
-        };
-        Ok(Some(SetupSets::of_plan(plan, folder, planned)?))
+        let planned = plan.sets(folder, self.settings.seed, watch);
+        match planned.and_then(|planned| SetupSets::of_plan(plan, folder, planned, watch)) {
+            Err(_) if is_cancelled() => Ok(None),
+            sets => Ok(Some(sets?)),
+        }
     }
 }
 
@@ -206,8 +201,13 @@ pub(super) fn watch(
 
 impl SetupSets {
     /// Returns the datasets of a plan whose paths are relative to `folder`.
-    pub(super) fn of_plan(plan: &Plan, folder: &Path, planned: PlannedSets) -> Result<Self, ImportError> {
-        let recorded = Recorded::of(plan.within(folder).absolute(), &planned)?;
+    pub(super) fn of_plan(
+        plan: &Plan,
+        folder: &Path,
+        planned: PlannedSets,
+        watch: Watch<'_>,
+    ) -> Result<Self, ImportError> {
+        let recorded = Recorded::of(plan.within(folder).absolute(), &planned, watch)?;
         let PlannedSets {
             recording,
             test_recording,

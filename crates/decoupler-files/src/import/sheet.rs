@@ -4,16 +4,19 @@
 use std::{
     fs::File,
     io::{BufReader, Cursor, Read, Seek},
+    panic::{AssertUnwindSafe, catch_unwind},
     path::Path,
 };
 
 use calamine::{Data, Ods, Range, Reader, Xls, Xlsx, open_workbook_from_rs};
+use decoupler_core::{machine::ReadingBudget, text::clean_name};
 use zip::ZipArchive;
 
 use super::{
-    Decimal, DialectChoice, Encoding, Format, Separator, Table, TableError, Watch,
+    Decimal, DialectChoice, Encoding, Format, Progress, Separator, Table, TableError, Watch,
     csv_table::{self, Reading},
     input_lines::Watched,
+    sheet_claims, xls_claims,
 };
 
 /// Kind of spreadsheet.
@@ -61,24 +64,30 @@ impl Spreadsheet {
         path: &Path,
         file: File,
         reading: &Reading<'_>,
+        budget: &mut ReadingBudget,
         watch: Watch<'_>,
     ) -> Result<Table, TableError> {
+        match self {
+            Self::Xls => xls_claims::claim(&file, budget)?,
+            Self::Xlsx | Self::Ods => sheet_claims::claim(BufReader::new(&file), budget, watch)?,
+        }
+        (&file).rewind()?;
         let source = BufReader::new(file);
-        let sheets = match self {
-            Self::Xlsx => sheets::<Xlsx<_>, _>(source),
-            Self::Xls => sheets::<Xls<_>, _>(source),
-            Self::Ods => sheets::<Ods<_>, _>(source),
-        }?;
-        let numbers = |range: &Range<Data>| {
-            let is_number = |(_, _, cell): &(usize, usize, &Data)| matches!(cell, Data::Int(_) | Data::Float(_));
-            range.used_cells().filter(is_number).count()
-        };
-        // Of equal ones, the first.
-        let chosen = sheets.iter().rev().max_by_key(|(_, range)| numbers(range));
-        let Some((name, range)) = chosen.filter(|(_, range)| !range.is_empty()) else {
+        // The reader of spreadsheets may panic on a file whose parts contradict each other.
+        let read = catch_unwind(AssertUnwindSafe(|| match self {
+            Self::Xlsx => Sheets::read::<Xlsx<_>, _>(source, watch),
+            Self::Xls => Sheets::read::<Xls<_>, _>(source, watch),
+            Self::Ods => Sheets::read::<Ods<_>, _>(source, watch),
+        }));
+        let sheets = read.unwrap_or_else(|_| {
+            let reason = "its parts contradict each other; save it again, or as CSV";
+            Err(TableError::damaged("the spreadsheet", reason))
+        })?;
+        let Some((name, range)) = sheets.chosen.filter(|(_, range)| !range.is_empty()) else {
             return Err(TableError::Empty);
         };
-        let text = text_of(range);
+        let text = text_of(&range);
+        drop(range);
         let size = text.len() as u64;
         let reading = Reading {
             choice: DialectChoice {
@@ -89,36 +98,68 @@ impl Spreadsheet {
             },
             ..reading.clone()
         };
-        let mut table = csv_table::read(path, Watched::new(Cursor::new(text), Some(size), watch), &reading)?;
-        let others = sheets
-            .iter()
-            .filter(|(other, range)| other != name && !range.is_empty());
-        table.notes.extend(others.map(|(other, range)| {
-            let (rows, width) = range.get_size();
+        let mut table = csv_table::read(
+            path,
+            Watched::new(Cursor::new(text), Some(size), watch),
+            &reading,
+            budget,
+        )?;
+        table.notes.extend(sheets.others.iter().map(|(other, (rows, width))| {
             format!("left out: sheet '{other}' is {rows} × {width}; save it as its own file to use it")
         }));
         table.format = Format::Sheet {
-            name: name.clone(),
+            name,
             header: table.has_header(),
         };
         Ok(table)
     }
 }
 
-fn sheets<R, S>(source: S) -> Result<Vec<(String, Range<Data>)>, TableError>
-where
-    R: Reader<S>,
-    S: Read + Seek,
-    R::Error: std::fmt::Display,
-{
-    let damaged = |error: R::Error| TableError::array("spreadsheet", format!("{error}; save it again, or as CSV"));
-    let mut workbook: R = open_workbook_from_rs(source).map_err(damaged)?;
-    let names = workbook.sheet_names();
-    let sheet = |name: String| {
-        let range = workbook.worksheet_range(&name).map_err(damaged)?;
-        Ok((name, range))
-    };
-    names.into_iter().map(sheet).collect()
+/// Sheets of a file, of which one is used.
+#[derive(Default)]
+struct Sheets {
+    /// The first of those with most numbers: name and cells.
+    chosen: Option<(String, Range<Data>)>,
+    /// Names of the others that have cells, with their numbers of rows and columns.
+    others: Vec<(String, (usize, usize))>,
+}
+
+impl Sheets {
+    /// Reads all sheets, of which no more than two are in memory at once.
+    fn read<R, S>(source: S, watch: Watch<'_>) -> Result<Self, TableError>
+    where
+        R: Reader<S>,
+        S: Read + Seek,
+        R::Error: std::fmt::Display,
+    {
+        let damaged = |error: R::Error| TableError::array("spreadsheet", format!("{error}; save it again, or as CSV"));
+        let mut workbook: R = open_workbook_from_rs(source).map_err(damaged)?;
+        let numbers = |range: &Range<Data>| {
+            let is_number = |(_, _, cell): &(usize, usize, &Data)| matches!(cell, Data::Int(_) | Data::Float(_));
+            range.used_cells().filter(is_number).count()
+        };
+        let mut sheets = Self::default();
+        let mut most = 0;
+        for name in workbook.sheet_names() {
+            if watch(Progress { bytes: 0, of: None }).is_break() {
+                return Err(TableError::Cancelled);
+            }
+            let range = workbook.worksheet_range(&name).map_err(damaged)?;
+            let count = numbers(&range);
+            let name = clean_name(&name);
+            let other = if sheets.chosen.is_none() || count > most {
+                most = count;
+                sheets.chosen.replace((name, range))
+            } else {
+                Some((name, range))
+            };
+            let other = other.filter(|(_, range)| !range.is_empty());
+            sheets
+                .others
+                .extend(other.map(|(name, range)| (name, range.get_size())));
+        }
+        Ok(sheets)
+    }
 }
 
 /// Writes a sheet as CSV; its first line is row 1 of the sheet.

@@ -21,6 +21,8 @@ pub struct Table {
     pub format: Format,
     /// Notes for the user: rows of unusual length, arrays left out.
     pub notes: Vec<String>,
+    /// Last line of a text file, if it is cut off and therefore left out.
+    pub torn_line: Option<u64>,
     /// Rows that were left out because they have more cells than there are columns.
     pub too_long: Excess,
     /// Rows that end before the last column; their other cells are missing.
@@ -247,8 +249,9 @@ pub(super) struct Labels {
 }
 
 impl Labels {
-    /// Adds a cell: its text and its value, if it is a number.
-    pub(super) fn push(&mut self, label: Option<(&str, Option<f64>)>) {
+    /// Adds a cell: its text and its value, if it is a number. Returns `true` if the label is new.
+    pub(super) fn push(&mut self, label: Option<(&str, Option<f64>)>) -> bool {
+        let known = self.texts.len();
         let number = label.map(|(text, value)| {
             self.known.get(text).copied().unwrap_or_else(|| {
                 let number = self.texts.len() as u32;
@@ -258,6 +261,7 @@ impl Labels {
             })
         });
         self.numbers.push(number);
+        self.texts.len() > known
     }
 
     pub(super) fn into_cells(self) -> Cells {

@@ -7,8 +7,8 @@ use std::time::Duration;
 use decoupler_core::{
     dataset::SplitBy,
     evaluation::{
-        Baselines, Combination, ErrorTable, Errors, NodeAddress, Outlook, Problem, ReferenceNote, Scores,
-        SimulatedSettings, Spread, StartRecord, TestErrors, auto::Tried, best_start, error_remarks,
+        Baselines, Combination, ErrorTable, Errors, Initialization, NodeAddress, Outlook, Problem, ReferenceNote,
+        Scores, SimulatedSettings, Spread, StartRecord, TestErrors, auto::Tried, best_start, error_remarks,
     },
     identifiability::Identifiability,
     text::counted,
@@ -123,8 +123,11 @@ fn tried_ui(ui: &mut Ui, tried: &Tried, is_chosen: bool) {
             ui.label(RichText::new(error).color(colour));
         });
     });
+    let begin = tried.begin().filter(|begin| *begin != Initialization::default());
+    let begin = begin.map(|begin| format!(" from {begin}"));
     let epochs = tried.epochs().map(|epochs| format!("; {}", counted(epochs, "epoch")));
-    dim_ui(ui, &format!("{}{}", tried.features(), epochs.unwrap_or_default()));
+    let [begin, epochs] = [begin, epochs].map(Option::unwrap_or_default);
+    dim_ui(ui, &format!("{}{epochs}{begin}", tried.features()));
     ui.add_space(space(1));
 }
 

@@ -23,7 +23,7 @@ use std::fmt;
 use ndarray::{Array2, Axis};
 use serde::{Deserialize, Serialize};
 
-use super::{RunError, RunSettings};
+use super::{Initialization, RunError, RunSettings};
 use crate::{
     dataset::{Dataset, Folds, History, Memory, Span, SplitBy},
     network::{InputChoice, Quantity, ScalingChoice},
@@ -186,6 +186,9 @@ pub enum TriedModel {
         starts: usize,
         /// Epochs after which the error was lowest.
         epochs: usize,
+        /// Weights with which the trainings begin.
+        #[serde(default, skip_serializing_if = "Initialization::is_random")]
+        begin: Initialization,
     },
 }
 
@@ -202,6 +205,14 @@ impl Tried {
             TriedModel::Network {
                 hidden, method, starts, ..
             } => describe_network(*hidden, method, *starts),
+        }
+    }
+
+    /// Weights with which the training of a network begins.
+    pub fn begin(&self) -> Option<Initialization> {
+        match self.model {
+            TriedModel::Ridge => None,
+            TriedModel::Network { begin, .. } => Some(begin),
         }
     }
 

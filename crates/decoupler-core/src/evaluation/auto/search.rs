@@ -458,6 +458,7 @@ impl<'a> Search<'a> {
             method: candidate.method,
             starts: candidate.starts,
             epochs: self.fixed.epochs.unwrap_or(best.epoch),
+            begin: candidate.initialization,
         };
         self.record(&candidate.memory, candidate.inputs, model, &best.errors, used);
         self.networks.push(Measured {

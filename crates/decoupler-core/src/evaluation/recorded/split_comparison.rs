@@ -178,7 +178,7 @@ pub struct TargetFindings {
     pub curve: LearningCurve,
 }
 
-/// Stage of [`Findings::measure`].
+/// Stage of [`Findings::measure`], or of the measurements next to it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum StudyStep {
@@ -190,6 +190,8 @@ pub enum StudyStep {
     Channels,
     /// Fits to fewer samples.
     Samples,
+    /// Cross-validation with a memory; see [`MemoryGain`](super::MemoryGain).
+    Memory,
 }
 
 impl fmt::Display for StudyStep {
@@ -199,6 +201,7 @@ impl fmt::Display for StudyStep {
             Self::OtherFolds => "cross-validation by another split",
             Self::Channels => "fits without each channel",
             Self::Samples => "fits to fewer samples",
+            Self::Memory => "cross-validation with inputs from the past",
         })
     }
 }

@@ -12,7 +12,10 @@ use super::{
     vectors::{Deviation, Tolerance, Vectors, golden_csv},
     weights::{self, Arithmetic, Weights},
 };
-use crate::export::{NetworkFile, WriteError};
+use crate::export::{
+    NetworkFile, WriteError,
+    unfinished::{UnfinishedFolder, folder_of},
+};
 
 /// Writes a decoder as a bundle at `path`: a folder, or for [`BundleFormat::Json`] a file. The files are read back and
 /// compared with the decoder before they are moved into place.
@@ -85,7 +88,7 @@ fn export_network_file(exported: &ExportedDecoder<'_>, path: &Path) -> Result<Bu
         return Err(BundleError::Exists(path.to_owned()));
     }
     let file = exported.file().ok_or(BundleError::NoFile)?;
-    let trial = tempfile::tempdir().map_err(|error| WriteError::io(path, error))?;
+    let trial = UnfinishedFolder::begin(folder_of(path)).map_err(|error| WriteError::io(path, error))?;
     let copy = trial.path().join("network.json");
     file.save(&copy)?;
     let read = NetworkFile::load(&copy)?;

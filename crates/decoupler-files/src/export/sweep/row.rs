@@ -2,6 +2,7 @@ use std::{
     cmp::Ordering,
     collections::{BTreeMap, BTreeSet},
     ffi::OsStr,
+    fs,
     io::{self, Write},
     path::{Path, PathBuf},
 };
@@ -244,6 +245,18 @@ impl SweepTableFormat {
             "csv" => Some(Self::Csv),
             "json" => Some(Self::Json),
             _ => None,
+        }
+    }
+
+    /// Returns the number of trials in the table at `path`; 0 if there is no such table.
+    pub fn trials_in(self, path: &Path) -> usize {
+        match self {
+            Self::Csv => csv::Reader::from_path(path).map_or(0, |table| table.into_byte_records().flatten().count()),
+            Self::Json => {
+                let text = fs::read(path).unwrap_or_default();
+                let table: serde_json::Value = serde_json::from_slice(&text).unwrap_or_default();
+                table["trials"].as_array().map_or(0, Vec::len)
+            }
         }
     }
 

@@ -60,10 +60,12 @@ impl Table {
         let right: Vec<bool> = (0..self.columns.len()).map(is_right).collect();
         let line = |cells: &Vec<String>| {
             let padded = cells.iter().zip(&widths).zip(&right).map(|((cell, width), is_right)| {
+                // A width in a format string panics above 65 535.
+                let spaces = " ".repeat(width - cell.chars().count());
                 if *is_right {
-                    format!("{cell:>width$}")
+                    spaces + cell
                 } else {
-                    format!("{cell:<width$}")
+                    cell.clone() + &spaces
                 }
             });
             padded.collect::<Vec<_>>().join("  ").trim_end().to_owned() + "\n"

@@ -12,7 +12,6 @@ use decoupler_core::{
     live::{Keeping, LineParser, Lines, NextLine, ParsedLine, Simulated, Source},
     scene::{Deformation, Fault, Noise, Rows, Scene},
     sensor::{ArrayScale, SensorModel},
-    text::system_cause,
 };
 
 use super::{
@@ -320,7 +319,7 @@ pub(super) fn open(source: &Source, is_wanted: &dyn Fn() -> bool) -> Result<Opti
 /// Lines of a device or socket.
 #[derive(Debug)]
 pub(super) struct SourceLines {
-    name: String,
+    source: Source,
     begins_anywhere: bool,
     lines: Lines,
     dropped: u64,
@@ -344,7 +343,7 @@ impl SourceLines {
         let mut lines = lines.map_err(|error| format!("no thread could be started: {error}"))?;
         lines.set_kept(kept);
         Ok(Self {
-            name: source.to_string(),
+            source: source.clone(),
             begins_anywhere: source.begins_anywhere(),
             lines,
             dropped: 0,
@@ -367,11 +366,7 @@ impl SourceLines {
             NextLine::None => return Err(Next::Nothing),
             NextLine::End(None) => return Err(Next::End(Ok(()))),
             NextLine::End(Some(error)) => {
-                let cause = system_cause(&error);
-                return Err(Next::End(Err(format!(
-                    "{} is lost: {cause}; connect it again",
-                    self.name
-                ))));
+                return Err(Next::End(Err(self.source.lost(&error))));
             }
         };
         let (number, read_at) = (line.number, line.read_at);
@@ -399,6 +394,6 @@ impl SourceLines {
 
     /// Message of an error that ends the reading.
     pub(super) fn failed(&self, error: &impl fmt::Display) -> String {
-        format!("{}: {error}", self.name)
+        format!("{}: {error}", self.source)
     }
 }

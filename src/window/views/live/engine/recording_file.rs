@@ -11,6 +11,8 @@ use decoupler_core::{live::Recorder, text::system_cause};
 #[derive(Debug)]
 pub(super) struct RecordingFile {
     path: PathBuf,
+    /// The file of the recorder.
+    file: File,
     recorder: Recorder<File>,
     frames: u64,
     /// Times of the first and the last frame in seconds.
@@ -29,9 +31,17 @@ impl RecordingFile {
             format!("cannot record to the folder '{folder}': {cause}")
         };
         let (path, file) = created.map_err(refused)?;
-        let recorder = Recorder::new(file, rows, columns).map_err(refused)?;
+        let recorder = file
+            .try_clone()
+            .and_then(|file| Recorder::new(file, rows, columns))
+            .inspect_err(|_| {
+                // A part of the header is no recording; the error is reported in any case.
+                let _ = fs::remove_file(&path);
+            })
+            .map_err(refused)?;
         Ok(Self {
             path,
+            file,
             recorder,
             frames: 0,
             span_s: None,
@@ -45,9 +55,11 @@ impl RecordingFile {
     /// Writes a frame.
     ///
     /// # Errors
-    /// If it cannot be written, with the reason; earlier frames stay in the file.
+    /// If it cannot be written, with the reason; earlier frames stay in the file, and no part of this one.
     pub(super) fn record(&mut self, time_s: f64, frame_ohm: &[f64]) -> Result<(), String> {
         self.recorder.record(time_s, frame_ohm).map_err(|error| {
+            // Readers leave out a part of a line, too.
+            let _ = self.file.set_len(self.recorder.whole_bytes());
             let (path, cause) = (self.path.display(), system_cause(&error));
             format!("the recording '{path}' has ended: {cause}; earlier frames are kept")
         })?;

@@ -1,5 +1,5 @@
 use std::{
-    fs::File,
+    fs::{self, File},
     io::{BufRead, BufReader, Seek, SeekFrom},
     ops::RangeInclusive,
     path::Path,
@@ -8,6 +8,7 @@ use std::{
 
 use decoupler_core::{
     live::{LineParser, Lines, ParsedLine, Recording},
+    machine::ReadingBudget,
     scene::Rows,
     sensor::ArrayScale,
     text::system_cause,
@@ -139,8 +140,8 @@ impl ReplayFrames {
     }
 }
 
-/// Size limit of a replayed file, which is kept in memory as a whole.
-const LARGEST_BYTES: u64 = 1 << 30;
+/// Memory of a byte of text that is replayed: short numbers, in a vector that has just doubled.
+const MEMORY_OF_BYTE: u64 = 8;
 /// Rate of frames without times, per second.
 pub(super) const RATE_WITHOUT_TIMES: f64 = 50.0;
 
@@ -158,14 +159,13 @@ pub(super) fn read_replay(
 ) -> Result<Recording, String> {
     let refused = |cause: &dyn std::fmt::Display| format!("cannot replay '{}': {cause}", path.display());
     let system = |error: std::io::Error| refused(&system_cause(&error));
-    let mut file = File::open(path).map_err(system)?;
-    let bytes = file.metadata().map_err(system)?.len();
-    if bytes > LARGEST_BYTES {
-        return Err(refused(&format_args!(
-            "it has {:.1} GB, and at most 1 GB can be replayed; split it, or decode it with decoupler decode",
-            bytes as f64 / 1e9
-        )));
+    let found = fs::metadata(path).map_err(system)?;
+    if !found.is_file() {
+        return Err(refused(&"it is not a file; choose a recording"));
     }
+    let claimed = ReadingBudget::now().claim(found.len().saturating_mul(MEMORY_OF_BYTE));
+    claimed.map_err(|over| refused(&over))?;
+    let mut file = File::open(path).map_err(system)?;
     let mut first = Vec::new();
     BufReader::new(&file).read_until(b'\n', &mut first).map_err(system)?;
     file.seek(SeekFrom::Start(0)).map_err(system)?;
@@ -174,7 +174,11 @@ pub(super) fn read_replay(
         .split(|&byte| byte == b',')
         .any(|name| name.trim_ascii() == b"time_s");
     let recording = if has_times {
-        Recording::read(reader, read, scale.rows(), scale.columns()).map_err(|error| error.to_string())
+        let recording = Recording::read(reader, read, scale.rows(), scale.columns());
+        if let Some(line) = recording.as_ref().ok().and_then(Recording::torn_line) {
+            tally.bad(format!("line {line}, the last, is cut off and left out"));
+        }
+        recording.map_err(|error| error.to_string())
     } else {
         read_lines(reader, scale, rows, read.len(), tally)
     };
@@ -229,7 +233,7 @@ fn read_lines(
 
 #[cfg(test)]
 mod tests {
-    use std::{fs, time::Instant};
+    use std::time::Instant;
 
     use decoupler_core::live::Recorder;
     use ndarray::Array3;
@@ -324,6 +328,33 @@ mod tests {
                 ndarray::array![[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]]
             );
         }
+    }
+
+    #[test]
+    fn a_recording_cut_off_by_a_full_disk_is_replayed_and_the_line_reported() {
+        let mut recorded = Vec::new();
+        let mut recorder = Recorder::new(&mut recorded, &[0, 1], 3).unwrap();
+        for time_s in [0.5, 0.75] {
+            recorder.record(time_s, &[1.0, 2.0, 3.0, 4.0, 5.0, 6.5]).unwrap();
+        }
+        let (recording, tally) = read(&recorded[..recorded.len() - 3], Rows::Known);
+        assert_eq!(recording.unwrap().times_s(), [0.5]);
+        let reason = tally.counts().last_bad.unwrap();
+        assert!(reason.contains("line 5, the last, is cut off"), "{reason}");
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn what_is_no_file_is_refused_before_it_is_opened() {
+        let mut tally = Tally::new(Instant::now());
+        let refused = read_replay(
+            Path::new("/dev/zero"),
+            "2x1_1x3".parse().unwrap(),
+            Rows::Known,
+            &[0, 1],
+            &mut tally,
+        );
+        assert!(refused.unwrap_err().contains("it is not a file"));
     }
 
     #[test]

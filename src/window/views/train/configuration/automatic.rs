@@ -11,7 +11,7 @@ use crate::window::{
     theme::space,
     widgets::{
         dim_ui,
-        fields::{FIELD_SIZE, capitalised, field_ui, input_text},
+        fields::{capitalised, field_ui, input_text},
         fold_ui,
     },
 };
@@ -91,16 +91,18 @@ pub(super) fn chosen_training_ui(ui: &mut Ui, chosen: Option<&RunSettings>) {
     });
 }
 
+/// Width of a field with a chosen number, in points: room for [`NOT_YET`].
+const WIDTH: f32 = space(21);
+
 /// Field with a chosen value.
 fn chosen_ui(ui: &mut Ui, name: &str, value: Option<String>) {
-    field_ui(ui, name, REASON, |ui| value_ui(ui, value, FIELD_SIZE.x, Align::Center));
+    field_ui(ui, name, REASON, |ui| value_ui(ui, value, WIDTH, Align::Center));
 }
 
 /// As [`chosen_ui`], with the value below the name.
 fn wide_ui(ui: &mut Ui, name: &str, value: Option<String>) {
     let label = ui.label(name).on_hover_text(REASON);
-    let width = ui.available_width();
-    value_ui(ui, value, width, Align::Min).labelled_by(label.id);
+    value_ui(ui, value, f32::INFINITY, Align::Min).labelled_by(label.id);
 }
 
 fn value_ui(ui: &mut Ui, value: Option<String>, width: f32, align: Align) -> Response {
@@ -108,6 +110,6 @@ fn value_ui(ui: &mut Ui, value: Option<String>, width: f32, align: Align) -> Res
     let edit = TextEdit::singleline(&mut text)
         .align(Align2([align, Align::Center]))
         .margin(vec2(space(2), space(1)))
-        .desired_width(width - 2.0 * space(2));
+        .desired_width(width);
     ui.add_enabled(false, edit).on_disabled_hover_text(REASON)
 }

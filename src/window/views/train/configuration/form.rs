@@ -144,7 +144,7 @@ fn recording_ui(ui: &mut Ui, recording: &mut RecordingEditor, shared: &Shared, e
         chosen_network_ui(ui, chosen);
     } else {
         ui.add_enabled_ui(!is_busy, |ui| {
-            hidden_choice_ui(ui, &mut settings.hidden, recording.channels())
+            hidden_choice_ui(ui, &mut settings.hidden, recording.channels());
         });
         recorded_method_ui(ui, &mut settings, shared.phase);
         if let Some(size) = recording.training_size(&settings) {

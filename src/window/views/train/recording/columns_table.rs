@@ -262,7 +262,12 @@ fn column_row<'a>(
         }
     };
     let remark_cell = move |ui: &mut Ui| {
-        if let Some((text, is_bad)) = remark(summary, column) {
+        let shape = || {
+            let mut variables = inspected.inspection.variables.iter();
+            let single = variables.find(|variable| variable.columns == (column..column + 1))?;
+            Some((single.shape.clone(), false))
+        };
+        if let Some((text, is_bad)) = remark(summary, column).or_else(shape) {
             let colour = if is_bad && meaning != Meaning::Unused {
                 palette.warning
             } else {

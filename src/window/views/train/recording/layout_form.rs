@@ -368,7 +368,7 @@ fn derived_ui(ui: &mut Ui, draft: &mut Draft) -> bool {
     );
     let hint = "With commas between them: d=c1-c2 is a difference, q=c1/c2 a ratio; r=c1/start(2s) and r=c1-start(100) compare \
                 with the mean of the first 2 seconds or 100 rows. Columns have their names in the table.";
-    let response = text_ui(ui, "Columns", hint, "d=c1-c2, r=c1/start(2s)", &mut draft.derived);
+    let response = text_ui(ui, "Expressions", hint, "d=c1-c2, r=c1/start(2s)", &mut draft.derived);
     if response.has_focus() {
         return false;
     }

@@ -1,0 +1,225 @@
+//! Memory that the sheets of a zip archive will take, found before they are read: the reader of spreadsheets allocates the whole
+//! rectangle between the first and the last cell, which a file of a few hundred bytes can make larger than any memory.
+
+use std::io::{BufReader, Read, Seek};
+
+use decoupler_core::machine::{OverBudget, ReadingBudget};
+use quick_xml::{
+    Reader,
+    events::{BytesStart, Event},
+};
+use zip::ZipArchive;
+
+use super::{TableError, Watch, input_lines::Watched};
+
+/// Memory of a byte of XML: strings of one letter, in a vector that has just doubled.
+const OF_BYTE: u64 = 4;
+/// Memory of a cell that has a value, with its text.
+const OF_CELL: u64 = 128;
+/// Memory of a cell of the rectangle, empty or not, as it is copied.
+const OF_PLACE: u64 = 72;
+/// Memory of a text without its letters.
+const OF_TEXT: u64 = size_of::<String>() as u64;
+/// Maximum number of rows and columns of a sheet.
+const LARGEST: [u64; 2] = [1 << 20, 1 << 14];
+
+/// Claims the memory of all sheets of the archive.
+///
+/// # Errors
+/// If it exceeds the budget.
+pub(super) fn claim(source: impl Read + Seek, budget: &mut ReadingBudget, watch: Watch<'_>) -> Result<(), TableError> {
+    let Ok(mut archive) = ZipArchive::new(source) else {
+        // Reported by the reader of the sheets.
+        return Ok(());
+    };
+    for index in 0..archive.len() {
+        let Ok(entry) = archive.by_index(index) else { continue };
+        let size = entry.size();
+        budget.claim(size.saturating_mul(OF_BYTE))?;
+        let mut is_cancelled = false;
+        let mut watched = |progress| {
+            let flow = watch(progress);
+            is_cancelled |= flow.is_break();
+            flow
+        };
+        let xml = BufReader::new(Watched::new(entry, Some(size), &mut watched));
+        claim_part(xml, budget)?;
+        if is_cancelled {
+            return Err(TableError::Cancelled);
+        }
+    }
+    Ok(())
+}
+
+/// Claims the memory of one part of the archive, up to its end or its first error.
+fn claim_part(xml: BufReader<impl Read>, budget: &mut ReadingBudget) -> Result<(), OverBudget> {
+    let mut reader = Reader::from_reader(xml);
+    // As the reader of the sheets.
+    let config = reader.config_mut();
+    config.check_end_names = false;
+    config.check_comments = false;
+    let (mut sheet, mut buffer) = (Sheet::default(), Vec::new());
+    loop {
+        buffer.clear();
+        match reader.read_event_into(&mut buffer) {
+            Ok(Event::Start(element) | Event::Empty(element)) => sheet.take(&element, budget)?,
+            Ok(Event::Eof) | Err(_) => return sheet.end(budget),
+            Ok(_) => {}
+        }
+    }
+}
+
+/// Rectangle of a sheet, or of one table of an OpenDocument file.
+#[derive(Default)]
+struct Sheet {
+    rectangle: Rectangle,
+    /// Row and column after the last cell.
+    next: [u64; 2],
+    /// Number of rows that the current row repeats.
+    row_repeats: u64,
+    /// Number of cells that the current cell repeats.
+    repeats: u64,
+    /// Number of cells of the current row whose memory is claimed.
+    claimed: u64,
+}
+
+fn number(element: &BytesStart<'_>, name: &str) -> Option<u64> {
+    element.try_get_attribute(name).ok()??.value.trim().parse().ok()
+}
+
+/// Returns row and column, from 0, of a reference such as B12.
+fn place(reference: &str) -> Option<[u64; 2]> {
+    let letters = reference.bytes().take_while(u8::is_ascii_alphabetic);
+    let column = letters.fold(0_u64, |column, letter| {
+        column
+            .saturating_mul(26)
+            .saturating_add(u64::from(letter.to_ascii_uppercase() - b'A') + 1)
+    });
+    let row: u64 = reference
+        .trim_start_matches(|c: char| c.is_ascii_alphabetic())
+        .parse()
+        .ok()?;
+    Some([row.checked_sub(1)?, column.checked_sub(1)?])
+}
+
+impl Sheet {
+    fn take(&mut self, element: &BytesStart<'_>, budget: &mut ReadingBudget) -> Result<(), OverBudget> {
+        match element.local_name().as_ref() {
+            "sst" => {
+                let texts = number(element, "uniqueCount").unwrap_or(0);
+                budget.claim(texts.saturating_mul(OF_TEXT))?;
+            }
+            "row" => {
+                let row = number(element, "r").and_then(|row| row.checked_sub(1));
+                self.next = [row.unwrap_or(self.next[0] + 1), 0];
+            }
+            "c" => {
+                let reference = element.try_get_attribute("r").ok().flatten();
+                self.next = reference.and_then(|r| place(&r.value)).unwrap_or(self.next);
+                self.rectangle.include(self.next, [1, 1]);
+                budget.claim(OF_CELL)?;
+                self.next[1] += 1;
+            }
+            "table" => {
+                self.end(budget)?;
+                *self = Self::default();
+            }
+            "table-row" => {
+                self.next = [self.next[0] + self.row_repeats, 0];
+                let repeats = number(element, "table:number-rows-repeated");
+                self.row_repeats = repeats.unwrap_or(1).min(LARGEST[0]);
+                (self.repeats, self.claimed) = (0, 0);
+            }
+            "table-cell" | "covered-table-cell" => {
+                self.next[1] += self.repeats;
+                let repeats = number(element, "table:number-columns-repeated");
+                self.repeats = repeats.unwrap_or(1).min(LARGEST[1]);
+                let values = ["office:value-type", "office:value", "table:formula"];
+                if values
+                    .iter()
+                    .any(|name| matches!(element.try_get_attribute(name), Ok(Some(_))))
+                {
+                    self.rectangle.include(self.next, [self.row_repeats, self.repeats]);
+                    let width = (self.next[1] + self.repeats).min(LARGEST[1]);
+                    budget.claim(OF_CELL.saturating_mul(width.saturating_sub(self.claimed)))?;
+                    self.claimed = self.claimed.max(width);
+                }
+            }
+            _ => {}
+        }
+        Ok(())
+    }
+
+    /// Claims the rectangle.
+    fn end(&self, budget: &mut ReadingBudget) -> Result<(), OverBudget> {
+        budget.claim(self.rectangle.memory())
+    }
+}
+
+/// Rectangle between the first and the last cell with a value.
+#[derive(Default)]
+pub(super) struct Rectangle {
+    /// First and last row and column.
+    bounds: Option<[[u64; 2]; 2]>,
+}
+
+impl Rectangle {
+    /// Includes a number of rows and columns from `first`.
+    pub(super) fn include(&mut self, first: [u64; 2], counts: [u64; 2]) {
+        let bounds = self.bounds.get_or_insert([first, first]);
+        for axis in 0..2 {
+            bounds[0][axis] = bounds[0][axis].min(first[axis]);
+            let last = first[axis].saturating_add(counts[axis].saturating_sub(1));
+            bounds[1][axis] = bounds[1][axis].max(last);
+        }
+    }
+
+    /// Returns its memory in bytes.
+    pub(super) fn memory(&self) -> u64 {
+        let Some([first, last]) = self.bounds else { return 0 };
+        let [rows, columns] = [0, 1].map(|axis| last[axis] - first[axis] + 1);
+        rows.saturating_mul(columns).saturating_mul(OF_PLACE)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn claimed(xml: &str) -> u64 {
+        let claims = |limit| claim_part(BufReader::new(xml.as_bytes()), &mut ReadingBudget::of(limit, true)).is_ok();
+        // Bisection: the smallest budget that suffices.
+        let (mut low, mut high) = (0, u64::MAX);
+        while high - low > 1 {
+            let middle = low + (high - low) / 2;
+            if claims(middle) { high = middle } else { low = middle }
+        }
+        high
+    }
+
+    #[test]
+    fn sheets_claim_the_rectangle_between_their_first_and_last_cell() {
+        let corners = "<sheetData><row r=\"2\"><c r=\"B2\"/></row><row r=\"1001\"><c r=\"AA1001\"/></row></sheetData>";
+        assert_eq!(claimed(corners), 1000 * 26 * OF_PLACE + 2 * OF_CELL);
+        let in_order = "<row><c/><c/></row><row><c/></row>";
+        assert_eq!(claimed(in_order), 4 * OF_PLACE + 3 * OF_CELL);
+        assert_eq!(claimed("<sst uniqueCount=\"1000000\"><si/></sst>"), 1_000_000 * OF_TEXT);
+    }
+
+    #[test]
+    fn repeated_cells_of_open_document_files_count_unless_they_are_empty() {
+        let table = |rows: &str| format!("<table:table>{rows}</table:table>");
+        let valued = "<table:table-cell table:number-columns-repeated=\"10\" office:value-type=\"float\"/>";
+        let row =
+            |cells: &str| format!("<table:table-row table:number-rows-repeated=\"1000\">{cells}</table:table-row>");
+        assert_eq!(claimed(&table(&row(valued))), 10_000 * OF_PLACE + 10 * OF_CELL);
+        // The empty rest of a sheet, as every program writes it.
+        let empty = row("<table:table-cell table:number-columns-repeated=\"16384\"/>");
+        assert_eq!(
+            claimed(&table(&format!("{}{empty}", row(valued)))),
+            10_000 * OF_PLACE + 10 * OF_CELL
+        );
+        let two = format!("{}{}", table(&row(valued)), table(&row(valued)));
+        assert_eq!(claimed(&two), 2 * (10_000 * OF_PLACE + 10 * OF_CELL));
+    }
+}

@@ -1,0 +1,80 @@
+//! Damaged files are refused: no changed bit and no missing end changes a number or loses a column silently.
+
+use std::{fs, ops::ControlFlow, path::Path};
+
+use decoupler_files::import::{Cells, DialectChoice, Table, read_table};
+
+/// Formats with a checksum.
+const CHECKED: [&str; 3] = ["plain.npz", "deflated.npz", "deflated.mat"];
+
+fn fixture(name: &str) -> Vec<u8> {
+    fs::read(
+        Path::new(env!("CARGO_MANIFEST_DIR"))
+            .join("tests/fixtures/import")
+            .join(name),
+    )
+    .unwrap()
+}
+
+/// Names of columns, bits of their numbers, and notes.
+type Content = (Vec<String>, Vec<Vec<u64>>, Vec<String>);
+
+/// Reads `bytes` as a file of this name; returns everything of the table that is used or shown.
+fn read(bytes: &[u8], path: &Path) -> Result<Content, String> {
+    fs::write(path, bytes).unwrap();
+    let read = read_table(path, DialectChoice::default(), &mut |_| ControlFlow::Continue(()));
+    let Table { columns, notes, .. } = read.map_err(|error| error.to_string())?;
+    let bits = |cells: &Cells| match cells {
+        Cells::Numbers(numbers) => numbers.iter().map(|number| number.to_bits()).collect(),
+        Cells::Labels { .. } => Vec::new(),
+    };
+    let numbers = columns.iter().map(|column| bits(&column.cells)).collect();
+    let names = columns.into_iter().map(|column| column.name).collect();
+    Ok((names, numbers, notes))
+}
+
+#[test]
+fn no_changed_bit_changes_a_number_or_a_name() {
+    let folder = tempfile::tempdir().unwrap();
+    for name in CHECKED {
+        let (path, good) = (folder.path().join(name), fixture(name));
+        let expected = read(&good, &path).unwrap();
+        let (mut accepted, mut refused) = (0, 0);
+        for place in 0..good.len() {
+            // Neighbours differ in their bit.
+            let bit = place * 3 % 8;
+            let mut bytes = good.clone();
+            bytes[place] ^= 1 << bit;
+            match read(&bytes, &path) {
+                Err(_) => refused += 1,
+                Ok(found) => {
+                    assert_eq!(found, expected, "{name}: bit {bit} of byte {place}");
+                    accepted += 1;
+                }
+            }
+        }
+        // Dates and versions are not checked, as by other programs.
+        assert!(refused > accepted, "{name}: {refused} refused, {accepted} accepted");
+    }
+}
+
+#[test]
+fn a_missing_end_is_noticed() {
+    let folder = tempfile::tempdir().unwrap();
+    for name in [&CHECKED[..], &["plain.mat", "f8.npy", "i2.npy"]].concat() {
+        let (path, good) = (folder.path().join(name), fixture(name));
+        let (names, numbers, _) = read(&good, &path).unwrap();
+        for length in 0..good.len() {
+            let Ok((found, values, _)) = read(&good[..length], &path) else {
+                continue;
+            };
+            // A MAT-file may end after any of its variables.
+            assert!(name.ends_with(".mat"), "{name}: {length} bytes are read");
+            let whole = found
+                .iter()
+                .zip(&values)
+                .all(|column| names.iter().zip(&numbers).any(|other| other == column));
+            assert!(whole, "{name}: {length} bytes are read as {found:?}");
+        }
+    }
+}

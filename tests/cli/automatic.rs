@@ -1,0 +1,76 @@
+//! Settings that are chosen automatically.
+
+use std::fs;
+
+use serde_json::Value;
+
+use crate::{
+    memory::{creeping, succeed},
+    printed::json,
+};
+
+const TRAIN: &str = "train --time t --inputs u --targets force --hidden auto --budget 1 --data";
+
+/// Returns a number of a candidate.
+fn number(tried: &Value, name: &str) -> f64 {
+    tried[name].as_f64().unwrap()
+}
+
+#[test]
+fn the_choice_has_the_lowest_error_or_is_within_a_standard_error_of_it() {
+    let folder = creeping();
+    let report = json(&format!("{TRAIN} press.csv --json"), folder.path());
+    let search = &report["search"];
+    let tried = search["tried"].as_array().unwrap();
+    assert!(
+        tried.len() > 5 && tried.iter().any(|tried| tried["model"] == "ridge"),
+        "{search}"
+    );
+    let networks = || tried.iter().filter(|tried| tried["model"].is_object());
+    let lowest = networks()
+        .min_by(|one, other| number(one, "error").total_cmp(&number(other, "error")))
+        .unwrap();
+    let chosen = &tried[search["chosen"].as_u64().unwrap() as usize];
+    // The standard error of a difference is at most the sum of both.
+    let tolerance = number(lowest, "standard_error") + number(chosen, "standard_error");
+    assert!(
+        number(chosen, "error") <= number(lowest, "error") + tolerance,
+        "{chosen} {lowest}"
+    );
+    assert_eq!(
+        (&chosen["memory"], &chosen["inputs"]),
+        (&lowest["memory"], &lowest["inputs"])
+    );
+    // A reading that creeps needs its past, and the trainings that it begins with are recorded.
+    assert!(chosen["memory"].is_object(), "{chosen}");
+    assert!(
+        networks().any(|tried| tried["model"]["network"]["begin"] == "ridge"),
+        "{search}"
+    );
+
+    let text = succeed(&format!("{TRAIN} press.csv"), folder.path());
+    assert!(
+        text.contains("Settings chosen from") && text.contains("within a budget of 1 s"),
+        "{text}"
+    );
+    let marked = text.lines().filter(|line| line.trim_start().starts_with("* ")).count();
+    assert_eq!(marked, 1, "{text}");
+}
+
+#[test]
+fn test_samples_take_no_part_in_the_choice() {
+    let folder = creeping();
+    // The last fifth of the 600 rows is for testing.
+    let text = fs::read_to_string(folder.path().join("press.csv")).unwrap();
+    let replaced = text
+        .lines()
+        .enumerate()
+        .map(|(number, line)| match line.split(',').next() {
+            Some(time) if number > 480 => format!("{time},{},{}\n", number % 7, number % 5),
+            _ => format!("{line}\n"),
+        });
+    fs::write(folder.path().join("other.csv"), replaced.collect::<String>()).unwrap();
+    let [one, other] = ["press.csv", "other.csv"].map(|file| json(&format!("{TRAIN} {file} --json"), folder.path()));
+    assert_eq!(one["search"], other["search"]);
+    assert_ne!(one["targets"], other["targets"]);
+}
