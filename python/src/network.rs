@@ -259,10 +259,7 @@ impl Network {
     /// `True` if the intervals were calibrated.
     #[getter]
     fn has_intervals(&self) -> bool {
-        self.record
-            .intervals
-            .as_ref()
-            .is_some_and(|intervals| !intervals.is_empty())
+        self.record.intervals.is_some()
     }
 
     /// Settings, record of the training and scores, as in the network file.

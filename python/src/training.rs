@@ -5,8 +5,8 @@ use std::sync::{Mutex, PoisonError};
 use decoupler_core::{
     dataset::{Dataset, Seed, Split, SplitBy},
     evaluation::{
-        Channel, Combination, Initialization, Intervals, Measured, Problem, RecordedSize, Run, RunError, RunSettings,
-        Workload,
+        Channel, Combination, Initialization, Intervals, Measured, NoIntervals, Problem, RecordedSize, Run, RunError,
+        RunSettings, Workload,
     },
     network::{Quantity, ScalingChoice},
     scene::RowModel,
@@ -166,7 +166,7 @@ pub struct Training {
     /// Reason why the training ended.
     #[pyo3(get)]
     stop_reason: String,
-    /// Defect of the training with its remedy, if there is one.
+    /// Defect of the training with its remedy, or the reason why there are no intervals.
     #[pyo3(get)]
     warning: Option<String>,
     /// Exception that ended the training: `KeyboardInterrupt`, or one that the callback raised.
@@ -253,15 +253,21 @@ pub fn train(
     let mut run = detached(py, move || Run::on_split(run_settings, split))?;
     let mut interruption = step_to_the_end(py, &mut run, callback.as_ref());
     run.stop();
-    let intervals = match calibration.filter(|_| interruption.is_none()) {
-        Some(set) => match calibrate(py, &run_settings, &set, by) {
-            Ok(intervals) => intervals,
-            Err(error) => {
-                interruption = Some(error);
-                None
-            }
-        },
+    let mut warning = run.defect().map(|defect| defect.to_string());
+    let calibrated = calibration
+        .filter(|_| interruption.is_none())
+        .map(|set| calibrate(py, &run_settings, &set, by));
+    let intervals = match calibrated {
         None => None,
+        Some(Ok(Ok(intervals))) => Some(intervals),
+        Some(Ok(Err(reason))) => {
+            warning.get_or_insert_with(|| format!("no prediction intervals: {reason}"));
+            None
+        }
+        Some(Err(error)) => {
+            interruption = Some(error);
+            None
+        }
     };
     let origin = Origin::of(&run, validation.is_none().then_some(division), crc32);
     let network = Network::trained(run.network(), row_wires, problem, run_settings, intervals, origin);
@@ -272,7 +278,7 @@ pub fn train(
         epochs: leader.latest().epoch,
         best_epoch: leader.best_epoch(),
         stop_reason: run.stop_reason().map_or_else(String::new, |reason| reason.to_string()),
-        warning: run.defect().map(|defect| defect.to_string()),
+        warning,
         interruption: interruption.map(|error| error.into_value(py).into_any()),
     })
 }
@@ -306,8 +312,14 @@ fn report(run: &Run, callback: &Bound<'_, PyAny>) -> PyResult<bool> {
     callback.call1((latest.epoch, losses))?.is_truthy()
 }
 
-/// Calibrates prediction intervals by cross-validation of the training samples.
-fn calibrate(py: Python<'_>, settings: &RunSettings, set: &Dataset, by: SplitBy) -> PyResult<Option<Intervals>> {
+/// Calibrates prediction intervals by cross-validation of the training samples. Returns the reason if the samples do not
+/// suffice.
+fn calibrate(
+    py: Python<'_>,
+    settings: &RunSettings,
+    set: &Dataset,
+    by: SplitBy,
+) -> PyResult<Result<Intervals, NoIntervals>> {
     let interruption = Mutex::new(None);
     let calibrated = detached(py, || {
         let is_cancelled = || {
@@ -318,11 +330,13 @@ fn calibrate(py: Python<'_>, settings: &RunSettings, set: &Dataset, by: SplitBy)
             }
             interruption.is_some()
         };
-        let intervals = Intervals::cross_validate(settings, set, by, &is_cancelled)?;
-        Ok::<_, RunError>(intervals)
+        Ok::<_, RunError>(Intervals::cross_validate(settings, set, by, &is_cancelled))
     })?;
-    match interruption.into_inner().unwrap_or_else(PoisonError::into_inner) {
-        Some(signal) => Err(signal),
-        None => Ok(calibrated),
+    if let Some(signal) = interruption.into_inner().unwrap_or_else(PoisonError::into_inner) {
+        return Err(signal);
+    }
+    match calibrated {
+        Err(NoIntervals::Run(error)) => Err(value_error(error)),
+        calibrated => Ok(calibrated),
     }
 }

@@ -209,6 +209,14 @@ def test_intervals_cover_nine_of_ten_samples():
         NetworkRegressor(epochs=2).fit(X, y).predict_interval(X)
 
 
+def test_too_few_samples_for_intervals_warn(curve):
+    X, y = (values[:8] for values in curve)
+    model = NetworkRegressor(2, epochs=3, intervals="always", random_state=0)
+    with pytest.warns(ConvergenceWarning, match="no prediction intervals: there are fewer than 9"):
+        model.fit(X, y)
+    assert model.predict(X).shape == y.shape
+
+
 def test_an_unsuccessful_training_warns(curve):
     settings = {"learning_rate": 50.0}
     model = NetworkRegressor(method="gd", epochs=20, method_settings=settings, random_state=0)
