@@ -33,6 +33,7 @@ fn intervals_are_calibrated_at_the_end_of_a_training() {
     let (mut driver, _, _folder) = opened_text(&noisy(300));
     driver.limit_epochs("10");
     driver.train_recording();
+    driver.wait("the kept run", |driver| !driver.state().runs.workspace.runs.is_empty());
 
     let setup = driver.state().run.as_ref().unwrap().setup.clone();
     let sets = setup.sets(Path::new(""), &|| false, &mut |_| ()).unwrap().unwrap();
