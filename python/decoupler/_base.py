@@ -75,5 +75,21 @@ class Decoder(MultiOutputMixin, RegressorMixin, BaseEstimator):  # type: ignore[
         raise NotImplementedError
 
     def predict(self, X: ArrayLike) -> NDArray[np.float64]:
-        """Decode samples."""
+        """Decode samples.
+
+        Parameters
+        ----------
+        X : array-like of shape (samples, channels)
+            Readings, with the column of row-wires if there is one.
+
+        Returns
+        -------
+        ndarray of shape (samples,) or (samples, targets)
+            Targets, in their units.
+        """
+        readings, wires = self._readings(X)
+        return self._shaped(self._decoded(readings, wires))
+
+    def _decoded(self, readings: NDArray[Any], wires: list[int] | None) -> NDArray[np.float64]:
+        """Decode checked readings to samples x targets."""
         raise NotImplementedError

@@ -16,36 +16,41 @@ class _SampleDecoder(Decoder):
     _kind: str
 
     inputs: str
+    scaling: str = "whiten"
+    random_state: Any = 0
 
-    def _fit(self, X: ArrayLike, y: ArrayLike, groups: ArrayLike | None, scaling: str, random_state: Any) -> Self:
+    def fit(self, X: ArrayLike, y: ArrayLike, *, groups: ArrayLike | None = None) -> Self:
+        """Fit to samples.
+
+        Parameters
+        ----------
+        X : array-like of shape (samples, channels)
+            Readings, with the column of row-wires if there is one.
+        y : array-like of shape (samples,) or (samples, targets)
+            Targets.
+        groups : array-like of shape (samples,), default=None
+            Group of each sample, left out together when settings such as penalties are chosen.
+
+        Returns
+        -------
+        self
+            The fitted estimator.
+        """
         readings, targets, wires = self._samples(X, y)
         self._decoder = _native.fit_decoder(
             self._kind,
             readings,
             targets,
             inputs=self.inputs,
-            scaling=scaling,
-            seed=seed_of(random_state),
+            scaling=self.scaling,
+            seed=seed_of(self.random_state),
             row_wires=wires,
             groups=group_numbers(groups, len(readings)),
         )
         return self
 
-    def predict(self, X: ArrayLike) -> NDArray[np.float64]:
-        """Decode samples.
-
-        Parameters
-        ----------
-        X : array-like of shape (samples, channels)
-            Readings, with the column of row-wires if there is one.
-
-        Returns
-        -------
-        ndarray of shape (samples,) or (samples, targets)
-            Targets, in their units.
-        """
-        readings, wires = self._readings(X)
-        return self._shaped(self._decoder.predict(readings, wires))
+    def _decoded(self, readings: NDArray[Any], wires: list[int] | None) -> NDArray[np.float64]:
+        return self._decoder.predict(readings, wires)
 
 
 class RidgeDecoder(_SampleDecoder):
@@ -86,25 +91,6 @@ class RidgeDecoder(_SampleDecoder):
         self.inputs = inputs
         self.scaling = scaling
         self.rows = rows
-
-    def fit(self, X: ArrayLike, y: ArrayLike, *, groups: ArrayLike | None = None) -> Self:
-        """Fit to samples.
-
-        Parameters
-        ----------
-        X : array-like of shape (samples, channels)
-            Readings, with the column of row-wires if there is one.
-        y : array-like of shape (samples,) or (samples, targets)
-            Targets.
-        groups : array-like of shape (samples,), default=None
-            Group of each sample, left out together when the penalties are chosen.
-
-        Returns
-        -------
-        RidgeDecoder
-            The fitted estimator.
-        """
-        return self._fit(X, y, groups, self.scaling, 0)
 
 
 class RadialBasisDecoder(_SampleDecoder):
@@ -157,25 +143,6 @@ class RadialBasisDecoder(_SampleDecoder):
         self.rows = rows
         self.random_state = random_state
 
-    def fit(self, X: ArrayLike, y: ArrayLike, *, groups: ArrayLike | None = None) -> Self:
-        """Fit to samples.
-
-        Parameters
-        ----------
-        X : array-like of shape (samples, channels)
-            Readings, with the column of row-wires if there is one.
-        y : array-like of shape (samples,) or (samples, targets)
-            Targets.
-        groups : array-like of shape (samples,), default=None
-            Group of each sample, left out together when width and penalties are chosen.
-
-        Returns
-        -------
-        RadialBasisDecoder
-            The fitted estimator.
-        """
-        return self._fit(X, y, groups, self.scaling, self.random_state)
-
 
 class FuzzyDecoder(_SampleDecoder):
     """Fuzzy rules with affine consequents: a Takagi-Sugeno system on whitened inputs.
@@ -221,22 +188,3 @@ class FuzzyDecoder(_SampleDecoder):
         self.inputs = inputs
         self.rows = rows
         self.random_state = random_state
-
-    def fit(self, X: ArrayLike, y: ArrayLike, *, groups: ArrayLike | None = None) -> Self:
-        """Fit to samples.
-
-        Parameters
-        ----------
-        X : array-like of shape (samples, channels)
-            Readings, with the column of row-wires if there is one.
-        y : array-like of shape (samples,) or (samples, targets)
-            Targets.
-        groups : array-like of shape (samples,), default=None
-            Group of each sample, left out together in the cross-validation.
-
-        Returns
-        -------
-        FuzzyDecoder
-            The fitted estimator.
-        """
-        return self._fit(X, y, groups, "whiten", self.random_state)

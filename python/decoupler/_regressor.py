@@ -230,21 +230,8 @@ class NetworkRegressor(Decoder):
         readings, wires = self._separated(matrix(X, "X of validation"))
         return readings, matrix(y, "y of validation"), wires
 
-    def predict(self, X: ArrayLike) -> NDArray[np.float64]:
-        """Decode samples.
-
-        Parameters
-        ----------
-        X : array-like of shape (samples, channels)
-            Readings, with the column of row-wires if there is one.
-
-        Returns
-        -------
-        ndarray of shape (samples,) or (samples, targets)
-            Targets, in their units.
-        """
-        readings, wires = self._readings(X)
-        return self._shaped(self.network_._native.predict(readings, wires))
+    def _decoded(self, readings: NDArray[Any], wires: list[int] | None) -> NDArray[np.float64]:
+        return self.network_._native.predict(readings, wires)
 
     def predict_interval(self, X: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Return the limits of the 90 % prediction intervals.

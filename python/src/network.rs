@@ -326,7 +326,7 @@ impl Network {
     }
 
     /// Writes the network file of a fit on `training` samples with its errors on `test` samples, each readings, targets,
-    /// row-wires and groups, and the samples beside it.
+    /// row-wires and groups, and the samples next to it.
     fn save_trained<'py>(
         &self,
         py: Python<'py>,

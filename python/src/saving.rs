@@ -1,4 +1,4 @@
-//! Network files of networks trained in Python. A network file names the recording, so the samples are written beside it.
+//! Network files of networks trained in Python. A network file names the recording, so the samples are written next to it.
 
 use std::{
     fmt::Display,
@@ -83,7 +83,7 @@ pub struct Saved<'a> {
 }
 
 impl Saved<'_> {
-    /// Writes the network file at `path` with its errors on `test`, and both sets of samples beside it as CSV.
+    /// Writes the network file at `path` with its errors on `test`, and both sets of samples next to it as CSV.
     /// `training` are all samples of the fit, and `split` their division.
     ///
     /// # Errors
@@ -93,12 +93,12 @@ impl Saved<'_> {
             return Err("the samples are not those of fit: give X and y (and groups) as in fit".to_owned());
         }
         let columns = Columns::of(self.problem, training);
-        let beside = |part: &str| {
+        let path_of = |part: &str| {
             let mut name = path.file_stem().unwrap_or_default().to_owned();
             name.push(format!(".{part}.csv"));
             path.with_file_name(name)
         };
-        let (data, tested) = (beside("training"), beside("test"));
+        let (data, tested) = (path_of("training"), path_of("test"));
         columns.write(&data, training).map_err(text)?;
         columns.write(&tested, test).map_err(text)?;
         let setup = Setup::recording(self.settings, columns.plan(data, tested, self.division));

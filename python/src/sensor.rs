@@ -108,9 +108,7 @@ impl Sensor {
         py: Python<'py>,
         displacements: PyReadonlyArray4<'py, f64>,
     ) -> PyResult<Bound<'py, PyArray3<f64>>> {
-        let frames = displacements.as_array();
-        let all = frames.axis_iter(Axis(0)).map(|frame| self.displacements(frame));
-        let all = all.collect::<PyResult<Vec<_>>>()?;
+        let all = self.displacements_of_frames(&displacements)?;
         let (rows, nodes, columns) = self.sizes();
         let resistances = detached(py, || {
             let mut resistances = vec![0.0; all.len() * rows * columns];
@@ -130,9 +128,7 @@ impl Sensor {
         py: Python<'py>,
         displacements: PyReadonlyArray4<'py, f64>,
     ) -> PyResult<Bound<'py, PyArray5<f64>>> {
-        let frames = displacements.as_array();
-        let all = frames.axis_iter(Axis(0)).map(|frame| self.displacements(frame));
-        let all = all.collect::<PyResult<Vec<_>>>()?;
+        let all = self.displacements_of_frames(&displacements)?;
         let (rows, nodes, columns) = self.sizes();
         let values = detached(py, || {
             let mut values = Vec::with_capacity(all.len() * rows * columns * nodes * 3);
@@ -209,6 +205,15 @@ impl Sensor {
     fn sizes(&self) -> (usize, usize, usize) {
         let scale = self.0.scale;
         (scale.rows(), scale.nodes_per_row(), scale.columns())
+    }
+
+    /// Displacements of each frame, row by row.
+    fn displacements_of_frames(&self, frames: &PyReadonlyArray4<'_, f64>) -> PyResult<Vec<Vec<DVec3>>> {
+        let frames = frames.as_array();
+        frames
+            .axis_iter(Axis(0))
+            .map(|frame| self.displacements(frame))
+            .collect()
     }
 
     /// Displacements of one frame, row by row.

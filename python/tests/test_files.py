@@ -237,7 +237,7 @@ def test_a_network_with_a_memory_decodes_consecutive_samples(folder, recorded):
 
 @pytest.mark.parametrize("rows", [None, "wire"])
 def test_a_saved_network_is_one_of_the_program(tmp_path, recorded, rows):
-    """The program decodes with it and measures the same errors; the recording is found beside it."""
+    """The program decodes with it and measures the same errors; the recording is found next to it."""
     train, test = (table.assign(wire=table.index % 2) for table in recorded)
     names = NAMES if rows is None else [*NAMES, rows]
     model = NetworkRegressor(4, epochs=15, rows=rows, intervals="always", random_state=0)

@@ -1,5 +1,5 @@
 //! Exports of the window on a disk that fails at the N-th operation, for every N: the failure is shown, no part of a file is
-//! left, and the window goes on.
+//! left, and the window continues.
 
 use std::{env, fs, path::PathBuf, process::Command};
 

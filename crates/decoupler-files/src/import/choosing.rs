@@ -30,7 +30,7 @@ impl ChosenSetup {
     /// The answers are those of committees with the chosen settings, each trained without the fold that it answers to.
     /// Epochs and settings were chosen for these same answers, which makes their errors slightly too small; that they come
     /// from fewer training samples, and for large recordings from every nth of them or smaller committees, makes them too
-    /// large, which weighs more.
+    /// large, which has the greater effect.
     pub fn intervals(&self) -> Option<Result<Intervals, NoIntervals>> {
         let (choice, plan) = (self.choice.as_ref()?, self.setup.plan()?);
         let training = &self.sets.sets.split.training;

@@ -240,7 +240,7 @@ impl LocatedDerived {
         }
     }
 
-    /// Value in a row; NaN if it is no number, such as a quotient by zero. `cell` returns a cell of the row by column, and
+    /// Value in a row; NaN if there is none, such as for a quotient by zero. `cell` returns a cell of the row by column, and
     /// `mean` is the mean at the start.
     pub(super) fn value(&self, cell: impl Fn(usize) -> f64, mean: Option<f64>) -> f64 {
         let reference = match self.reference {

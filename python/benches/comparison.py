@@ -4,7 +4,7 @@ All networks have one hidden layer of 12 hyperbolic tangents and take inputs and
 trained without early stopping is tested with the weights of the lowest validation error. Needs `pyrenn`;
 torch-levenberg-marquardt is included if it is installed. Usage:
 
-    beside.py [--seconds 1,10,60] [--recording X.npy y.npy X_test.npy y_test.npy]
+    comparison.py [--seconds 1,10,60] [--recording X.npy y.npy X_test.npy y_test.npy]
 """
 
 import argparse
@@ -94,7 +94,7 @@ class Best:
 
 
 def ours(task: Task, seconds: float, **settings) -> Progress:
-    """A fit for each limit, which the callback ends; training goes on after validation failures."""
+    """A fit for each limit, which the callback ends; training continues after validation failures."""
     for limit in (1.0, 10.0, 60.0):
         if limit > seconds:
             return
