@@ -289,6 +289,7 @@ fn a_file_being_written_is_finished_before_the_window_closes() {
     let mut driver = Driver::open();
     driver.configure_small();
     driver.train();
+    driver.wait_for_kept_run();
     driver.export("Error table, CSV");
     driver.type_into("File", &pipe.display().to_string());
     driver.click_button("Save");

@@ -470,6 +470,12 @@ impl Driver {
         });
     }
 
+    /// Waits until the ended training is among the kept runs: its folder is written in the background.
+    #[track_caller]
+    pub(crate) fn wait_for_kept_run(&mut self) {
+        self.wait("the kept run", |driver| !driver.state().runs.workspace.runs.is_empty());
+    }
+
     /// Waits until the paused or ended training shows its last epoch: the time per frame is measured only then.
     #[track_caller]
     pub(crate) fn wait_for_last_epoch(&mut self) {

@@ -33,7 +33,7 @@ fn intervals_are_calibrated_at_the_end_of_a_training() {
     let (mut driver, _, _folder) = opened_text(&noisy(300));
     driver.limit_epochs("10");
     driver.train_recording();
-    driver.wait("the kept run", |driver| !driver.state().runs.workspace.runs.is_empty());
+    driver.wait_for_kept_run();
 
     let setup = driver.state().run.as_ref().unwrap().setup.clone();
     let sets = setup.sets(Path::new(""), &|| false, &mut |_| ()).unwrap().unwrap();
@@ -61,8 +61,9 @@ fn intervals_are_calibrated_at_the_end_of_a_training() {
 
 #[test]
 fn stopping_a_calibration_keeps_the_network_without_intervals() {
-    let (mut driver, _, _folder) = opened_text(&noisy(300));
-    driver.limit_epochs("3000");
+    // Its five trainings take seconds, so that they are stopped on a busy machine too.
+    let (mut driver, _, _folder) = opened_text(&noisy(100_000));
+    driver.limit_epochs("60");
     if driver.state().recording.is_auto {
         driver.click("Choose settings automatically");
     }
@@ -71,6 +72,7 @@ fn stopping_a_calibration_keeps_the_network_without_intervals() {
     assert!(driver.says("Calibrating the 90 % intervals"));
     driver.click("■ Stop");
     driver.wait_for_training();
+    driver.wait_for_kept_run();
     assert_ne!(driver.state().phase, Phase::Ended(StopReason::Stopped));
     assert!(driver.has("No 90 % intervals: interrupted."));
     assert_eq!(kept(&driver).intervals, None);

@@ -220,8 +220,12 @@ impl DecouplerWindow {
     /// Takes the results of checking typed paths.
     pub(super) fn take_path_checks(&mut self) {
         while let Some((path, found)) = self.path_checks.next_checked() {
-            if self.saving.as_mut().is_some_and(|saving| saving.take(&path, found)) {
+            let Some(saving) = &mut self.saving else { continue };
+            let was_checking = saving.checked_path().is_some();
+            if saving.take(&path, found) {
                 self.take_path(path);
+            } else if was_checking && saving.checked_path().is_none() {
+                self.stay_for_path();
             }
         }
     }

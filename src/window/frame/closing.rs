@@ -4,7 +4,7 @@ use eframe::egui::{Align, Color32, Frame, Id, Layout, Margin, Modal, RichText, S
 
 use decoupler_core::text::counted;
 
-use super::DecouplerWindow;
+use super::{DecouplerWindow, save_form::Saving};
 use crate::window::{
     shared::{Effect, FileTask, Matter, Unfinished},
     theme::{Palette, Theme, semibold, space, type_size},
@@ -159,7 +159,7 @@ impl DecouplerWindow {
             _ => {}
         }
         let may_close = match self.closing {
-            Some(Closing::Finishing) => self.files.paths().next().is_none(),
+            Some(Closing::Finishing) => self.awaited_files().is_empty(),
             Some(Closing::Now) => true,
             _ => false,
         };
@@ -180,13 +180,13 @@ impl DecouplerWindow {
             let unfinished = view.unfinished(&self.shared);
             lines.extend(unfinished.into_iter().map(|work| Line::of(view.name(), work)));
         }
-        let file = |path: &Path| Line {
+        let file = |path: PathBuf| Line {
             subject: ("File", path.display().to_string()),
             progress: "being written".to_owned(),
             fate: Fate::Awaited,
             is_kept: true,
         };
-        lines.extend(self.files.paths().map(file));
+        lines.extend(self.awaited_files().into_iter().map(file));
         let runs = &self.shared.runs;
         if runs.path.is_some() && runs.unwritten > 0 {
             let count = counted(runs.unwritten as u64, "run");
@@ -199,6 +199,19 @@ impl DecouplerWindow {
             lines.push(Line::of("Run list", unwritten));
         }
         lines
+    }
+
+    /// Files that closing waits for: those being written, and the one to be written once its path has been checked.
+    pub(super) fn awaited_files(&self) -> Vec<PathBuf> {
+        let checked = self.saving.as_ref().and_then(Saving::checked_path);
+        self.files.paths().map(Path::to_owned).chain(checked).collect()
+    }
+
+    /// Stays open for a question about the path of a file that closing was waiting for.
+    pub(super) fn stay_for_path(&mut self) {
+        if matches!(self.closing, Some(Closing::Finishing)) {
+            self.closing = None;
+        }
     }
 
     /// Notes the path of `task` if it is one of the checkpoints to be saved before closing. Returns false if another of
@@ -251,7 +264,7 @@ impl DecouplerWindow {
                 }
             }
             Some(Closing::Finishing) => {
-                let names = self.files.paths().map(|path| path.display().to_string());
+                let names = self.awaited_files().into_iter().map(|path| path.display().to_string());
                 let text = format!(
                     "Still being written: {}. The window will close afterwards.",
                     names.collect::<Vec<_>>().join(", ")

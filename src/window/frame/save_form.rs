@@ -68,6 +68,11 @@ impl Saving {
         self.stage = Stage::Checking;
     }
 
+    /// The path, while it is being checked.
+    pub(super) fn checked_path(&self) -> Option<PathBuf> {
+        (self.stage == Stage::Checking).then(|| self.path())
+    }
+
     /// Takes the result of checking a path; returns true if the file can be written there without a question.
     pub(super) fn take(&mut self, path: &Path, found: Found) -> bool {
         // Another path may have been typed since.

@@ -10,7 +10,7 @@ use std::{
 
 use eframe::egui::Context;
 
-use super::{DecouplerWindow, Desktop};
+use super::{DecouplerWindow, Desktop, files::Found, save_form::Saving};
 use crate::window::{
     preview::PreviewEvent,
     shared::{Contents, Effect, FileTask, FileWords, Matter, Notice, Phase},
@@ -215,4 +215,17 @@ fn a_training_that_cannot_begin_leaves_the_settings_own_test_set_on_show() {
             .test()
             .is_some_and(|test| test.sensor == impossible.source.sensor)
     });
+}
+
+#[test]
+fn closing_waits_for_a_file_whose_path_is_being_checked() {
+    let mut window = Opened::trained();
+    let path = PathBuf::from("table.csv");
+    let mut saving = Saving::new(save_task(&window), path.display().to_string());
+    saving.wait_for_check();
+    window.saving = Some(saving);
+    assert_eq!(window.awaited_files(), [path.clone()]);
+    let saving = window.saving.as_mut().unwrap();
+    assert!(!saving.take(&path, Found::File), "the user is asked");
+    assert_eq!(window.awaited_files(), [PathBuf::new(); 0]);
 }
