@@ -8,26 +8,33 @@ use super::{
     method::{Algorithm, Checked, Description},
     setting::settings,
 };
-use crate::network::Mlp;
+use crate::network::{Mlp, Shape};
 
 settings! {
-    /// Settings of the scaled conjugate gradient, with the field's usual defaults (`trainscg`).
+    /// Settings of the scaled conjugate gradient, with the field's usual defaults (`trainscg`). Files from before a
+    /// setting existed get its default.
+    #[serde(default)]
     pub struct ScaledConjugateGradientSettings {
         sigma: "sigma" = 5e-5, in 1e-12..=1.0,
             "Length of the finite difference from which the curvature is estimated.";
         lambda: "lambda" = 5e-7, in f64::MIN_POSITIVE..=1e300,
             "Initial scale of the curvature: it shortens steps where the error is not convex.";
+        decay: "weight decay" = 0.0, in 0.0..=1e12,
+            "Penalty on large weights: this times the sum of the squared weights is added to the sum of the squared errors.";
     }
 }
 
 /// The scaled conjugate gradient (Møller 1993, the steps of his section 4 in order; `trainscg`). Along the direction p
 /// the curvature δ = pᵀs is estimated from two gradients, s = (E′(w + σp/|p|) − E′(w)) |p|/σ, and raised by λ|p|² until
 /// it is positive; the step is pᵀr/δ, where r is the negative gradient. λ is lowered or raised depending on how well
-/// the quadratic model predicts the error. An epoch is one iteration, even if its step is rejected.
+/// the quadratic model predicts the error. An epoch is one iteration, even if its step is rejected. With weight decay E
+/// includes the penalty on the weights; the errors returned do not.
 pub(super) struct ScaledConjugateGradient {
     settings: ScaledConjugateGradientSettings,
     state: ConjugateState,
     now: Evaluation,
+    /// E at the weights: the mean squared error and the penalty.
+    objective: f64,
     backpropagation: Backpropagation,
     moved: Mlp,
 }
@@ -57,13 +64,13 @@ impl Checked for ConjugateState {
 }
 
 impl ScaledConjugateGradient {
-    /// Evaluates the error and gradient at `length` along p from `mlp`.
-    fn evaluate_along(&mut self, mlp: &Mlp, length: f64, examples: &Examples) -> Evaluation {
+    /// Evaluates E and its gradient at `length` along p from `mlp`.
+    fn evaluate_along(&mut self, mlp: &Mlp, length: f64, examples: &Examples) -> (Evaluation, f64) {
         let moved = mlp.weights().iter().zip(&self.state.p);
         for (target, (weight, p)) in self.moved.weights_mut().iter_mut().zip(moved) {
             *target = weight + length * p;
         }
-        self.backpropagation.evaluate(&self.moved, examples)
+        penalized(&mut self.backpropagation, self.settings.decay, &self.moved, examples)
     }
 
     /// Updates residual and direction (Møller's step 7) after an accepted step with μ = pᵀr.
@@ -106,9 +113,14 @@ impl Algorithm for ScaledConjugateGradient {
         remedy: "try another seed, or Levenberg-Marquardt (lm)",
     };
 
+    /// Two evaluations of error and gradient: one for the curvature, one after the step.
+    fn epoch_multiplications(shape: Shape, samples: usize) -> f64 {
+        4.0 * samples as f64 * shape.weights() as f64
+    }
+
     fn new(settings: ScaledConjugateGradientSettings, mlp: &Mlp, examples: &Examples) -> (Self, Evaluation) {
         let mut backpropagation = Backpropagation::new(mlp);
-        let now = backpropagation.evaluate(mlp, examples);
+        let (now, objective) = penalized(&mut backpropagation, settings.decay, mlp, examples);
         let r: Vec<f64> = backpropagation.gradient.iter().map(|slope| -slope).collect();
         let method = Self {
             settings,
@@ -122,6 +134,7 @@ impl Algorithm for ScaledConjugateGradient {
                 since_restart: 0,
             },
             now,
+            objective,
             backpropagation,
             moved: mlp.clone(),
         };
@@ -157,8 +170,8 @@ impl Algorithm for ScaledConjugateGradient {
         }
         let mu = dot(&state.p, &state.r);
         let (delta, length) = (state.delta, mu / state.delta);
-        let then = self.evaluate_along(mlp, length, examples);
-        let predicted = 2.0 * delta * (self.now.mse - then.mse) / (mu * mu);
+        let (then, objective) = self.evaluate_along(mlp, length, examples);
+        let predicted = 2.0 * delta * (self.objective - objective) / (mu * mu);
         // A non-finite error counts as much worse than predicted.
         let comparison = if then.if_finite().is_ok() {
             predicted.max(MIN_COMPARISON)
@@ -168,7 +181,7 @@ impl Algorithm for ScaledConjugateGradient {
         self.state.success = comparison >= 0.0;
         if self.state.success {
             std::mem::swap(mlp, &mut self.moved);
-            self.now = then;
+            (self.now, self.objective) = (then, objective);
             self.turn(mu);
             self.state.lambda_bar = 0.0;
             if comparison >= 0.75 {
@@ -196,6 +209,27 @@ impl Algorithm for ScaledConjugateGradient {
     }
 }
 
+/// Evaluates the errors of `mlp`, and E with its gradient: the mean squared error and the penalty on the weights.
+fn penalized(backpropagation: &mut Backpropagation, decay: f64, mlp: &Mlp, examples: &Examples) -> (Evaluation, f64) {
+    let evaluation = backpropagation.evaluate(mlp, examples);
+    if decay == 0.0 {
+        return (evaluation, evaluation.mse);
+    }
+    let per_error = decay / examples.errors();
+    for (slope, weight) in backpropagation.gradient.iter_mut().zip(mlp.weights()) {
+        *slope += 2.0 * per_error * weight;
+    }
+    let gradient_norm = dot(&backpropagation.gradient, &backpropagation.gradient).sqrt();
+    let objective = evaluation.mse + per_error * dot(mlp.weights(), mlp.weights());
+    (
+        Evaluation {
+            gradient_norm,
+            ..evaluation
+        },
+        objective,
+    )
+}
+
 /// Lower limit on the comparison of actual and predicted error.
 const MIN_COMPARISON: f64 = -1e3;
 
@@ -219,5 +253,36 @@ mod tests {
         assert!(start.gradient_norm > 0.1);
         let reason = (0..100).find_map(|_| method.step(&mut mlp, &examples).err());
         assert_eq!(reason, Some(StopReason::LambdaLarge));
+    }
+
+    /// At the end of a training every central difference of the penalised error vanishes.
+    #[test]
+    fn weight_decay_ends_where_the_penalised_error_is_lowest() {
+        const DECAY: f64 = 0.3;
+        let (mut mlp, examples) = (random_mlp(3, 4, 2, 1), random_examples(50, 3, 2, 2));
+        let objective = |mlp: &Mlp| {
+            let squares: f64 = mlp.weights().iter().map(|weight| weight * weight).sum();
+            Backpropagation::new(mlp).evaluate(mlp, &examples).mse + DECAY * squares / 100.0
+        };
+        let settings = ScaledConjugateGradientSettings {
+            decay: DECAY,
+            ..ScaledConjugateGradientSettings::default()
+        };
+        let (mut method, start) = ScaledConjugateGradient::new(settings, &mlp, &examples);
+        let before = objective(&mlp);
+        let last = (0..2000)
+            .map_while(|_| method.step(&mut mlp, &examples).ok())
+            .last()
+            .unwrap();
+        assert!(objective(&mlp) < 0.9 * before && last.gradient_norm < 1e-6 * start.gradient_norm);
+        for place in 0..mlp.weights().len() {
+            let moved = |step: f64| {
+                let mut moved = mlp.clone();
+                moved.weights_mut()[place] += step;
+                objective(&moved)
+            };
+            let slope = (moved(1e-4) - moved(-1e-4)) / 2e-4;
+            assert!(slope.abs() < 1e-7, "{place}: {slope}");
+        }
     }
 }

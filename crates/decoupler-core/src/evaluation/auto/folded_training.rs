@@ -120,13 +120,11 @@ impl<'a> FoldedTraining<'a> {
     }
 
     /// Returns `true` if further epochs are unlikely to be noticeably better: half as many epochs as the last noticeable
-    /// gain took, and some more, have passed since, or all trainings have ended.
-    pub(super) fn has_passed_its_best(&self) -> bool {
-        /// Epochs to wait in any case.
-        const PATIENCE: usize = 15;
+    /// gain took, and `patience` more, have passed since, or all trainings have ended.
+    pub(super) fn has_passed_its_best(&self, patience: usize) -> bool {
         let (gain, _) = self.gain;
         let mut trainers = self.parts.iter().flat_map(|part| &part.trainers);
-        self.epoch >= gain + gain / 2 + PATIENCE || trainers.all(|trainer| trainer.stop_reason().is_some())
+        self.epoch >= gain + gain / 2 + patience || trainers.all(|trainer| trainer.stop_reason().is_some())
     }
 
     /// Epoch of the latest weights.

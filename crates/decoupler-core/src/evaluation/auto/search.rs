@@ -9,7 +9,7 @@ use super::{
 use crate::{
     dataset::{Dataset, Folds, Memory, Seed, SplitBy, Stream},
     network::{InputChoice, InputScaling, Inputs, LARGEST_HIDDEN, Quantity, ScalingChoice, Shape},
-    training::{Damping, Method, RegularizationSettings, TrainingError},
+    training::{Damping, Method, RegularizationSettings, ScaledConjugateGradientSettings, TrainingError},
 };
 
 /// Number of blocks or sets of groups in the cross-validation.
@@ -22,8 +22,18 @@ const SCREENED: usize = 2;
 const HIDDEN: [usize; 6] = [2, 4, 8, 16, 32, 64];
 /// Hidden nodes with which features are compared.
 const FIRST_HIDDEN: usize = 4;
+/// Hidden nodes with which features are compared where samples are fewer than weights.
+const FIRST_HIDDEN_WIDE: usize = 16;
 /// Maximum number of epochs.
 const MAX_EPOCHS: usize = 400;
+/// Maximum number of epochs of the scaled conjugate gradient, which are short.
+const MAX_SHORT_EPOCHS: usize = 3000;
+/// Epochs to wait for a noticeable gain in any case.
+const PATIENCE: usize = 15;
+/// As [`PATIENCE`], for the scaled conjugate gradient.
+const SHORT_PATIENCE: usize = 300;
+/// Weight decays to try, the first one first.
+const DECAYS: [f64; 3] = [0.1, 0.01, 1.0];
 /// Feature sets that networks try, next to the plain readings.
 const FEATURE_SETS: usize = 2;
 /// Candidates that are compared again as committees.
@@ -126,14 +136,22 @@ impl<'a> Search<'a> {
         // Shares of the budget at the end of each stage.
         let [features, nodes, refined, all] = [0.35, 0.7, 0.85, 1.0];
         let feature_sets = self.screen_features()?;
-        let hidden = self.fixed.hidden.unwrap_or(FIRST_HIDDEN);
-        let method = self.fixed.method.unwrap_or(Method::LevenbergMarquardt(DAMPING));
+        let hidden = self.fixed.hidden.unwrap_or(self.first_hidden());
+        let damped = Method::LevenbergMarquardt(DAMPING);
+        let is_wide = self.is_wide();
+        let method = if is_wide { decaying(DECAYS[0]) } else { damped };
+        let method = self.fixed.method.unwrap_or(method);
         let starts = self.fixed.starts.unwrap_or(SCREENED).min(SCREENED);
         let first: Vec<Candidate> = feature_sets
             .into_iter()
             .flat_map(|(memory, inputs)| {
-                // A regression on many averages that overlap may be worse to begin with than random weights.
-                let random = (!memory.is_empty()).then_some(Initialization::Random);
+                // A regression on many averages that overlap may be worse to begin with than random weights, and one on
+                // nearly as many inputs as samples is.
+                let begins: &[Initialization] = match (is_wide, memory.is_empty()) {
+                    (true, _) => &[Initialization::Random],
+                    (false, true) => &[Initialization::Ridge],
+                    (false, false) => &[Initialization::Ridge, Initialization::Random],
+                };
                 let with = move |initialization| Candidate {
                     memory: memory.clone(),
                     inputs,
@@ -142,7 +160,7 @@ impl<'a> Search<'a> {
                     starts,
                     initialization,
                 };
-                std::iter::once(Initialization::Ridge).chain(random).map(with)
+                begins.iter().copied().map(with)
             })
             .collect();
         let count = first.len();
@@ -155,6 +173,26 @@ impl<'a> Search<'a> {
         }
         self.refine(refined)?;
         self.decide(all)
+    }
+
+    /// Returns `true` if even a small network has more weights than there are samples. Levenberg-Marquardt then fits
+    /// noise within an epoch or two, and its epochs are expensive.
+    fn is_wide(&self) -> bool {
+        let set = self.samples.set;
+        let shape = Shape {
+            inputs: set.channels(),
+            hidden: FIRST_HIDDEN,
+            outputs: set.outputs(),
+        };
+        shape.weights() > set.samples()
+    }
+
+    fn first_hidden(&self) -> usize {
+        if self.is_wide() {
+            FIRST_HIDDEN_WIDE
+        } else {
+            FIRST_HIDDEN
+        }
     }
 
     /// Compares features by ridge regression; returns the plain readings and the best others.
@@ -178,6 +216,7 @@ impl<'a> Search<'a> {
             }
         }
         let count = sets.len();
+        let mut plain_error: Option<f64> = None;
         let mut measured: Vec<(f64, (Memory, InputChoice))> = Vec::new();
         for (number, (memory, inputs)) in sets.into_iter().enumerate() {
             self.expected = count - number + FEATURE_SETS + 1 + 4 + 3 + FINALISTS;
@@ -202,7 +241,11 @@ impl<'a> Search<'a> {
                 }
                 None => f64::INFINITY,
             };
-            // The plain readings are always tried.
+            // The plain readings are always tried, and many inputs are not multiplied unless that helps.
+            let plain = plain_error.get_or_insert(error);
+            if number > 0 && self.is_wide() && error >= *plain {
+                continue;
+            }
             let rank = if number == 0 { -1.0 } else { error };
             measured.push((rank, (memory, inputs)));
         }
@@ -251,7 +294,7 @@ impl<'a> Search<'a> {
         if let Some(plain) = plain {
             self.vary_hidden_of(&plain, share)?;
         }
-        let hidden = self.best().map_or(FIRST_HIDDEN, |candidate| candidate.hidden);
+        let hidden = self.best().map_or(self.first_hidden(), |candidate| candidate.hidden);
         let ranked = self.ranked();
         let others = ranked.iter().map(|&place| &self.networks[place].candidate);
         let second = others
@@ -267,7 +310,10 @@ impl<'a> Search<'a> {
 
     /// Tries `base` with more hidden nodes while it helps, and with fewer if it does not.
     fn vary_hidden_of(&mut self, base: &Candidate, share: f64) -> Result<(), End> {
-        let first = HIDDEN.iter().position(|&hidden| hidden == FIRST_HIDDEN).unwrap_or(0);
+        let first = HIDDEN
+            .iter()
+            .position(|&hidden| hidden == self.first_hidden())
+            .unwrap_or(0);
         let mut has_improved = false;
         for (place, &hidden) in HIDDEN.iter().enumerate().skip(first + 1) {
             self.expected = HIDDEN.len() - place + 1 + 3 + FINALISTS;
@@ -320,10 +366,12 @@ impl<'a> Search<'a> {
             variants.push(Candidate { inputs, ..best.clone() });
         }
         if self.fixed.method.is_none() {
-            variants.push(Candidate {
-                method: regularized(0.0),
-                ..best.clone()
-            });
+            let methods = if self.is_wide() {
+                DECAYS[1..].iter().map(|&decay| decaying(decay)).collect()
+            } else {
+                vec![regularized(0.0)]
+            };
+            variants.extend(methods.into_iter().map(|method| Candidate { method, ..best.clone() }));
         }
         let count = variants.len();
         for (number, variant) in variants.into_iter().enumerate() {
@@ -438,9 +486,13 @@ impl<'a> Search<'a> {
         }
         .weights();
         let epoch = training.epoch_multiplications();
-        let max_epochs = self.fixed.epochs.unwrap_or(MAX_EPOCHS);
+        let (most, patience) = match candidate.method {
+            Method::ScaledConjugateGradient(_) => (MAX_SHORT_EPOCHS, SHORT_PATIENCE),
+            _ => (MAX_EPOCHS, PATIENCE),
+        };
+        let max_epochs = self.fixed.epochs.unwrap_or(most);
         let mut used = 0.0;
-        while training.epoch() < max_epochs && !training.has_passed_its_best() {
+        while training.epoch() < max_epochs && !training.has_passed_its_best(patience) {
             if used + epoch > limit && training.epoch() >= MIN_EPOCHS {
                 break;
             }
@@ -627,6 +679,14 @@ fn regularized(correlation_epoch: f64) -> Method {
         mu_decrease: DAMPING.mu_decrease,
         correlation_epoch,
         ..usual
+    })
+}
+
+/// The scaled conjugate gradient with weight decay.
+fn decaying(decay: f64) -> Method {
+    Method::ScaledConjugateGradient(ScaledConjugateGradientSettings {
+        decay,
+        ..ScaledConjugateGradientSettings::default()
     })
 }
 
