@@ -32,8 +32,8 @@ const MAX_SHORT_EPOCHS: usize = 3000;
 const PATIENCE: usize = 15;
 /// As [`PATIENCE`], for the scaled conjugate gradient.
 const SHORT_PATIENCE: usize = 300;
-/// Weight decays to try, the first one first.
-const DECAYS: [f64; 3] = [0.1, 0.01, 1.0];
+/// Weight decays to try, for each sample; the first one first.
+const DECAYS: [f64; 3] = [3e-4, 3e-5, 3e-3];
 /// Feature sets that networks try, next to the plain readings.
 const FEATURE_SETS: usize = 2;
 /// Candidates that are compared again as committees.
@@ -139,7 +139,7 @@ impl<'a> Search<'a> {
         let hidden = self.fixed.hidden.unwrap_or(self.first_hidden());
         let damped = Method::LevenbergMarquardt(DAMPING);
         let is_wide = self.is_wide();
-        let method = if is_wide { decaying(DECAYS[0]) } else { damped };
+        let method = if is_wide { self.decaying(DECAYS[0]) } else { damped };
         let method = self.fixed.method.unwrap_or(method);
         let starts = self.fixed.starts.unwrap_or(SCREENED).min(SCREENED);
         let first: Vec<Candidate> = feature_sets
@@ -308,6 +308,14 @@ impl<'a> Search<'a> {
         Ok(())
     }
 
+    /// The scaled conjugate gradient with this weight decay for each sample.
+    fn decaying(&self, decay: f64) -> Method {
+        Method::ScaledConjugateGradient(ScaledConjugateGradientSettings {
+            decay: decay * self.samples.set.samples() as f64,
+            ..ScaledConjugateGradientSettings::default()
+        })
+    }
+
     /// Tries `base` with more hidden nodes while it helps, and with fewer if it does not.
     fn vary_hidden_of(&mut self, base: &Candidate, share: f64) -> Result<(), End> {
         let first = HIDDEN
@@ -367,7 +375,7 @@ impl<'a> Search<'a> {
         }
         if self.fixed.method.is_none() {
             let methods = if self.is_wide() {
-                DECAYS[1..].iter().map(|&decay| decaying(decay)).collect()
+                DECAYS[1..].iter().map(|&decay| self.decaying(decay)).collect()
             } else {
                 vec![regularized(0.0)]
             };
@@ -679,14 +687,6 @@ fn regularized(correlation_epoch: f64) -> Method {
         mu_decrease: DAMPING.mu_decrease,
         correlation_epoch,
         ..usual
-    })
-}
-
-/// The scaled conjugate gradient with weight decay.
-fn decaying(decay: f64) -> Method {
-    Method::ScaledConjugateGradient(ScaledConjugateGradientSettings {
-        decay,
-        ..ScaledConjugateGradientSettings::default()
     })
 }
 
