@@ -25,8 +25,9 @@ pub(super) struct TrainingArguments {
     array: Option<ArrayScale>,
     /// Hidden nodes. For a recording, auto chooses settings by cross-validation on the training samples, within --budget
     /// (60 seconds of one core by default): the readings, their logarithms or reciprocals; no memory, or averages with time
-    /// constants around the correlation time of the targets; 2 to 64 hidden nodes; min-max scaling or whitening; br, with and
-    /// without correlated errors, or lm; the number of epochs, up to 400; weights that begin random or at ridge regression;
+    /// constants around the correlation time of the targets; 2 to 64 hidden nodes; min-max scaling or whitening; lm, or br with
+    /// and without correlated errors, or scg with weight decay where inputs are too many for the samples; the number of
+    /// epochs, up to 400 (3000 of scg); weights that begin random or at ridge regression;
     /// and a committee of up to 5 networks. What else is given here is kept. It is the default for a recording if none of --hidden, --starts, --combine, --begin, --method, --set, --epochs, --goal, --max-fail and --min-gradient is given
     /// [default: 12; auto for a recording]
     #[arg(long, value_name = "N|auto", value_parser = hidden_nodes)]

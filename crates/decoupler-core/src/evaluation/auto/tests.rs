@@ -1,10 +1,12 @@
 use ndarray::Array2;
+use rand::RngExt as _;
 
 use super::*;
 use crate::{
-    dataset::SplitBy,
+    dataset::{Seed, SplitBy, Stream},
     evaluation::{Combination, Measured, Run},
     scene::RowModel,
+    training::Method,
 };
 
 const BUDGET_S: f64 = 0.4;
@@ -135,4 +137,39 @@ fn the_choice_trains_to_about_its_error() {
     let spread = targets.iter().skip(400).map(|target| target * target).sum::<f64>();
     let (error, expected) = ((square / spread).sqrt(), choice.record.choice().unwrap().error);
     assert!(error < 4.0 * expected, "{error} {expected}");
+}
+
+/// Potentials at 40 places on a soft sheet that is pressed somewhere, with noise: 100 samples are fewer than the weights of
+/// four hidden nodes.
+#[test]
+fn many_inputs_for_few_samples_get_weight_decay() {
+    let mut rng = Seed(3).rng(Stream::Folds);
+    let places = Array2::from_shape_simple_fn((40, 2), || rng.random_range(-1.0..1.0));
+    let targets = Array2::from_shape_simple_fn((100, 2), || rng.random_range(-1.0..1.0));
+    let readings = Array2::from_shape_fn((100, 40), |(sample, channel)| {
+        let square: f64 = (&targets.row(sample) - &places.row(channel)).mapv(|d| d * d).sum();
+        1.0 / (1.0 + 4.0 * square) + rng.random_range(-0.03..0.03)
+    });
+    let set = Dataset::new(readings, targets, None, (0..100).collect()).unwrap();
+    let samples = AutoSamples {
+        set: &set,
+        past: None,
+        by: SplitBy::Random,
+    };
+    let base = RunSettings::from(Measured { rows: RowModel::Shared });
+    let choice = choose_settings(&base, &AutoFixed::default(), &samples, 4.0, &|| false, &mut |_| ())
+        .unwrap()
+        .unwrap();
+    let Method::ScaledConjugateGradient(settings) = choice.settings.training.method else {
+        panic!("{:?}", choice.record);
+    };
+    assert!(settings.decay > 0.0);
+    let ridge = choice
+        .record
+        .tried
+        .iter()
+        .filter(|tried| tried.model == TriedModel::Ridge);
+    let ridge = ridge.map(|tried| tried.error).fold(f64::INFINITY, f64::min);
+    let error = choice.record.choice().unwrap().error;
+    assert!(error < 0.8 * ridge, "{error} {ridge}");
 }
