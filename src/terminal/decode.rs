@@ -21,7 +21,6 @@ use decoupler_files::{
         AtomicFile, NetworkFile, WriteError, check_writable, format_number, is_same, write_decoded,
         write_decoded_header,
     },
-    import::KeptColumn,
 };
 use glam::DVec3;
 use ndarray::{Array2, ArrayView1, Axis, Slice};
@@ -122,7 +121,9 @@ fn decode_file(file: &NetworkFile, input: &Path, output: &Path) -> Result<(), Fa
                 [&readings, &answer].map(|row| row.to_slice().expect("a row of a standard array is contiguous"));
             let of_line = outside.count(file.network.at(row_index), line, readings, targets);
             drift.take(line, readings);
-            write_cells(kept, row, &mut written).map_err(refused)?;
+            for column in kept {
+                write_cell(&column.cells[row], &mut written).map_err(refused)?;
+            }
             with_half_widths(file, targets, &mut values);
             write_decoded(
                 ArrayView1::from(&values),
@@ -139,17 +140,14 @@ fn decode_file(file: &NetworkFile, input: &Path, output: &Path) -> Result<(), Fa
     Ok(())
 }
 
-/// Writes the cells of the kept columns, each followed by a comma.
-fn write_cells(kept: &[KeptColumn], row: usize, out: &mut dyn Write) -> io::Result<()> {
-    for column in kept {
-        let cell = inert(&column.cells[row]);
-        if cell.contains([',', '"', '\n', '\r']) {
-            write!(out, "\"{}\",", cell.replace('"', "\"\""))?;
-        } else {
-            write!(out, "{cell},")?;
-        }
+/// Writes a cell kept from the input, followed by a comma.
+pub(super) fn write_cell(cell: &str, out: &mut dyn Write) -> io::Result<()> {
+    let cell = inert(cell);
+    if cell.contains([',', '"', '\n', '\r']) {
+        write!(out, "\"{}\",", cell.replace('"', "\"\""))
+    } else {
+        write!(out, "{cell},")
     }
-    Ok(())
 }
 
 /// Fills `values` with the answers, each followed by the half-width of its interval if the target has one.

@@ -23,7 +23,7 @@ use decoupler_core::{
 };
 use decoupler_files::{
     export::NetworkFile,
-    import::{InputLine, InputLineError, InputLines},
+    import::{InputLine, InputLineError, InputLines, KeptCell},
 };
 
 use super::{
@@ -166,8 +166,8 @@ impl Follow {
                 report_too_long(number, report);
                 return Ok(Kept::AsBefore);
             };
-            let parsed = match parser.parse(number, text) {
-                Ok(ParsedLine::NoReadings) => return Ok(Kept::AsBefore),
+            let (parsed, kept) = match parser.parse(number, text) {
+                Ok((ParsedLine::NoReadings, _)) => return Ok(Kept::AsBefore),
                 Ok(parsed) => parsed,
                 Err(error) if error.is_final() && !(input.begins_anywhere() && number == 1) => {
                     return Err(error.failure(input.clone()));
@@ -178,7 +178,7 @@ impl Follow {
                 }
             };
             let is_whole = faults.take(number, parsed);
-            match answers.write(number, parsed, faults.left_out()) {
+            match answers.write(number, parsed, kept, faults.left_out()) {
                 Ok(true) => report.good(read_at.elapsed()),
                 Ok(false) => {
                     report.bad(&format_args!(
@@ -247,26 +247,39 @@ impl Parser {
         })
     }
 
-    pub(super) fn parse(&mut self, line: u64, text: &[u8]) -> Result<ParsedLine<'_>, ParseError> {
-        match self {
-            Self::Array(parser) => parser.parse(line, text).map_err(ParseError::Array),
+    /// Returns the parsed line and the cells that are copied to the output.
+    pub(super) fn parse(&mut self, line: u64, text: &[u8]) -> Result<(ParsedLine<'_>, &[KeptCell]), ParseError> {
+        let of_columns = match self {
+            Self::Array(parser) => {
+                let parsed = parser.parse(line, text).map_err(ParseError::Array)?;
+                return Ok((parsed, &[]));
+            }
             Self::Columns(parser) => match parser.parse(line, text) {
-                Ok(InputLine::NoReadings) => Ok(ParsedLine::NoReadings),
+                Ok(InputLine::NoReadings) => (ParsedLine::NoReadings, &[][..]),
                 Ok(InputLine::Start { is_first }) => {
                     if is_first {
                         warn(&format!(
                             "line {line}: the lines at the start give the means of derived columns and are not decoded"
                         ));
                     }
-                    Ok(ParsedLine::NoReadings)
+                    (ParsedLine::NoReadings, &[][..])
                 }
-                Ok(InputLine::Readings { row_index, readings }) => Ok(ParsedLine::Row {
-                    row_index: Some(row_index),
-                    readings_ohm: readings,
-                }),
-                Err(source) => Err(ParseError::Columns { line, source }),
+                Ok(InputLine::Readings {
+                    row_index,
+                    readings: readings_ohm,
+                    kept,
+                }) => {
+                    let row_index = Some(row_index);
+                    let row = ParsedLine::Row {
+                        row_index,
+                        readings_ohm,
+                    };
+                    (row, kept)
+                }
+                Err(source) => return Err(ParseError::Columns { line, source }),
             },
-        }
+        };
+        Ok(of_columns)
     }
 
     /// Counts a line that is too long to be parsed.

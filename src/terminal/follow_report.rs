@@ -9,12 +9,15 @@ use decoupler_core::{
     decoupling::{CompiledNetworks, Decoder},
     live::{Latencies, LeftOutDecoder, ParsedLine, Source},
 };
-use decoupler_files::export::{NetworkFile, write_decoded};
+use decoupler_files::{
+    export::{NetworkFile, write_decoded},
+    import::KeptCell,
+};
 use ndarray::ArrayView1;
 use serde_json::{Map, Value, json};
 
 use super::{
-    decode::{OutsideTraining, rows_read, with_half_widths, write_heading},
+    decode::{OutsideTraining, rows_read, with_half_widths, write_cell, write_heading},
     failure::Failure,
     intervals::Drift,
     output::messages,
@@ -195,11 +198,12 @@ impl<'a> Answers<'a> {
     }
 
     /// Decodes a line, using `left_out` with the latest readings of every row read if given, and writes and flushes the
-    /// answer. Returns `false` if there is none.
+    /// answer after the cells `kept` from the line. Returns `false` if there is none.
     pub(super) fn write(
         &mut self,
         line: u64,
         parsed: ParsedLine<'_>,
+        kept: &[KeptCell],
         left_out: Option<(&mut LeftOutDecoder, &[f64])>,
     ) -> io::Result<bool> {
         let outputs = self.file.problem.targets.len();
@@ -249,12 +253,16 @@ impl<'a> Answers<'a> {
         }
         let problem = &self.file.problem;
         if !self.has_heading {
-            write_heading(self.file, &[], rows, &mut self.output)?;
+            let titles = Vec::from_iter(kept.iter().map(|kept| kept.title.clone()));
+            write_heading(self.file, &titles, rows, &mut self.output)?;
             self.has_heading = true;
         }
         let answer = &self.answer[..rows * outputs];
         match self.form {
             Form::Csv => {
+                for cell in kept {
+                    write_cell(&cell.text, &mut self.output)?;
+                }
                 with_half_widths(self.file, answer, &mut self.values);
                 write_decoded(
                     ArrayView1::from(&self.values),
@@ -294,6 +302,10 @@ impl<'a> Answers<'a> {
                     "readings_outside": readings_outside,
                     "targets_outside": targets_outside,
                 });
+                if !kept.is_empty() {
+                    let cells = kept.iter().map(|kept| (kept.title.clone(), kept.text.clone().into()));
+                    answer["columns"] = cells.collect::<Map<String, Value>>().into();
+                }
                 if !half_widths.is_empty() {
                     answer["half_widths_90"] = half_widths.into();
                 }

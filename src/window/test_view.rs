@@ -148,18 +148,14 @@ impl TestView {
         let row_count = sensor.scale.rows();
         // There is no test set of a row that does not exist.
         let rows = settings.source.scene.rows.read(row_count).unwrap_or_default();
-        let x_mm: Vec<f64> = rows.iter().map(|&row| sensor.geometry.row_x_mm(row)).collect();
-        let nodes = 0..sensor.scale.nodes_per_row();
-        let y_mm: Vec<f64> = nodes
-            .map(|node| sensor.geometry.node_y_mm(sensor.scale, node))
-            .collect();
+        let (x_mm, y_mm) = sensor.geometry.lattice_mm(sensor.scale, &rows);
         let stroke_mm = settings.source.stroke_mm();
         let unloaded = Pressed::new(&sensor, &rows, &Touch::default(), stroke_mm);
         Ok(Self {
             unloaded_ohm: unloaded.ok().map(|unloaded| Arc::new(unloaded.readings_ohm().clone())),
             snapshots: Arc::new(set.snapshots()),
             set,
-            surface: Arc::new(SurfaceMap::new(&x_mm, &y_mm)?),
+            surface: SurfaceMap::shared(&x_mm, &y_mm)?,
             sensor,
             rows,
             stroke_mm,

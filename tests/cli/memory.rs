@@ -86,6 +86,17 @@ fn a_memory_removes_creep_and_goes_with_the_network() {
         .map(|line| format!("{}\n", line.split_once(',').unwrap().1));
     fs::write(folder.path().join("untimed.csv"), untimed.collect::<String>()).unwrap();
     let without_times = succeed("decode --network n.json --follow --input untimed.csv", folder.path());
+    // The times are copied as they came.
+    let header = streamed.lines().next().unwrap();
+    assert!(header.starts_with("t,"), "{header}");
+    let times = |text: &str| Vec::from_iter(text.lines().skip(1).map(|line| line.split(',').next().unwrap().to_owned()));
+    assert_eq!(times(&streamed), times(&readings));
+    let objects = succeed(
+        "decode --network n.json --follow --format jsonl --input readings.csv",
+        folder.path(),
+    );
+    let object: serde_json::Value = serde_json::from_str(objects.lines().nth(1).unwrap()).unwrap();
+    assert_eq!(object["columns"]["t"], times(&readings)[1].as_str());
     for found in [answers(&streamed), answers(&without_times)] {
         assert_eq!(found.len(), decoded.len());
         assert!(

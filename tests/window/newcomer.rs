@@ -205,6 +205,23 @@ fn every_term_has_the_same_text_in_the_glossary_and_as_a_tooltip() {
 }
 
 #[test]
+fn about_has_the_version_and_the_licences_of_all_libraries() {
+    let mut driver = open_first();
+    driver.press_with(Modifiers::COMMAND, Key::K);
+    driver.type_into("Action", "about");
+    driver.press(Key::Enter);
+    driver.settle();
+    assert!(driver.has(concat!("Decoupler ", env!("CARGO_PKG_VERSION"))));
+    assert!(
+        driver.says("Decoupler contains these libraries"),
+        "{:#?}",
+        driver.texts()
+    );
+    driver.click("Glossary");
+    assert!(!driver.says("Decoupler contains these libraries"));
+}
+
+#[test]
 fn the_list_of_actions_finds_terms_too() {
     let mut driver = open_first();
     driver.press_with(Modifiers::COMMAND, Key::K);

@@ -82,6 +82,13 @@ impl DecouplerWindow {
         if offers.offer("Glossary", true) {
             self.open_glossary("");
         }
+        if offers.offer("About Decoupler", true) {
+            let page = Page::About;
+            self.overlay = Overlay::Help(Help {
+                page,
+                ..Help::default()
+            });
+        }
         if offers.offer("Take the tour", true) {
             self.begin_tour();
         }

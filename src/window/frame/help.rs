@@ -1,4 +1,7 @@
-use eframe::egui::{Frame, Id, Margin, Modal, RichText, ScrollArea, TextEdit, Ui, WidgetInfo, accesskit::Role, vec2};
+use eframe::egui::{
+    FontId, Frame, Id, Label, Margin, Modal, RichText, ScrollArea, TextEdit, TextStyle, Ui, WidgetInfo,
+    accesskit::Role, vec2,
+};
 
 use crate::window::{
     glossary::{self, Term},
@@ -29,7 +32,12 @@ pub(super) enum Page {
     Keys,
     /// The list of all terms.
     Glossary,
+    /// Version and licences.
+    About,
 }
+
+/// Licences of the libraries in the program; `.ci/notices` makes the file.
+const NOTICES: &str = include_str!("../../../assets/NOTICES.txt");
 
 /// The open help.
 #[derive(Debug, Default)]
@@ -48,14 +56,18 @@ pub(super) enum Reply {
     Tour,
 }
 
-/// Shows the keys or the glossary over the window.
+/// Shows the pages of the help over the window.
 pub(super) fn help_ui(ui: &Ui, help: &mut Help, actions: &[Action]) -> Option<Reply> {
     let mut reply = None;
     let frame = Frame::popup(ui.style()).inner_margin(Margin::same(16));
     let modal = Modal::new(Id::unique("help")).frame(frame).show(ui.ctx(), |ui| {
         ui.set_width(space(120));
         ui.horizontal(|ui| {
-            let pages = [(Page::Keys, "Keys"), (Page::Glossary, "Glossary")];
+            let pages = [
+                (Page::Keys, "Keys"),
+                (Page::Glossary, "Glossary"),
+                (Page::About, "About"),
+            ];
             help.page = tabs_ui(ui, "Help", &pages, help.page).unwrap_or(help.page);
             ui.with_layout(eframe::egui::Layout::right_to_left(eframe::egui::Align::Center), |ui| {
                 let tour = ui.add(ghost_button("Take the tour"));
@@ -68,6 +80,7 @@ pub(super) fn help_ui(ui: &Ui, help: &mut Help, actions: &[Action]) -> Option<Re
         match help.page {
             Page::Keys => keys_ui(ui, actions),
             Page::Glossary => glossary_ui(ui, &mut help.typed),
+            Page::About => about_ui(ui),
         }
     });
     if modal.should_close() {
@@ -125,6 +138,28 @@ fn glossary_ui(ui: &mut Ui, typed: &mut String) {
         }
         if !is_any {
             dim_ui(ui, "No matches");
+        }
+    });
+}
+
+/// Shows the version, and the licences of the program and its libraries.
+fn about_ui(ui: &mut Ui) {
+    let version = format!("Decoupler {}", env!("CARGO_PKG_VERSION"));
+    ui.label(RichText::new(version).font(semibold(type_size().body)));
+    dim_ui(ui, env!("CARGO_PKG_DESCRIPTION"));
+    dim_ui(ui, "Licensed under MIT or Apache-2.0, at your choice.");
+    ui.add_space(space(2));
+    let font = FontId::monospace(type_size().small);
+    let height = ui.text_style_height(&TextStyle::Monospace).max(font.size);
+    let lines = Vec::from_iter(NOTICES.lines());
+    let scroll = ScrollArea::both()
+        .max_height(space(104))
+        .min_scrolled_height(space(104))
+        .auto_shrink([false, true]);
+    // Of thousands of lines only those in view are laid out.
+    scroll.show_rows(ui, height, lines.len(), |ui, rows| {
+        for line in &lines[rows] {
+            ui.add(Label::new(RichText::new(*line).font(font.clone())).extend());
         }
     });
 }

@@ -123,6 +123,15 @@ impl Geometry {
         columns_centre + self.node_pitch_mm * (node as f64 - (scale.nodes_per_row() - 1) as f64 / 2.0)
     }
 
+    /// Returns x of each of these row-wires, and y of the nodes on each: the lattice of the nodes at rest.
+    pub fn lattice_mm(&self, scale: ArrayScale, rows: &[usize]) -> (Vec<f64>, Vec<f64>) {
+        let nodes = 0..scale.nodes_per_row();
+        (
+            rows.iter().map(|&row| self.row_x_mm(row)).collect(),
+            nodes.map(|node| self.node_y_mm(scale, node)).collect(),
+        )
+    }
+
     /// Returns the undeformed position of node `node` on row-wire `row`.
     pub fn row_node_mm(&self, scale: ArrayScale, row: usize, node: usize) -> DVec3 {
         DVec3::new(self.row_x_mm(row), self.node_y_mm(scale, node), self.height_mm)

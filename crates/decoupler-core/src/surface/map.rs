@@ -16,7 +16,11 @@
 //!
 //! Beyond both ends the curve is straight. Through two nodes it is a line, through one a constant.
 
-use std::{fmt, ops::RangeInclusive};
+use std::{
+    fmt,
+    ops::RangeInclusive,
+    sync::{Arc, Mutex, PoisonError, Weak},
+};
 
 use ndarray::{Array2, ArrayView1, Zip};
 
@@ -80,7 +84,39 @@ enum Spline {
     Scattered(Scattered),
 }
 
+/// A map in use, with its coordinates x and y.
+struct Shared {
+    x_mm: Vec<f64>,
+    y_mm: Vec<f64>,
+    map: Weak<SurfaceMap>,
+}
+
+/// Maps in use; of few lattices at a time.
+static SHARED: Mutex<Vec<Shared>> = Mutex::new(Vec::new());
+
 impl SurfaceMap {
+    /// Returns the map of a lattice that is already in use, or prepares it as [`Self::new`] does: it takes 9 MB for an array
+    /// of 10×10, and all runs of one array have the same.
+    ///
+    /// # Errors
+    /// See [`Self::new`].
+    pub fn shared(x_mm: &[f64], y_mm: &[f64]) -> Result<Arc<Self>, SurfaceError> {
+        // While it is prepared, others who want the same wait for it. A panic leaves the list as it was.
+        let mut shared = SHARED.lock().unwrap_or_else(PoisonError::into_inner);
+        shared.retain(|shared| shared.map.strong_count() > 0);
+        let same = shared.iter().find(|shared| shared.x_mm == x_mm && shared.y_mm == y_mm);
+        if let Some(map) = same.and_then(|shared| shared.map.upgrade()) {
+            return Ok(map);
+        }
+        let map = Arc::new(Self::new(x_mm, y_mm)?);
+        shared.push(Shared {
+            x_mm: x_mm.to_owned(),
+            y_mm: y_mm.to_owned(),
+            map: Arc::downgrade(&map),
+        });
+        Ok(map)
+    }
+
     /// Prepares the surface of the lattice `x_mm × y_mm`: one x per row-wire and one y per node of a row, in
     /// millimetres, in any order.
     ///

@@ -196,37 +196,49 @@ pub(super) type Place = (f64, f64);
 
 /// Returns W (`points × nodes`) for nodes that are not on one line; `None` if the equations are numerically singular.
 pub(super) fn weights(nodes_mm: &[Place], points_mm: &[Place]) -> Option<Array2<f64>> {
+    /// Points whose equations are solved together, so that not the whole grid is in memory several times.
+    const BLOCK: usize = 1024;
     let local = LocalCoordinates::of(nodes_mm);
     let nodes = local.places(nodes_mm);
-    let points = local.places(points_mm);
     let affine = AffineBasis::of(&nodes);
     let on_nodes = affine.at(&nodes);
-    let (basis, at_points) = (on_nodes.as_ref(), affine.at(&points));
+    let basis = on_nodes.as_ref();
 
     let greens = |others: &[Place]| {
         Mat::from_fn(nodes.len(), others.len(), |n, p| {
             green(distance_squared(nodes[n], others[p]))
         })
     };
-    let mut system = greens(&nodes);
-    let mut solution = greens(&points);
-    solution -= (&system * basis) * at_points.transpose();
-    remove_affine(basis, &mut solution);
-
+    let system = greens(&nodes);
+    let mut projected = system.clone();
     // Before the projection, which for three nodes leaves only rounding errors.
     let tau = system.norm_max();
     // Twice, once from each side: A is symmetric.
-    remove_affine(basis, &mut system);
-    system = system.transpose().to_owned();
-    remove_affine(basis, &mut system);
-    system += (Scale(tau) * basis) * basis.transpose();
-    system.llt(Side::Lower).ok()?.solve_in_place(&mut solution);
+    remove_affine(basis, &mut projected);
+    projected = projected.transpose().to_owned();
+    remove_affine(basis, &mut projected);
+    projected += (Scale(tau) * basis) * basis.transpose();
+    let factors = projected.llt(Side::Lower).ok()?;
 
-    remove_affine(basis, &mut solution);
-    solution += basis * at_points.transpose();
-    Some(Array2::from_shape_fn((points.len(), nodes.len()), |(p, n)| {
-        solution[(n, p)]
-    }))
+    let of_affine = &system * basis;
+    let mut weights = Array2::zeros((points_mm.len(), nodes.len()));
+    let blocks = points_mm
+        .chunks(BLOCK)
+        .zip(weights.axis_chunks_iter_mut(ndarray::Axis(0), BLOCK));
+    for (points_mm, mut weights) in blocks {
+        let points = local.places(points_mm);
+        let at_points = affine.at(&points);
+        let mut solution = greens(&points);
+        solution -= &of_affine * at_points.transpose();
+        remove_affine(basis, &mut solution);
+        factors.solve_in_place(&mut solution);
+        remove_affine(basis, &mut solution);
+        solution += basis * at_points.transpose();
+        for ((point, node), weight) in weights.indexed_iter_mut() {
+            *weight = solution[(node, point)];
+        }
+    }
+    Some(weights)
 }
 
 /// φ(r) = r² ln r from r².

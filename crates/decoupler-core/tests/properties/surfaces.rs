@@ -1,5 +1,7 @@
 //! Splines through lattices of nodes with arbitrary distances, heights, units and origins.
 
+use std::sync::Arc;
+
 use decoupler_core::surface::{Interpolation, SurfaceMap};
 use proptest::prelude::*;
 
@@ -138,4 +140,21 @@ proptest! {
         let off = largest_difference(&raised.surface(), &expected);
         prop_assert!(off < 1e-11, "raised: {off:e}");
     }
+}
+
+#[test]
+fn a_lattice_has_one_shared_map_as_long_as_it_is_used() {
+    let (x_mm, y_mm) = ([0.0, 1.5, 4.0], [-1.0, 0.25, 3.0, 5.0]);
+    let shared = || SurfaceMap::shared(&x_mm, &y_mm).unwrap();
+    let first = shared();
+    assert!(Arc::ptr_eq(&first, &shared()));
+    let transposed = SurfaceMap::shared(&y_mm, &x_mm).unwrap();
+    assert!(!Arc::ptr_eq(&first, &transposed));
+    let heights_mm = Vec::from_iter((0..12).map(|node| f64::from(node * node % 7)));
+    let own = SurfaceMap::new(&x_mm, &y_mm).unwrap();
+    assert_eq!(first.evaluate(&heights_mm), own.evaluate(&heights_mm));
+    assert!(SurfaceMap::shared(&x_mm, &[]).is_err());
+    let used = Arc::downgrade(&first);
+    drop(first);
+    assert!(used.upgrade().is_none(), "nobody uses it any more");
 }

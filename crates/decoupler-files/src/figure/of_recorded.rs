@@ -183,16 +183,16 @@ impl TargetSurface {
         let first = positions.first().and_then(|first| targets.get(first.target));
         let (map, nodes) = match TargetPosition::lattice(positions) {
             Some(lattice) => (
-                SurfaceMap::new(lattice.x_mm(), lattice.y_mm())?,
+                SurfaceMap::shared(lattice.x_mm(), lattice.y_mm())?,
                 lattice.places().iter().map(|&place| positions[place]).collect(),
             ),
             None => (
-                SurfaceMap::scattered(&TargetPosition::places_mm(positions))?,
+                Arc::new(SurfaceMap::scattered(&TargetPosition::places_mm(positions))?),
                 positions.to_vec(),
             ),
         };
         Ok(Self {
-            map: Arc::new(map),
+            map,
             nodes,
             unit: first.and_then(|first| first.unit.as_deref()).map(Arc::from),
         })

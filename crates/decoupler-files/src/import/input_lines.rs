@@ -37,6 +37,16 @@ pub struct InputLines {
     /// Cells of the line as numbers; NaN if they are not numbers.
     cells: Vec<f64>,
     readings: Vec<f64>,
+    kept: Vec<KeptCell>,
+}
+
+/// Cell of a line that is copied to the output.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct KeptCell {
+    /// Name of its column, with the unit in brackets if there is one.
+    pub title: String,
+    /// Its text.
+    pub text: String,
 }
 
 /// Parsed line.
@@ -55,6 +65,8 @@ pub enum InputLine<'a> {
         row_index: usize,
         /// Readings in the order of the inputs; with a memory, their features.
         readings: &'a [f64],
+        /// Time, group and row-wire of the line, as far as it has them.
+        kept: &'a [KeptCell],
     },
 }
 
@@ -110,6 +122,7 @@ impl InputLines {
             columns: None,
             cells: Vec::new(),
             readings: Vec::new(),
+            kept: Vec::new(),
         }
     }
 
@@ -203,11 +216,20 @@ impl InputLines {
             return Err(InputLineError::NoValue(name.to_owned()));
         }
         columns.gather(&self.cells, &mut self.readings);
+        for ((column, _), kept) in columns.kept.iter().zip(&mut self.kept) {
+            kept.text.clear();
+            let field = self.fields.iter().nth(*column).unwrap_or_default();
+            kept.text.push_str(&String::from_utf8_lossy(field));
+        }
         let readings = match &mut self.memory {
             None => &self.readings,
             Some(memory) => memory.step(row_index, &self.readings, columns.time_s(&self.cells)),
         };
-        Ok(InputLine::Readings { row_index, readings })
+        Ok(InputLine::Readings {
+            row_index,
+            readings,
+            kept: &self.kept,
+        })
     }
 
     /// Takes the lines of the start into the memory; those without all inputs are no samples.
@@ -261,6 +283,12 @@ impl InputLines {
         };
         // The header of a device that starts again does not begin another start.
         if self.columns.as_ref() != Some(&columns) {
+            let titles = columns.kept.iter().map(|(_, title)| title.clone());
+            let cells = titles.map(|title| KeptCell {
+                title,
+                ..KeptCell::default()
+            });
+            self.kept = cells.collect();
             (self.columns, self.derived) = (Some(columns), derived);
         }
         Ok(())
@@ -350,7 +378,9 @@ mod tests {
     fn readings(lines: &mut InputLines, line: u64, text: &str) -> Option<(usize, Vec<f64>)> {
         match lines.parse(line, text.as_bytes()).unwrap() {
             InputLine::NoReadings | InputLine::Start { .. } => None,
-            InputLine::Readings { row_index, readings } => Some((row_index, readings.to_vec())),
+            InputLine::Readings {
+                row_index, readings, ..
+            } => Some((row_index, readings.to_vec())),
         }
     }
 

@@ -47,6 +47,8 @@ pub struct InputColumns {
     pub row_wire: Option<usize>,
     /// Time column, if there is one.
     pub time: Option<InputTime>,
+    /// Columns copied to the output, with their titles.
+    pub kept: Vec<(usize, String)>,
     /// Number of columns of the table.
     pub width: usize,
 }
@@ -69,6 +71,8 @@ pub struct OtherColumns {
     pub time: Option<String>,
     /// Unit of the times, if the header does not give it.
     pub time_unit: Option<String>,
+    /// Columns that say when or to what a sample belongs and are copied to the output.
+    pub kept: Vec<String>,
 }
 
 /// Reason why the columns of a table are not the inputs of a network.
@@ -164,6 +168,7 @@ impl InputColumns {
             inputs: (before..width).collect(),
             row_wire: has_row_wire.then_some(0),
             time: None,
+            kept: Vec::new(),
             width,
         })
     }
@@ -224,9 +229,16 @@ impl InputColumns {
             let unit_s = super::selection::seconds(unit)?;
             Some(InputTime { column, unit_s })
         });
+        let kept = others.kept.iter().filter_map(|name| Some(names.find(name).ok()?.column));
+        let kept = kept.filter(|column| !found.contains(column)).map(|column| {
+            let Column { name, unit, .. } = &columns[column];
+            let (name, unit) = (name.clone(), unit.clone());
+            (column, Channel { name, unit }.title())
+        });
         Ok(Self {
-            inputs: found,
+            kept: kept.collect(),
             row_wire: other(&others.row_wire),
+            inputs: found,
             time,
             width: columns.len(),
         })
@@ -265,6 +277,7 @@ impl Recipe {
             inputs: columns,
             row_wire,
             time,
+            kept,
             ..
         } = found.map_err(|source| ImportError::Inputs {
             path: path.to_owned(),
@@ -317,15 +330,10 @@ impl Recipe {
                 features
             }
         };
-        let kept = [&self.time, &self.group, &self.row_wire].into_iter().flatten();
-        let kept = kept.filter_map(|name| Some(names.find(name).ok()?.column));
-        let kept = kept.filter(|column| !columns.contains(column)).map(|column| {
-            let Column { name, unit, cells, .. } = &table.columns[column];
-            let (name, unit) = (name.clone(), unit.clone());
-            KeptColumn {
-                title: Channel { name, unit }.title(),
-                cells: (0..table.rows).map(|row| cells.text(row)).collect(),
-            }
+        let kept = kept.into_iter().map(|(column, title)| {
+            let cells = &table.columns[column].cells;
+            let cells = (0..table.rows).map(|row| cells.text(row)).collect();
+            KeptColumn { title, cells }
         });
         Ok(InputTable {
             readings,
@@ -341,7 +349,9 @@ impl Recipe {
     pub fn other_columns(&self, problem: &Problem) -> OtherColumns {
         let needs_time = problem.memory.is_some() || self.derive.iter().any(Derived::needs_time);
         let time = self.time.clone().filter(|_| needs_time);
+        let kept = [&self.time, &self.group, &self.row_wire].into_iter().flatten();
         OtherColumns {
+            kept: kept.cloned().collect(),
             row_wire: self.row_wire.clone(),
             time_unit: time.as_ref().and_then(|time| self.units.get(time).cloned()),
             time,

@@ -46,7 +46,7 @@ pub use dialect::{Decimal, Dialect, DialectChoice, DialectError, Encoding, Separ
 pub use error::{Cure, ImportError, TableError};
 pub use format::Format;
 pub use importing::{Dropped, FileReport, JoinReport, Recording, read_table};
-pub use input_lines::{InputLine, InputLineError, InputLines, Progress, Watch};
+pub use input_lines::{InputLine, InputLineError, InputLines, KeptCell, Progress, Watch};
 pub use inputs::{InputColumns, InputError, InputTable, InputTime, KeptColumn, OtherColumns};
 pub use inspection::{ColumnKind, ColumnSummary, InspectedFile, Inspection, TimeSummary};
 pub use missing::{Condition, Missing};

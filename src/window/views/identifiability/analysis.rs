@@ -78,16 +78,11 @@ pub enum AnalysisError {
 }
 
 impl Analysis {
-    /// Analyses every row that is read; returns `None` once it `is_abandoned`. The surface of the last analysis is
-    /// reused if its nodes are the same.
+    /// Analyses every row that is read; returns `None` once it `is_abandoned`.
     ///
     /// # Errors
     /// If the sensor or the scene is invalid.
-    pub fn new(
-        question: &Question,
-        last: Option<&Self>,
-        is_abandoned: impl Fn() -> bool,
-    ) -> Result<Option<Self>, AnalysisError> {
+    pub fn new(question: &Question, is_abandoned: impl Fn() -> bool) -> Result<Option<Self>, AnalysisError> {
         let Question { sensor, scene, .. } = question;
         sensor.check()?;
         scene.check()?;
@@ -118,15 +113,9 @@ impl Analysis {
             RowModel::Each => None,
         };
         let prior_mm = scene.stroke_mm(&sensor.geometry) / 12.0_f64.sqrt();
-        let surface = match last {
-            Some(last) if lattice(&last.question.sensor) == lattice(sensor) && last.rows.len() == rows.len() => {
-                Arc::clone(&last.surface)
-            }
-            _ => {
-                let x_mm: Vec<f64> = rows.iter().map(|seen| sensor.geometry.row_x_mm(seen.row)).collect();
-                Arc::new(SurfaceMap::new(&x_mm, &lattice(sensor).1)?)
-            }
-        };
+        let read = Vec::from_iter(rows.iter().map(|seen| seen.row));
+        let (x_mm, y_mm) = sensor.geometry.lattice_mm(sensor.scale, &read);
+        let surface = SurfaceMap::shared(&x_mm, &y_mm)?;
         let alike = alike.flatten();
         let frames = |value: fn(&Identifiability, usize) -> DVec3, scale: f64| -> Vec<Frame> {
             let of_axis = |&axis: &usize| frame(sensor, &rows, &surface, |seen, node| scale * value(seen, node)[axis]);
@@ -179,14 +168,6 @@ fn align(rows: &mut [Identifiability]) {
     }
 }
 
-/// Returns x of the row-wires and y of the nodes on each.
-fn lattice(sensor: &SensorModel) -> (Vec<f64>, Vec<f64>) {
-    let x_mm = (0..sensor.scale.rows()).map(|row| sensor.geometry.row_x_mm(row));
-    let nodes = 0..sensor.scale.nodes_per_row();
-    let y_mm = nodes.map(|node| sensor.geometry.node_y_mm(sensor.scale, node));
-    (x_mm.collect(), y_mm.collect())
-}
-
 fn frame(
     sensor: &SensorModel,
     rows: &[Identifiability],
@@ -212,7 +193,7 @@ mod tests {
     use decoupler_core::scene::{Movement, Noise, Rows};
 
     fn analysis(question: &Question) -> Analysis {
-        Analysis::new(question, None, || false).unwrap().unwrap()
+        Analysis::new(question, || false).unwrap().unwrap()
     }
 
     #[test]
@@ -293,11 +274,9 @@ mod tests {
         question.scene.movement = Movement::SIDEWAYS;
         let found = analysis(&question);
         assert_eq!((found.patterns.len(), found.sensitivities.len()), (3, 3));
-        assert!(Analysis::new(&question, Some(&found), || true).unwrap().is_none());
+        assert!(Analysis::new(&question, || true).unwrap().is_none());
         question.sensor.geometry.height_mm = -1.0;
-        let message = Analysis::new(&question, Some(&found), || false)
-            .unwrap_err()
-            .to_string();
+        let message = Analysis::new(&question, || false).unwrap_err().to_string();
         assert!(message.contains("height"), "{message}");
     }
 }

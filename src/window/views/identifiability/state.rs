@@ -115,7 +115,6 @@ pub struct IdentifiabilityWorker {
     job: Job<Answered>,
     /// The newest question, waiting while another is answered.
     waiting: Option<Question>,
-    last: Option<Arc<Analysis>>,
 }
 
 impl IdentifiabilityWorker {
@@ -124,7 +123,6 @@ impl IdentifiabilityWorker {
         Self {
             job: Job::new("identifiability", wake),
             waiting: None,
-            last: None,
         }
     }
 
@@ -142,9 +140,6 @@ impl IdentifiabilityWorker {
     pub fn next_answer(&mut self) -> Option<Answer> {
         loop {
             let answered = self.job.next_event()?;
-            if let Ok(Some(analysis)) = &answered {
-                self.last = Some(Arc::clone(analysis));
-            }
             let next = self.waiting.take();
             let is_newest = next.is_none();
             if let Some(question) = next {
@@ -157,12 +152,11 @@ impl IdentifiabilityWorker {
     }
 
     fn begin(&mut self, question: Question) {
-        let last = self.last.clone();
         self.job.start(
             move |report| {
                 let begun = Instant::now();
                 let is_abandoned = || report.is_cancelled() && begun.elapsed() > SHORT;
-                let analysis = Analysis::new(&question, last.as_deref(), is_abandoned);
+                let analysis = Analysis::new(&question, is_abandoned);
                 Ok(analysis.map_err(|error| error.to_string())?.map(Arc::new))
             },
             |ended| ended.unwrap_or_else(|error| Err(format!("{error}; change a value to try again"))),

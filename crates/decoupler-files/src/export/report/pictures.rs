@@ -147,10 +147,8 @@ fn array_surfaces(
     let source = &settings.source;
     let (scale, geometry) = (source.sensor.scale, &source.sensor.geometry);
     let rows = source.scene.rows.read(scale.rows()).ok()?;
-    let x_mm: Vec<f64> = rows.iter().map(|&row| geometry.row_x_mm(row)).collect();
-    let nodes = 0..scale.nodes_per_row();
-    let y_mm: Vec<f64> = nodes.map(|node| geometry.node_y_mm(scale, node)).collect();
-    let map = Arc::new(SurfaceMap::new(&x_mm, &y_mm).ok()?);
+    let (x_mm, y_mm) = geometry.lattice_mm(scale, &rows);
+    let map = SurfaceMap::shared(&x_mm, &y_mm).ok()?;
     let snapshots = test.snapshots();
     let samples = snapshots.get(worst.snapshot)?;
     let nodes_of = |row: ndarray::ArrayView1<'_, f64>| -> Vec<DVec3> {

@@ -62,10 +62,8 @@ impl Decoding {
                 .map_err(|error| error.to_string())?;
             rest_ohm.extend(of_row);
         }
-        let x_mm: Vec<f64> = rows.iter().map(|&row| sensor.geometry.row_x_mm(row)).collect();
-        let nodes = 0..scale.nodes_per_row();
-        let y_mm: Vec<f64> = nodes.map(|node| sensor.geometry.node_y_mm(scale, node)).collect();
-        let surface = SurfaceMap::new(&x_mm, &y_mm).map_err(|error| error.to_string())?;
+        let (x_mm, y_mm) = sensor.geometry.lattice_mm(scale, &rows);
+        let surface = SurfaceMap::shared(&x_mm, &y_mm).map_err(|error| error.to_string())?;
         let height_mm = sensor.geometry.height_mm;
         let noise = scene
             .noise
@@ -77,7 +75,7 @@ impl Decoding {
             compiled: CompiledNetworks::new(&network.network, rows.len()),
             network,
             sensor,
-            surface: Arc::new(surface),
+            surface,
             z_range_mm: height_mm - scene.stroke_mm(&sensor.geometry)..=height_mm,
             re_zero: ReZero::new(rest_ohm.clone(), scale.columns(), noise),
             zero: zero.filter(|zero| zero.is_sound(rows.len(), scale.columns())),

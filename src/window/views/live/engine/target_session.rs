@@ -317,7 +317,9 @@ impl TargetLines {
         };
         match self.parser.parse(number, text) {
             Ok(InputLine::NoReadings | InputLine::Start { .. }) => Next::Nothing,
-            Ok(InputLine::Readings { row_index, readings }) => {
+            Ok(InputLine::Readings {
+                row_index, readings, ..
+            }) => {
                 sample[0] = row_index as f64;
                 sample[1..].copy_from_slice(readings);
                 Next::Frame(arrived)
