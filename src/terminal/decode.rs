@@ -305,6 +305,7 @@ pub(super) fn write_heading(file: &NetworkFile, kept: &[String], rows: usize, ou
         let half_width = of_target.is_some_and(Option::is_some).then(|| Channel {
             name: half_width_name(target),
             unit: target.unit.clone(),
+            original: None,
         });
         [Some(target.clone()), half_width].into_iter().flatten()
     });

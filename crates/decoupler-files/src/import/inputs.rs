@@ -198,7 +198,7 @@ impl InputColumns {
     fn find(columns: &[Column], inputs: &[Channel], others: &OtherColumns) -> Result<Self, InputError> {
         let names = Names::of_columns(&[columns], &[]);
         let mut found = Vec::with_capacity(inputs.len());
-        for Channel { name, unit } in inputs {
+        for Channel { name, unit, .. } in inputs {
             let column = match names.find(name) {
                 Ok(id) => id.column,
                 Err(ImportError::Unknown { name, near }) => return Err(InputError::Missing { name, near }),
@@ -323,7 +323,12 @@ impl Recipe {
             let Column { name, unit, cells, .. } = &table.columns[column];
             let (name, unit) = (name.clone(), unit.clone());
             KeptColumn {
-                title: Channel { name, unit }.title(),
+                title: Channel {
+                    name,
+                    unit,
+                    original: None,
+                }
+                .title(),
                 cells: (0..table.rows).map(|row| cells.text(row)).collect(),
             }
         });
