@@ -38,7 +38,8 @@ fn names_in_headers_are_printed_without_control_characters_and_cut() {
         );
         for text in [&output.stdout, &output.stderr].map(|bytes| String::from_utf8_lossy(bytes)) {
             assert!(!has_control(&text), "{arguments:?}: {text:?}");
-            assert!(text.lines().all(|line| line.len() < 5000), "{arguments:?}");
+            // The JSON on one line has the beginnings of the originals, too.
+            assert!(text.lines().all(|line| line.len() < 10_000), "{arguments:?}");
         }
     }
 }

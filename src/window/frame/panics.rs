@@ -7,9 +7,8 @@ use eframe::egui::Key;
 use crate::{
     driver::Driver,
     window::{
-        Notice, Phase,
         job::planned_panic::{MESSAGE, is_pending, plan},
-        shared::View as _,
+        shared::{Notice, Phase, View as _},
     },
 };
 
@@ -32,6 +31,8 @@ fn shows_panic(driver: &mut Driver, name: &'static str) {
         };
         driver.window_mut().notices.dismiss(place);
     }
+    // The layout without notices.
+    driver.harness().run_steps(2);
 }
 
 #[test]
@@ -45,7 +46,7 @@ fn jobs_of_a_training_can_be_started_again_after_a_panic() {
     panics(&mut driver, "preview", |driver| driver.click("10×8"));
     driver.configure_small();
     panics(&mut driver, "ready network", |driver| {
-        driver.act("Press the middle of the surface")
+        driver.act("Press the middle of the surface");
     });
     driver.press(Key::Escape);
     driver.train();
@@ -70,8 +71,12 @@ fn jobs_of_a_training_can_be_started_again_after_a_panic() {
         driver.harness().run_steps(2);
         driver.press(Key::ArrowLeft);
     });
+    driver.get("Epoch of the displayed network").focus();
+    driver.harness().run_steps(2);
     driver.press(Key::ArrowLeft);
-    driver.wait("the network of the epoch", |driver| driver.says("Network of epoch 14"));
+    driver.wait("the network of the epoch", |driver| {
+        driver.views().train.scrub.result().is_some()
+    });
     driver.click_button("Latest");
 
     panics(&mut driver, "decoders", |driver| driver.click("More decoders"));
@@ -80,7 +85,7 @@ fn jobs_of_a_training_can_be_started_again_after_a_panic() {
     driver.wait("a decoder", |driver| driver.says("Ridge, Z %: "));
 
     panics(&mut driver, "fits", |driver| {
-        driver.act("Press the middle of the surface")
+        driver.act("Press the middle of the surface");
     });
     driver.press(Key::Escape);
     plan("comparison");
@@ -105,14 +110,14 @@ fn jobs_of_the_other_views_can_be_started_again_after_a_panic() {
     driver.wait_for_kept_run();
 
     panics(&mut driver, "identifiability", |driver| {
-        driver.click_button("Identifiability")
+        driver.click_button("Identifiability");
     });
     driver.enter("Height", "8");
     driver.wait("the analysis", |driver| {
         driver.views().identifiability.analysis.is_some()
     });
     panics(&mut driver, "clipboard", |driver| {
-        driver.act("Copy singular values as a picture")
+        driver.act("Copy singular values as a picture");
     });
     driver.act("Copy singular values as a picture");
     driver.wait("the picture", |driver| matches!(driver.notice(), Some(Notice::Done(_))));
@@ -134,7 +139,7 @@ fn jobs_of_the_other_views_can_be_started_again_after_a_panic() {
     driver.click_button("Live");
     panics(&mut driver, "live", |driver| driver.click("▶ Start"));
     panics(&mut driver, "sample", |driver| {
-        driver.click("Play the sample recording")
+        driver.click("Play the sample recording");
     });
     driver.click("▶ Start");
     driver.wait("a frame", |driver| driver.has("Live decoupled surface"));
@@ -157,7 +162,7 @@ fn jobs_of_a_recording_can_be_started_again_after_a_panic() {
         let mut effects = Vec::new();
         let window = driver.window_mut();
         let (view, shared) = (&mut window.views.train, &window.shared);
-        assert!(view.take_files(&[path.clone()], shared, &mut effects));
+        assert!(view.take_files(std::slice::from_ref(&path), shared, &mut effects));
         driver.harness().step();
     };
     panics(&mut driver, "opening", open);
