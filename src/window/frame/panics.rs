@@ -82,18 +82,8 @@ fn jobs_of_a_training_can_be_started_again_after_a_panic() {
     panics(&mut driver, "decoders", |driver| driver.click("More decoders"));
     driver.click("More decoders");
     driver.click("More decoders");
-    driver.wait("a decoder", |driver| driver.says("Ridge, Z %: "));
-
-    panics(&mut driver, "fits", |driver| {
-        driver.act("Press the middle of the surface");
-    });
-    driver.press(Key::Escape);
-    plan("comparison");
-    driver.act("Press the middle of the surface");
-    shows_panic(&mut driver, "comparison");
-    driver.press(Key::Escape);
-    driver.act("Press the middle of the surface");
-    driver.wait("the other decoders", |driver| !driver.says("internal error"));
+    driver.wait("a decoder", |driver| !driver.says("internal error"));
+    driver.click("More decoders");
 
     driver.enter("Hidden nodes", "5");
     plan("compared run");
