@@ -9,3 +9,15 @@
 
 pub mod terminal;
 pub mod window;
+
+// The driver of the window's tests names this crate as they do.
+#[cfg(test)]
+extern crate self as decoupler;
+#[cfg(test)]
+#[allow(dead_code, reason = "shared with the tests of the window")]
+#[path = "../tests/window/driver.rs"]
+mod driver;
+#[cfg(test)]
+#[allow(dead_code, reason = "shared with the tests of the window")]
+#[path = "../tests/window/rasterise.rs"]
+mod rasterise;

@@ -54,6 +54,19 @@ fn modules_use_only_earlier_modules_and_views_no_other_view() {
     assert_eq!(faults, Vec::<String>::new());
 }
 
+/// There a panic becomes an event, which the window shows.
+#[test]
+fn threads_are_started_in_one_place() {
+    let window = Path::new(env!("CARGO_MANIFEST_DIR")).join("src/window");
+    let starts = sources(&window).into_iter().filter(|file| {
+        let text = fs::read_to_string(file).unwrap();
+        ["thread::spawn", "thread::Builder", "rayon::spawn", ".spawn("]
+            .iter()
+            .any(|start| text.contains(start))
+    });
+    assert_eq!(Vec::from_iter(starts), [window.join("job/mod.rs")]);
+}
+
 fn place_of(module: &str) -> Option<usize> {
     ORDER.iter().position(|place| module.trim_end_matches(".rs") == *place)
 }

@@ -16,11 +16,8 @@ use decoupler_core::{
     text::inert,
     training::StoppingRules,
 };
-use decoupler_files::{
-    export::{
-        AtomicFile, NetworkFile, WriteError, check_writable, format_number, is_same, write_decoded,
-        write_decoded_header,
-    },
+use decoupler_files::export::{
+    AtomicFile, NetworkFile, WriteError, check_writable, format_number, is_same, write_decoded, write_decoded_header,
 };
 use glam::DVec3;
 use ndarray::{Array2, ArrayView1, Axis, Slice};
@@ -303,6 +300,7 @@ pub(super) fn write_heading(file: &NetworkFile, kept: &[String], rows: usize, ou
         let half_width = of_target.is_some_and(Option::is_some).then(|| Channel {
             name: half_width_name(target),
             unit: target.unit.clone(),
+            original: None,
         });
         [Some(target.clone()), half_width].into_iter().flatten()
     });

@@ -127,6 +127,10 @@ fn columns_table(columns: &[ColumnSummary]) -> Table {
         };
         let number = |number: Option<f64>| number.map_or("–".to_owned(), plain);
         let notes = [
+            column
+                .original
+                .as_deref()
+                .map(|original| format!("in the file: {}", beginning(original))),
             column.is_constant.then(|| "constant".to_owned()),
             column.is_rounding.then(|| "constant but for rounding".to_owned()),
             column
@@ -155,6 +159,15 @@ fn columns_table(columns: &[ColumnSummary]) -> Table {
     Table {
         columns: names.map(TableColumn::field).into(),
         rows: columns.iter().map(row).collect(),
+    }
+}
+
+/// Returns the first characters of a name.
+fn beginning(name: &str) -> String {
+    const LONGEST: usize = 60;
+    match name.char_indices().nth(LONGEST) {
+        None => name.to_owned(),
+        Some((end, _)) => format!("{}…", &name[..end]),
     }
 }
 

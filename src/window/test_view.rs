@@ -444,6 +444,7 @@ mod tests {
                 Channel {
                     name: name.to_owned(),
                     unit: (!unit.is_empty()).then(|| unit.to_owned()),
+                    original: None,
                 }
             };
             position_pair(&Vec::from_iter(titles.split(' ').map(channel)))

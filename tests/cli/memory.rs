@@ -89,7 +89,13 @@ fn a_memory_removes_creep_and_goes_with_the_network() {
     // The times are copied as they came.
     let header = streamed.lines().next().unwrap();
     assert!(header.starts_with("t,"), "{header}");
-    let times = |text: &str| Vec::from_iter(text.lines().skip(1).map(|line| line.split(',').next().unwrap().to_owned()));
+    let times = |text: &str| {
+        Vec::from_iter(
+            text.lines()
+                .skip(1)
+                .map(|line| line.split(',').next().unwrap().to_owned()),
+        )
+    };
     assert_eq!(times(&streamed), times(&readings));
     let objects = succeed(
         "decode --network n.json --follow --format jsonl --input readings.csv",

@@ -321,20 +321,23 @@ fn closing_the_window_while_it_records_ends_at_once_and_loses_no_frame() {
     assert!(recording.times_s().len() >= frames as usize);
 }
 
+/// Returns the frame of the array at rest, and its line.
+fn at_rest(file: &NetworkFile) -> (Vec<f64>, String) {
+    let sensor = file.settings.simulated().unwrap().source.sensor;
+    let at_rest = vec![DVec3::ZERO; sensor.scale.nodes_per_row()];
+    let rows = (0..10).map(|row| sensor.row_resistances(row, &at_rest).unwrap());
+    let frame_ohm: Vec<f64> = rows.flatten().collect();
+    let numbers = frame_ohm.iter().map(|ohm| format!("{ohm:?}"));
+    let line = Vec::from_iter(numbers).join(",");
+    (frame_ohm, line)
+}
+
 #[test]
 fn a_socket_is_decoded_and_its_bad_lines_and_end_are_reported() {
     let folder = tempfile::tempdir().unwrap();
     let mut driver = open(folder.path());
     let file = network(&driver, 0);
-    let sensor = file.settings.simulated().unwrap().source.sensor;
-    let at_rest = vec![DVec3::ZERO; sensor.scale.nodes_per_row()];
-    let rows = (0..10).map(|row| sensor.row_resistances(row, &at_rest).unwrap());
-    let frame_ohm: Vec<f64> = rows.flatten().collect();
-    let line = frame_ohm
-        .iter()
-        .map(|ohm| format!("{ohm:?}"))
-        .collect::<Vec<_>>()
-        .join(",");
+    let (frame_ohm, line) = at_rest(&file);
 
     let listener = TcpListener::bind("127.0.0.1:0").unwrap();
     driver.click_button("TCP");
@@ -363,6 +366,38 @@ fn a_socket_is_decoded_and_its_bad_lines_and_end_are_reported() {
     driver.click("▶ Start");
     drop(listener);
     driver.wait("the end of the source", |driver| driver.views().live.running.is_none());
+}
+
+#[test]
+fn a_stream_that_has_ended_or_is_lost_is_connected_again_with_one_click() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut driver = open(folder.path());
+    let file = network(&driver, 0);
+    let (_, line) = at_rest(&file);
+    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+    let address = listener.local_addr().unwrap();
+    driver.click_button("TCP");
+    driver.enter("Address", &address.to_string());
+    driver.click("▶ Start");
+    let (mut sender, _) = listener.accept().unwrap();
+    writeln!(sender, "{line}").unwrap();
+    driver.wait("a frame", |driver| driver.has("Decoded: 1"));
+    assert!(!driver.has("Try again"), "it has not ended");
+    drop((sender, listener));
+    driver.wait("the end", |driver| driver.says("The source has ended."));
+
+    driver.click("Try again");
+    driver.wait("the failure", |driver| driver.says("cannot connect"));
+    let listener = TcpListener::bind(address).unwrap();
+    driver.click("Try again");
+    let (mut sender, _) = listener.accept().unwrap();
+    assert!(!driver.says("cannot connect"), "the notice goes with the retry");
+    writeln!(sender, "{line}").unwrap();
+    driver.wait("a frame", |driver| driver.has("Decoded: 1"));
+    drop(sender);
+    driver.wait("the end", |driver| driver.has("Try again"));
+    driver.enter("Address", "localhost:1");
+    assert!(!driver.has("Try again"), "another source is not a retry");
 }
 
 #[test]

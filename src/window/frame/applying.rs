@@ -5,6 +5,7 @@ use std::{
 
 use super::{DecouplerWindow, clipboard::ToCopy, files::Found, remembered::is_within_limits, save_form::Saving};
 use crate::window::{
+    job::caught,
     preview,
     shared::{
         Effect, FileInUse, FileTask, Look, Matter, Offers, Phase, Purpose, RecordingDraft, RunView, SourceKind,
@@ -260,7 +261,11 @@ impl DecouplerWindow {
             Purpose::SaveTraining(run, contents) => {
                 let (send, taken) = channel();
                 let inspection = Inspection::new(move |run| {
-                    let taken = run.map_err(str::to_owned).and_then(|run| contents.take(run));
+                    // The training continues if this panics.
+                    let taken = caught("training", || {
+                        run.map_err(str::to_owned).and_then(|run| contents.take(run))
+                    });
+                    let taken = taken.map_err(|error| error.to_string()).flatten();
                     // The thread that writes the file is waiting for it.
                     let _ = send.send(taken);
                 });

@@ -170,6 +170,7 @@ impl DecouplerWindow {
         let actions = self.offer_actions(ui.ctx(), &mut effects);
         self.take_dropped(ui.ctx(), &mut effects);
         let is_asked = self.is_asked();
+        let can_reconnect = self.views.live.can_retry(&self.shared);
         let (view, shared) = (&mut *self.views.all()[self.shown], &self.shared);
         if !is_asked {
             view.take_pointer(ui.ctx(), shared);
@@ -218,8 +219,12 @@ impl DecouplerWindow {
         let replies = egui::CentralPanel::default().frame(background).show(ui, |ui| {
             let mut replies = Vec::new();
             for (place, (matter, notice)) in self.notices.iter().enumerate() {
-                let can_restart = matter == Matter::Training && shared.phase == Phase::Died;
-                replies.extend(notice_ui(ui, notice, can_restart).map(|reply| (place, reply)));
+                let remedy = match matter {
+                    Matter::Training if shared.phase == Phase::Died => Some(notices::Reply::Restart),
+                    Matter::Live if can_reconnect => Some(notices::Reply::Reconnect),
+                    _ => None,
+                };
+                replies.extend(notice_ui(ui, notice, remedy).map(|reply| (place, reply)));
             }
             view.body_ui(ui, shared, &mut effects);
             replies
@@ -250,6 +255,7 @@ impl DecouplerWindow {
             match reply {
                 notices::Reply::Dismiss => self.notices.dismiss(place),
                 notices::Reply::Restart => self.restart_worker(),
+                notices::Reply::Reconnect => self.views.live.retry(&self.shared, &mut effects),
             }
         }
         self.apply_all(effects);

@@ -4,6 +4,7 @@ use super::{
     files::Answer,
 };
 use crate::window::{
+    job::JobError,
     preview::PreviewEvent,
     shared::{Matter, Notice, Phase, Preview, RunView},
     training_worker::Event,
@@ -167,8 +168,12 @@ impl DecouplerWindow {
             Event::Finished(Ok(file)) => self.runs.keep(*file),
             Event::Finished(Err(reason)) => self.notices.fail(Matter::Training, reason),
             Event::Died(reason) => {
-                shared.phase = Phase::Died;
-                let reason = reason.map(|error| format!(" ({error})")).unwrap_or_default();
+                match &reason {
+                    // The next training needs a thread.
+                    Some(JobError::Panicked { .. }) => self.restart_worker(),
+                    _ => shared.phase = Phase::Died,
+                }
+                let reason = reason.map(|error| format!(": {error}")).unwrap_or_default();
                 let text = format!("The training ended unexpectedly{reason}. The results shown remain available.");
                 self.notices.fail(Matter::Training, text);
             }

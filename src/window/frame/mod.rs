@@ -10,6 +10,8 @@ mod events;
 mod files;
 mod help;
 mod notices;
+#[cfg(test)]
+mod panics;
 mod remembered;
 mod save_form;
 #[cfg(test)]

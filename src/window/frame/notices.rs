@@ -92,11 +92,22 @@ pub enum Reply {
     Dismiss,
     /// Restart the training thread.
     Restart,
+    /// Connect again to the stream that has ended.
+    Reconnect,
 }
 
-/// Shows the notices in a strip above the view: failures with what to do, and successes. The training thread can be
-/// restarted from it if `can_restart`.
-pub fn notice_ui(ui: &mut Ui, notice: &Notice, can_restart: bool) -> Option<Reply> {
+impl Reply {
+    fn name(&self) -> &'static str {
+        match self {
+            Self::Dismiss => "Dismiss",
+            Self::Restart => "Start again",
+            Self::Reconnect => "Try again",
+        }
+    }
+}
+
+/// Shows a notice in a strip above the view, a failure or a success, and a button for the `remedy`, if there is one.
+pub fn notice_ui(ui: &mut Ui, notice: &Notice, remedy: Option<Reply>) -> Option<Reply> {
     let mut reply = None;
     let palette = Theme::of(ui).palette;
     let (text, colour) = match notice {
@@ -111,11 +122,13 @@ pub fn notice_ui(ui: &mut Ui, notice: &Notice, can_restart: bool) -> Option<Repl
     frame.show(ui, |ui| {
         ui.horizontal(|ui| {
             ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
-                if ui.button("Dismiss").clicked() {
+                if ui.button(Reply::Dismiss.name()).clicked() {
                     reply = Some(Reply::Dismiss);
                 }
-                if can_restart && ui.button("Start again").clicked() {
-                    reply = Some(Reply::Restart);
+                if let Some(remedy) = remedy
+                    && ui.button(remedy.name()).clicked()
+                {
+                    reply = Some(remedy);
                 }
                 ui.with_layout(Layout::left_to_right(Align::Center), |ui| {
                     ui.add(eframe::egui::Label::new(RichText::new(text).color(colour)).wrap());

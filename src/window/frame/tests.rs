@@ -102,11 +102,17 @@ fn a_worker_that_died_takes_no_results_with_it_also_when_another_is_started() {
     let mut window = Opened::trained();
     let ended = window.shared.phase;
     window.worker = Worker::dying(Arc::clone(&window.wake));
-    window.wait(|window| window.shared.phase == Phase::Died);
+    window.wait(|window| window.notice().is_some());
+    let Some(Notice::Failed(reason)) = window.notice() else {
+        panic!("{:?}", window.notice())
+    };
+    assert!(
+        reason.contains("an internal error stopped the thread 'training': a test"),
+        "{reason}"
+    );
+    assert_eq!(window.shared.phase, ended);
     assert!(window.shared.result().is_some());
-    window.restart_worker();
-    assert_eq!((window.shared.phase, window.notice()), (ended, None));
-    assert!(window.shared.result().is_some());
+    window.apply(Effect::Settle(Matter::Training));
 
     export(&mut window, "network.json".into());
     window.wait(|window| window.notice().is_some());
@@ -129,8 +135,6 @@ fn a_worker_that_died_takes_no_results_with_it_also_when_another_is_started() {
 fn a_picture_that_died_with_the_worker_is_drawn_by_the_next() {
     let mut window = Opened::new();
     window.worker = Worker::dying(Arc::clone(&window.wake));
-    window.wait(|window| window.shared.phase == Phase::Died);
-    window.restart_worker();
     window.wait(|window| {
         window
             .shared

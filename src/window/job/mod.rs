@@ -26,7 +26,7 @@ const LONGEST_WAIT: Duration = Duration::from_millis(150);
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum JobError {
     /// A bug in the program.
-    #[error("the thread '{name}' ended unexpectedly: {panic}")]
+    #[error("an internal error stopped the thread '{name}': {panic}. Other work is not affected")]
     Panicked {
         /// The thread.
         name: &'static str,
@@ -85,7 +85,10 @@ impl<E: Send + 'static> Job<E> {
         let (name, yields) = (self.name, self.yields);
         let before = self.newest.take().map(|piece| piece.mailbox);
         let mailbox = Arc::new(Mailbox::new());
-        let report = Report::new(Arc::clone(&mailbox), Arc::clone(&self.wake));
+        let report = || Report::new(Arc::clone(&mailbox), Arc::clone(&self.wake));
+        let [in_work, at_end] = [report(), report()];
+        #[cfg(test)]
+        let work = planned_panic::before(name, work);
         let run = move || {
             if yields {
                 yield_to_window();
@@ -93,17 +96,12 @@ impl<E: Send + 'static> Job<E> {
             if let Some(before) = before {
                 before.wait_for_end(None);
             }
-            let result = catch_unwind(AssertUnwindSafe(|| work(&report)));
-            report.end(last(result.map_err(|panic| JobError::Panicked {
-                name,
-                panic: message(panic.as_ref()),
-            })));
+            work(&in_work)
         };
-        let thread = match thread::Builder::new().name(name.to_owned()).spawn(run) {
+        let thread = match start_thread(name, run, move |result| at_end.end(last(result))) {
             Ok(thread) => Some(thread),
             Err(error) => {
-                let report = Report::new(Arc::clone(&mailbox), Arc::clone(&self.wake));
-                report.end(last(Err(JobError::NoThread(error.to_string()))));
+                report().end(last(Err(error)));
                 None
             }
         };
@@ -169,6 +167,32 @@ impl<E> fmt::Debug for Job<E> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_struct("Job").field("name", &self.name).finish_non_exhaustive()
     }
+}
+
+/// Runs `work` on a thread of its own, and passes its result to `end` there, also if it panics. All threads of the window
+/// are started here.
+///
+/// # Errors
+/// If the system cannot start another thread.
+pub(in crate::window) fn start_thread<T: 'static>(
+    name: &'static str,
+    work: impl FnOnce() -> T + Send + 'static,
+    end: impl FnOnce(Result<T, JobError>) + Send + 'static,
+) -> Result<JoinHandle<()>, JobError> {
+    let run = move || end(caught(name, work));
+    let started = thread::Builder::new().name(name.to_owned()).spawn(run);
+    started.map_err(|error| JobError::NoThread(error.to_string()))
+}
+
+/// Runs `work`; `name` is the name of its thread.
+///
+/// # Errors
+/// If it panics.
+pub(in crate::window) fn caught<T>(name: &'static str, work: impl FnOnce() -> T) -> Result<T, JobError> {
+    catch_unwind(AssertUnwindSafe(work)).map_err(|panic| JobError::Panicked {
+        name,
+        panic: message(panic.as_ref()),
+    })
 }
 
 /// Lowers the priority of this thread and those it starts a little: on a busy machine the window gets about fifteen times
@@ -309,5 +333,7 @@ impl<E> Report<E> {
     }
 }
 
+#[cfg(test)]
+pub(in crate::window) mod planned_panic;
 #[cfg(test)]
 mod tests;

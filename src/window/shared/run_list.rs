@@ -19,12 +19,15 @@ use std::{
 use decoupler_files::export::{KeptRun, KeptRuns, NetworkFile, RunFolder};
 
 use crate::window::{
-    job::{Job, JobError, Wake},
+    job::{Job, JobError, Wake, caught},
     shared::Notice,
 };
 
 /// Longest time that closing waits for the files.
 const LONGEST_WRITE: Duration = Duration::from_secs(5);
+
+/// Name of the thread.
+const THREAD: &str = "run list";
 
 /// Requests to the thread.
 pub(super) enum RunsRequest {
@@ -74,7 +77,7 @@ impl RunsWorker {
     /// Starts the thread. `wake` is called after each event.
     pub fn start(wake: Wake) -> Self {
         let (requests, incoming) = channel();
-        let mut job = Job::new("run list", wake);
+        let mut job = Job::new(THREAD, wake);
         job.start(
             move |report| {
                 let mut folder = RunFolder::default();
@@ -139,6 +142,19 @@ impl Drop for RunsWorker {
 }
 
 fn answer(request: RunsRequest, folder: &mut RunFolder) -> Listed {
+    // The thread keeps the runs that could not be written, so it must survive.
+    let answered = caught(THREAD, || carry_out(request, folder));
+    let problems = answered.unwrap_or_else(|error| vec![format!("{error}; the change is not kept")]);
+    Listed {
+        runs: folder.runs().clone(),
+        path: folder.path().map(PathBuf::from),
+        unwritten: folder.unwritten(),
+        problems,
+    }
+}
+
+/// Carries out a request; returns the problems.
+fn carry_out(request: RunsRequest, folder: &mut RunFolder) -> Vec<String> {
     // Changes apply to the current contents of the folder.
     let mut problems = folder.look();
     match request {
@@ -159,12 +175,7 @@ fn answer(request: RunsRequest, folder: &mut RunFolder) -> Listed {
         }
         RunsRequest::Remove(id) => problems.extend(failure(folder.remove(id))),
     }
-    Listed {
-        runs: folder.runs().clone(),
-        path: folder.path().map(PathBuf::from),
-        unwritten: folder.unwritten(),
-        problems,
-    }
+    problems
 }
 
 fn failure<E: fmt::Display>(written: Result<(), E>) -> Option<String> {
@@ -281,6 +292,29 @@ mod tests {
 
     fn wait(woken: &Receiver<()>) {
         woken.recv_timeout(Duration::from_secs(60)).unwrap();
+    }
+
+    #[test]
+    fn a_request_that_panics_is_reported_and_the_next_is_answered() {
+        let (wake, woken) = channel();
+        let worker = RunsWorker::start(Arc::new(move || wake.send(()).unwrap_or(())));
+        let mut list = RunList::default();
+        worker.keep(small_run());
+        // There is no third place.
+        worker.ask(RunsRequest::Pin(PLACES.len(), None));
+        (0..2).for_each(|_| wait(&woken));
+        let Some(Notice::Failed(reason)) = list.take_events(&worker) else {
+            panic!("no failure")
+        };
+        assert!(
+            reason.contains("an internal error stopped the thread 'run list'"),
+            "{reason}"
+        );
+        assert_eq!(list.workspace.runs.len(), 1, "the run of this session is still there");
+        worker.keep(small_run());
+        wait(&woken);
+        assert_eq!(list.take_events(&worker), None);
+        assert_eq!(list.workspace.runs.len(), 2);
     }
 
     #[test]

@@ -11,7 +11,7 @@ use crate::{
     scene::{Indenter, Loading, Noise, RowModel, Rows, Scene, SceneError},
     sensor::{ArrayScale, SensorModel},
     surface::Lattice,
-    text::{cleaned, cleaned_if_any},
+    text::{cleaned, cleaned_if_any, escaped_if_any},
     training::{StoppingRules, TrainingSettings},
 };
 
@@ -293,12 +293,13 @@ fn features(memory: &Memory, channels: &[Channel]) -> Vec<Channel> {
         .map(|(name, unit)| Channel {
             name,
             unit: unit.clone(),
+            original: None,
         })
         .collect()
 }
 
 /// Name and unit of a reading or target.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Channel {
     /// Full name, as in the header of a file.
@@ -311,6 +312,13 @@ pub struct Channel {
         deserialize_with = "cleaned_if_any"
     )]
     pub unit: Option<String>,
+    /// Header of the column in the file with unprintable characters escaped, if they were removed from `name`, or it was cut.
+    #[serde(
+        default,
+        skip_serializing_if = "Option::is_none",
+        deserialize_with = "escaped_if_any"
+    )]
+    pub original: Option<String>,
 }
 
 /// Position of a target that is measured at a known place of the skin.
@@ -355,6 +363,7 @@ impl Problem {
             let channel = |number| Channel {
                 name: format!("{letter}{number}"),
                 unit: None,
+                original: None,
             };
             numbers.map(channel).collect()
         };
@@ -380,6 +389,7 @@ impl Simulation {
         let channel = |name: String, unit: &str| Channel {
             name,
             unit: Some(unit.to_owned()),
+            original: None,
         };
         let nodes = 1..=scale.nodes_per_row();
         Problem {

@@ -310,6 +310,7 @@ impl ErrorTable {
             let all = Channel {
                 name: ALL_TARGETS.to_owned(),
                 unit: Some(unit.to_owned()),
+                original: None,
             };
             blocks.push(block(all, &|errors| TargetErrors::over_all(errors.targets())));
         }
@@ -388,6 +389,7 @@ mod tests {
         let channel = |(name, unit): (&str, &str)| Channel {
             name: name.to_owned(),
             unit: Some(unit.to_owned()),
+            original: None,
         };
         Problem {
             targets: ["a", "b"].into_iter().zip(units).map(channel).collect(),

@@ -1,5 +1,6 @@
 use std::{
     io::{self, ErrorKind, Read},
+    panic::{AssertUnwindSafe, catch_unwind},
     sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError},
     thread,
     time::{Duration, Instant},
@@ -105,7 +106,9 @@ impl Lines {
         });
         let reader = Arc::clone(&shared);
         thread::Builder::new().name("lines".to_owned()).spawn(move || {
-            let end = reader.read(source, skips_first);
+            // A panic of a driver must not look like a source without lines.
+            let read = catch_unwind(AssertUnwindSafe(|| reader.read(source, skips_first)));
+            let end = read.unwrap_or_else(|_| Err(io::Error::other("an internal error stopped the reading")));
             let mut state = reader.lock();
             state.end = Some(end.err());
             reader.filled.notify_one();
@@ -302,6 +305,21 @@ mod tests {
     fn a_line_without_end_is_not_kept() {
         let long = io::Cursor::new(vec![b'x'; 3 * Lines::LONGEST]).chain(&b"\nshort\n"[..]);
         assert_eq!(all(long, false), [(1, None), (2, Some("short".to_owned()))]);
+    }
+
+    #[test]
+    fn a_reader_that_panics_ends_with_an_error() {
+        struct Panics;
+        impl Read for Panics {
+            fn read(&mut self, _: &mut [u8]) -> io::Result<usize> {
+                panic!("a defect of the driver")
+            }
+        }
+        let mut lines = Lines::spawn(Panics, Keeping::All, false).unwrap();
+        let NextLine::End(Some(error)) = lines.next(Duration::from_secs(60)) else {
+            panic!("no error")
+        };
+        assert!(error.to_string().contains("internal error"), "{error}");
     }
 
     #[test]

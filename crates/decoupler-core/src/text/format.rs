@@ -110,6 +110,22 @@ fn printable_name(name: &str) -> String {
     words.filter(|word| !word.is_empty()).collect::<Vec<_>>().join(" ")
 }
 
+/// Returns a name as it is in a file, with unprintable characters escaped (`\u{1b}`) and at most 1000 characters long; `None`
+/// if [`clean_name`] leaves it as it is, apart from the apostrophe of [`inert`].
+pub fn original_name(name: &str) -> Option<String> {
+    const LONGEST: usize = 1000;
+    let name = name.trim_matches(' ');
+    let is_kept = !name.contains(is_unprintable) && name.chars().nth(LONGEST_NAME).is_none();
+    (!is_kept).then(|| {
+        let escaped = |letter: char| match is_unprintable(letter) {
+            true => letter.escape_unicode().to_string(),
+            false => letter.to_string(),
+        };
+        let beginning = name.chars().take(LONGEST);
+        beginning.map(escaped).collect()
+    })
+}
+
 /// Returns a text that is safe in a spreadsheet, which treats a cell that begins with one of `= + - @` as a formula:
 /// such a text gets a leading apostrophe, unless it is a number.
 pub fn inert(text: &str) -> String {
@@ -142,6 +158,12 @@ pub fn printable(text: &str) -> String {
         }
     }
     escaped
+}
+
+/// Reads the original of a name; unprintable characters, which no program of ours writes, are escaped.
+pub(crate) fn escaped_if_any<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<String>, D::Error> {
+    let name = Option::<String>::deserialize(deserializer)?;
+    Ok(name.map(|name| original_name(&name).unwrap_or(name)))
 }
 
 /// Reads a name and cleans it.
@@ -280,12 +302,30 @@ mod tests {
     }
 
     #[test]
+    fn the_original_of_a_changed_name_is_printable() {
+        for (name, original) in [
+            ("force (µN)", None),
+            (" 'quoted' ", None),
+            ("'=1+2", None),
+            ("a\u{1b}[31mb", Some("a\\u{1b}[31mb")),
+            ("x\ty", Some("x\\u{9}y")),
+            ("e\u{202e}f", Some("e\\u{202e}f")),
+        ] {
+            let found = original_name(name);
+            assert_eq!(found.as_deref(), original);
+            // Cleaning the original name, as it is in the file, leads to the same name as before.
+            assert!(found.is_none_or(|found| clean_name(&found) == found));
+        }
+    }
+
+    #[test]
     fn long_names_are_cut_and_texts_for_a_terminal_escaped() {
         let long = "ü".repeat(100_000);
         let name = clean_name(&long);
         assert_eq!(name.chars().count(), 200);
         assert!(name.ends_with("ü…") && clean_name(&name) == name);
         assert_eq!(clean_name(&"x".repeat(200)), "x".repeat(200));
+        assert_eq!(original_name(&long).map(|name| name.chars().count()), Some(1000));
         let text = printable("cannot read '/a/b\u{1b}[2J\u{9b}c': \tno\nmore");
         assert_eq!(text, "cannot read '/a/b\\u{1b}[2J\\u{9b}c': \tno\nmore");
     }

@@ -332,6 +332,7 @@ mod tests {
         let force = Channel {
             name: "force".to_owned(),
             unit: Some("N".to_owned()),
+            original: None,
         };
         let figure = target_histogram_figure(&pairs, ErrorBins::new(&pairs).bin(2.0), &force);
         let plot = &figure.plots[0];

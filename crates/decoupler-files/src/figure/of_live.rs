@@ -116,6 +116,7 @@ mod tests {
         let channel = |name: &str, unit: &str| Channel {
             name: name.to_owned(),
             unit: Some(unit.to_owned()),
+            original: None,
         };
         let targets = [channel("x", "mm"), channel("force", "N"), channel("y", "mm")];
         let history = [(0.0, Arc::from([1.0, 2.0, 3.0])), (0.5, Arc::from([4.0, 5.0, 6.0]))];
@@ -135,6 +136,7 @@ mod tests {
         let target = Channel {
             name: "force".to_owned(),
             unit: None,
+            original: None,
         };
         let history = [(0.0, Arc::from([1.0])), (0.5, Arc::from([4.0]))];
         let half_width = HalfWidth {

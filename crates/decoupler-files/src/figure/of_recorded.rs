@@ -274,6 +274,7 @@ mod tests {
         let force = Channel {
             name: "force".to_owned(),
             unit: Some("N".to_owned()),
+            original: None,
         };
         let figure = hysteresis_figure(&found, &force);
         let [_, differences] = &figure.plots[..] else {
@@ -335,6 +336,7 @@ mod tests {
         let channel = |unit: &str| Channel {
             name: String::new(),
             unit: Some(unit.to_owned()),
+            original: None,
         };
         let targets = Vec::from_iter((0..8).map(|target| channel(if target == 3 { "°C" } else { "N" })));
         let places = [

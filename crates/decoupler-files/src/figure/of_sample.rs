@@ -222,6 +222,7 @@ mod tests {
         units.map(|unit| Channel {
             name: "f".to_owned(),
             unit: unit.map(str::to_owned),
+            original: None,
         })
     }
 
@@ -252,6 +253,7 @@ mod tests {
         let channel = Channel {
             name: "t".to_owned(),
             unit: None,
+            original: None,
         };
         let places = |count: usize| -> Vec<f64> {
             let values = vec![0.5; count];

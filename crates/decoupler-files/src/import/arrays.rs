@@ -2,7 +2,7 @@
 
 use std::{collections::BTreeMap, path::Path};
 
-use decoupler_core::text::clean_name;
+use decoupler_core::text::{clean_name, original_name};
 
 use super::{
     Cells, Column, Fault, Format, Table, TableError, Variable,
@@ -31,6 +31,7 @@ pub(super) fn table(
         .into_iter()
         .map(|what| format!("left out: {}", clean_name(&what)))
         .collect();
+    let originals = Vec::from_iter(arrays.iter().map(|array| original_name(&array.name)));
     let arrays = Vec::from_iter(arrays.into_iter().map(|array| Array {
         name: clean_name(&array.name),
         ..array
@@ -44,7 +45,7 @@ pub(super) fn table(
         return Err(TableError::array("there is no array of numbers", found));
     };
     let (mut columns, mut variables) = (Vec::new(), Vec::new());
-    for array in arrays {
+    for (array, original) in arrays.into_iter().zip(originals) {
         let (name, shape, first) = (array.name.clone(), array.shape.clone(), columns.len());
         let variable = |end| Variable {
             name,
@@ -77,7 +78,10 @@ pub(super) fn table(
                 (name, 1) => name.to_owned(),
                 (name, _) => format!("{name}.c{}", index + 1),
             };
-            columns.push(column(name, numbers, reading));
+            columns.push(Column {
+                original: original.clone(),
+                ..column(name, numbers, reading)
+            });
         }
         variables.push(variable(columns.len()));
     }

@@ -14,7 +14,10 @@ use super::{
     table::{Excess, Labels, Lines, name_and_unit, stem},
     time_stamp::TimeStamp,
 };
-use decoupler_core::{machine::ReadingBudget, text::clean_name};
+use decoupler_core::{
+    machine::ReadingBudget,
+    text::{clean_name, original_name},
+};
 
 /// Maximum number of rows; ten hours at 1 kHz are fewer.
 const LARGEST_ROWS: usize = 50_000_000;
@@ -317,7 +320,8 @@ impl<'a> Builder<'a> {
 pub(super) fn named(headers: &[String], width: usize) -> Vec<Column> {
     let mut columns: Vec<Column> = Vec::new();
     for index in 0..width {
-        let header = clean_name(headers.get(index).map_or("", String::as_str));
+        let given = headers.get(index).map_or("", String::as_str);
+        let header = clean_name(given);
         let (name, unit) = name_and_unit(&header);
         let wanted = if name.is_empty() {
             format!("c{}", index + 1)
@@ -327,6 +331,7 @@ pub(super) fn named(headers: &[String], width: usize) -> Vec<Column> {
         columns.push(Column {
             name: wanted,
             unit: unit.map(str::to_owned),
+            original: original_name(given),
             ..Column::default()
         });
     }

@@ -137,7 +137,11 @@ impl InputLines {
         for name in names.filter(|name| !is_derived(name)) {
             if read.iter().all(|channel| channel.name != *name) {
                 let (name, unit) = (name.clone(), None);
-                read.push(Channel { name, unit });
+                read.push(Channel {
+                    name,
+                    unit,
+                    original: None,
+                });
             }
         }
         Self { read, derive, ..self }
@@ -371,6 +375,7 @@ mod tests {
         let channel = |name: &&str| Channel {
             name: (*name).to_owned(),
             unit: None,
+            original: None,
         };
         names.iter().map(channel).collect()
     }

@@ -203,7 +203,7 @@ impl InputColumns {
     fn find(columns: &[Column], inputs: &[Channel], others: &OtherColumns) -> Result<Self, InputError> {
         let names = Names::of_columns(&[columns], &[]);
         let mut found = Vec::with_capacity(inputs.len());
-        for Channel { name, unit } in inputs {
+        for Channel { name, unit, .. } in inputs {
             let column = match names.find(name) {
                 Ok(id) => id.column,
                 Err(ImportError::Unknown { name, near }) => return Err(InputError::Missing { name, near }),
@@ -229,11 +229,19 @@ impl InputColumns {
             let unit_s = super::selection::seconds(unit)?;
             Some(InputTime { column, unit_s })
         });
-        let kept = others.kept.iter().filter_map(|name| Some(names.find(name).ok()?.column));
+        let kept = others
+            .kept
+            .iter()
+            .filter_map(|name| Some(names.find(name).ok()?.column));
         let kept = kept.filter(|column| !found.contains(column)).map(|column| {
             let Column { name, unit, .. } = &columns[column];
             let (name, unit) = (name.clone(), unit.clone());
-            (column, Channel { name, unit }.title())
+            let channel = Channel {
+                name,
+                unit,
+                original: None,
+            };
+            (column, channel.title())
         });
         Ok(Self {
             kept: kept.collect(),

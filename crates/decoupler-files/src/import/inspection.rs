@@ -41,6 +41,9 @@ pub struct ColumnSummary {
     pub name: String,
     /// Unit, if the header has one.
     pub unit: Option<String>,
+    /// Header in the file, with unprintable characters escaped, if the name lacks some of its characters.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub original: Option<String>,
     /// Kind of the cells.
     pub kind: ColumnKind,
     /// Number of missing cells.
@@ -174,6 +177,7 @@ impl ColumnSummary {
         Self {
             name: column.name.clone(),
             unit: column.unit.clone(),
+            original: column.original.clone(),
             kind,
             missing: column.missing,
             texts: column.faults.count,

@@ -159,7 +159,7 @@ impl Rows<'_> {
         let times_s = match self.meanings.time {
             None => None,
             Some(id) => {
-                let Channel { name, unit } = self.channel(id);
+                let Channel { name, unit, .. } = self.channel(id);
                 let factor = seconds(unit.as_deref());
                 if factor.is_none() && self.recipe.memory.as_ref().is_some_and(Memory::needs_clock) {
                     let unit = unit.unwrap_or_default();
@@ -220,6 +220,7 @@ impl Rows<'_> {
         Channel {
             name: self.names.name(id).to_owned(),
             unit: self.meanings.units.get(&id).or(column.unit.as_ref()).cloned(),
+            original: column.original.clone(),
         }
     }
 

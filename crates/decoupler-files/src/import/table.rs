@@ -120,6 +120,8 @@ pub struct Column {
     pub name: String,
     /// Unit, if the header has one in brackets.
     pub unit: Option<String>,
+    /// Header in the file, with unprintable characters escaped, if the name lacks some of its characters.
+    pub original: Option<String>,
     /// Cells, one per row.
     pub cells: Cells,
     /// Number of cells that are missing.

@@ -48,6 +48,8 @@ pub struct LiveView {
     pub(super) shows_zero: bool,
     /// The node under the pointer, marked on both surfaces.
     pub(super) node: Option<usize>,
+    /// The stream that has ended by itself, as it was requested.
+    ended: Option<SourcePlan>,
     /// True if the window has received a frame and not yet reported to the thread that it was drawn.
     is_to_be_drawn: bool,
     job: Job<LiveEvent>,
@@ -60,7 +62,16 @@ pub struct Running {
     pub network: String,
     /// Source of the frames.
     pub source: SourcePlan,
+    /// Source as it was requested: a named pipe looks like a file until it is opened.
+    asked: SourcePlan,
     commands: Sender<Command>,
+}
+
+impl Running {
+    /// Returns the source as it was requested, if it is a stream.
+    fn stream(&self) -> Option<SourcePlan> {
+        matches!(self.source, SourcePlan::Stream(_)).then(|| self.asked.clone())
+    }
 }
 
 impl LiveView {
@@ -80,6 +91,7 @@ impl LiveView {
             drops: DropScale::default(),
             shows_zero: false,
             node: None,
+            ended: None,
             is_to_be_drawn: false,
             job: Job::prompt("live", wake),
         }
@@ -168,6 +180,19 @@ impl LiveView {
         }
     }
 
+    /// Returns true if a stream has ended by itself and is still the chosen source.
+    pub fn can_retry(&self, shared: &Shared) -> bool {
+        let is_same = |ended: &SourcePlan| self.plan(shared, 0.0).is_ok_and(|(_, plan)| plan.source == *ended);
+        self.running.is_none() && self.ended.as_ref().is_some_and(is_same)
+    }
+
+    /// Connects again to the stream that has ended.
+    pub fn retry(&mut self, shared: &Shared, effects: &mut Vec<Effect>) {
+        if self.can_retry(shared) {
+            self.start(shared, effects);
+        }
+    }
+
     /// Restarts with the network that is chosen now, from the current position of a replay.
     pub(super) fn restart(&mut self, shared: &Shared) {
         let replay = self.shown.replay;
@@ -189,11 +214,12 @@ impl LiveView {
         self.zero_problem = None;
         self.drops = DropScale::default();
         self.node = None;
-        self.is_to_be_drawn = false;
+        (self.ended, self.is_to_be_drawn) = (None, false);
         let (commands, incoming) = channel();
         self.running = Some(Running {
             network,
             source: plan.source.clone(),
+            asked: plan.source.clone(),
             commands,
         });
         self.job.start(
@@ -290,6 +316,7 @@ impl LiveView {
                 LiveEvent::Ended(end) => {
                     let running = self.running.take();
                     self.keep_recording();
+                    self.ended = running.as_ref().and_then(Running::stream);
                     match end {
                         Err(reason) => notify(Notice::Failed(reason)),
                         Ok(()) if running.is_some() => notify(Notice::Done("The source has ended.".to_owned())),

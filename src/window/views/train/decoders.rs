@@ -37,6 +37,8 @@ pub struct DecoderMeasuring {
     job: Job<MeasuringEvent>,
     /// The training whose networks are measured, and its number of epochs at that time.
     of: Option<(RunId, usize)>,
+    /// True after an internal error: the decoders are measured again once the table is closed and opened.
+    has_failed: bool,
 }
 
 impl DecoderMeasuring {
@@ -45,6 +47,7 @@ impl DecoderMeasuring {
         Self {
             job: Job::new("decoders", wake),
             of: None,
+            has_failed: false,
         }
     }
 
@@ -59,7 +62,8 @@ impl DecoderMeasuring {
                 .then_some((run, (run.id, result.epochs_run), &result.networks))
         });
         let is_other = standing.is_some_and(|(_, of, _)| self.of.is_some_and(|measured| measured != of));
-        if is_other || shared.phase == Phase::Training {
+        let is_closed = self.has_failed && !state.is_open;
+        if is_other || is_closed || shared.phase == Phase::Training {
             self.forget(state);
         }
         let is_wanted = state.is_open && state.measured.is_none();
@@ -73,7 +77,7 @@ impl DecoderMeasuring {
 
     fn forget(&mut self, state: &mut DecodersState) {
         self.job.abandon();
-        (self.of, state.measured) = (None, None);
+        (self.of, state.measured, self.has_failed) = (None, None, false);
     }
 
     /// Measures all decoders of `setup` with their trained `networks` on `test`.
@@ -90,7 +94,10 @@ impl DecoderMeasuring {
             match event {
                 MeasuringEvent::Measured(place, report) => state.take(place, report),
                 MeasuringEvent::Ended(Ok(())) => {}
-                MeasuringEvent::Ended(Err(error)) => state.end(&format!("{error}: close the table and open it again")),
+                MeasuringEvent::Ended(Err(error)) => {
+                    self.has_failed = true;
+                    state.end(&format!("{error}; close the table and open it again"));
+                }
             }
         }
     }

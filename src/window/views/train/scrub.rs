@@ -31,6 +31,8 @@ pub struct ScrubState {
     /// Result of the network of an epoch.
     result: Option<RunResult>,
     job: Job<Result<Option<RunResult>, JobError>>,
+    /// Reason why the network of an epoch could not be shown, until it is reported.
+    failure: Option<JobError>,
     /// When the replay began, in seconds, and at which epoch.
     replay: Option<(f64, usize)>,
 }
@@ -43,6 +45,7 @@ impl ScrubState {
             wanted: None,
             result: None,
             job: Job::prompt("past network", wake),
+            failure: None,
             replay: None,
         }
     }
@@ -110,8 +113,12 @@ impl ScrubState {
         while let Some(computed) = self.job.next_event() {
             match computed {
                 Ok(Some(result)) => self.result = Some(result),
-                // A defect in the program, or an epoch thinned out meanwhile.
-                Ok(None) | Err(_) => self.show_latest(),
+                // The epoch was thinned out meanwhile.
+                Ok(None) => self.show_latest(),
+                Err(error) => {
+                    self.show_latest();
+                    self.failure = Some(error);
+                }
             }
         }
         let Some((run, wanted)) = run.zip(self.wanted) else {
@@ -124,6 +131,12 @@ impl ScrubState {
         if !is_there && !self.job.is_under_way() {
             self.compute(run, epoch);
         }
+    }
+
+    /// Returns the reason why the network of an epoch could not be shown, once.
+    pub(super) fn take_failure(&mut self) -> Option<String> {
+        let error = self.failure.take()?;
+        Some(format!("The network of this epoch cannot be shown: {error}"))
     }
 
     fn compute(&mut self, run: &RunView, epoch: usize) {

@@ -37,6 +37,8 @@ impl View for TrainView {
     fn take_events(&mut self, shared: &Shared, effects: &mut Vec<Effect>) {
         self.recording.take_events(shared, effects);
         self.measuring.follow(shared, &mut self.decoders);
+        let failure = self.scrub.take_failure();
+        effects.extend(failure.map(|reason| Effect::Tell(Matter::Training, Notice::Failed(reason))));
     }
 
     fn take_files(&mut self, paths: &[PathBuf], shared: &Shared, effects: &mut Vec<Effect>) -> bool {

@@ -101,6 +101,7 @@ mod tests {
         let channel = |name: &&str| Channel {
             name: (*name).to_owned(),
             unit: None,
+            original: None,
         };
         names.iter().map(channel).collect()
     }

@@ -163,6 +163,7 @@ fn named(name: String, unit: &str) -> Channel {
     Channel {
         name,
         unit: Some(unit.to_owned()),
+        original: None,
     }
 }
 
@@ -202,6 +203,7 @@ mod tests {
         let channel = |name: &&str| Channel {
             name: (*name).to_owned(),
             unit: Some("µT*/".to_owned()),
+            original: None,
         };
         let meaning = Meaning::Own {
             inputs: odd.iter().map(channel).collect(),

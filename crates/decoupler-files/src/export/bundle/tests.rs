@@ -175,6 +175,7 @@ fn own_data(array: &Portable) -> Portable {
         let named = |index| Channel {
             name: format!("c{index}"),
             unit: None,
+            original: None,
         };
         (0..count).map(named).collect()
     };

@@ -2,7 +2,6 @@ use std::{
     fmt,
     io::Read,
     sync::mpsc::{RecvTimeoutError, channel},
-    thread,
     time::{Duration, Instant},
 };
 
@@ -19,6 +18,7 @@ use super::{
     replay::{ReplayFrames, read_replay},
     session::Tally,
 };
+use crate::window::job::start_thread;
 
 /// An open source of frames.
 #[derive(Debug)]
@@ -300,15 +300,15 @@ const BETWEEN_LOOKS: Duration = Duration::from_millis(20);
 pub(super) fn open(source: &Source, is_wanted: &dyn Fn() -> bool) -> Result<Option<Box<dyn Read + Send>>, String> {
     let (send, opened) = channel();
     let wanted = source.clone();
-    let open = move || {
+    let open = move || wanted.open().map_err(|error| error.to_string());
+    let started = start_thread("open source", open, move |opened| {
         // The receiver is gone if the source is no longer wanted.
-        let _ = send.send(wanted.open());
-    };
-    let thread = thread::Builder::new().name("open source".to_owned()).spawn(open);
-    thread.map_err(|error| format!("no thread could be started: {error}"))?;
+        let _ = send.send(opened.map_err(|error| error.to_string()).flatten());
+    });
+    started.map_err(|error| error.to_string())?;
     while is_wanted() {
         match opened.recv_timeout(BETWEEN_LOOKS) {
-            Ok(opened) => return opened.map(Some).map_err(|error| error.to_string()),
+            Ok(opened) => return opened.map(Some),
             Err(RecvTimeoutError::Timeout) => {}
             Err(RecvTimeoutError::Disconnected) => return Err(format!("opening {source} failed unexpectedly")),
         }

@@ -50,6 +50,8 @@ pub(super) struct Comparing {
     rows: Vec<Compared>,
     /// The touch being decoded or decoded last.
     asked: Option<Arc<Pressed>>,
+    /// True after an internal error, with which decoders were lost; they are fitted again for the next touch.
+    has_failed: bool,
 }
 
 impl Comparing {
@@ -61,6 +63,7 @@ impl Comparing {
             decoders: Vec::new(),
             rows: Vec::new(),
             asked: None,
+            has_failed: false,
         }
     }
 
@@ -78,13 +81,10 @@ impl Comparing {
             (Some(of), Some(subject)) => of.is(subject),
             (of, subject) => of.is_none() && subject.is_none(),
         };
-        if !is_same {
+        if !is_same || (self.has_failed && !self.is_asked(&shown.pressed)) {
             self.begin(subject.cloned());
         }
-        let is_new = !self
-            .asked
-            .as_ref()
-            .is_some_and(|asked| Arc::ptr_eq(asked, &shown.pressed));
+        let is_new = !self.is_asked(&shown.pressed);
         if is_new {
             self.rows.iter_mut().for_each(|row| row.is_present = false);
         }
@@ -99,6 +99,10 @@ impl Comparing {
         }
     }
 
+    fn is_asked(&self, pressed: &Arc<Pressed>) -> bool {
+        self.asked.as_ref().is_some_and(|asked| Arc::ptr_eq(asked, pressed))
+    }
+
     fn has(&self, kind: DecoderKind) -> bool {
         self.decoders.iter().any(|(other, _)| *other == kind)
     }
@@ -107,7 +111,7 @@ impl Comparing {
     fn begin(&mut self, subject: Option<Subject>) {
         self.fits.abandon();
         self.decoding.abandon();
-        (self.decoders, self.asked) = (Vec::new(), None);
+        (self.decoders, self.asked, self.has_failed) = (Vec::new(), None, false);
         self.of.clone_from(&subject);
         let Some(subject) = subject else {
             self.rows.clear();
@@ -149,7 +153,7 @@ impl Comparing {
                 FitEvent::Fitted(kind, Ok(decoder)) => self.decoders.push((kind, decoder)),
                 FitEvent::Fitted(kind, Err(reason)) => self.fail(|other| other == kind, &reason),
                 FitEvent::Ended(Ok(())) => {}
-                FitEvent::Ended(Err(error)) => self.fail(|_| true, &error.to_string()),
+                FitEvent::Ended(Err(error)) => self.fail_all(&error),
             }
         }
         while let Some(decoded) = self.decoding.next_event() {
@@ -168,8 +172,16 @@ impl Comparing {
                         }
                     }
                 }
-                Err(error) => self.fail(|_| true, &error.to_string()),
+                Err(error) => self.fail_all(&error),
             }
+        }
+    }
+
+    /// Shows an internal error for every decoder without an answer to the current touch.
+    fn fail_all(&mut self, error: &JobError) {
+        self.has_failed = true;
+        for row in self.rows.iter_mut().filter(|row| !row.is_present) {
+            (row.answer, row.is_present) = (Some(Err(error.to_string())), true);
         }
     }
 

@@ -1,0 +1,175 @@
+//! A panic in the work of each job is shown, the window lives, and the job can be started again.
+
+use std::{fs, path::Path};
+
+use eframe::egui::Key;
+
+use crate::{
+    driver::Driver,
+    window::{
+        job::planned_panic::{MESSAGE, is_pending, plan},
+        shared::{Notice, Phase, View as _},
+    },
+};
+
+/// Starts the job `name` with `begin` and a planned panic, and waits until the window shows it.
+#[track_caller]
+fn panics(driver: &mut Driver, name: &'static str, begin: impl FnOnce(&mut Driver)) {
+    plan(name);
+    begin(driver);
+    shows_panic(driver, name);
+}
+
+#[track_caller]
+fn shows_panic(driver: &mut Driver, name: &'static str) {
+    let shown = format!("an internal error stopped the thread '{name}': {MESSAGE}. Other work is not affected");
+    driver.wait(&shown, |driver| driver.says(&shown));
+    assert!(!is_pending(), "{name}");
+    for _ in 0..5 {
+        let Some(place) = driver.notice().is_some().then_some(0) else {
+            break;
+        };
+        driver.window_mut().notices.dismiss(place);
+    }
+    // The layout without notices.
+    driver.harness().run_steps(2);
+}
+
+#[test]
+fn jobs_of_a_training_can_be_started_again_after_a_panic() {
+    let folder = tempfile::tempdir().unwrap();
+    // The thread that trains is started with the window.
+    plan("training");
+    let mut driver = Driver::open();
+    shows_panic(&mut driver, "training");
+    assert_eq!(driver.state().phase, Phase::Idle);
+    panics(&mut driver, "preview", |driver| driver.click("10×8"));
+    driver.configure_small();
+    panics(&mut driver, "ready network", |driver| {
+        driver.act("Press the middle of the surface");
+    });
+    driver.press(Key::Escape);
+    driver.train();
+    driver.wait_for_last_epoch();
+    driver.wait_for_kept_run();
+
+    let table = folder.path().join("table.csv");
+    panics(&mut driver, "file", |driver| driver.save("Error table, CSV", &table));
+    assert!(!table.exists());
+    driver.save("Error table, CSV", &table);
+    assert!(table.exists());
+
+    panics(&mut driver, "path", |driver| {
+        driver.export("Error table, CSV");
+        driver.type_into("File", &table.display().to_string());
+        driver.click_button("Save");
+    });
+    driver.press(Key::Escape);
+
+    panics(&mut driver, "past network", |driver| {
+        driver.get("Epoch of the displayed network").focus();
+        driver.harness().run_steps(2);
+        driver.press(Key::ArrowLeft);
+    });
+    driver.get("Epoch of the displayed network").focus();
+    driver.harness().run_steps(2);
+    driver.press(Key::ArrowLeft);
+    driver.wait("the network of the epoch", |driver| {
+        driver.views().train.scrub.result().is_some()
+    });
+    driver.click_button("Latest");
+
+    panics(&mut driver, "decoders", |driver| driver.click("More decoders"));
+    driver.click("More decoders");
+    driver.click("More decoders");
+    driver.wait("a decoder", |driver| !driver.says("internal error"));
+    driver.click("More decoders");
+
+    driver.enter("Hidden nodes", "5");
+    plan("compared run");
+    driver.train();
+    driver.click_button("Compare");
+    shows_panic(&mut driver, "compared run");
+}
+
+#[test]
+fn jobs_of_the_other_views_can_be_started_again_after_a_panic() {
+    let mut driver = Driver::open();
+    driver.configure_small();
+    driver.train();
+    driver.wait_for_kept_run();
+
+    panics(&mut driver, "identifiability", |driver| {
+        driver.click_button("Identifiability");
+    });
+    driver.enter("Height", "8");
+    driver.wait("the analysis", |driver| {
+        driver.views().identifiability.analysis.is_some()
+    });
+    panics(&mut driver, "clipboard", |driver| {
+        driver.act("Copy singular values as a picture");
+    });
+    driver.act("Copy singular values as a picture");
+    driver.wait("the picture", |driver| matches!(driver.notice(), Some(Notice::Done(_))));
+
+    driver.click_button("Trade-off");
+    panics(&mut driver, "trade-off", |driver| driver.click("▶ Measure"));
+    assert!(driver.is_enabled("▶ Measure"));
+
+    driver.click_button("Experiments");
+    panics(&mut driver, "experiments", |driver| driver.click("▶ Run"));
+    assert!(driver.is_enabled("▶ Run"));
+    driver.click("Sweep");
+    panics(&mut driver, "sweep folder", |driver| {
+        driver.open_form("Open sweep folder…");
+        driver.type_into("File", "nowhere");
+        driver.click_button("Open");
+    });
+
+    driver.click_button("Live");
+    panics(&mut driver, "live", |driver| driver.click("▶ Start"));
+    panics(&mut driver, "sample", |driver| {
+        driver.click("Play the sample recording");
+    });
+    driver.click("▶ Start");
+    driver.wait("a frame", |driver| driver.has("Live decoupled surface"));
+    driver.click("■ Stop");
+    panics(&mut driver, "network file", |driver| {
+        driver.open_form("Open network file…");
+        driver.type_into("File", "network.json");
+        driver.click_button("Open");
+    });
+}
+
+#[test]
+fn jobs_of_a_recording_can_be_started_again_after_a_panic() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("press.csv");
+    let rows = (0..60).map(|row| format!("{},{},{}\n", row, row * row % 17, row * row % 17 + row % 3));
+    fs::write(&path, format!("time (s),u (V),d (mm)\n{}", String::from_iter(rows))).unwrap();
+    let mut driver = Driver::open();
+    let open = |driver: &mut Driver| {
+        let mut effects = Vec::new();
+        let window = driver.window_mut();
+        let (view, shared) = (&mut window.views.train, &window.shared);
+        assert!(view.take_files(std::slice::from_ref(&path), shared, &mut effects));
+        driver.harness().step();
+    };
+    panics(&mut driver, "opening", open);
+    panics(&mut driver, "import", open);
+    driver.click_button("Identifiability");
+    panics(&mut driver, "recording study", |driver| driver.act("Analyse readings"));
+    driver.act("Analyse readings");
+    driver.wait("the findings", |driver| driver.says("R²"));
+}
+
+#[test]
+fn a_panic_while_settings_are_remembered_is_shown_once() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("window.json");
+    let mut driver = Driver::open_remembering(&path);
+    panics(&mut driver, "memory", |driver| driver.act("Light theme"));
+    fs::remove_file(&path).unwrap_or_default();
+    driver.act("Dark theme");
+    driver.wait("the file", |_| Path::new(&path).exists());
+}
