@@ -8,14 +8,25 @@
 
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
+mod archives;
 mod arguments;
 mod checkpoint_file;
 mod corpus;
+mod expressions;
+mod frame_recording;
 mod import;
+mod input_lines;
+mod live_lines;
 mod mutation;
 mod names;
 mod network_file;
 mod readings;
+mod recipe_file;
 mod run_folder;
 mod sealing;
+mod sensor_file;
+mod sweep_folder;
+mod sweep_specification;
+mod time_stamps;
 mod trained;
+mod window_file;
