@@ -46,7 +46,7 @@ fn any_input() {
     };
     replay!(|bytes: &[u8]| {
         check(bytes);
-        for_each_seed(3, |rng| check(&mutated_document(bytes, rng)));
+        for_each_seed(6, |rng| check(&mutated_document(bytes, rng)));
     });
     let accepted = accepted.into_inner();
     assert!(accepted > 3, "only {accepted} specifications are accepted");

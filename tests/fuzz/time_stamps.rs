@@ -12,7 +12,6 @@ use crate::{
 
 /// Seconds from a stamp of the same zone to the one given, if that is read as a time stamp.
 fn seconds(stamp: &str, path: &Path) -> Option<f64> {
-    let stamp = stamp.replace(['"', '\n', '\r', ','], "");
     let zone = if stamp.trim_end().ends_with(['Z', 'z']) || stamp.get(16..)?.contains(['+', '-']) {
         "Z"
     } else {
@@ -43,6 +42,7 @@ fn numbers(text: &str) -> Vec<u64> {
 
 /// Checks the fields of a stamp that is accepted. Returns true if it is.
 fn check(stamp: &str, path: &Path) -> bool {
+    let stamp = &stamp.replace(['"', '\n', '\r', ','], "");
     let Some(seconds) = seconds(stamp, path) else {
         return false;
     };

@@ -13,7 +13,7 @@ use crate::{
 };
 
 /// Number of frames that the window draws.
-const FRAMES: usize = 3;
+const FRAMES: usize = 2;
 
 /// Opens the window on the file, draws it, and closes it; returns the description of what it has read.
 fn open(path: &Path) -> String {
@@ -60,7 +60,7 @@ fn any_input() {
     };
     replay!(|bytes: &[u8]| {
         check(bytes);
-        for_each_seed(5, |rng| check(&mutated_document(bytes, rng)));
+        for_each_seed(1, |rng| check(&mutated_document(bytes, rng)));
     });
     let accepted = accepted.into_inner();
     assert!(accepted > 3, "only {accepted} files are read");

@@ -487,11 +487,9 @@ mod tests {
     #[test]
     fn the_past_of_a_stretch_is_dropped_at_its_end() {
         let stretches = Vec::from_iter(0..100_000);
-        let readings = Array2::from_shape_fn((stretches.len(), 1), |(sample, _)| sample as f64);
         let memory = Memory::of_lags(&[LARGEST_LAG]);
-        let found = memory
-            .expand(readings.slice(ndarray::s![..200, ..]), &stretches[..200], None)
-            .unwrap();
+        let readings = Array2::from_shape_fn((200, 1), |(sample, _)| sample as f64);
+        let found = memory.expand(readings.view(), &stretches[..200], None).unwrap();
         assert_eq!(found.column(0), found.column(1));
         // All at once, as those of row-wires are.
         let interleaved = [&stretches[..], &stretches].concat();

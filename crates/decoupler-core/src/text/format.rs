@@ -144,6 +144,20 @@ pub fn printable(text: &str) -> String {
     escaped
 }
 
+/// Returns a text for a message of one line: line breaks, tabs and other unprintable characters, for example of a field of a
+/// damaged file, are escaped.
+pub fn in_one_line(text: &str) -> String {
+    let mut escaped = String::with_capacity(text.len());
+    for letter in text.chars() {
+        if is_unprintable(letter) {
+            escaped.extend(letter.escape_debug());
+        } else {
+            escaped.push(letter);
+        }
+    }
+    escaped
+}
+
 /// Reads a name and cleans it.
 pub(crate) fn cleaned<'de, D: Deserializer<'de>>(deserializer: D) -> Result<String, D::Error> {
     String::deserialize(deserializer).map(|name| clean_name(&name))

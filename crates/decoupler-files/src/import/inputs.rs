@@ -305,7 +305,8 @@ impl Recipe {
                 // A state for each row-wire that occurs, whatever its number.
                 let found = BTreeSet::from_iter(row_wires.iter().flatten().copied());
                 let found = Vec::from_iter(found);
-                let mut stream = MemoryStream::new(memory, columns.len(), found.len().max(1))?;
+                let stream = MemoryStream::new(memory, columns.len(), found.len().max(1));
+                let mut stream = stream.map_err(|error| ImportError::from(error).of_file(path))?;
                 let mut features = Array2::zeros((table.rows, problem.feature_count()));
                 for (row, mut features) in features.rows_mut().into_iter().enumerate() {
                     if row > 0 && group.is_some_and(|group| group.group(row) != group.group(row - 1)) {
