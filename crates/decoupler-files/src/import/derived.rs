@@ -156,7 +156,7 @@ impl Derived {
     pub(super) fn refused(&self, reason: String) -> ImportError {
         ImportError::Derived {
             text: in_one_line(&self.to_string()),
-            reason,
+            reason: in_one_line(&reason),
         }
     }
 }
