@@ -76,7 +76,7 @@ fn any_input() {
         for text in String::from_utf8_lossy(bytes).lines() {
             check(text);
             for_each_seed(100, |rng| {
-                check(&String::from_utf8_lossy(&mutated(text.as_bytes(), rng)))
+                check(&String::from_utf8_lossy(&mutated(text.as_bytes(), rng)));
             });
         }
     });

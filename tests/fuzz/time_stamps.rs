@@ -101,7 +101,7 @@ fn any_input() {
         for stamp in String::from_utf8_lossy(bytes).lines() {
             check(stamp);
             for_each_seed(30, |rng| {
-                check(&String::from_utf8_lossy(&mutated(stamp.as_bytes(), rng)))
+                check(&String::from_utf8_lossy(&mutated(stamp.as_bytes(), rng)));
             });
         }
     });
