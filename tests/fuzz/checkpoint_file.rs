@@ -5,7 +5,7 @@ use decoupler_files::export::CheckpointFile;
 use crate::{
     corpus::replay,
     mutation::{for_each_seed, mutated},
-    sealing::resealed,
+    sealing::{mutated_and_sealed, resealed},
     trained::trained,
 };
 
@@ -24,7 +24,9 @@ fn damage_is_detected_and_impossible_states_are_refused() {
                 read.program.clone_from(&file.program);
                 assert_eq!(read, file, "{}", String::from_utf8_lossy(&damaged));
             }
-            let Some(sealed) = resealed(&damaged) else { return };
+            let Some(sealed) = mutated_and_sealed(&valid, rng) else {
+                return;
+            };
             fs::write(&path, sealed).unwrap();
             // Other settings may ask for other samples, as many as a million.
             if let Ok(read) = CheckpointFile::load(&path)

@@ -1,19 +1,31 @@
-use std::{fs, ops::ControlFlow, path::Path};
+use std::{collections::BTreeSet, fmt::Write, fs, ops::ControlFlow, path::Path};
 
-use decoupler_core::evaluation::TargetPosition;
-use decoupler_files::import::{Cells, DialectChoice, Inspection, Recipe, holds_positions, read_table};
+use decoupler_core::{evaluation::TargetPosition, machine::MachineMemory};
+use decoupler_files::import::{
+    Cells, DialectChoice, Inspection, Recipe, Separator, Table, holds_positions, read_table, suggested_plan,
+};
 
 use crate::{
     corpus::replay,
     mutation::{for_each_seed, mutated},
 };
 
-/// Reads `bytes` as a file with the extension of `path`, checks its columns, and makes samples of the first two.
-fn check(bytes: &[u8], path: &Path) {
+/// Memory for reading a file, in GB.
+const MEMORY_GB: f64 = 0.25;
+
+/// Reads `bytes` as a file with the extension of `path`, checks its columns, and makes samples of the first two, and of those
+/// of the suggested plan.
+pub(crate) fn check(bytes: &[u8], path: &Path) {
+    MachineMemory::limit(MEMORY_GB);
     fs::write(path, bytes).unwrap();
     let mut watch = |_| ControlFlow::Continue(());
-    let Ok(table) = read_table(path, DialectChoice::default(), &mut watch) else {
-        return;
+    let table = match read_table(path, DialectChoice::default(), &mut watch) {
+        Ok(table) => table,
+        Err(error) => {
+            let message = error.to_string();
+            assert!(message.len() < 2000 && !message.contains('\n'), "{message}");
+            return;
+        }
     };
     // A false header does not allocate memory.
     assert!(table.rows <= 1100 * bytes.len().max(1));
@@ -24,6 +36,11 @@ fn check(bytes: &[u8], path: &Path) {
             assert_eq!(gaps, column.missing + column.faults.count);
             assert!(numbers.iter().all(|number| !number.is_infinite()));
         }
+    }
+    let names = BTreeSet::from_iter(table.columns.iter().map(|column| &column.name));
+    assert_eq!(names.len(), table.columns.len(), "each column has its own name");
+    if table.dialect().is_none() {
+        same_as_text(&table, path);
     }
     let (inspection, _) = Inspection::read(path, DialectChoice::default(), None, &mut watch).unwrap();
     for column in &inspection.columns {
@@ -42,7 +59,19 @@ fn check(bytes: &[u8], path: &Path) {
             .collect(),
         ..Recipe::default()
     };
-    if let Ok(recording) = recipe.import(Path::new(""), &mut watch) {
+    check_samples(&recipe);
+    let plain = Recipe {
+        data: path.to_owned(),
+        ..Recipe::default()
+    };
+    if let Ok(files) = plain.inspect(Path::new(""), &[], &mut watch) {
+        check_samples(&suggested_plan(&files).import);
+    }
+}
+
+/// Imports the samples, which are finite; every row is a sample or is dropped for a reason.
+fn check_samples(recipe: &Recipe) {
+    if let Ok(recording) = recipe.import(Path::new(""), &mut |_| ControlFlow::Continue(())) {
         let set = &recording.set;
         assert!(
             set.readings()
@@ -52,6 +81,48 @@ fn check(bytes: &[u8], path: &Path) {
         );
         let dropped: usize = recording.dropped.iter().map(|dropped| dropped.rows).sum();
         assert_eq!(set.samples() + dropped, recording.rows);
+    }
+}
+
+/// Longest table that is also written as text.
+const MAX_CELLS: usize = 2000;
+
+/// Writes the numbers of a table as text with all their digits: they are read back bit by bit.
+fn same_as_text(table: &Table, path: &Path) {
+    let columns = Vec::from_iter(table.columns.iter().map(|column| match &column.cells {
+        Cells::Numbers(numbers) if column.faults.count == 0 => numbers.as_slice(),
+        Cells::Numbers(_) | Cells::Labels { .. } => &[],
+    }));
+    if table.rows * columns.len() > MAX_CELLS || columns.iter().any(|numbers| numbers.is_empty()) {
+        return;
+    }
+    let mut text = Vec::from_iter((0..columns.len()).map(|column| format!("x{column}"))).join(",");
+    for row in 0..table.rows {
+        text.push('\n');
+        for (index, numbers) in columns.iter().enumerate() {
+            let comma = if index > 0 { "," } else { "" };
+            match numbers[row] {
+                number if number.is_nan() => write!(text, "{comma}NaN").unwrap(),
+                number => write!(text, "{comma}{number:?}").unwrap(),
+            }
+        }
+    }
+    text.push('\n');
+    let copy = path.with_file_name("copy.csv");
+    fs::write(&copy, text).unwrap();
+    let choice = DialectChoice {
+        separator: Some(Separator::Comma),
+        header: Some(true),
+        ..DialectChoice::default()
+    };
+    let read = read_table(&copy, choice, &mut |_| ControlFlow::Continue(())).unwrap();
+    assert_eq!(read.columns.len(), columns.len());
+    for (numbers, column) in columns.iter().zip(&read.columns) {
+        let Cells::Numbers(found) = &column.cells else {
+            panic!("{column:?}")
+        };
+        let is_same = |(one, other): (&f64, &f64)| one == other || (one.is_nan() && other.is_nan());
+        assert!(numbers.iter().zip(found).all(is_same), "{numbers:?} {found:?}");
     }
 }
 

@@ -1,8 +1,12 @@
 //! Random changes of a valid input.
 
-use std::ops::Range;
+use std::{
+    ops::Range,
+    time::{Duration, Instant},
+};
 
 use rand::{Rng, RngExt, SeedableRng, rngs::ChaCha8Rng};
+use serde_json::Value;
 
 /// Text that parsers have failed on.
 const TOKENS: [&str; 30] = [
@@ -38,11 +42,20 @@ const TOKENS: [&str; 30] = [
     "true",
 ];
 
+/// Longest time for one input of a few kilobytes, on a busy machine. A reader whose time grows with the square of the
+/// input, or with a number stated in it, takes longer.
+const LONGEST: Duration = Duration::from_secs(30);
+
 /// Calls `check` with `default` seeded generators, or with `FUZZ_ROUNDS` times as many.
+///
+/// # Panics
+/// If a call takes longer than [`LONGEST`].
 pub(crate) fn for_each_seed(default: u64, mut check: impl FnMut(&mut ChaCha8Rng)) {
     let rounds = std::env::var("FUZZ_ROUNDS").ok().and_then(|text| text.parse().ok());
     for seed in 0..default * rounds.unwrap_or(1) {
+        let start = Instant::now();
         check(&mut ChaCha8Rng::seed_from_u64(seed));
+        assert!(start.elapsed() < LONGEST, "seed {seed} takes {:?}", start.elapsed());
     }
 }
 
@@ -53,6 +66,49 @@ pub(crate) fn mutated(valid: &[u8], rng: &mut impl Rng) -> Vec<u8> {
         change(&mut bytes, rng);
     }
     bytes
+}
+
+/// Returns the JSON document with one to four random changes: of its text, or of values, so that it stays JSON.
+pub(crate) fn mutated_document(valid: &[u8], rng: &mut impl Rng) -> Vec<u8> {
+    match serde_json::from_slice::<Value>(valid) {
+        Ok(mut document) if rng.random() => {
+            for _ in 0..rng.random_range(1..=4) {
+                change_value(&mut document, rng);
+            }
+            document.to_string().into_bytes()
+        }
+        _ => mutated(valid, rng),
+    }
+}
+
+/// Changes a value of a document, or one within it.
+fn change_value(value: &mut Value, rng: &mut impl Rng) {
+    match value {
+        Value::Object(fields) if !fields.is_empty() && rng.random_ratio(19, 20) => {
+            let place = rng.random_range(0..fields.len());
+            let name = fields.keys().nth(place).cloned().unwrap_or_default();
+            if rng.random_ratio(1, 20) {
+                fields.remove(&name);
+            } else if let Some(field) = fields.get_mut(&name) {
+                change_value(field, rng);
+            }
+        }
+        Value::Array(values) if !values.is_empty() && rng.random_ratio(9, 10) => {
+            let place = rng.random_range(0..values.len());
+            match rng.random_range(0..10) {
+                0 => drop(values.remove(place)),
+                1 => values.push(values[place].clone()),
+                _ => change_value(&mut values[place], rng),
+            }
+        }
+        Value::String(text) if rng.random_ratio(9, 10) => {
+            *text = String::from_utf8_lossy(&mutated(text.as_bytes(), rng)).into_owned();
+        }
+        value => {
+            let token = TOKENS[rng.random_range(0..TOKENS.len())];
+            *value = serde_json::from_str(token).unwrap_or_else(|_| token.into());
+        }
+    }
 }
 
 fn change(bytes: &mut Vec<u8>, rng: &mut impl Rng) {

@@ -7,7 +7,7 @@ use rand::RngExt;
 use crate::{
     corpus::replay,
     mutation::{for_each_seed, mutated},
-    sealing::resealed,
+    sealing::{mutated_and_sealed, resealed},
     trained::trained,
 };
 
@@ -52,7 +52,7 @@ fn accepted_files_give_finite_answers_or_are_flagged() {
         NetworkFile::from_run(&run, None).unwrap().save(&path).unwrap();
         let valid = fs::read(&path).unwrap();
         for_each_seed(300, |rng| {
-            let Some(damaged) = resealed(&mutated(&valid, rng)) else {
+            let Some(damaged) = mutated_and_sealed(&valid, rng) else {
                 return;
             };
             accepted += usize::from(check(&path, &damaged, rng));

@@ -9,7 +9,7 @@ use std::{
 use flate2::{Compression, write::ZlibEncoder};
 use zip::{ZipWriter, write::SimpleFileOptions};
 
-use crate::refused;
+use crate::{ended, refused};
 
 /// Part of the message on a file that needs more memory than reading may take.
 const OVER_BUDGET: &str = "raise the limit with the option --memory-limit";
@@ -261,6 +261,43 @@ fn the_limit_can_be_raised_and_lowered() {
         message.contains("needs 48 MB of memory, and reading may use 10 MB"),
         "{message}"
     );
-    let (read, message) = crate::ended(&[&inspect[..], &["--memory-limit", "0.2"]].concat(), folder.path());
+    let (read, message) = ended(&[&inspect[..], &["--memory-limit", "0.2"]].concat(), folder.path());
     assert!(read, "{message}");
+}
+
+/// The memory of a network has a state of 1.6 MB for each row-wire, and the file has row-wires of high numbers, or many.
+#[test]
+fn row_wires_in_readings_claim_only_the_memory_that_they_need() {
+    let folder = tempfile::tempdir().unwrap();
+    let rows = (0..60).map(|row| format!("{row},{},{},{},{}\n", row % 2 + 1, row % 7, row % 5, row % 3));
+    let header = "t (s),row,a,b,force\n";
+    fs::write(
+        folder.path().join("press.csv"),
+        header.to_owned() + &rows.collect::<String>(),
+    )
+    .unwrap();
+    let train = "train --data press.csv --inputs a,b --targets force --time t --row-wire row --lags 100000 --hidden 1 --epochs 1 \
+                 --out n.json";
+    let (is_trained, message) = ended(&Vec::from_iter(train.split_whitespace()), folder.path());
+    assert!(is_trained, "{message}");
+    let decode = [
+        "decode",
+        "--network",
+        "n.json",
+        "--input",
+        "in.csv",
+        "--output",
+        "out.csv",
+    ];
+    fs::write(folder.path().join("in.csv"), "t (s),row,a,b\n0,1,1,2\n1,10000,1,2\n").unwrap();
+    let (is_read, message) = ended(&decode, folder.path());
+    assert!(is_read, "{message}");
+    let rows = (1..=10_000).map(|row| format!("{row},{row},1,2\n"));
+    fs::write(
+        folder.path().join("in.csv"),
+        "t (s),row,a,b\n".to_owned() + &rows.collect::<String>(),
+    )
+    .unwrap();
+    let message = refused(&decode, folder.path());
+    assert!(message.contains("in.csv") && message.contains(OVER_BUDGET), "{message}");
 }

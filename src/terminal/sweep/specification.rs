@@ -6,7 +6,7 @@ use std::{
 };
 
 use clap::{ArgAction, Args, Command, FromArgMatches};
-use decoupler_core::decoupling::DecoderKind;
+use decoupler_core::{decoupling::DecoderKind, text::in_one_line};
 use decoupler_files::{
     export::RecipeSource,
     import::{Plan, Setup},
@@ -70,7 +70,7 @@ impl Specification {
         })?;
         let layout: Layout = serde_json::from_str(&text).map_err(|error| SpecificationError::Layout {
             path: path.to_owned(),
-            message: error.to_string(),
+            message: in_one_line(&error.to_string()),
         })?;
         let mut specification = Self {
             path: path.to_owned(),
@@ -183,8 +183,8 @@ impl Specification {
     pub(super) fn error(&self, place: String, message: String) -> SpecificationError {
         SpecificationError::Option {
             path: self.path.clone(),
-            place,
-            message,
+            place: in_one_line(&place),
+            message: in_one_line(&message),
         }
     }
 }

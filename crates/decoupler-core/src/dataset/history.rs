@@ -187,6 +187,7 @@ impl MemoryStream {
     /// See [`Memory::check`].
     pub fn new(memory: &Memory, channels: usize, row_wires: usize) -> Result<Self, MemoryError> {
         let state = MemoryState::new(memory, channels)?;
+        state.check_streams(row_wires)?;
         Ok(Self {
             features: vec![0.0; state.features()],
             states: vec![(state, None); row_wires],

@@ -1,10 +1,14 @@
-use std::{collections::HashMap, fmt};
+use std::{
+    collections::{HashMap, HashSet},
+    fmt,
+};
 
 use ndarray::{Array2, ArrayView2};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use super::Span;
+use crate::machine::{OverBudget, ReadingBudget};
 
 /// Maximum number of samples that a lag reaches back.
 pub const LARGEST_LAG: usize = 100_000;
@@ -78,6 +82,14 @@ pub enum MemoryError {
         features: usize,
         /// Number of values in the state.
         state: usize,
+    },
+    /// The states of several streams do not fit into the memory of the machine.
+    #[error("the lags and averages of {streams} row-wires at once are too large: {source}")]
+    TooLarge {
+        /// Number of streams of samples.
+        streams: usize,
+        /// Memory needed, and the limit.
+        source: OverBudget,
     },
 }
 
@@ -164,6 +176,8 @@ impl Memory {
             "one time for each sample"
         );
         let start = MemoryState::new(self, channels)?;
+        let last: HashMap<usize, usize> = { stretches.iter().copied() }.zip(0..).collect();
+        start.check_streams(most_open(stretches, &last))?;
         let mut states: HashMap<usize, (MemoryState, Option<f64>)> = HashMap::new();
         let mut features = Array2::zeros((samples, self.features(channels)));
         let mut row = vec![0.0; channels];
@@ -180,6 +194,9 @@ impl Memory {
                 output.as_slice_mut().expect("a row of a new array is contiguous"),
             );
             *previous_s = time_s;
+            if last.get(&stretches[sample]) == Some(&sample) {
+                states.remove(&stretches[sample]);
+            }
         }
         Ok(features)
     }
@@ -211,6 +228,20 @@ impl fmt::Display for Memory {
             (false, true) => write!(f, "{}, as differences", parts.join(" and ")),
         }
     }
+}
+
+/// Returns the largest number of stretches that have begun and not ended; `last` is the last sample of each.
+fn most_open(stretches: &[usize], last: &HashMap<usize, usize>) -> usize {
+    let mut open = HashSet::new();
+    let mut most = 0;
+    for (sample, stretch) in stretches.iter().enumerate() {
+        open.insert(stretch);
+        most = most.max(open.len());
+        if last.get(stretch) == Some(&sample) {
+            open.remove(stretch);
+        }
+    }
+    most
 }
 
 /// One part of the past.
@@ -337,6 +368,20 @@ impl MemoryState {
         })
     }
 
+    /// Checks that copies of this state for `streams` streams of samples fit into memory.
+    ///
+    /// # Errors
+    /// If they do not.
+    pub(super) fn check_streams(&self, streams: usize) -> Result<(), MemoryError> {
+        let bytes = (self.constants.state() as u64).saturating_mul(size_of::<f64>() as u64);
+        // A state or two are within the limit for one state.
+        if streams <= 2 {
+            return Ok(());
+        }
+        let claimed = ReadingBudget::now().claim(bytes.saturating_mul(streams as u64));
+        claimed.map_err(|source| MemoryError::TooLarge { streams, source })
+    }
+
     /// Number of features that a step returns.
     pub fn features(&self) -> usize {
         self.constants.features()
@@ -348,11 +393,20 @@ impl MemoryState {
     }
 
     /// Takes in the readings of the next sample, `interval_s` seconds after the one before (the usual interval if `None`),
-    /// and writes its features. The interval of the first sample is not used.
+    /// and writes its features. The interval of the first sample is not used. If a difference overflows, the past is
+    /// forgotten: the features of finite readings are finite.
     ///
     /// # Panics
     /// If the number of readings or features is wrong.
     pub fn step(&mut self, readings: &[f64], interval_s: Option<f64>, features: &mut [f64]) {
+        self.advance(readings, interval_s, features);
+        if !features.iter().all(|feature| feature.is_finite()) {
+            self.restart();
+            self.advance(readings, None, features);
+        }
+    }
+
+    fn advance(&mut self, readings: &[f64], interval_s: Option<f64>, features: &mut [f64]) {
         let channels = self.constants.channels;
         assert_eq!(readings.len(), channels, "one reading for each channel");
         assert_eq!(features.len(), self.features(), "room for all features");
@@ -427,6 +481,40 @@ mod tests {
         };
         assert_eq!(memory.names(["a"]), ["a", "a-a[-1]"]);
         assert!(!memory.is_empty() && Memory::default().is_empty());
+    }
+
+    /// One state of ten channels takes 8 MB, those of all stretches 800 GB.
+    #[test]
+    fn the_past_of_a_stretch_is_dropped_at_its_end() {
+        let stretches = Vec::from_iter(0..100_000);
+        let memory = Memory::of_lags(&[LARGEST_LAG]);
+        let readings = Array2::from_shape_fn((200, 1), |(sample, _)| sample as f64);
+        let found = memory.expand(readings.view(), &stretches[..200], None).unwrap();
+        assert_eq!(found.column(0), found.column(1));
+        // All at once, as those of row-wires are.
+        let interleaved = [&stretches[..], &stretches].concat();
+        let readings = Array2::zeros((interleaved.len(), 10));
+        let refused = memory
+            .expand(readings.view(), &interleaved, None)
+            .unwrap_err()
+            .to_string();
+        assert!(
+            refused.contains("100000 row-wires at once") && refused.contains("800.0 GB"),
+            "{refused}"
+        );
+    }
+
+    #[test]
+    fn differences_that_overflow_are_a_new_start() {
+        let memory = Memory {
+            lags: vec![Span::Samples(1.0)],
+            differences: true,
+            interval_s: Some(0.1),
+            ..Memory::of_averages_s(&[0.3])
+        };
+        let found = all(&memory, array![[1e308], [-1e308], [-1e308], [2.0]].view());
+        assert!(found.iter().all(|feature| feature.is_finite()), "{found}");
+        assert_eq!(found.row(1).to_vec(), [-1e308, 0.0, 0.0]);
     }
 
     #[test]

@@ -36,7 +36,10 @@ impl Rows {
         match self {
             Self::All | Self::Known => Ok((0..rows).collect()),
             Self::One(row) if row < rows => Ok(vec![row]),
-            Self::One(row) => Err(SceneError::Row { row: row + 1, rows }),
+            Self::One(row) => Err(SceneError::Row {
+                row: row.saturating_add(1),
+                rows,
+            }),
         }
     }
 
@@ -70,7 +73,7 @@ impl fmt::Display for Rows {
         match self {
             Self::All => f.pad("all"),
             Self::Known => f.pad("known"),
-            Self::One(row) => f.pad(&(row + 1).to_string()),
+            Self::One(row) => f.pad(&row.saturating_add(1).to_string()),
         }
     }
 }
@@ -93,6 +96,9 @@ mod tests {
     #[test]
     fn rows_that_do_not_exist_are_reported() {
         assert_eq!(Rows::One(10).read(10), Err(SceneError::Row { row: 11, rows: 10 }));
+        // The last number that a file can have.
+        let last = Rows::One(usize::MAX);
+        assert!(last.read(10).is_err() && last.to_string() == usize::MAX.to_string());
         for text in ["0", "-1", "some", ""] {
             let message = text.parse::<Rows>().unwrap_err().to_string();
             assert!(message.contains("all, known"), "{message}");

@@ -116,14 +116,7 @@ pub fn original_name(name: &str) -> Option<String> {
     const LONGEST: usize = 1000;
     let name = name.trim_matches(' ');
     let is_kept = !name.contains(is_unprintable) && name.chars().nth(LONGEST_NAME).is_none();
-    (!is_kept).then(|| {
-        let escaped = |letter: char| match is_unprintable(letter) {
-            true => letter.escape_unicode().to_string(),
-            false => letter.to_string(),
-        };
-        let beginning = name.chars().take(LONGEST);
-        beginning.map(escaped).collect()
-    })
+    (!is_kept).then(|| escaped(name.chars().take(LONGEST), is_unprintable))
 }
 
 /// Returns a text that is safe in a spreadsheet, which treats a cell that begins with one of `= + - @` as a formula:
@@ -149,10 +142,22 @@ pub fn is_unprintable(c: char) -> bool {
 
 /// Returns a text for a terminal, in which unprintable characters, for example of the name of a file, are escaped.
 pub fn printable(text: &str) -> String {
-    let mut escaped = String::with_capacity(text.len());
-    for letter in text.chars() {
-        if is_unprintable(letter) && !"\n\t".contains(letter) {
-            escaped.extend(letter.escape_unicode());
+    escaped(text.chars(), |letter| {
+        is_unprintable(letter) && !"\n\t".contains(letter)
+    })
+}
+
+/// Returns a text for a message of one line: line breaks, tabs and other unprintable characters, for example of a field of a
+/// damaged file, are escaped.
+pub fn in_one_line(text: &str) -> String {
+    escaped(text.chars(), is_unprintable)
+}
+
+fn escaped(text: impl Iterator<Item = char>, is_escaped: impl Fn(char) -> bool) -> String {
+    let mut escaped = String::new();
+    for letter in text {
+        if is_escaped(letter) {
+            escaped.extend(letter.escape_debug());
         } else {
             escaped.push(letter);
         }

@@ -6,7 +6,7 @@ mod resistance_reader;
 
 pub use format::{
     begins_formula, capitalised, clean_name, counted, format_decimals, format_duration, format_number, format_percent,
-    format_r2, inert, is_unprintable, original_name, printable, system_cause,
+    format_r2, in_one_line, inert, is_unprintable, original_name, printable, system_cause,
 };
 pub(crate) use format::{cleaned, cleaned_if_any, escaped_if_any};
 pub use resistance_reader::{CsvFields, LONGEST_ROW, ReadError, Reading, ResistanceColumns, ResistanceReader, number};

@@ -14,7 +14,7 @@ use super::{
 use crate::import::Recorded;
 use decoupler_core::{
     evaluation::{Run, Source},
-    text::system_cause,
+    text::{in_one_line, system_cause},
 };
 
 pub(super) const PROGRAM: &str = concat!("decoupler ", env!("CARGO_PKG_VERSION"));
@@ -124,10 +124,10 @@ impl DocumentKind {
 
     fn check_heading(self, path: &Path, bytes: &[u8]) -> Result<(), DocumentError> {
         let path = || path.to_owned();
-        let other = |reason| DocumentError::Other {
+        let other = |reason: String| DocumentError::Other {
             path: path(),
             kind: self,
-            reason,
+            reason: in_one_line(&reason),
         };
         let beginning = format!("{{\"format\":\"{}\",", self.format());
         let heading = Heading::read(bytes).map_err(|no_heading| match no_heading {
@@ -160,7 +160,7 @@ impl DocumentKind {
         DocumentError::Damaged {
             path,
             kind: self,
-            defect,
+            defect: in_one_line(&defect),
         }
     }
 }

@@ -6,6 +6,7 @@ use decoupler_core::{
         TargetErrors, TargetPosition, TestErrors,
         recorded::{Determinacy, Determination, Findings, FittedModel, TargetFindings, Undetermined},
     },
+    text::in_one_line,
     training::EpochRecord,
 };
 use serde::Deserialize;
@@ -198,7 +199,7 @@ impl Heading {
 
     /// The program that wrote it.
     pub(super) fn program(&self) -> String {
-        self.program.as_str().unwrap_or("another program").to_owned()
+        in_one_line(self.program.as_str().unwrap_or("another program"))
     }
 }
 

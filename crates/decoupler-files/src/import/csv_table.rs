@@ -1,5 +1,5 @@
 use std::{
-    collections::HashMap,
+    collections::{HashMap, HashSet},
     io::{Cursor, Read},
     path::Path,
 };
@@ -339,14 +339,20 @@ pub(super) fn named(headers: &[String], width: usize) -> Vec<Column> {
     columns
 }
 
-/// Numbers columns of the same name.
+/// Numbers columns of the same name; a number that is in the header already is left out.
 fn name_apart(columns: &mut [Column]) {
+    let mut names: HashSet<String> = HashSet::from_iter(columns.iter().map(|column| column.name.clone()));
     let mut counts: HashMap<String, usize> = HashMap::new();
     for column in columns {
         let count = counts.entry(column.name.clone()).or_default();
         *count += 1;
-        if *count > 1 {
-            column.name = format!("{}#{count}", column.name);
+        while *count > 1 {
+            let numbered = format!("{}#{count}", column.name);
+            if names.insert(numbered.clone()) {
+                column.name = numbered;
+                break;
+            }
+            *count += 1;
         }
     }
 }

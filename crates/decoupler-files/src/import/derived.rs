@@ -2,6 +2,7 @@
 
 use std::{fmt, str::FromStr};
 
+use decoupler_core::text::in_one_line;
 use serde::{Deserialize, Serialize};
 
 use super::{Cells, Column, Faults, ImportError, Table, selection::seconds};
@@ -154,8 +155,8 @@ impl Derived {
 
     pub(super) fn refused(&self, reason: String) -> ImportError {
         ImportError::Derived {
-            text: self.to_string(),
-            reason,
+            text: in_one_line(&self.to_string()),
+            reason: in_one_line(&reason),
         }
     }
 }
@@ -260,7 +261,7 @@ impl FromStr for Derived {
 
     fn from_str(text: &str) -> Result<Self, ImportError> {
         let refuse = |reason: &str| ImportError::Derived {
-            text: text.to_owned(),
+            text: in_one_line(text),
             reason: reason.to_owned(),
         };
         let (name, expression) = text.split_once('=').ok_or_else(|| refuse("it has no name"))?;

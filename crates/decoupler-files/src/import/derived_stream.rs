@@ -5,6 +5,9 @@ use super::{
     derived::{LocatedDerived, NOTHING_AT_START, TimeColumn},
 };
 
+/// Maximum number of cells kept until the start is over: 128 MB.
+const MAX_CELLS: usize = 1 << 24;
+
 /// Derived columns of a stream. Means at the start are known only after the start, whose lines are kept until then.
 #[derive(Clone, Debug)]
 pub(super) struct DerivedStream {
@@ -20,6 +23,9 @@ enum State {
     /// Mean at the start of each column that needs one.
     Running(Vec<Option<f64>>),
 }
+
+/// Reason why the start of a stream is not waited for.
+const TOO_LONG: &str = "its start is too long for a stream; give fewer rows or seconds";
 
 /// What a line is.
 #[derive(Clone, Debug, PartialEq)]
@@ -71,7 +77,7 @@ impl DerivedStream {
     /// Adds the derived columns to the cells of the next line.
     ///
     /// # Errors
-    /// If no cell at the start is a number.
+    /// If no cell at the start is a number, or the start is too long.
     pub(super) fn take(&mut self, cells: &mut Vec<f64>) -> Result<Progress, ImportError> {
         match &mut self.state {
             State::Running(means) => {
@@ -88,7 +94,10 @@ impl DerivedStream {
                         lines[row].get(place).copied().unwrap_or(f64::NAN)
                     })
                 };
-                if !self.columns.iter().all(has_start) {
+                if let Some((derived, _)) = self.columns.iter().find(|column| !has_start(column)) {
+                    if lines.len().saturating_mul(cells.len()) > MAX_CELLS {
+                        return Err(derived.refused(TOO_LONG.to_owned()));
+                    }
                     let is_first = lines.len() == 1;
                     return Ok(Progress::Start { is_first });
                 }

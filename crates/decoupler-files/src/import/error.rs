@@ -6,7 +6,7 @@ use std::{
 use decoupler_core::{
     dataset::{DatasetError, DivisionError, MemoryError},
     machine::OverBudget,
-    text::system_cause,
+    text::{in_one_line, system_cause},
 };
 use thiserror::Error;
 
@@ -207,6 +207,7 @@ impl ImportError {
             | Self::NoRows { .. }
             | Self::RowWire { .. }
             | Self::Derived { .. }
+            | Self::Memory(_)
             | Self::Condition { .. } => Self::OfFile {
                 path: path.to_owned(),
                 source: Box::new(self),
@@ -315,15 +316,15 @@ pub enum TableError {
 impl TableError {
     pub(super) fn damaged(what: impl Into<String>, reason: impl Into<String>) -> Self {
         Self::Damaged {
-            what: what.into(),
-            reason: reason.into(),
+            what: in_one_line(&what.into()),
+            reason: in_one_line(&reason.into()),
         }
     }
 
     pub(super) fn array(what: impl Into<String>, reason: impl Into<String>) -> Self {
         Self::Array {
-            what: what.into(),
-            reason: reason.into(),
+            what: in_one_line(&what.into()),
+            reason: in_one_line(&reason.into()),
         }
     }
 }

@@ -1,4 +1,4 @@
-use std::path::Path;
+use std::{collections::BTreeSet, path::Path};
 
 use decoupler_core::{
     dataset::MemoryStream,
@@ -323,16 +323,20 @@ impl Recipe {
             Some(memory) => {
                 let group = self.group.as_ref().and_then(|group| names.find(group).ok());
                 let group = group.map(|id| &table.columns[id.column].cells);
-                let states = row_wires.iter().flatten().max().map_or(1, |last| last + 1);
-                let mut stream = MemoryStream::new(memory, columns.len(), states)?;
+                // A state for each row-wire that occurs, whatever its number.
+                let found = BTreeSet::from_iter(row_wires.iter().flatten().copied());
+                let found = Vec::from_iter(found);
+                let stream = MemoryStream::new(memory, columns.len(), found.len().max(1));
+                let mut stream = stream.map_err(|error| ImportError::from(error).of_file(path))?;
                 let mut features = Array2::zeros((table.rows, problem.feature_count()));
                 for (row, mut features) in features.rows_mut().into_iter().enumerate() {
                     if row > 0 && group.is_some_and(|group| group.group(row) != group.group(row - 1)) {
                         stream.restart();
                     }
-                    let row_wire = row_wires.as_ref().map_or(0, |row_wires| row_wires[row]);
+                    let row_wire = row_wires.as_ref().map(|row_wires| row_wires[row]);
+                    let state = row_wire.and_then(|row_wire| found.binary_search(&row_wire).ok());
                     let time_s = time.map(|time| time.unit_s * table.columns[time.column].cells.number(row));
-                    let of_row = stream.step(row_wire, &readings.row(row).to_vec(), time_s);
+                    let of_row = stream.step(state.unwrap_or(0), &readings.row(row).to_vec(), time_s);
                     features.iter_mut().zip(of_row).for_each(|(to, from)| *to = *from);
                 }
                 features

@@ -215,7 +215,9 @@ impl Value {
         if length > 0 {
             fields.extend(names.chunks_exact(length).map(|name| (text(name), Vec::new())));
         }
-        for _ in 0..count as usize {
+        // Without fields, a shape of any size has no data.
+        let elements = if fields.is_empty() { 0 } else { count as usize };
+        for _ in 0..elements {
             for (_, values) in &mut fields {
                 let tag = Tag::read(&mut source, endian)?.ok_or_else(cut_off)?;
                 let mut limited = (&mut source).take(tag.size as u64);

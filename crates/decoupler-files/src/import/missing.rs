@@ -1,5 +1,6 @@
 use std::{convert::Infallible, fmt, str::FromStr};
 
+use decoupler_core::text::in_one_line;
 use serde::{Deserialize, Serialize};
 
 use super::{ImportError, format::Cell};
@@ -147,8 +148,8 @@ impl FromStr for Condition {
 
     fn from_str(text: &str) -> Result<Self, ImportError> {
         let wrong = |reason: String| ImportError::Condition {
-            text: text.to_owned(),
-            reason,
+            text: in_one_line(text),
+            reason: in_one_line(&reason),
         };
         let words: Vec<&str> = text.split_whitespace().collect();
         let parts = words.split(|word| word.eq_ignore_ascii_case("and") || *word == "&&");

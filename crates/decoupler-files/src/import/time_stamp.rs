@@ -37,13 +37,20 @@ impl TimeStamp {
             1..=12 => 31,
             _ => return None,
         };
-        if !(1..=last).contains(&day) || hour > 24 || minute > 59 || cell[13] != b':' {
+        // 24:00 is the end of a day.
+        let is_time = hour < 24 || (hour == 24 && minute == 0);
+        if !(1..=last).contains(&day) || !is_time || minute > 59 || cell[13] != b':' {
             return None;
         }
         let mut rest = &cell[16..];
         let mut nanoseconds = 0;
         if let [b':', tens @ b'0'..=b'6', units @ b'0'..=b'9', after @ ..] = rest {
-            nanoseconds = SECOND * i128::from(10 * (tens - b'0') + units - b'0');
+            let seconds = 10 * (tens - b'0') + units - b'0';
+            // Second 60 is a leap second.
+            if seconds > 60 {
+                return None;
+            }
+            nanoseconds = SECOND * i128::from(seconds);
             rest = after;
             if let [b'.' | b',', fraction @ ..] = rest {
                 let count = fraction.iter().take_while(|byte| byte.is_ascii_digit()).count();
@@ -84,6 +91,9 @@ fn zone_minutes(text: &[u8]) -> Option<Option<i128>> {
         [sign, a, b, c, d] | [sign, a, b, b':', c, d] => (sign, number(a, b)?, number(c, d)?),
         _ => return None,
     };
+    if hours > 23 || minutes > 59 {
+        return None;
+    }
     match sign {
         b'+' => Some(Some(60 * hours + minutes)),
         b'-' => Some(Some(-60 * hours - minutes)),
@@ -133,6 +143,10 @@ mod tests {
             "2026-02-29T00:00:00",
             "2026-13-01T00:00:00",
             "2026-11-24T25:00:00",
+            "2026-11-24T24:30:00",
+            "2026-11-24T22:53:69",
+            "2026-11-24T22:53:23+99:99",
+            "2026-11-24T22:53:23+01:60",
             "2026-11-24T22:53:23 CET",
             "24.11.2026 22:53:23",
             "1234567890123456789",

@@ -4,7 +4,7 @@ use std::{fmt::Write as _, fs, ops::ControlFlow, path::Path};
 
 use decoupler_core::{
     dataset::{Memory, MemoryStream, Span},
-    evaluation::Problem,
+    evaluation::{Channel, Problem},
 };
 use decoupler_files::import::{InputLine, InputLines, Recipe};
 use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
@@ -38,6 +38,14 @@ fn lines(recipe: &Recipe, problem: &Problem) -> InputLines {
     InputLines::new(problem.inputs.clone(), recipe.other_columns(problem), None)
         .with_derived(recipe.derive.clone())
         .with_memory(memory)
+}
+
+/// A channel without a unit.
+fn channel(name: &str) -> Channel {
+    Channel {
+        name: name.to_owned(),
+        unit: None,
+    }
 }
 
 fn imported(recipe: &Recipe, folder: &Path) -> Problem {
@@ -125,4 +133,25 @@ fn lines_without_a_derived_value_or_a_column_are_refused_with_the_reason() {
             "{texts:?}: {found_final} {found}"
         );
     }
+}
+
+#[test]
+fn a_stream_waits_for_its_start_only_as_long_as_that_fits_into_memory() {
+    let recipe = recipe(&["r=c1-start(1000000)"], &["r"]);
+    let problem = Problem {
+        inputs: vec![channel("r")],
+        targets: vec![channel("y")],
+        memory: None,
+        positions: Vec::new(),
+        has_nodes: false,
+    };
+    let mut lines = lines(&recipe, &problem);
+    let line = vec!["1"; 100_000].join(",");
+    let last = (1..10_000).find_map(|number| Some((number, lines.parse(number, line.as_bytes()).err()?)));
+    let (number, error) = last.unwrap();
+    assert!(number < 200 && error.is_final(), "{number}: {error}");
+    assert!(
+        error.to_string().contains("start(1000000)") && error.to_string().contains("give fewer"),
+        "{error}"
+    );
 }

@@ -57,6 +57,13 @@ fn import(recipe: &Recipe, folder: &TempDir) -> Result<Recording, String> {
 }
 
 #[test]
+fn every_column_has_its_own_name() {
+    let folder = folder(&[("data.csv", "a,a,a#2,a,b,\n1,2,3,4,5,6\n1,2,3,4,5,7\n")]);
+    let table = read(&folder.path().join("data.csv")).unwrap();
+    assert_eq!(names(&table), ["a", "a#3", "a#2", "a#4", "b", "c6"]);
+}
+
+#[test]
 fn every_layout_of_one_table_gives_the_same_numbers() {
     let latin1 = "x (\u{b5}m);y\n1,5;-2\n3;4e-1\n"
         .chars()

@@ -1,0 +1,101 @@
+use std::{fs, ops::ControlFlow, path::Path};
+
+use decoupler_core::{dataset::Seed, machine::MachineMemory};
+use decoupler_files::export::{RecipeFile, RecipeSource};
+
+use crate::{
+    corpus::replay,
+    mutation::{for_each_seed, mutated_document},
+};
+
+/// Recordings to which the recipes of the corpus refer.
+const RECORDINGS: [(&str, &str); 4] = [
+    (
+        "press.csv",
+        "t (s),a (V),b (V),row,trial,force (N)\n\
+         0,1.5,2.5,1,x,0\n0.1,1.6,2.4,1,x,0.5\n0.2,1.7,2.2,2,x,1\n0.3,1.9,-1,2,y,1.5\n0.4,2.1,1.9,1,y,1.25\n0.5,2,2,1,y,0.75\n",
+    ),
+    ("states.csv", "t (s),z,w\n0,0,1\n0.05,1,1\n0.2,2,0\n0.41,4,1\n"),
+    (
+        "second.csv",
+        "t (s),a (V),b (V),row,trial,force (N)\n5,1,2,1,z,1\n5.1,1.1,2,1,z,2\n5.2,1.3,2.1,2,z,2\n",
+    ),
+    ("positions.csv", "target,x,y\nforce,0,0\nstates.z,1,0\n"),
+];
+
+fn folder_with_recordings() -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    for (name, text) in RECORDINGS {
+        fs::write(folder.path().join(name), text).unwrap();
+    }
+    folder
+}
+
+/// Returns true if the recipe is accepted and gives samples. It is unchanged after saving and loading, and its samples are
+/// finite.
+fn check(path: &Path, bytes: &[u8]) -> bool {
+    MachineMemory::limit(0.25);
+    fs::write(path, bytes).unwrap();
+    let source = match RecipeFile::load(path) {
+        Ok(source) => source,
+        Err(error) => {
+            let message = error.to_string();
+            assert!(message.len() < 2000 && !message.contains('\n'), "{message}");
+            return false;
+        }
+    };
+    let text = || String::from_utf8_lossy(bytes);
+    RecipeFile::save(source.clone(), path).unwrap();
+    let again = RecipeFile::load(path).unwrap();
+    let RecipeSource::Recording(plan) = source else {
+        assert_eq!(again, source, "{}", text());
+        return true;
+    };
+    // The files of the recipe are named from another folder, but are the same.
+    let RecipeSource::Recording(again) = again else {
+        panic!("{}", text())
+    };
+    assert_eq!(again.absolute(), plan.absolute(), "{}", text());
+    // Devices and other files of this machine are no recordings of a corpus.
+    let folder = path.parent().unwrap();
+    let is_ours = |file: &std::path::PathBuf| {
+        file.parent() == Some(folder) && RECORDINGS.iter().any(|(name, _)| file.ends_with(name))
+    };
+    if !plan.files().all(is_ours) {
+        return false;
+    }
+    match plan.sets(Path::new(""), Seed(1), &mut |_| ControlFlow::Continue(())) {
+        Ok(sets) => {
+            let recording = &sets.recording;
+            for set in [&recording.set, &sets.test, &sets.split.training] {
+                let is_finite = |number: &f64| number.is_finite();
+                assert!(set.readings().iter().all(is_finite), "{}", text());
+                assert!(set.targets().iter().all(is_finite), "{}", text());
+            }
+            let dropped: usize = recording.dropped.iter().map(|dropped| dropped.rows).sum();
+            assert_eq!(recording.set.samples() + dropped, recording.rows, "{}", text());
+            true
+        }
+        Err(error) => {
+            let message = error.to_string();
+            assert!(message.len() < 3000 && !message.contains('\n'), "{message}");
+            false
+        }
+    }
+}
+
+#[test]
+fn any_input() {
+    let folder = folder_with_recordings();
+    let path = folder.path().join("recipe.json");
+    let accepted = std::sync::atomic::AtomicUsize::new(0);
+    replay!(|bytes: &[u8]| {
+        let count = |is_accepted| accepted.fetch_add(usize::from(is_accepted), std::sync::atomic::Ordering::Relaxed);
+        count(check(&path, bytes));
+        for_each_seed(60, |rng| {
+            count(check(&path, &mutated_document(bytes, rng)));
+        });
+    });
+    let accepted = accepted.into_inner();
+    assert!(accepted > 50, "only {accepted} recipes are read");
+}

@@ -1,0 +1,53 @@
+//! Specifications of sweeps. None is trained: the command prints a script for the trials.
+
+use std::{fs, path::Path, process::Command};
+
+use crate::{
+    corpus::replay,
+    mutation::{for_each_seed, mutated_document},
+};
+
+/// Returns true if the specification is accepted; otherwise checks its error message.
+fn check(bytes: &[u8], folder: &Path) -> bool {
+    fs::write(folder.join("spec.json"), bytes).unwrap();
+    let output = Command::new(env!("CARGO_BIN_EXE_decoupler"))
+        .args(["sweep", "--spec", "spec.json", "--engine", "slurm", "--out", "results"])
+        .current_dir(folder)
+        .env("DECOUPLER_MEMORY_GB", "1")
+        .output()
+        .unwrap();
+    let message = String::from_utf8_lossy(&output.stderr);
+    let text = || String::from_utf8_lossy(bytes);
+    assert!(!message.contains("panicked"), "{}: {message}", text());
+    match output.status.code() {
+        Some(0) => assert!(output.stdout.starts_with(b"#!"), "{}", text()),
+        Some(1 | 2) => {
+            assert!(message.starts_with("error: "), "{}: {message}", text());
+            assert!(message.len() < 3000, "{}: {message}", text());
+        }
+        other => panic!("{}: {other:?} {message}", text()),
+    }
+    assert!(!folder.join("results").exists(), "{}", text());
+    output.status.success()
+}
+
+#[test]
+fn any_input() {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(
+        folder.path().join("press.csv"),
+        "a,b,force\n1,2,3\n2,3,4\n3,5,5\n4,7,6\n5,8,8\n",
+    )
+    .unwrap();
+    let accepted = std::sync::atomic::AtomicUsize::new(0);
+    let check = |bytes: &[u8]| {
+        let is_accepted = check(bytes, folder.path());
+        accepted.fetch_add(usize::from(is_accepted), std::sync::atomic::Ordering::Relaxed);
+    };
+    replay!(|bytes: &[u8]| {
+        check(bytes);
+        for_each_seed(6, |rng| check(&mutated_document(bytes, rng)));
+    });
+    let accepted = accepted.into_inner();
+    assert!(accepted > 3, "only {accepted} specifications are accepted");
+}
