@@ -297,11 +297,9 @@ pub(super) fn write_heading(file: &NetworkFile, kept: &[String], rows: usize, ou
             .intervals
             .as_ref()
             .and_then(|intervals| intervals.targets.get(index));
-        let half_width = of_target.is_some_and(Option::is_some).then(|| Channel {
-            name: half_width_name(target),
-            unit: target.unit.clone(),
-            original: None,
-        });
+        let half_width = of_target
+            .is_some_and(Option::is_some)
+            .then(|| Channel::new(half_width_name(target), target.unit.as_deref()));
         [Some(target.clone()), half_width].into_iter().flatten()
     });
     let kept = kept.iter().map(|title| inert(title));

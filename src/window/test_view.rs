@@ -441,11 +441,7 @@ mod tests {
         let pair = |titles: &str| {
             let channel = |title: &str| {
                 let (name, unit) = title.split_once('/').unwrap_or((title, ""));
-                Channel {
-                    name: name.to_owned(),
-                    unit: (!unit.is_empty()).then(|| unit.to_owned()),
-                    original: None,
-                }
+                Channel::new(name, Some(unit).filter(|unit| !unit.is_empty()))
             };
             position_pair(&Vec::from_iter(titles.split(' ').map(channel)))
         };

@@ -17,10 +17,7 @@ use crate::{
 
 /// A recipe and the problem of its network.
 fn problem(inputs: &[&str], derive: &[&str], memory: Option<Memory>) -> (Recipe, Problem) {
-    let channel = |name: &&str| Channel {
-        name: (*name).to_owned(),
-        unit: None,
-    };
+    let channel = |name: &&str| Channel::new(*name, None);
     let problem = Problem {
         inputs: inputs.iter().map(channel).collect(),
         targets: vec![channel(&"force")],
@@ -64,7 +61,9 @@ fn check(bytes: &[u8], recipe: &Recipe, problem: &Problem, has_rows: bool, path:
         match lines.parse(number, line) {
             Ok(InputLine::NoReadings) => {}
             Ok(InputLine::Start { .. }) => is_faultless = false,
-            Ok(InputLine::Readings { row_index, readings }) => {
+            Ok(InputLine::Readings {
+                row_index, readings, ..
+            }) => {
                 assert!(row_index < networks);
                 assert_eq!(readings.len(), problem.feature_count());
                 assert!(

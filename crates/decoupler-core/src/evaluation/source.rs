@@ -290,11 +290,7 @@ fn features(memory: &Memory, channels: &[Channel]) -> Vec<Channel> {
     names
         .into_iter()
         .zip(units)
-        .map(|(name, unit)| Channel {
-            name,
-            unit: unit.clone(),
-            original: None,
-        })
+        .map(|(name, unit)| Channel::new(name, unit.as_deref()))
         .collect()
 }
 
@@ -360,11 +356,7 @@ impl Problem {
     pub fn unnamed(inputs: usize, targets: usize) -> Self {
         let channels = |letter: &str, count: usize| {
             let numbers = 1..=count;
-            let channel = |number| Channel {
-                name: format!("{letter}{number}"),
-                unit: None,
-                original: None,
-            };
+            let channel = |number| Channel::new(format!("{letter}{number}"), None);
             numbers.map(channel).collect()
         };
         Self {
@@ -386,11 +378,7 @@ impl Simulation {
     /// Returns the description of the channels of a row-wire: its resistances and the coordinates of its nodes.
     pub fn problem(&self) -> Problem {
         let scale = self.sensor.scale;
-        let channel = |name: String, unit: &str| Channel {
-            name,
-            unit: Some(unit.to_owned()),
-            original: None,
-        };
+        let channel = |name: String, unit: &str| Channel::new(name, Some(unit));
         let nodes = 1..=scale.nodes_per_row();
         Problem {
             inputs: (1..=scale.columns())
@@ -407,6 +395,15 @@ impl Simulation {
 }
 
 impl Channel {
+    /// Returns a channel whose name is as it was in its file.
+    pub fn new(name: impl Into<String>, unit: Option<&str>) -> Self {
+        Self {
+            name: name.into(),
+            unit: unit.map(str::to_owned),
+            original: None,
+        }
+    }
+
     /// Returns the name, followed by the unit in parentheses if it is known.
     pub fn title(&self) -> String {
         match &self.unit {

@@ -307,11 +307,7 @@ impl ErrorTable {
             targets.map(|(index, target)| block(target.clone(), &|errors| errors.targets().get(index).copied())),
         );
         if let Some(unit) = problem.shared_unit().filter(|_| problem.targets.len() > 1) {
-            let all = Channel {
-                name: ALL_TARGETS.to_owned(),
-                unit: Some(unit.to_owned()),
-                original: None,
-            };
+            let all = Channel::new(ALL_TARGETS, Some(unit));
             blocks.push(block(all, &|errors| TargetErrors::over_all(errors.targets())));
         }
         Self { measures, blocks }
@@ -386,11 +382,7 @@ mod tests {
     use super::*;
 
     fn problem(units: [&str; 2]) -> Problem {
-        let channel = |(name, unit): (&str, &str)| Channel {
-            name: name.to_owned(),
-            unit: Some(unit.to_owned()),
-            original: None,
-        };
+        let channel = |(name, unit): (&str, &str)| Channel::new(name, Some(unit));
         Problem {
             targets: ["a", "b"].into_iter().zip(units).map(channel).collect(),
             ..Problem::default()

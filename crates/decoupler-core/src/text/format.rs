@@ -313,7 +313,7 @@ mod tests {
             (" 'quoted' ", None),
             ("'=1+2", None),
             ("a\u{1b}[31mb", Some("a\\u{1b}[31mb")),
-            ("x\ty", Some("x\\u{9}y")),
+            ("x\ty", Some("x\\ty")),
             ("e\u{202e}f", Some("e\\u{202e}f")),
         ] {
             let found = original_name(name);

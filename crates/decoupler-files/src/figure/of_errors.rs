@@ -329,11 +329,7 @@ mod tests {
         let off = pairs.iter().position(|(actual, decoded)| actual != decoded).unwrap();
         assert_eq!(pair_sample(&test, off), Some(30_000));
         assert_eq!(pair_sample(&test, pairs.len()), None);
-        let force = Channel {
-            name: "force".to_owned(),
-            unit: Some("N".to_owned()),
-            original: None,
-        };
+        let force = Channel::new("force", Some("N"));
         let figure = target_histogram_figure(&pairs, ErrorBins::new(&pairs).bin(2.0), &force);
         let plot = &figure.plots[0];
         assert_eq!(plot.x.name, "error of force (N), decoded − actual");

@@ -113,11 +113,7 @@ mod tests {
 
     #[test]
     fn targets_of_one_unit_share_a_plot() {
-        let channel = |name: &str, unit: &str| Channel {
-            name: name.to_owned(),
-            unit: Some(unit.to_owned()),
-            original: None,
-        };
+        let channel = |name: &str, unit: &str| Channel::new(name, Some(unit));
         let targets = [channel("x", "mm"), channel("force", "N"), channel("y", "mm")];
         let history = [(0.0, Arc::from([1.0, 2.0, 3.0])), (0.5, Arc::from([4.0, 5.0, 6.0]))];
         let figure = targets_over_time_figure(&targets, &history, None);
@@ -133,11 +129,7 @@ mod tests {
 
     #[test]
     fn intervals_limit_a_band_around_the_values() {
-        let target = Channel {
-            name: "force".to_owned(),
-            unit: None,
-            original: None,
-        };
+        let target = Channel::new("force", None);
         let history = [(0.0, Arc::from([1.0])), (0.5, Arc::from([4.0]))];
         let half_width = HalfWidth {
             constant: 0.5,

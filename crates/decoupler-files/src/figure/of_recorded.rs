@@ -271,11 +271,7 @@ mod tests {
         let found = HysteresisLoop::measure(actual.view(), decoded.view(), &[0; 400])
             .remove(0)
             .unwrap();
-        let force = Channel {
-            name: "force".to_owned(),
-            unit: Some("N".to_owned()),
-            original: None,
-        };
+        let force = Channel::new("force", Some("N"));
         let figure = hysteresis_figure(&found, &force);
         let [_, differences] = &figure.plots[..] else {
             panic!("{figure:?}");
@@ -333,11 +329,7 @@ mod tests {
 
     /// 2 × 3 targets in shuffled order with others between them, and a plane over the skin.
     fn plane() -> (TargetSurface, Vec<f64>) {
-        let channel = |unit: &str| Channel {
-            name: String::new(),
-            unit: Some(unit.to_owned()),
-            original: None,
-        };
+        let channel = |unit: &str| Channel::new(String::new(), Some(unit));
         let targets = Vec::from_iter((0..8).map(|target| channel(if target == 3 { "°C" } else { "N" })));
         let places = [
             (7, 0.0, 5.0),

@@ -219,11 +219,7 @@ mod tests {
     use super::*;
 
     fn channels(units: [Option<&str>; 2]) -> [Channel; 2] {
-        units.map(|unit| Channel {
-            name: "f".to_owned(),
-            unit: unit.map(str::to_owned),
-            original: None,
-        })
+        units.map(|unit| Channel::new("f", unit))
     }
 
     #[test]
@@ -250,11 +246,7 @@ mod tests {
 
     #[test]
     fn many_targets_are_counted_from_one() {
-        let channel = Channel {
-            name: "t".to_owned(),
-            unit: None,
-            original: None,
-        };
+        let channel = Channel::new("t", None);
         let places = |count: usize| -> Vec<f64> {
             let values = vec![0.5; count];
             let figure = sample_figure(

@@ -136,12 +136,7 @@ impl InputLines {
         let mut read: Vec<Channel> = Vec::new();
         for name in names.filter(|name| !is_derived(name)) {
             if read.iter().all(|channel| channel.name != *name) {
-                let (name, unit) = (name.clone(), None);
-                read.push(Channel {
-                    name,
-                    unit,
-                    original: None,
-                });
+                read.push(Channel::new(name, None));
             }
         }
         Self { read, derive, ..self }
@@ -372,11 +367,7 @@ mod tests {
     use super::*;
 
     fn channels(names: &[&str]) -> Vec<Channel> {
-        let channel = |name: &&str| Channel {
-            name: (*name).to_owned(),
-            unit: None,
-            original: None,
-        };
+        let channel = |name: &&str| Channel::new(*name, None);
         names.iter().map(channel).collect()
     }
 

@@ -235,13 +235,7 @@ impl InputColumns {
             .filter_map(|name| Some(names.find(name).ok()?.column));
         let kept = kept.filter(|column| !found.contains(column)).map(|column| {
             let Column { name, unit, .. } = &columns[column];
-            let (name, unit) = (name.clone(), unit.clone());
-            let channel = Channel {
-                name,
-                unit,
-                original: None,
-            };
-            (column, channel.title())
+            (column, Channel::new(name, unit.as_deref()).title())
         });
         Ok(Self {
             kept: kept.collect(),

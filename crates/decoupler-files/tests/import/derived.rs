@@ -42,10 +42,7 @@ fn lines(recipe: &Recipe, problem: &Problem) -> InputLines {
 
 /// A channel without a unit.
 fn channel(name: &str) -> Channel {
-    Channel {
-        name: name.to_owned(),
-        unit: None,
-    }
+    Channel::new(name, None)
 }
 
 fn imported(recipe: &Recipe, folder: &Path) -> Problem {

@@ -98,11 +98,7 @@ mod tests {
     use super::*;
 
     fn channels(names: &[&str]) -> Vec<Channel> {
-        let channel = |name: &&str| Channel {
-            name: (*name).to_owned(),
-            unit: None,
-            original: None,
-        };
+        let channel = |name: &&str| Channel::new(*name, None);
         names.iter().map(channel).collect()
     }
 

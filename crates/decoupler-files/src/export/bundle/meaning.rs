@@ -81,7 +81,7 @@ impl Meaning {
     pub(super) fn inputs(&self) -> Vec<Channel> {
         match self {
             Self::Array(scale) => (1..=scale.columns())
-                .map(|channel| named(format!("r_{channel}"), "ohm"))
+                .map(|channel| Channel::new(format!("r_{channel}"), Some("ohm")))
                 .collect(),
             Self::Own { inputs, .. } => inputs.clone(),
         }
@@ -91,7 +91,12 @@ impl Meaning {
     pub(super) fn targets(&self) -> Vec<Channel> {
         match self {
             Self::Array(scale) => (0..scale.coordinates_per_row())
-                .map(|output| named(format!("{}_{}", ["x", "y", "z"][output % 3], output / 3 + 1), "mm"))
+                .map(|output| {
+                    Channel::new(
+                        format!("{}_{}", ["x", "y", "z"][output % 3], output / 3 + 1),
+                        Some("mm"),
+                    )
+                })
                 .collect(),
             Self::Own { targets, .. } => targets.clone(),
         }
@@ -102,7 +107,7 @@ impl Meaning {
         match self {
             Self::Array(_) => {
                 let largest = figures.iter().fold(0.0_f64, |largest, &figure| largest.max(figure));
-                vec![(named("any coordinate".to_owned(), "mm"), largest)]
+                vec![(Channel::new("any coordinate", Some("mm")), largest)]
             }
             Self::Own { targets, .. } => targets.iter().cloned().zip(figures.iter().copied()).collect(),
         }
@@ -159,14 +164,6 @@ impl Meaning {
     }
 }
 
-fn named(name: String, unit: &str) -> Channel {
-    Channel {
-        name,
-        unit: Some(unit.to_owned()),
-        original: None,
-    }
-}
-
 /// Replaces everything in a user's text that would end a comment or cause a compiler warning in one.
 pub(super) fn comment(text: &str) -> String {
     let plain = text.replace(is_unprintable, " ");
@@ -200,11 +197,7 @@ mod tests {
     #[test]
     fn user_defined_names_do_not_end_comments() {
         let odd = ["a */ b", "/* c", "d\n*/", "e\u{202e}f", "??/", "**/", "*\n/", "/\u{7}*"];
-        let channel = |name: &&str| Channel {
-            name: (*name).to_owned(),
-            unit: Some("µT*/".to_owned()),
-            original: None,
-        };
+        let channel = |name: &&str| Channel::new(*name, Some("µT*/"));
         let meaning = Meaning::Own {
             inputs: odd.iter().map(channel).collect(),
             targets: vec![channel(&"x")],

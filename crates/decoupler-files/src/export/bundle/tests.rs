@@ -172,11 +172,7 @@ fn weights_for_numpy_and_matlab_round_trip_bit_for_bit() {
 /// The same network of own data: readings of any sign and in any unit.
 fn own_data(array: &Portable) -> Portable {
     let channels = |count| {
-        let named = |index| Channel {
-            name: format!("c{index}"),
-            unit: None,
-            original: None,
-        };
+        let named = |index| Channel::new(format!("c{index}"), None);
         (0..count).map(named).collect()
     };
     Portable {
