@@ -69,7 +69,10 @@ impl Spreadsheet {
     ) -> Result<Table, TableError> {
         match self {
             Self::Xls => xls_claims::claim(&file, budget)?,
-            Self::Xlsx | Self::Ods => sheet_claims::claim(BufReader::new(&file), budget, watch)?,
+            Self::Xlsx | Self::Ods => {
+                let is_strict = matches!(self, Self::Ods);
+                sheet_claims::claim(BufReader::new(&file), is_strict, budget, watch)?;
+            }
         }
         (&file).rewind()?;
         let source = BufReader::new(file);

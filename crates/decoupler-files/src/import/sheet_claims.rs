@@ -23,11 +23,17 @@ const OF_TEXT: u64 = size_of::<String>() as u64;
 /// Maximum number of rows and columns of a sheet.
 const LARGEST: [u64; 2] = [1 << 20, 1 << 14];
 
-/// Claims the memory of all sheets of the archive.
+/// Claims the memory of all sheets of the archive. With `is_strict`, elements of its sheets must end: the reader of OpenDocument
+/// files waits for their ends for ever.
 ///
 /// # Errors
-/// If it exceeds the budget.
-pub(super) fn claim(source: impl Read + Seek, budget: &mut ReadingBudget, watch: Watch<'_>) -> Result<(), TableError> {
+/// If it exceeds the budget, or an element does not end.
+pub(super) fn claim(
+    source: impl Read + Seek,
+    is_strict: bool,
+    budget: &mut ReadingBudget,
+    watch: Watch<'_>,
+) -> Result<(), TableError> {
     let Ok(mut archive) = ZipArchive::new(source) else {
         // Reported by the reader of the sheets.
         return Ok(());
@@ -35,6 +41,7 @@ pub(super) fn claim(source: impl Read + Seek, budget: &mut ReadingBudget, watch:
     for index in 0..archive.len() {
         let Ok(entry) = archive.by_index(index) else { continue };
         let size = entry.size();
+        let is_strict = is_strict && entry.name().is_ok_and(|name| name == "content.xml");
         budget.claim(size.saturating_mul(OF_BYTE))?;
         let mut is_cancelled = false;
         let mut watched = |progress| {
@@ -43,30 +50,42 @@ pub(super) fn claim(source: impl Read + Seek, budget: &mut ReadingBudget, watch:
             flow
         };
         let xml = BufReader::new(Watched::new(entry, Some(size), &mut watched));
-        claim_part(xml, budget)?;
+        let claimed = claim_part(xml, is_strict, budget);
         if is_cancelled {
             return Err(TableError::Cancelled);
         }
+        claimed?;
     }
     Ok(())
 }
 
 /// Claims the memory of one part of the archive, up to its end or its first error.
-fn claim_part(xml: BufReader<impl Read>, budget: &mut ReadingBudget) -> Result<(), OverBudget> {
+fn claim_part(xml: BufReader<impl Read>, is_strict: bool, budget: &mut ReadingBudget) -> Result<(), TableError> {
     let mut reader = Reader::from_reader(xml);
     // As the reader of the sheets.
     let config = reader.config_mut();
-    config.check_end_names = false;
+    config.check_end_names = is_strict;
     config.check_comments = false;
-    let (mut sheet, mut buffer) = (Sheet::default(), Vec::new());
+    let (mut sheet, mut buffer, mut open) = (Sheet::default(), Vec::new(), 0);
     loop {
         buffer.clear();
         match reader.read_event_into(&mut buffer) {
-            Ok(Event::Start(element) | Event::Empty(element)) => sheet.take(&element, budget)?,
-            Ok(Event::Eof) | Err(_) => return sheet.end(budget),
+            Ok(Event::Start(element)) => {
+                open += 1;
+                sheet.take(&element, budget)?;
+            }
+            Ok(Event::Empty(element)) => sheet.take(&element, budget)?,
+            Ok(Event::End(_)) => open -= 1,
+            Ok(Event::Eof) if !is_strict || open == 0 => break,
+            Err(_) if !is_strict => break,
+            Ok(Event::Eof) | Err(_) => {
+                let reason = "an element of its contents has no end; save it again, or as CSV";
+                return Err(TableError::damaged("the spreadsheet", reason));
+            }
             Ok(_) => {}
         }
     }
+    Ok(sheet.end(budget)?)
 }
 
 /// Rectangle of a sheet, or of one table of an OpenDocument file.
@@ -187,7 +206,14 @@ mod tests {
     use super::*;
 
     fn claimed(xml: &str) -> u64 {
-        let claims = |limit| claim_part(BufReader::new(xml.as_bytes()), &mut ReadingBudget::of(limit, true)).is_ok();
+        let claims = |limit| {
+            claim_part(
+                BufReader::new(xml.as_bytes()),
+                false,
+                &mut ReadingBudget::of(limit, true),
+            )
+            .is_ok()
+        };
         // Bisection: the smallest budget that suffices.
         let (mut low, mut high) = (0, u64::MAX);
         while high - low > 1 {
