@@ -28,25 +28,26 @@ pub fn hysteresis_figure(found: &HysteresisLoop, target: &Channel) -> PlotFigure
         let points = levels.map(|level| [level.actual, of(level.actual, level.loading, level.unloading)]);
         Series::new(name, Look::line(hue, style), points)
     };
+    let named = |name: &str, rmse| format!("{name}, RMSE {}", format_number(rmse));
+    let (loading, unloading) = (
+        named("loading", found.loading.rmse),
+        named("unloading", found.unloading.rmse),
+    );
     let branches = |is_difference: bool| {
         let less = move |value: f64, actual: f64| if is_difference { value - actual } else { value };
         vec![
             branch("equal", Hue::Ink, LineStyle::Dashed, &|actual, _, _| {
                 less(actual, actual)
             }),
-            branch("loading", Hue::Blue, LineStyle::Solid, &|actual, loading, _| {
+            branch(&loading, Hue::Blue, LineStyle::Solid, &|actual, loading, _| {
                 less(loading, actual)
             }),
-            branch("unloading", Hue::Orange, LineStyle::Solid, &|actual, _, unloading| {
+            branch(&unloading, Hue::Orange, LineStyle::Solid, &|actual, _, unloading| {
                 less(unloading, actual)
             }),
         ]
     };
-    let [loading, unloading] = [found.loading.rmse, found.unloading.rmse].map(format_number);
-    let note = format!(
-        "Hysteresis {:.1} % of the range, RMSE {loading} loading, {unloading} unloading",
-        found.percent_of_range
-    );
+    let note = format!("Hysteresis {:.1} % of the range", found.percent_of_range);
     let mut figure = decoded_against_actual(&target.title(), "decoded", branches(false), vec![note]);
     let unit = target
         .unit

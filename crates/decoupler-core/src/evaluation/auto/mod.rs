@@ -15,6 +15,7 @@ mod fold_errors;
 mod folded_training;
 mod search;
 mod spans;
+mod stages;
 #[cfg(test)]
 mod tests;
 
