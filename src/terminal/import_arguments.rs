@@ -69,8 +69,8 @@ pub(super) struct ImportArguments {
     /// Column that groups samples with equal values, such as one press or session
     #[arg(long, value_name = "COLUMN", requires = "data")]
     group: Option<String>,
-    /// Inputs from the past: the readings of so many samples, or seconds, before each sample, such as 5,10,20 or 0.5s; within
-    /// a group and across no gap in time (over fifty usual intervals)
+    /// Inputs from the past: the readings this number of samples, or seconds, before each sample, such as 5,10,20 or 0.5s;
+    /// within a group and across no gap in time (over fifty usual intervals)
     #[arg(long, value_name = "SPANS", value_delimiter = ',', requires = "data")]
     lags: Vec<Span>,
     /// Inputs from the past: exponential averages of the readings with these time constants, such as 0.1s,1s,10s, which need

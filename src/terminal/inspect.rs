@@ -132,7 +132,7 @@ fn columns_table(columns: &[ColumnSummary]) -> Table {
                 .as_deref()
                 .map(|original| format!("in the file: {}", beginning(original))),
             column.is_constant.then(|| "constant".to_owned()),
-            column.is_rounding.then(|| "constant but for rounding".to_owned()),
+            column.is_rounding.then(|| "constant except for rounding".to_owned()),
             column
                 .sentinel
                 .map(|found| format!("{} × {}: none?", found.cells, found.value)),

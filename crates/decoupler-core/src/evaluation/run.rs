@@ -29,7 +29,7 @@ use crate::{
 ///
 /// Starts share the sets and scalings and differ only in their random initialisation. The *leader* is the start
 /// whose best network has the lowest validation error so far (training error if nothing is held out); the test set
-/// never decides. The run answers with the leader's network, or with the mean of those of all starts
+/// never decides. The run answers with the leader's network, or with the mean of the networks of all starts
 /// ([`RunSettings::combine`]).
 pub struct Run {
     pub(super) settings: RunSettings,
@@ -185,7 +185,8 @@ impl Run {
         &self.problem
     }
 
-    /// Returns the best networks so far, ready to decode readings: the leader's, or the mean of those of all starts.
+    /// Returns the best networks so far, ready to decode readings: the leader's, or the mean of the networks of all
+    /// starts.
     pub fn network(&self) -> Networks {
         self.network_of(self.best())
     }

@@ -56,7 +56,7 @@ impl Mlp {
         Self { shape, weights }
     }
 
-    /// Returns the network whose outputs are the mean of the outputs of `networks`, exact but for rounding: their hidden
+    /// Returns the network whose outputs are the mean of the outputs of `networks`, exact except for rounding: their hidden
     /// nodes side by side, with output weights divided by the number of networks.
     ///
     /// # Panics

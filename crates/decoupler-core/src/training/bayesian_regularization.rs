@@ -33,8 +33,8 @@ use crate::network::{Mlp, Shape};
 /// Otherwise a target without information, such as a constant with jitter, raises the noise level of all. The prior of
 /// the output weights is the conjugate one, in units of the noise of their target: with precisions ρₜ = βₜ/β, it is the
 /// same training with targets and output weights multiplied by √ρₜ, so the equations keep their structure, and units
-/// of targets have no influence. With groups of weights, the α of output weights is the lowest of those of single targets. The weights of the hidden layer, which all targets determine together, are shared
-/// among the γₜ in proportion to the squares of these output weights.
+/// of targets have no influence. With groups of weights, the α of output weights is the lowest among single targets. The
+/// weights of the hidden layer, which all targets determine together, are shared among the γₜ in proportion to the squares of these output weights.
 ///
 /// Errors of neighbouring frames of a recording are correlated: n of them carry only as much information as n/τ
 /// independent errors, where τ is their [`correlation_time`]. It is measured once, at
@@ -201,7 +201,7 @@ impl BayesianRegularization {
         self.state.beta = bounded(determined / (2.0 * self.weighted_mse * self.errors()));
     }
 
-    /// Returns α of a group that has only weights of outputs: the lowest of those of single targets. `None` for another
+    /// Returns α of a group that has only weights of outputs: the lowest among single targets. `None` for another
     /// group, or if all targets have the same noise level.
     ///
     /// In units of its noise, a target without information has small weights that the data determine well. In a common

@@ -156,5 +156,5 @@ fn a_lattice_has_one_shared_map_as_long_as_it_is_used() {
     assert!(SurfaceMap::shared(&x_mm, &[]).is_err());
     let used = Arc::downgrade(&first);
     drop(first);
-    assert!(used.upgrade().is_none(), "nobody uses it any more");
+    assert!(used.upgrade().is_none(), "it is no longer used");
 }

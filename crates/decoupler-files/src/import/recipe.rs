@@ -100,7 +100,7 @@ impl Recipe {
     }
 }
 
-/// Files that take the place of those of a recipe, with the same columns.
+/// Files that replace the files of a recipe, with the same columns.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct FileSet {

@@ -25,7 +25,7 @@ impl Extrapolation {
     /// Minimum share of the test samples that is worth a warning.
     const MIN_SHARE: f64 = 0.01;
 
-    /// Compares the samples of `test` with the ranges of those of `training`, which have the same channels and outputs.
+    /// Compares the samples of `test` with the ranges of the samples of `training`, which have the same channels and outputs.
     pub fn measure(training: &Dataset, test: &Dataset) -> Self {
         let mut is_outside = vec![false; test.samples()];
         let mut count = |training: ArrayView2<'_, f64>, test: ArrayView2<'_, f64>| {

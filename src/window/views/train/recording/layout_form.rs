@@ -420,7 +420,7 @@ fn memory_ui(ui: &mut Ui, draft: &mut Draft, is_automatic: bool) {
         ("Averages", hint, "0.1s, 1s, 10s", averages),
         (
             "Lags",
-            "Readings so many samples, or seconds, before each sample, as further inputs.",
+            "Readings this number of samples, or seconds, before each sample, as further inputs.",
             "5, 10, 20",
             lags,
         ),
