@@ -34,7 +34,8 @@ use crate::network::{Mlp, Shape};
 /// the output weights is the conjugate one, in units of the noise of their target: with precisions ρₜ = βₜ/β, it is the
 /// same training with targets and output weights multiplied by √ρₜ, so the equations keep their structure, and units
 /// of targets have no influence. With groups of weights, the α of output weights is the lowest among single targets. The
-/// weights of the hidden layer, which all targets determine together, are shared among the γₜ in proportion to the squares of these output weights.
+/// weights of the hidden layer, which all targets determine together, are shared among the γₜ in proportion to the squares of
+/// these output weights.
 ///
 /// Errors of neighbouring frames of a recording are correlated: n of them carry only as much information as n/τ
 /// independent errors, where τ is their [`correlation_time`]. It is measured once, at
