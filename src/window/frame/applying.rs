@@ -103,7 +103,7 @@ impl DecouplerWindow {
             Effect::RenameRun(id, name) => shared.runs.rename(id, &name, &self.runs),
             Effect::PinRun(place, id) => shared.runs.pin(place, id, &self.runs),
             Effect::RemoveRun(id) => shared.runs.remove(id, &self.runs),
-            Effect::Tell(matter, notice) => self.notices.add(matter, notice),
+            Effect::Notify(matter, notice) => self.notices.add(matter, notice),
             Effect::Settle(matter) => self.notices.settle(matter),
         }
     }

@@ -184,7 +184,7 @@ pub enum Effect {
     /// Remove the run with this number.
     RemoveRun(u64),
     /// Show a notice to the user.
-    Tell(Matter, Notice),
+    Notify(Matter, Notice),
     /// Withdraw the failures of this subject, which have been resolved.
     Settle(Matter),
 }

@@ -47,7 +47,7 @@ impl View for ExperimentsView {
                     effects.extend(
                         result
                             .err()
-                            .map(|reason| Effect::Tell(Matter::Experiments, Notice::Failed(reason))),
+                            .map(|reason| Effect::Notify(Matter::Experiments, Notice::Failed(reason))),
                     );
                 }
             }

@@ -175,7 +175,7 @@ impl LiveView {
                 self.source.path = sample.recording.display().to_string();
                 self.start(shared, effects);
             }
-            Some(Err(reason)) => effects.push(Effect::Tell(Matter::Live, Notice::Failed(reason))),
+            Some(Err(reason)) => effects.push(Effect::Notify(Matter::Live, Notice::Failed(reason))),
             None => {}
         }
     }
@@ -288,7 +288,7 @@ impl LiveView {
 
     /// Takes the events of the thread.
     pub(super) fn follow(&mut self, effects: &mut Vec<Effect>) {
-        let mut notify = |notice| effects.push(Effect::Tell(Matter::Live, notice));
+        let mut notify = |notice| effects.push(Effect::Notify(Matter::Live, notice));
         while let Some(event) = self.job.next_event() {
             match event {
                 LiveEvent::Source(source) => {

@@ -58,7 +58,7 @@ impl View for TradeOffView {
                     effects.extend(
                         result
                             .err()
-                            .map(|reason| Effect::Tell(Matter::TradeOff, Notice::Failed(reason))),
+                            .map(|reason| Effect::Notify(Matter::TradeOff, Notice::Failed(reason))),
                     );
                 }
             }

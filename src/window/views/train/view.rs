@@ -38,13 +38,13 @@ impl View for TrainView {
         self.recording.take_events(shared, effects);
         self.measuring.follow(shared, &mut self.decoders);
         let failure = self.scrub.take_failure();
-        effects.extend(failure.map(|reason| Effect::Tell(Matter::Training, Notice::Failed(reason))));
+        effects.extend(failure.map(|reason| Effect::Notify(Matter::Training, Notice::Failed(reason))));
     }
 
     fn take_files(&mut self, paths: &[PathBuf], shared: &Shared, effects: &mut Vec<Effect>) -> bool {
         if shared.phase.is_busy() {
             let text = "A training is running: stop it before you open other files.";
-            effects.push(Effect::Tell(Matter::Recording, Notice::Failed(text.to_owned())));
+            effects.push(Effect::Notify(Matter::Recording, Notice::Failed(text.to_owned())));
         } else {
             self.recording.open(paths.to_vec());
         }

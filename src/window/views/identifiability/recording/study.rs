@@ -144,7 +144,7 @@ impl RecordingStudy {
                     self.under_way = None;
                     effects.push(match ended {
                         Ok(()) => Effect::Settle(Matter::Identifiability),
-                        Err(reason) => Effect::Tell(Matter::Identifiability, Notice::Failed(reason)),
+                        Err(reason) => Effect::Notify(Matter::Identifiability, Notice::Failed(reason)),
                     });
                 }
             }

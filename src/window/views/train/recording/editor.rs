@@ -321,7 +321,7 @@ impl RecordingEditor {
             "The settings of {} are set. Its run is listed in Compare.",
             file.source_name()
         );
-        effects.push(Effect::Tell(Matter::Recording, Notice::Done(text)));
+        effects.push(Effect::Notify(Matter::Recording, Notice::Done(text)));
         if !is_listed {
             effects.push(Effect::KeepRun(Box::new(file)));
         }
@@ -414,7 +414,7 @@ impl RecordingEditor {
 }
 
 pub(super) fn failed(reason: &str) -> Effect {
-    Effect::Tell(Matter::Recording, Notice::Failed(reason.to_owned()))
+    Effect::Notify(Matter::Recording, Notice::Failed(reason.to_owned()))
 }
 
 fn take_settings(settings: RunSettings, effects: &mut Vec<Effect>) {
