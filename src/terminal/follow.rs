@@ -249,20 +249,20 @@ impl Parser {
 
     /// Returns the parsed line and the cells that are copied to the output.
     pub(super) fn parse(&mut self, line: u64, text: &[u8]) -> Result<(ParsedLine<'_>, &[KeptCell]), ParseError> {
-        let of_columns = match self {
+        match self {
             Self::Array(parser) => {
                 let parsed = parser.parse(line, text).map_err(ParseError::Array)?;
-                return Ok((parsed, &[]));
+                Ok((parsed, &[]))
             }
             Self::Columns(parser) => match parser.parse(line, text) {
-                Ok(InputLine::NoReadings) => (ParsedLine::NoReadings, &[][..]),
+                Ok(InputLine::NoReadings) => Ok((ParsedLine::NoReadings, &[])),
                 Ok(InputLine::Start { is_first }) => {
                     if is_first {
                         warn(&format!(
                             "line {line}: the lines at the start give the means of derived columns and are not decoded"
                         ));
                     }
-                    (ParsedLine::NoReadings, &[][..])
+                    Ok((ParsedLine::NoReadings, &[]))
                 }
                 Ok(InputLine::Readings {
                     row_index,
@@ -274,12 +274,11 @@ impl Parser {
                         row_index,
                         readings_ohm,
                     };
-                    (row, kept)
+                    Ok((row, kept))
                 }
-                Err(source) => return Err(ParseError::Columns { line, source }),
+                Err(source) => Err(ParseError::Columns { line, source }),
             },
-        };
-        Ok(of_columns)
+        }
     }
 
     /// Counts a line that is too long to be parsed.

@@ -8,7 +8,7 @@ use decoupler_core::{
     scene::Loading,
 };
 use decoupler_files::export::format_number;
-use eframe::egui::{Key, Modifiers, vec2};
+use eframe::egui::{Key, vec2};
 
 use crate::driver::{Driver, SKIP};
 
@@ -207,10 +207,7 @@ fn every_term_has_the_same_text_in_the_glossary_and_as_a_tooltip() {
 #[test]
 fn about_has_the_version_and_the_licences_of_all_libraries() {
     let mut driver = open_first();
-    driver.press_with(Modifiers::COMMAND, Key::K);
-    driver.type_into("Action", "about");
-    driver.press(Key::Enter);
-    driver.settle();
+    driver.act("about");
     assert!(driver.has(concat!("Decoupler ", env!("CARGO_PKG_VERSION"))));
     assert!(
         driver.says("Decoupler contains these libraries"),
@@ -224,10 +221,7 @@ fn about_has_the_version_and_the_licences_of_all_libraries() {
 #[test]
 fn the_list_of_actions_finds_terms_too() {
     let mut driver = open_first();
-    driver.press_with(Modifiers::COMMAND, Key::K);
-    driver.type_into("Action", "pareto");
-    driver.press(Key::Enter);
-    driver.settle();
+    driver.act("pareto");
     assert!(
         driver.says("no other is both faster and more accurate"),
         "{:#?}",
