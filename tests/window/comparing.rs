@@ -1,6 +1,6 @@
 //! Finished trainings kept, compared, and restored after a restart; figures of the paper; pictures for print.
 
-use std::{fmt::Write as _, fs, path::Path, sync::Arc};
+use std::{fmt::Write as _, fs, path::Path};
 
 use decoupler::window::{BottomTab, Effect, Phase};
 use decoupler_files::{
@@ -90,9 +90,8 @@ fn two_runs_are_compared_and_survive_a_restart() {
         for (compared, run) in places.filter_map(|place| place.compared.as_ref()).zip(&runs) {
             assert_eq!(*compared.answers, run.decouple_test(), "the same bits");
         }
-        let kept = driver.state().runs.workspace.runs.iter();
-        for (kept, file) in kept.zip(&shown) {
-            assert_eq!(kept.file.training.history, file.training.history);
+        for (index, file) in shown.iter().enumerate() {
+            assert_eq!(driver.kept(index).training.history, file.training.history);
         }
     };
     check(&driver);
@@ -368,15 +367,7 @@ fn two_runs_of_a_recording_are_compared_target_by_target() {
     driver.click_button("Compare");
     wait_for_both(&mut driver);
     driver.settle();
-    let kept = Vec::from_iter(
-        driver
-            .state()
-            .runs
-            .workspace
-            .runs
-            .iter()
-            .map(|run| Arc::clone(&run.file)),
-    );
+    let kept = [0, 1].map(|index| driver.kept(index));
     for (file, letter) in kept.iter().zip(["A", "B"]) {
         let errors = file.scores.network.targets()[1];
         for (name, value) in [("RMSE", errors.rmse), ("R²", errors.r2.unwrap())] {

@@ -4,13 +4,16 @@ use std::{
     cell::RefCell,
     path::Path,
     rc::Rc,
-    sync::mpsc::{Receiver, channel},
+    sync::{
+        Arc,
+        mpsc::{Receiver, channel},
+    },
     time::{Duration, Instant},
 };
 
 use decoupler::window::{DecouplerWindow, Desktop, Notice, Phase, Shared, SourceKind, Views, WindowFile};
 use decoupler_core::evaluation::{ErrorTable, Run, SimulatedSettings, Simulation};
-use decoupler_files::export::format_number;
+use decoupler_files::export::{NetworkFile, format_number};
 use eframe::egui::{
     Context, Key, Modifiers, OutputCommand, Rect, Ui, UiBuilder, Vec2, ViewportCommand, ViewportEvent, ViewportId,
     accesskit::Role, vec2,
@@ -161,6 +164,13 @@ impl Driver {
     /// Returns the shared state of the window.
     pub(crate) fn state(&self) -> &Shared {
         self.window().shared()
+    }
+
+    /// Returns a run of the list, from memory or its file.
+    pub(crate) fn kept(&self, index: usize) -> Arc<NetworkFile> {
+        let runs = &self.state().runs;
+        let folder = runs.path.as_deref().unwrap_or(Path::new(""));
+        runs.workspace.runs[index].load(folder).unwrap()
     }
 
     /// Returns the views with their private state.

@@ -155,7 +155,7 @@ fn a_network_file_brings_back_its_settings_its_recording_and_its_run() {
     other.drop_files(&[&saved]);
     other.wait("the import", |driver| driver.state().setup().ok() == Some(file.setup()));
     other.wait("the run", |driver| driver.state().runs.workspace.runs.len() == 1);
-    assert_eq!(*other.state().runs.workspace.runs[0].file, file);
+    assert_eq!(*other.kept(0), file);
     assert!(other.has("Hidden nodes") && other.state().settings().hidden == 4);
     // Opening it again does not add another run.
     other.drop_files(&[&saved]);

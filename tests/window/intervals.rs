@@ -8,10 +8,10 @@ use decoupler_core::{
     evaluation::{Coverage, Intervals},
     training::StopReason,
 };
-use decoupler_files::export::{NetworkFile, format_number};
+use decoupler_files::export::format_number;
 use rand::{RngExt as _, SeedableRng as _, rngs::ChaCha8Rng};
 
-use crate::{driver::Driver, recordings::opened_text};
+use crate::recordings::opened_text;
 
 /// Readings of two channels and a target that they determine but for noise.
 fn noisy(rows: usize) -> String {
@@ -22,10 +22,6 @@ fn noisy(rows: usize) -> String {
         writeln!(text, "{u1},{u2},{}", u1 + 0.3 * u2 + 0.1 * noise).unwrap();
     }
     text
-}
-
-fn kept(driver: &Driver) -> &NetworkFile {
-    &driver.state().runs.workspace.runs[0].file
 }
 
 #[test]
@@ -39,7 +35,7 @@ fn intervals_are_calibrated_at_the_end_of_a_training() {
     let sets = setup.sets(Path::new(""), &|| false, &mut |_| ()).unwrap().unwrap();
     let training = &sets.sets.split.training;
     let expected = Intervals::cross_validate(setup.settings(), training, SplitBy::Time, &|| false).unwrap();
-    assert_eq!(kept(&driver).intervals.as_ref(), Some(&expected));
+    assert_eq!(driver.kept(0).intervals.as_ref(), Some(&expected));
     let coverage: Coverage = driver.state().result().unwrap().coverage[0].unwrap();
     // 90 % of the noise is within 0.09.
     assert!((coverage.half_width / 0.09 - 1.0).abs() < 0.2, "{coverage:?}");
@@ -75,5 +71,5 @@ fn stopping_a_calibration_keeps_the_network_without_intervals() {
     driver.wait_for_kept_run();
     assert_ne!(driver.state().phase, Phase::Ended(StopReason::Stopped));
     assert!(driver.has("No 90 % intervals: interrupted."));
-    assert_eq!(kept(&driver).intervals, None);
+    assert_eq!(driver.kept(0).intervals, None);
 }

@@ -7,7 +7,6 @@ use std::{
     io::{BufReader, Write},
     net::TcpListener,
     path::{Path, PathBuf},
-    sync::Arc,
 };
 
 use decoupler::window::Phase;
@@ -47,10 +46,6 @@ fn train(driver: &mut Driver, runs: usize) {
 fn start(driver: &mut Driver) {
     driver.click("▶ Start");
     driver.wait("the first frame", |driver| driver.has("Live decoupled surface"));
-}
-
-fn network(driver: &Driver, place: usize) -> Arc<NetworkFile> {
-    Arc::clone(&driver.state().runs.workspace.runs[place].file)
 }
 
 fn decoded(driver: &Driver) -> u64 {
@@ -107,7 +102,7 @@ fn without_a_network_one_click_trains_one_and_another_decodes_live() {
     });
     wait_for_frames(&mut driver, 3);
 
-    let file = network(&driver, 0);
+    let file = driver.kept(0);
     let (time_s, nodes) = displayed(&driver).unwrap();
     let scene = Scene {
         noise: Noise::default(),
@@ -250,7 +245,7 @@ fn a_recording_is_replayed_with_the_same_answers_and_by_any_network() {
     };
     let replayed = collect(&mut driver, "the end of the replay", ended);
     assert!(driver.becomes_idle(), "a replay that is paused");
-    let file = network(&driver, 1);
+    let file = driver.kept(1);
     let answers = recording.times_s().iter().enumerate().map(|(frame, time_s)| {
         let frame_ohm: Vec<f64> = recording.frame_ohm(frame).iter().copied().collect();
         (time_s.to_bits(), by_library(&file, &frame_ohm))
@@ -265,7 +260,7 @@ fn a_recording_is_replayed_with_the_same_answers_and_by_any_network() {
         let (time_s, nodes) = displayed(driver).unwrap();
         let frame = recording.frame_at(time_s);
         let frame_ohm: Vec<f64> = recording.frame_ohm(frame).iter().copied().collect();
-        assert_eq!(nodes, by_library(&network(driver, place), &frame_ohm));
+        assert_eq!(nodes, by_library(&driver.kept(place), &frame_ohm));
         (frame, recording.times_s().len() - 1)
     };
     let (frame, last) = check(&driver, 1);
@@ -298,6 +293,29 @@ fn a_recording_is_replayed_with_the_same_answers_and_by_any_network() {
     let copy = folder.path().join("copy.csv");
     driver.save("Save recording…", &copy);
     assert_eq!(read(&copy), recording);
+}
+
+#[test]
+fn a_run_whose_file_is_damaged_is_not_decoded_with() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut driver = Driver::open_keeping(&folder.path().join("runs"));
+    driver.configure_small();
+    for runs in 1..=2 {
+        train(&mut driver, runs);
+    }
+    let run = driver.state().runs.workspace.runs[0].clone();
+    assert_eq!(run.file, None, "it is only in its file");
+    let damaged = folder.path().join("runs").join(format!("run-{}.json", run.id));
+    fs::write(&damaged, "{").unwrap();
+    driver.click_button("Live");
+    pick(&mut driver, "Decode with", &run.name);
+    driver.wait("the reason", |driver| driver.says("is cut off"));
+    driver.click("▶ Start");
+    driver.wait("the newest network", |driver| {
+        let running = driver.views().live.running.as_ref();
+        running.is_some_and(|running| running.network == driver.state().runs.newest().unwrap().name)
+    });
+    assert_eq!(fs::read_to_string(&damaged).unwrap(), "{");
 }
 
 #[test]
@@ -336,7 +354,7 @@ fn at_rest(file: &NetworkFile) -> (Vec<f64>, String) {
 fn a_socket_is_decoded_and_its_bad_lines_and_end_are_reported() {
     let folder = tempfile::tempdir().unwrap();
     let mut driver = open(folder.path());
-    let file = network(&driver, 0);
+    let file = driver.kept(0);
     let (frame_ohm, line) = at_rest(&file);
 
     let listener = TcpListener::bind("127.0.0.1:0").unwrap();
@@ -372,7 +390,7 @@ fn a_socket_is_decoded_and_its_bad_lines_and_end_are_reported() {
 fn a_stream_that_has_ended_or_is_lost_is_connected_again_with_one_click() {
     let folder = tempfile::tempdir().unwrap();
     let mut driver = open(folder.path());
-    let file = network(&driver, 0);
+    let file = driver.kept(0);
     let (_, line) = at_rest(&file);
     let listener = TcpListener::bind("127.0.0.1:0").unwrap();
     let address = listener.local_addr().unwrap();
@@ -458,7 +476,7 @@ fn a_network_of_a_recording_decodes_a_file_by_the_names_of_its_columns() {
     let (time_s, values) = &targets.history[0];
     let first = Vec::from_iter(reordered[1].split(',').map(|cell| cell.parse::<f64>().unwrap()));
     let mut expected = [0.0; 2];
-    let file = network(&driver, 0);
+    let file = driver.kept(0);
     let mut compiled = CompiledNetworks::<f64>::new(&file.network, 1);
     compiled.decode_row(0, &[first[1], first[0]], &mut expected).unwrap();
     assert_eq!((*time_s, &values[..]), (0.0, &expected[..]));

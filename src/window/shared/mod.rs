@@ -21,7 +21,7 @@ pub use network_exports::{
     DecoderSource, NetworkSource, decoder_export_ui, decoder_forms_ui, file_stem, network_exports,
 };
 pub use offers::{Action, FileInUse, Offers, refuse_in_use};
-pub use run_list::{PLACES, RunList, RunsWorker};
+pub use run_list::{LoadedRun, PLACES, RunList, RunsWorker};
 pub use run_view::{RunCommand, RunView, run_buttons_ui, sentence};
 pub use state::{Phase, Preview, RecordingDraft, Shared, SourceKind, opening_settings};
 pub use training_form::{Effect, Matter, Notice, combination_name, method_choice_ui, method_settings_ui, stopping_ui};

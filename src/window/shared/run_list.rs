@@ -143,7 +143,11 @@ impl Drop for RunsWorker {
 
 fn answer(request: RunsRequest, folder: &mut RunFolder) -> Listed {
     // The thread keeps the runs that could not be written, so it must survive.
-    let answered = caught(THREAD, || carry_out(request, folder));
+    let answered = caught(THREAD, || {
+        let mut problems = carry_out(request, folder);
+        problems.extend(folder.load_used());
+        problems
+    });
     let problems = answered.unwrap_or_else(|error| vec![format!("{error}; the change is not kept")]);
     Listed {
         runs: folder.runs().clone(),
@@ -196,15 +200,39 @@ pub struct RunList {
     pub unwritten: usize,
 }
 
+/// A run whose file is in memory.
+#[derive(Clone, Copy, Debug)]
+pub struct LoadedRun<'a> {
+    /// [`KeptRun::id`].
+    pub id: u64,
+    /// Name given by the user.
+    pub name: &'a str,
+    /// Its file.
+    pub file: &'a Arc<NetworkFile>,
+}
+
+impl<'a> LoadedRun<'a> {
+    /// Returns the run, if its file is in memory.
+    fn of(run: &'a KeptRun) -> Option<Self> {
+        let KeptRun { id, name, file, .. } = run;
+        file.as_ref().map(|file| Self { id: *id, name, file })
+    }
+}
+
 impl RunList {
     /// Returns the run with this number.
     pub fn run(&self, id: u64) -> Option<&KeptRun> {
         self.workspace.runs.iter().find(|run| run.id == id)
     }
 
-    /// Returns the run in one of the two places.
-    pub fn pinned(&self, place: usize) -> Option<&KeptRun> {
-        self.run(self.workspace.pinned[place]?)
+    /// Returns the run in one of the two places, once it is loaded.
+    pub fn pinned(&self, place: usize) -> Option<LoadedRun<'_>> {
+        self.run(self.workspace.pinned[place]?).and_then(LoadedRun::of)
+    }
+
+    /// Returns the newest run, once it is loaded.
+    pub fn newest(&self) -> Option<LoadedRun<'_>> {
+        self.workspace.runs.last().and_then(LoadedRun::of)
     }
 }
 

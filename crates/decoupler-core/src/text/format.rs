@@ -148,9 +148,20 @@ pub fn printable(text: &str) -> String {
 }
 
 /// Returns a text for a message of one line: line breaks, tabs and other unprintable characters, for example of a field of a
-/// damaged file, are escaped.
+/// damaged file, are escaped. The middle of a text of more than 1000 characters is left out: the cure is at the end.
 pub fn in_one_line(text: &str) -> String {
-    escaped(text.chars(), is_unprintable)
+    const BEGIN: usize = 700;
+    const END: usize = 299;
+    let text = escaped(text.chars(), is_unprintable);
+    let place = |index: usize| text.char_indices().nth(index).map(|(place, _)| place);
+    match (
+        place(BEGIN),
+        place(BEGIN + END + 1),
+        text.char_indices().nth_back(END - 1),
+    ) {
+        (Some(begin), Some(_), Some((end, _))) => format!("{}…{}", &text[..begin], &text[end..]),
+        _ => text,
+    }
 }
 
 fn escaped(text: impl Iterator<Item = char>, is_escaped: impl Fn(char) -> bool) -> String {
@@ -225,6 +236,18 @@ fn with_remedy(error: &io::Error) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn long_messages_lose_their_middle() {
+        let whole = "é".repeat(1000);
+        assert_eq!(in_one_line(&whole), whole);
+        let cut = in_one_line(&format!("begin\n{}save it again", "é".repeat(5000)));
+        assert_eq!(cut.chars().count(), 1000);
+        assert!(
+            cut.starts_with("begin\\né") && cut.contains("é…é") && cut.ends_with("ésave it again"),
+            "{cut}"
+        );
+    }
 
     #[test]
     fn numbers_have_three_significant_digits() {

@@ -58,7 +58,7 @@ pub use experiment_tables::{
 };
 pub use network_file::NetworkFile;
 pub use recipe_file::{RecipeFile, RecipeSource};
-pub use run_folder::{KeptRun, KeptRuns, RunFolder};
+pub use run_folder::{KeptRun, KeptRuns, RunFolder, RunSummary};
 pub use samples::{TrainingRecord, write_decoded, write_decoded_header, write_samples, write_samples_header};
 pub use search_table::{describe_search, search_table};
 pub use sensor_file::SensorFile;

@@ -16,6 +16,7 @@ use serde_json::value::to_raw_value;
 use super::{
     AtomicFile, DocumentError, DocumentKind, NetworkFile, WriteError, document::PROGRAM, network_file::Sealed,
 };
+use crate::import::Setup;
 
 /// The finished trainings, and the two that are compared.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -33,8 +34,49 @@ pub struct KeptRun {
     pub id: u64,
     /// Name given by the user.
     pub name: String,
-    /// Settings, network, training record and errors.
-    pub file: Arc<NetworkFile>,
+    /// What a list shows of it.
+    pub summary: Arc<RunSummary>,
+    /// Settings, network, training record and errors; `None` while they are only in its file. The records of a few
+    /// hundred runs would take more memory than the rest of the program.
+    pub file: Option<Arc<NetworkFile>>,
+}
+
+/// What a list shows of a finished training.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RunSummary {
+    /// Settings, and the plan of a recording.
+    pub setup: Setup,
+    /// `true` if the targets are nodes of an array: [`Problem::has_nodes`](decoupler_core::evaluation::Problem).
+    pub has_nodes: bool,
+    /// Error on the test set in percent.
+    pub percent: Option<f64>,
+    /// Training time on one thread in seconds.
+    pub seconds: f64,
+}
+
+impl RunSummary {
+    /// Summary of the run in a network file.
+    pub fn of(file: &NetworkFile) -> Self {
+        Self {
+            setup: file.setup(),
+            has_nodes: file.problem.has_nodes,
+            percent: file.scores.network.percent(),
+            seconds: file.training.seconds,
+        }
+    }
+}
+
+impl KeptRun {
+    /// Returns the run, which is read from its file in `folder` if it is not in memory.
+    ///
+    /// # Errors
+    /// The file cannot be read or is damaged.
+    pub fn load(&self, folder: &Path) -> Result<Arc<NetworkFile>, DocumentError> {
+        match &self.file {
+            Some(file) => Ok(Arc::clone(file)),
+            None => NetworkFile::load(&run_path(folder, self.id)).map(Arc::new),
+        }
+    }
 }
 
 /// The run list and the folder that keeps it.
@@ -43,7 +85,7 @@ pub struct KeptRun {
 /// is the pair that is compared; each is written when it changes. Several programs can therefore share a folder without
 /// locks: no two write the same run, the last name given counts, and [`Self::look`] finds the changes made by others.
 ///
-/// A run that cannot be written stays in memory.
+/// In memory are the runs that cannot be written, and those that [`Self::load_used`] reads.
 #[derive(Debug, Default)]
 pub struct RunFolder {
     /// `None` if runs are not kept.
@@ -93,7 +135,8 @@ impl RunFolder {
             let Some(run) = runs.iter().find(|run| run.id == id) else {
                 return false;
             };
-            let written = run.file.save_by(&run_path(folder, id), AtomicFile::commit_new);
+            let Some(file) = &run.file else { return false };
+            let written = file.save_by(&run_path(folder, id), AtomicFile::commit_new);
             let named = written.and_then(|()| Ok(write(&name_path(folder, id), &run.name)?));
             named.is_err() && !run_path(folder, id).exists()
         });
@@ -123,13 +166,19 @@ impl RunFolder {
             if let Err(place) = self.kept.runs.binary_search_by_key(&id, |run| run.id) {
                 match NetworkFile::load(&run_path(path, id)) {
                     Ok(file) => {
-                        let name = new_name(&self.kept.runs, &file);
-                        let file = Arc::new(file);
-                        self.kept.runs.insert(place, KeptRun { id, name, file });
+                        let summary = Arc::new(RunSummary::of(&file));
+                        let name = new_name(&self.kept.runs, &summary.setup);
+                        let run = KeptRun {
+                            id,
+                            name,
+                            summary,
+                            file: None,
+                        };
+                        self.kept.runs.insert(place, run);
                     }
                     // Another program has removed it just now.
                     Err(_) if !run_path(path, id).exists() => {}
-                    Err(error) => problems.push(format!("a run is left out of the list: {error}")),
+                    Err(error) => problems.push(left_out(&error)),
                 }
             }
         }
@@ -155,6 +204,34 @@ impl RunFolder {
         self.untold(problems)
     }
 
+    /// Reads the runs into memory that are compared, and the newest; releases the others. Returns the files that cannot
+    /// be read, each once; their runs leave the list.
+    pub fn load_used(&mut self) -> Vec<String> {
+        let Some(folder) = &self.path else { return Vec::new() };
+        let KeptRuns { runs, pinned } = &mut self.kept;
+        let newest = runs.last().map(|run| run.id);
+        let count = runs.len();
+        let mut problems = Vec::new();
+        runs.retain_mut(|run| {
+            if self.unwritten.contains(&run.id) {
+                return true;
+            }
+            let is_used = newest == Some(run.id) || pinned.contains(&Some(run.id));
+            let loaded = is_used.then(|| run.load(folder)).transpose();
+            run.file = loaded.unwrap_or_else(|error| {
+                problems.push(left_out(&error));
+                None
+            });
+            run.file.is_some() || !is_used
+        });
+        let is_newest_another = runs.len() < count;
+        let mut untold = self.untold(problems);
+        if is_newest_another {
+            untold.extend(self.load_used());
+        }
+        untold
+    }
+
     fn untold(&mut self, mut problems: Vec<String>) -> Vec<String> {
         problems.retain(|problem| self.reported.insert(problem.clone()));
         problems
@@ -165,13 +242,20 @@ impl RunFolder {
     /// # Errors
     /// Its file cannot be written; it is then in the list until the program ends.
     pub fn keep(&mut self, file: Arc<NetworkFile>) -> Result<(), DocumentError> {
-        let name = new_name(&self.kept.runs, &file);
+        let summary = Arc::new(RunSummary::of(&file));
+        let name = new_name(&self.kept.runs, &summary.setup);
         let (id, written) = self.write_run(&file, &name);
         if self.folder_of(id).is_none() {
             self.unwritten.insert(id);
         }
         let place = self.kept.runs.partition_point(|run| run.id < id);
-        self.kept.runs.insert(place, KeptRun { id, name, file });
+        let run = KeptRun {
+            id,
+            name,
+            summary,
+            file: Some(file),
+        };
+        self.kept.runs.insert(place, run);
         written
     }
 
@@ -246,13 +330,18 @@ impl RunFolder {
 }
 
 /// Returns source, hidden nodes and method; numbered if there is such a name.
-fn new_name(runs: &[KeptRun], file: &NetworkFile) -> String {
-    let method = file.settings.training.method.short_name();
-    let name = format!("{} h{} {method}", file.source_name(), file.settings.hidden);
+fn new_name(runs: &[KeptRun], setup: &Setup) -> String {
+    let settings = setup.settings();
+    let method = settings.training.method.short_name();
+    let name = format!("{} h{} {method}", setup.source_name(), settings.hidden);
     let is_taken = |name: &str| runs.iter().any(|run| run.name == name);
     let numbered = (2..).map(|number| format!("{name} ({number})"));
     let mut names = std::iter::once(name.clone()).chain(numbered);
     names.find(|name| !is_taken(name)).unwrap_or(name)
+}
+
+fn left_out(error: &DocumentError) -> String {
+    format!("a run is left out of the list: {error}")
 }
 
 const KIND: DocumentKind = DocumentKind::RunList;

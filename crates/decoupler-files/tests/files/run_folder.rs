@@ -26,7 +26,8 @@ fn trained(hidden: usize) -> Arc<NetworkFile> {
 
 /// Opens a folder without damaged files.
 fn open(path: &Path) -> RunFolder {
-    let (folder, problems) = RunFolder::open(path).unwrap();
+    let (mut folder, mut problems) = RunFolder::open(path).unwrap();
+    problems.extend(folder.load_used());
     assert!(problems.is_empty(), "{problems:?}");
     folder
 }
@@ -40,6 +41,7 @@ fn two(path: &Path) -> RunFolder {
     let id = folder.runs().runs[1].id;
     folder.rename(id, "zweiter \"Lauf\" ×").unwrap();
     folder.pin([Some(id), None]).unwrap();
+    assert!(folder.load_used().is_empty());
     folder
 }
 
@@ -74,7 +76,10 @@ fn runs_are_read_back_unchanged() {
     assert_eq!(open(&path).runs(), kept.runs());
     // Each run is a network file like any other.
     let run = &kept.runs().runs[0];
-    assert_eq!(NetworkFile::load(&run_path(&path, run)).unwrap(), *run.file);
+    assert_eq!(
+        NetworkFile::load(&run_path(&path, run)).unwrap(),
+        *run.load(&path).unwrap()
+    );
 }
 
 #[test]
@@ -107,7 +112,9 @@ fn two_programs_see_each_others_changes() {
     let folder = tempfile::tempdir().unwrap();
     let [mut first, mut second] = [(); 2].map(|()| open(folder.path()));
     let agree = |first: &mut RunFolder, second: &mut RunFolder| {
-        assert!(first.look().is_empty() && second.look().is_empty());
+        for folder in [&mut *first, &mut *second] {
+            assert!(folder.look().is_empty() && folder.load_used().is_empty());
+        }
         assert_eq!(first.runs(), second.runs());
     };
     first.keep(trained(2)).unwrap();
@@ -182,6 +189,7 @@ fn a_damaged_run_is_named_and_left_alone() {
         // Once repaired, it is listed again with its name and place.
         fs::write(&path, &whole).unwrap();
         found.look();
+        assert!(found.load_used().is_empty());
         assert_eq!(found.runs(), kept.runs());
     }
 }

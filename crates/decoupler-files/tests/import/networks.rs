@@ -290,16 +290,68 @@ fn a_run_folder_keeps_runs_of_both_sources() {
     let names = |folder: &RunFolder| Vec::from_iter(folder.runs().runs.iter().map(|run| run.name.clone()));
     assert_eq!(names(&kept), ["2×2_2×6 h12 lm", "data h5 br"]);
     let (mut other, problems) = RunFolder::open(&runs).unwrap();
-    assert_eq!((other.runs(), problems), (kept.runs(), Vec::new()));
+    assert!(problems.is_empty() && other.load_used().is_empty() && kept.load_used().is_empty());
+    assert_eq!(other.runs(), kept.runs());
     let [first, second] = [0, 1].map(|place| kept.runs().runs[place].id);
     other.rename(second, "press").unwrap();
     other.pin([Some(second), Some(first)]).unwrap();
     kept.remove(first).unwrap();
-    assert!(kept.look().is_empty() && other.look().is_empty());
+    for folder in [&mut kept, &mut other] {
+        assert!(folder.look().is_empty() && folder.load_used().is_empty());
+    }
     assert_eq!(kept.runs(), other.runs());
     assert_eq!(names(&kept), ["press"]);
     assert_eq!(kept.runs().pinned, [Some(second), None]);
-    assert_eq!(*kept.runs().runs[0].file, *files[1]);
+    assert_eq!(*kept.runs().runs[0].load(&runs).unwrap(), *files[1]);
+}
+
+#[test]
+fn only_the_runs_in_use_are_in_memory() {
+    let root = tempfile::tempdir().unwrap();
+    let [recordings, runs] = folders(root.path());
+    let (mut kept, _) = RunFolder::open(&runs).unwrap();
+    let file = Arc::new(trained(&recordings));
+    for _ in 0..5 {
+        kept.keep(Arc::clone(&file)).unwrap();
+    }
+    let ids = Vec::from_iter(kept.runs().runs.iter().map(|run| run.id));
+    let loaded = |folder: &RunFolder| {
+        let loaded = folder.runs().runs.iter().map(|run| run.file.is_some());
+        Vec::from_iter(loaded)
+    };
+    kept.pin([Some(ids[1]), None]).unwrap();
+    assert!(kept.load_used().is_empty());
+    assert_eq!(loaded(&kept), [false, true, false, false, true]);
+    assert!(kept.runs().runs.iter().all(|run| *run.load(&runs).unwrap() == *file));
+    kept.pin([None, Some(ids[3])]).unwrap();
+    kept.remove(ids[4]).unwrap();
+    assert!(kept.load_used().is_empty());
+    assert_eq!(loaded(&kept), [false, false, false, true]);
+    // Damaged since it was listed: it is named, leaves the list, and stays as it is.
+    let damaged = runs.join(format!("run-{}.json", ids[2]));
+    fs::write(&damaged, "{").unwrap();
+    kept.pin([Some(ids[2]), None]).unwrap();
+    let problems = kept.load_used();
+    assert!(
+        matches!(&problems[..], [problem] if problem.contains(&format!("run-{}.json", ids[2]))),
+        "{problems:?}"
+    );
+    assert_eq!(
+        Vec::from_iter(kept.runs().runs.iter().map(|run| run.id)),
+        [ids[0], ids[1], ids[3]]
+    );
+    assert!(
+        kept.look().is_empty() && kept.load_used().is_empty(),
+        "it is named once"
+    );
+    assert_eq!(fs::read_to_string(&damaged).unwrap(), "{");
+    // Runs that have no file stay.
+    let mut unkept = RunFolder::default();
+    for _ in 0..3 {
+        unkept.keep(Arc::clone(&file)).unwrap();
+    }
+    assert!(unkept.load_used().is_empty());
+    assert_eq!(loaded(&unkept), [true; 3]);
 }
 
 #[test]

@@ -136,7 +136,8 @@ proptest! {
         kept.pin([pinned, None]).unwrap();
         let found = Vec::from_iter(kept.runs().runs.iter().map(|run| &run.name));
         prop_assert_eq!(found, Vec::from_iter(&names));
-        let (again, problems) = open();
+        let (mut again, mut problems) = open();
+        problems.extend([again.load_used(), kept.load_used()].concat());
         prop_assert_eq!((again.runs(), problems), (kept.runs(), Vec::new()));
     }
 }

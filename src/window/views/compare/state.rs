@@ -4,7 +4,7 @@ use decoupler_core::text::counted;
 use decoupler_files::{
     export::{KeptRun, NetworkFile, format_duration, format_percent},
     figure::surface::Surface,
-    import::Recorded,
+    import::{Recorded, Setup},
 };
 use eframe::egui::{Button, Id, RichText, TextEdit, Ui, WidgetInfo, accesskit::Role};
 use ndarray::Array2;
@@ -219,7 +219,7 @@ impl CompareView {
             if place.id != run.map(|run| run.id) {
                 *place = Place::default();
                 if let Some(run) = run {
-                    (place.id, place.job) = (Some(run.id), Some(prepare(&run.file, &self.wake)));
+                    (place.id, place.job) = (Some(run.id), Some(prepare(run.file, &self.wake)));
                 }
             }
             let Some(prepared) = place.job.as_ref().and_then(Job::next_event) else {
@@ -299,12 +299,12 @@ fn run_ui(
 ) {
     let name = &run.name;
     name_ui(ui, position, run, effects);
-    dim_ui(ui, &conditions(&run.file));
-    let time = Duration::try_from_secs_f64(run.file.training.seconds).unwrap_or_default();
+    dim_ui(ui, &conditions(&run.summary.setup));
+    let time = Duration::try_from_secs_f64(run.summary.seconds).unwrap_or_default();
     let text = format!(
         "{} {}, {} on one thread",
-        if run.file.problem.has_nodes { "Z" } else { "Error" },
-        format_percent(run.file.scores.network.percent()),
+        if run.summary.has_nodes { "Z" } else { "Error" },
+        format_percent(run.summary.percent),
         format_duration(time)
     );
     ui.label(RichText::new(text).size(type_size().note));
@@ -338,7 +338,7 @@ fn run_ui(
         let take = ui.add_enabled(can_take, Button::new("Settings").min_size([0.0, space(6)].into()));
         take.widget_info(|| WidgetInfo::labeled(Role::Button, can_take, format!("Use the settings of {name}")));
         if take.on_hover_text("Uses its settings for the next training.").clicked() {
-            let setup = Box::new(run.file.setup());
+            let setup = Box::new(run.summary.setup.clone());
             effects.extend([Effect::TakeSetup(setup), Effect::ShowTraining]);
         }
         let remove = ui.add(Button::new("Remove…").min_size([0.0, space(6)].into()));
@@ -370,8 +370,8 @@ fn name_ui(ui: &mut Ui, position: usize, run: &KeptRun, effects: &mut Vec<Effect
 }
 
 /// Returns the settings of the run in one line.
-fn conditions(file: &NetworkFile) -> String {
-    let settings = &file.settings;
+fn conditions(setup: &Setup) -> String {
+    let settings = setup.settings();
     let starts = match settings.starts {
         1 => String::new(),
         starts => format!(", {starts} starts"),
@@ -382,7 +382,7 @@ fn conditions(file: &NetworkFile) -> String {
     });
     let mut text = format!(
         "{}, {} hidden, {}{samples}, seed {}{starts}",
-        file.source_name(),
+        setup.source_name(),
         settings.hidden,
         settings.training.method.short_name(),
         settings.seed

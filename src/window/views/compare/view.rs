@@ -8,7 +8,7 @@ use decoupler_core::{
     scene::{Loading, Movement, Noise, NoisySets, Rows, Scene},
 };
 use decoupler_files::{
-    export::{KeptRun, Table, TableColumn, format_duration, format_number},
+    export::{Table, TableColumn, format_duration, format_number},
     figure::{
         Figure, PlotFigure, compared_losses_figure,
         surface::{Surface, SurfaceFigure},
@@ -25,8 +25,8 @@ use super::{
 use crate::window::{
     plotting::{Pointer, plots_ui, titled_plots_ui},
     shared::{
-        Effect, Export, Look, NetworkSource, PLACES, RightCard, RunList, Shared, View, colour_scale_ui, copy_exports,
-        follow_surface, network_exports, picture_exports, target_choice_ui, view_mode_ui,
+        Effect, Export, LoadedRun, Look, NetworkSource, PLACES, RightCard, RunList, Shared, View, colour_scale_ui,
+        copy_exports, follow_surface, network_exports, picture_exports, target_choice_ui, view_mode_ui,
     },
     surface_view::{ColourBar, SurfaceView},
     test_view::TestSet,
@@ -128,7 +128,7 @@ impl CompareView {
         let look = shared.look;
         let surface = |place: usize| {
             let Compared { test, drawn, .. } = self.places[place].compared.as_ref()?;
-            let name = shared.runs.pinned(place).map_or("", |run| &run.name);
+            let name = shared.runs.pinned(place).map_or("", |run| run.name);
             let (letter, style) = (PLACES[place], look.style());
             match (drawn, test) {
                 (Drawn::Frames(frames), TestSet::Array(test)) => {
@@ -193,7 +193,7 @@ impl CompareView {
                 }
                 if let Some(run) = runs.pinned(place) {
                     ui.with_layout(Layout::left_to_right(Align::Center), |ui| {
-                        let name = RichText::new(&run.name).font(semibold(type_size().title));
+                        let name = RichText::new(run.name).font(semibold(type_size().title));
                         ui.add(eframe::egui::Label::new(name).truncate());
                     });
                 }
@@ -272,7 +272,7 @@ pub(super) fn compare_exports<'a>(view: &'a CompareView, shared: &'a Shared) -> 
     let mut exports = Vec::new();
     for (place, letter) in PLACES.into_iter().enumerate() {
         let run = runs.pinned(place);
-        let source = run.map(|run| NetworkSource::Kept(run.name.clone(), Arc::clone(&run.file)));
+        let source = run.map(|run| NetworkSource::Kept(run.name.to_owned(), Arc::clone(run.file)));
         let source = source.ok_or_else(|| format!("No run is chosen as {letter}: choose one in the list."));
         exports.extend(network_exports(&format!("{letter}: "), &source, Vec::new));
     }
@@ -386,9 +386,9 @@ const OTHER_SAMPLES: &str =
     "These networks were tested on different samples, so their errors are not directly comparable.";
 
 /// Formats a figure of a run; returns `None` if it does not apply to the source of the run.
-type FigureOf = fn(&KeptRun) -> Option<String>;
+type FigureOf = fn(&LoadedRun<'_>) -> Option<String>;
 
-fn of_nodes(run: &KeptRun, figure: fn(&Errors) -> Option<f64>) -> Option<String> {
+fn of_nodes(run: &LoadedRun<'_>, figure: fn(&Errors) -> Option<f64>) -> Option<String> {
     run.file
         .scores
         .network
@@ -396,7 +396,7 @@ fn of_nodes(run: &KeptRun, figure: fn(&Errors) -> Option<f64>) -> Option<String>
         .map(|errors| format_number(figure(errors)))
 }
 
-fn of_array(run: &KeptRun, figure: fn(&Simulation) -> String) -> Option<String> {
+fn of_array(run: &LoadedRun<'_>, figure: fn(&Simulation) -> String) -> Option<String> {
     run.file.settings.source.simulation().map(figure)
 }
 
@@ -445,7 +445,7 @@ const FIGURES: [(&str, FigureOf); 20] = [
 /// Returns the figures that apply to at least one of the compared runs, formatted for each run.
 fn figures(runs: &RunList) -> impl Iterator<Item = (&'static str, [Option<String>; 2])> {
     let figure = |(name, figure): &(&'static str, FigureOf)| {
-        let of = |place| runs.pinned(place).and_then(figure);
+        let of = |place| runs.pinned(place).as_ref().and_then(figure);
         (*name, [of(0), of(1)])
     };
     let figures = Vec::from_iter(FIGURES.iter().map(figure));
@@ -465,13 +465,13 @@ fn target_figures(runs: &RunList) -> Vec<(String, [Option<String>; 2])> {
             targets.push(target);
         }
     }
-    let errors = |run: &KeptRun, target: &Channel| {
+    let errors = |run: &LoadedRun<'_>, target: &Channel| {
         let index = run.file.problem.targets.iter().position(|other| other == target)?;
         run.file.scores.network.targets().get(index).copied()
     };
     let figures = |target: &Channel| {
         let of = |figure: fn(&TargetErrors) -> String| {
-            pinned.map(|run| run.and_then(|run| errors(run, target)).map(|errors| figure(&errors)))
+            pinned.map(|run| run.and_then(|run| errors(&run, target)).map(|errors| figure(&errors)))
         };
         let title = target.title();
         [
@@ -485,14 +485,14 @@ fn target_figures(runs: &RunList) -> Vec<(String, [Option<String>; 2])> {
 /// Returns true if the two runs were tested on different samples.
 fn are_other_samples(runs: &RunList) -> bool {
     // The channels of the readings may differ.
-    let samples = |run: &KeptRun| {
+    let samples = |run: &LoadedRun<'_>| {
         let mut plan = run.file.recorded.as_ref()?.plan.clone();
         plan.import.inputs.clear();
         plan.import.units.clear();
         Some((plan, run.file.settings.seed))
     };
     match [0, 1].map(|place| runs.pinned(place)) {
-        [Some(a), Some(b)] => samples(a) != samples(b),
+        [Some(a), Some(b)] => samples(&a) != samples(&b),
         _ => false,
     }
 }
@@ -507,7 +507,7 @@ fn describe_split(plan: &Plan) -> String {
 /// Returns the figures of both runs, with their names as headings.
 pub fn compared_table(runs: &RunList) -> Table {
     let name = |place: usize| {
-        let run = runs.pinned(place).map_or("", |run| &run.name);
+        let run = runs.pinned(place).map_or("", |run| run.name);
         TableColumn::field(format!("{}: {run}", PLACES[place]))
     };
     let cell = |words: Option<String>| words.unwrap_or_else(|| format_number(None)).into();

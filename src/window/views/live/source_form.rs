@@ -309,10 +309,21 @@ pub fn form_ui(ui: &mut Ui, view: &mut LiveView, shared: &Shared, effects: &mut 
 #[derive(Debug)]
 pub struct NetworkChoice {
     pick: NetworkPick,
+    /// The run that was picked, once it is loaded.
+    run: Option<(u64, Arc<NetworkFile>)>,
+    /// The file that was opened.
     file: Option<(String, Arc<NetworkFile>)>,
     problem: Option<String>,
     chosen: Option<Receiver<PathBuf>>,
-    loading: Job<Result<(PathBuf, Box<NetworkFile>), String>>,
+    loading: Job<Result<Loaded, String>>,
+}
+
+/// A network that was read for this view.
+enum Loaded {
+    /// Of the run with this number.
+    Run(u64, Arc<NetworkFile>),
+    /// From a file of this name.
+    File(String, Arc<NetworkFile>),
 }
 
 /// Place of the network.
@@ -331,6 +342,7 @@ impl NetworkChoice {
     pub fn new(wake: Wake) -> Self {
         Self {
             pick: NetworkPick::Newest,
+            run: None,
             file: None,
             problem: None,
             chosen: None,
@@ -338,19 +350,42 @@ impl NetworkChoice {
         }
     }
 
-    /// Returns the chosen network and its name; `None` if there is none.
+    /// Returns the chosen network and its name; `None` if there is none, or it is still being read.
     pub fn network<'a>(&'a self, runs: &'a RunList) -> Option<(&'a str, &'a Arc<NetworkFile>)> {
-        let run = match self.pick {
-            NetworkPick::File => {
-                let (name, file) = self.file.as_ref()?;
-                return Some((name, file));
-            }
+        let picked = match self.pick {
+            NetworkPick::File => return self.file.as_ref().map(|(name, file)| (&**name, file)),
             NetworkPick::Run(id) => runs.run(id),
             NetworkPick::Newest => None,
         };
-        // A run that was removed is replaced by the newest.
-        let run = run.or(runs.workspace.runs.last())?;
-        Some((&run.name, &run.file))
+        match picked {
+            Some(run) => {
+                let (_, file) = self.run.as_ref().filter(|(read, _)| *read == run.id)?;
+                Some((&run.name, file))
+            }
+            // A run that was removed is replaced by the newest.
+            None => runs.newest().map(|run| (run.name, run.file)),
+        }
+    }
+
+    /// Reads the run that was just picked, if it is not in memory; returns `true` if it is.
+    fn read_picked(&mut self, runs: &RunList) -> bool {
+        let NetworkPick::Run(id) = self.pick else { return true };
+        let Some(run) = runs.run(id).cloned() else { return true };
+        if let Some(file) = &run.file {
+            self.run = Some((id, Arc::clone(file)));
+            return true;
+        }
+        let folder = runs.path.clone().unwrap_or_default();
+        self.load(move || Ok(Loaded::Run(id, run.load(&folder).map_err(|error| error.to_string())?)));
+        false
+    }
+
+    fn load(&mut self, read: impl FnOnce() -> Result<Loaded, String> + Send + 'static) {
+        self.problem = None;
+        self.loading.start(
+            move |_| read(),
+            |read| read.unwrap_or_else(|error| Err(error.to_string())),
+        );
     }
 
     /// Decodes with this network, which does not belong to a run.
@@ -360,26 +395,31 @@ impl NetworkChoice {
         self.pick = NetworkPick::File;
     }
 
-    /// Takes the file that the user has opened; returns `true` once its network is loaded.
+    /// Reads the file that the user has opened; returns `true` once another network is loaded.
     pub fn take_events(&mut self) -> bool {
         if let Some(path) = self.chosen.as_ref().and_then(|chosen| chosen.try_recv().ok()) {
             self.chosen = None;
-            self.loading.start(
-                move |_| {
-                    let file = NetworkFile::load(&path).map_err(|error| error.to_string())?;
-                    Ok((path, Box::new(file)))
-                },
-                |loaded| loaded.unwrap_or_else(|error| Err(error.to_string())),
-            );
+            self.load(move || {
+                let file = NetworkFile::load(&path).map_err(|error| error.to_string())?;
+                let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy();
+                Ok(Loaded::File(name.into_owned(), Arc::new(file)))
+            });
         }
         match self.loading.next_event() {
-            Some(Ok((path, file))) => {
-                let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy();
-                self.take(&name, Arc::from(file));
+            Some(Ok(Loaded::Run(id, file))) => {
+                self.run = Some((id, file));
+                self.pick == NetworkPick::Run(id)
+            }
+            Some(Ok(Loaded::File(name, file))) => {
+                self.take(&name, file);
                 true
             }
             Some(Err(reason)) => {
                 self.problem = Some(reason);
+                let read = self.run.as_ref().map(|(id, _)| NetworkPick::Run(*id));
+                if matches!(self.pick, NetworkPick::Run(_)) && read != Some(self.pick) {
+                    self.pick = NetworkPick::Newest;
+                }
                 false
             }
             None => false,
@@ -392,11 +432,12 @@ impl NetworkChoice {
         let newest = runs.workspace.runs.last();
         let newest = newest.map_or_else(|| "no run yet".to_owned(), |run| format!("Newest run: {}", run.name));
         let file = self.file.as_ref().map(|(name, _)| format!("File: {name}"));
-        let shown = match (self.pick, self.network(runs)) {
-            (NetworkPick::Run(id), Some((name, _))) if runs.run(id).is_some() => name.to_owned(),
-            (NetworkPick::File, _) => file.clone().unwrap_or_default(),
-            _ => newest.clone(),
+        let shown = match self.pick {
+            NetworkPick::Newest => None,
+            NetworkPick::Run(id) => runs.run(id).map(|run| run.name.clone()),
+            NetworkPick::File => file.clone(),
         };
+        let shown = shown.unwrap_or_else(|| newest.clone());
         let width = ui.available_width();
         let label = ui.label("Decode with");
         let combo = ComboBox::from_id_salt("live network")
@@ -431,7 +472,7 @@ impl NetworkChoice {
         if let Some(problem) = &self.problem {
             note_ui(ui, problem);
         }
-        self.pick != before
+        self.pick != before && self.read_picked(runs)
     }
 }
 

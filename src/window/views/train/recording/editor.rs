@@ -21,7 +21,7 @@ use decoupler_core::{
     scene::RowModel,
 };
 use decoupler_files::{
-    export::NetworkFile,
+    export::{NetworkFile, RunSummary},
     import::{Meaning, Plan, Setup},
 };
 
@@ -305,7 +305,8 @@ impl RecordingEditor {
         shared: &Shared,
         effects: &mut Vec<Effect>,
     ) {
-        let is_listed = shared.runs.workspace.runs.iter().any(|run| *run.file == file);
+        let summary = RunSummary::of(&file);
+        let is_listed = shared.runs.workspace.runs.iter().any(|run| *run.summary == summary);
         match import {
             None => effects.push(Effect::TakeSetup(Box::new(file.setup()))),
             Some(import) => {
