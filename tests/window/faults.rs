@@ -20,7 +20,7 @@ use crate::{
 
 /// Exports of each view. Every kind of file and every way to its contents is among them; other names of a menu differ only
 /// in what is written.
-const EXPORTS: [(&str, &[(&str, &str)]); 4] = [
+const EXPORTS: [(&str, &[(&str, &str)]); 5] = [
     (
         "Train",
         &[
@@ -31,6 +31,9 @@ const EXPORTS: [(&str, &[(&str, &str)]); 4] = [
             ("Chart, PNG", "chart.png"),
             ("Report, HTML", "report.html"),
             ("NumPy, f64", "numpy"),
+            ("ONNX, f32", "onnx"),
+            ("C99, f64", "c99"),
+            ("MATLAB/Octave, f64", "matlab"),
         ],
     ),
     (
@@ -38,6 +41,10 @@ const EXPORTS: [(&str, &[(&str, &str)]); 4] = [
         &[("A: Network file, JSON", "kept.json"), ("A: Report, HTML", "kept.html")],
     ),
     ("Identifiability", &[("Singular values, SVG", "values.svg")]),
+    (
+        "Trade-off",
+        &[("All points, CSV", "points.csv"), ("Charts, PNG", "charts.png")],
+    ),
     (
         "Experiments",
         &[
@@ -115,6 +122,17 @@ fn exports_at_every_fault() {
             driver.wait("the analysis", |driver| {
                 driver.views().identifiability.analysis.is_some()
             });
+        }
+        if view == "Trade-off" {
+            for decoder in ["Radial basis", "Fuzzy rules", "Network + Newton"] {
+                driver.click(decoder);
+            }
+            for (label, text) in [("Noise levels", "0"), ("Hidden nodes", "2"), ("Maximum samples", "100")] {
+                driver.type_into(label, text);
+            }
+            driver.enter("Maximum epochs", "1");
+            driver.click("▶ Measure");
+            driver.wait("the end", |driver| driver.views().trade_off.running.is_none());
         }
         if view == "Experiments" {
             for (label, text) in [("Hidden nodes", "2"), ("Seeds", "1"), ("Epochs", "1"), ("Starts", "1")] {

@@ -5,10 +5,10 @@ use std::{fs, path::Path};
 use eframe::egui::Key;
 
 use crate::{
-    driver::Driver,
+    driver::{Driver, small},
     window::{
         job::planned_panic::{MESSAGE, is_pending, plan},
-        shared::{Notice, Phase, View as _},
+        shared::{Effect, Notice, Phase, View as _},
     },
 };
 
@@ -53,6 +53,22 @@ fn jobs_of_a_training_can_be_started_again_after_a_panic() {
     driver.wait_for_last_epoch();
     driver.wait_for_kept_run();
 
+    driver.act("Press the middle of the surface");
+    let answered = |driver: &Driver| driver.has("Ridge");
+    driver.wait("the other decoders", answered);
+    // One new touch each: the next one begins again.
+    let press = |driver: &mut Driver, depth_mm: f64| {
+        driver.get("Depth of the press").set_value_accesskit(depth_mm);
+        driver.harness().run_steps(2);
+    };
+    panics(&mut driver, "comparison", |driver| press(driver, 0.5));
+    panics(&mut driver, "fits", |driver| press(driver, 0.6));
+    press(&mut driver, 0.7);
+    driver.wait("the other decoders", |driver| {
+        answered(driver) && !driver.says("internal error")
+    });
+    driver.press(Key::Escape);
+
     let table = folder.path().join("table.csv");
     panics(&mut driver, "file", |driver| driver.save("Error table, CSV", &table));
     assert!(!table.exists());
@@ -90,6 +106,28 @@ fn jobs_of_a_training_can_be_started_again_after_a_panic() {
     driver.train();
     driver.click_button("Compare");
     shows_panic(&mut driver, "compared run");
+}
+
+#[test]
+fn a_press_on_a_large_array_is_answered_again_after_a_panic() {
+    let mut driver = Driver::open();
+    let mut settings = small();
+    // Answers of smaller arrays need no job.
+    settings.source.sensor.scale = "100x60_3x180".parse().unwrap();
+    (settings.source.samples, settings.source.test_samples) = (2, 1);
+    driver.window_mut().apply(Effect::Configure(Box::new(settings)));
+    driver.wait("the surface", |driver| {
+        let test = driver.state().test();
+        test.is_some_and(|test| test.sensor == settings.source.sensor)
+    });
+    panics(&mut driver, "press", |driver| {
+        driver.act("Press the middle of the surface")
+    });
+    driver.press(Key::Escape);
+    driver.act("Press the middle of the surface");
+    driver.wait("the pressed surface", |driver| {
+        driver.views().train.press.shown().is_some()
+    });
 }
 
 #[test]

@@ -402,7 +402,7 @@ impl CsvFields {
 
     /// Field with this index, without surrounding spaces.
     ///
-    /// If there are fewer fields.
+    /// # Panics
     /// If there are not this many fields.
     pub fn get(&self, index: usize) -> &[u8] {
         let ends = &self.ends[..self.count];

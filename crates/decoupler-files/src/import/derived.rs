@@ -2,7 +2,7 @@
 
 use std::{fmt, str::FromStr};
 
-use decoupler_core::text::in_one_line;
+use decoupler_core::text::{in_one_line, is_unprintable};
 use serde::{Deserialize, Serialize};
 
 use super::{Cells, Column, Faults, ImportError, Table, selection::seconds};
@@ -264,8 +264,10 @@ impl FromStr for Derived {
             text: in_one_line(text),
             reason: reason.to_owned(),
         };
-        let (name, expression) = text.split_once('=').ok_or_else(|| refuse("it has no name"))?;
-        let spaced = [(" - ", Operator::Minus), (" / ", Operator::Over)];
+        // Names of columns have no other, and the signs stand between spaces.
+        let spaced = text.replace(|c: char| c.is_whitespace() || is_unprintable(c), " ");
+        let (name, expression) = spaced.split_once('=').ok_or_else(|| refuse("it has no name"))?;
+        let apart = [(" - ", Operator::Minus), (" / ", Operator::Over)];
         let close = [("-", Operator::Minus), ("/", Operator::Over)];
         let at = |operators: [(&str, Operator); 2]| {
             let found = operators.into_iter().filter_map(|(sign, operator)| {
@@ -274,7 +276,7 @@ impl FromStr for Derived {
             });
             found.min_by_key(|(place, ..)| *place)
         };
-        let (place, length, operator) = at(spaced)
+        let (place, length, operator) = at(apart)
             .or_else(|| at(close))
             .ok_or_else(|| refuse("it has neither - nor /"))?;
         let (column, reference) = (expression[..place].trim(), expression[place + length..].trim());
@@ -350,6 +352,7 @@ mod tests {
             (" r = c1 / start( 2.5s ) ", "r=c1 / start(2.5s)"),
             ("p=flow-rate - start(100)", "p=flow-rate - start(100)"),
             ("q=states.c2/states.c3", "q=states.c2 / states.c3"),
+            ("r = c1\r -\t - c2", "r=c1 - - c2"),
         ] {
             let derived: Derived = text.parse().unwrap();
             assert_eq!(derived.to_string(), written);

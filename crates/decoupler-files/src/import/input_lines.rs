@@ -215,10 +215,12 @@ impl InputLines {
             return Err(InputLineError::NoValue(name.to_owned()));
         }
         columns.gather(&self.cells, &mut self.readings);
-        for ((column, _), kept) in columns.kept.iter().zip(&mut self.kept) {
-            kept.text.clear();
-            let field = self.fields.iter().nth(*column).unwrap_or_default();
-            kept.text.push_str(&String::from_utf8_lossy(field));
+        for (&(column, _), kept) in columns.kept.iter().zip(&mut self.kept) {
+            kept.text = match self.cells[column] {
+                _ if column < width => String::from_utf8_lossy(self.fields.get(column)).into_owned(),
+                derived if derived.is_nan() => String::new(),
+                derived => derived.to_string(),
+            };
         }
         let readings = match &mut self.memory {
             None => &self.readings,
@@ -407,6 +409,22 @@ mod tests {
         assert_eq!(readings(&mut lines, 1, "row,u"), None);
         assert_eq!(readings(&mut lines, 2, "3,5"), Some((1, vec![5.0])));
         assert_eq!(lines.parse(3, b"2,5").unwrap_err(), InputLineError::NoNetwork(2.0));
+    }
+
+    #[test]
+    fn columns_are_copied_as_they_came_and_derived_ones_as_numbers() {
+        let others = OtherColumns {
+            kept: ["press", "gap"].map(str::to_owned).into(),
+            ..OtherColumns::default()
+        };
+        let derive = vec!["gap=u1-u2".parse().unwrap()];
+        let mut lines = InputLines::new(channels(&["u1", "u2"]), others, None).with_derived(derive);
+        assert_eq!(readings(&mut lines, 1, "press,u1,u2"), None);
+        let Ok(InputLine::Readings { kept, .. }) = lines.parse(2, b"\"007\",2.50,1") else {
+            panic!("no readings")
+        };
+        let texts = kept.iter().map(|cell| (cell.title.as_str(), cell.text.as_str()));
+        assert_eq!(Vec::from_iter(texts), [("press", "007"), ("gap", "1.5")]);
     }
 
     #[test]

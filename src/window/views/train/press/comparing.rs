@@ -77,6 +77,10 @@ impl Comparing {
         self.take_events();
         let Some(shown) = shown else { return };
         let subject = shown.question.subject.as_ref().filter(|subject| subject.is_idle);
+        if self.has_failed && self.asked.is_none() {
+            // Fitting has failed; it is tried again at the next touch, not in every frame.
+            self.asked = Some(Arc::clone(&shown.pressed));
+        }
         let is_same = match (&self.of, subject) {
             (Some(of), Some(subject)) => of.is(subject),
             (of, subject) => of.is_none() && subject.is_none(),
