@@ -25,7 +25,7 @@ def main(table: str, picture: str) -> None:
     frame.plot(minutes, [row["frame_ms"] for row in rows], color=COLOUR, label="median")
     frame.plot(minutes, [row["frame_p95_ms"] for row in rows], color=SECOND, linestyle="--", label="95 % within")
     frame.set_ylabel("between frames, ms")
-    frame.legend(frameon=False, ncols=2, loc="upper right")
+    frame.legend(frameon=False, ncols=2, loc="center right")
     counts.plot(minutes, [row["threads"] for row in rows], color=COLOUR, label="threads")
     counts.plot(minutes, [row["descriptors"] for row in rows], color=SECOND, linestyle="--", label="open files")
     counts.set_ylabel("number")
