@@ -121,7 +121,7 @@ fn a_press_on_a_large_array_is_answered_again_after_a_panic() {
         test.is_some_and(|test| test.sensor == settings.source.sensor)
     });
     panics(&mut driver, "press", |driver| {
-        driver.act("Press the middle of the surface")
+        driver.act("Press the middle of the surface");
     });
     driver.press(Key::Escape);
     driver.act("Press the middle of the surface");

@@ -264,7 +264,7 @@ impl FromStr for Derived {
             text: in_one_line(text),
             reason: reason.to_owned(),
         };
-        // Names of columns have no other, and the signs stand between spaces.
+        // Names of columns contain no other white space, and signs are found between spaces.
         let spaced = text.replace(|c: char| c.is_whitespace() || is_unprintable(c), " ");
         let (name, expression) = spaced.split_once('=').ok_or_else(|| refuse("it has no name"))?;
         let apart = [(" - ", Operator::Minus), (" / ", Operator::Over)];

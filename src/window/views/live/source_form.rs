@@ -369,6 +369,7 @@ impl NetworkChoice {
 
     /// Reads the run that was just picked, if it is not in memory; returns `true` if it is.
     fn read_picked(&mut self, runs: &RunList) -> bool {
+        self.problem = None;
         let NetworkPick::Run(id) = self.pick else { return true };
         let Some(run) = runs.run(id).cloned() else { return true };
         if let Some(file) = &run.file {

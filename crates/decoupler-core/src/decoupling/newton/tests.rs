@@ -198,7 +198,7 @@ fn an_answer_is_polished_to_rounding_in_a_few_steps() {
 fn the_residual_reported_is_that_of_the_answer() {
     let model = SensorModel::new("3x4_2x12".parse().unwrap());
     let set = Dataset::simulate(&model, &Scene::default(), 30, &mut Seed(2).rng(Stream::Test)).unwrap();
-    for steps in [1, 2, 50] {
+    for steps in [0, 1, 2, 50] {
         let rules = NewtonRules {
             steps,
             ..NewtonRules::default()
@@ -207,13 +207,17 @@ fn the_residual_reported_is_that_of_the_answer() {
         for sample in 0..30 {
             let mut readings = set.sample_readings(sample).to_vec();
             readings[5] *= 1.0 + 1e-9 * sample as f64;
-            let mut coordinates = vec![0.0; 12];
-            let report = newton
-                .solve(set.row_wire(sample).unwrap(), &readings, &mut coordinates)
-                .unwrap();
-            let residual = resistance_residual(&model, &readings, &coordinates);
-            let apart = (report.residual - residual).abs();
-            assert!(apart < 1e-14 + 1e-6 * residual, "{steps}: {report:?} {residual:e}");
+            let row = set.row_wire(sample).unwrap();
+            let mut solved = vec![0.0; 12];
+            let mut polished = Vec::from_iter(set.sample_targets(sample).iter().map(|mm| mm - 0.02));
+            for (report, coordinates) in [
+                (newton.solve(row, &readings, &mut solved).unwrap(), &solved),
+                (newton.polish(row, &readings, &mut polished).unwrap(), &polished),
+            ] {
+                let residual = resistance_residual(&model, &readings, coordinates);
+                let apart = (report.residual - residual).abs();
+                assert!(apart < 1e-14 + 1e-6 * residual, "{steps}: {report:?} {residual:e}");
+            }
         }
     }
 }
