@@ -91,19 +91,30 @@ impl Pressed {
         decoder: &mut dyn Decoder,
         is_stale: &dyn Fn() -> bool,
     ) -> Result<Option<PressedAnswer>, DecodeError> {
+        let begun = Instant::now();
+        self.answer_by(&|| begun.elapsed(), decoder, is_stale)
+    }
+
+    /// As [`Self::answer`], with the times of a clock.
+    fn answer_by(
+        &self,
+        clock: &dyn Fn() -> Duration,
+        decoder: &mut dyn Decoder,
+        is_stale: &dyn Fn() -> bool,
+    ) -> Result<Option<PressedAnswer>, DecodeError> {
         /// Number of timed repeats, of which the shortest counts.
         const TIMES: RangeInclusive<usize> = 3..=5;
         /// Maximum time spent on the repeats.
         const LONGEST: Duration = Duration::from_millis(30);
         let mut coordinates_mm = vec![0.0; self.coordinates_mm.len()];
-        let Some(first) = self.decode(decoder, &mut coordinates_mm, is_stale)? else {
+        let Some(first) = self.decode(clock, decoder, &mut coordinates_mm, is_stale)? else {
             return Ok(None);
         };
         let (mut shortest, mut spent, mut times) = (first, first, 1);
         // Repeats have a separate buffer: an interrupted one must not change the answer.
         let mut again_mm = coordinates_mm.clone();
         while times < *TIMES.end() && spent < LONGEST {
-            let Some(time) = self.decode(decoder, &mut again_mm, is_stale)? else {
+            let Some(time) = self.decode(clock, decoder, &mut again_mm, is_stale)? else {
                 break;
             };
             (shortest, spent, times) = (shortest.min(time), spent + time, times + 1);
@@ -129,11 +140,12 @@ impl Pressed {
     /// Decodes row by row, so that slow decoders can be interrupted; returns the time.
     fn decode(
         &self,
+        clock: &dyn Fn() -> Duration,
         decoder: &mut dyn Decoder,
         coordinates_mm: &mut [f64],
         is_stale: &dyn Fn() -> bool,
     ) -> Result<Option<Duration>, DecodeError> {
-        let begun = Instant::now();
+        let begun = clock();
         let answers = coordinates_mm.chunks_exact_mut(decoder.outputs());
         for (row_index, (readings, answer)) in self.readings_ohm.rows().into_iter().zip(answers).enumerate() {
             if is_stale() {
@@ -144,7 +156,7 @@ impl Pressed {
                 .decode_row(row_index, readings, answer)
                 .map_err(|error| DecodeError { row_index, ..error })?;
         }
-        Ok(Some(begun.elapsed()))
+        Ok(Some(clock() - begun))
     }
 }
 
@@ -268,6 +280,11 @@ pub fn fine_tune(
 
 #[cfg(test)]
 mod tests {
+    use std::sync::{
+        Arc,
+        atomic::{AtomicU64, Ordering},
+    };
+
     use glam::DVec2;
 
     use super::*;
@@ -308,15 +325,17 @@ mod tests {
         assert!(pressed.answer(&mut newton, &|| true).unwrap().is_none());
     }
 
-    /// Decoder that is slow for the first frames, as on a busy machine.
+    /// Decoder that is slow for the first frames, as on a busy machine, by a clock of its own.
     #[derive(Debug)]
     struct Hampered {
         frames: usize,
         slow: usize,
+        clock_ms: Arc<AtomicU64>,
     }
 
     impl Hampered {
-        const WHILE: Duration = Duration::from_millis(2);
+        const QUICK_MS: u64 = 1;
+        const SLOW_MS: u64 = 4;
     }
 
     impl Decoder for Hampered {
@@ -331,8 +350,12 @@ mod tests {
         fn decode_row(&mut self, _: usize, _: &[f64], answer: &mut [f64]) -> Result<(), DecodeError> {
             answer.fill(0.0);
             self.frames += 1;
-            let begun = Instant::now();
-            while self.frames <= self.slow && begun.elapsed() < Self::WHILE {}
+            let ms = if self.frames <= self.slow {
+                Self::SLOW_MS
+            } else {
+                Self::QUICK_MS
+            };
+            self.clock_ms.fetch_add(ms, Ordering::Relaxed);
             Ok(())
         }
     }
@@ -341,15 +364,22 @@ mod tests {
     fn the_time_is_the_shortest_of_several_and_a_single_one_is_not_reported() {
         let pressed = Pressed::new(&sensor(), &[3], &touch(), 1.0).unwrap();
         let time = |slow, stale_after: usize| {
-            let mut decoder = Hampered { frames: 0, slow };
+            let clock_ms = Arc::new(AtomicU64::new(0));
+            let mut decoder = Hampered {
+                frames: 0,
+                slow,
+                clock_ms: Arc::clone(&clock_ms),
+            };
             let asked = std::cell::Cell::new(0);
             let is_stale = || asked.replace(asked.get() + 1) >= stale_after;
-            let answer = pressed.answer(&mut decoder, &is_stale).unwrap();
+            let clock = || Duration::from_millis(clock_ms.load(Ordering::Relaxed));
+            let answer = pressed.answer_by(&clock, &mut decoder, &is_stale).unwrap();
             answer.map(|answer| answer.time)
         };
         let never = usize::MAX;
-        assert!(time(1, never).unwrap().is_some_and(|time| time < Hampered::WHILE / 2));
-        assert!(time(9, never).unwrap().is_some_and(|time| time >= Hampered::WHILE));
+        let [quick, slow] = [Hampered::QUICK_MS, Hampered::SLOW_MS].map(Duration::from_millis);
+        assert_eq!(time(1, never), Some(Some(quick)));
+        assert_eq!(time(9, never), Some(Some(slow)));
         // Answered, but interrupted before there are enough times.
         assert_eq!(time(0, 2), Some(None));
         assert_eq!(time(0, 0), None);
