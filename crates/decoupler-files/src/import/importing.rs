@@ -9,6 +9,7 @@ use decoupler_core::{
     dataset::{Dataset, History, Memory, MemoryError},
     evaluation::{Channel, Problem, TargetPosition},
     machine::ReadingBudget,
+    text::in_one_line,
 };
 use serde::Serialize;
 
@@ -253,7 +254,7 @@ impl Recipe {
         let (path, table) = &files[number];
         let refuse = |reason: String, cure: Cure| ImportError::Join {
             path: path.clone(),
-            reason,
+            reason: in_one_line(&reason),
             cure,
         };
         let main = &files[0].1;
