@@ -8,6 +8,7 @@ use decoupler_core::{
         experiments::{Axis, AxisKind, Experiment},
     },
     scene::{NoisySets, RowModel, Rows},
+    text::in_one_line,
     training::Method,
 };
 use serde::{Deserialize, Serialize};
@@ -100,7 +101,8 @@ impl SweepPlan {
         if values.is_empty() {
             "the only trial".to_owned()
         } else {
-            values.join(", ")
+            // Any text may be a value.
+            in_one_line(&values.join(", "))
         }
     }
 }
