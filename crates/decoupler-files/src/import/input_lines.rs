@@ -216,11 +216,12 @@ impl InputLines {
         }
         columns.gather(&self.cells, &mut self.readings);
         for (&(column, _), kept) in columns.kept.iter().zip(&mut self.kept) {
-            kept.text = match self.cells[column] {
-                _ if column < width => String::from_utf8_lossy(self.fields.get(column)).into_owned(),
-                derived if derived.is_nan() => String::new(),
-                derived => derived.to_string(),
-            };
+            kept.text.clear();
+            if column < width {
+                kept.text.push_str(&String::from_utf8_lossy(self.fields.get(column)));
+            } else if !self.cells[column].is_nan() {
+                kept.text.push_str(&self.cells[column].to_string());
+            }
         }
         let readings = match &mut self.memory {
             None => &self.readings,
