@@ -29,7 +29,11 @@ _Samples = tuple[_Matrix, _Matrix, Sequence[int] | None, Sequence[int] | None]
 @final
 class Network:
     def predict(
-        self, X: _Matrix, rows: Sequence[int] | None = None, times: Sequence[float] | None = None
+        self,
+        X: _Matrix,
+        rows: Sequence[int] | None = None,
+        times: Sequence[float] | None = None,
+        groups: Sequence[int] | None = None,
     ) -> NDArray[np.float64]: ...
     def half_widths(self, answers: _Matrix) -> NDArray[np.float64]: ...
     @property

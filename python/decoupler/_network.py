@@ -59,19 +59,28 @@ class Network:
         self._native = native
 
     def predict(
-        self, X: ArrayLike, *, rows: ArrayLike | None = None, times: ArrayLike | None = None
+        self,
+        X: ArrayLike,
+        *,
+        rows: ArrayLike | None = None,
+        times: ArrayLike | None = None,
+        groups: ArrayLike | None = None,
     ) -> NDArray[np.float64]:
         """Decode readings.
 
         Parameters
         ----------
         X : array-like of shape (samples, channels)
-            Readings, in the order of `inputs`. For a network with a memory, consecutive samples.
+            Readings, in the order of `inputs`.
         rows : array-like of shape (samples,), default=None
-            Row-wire of each sample, counted from 0, if there is one network for each.
+            Row-wire of each sample, counted from 0, if there is one network for each, or if the
+            network has a memory and samples of several row-wires alternate.
         times : array-like of shape (samples,), default=None
-            Time of each sample in seconds, for a network with a memory; without it, samples follow
-            each other at the usual interval of the training.
+            Time of each sample in seconds, for a network with a memory, which starts again after a
+            pause of more than 50 usual intervals; without it, samples follow each other at the
+            usual interval of the training.
+        groups : array-like of shape (samples,), default=None
+            Group of each sample, for a network with a memory: each has a past of its own.
 
         Returns
         -------
@@ -80,16 +89,22 @@ class Network:
         """
         wires = None if rows is None else row_wires(rows)
         seconds = None if times is None else np.asarray(times, dtype=np.float64).tolist()
-        return self._native.predict(matrix(X, "X"), wires, seconds)
+        numbers = None if groups is None else np.unique(np.asarray(groups), return_inverse=True)[1].ravel().tolist()
+        return self._native.predict(matrix(X, "X"), wires, seconds, numbers)
 
     def predict_interval(
-        self, X: ArrayLike, *, rows: ArrayLike | None = None, times: ArrayLike | None = None
+        self,
+        X: ArrayLike,
+        *,
+        rows: ArrayLike | None = None,
+        times: ArrayLike | None = None,
+        groups: ArrayLike | None = None,
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Return the limits of the 90 % prediction intervals.
 
         Parameters
         ----------
-        X, rows, times
+        X, rows, times, groups
             As in `predict`.
 
         Returns
@@ -102,7 +117,7 @@ class Network:
         ValueError
             If the intervals were not calibrated.
         """
-        answers = self.predict(X, rows=rows, times=times)
+        answers = self.predict(X, rows=rows, times=times, groups=groups)
         half_widths = self._native.half_widths(answers)
         return answers - half_widths, answers + half_widths
 

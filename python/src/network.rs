@@ -6,7 +6,7 @@ use std::{
 };
 
 use decoupler_core::{
-    dataset::MemoryStream,
+    dataset::History,
     decoupling::CompiledNetworks,
     evaluation::{Channel, Intervals, Problem, RunSettings},
     network::Networks,
@@ -116,44 +116,40 @@ impl Network {
     }
 
     /// Values computed from the readings and their past, for networks with a memory.
-    fn features(
-        &self,
-        readings: MatrixView<'_>,
-        indices: Option<&[usize]>,
-        times: Option<&[f64]>,
-    ) -> PyResult<Option<Array2<f64>>> {
+    fn features(&self, readings: MatrixView<'_>, past: &Past) -> PyResult<Option<Array2<f64>>> {
         let Some(memory) = &self.record.problem.memory else {
             return Ok(None);
         };
-        let (samples, channels) = readings.dim();
-        if times.is_some_and(|times| times.len() != samples) {
-            return Err(PyValueError::new_err("give the time of each sample"));
+        let samples = readings.dim().0;
+        let Past { rows, times, groups } = past;
+        let lengths = [
+            ("row-wire", rows.as_ref().map(Vec::len)),
+            ("time", times.as_ref().map(Vec::len)),
+            ("group", groups.as_ref().map(Vec::len)),
+        ];
+        if let Some((name, _)) = lengths
+            .into_iter()
+            .find(|(_, found)| found.is_some_and(|found| found != samples))
+        {
+            return Err(PyValueError::new_err(format!("give the {name} of each sample")));
         }
-        let rows = self.record.row_wires.as_ref().map_or(1, Vec::len);
-        let mut stream = MemoryStream::new(memory, channels, rows).map_err(value_error)?;
-        let mut features = Array2::zeros((samples, memory.features(channels)));
-        let readings = readings.to_array();
-        for (sample, readings) in readings.rows().into_iter().enumerate() {
-            let row_index = indices.map_or(0, |indices| indices[sample]);
-            let time_s = times.map(|times| times[sample]);
-            let readings = readings.as_slice().expect("copied in standard layout");
-            let of_sample = stream.step(row_index, readings, time_s);
-            features
-                .row_mut(sample)
-                .iter_mut()
-                .zip(of_sample)
-                .for_each(|(to, value)| *to = *value);
+        if times.iter().flatten().any(|time| !time.is_finite()) {
+            return Err(PyValueError::new_err(
+                "times contain NaN or infinity: leave these samples out",
+            ));
         }
-        Ok(Some(features))
+        let samples = (0..samples).collect();
+        let history = History::new(
+            readings.to_array(),
+            groups.as_deref(),
+            rows.as_deref(),
+            times.clone(),
+            samples,
+        );
+        history.features(memory).map(Some).map_err(value_error)
     }
 
-    fn decode(
-        &self,
-        py: Python<'_>,
-        readings: &Matrix<'_>,
-        rows: Option<Vec<usize>>,
-        times: Option<Vec<f64>>,
-    ) -> PyResult<Array2<f64>> {
+    fn decode(&self, py: Python<'_>, readings: &Matrix<'_>, past: Past) -> PyResult<Array2<f64>> {
         let view = readings.view();
         let ((samples, found), expected) = (view.dim(), self.record.problem.inputs.len());
         if found != expected {
@@ -161,11 +157,11 @@ impl Network {
                 "X has {found} readings per sample, the network reads {expected}"
             )));
         }
+        let features = self.features(view, &past)?;
         let indices = match &self.record.row_wires {
-            Some(known) => Some(row_indices(known, rows, samples)?),
+            Some(known) => Some(row_indices(known, past.rows, samples)?),
             None => None,
         };
-        let features = self.features(view, indices.as_deref(), times.as_deref())?;
         detached(py, || {
             let view = features
                 .as_ref()
@@ -175,6 +171,13 @@ impl Network {
             decode(&mut *decoder, view, indices.as_deref())
         })
     }
+}
+
+/// Row-wire, time in seconds and group of each sample, as far as they are known.
+struct Past {
+    rows: Option<Vec<usize>>,
+    times: Option<Vec<f64>>,
+    groups: Option<Vec<u64>>,
 }
 
 fn names(channels: &[Channel]) -> Vec<String> {
@@ -188,7 +191,7 @@ fn units(channels: &[Channel]) -> Vec<Option<String>> {
 #[pymethods]
 impl Network {
     /// Decodes readings (samples × channels) to targets (samples × targets).
-    #[pyo3(signature = (X, rows = None, times = None))]
+    #[pyo3(signature = (X, rows = None, times = None, groups = None))]
     #[allow(non_snake_case, reason = "the name in scikit-learn")]
     fn predict<'py>(
         &self,
@@ -196,8 +199,9 @@ impl Network {
         X: Matrix<'py>,
         rows: Option<Vec<usize>>,
         times: Option<Vec<f64>>,
+        groups: Option<Vec<u64>>,
     ) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        Ok(self.decode(py, &X, rows, times)?.into_pyarray(py))
+        Ok(self.decode(py, &X, Past { rows, times, groups })?.into_pyarray(py))
     }
 
     /// Half-widths of the 90 % prediction intervals (samples × targets) of `answers`, NaN for targets without one.

@@ -235,6 +235,33 @@ def test_a_network_with_a_memory_decodes_consecutive_samples(folder, recorded):
     assert (later[0] != answers[10]).any() and np.array_equal(later[5:], answers[15:])
 
 
+def test_a_memory_continues_as_in_the_program(tmp_path):
+    """Two groups and three row-wires are interleaved, the sensor pauses, and its clock starts again."""
+    random = np.random.default_rng(2)
+    sample = np.arange(3000)
+    times = np.cumsum(random.uniform(0.02, 0.05, 3000))
+    times[1000:] += 60.0
+    times[1500:] -= times[1500]
+    wires, groups = sample % 3, np.array(["first", "second"])[sample // 3 % 2]
+    u = np.sin(0.37 * sample) + np.sin(1.9 * np.sqrt(sample))
+    table = pd.DataFrame({"time": times, "press": groups, "row": wires + 1, "u": u, "force": np.roll(u, 6)})
+    table.to_csv(tmp_path / "train.csv", index=False)
+    columns = ["--time", "time", "--group", "press", "--row-wire", "row", "--inputs", "u", "--targets", "force"]
+    training = ["--lags", "2", "--memory", "0.5s", "--hidden", "3", "--epochs", "20", "--out", "network.json"]
+    done = program("train", "--data", "train.csv", *columns, *training, cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    done = program(
+        "decode", "--network", "network.json", "--input", "train.csv", "--output", "decoded.csv", cwd=tmp_path
+    )
+    assert done.returncode == 0, done.stderr
+    expected = pd.read_csv(tmp_path / "decoded.csv")["force"]
+    network = load_network(tmp_path / "network.json")
+    answers = network.predict(u[:, None], rows=wires, times=times, groups=groups)[:, 0]
+    np.testing.assert_allclose(answers, expected, rtol=0, atol=1e-12)
+    with pytest.raises(ValueError, match="group of each sample"):
+        network.predict(u[:, None], groups=groups[1:])
+
+
 @pytest.mark.parametrize("rows", [None, "wire"])
 def test_a_saved_network_is_one_of_the_program(tmp_path, recorded, rows):
     """The program decodes with it and measures the same errors; the recording is found next to it."""

@@ -13,7 +13,7 @@ use std::{
 
 use clap::Args;
 use decoupler_core::{
-    dataset::SimulationError,
+    dataset::{Place, SimulationError},
     evaluation::Simulation,
     live::{
         FaultEvent, FaultMonitor, Keeping, LeftOutDecoder, Line, LineError, LineParser, Lines, NextLine, ParsedLine,
@@ -226,7 +226,11 @@ pub(super) enum Parser {
     /// Resistances, row by row or in whole snapshots.
     Array(Box<LineParser>),
     /// Columns named like the inputs.
-    Columns(Box<InputLines>),
+    Columns {
+        lines: Box<InputLines>,
+        /// True once it was reported that the time steps back.
+        has_stepped_back: bool,
+    },
 }
 
 /// Error in a line.
@@ -243,7 +247,10 @@ impl Parser {
                 let parser = LineParser::new(simulation.sensor.scale, simulation.scene.rows, is_complete);
                 Self::Array(Box::new(parser.map_err(SimulationError::from)?))
             }
-            None => Self::Columns(Box::new(file.input_lines())),
+            None => Self::Columns {
+                lines: Box::new(file.input_lines()),
+                has_stepped_back: false,
+            },
         })
     }
 
@@ -254,7 +261,10 @@ impl Parser {
                 let parsed = parser.parse(line, text).map_err(ParseError::Array)?;
                 Ok((parsed, &[]))
             }
-            Self::Columns(parser) => match parser.parse(line, text) {
+            Self::Columns {
+                lines,
+                has_stepped_back,
+            } => match lines.parse(line, text) {
                 Ok(InputLine::NoReadings) => Ok((ParsedLine::NoReadings, &[])),
                 Ok(InputLine::Start { is_first }) => {
                     if is_first {
@@ -267,8 +277,15 @@ impl Parser {
                 Ok(InputLine::Readings {
                     row_index,
                     readings: readings_ohm,
+                    place,
                     kept,
                 }) => {
+                    if matches!(place, Some(Place::AfterStepBack(_))) && !std::mem::replace(has_stepped_back, true) {
+                        warn(&format!(
+                            "line {line}: the time steps back: the history of readings restarts here and at every further \
+                             step back; send the lines in order of time"
+                        ));
+                    }
                     let row_index = Some(row_index);
                     let row = ParsedLine::Row {
                         row_index,

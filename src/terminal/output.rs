@@ -108,9 +108,14 @@ fn read_columns(file: &NetworkFile, recipe: &Recipe, input: &Path) -> Result<Rea
         row_wires,
         lines,
         torn_line,
+        warnings,
         kept,
     } = table;
     warn_if_torn(input, torn_line);
+    for warning in warnings {
+        // There is no one to report to if this fails.
+        let _ = writeln!(messages(), "warning: '{}': {warning}", input.display());
+    }
     let row_indices = match (row_wires, &file.row_wires) {
         _ if !has_rows => vec![0; lines.len()],
         (Some(of_lines), Some(read)) => {

@@ -1,6 +1,6 @@
 //! A memory from the arguments to the answers: training, decoding of files and of streams.
 
-use std::{fs, path::Path};
+use std::{collections::HashMap, fmt::Write, fs, path::Path};
 
 use tempfile::TempDir;
 
@@ -211,4 +211,189 @@ fn inspect_reports_whether_the_past_helps() {
         text.contains("The past helps to predict force: with averages over 0.5s, 5s"),
         "{text}"
     );
+}
+
+/// How the times of a recording are written.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Clock {
+    Seconds,
+    Milliseconds,
+    Stamps,
+}
+
+/// 3000 samples of two interleaved groups with three row-wires each, at irregular intervals, with two pauses, and a clock that
+/// starts again in the middle. The target is the reading and, by half, that two samples before in the same group and
+/// row-wire, or the first after a pause or a restart of the clock.
+fn several_series(clock: Clock) -> TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    let header = match clock {
+        Clock::Seconds | Clock::Stamps => "time",
+        Clock::Milliseconds => "time (ms)",
+    };
+    let mut text = format!("{header},press (id),row,u,force\n");
+    let mut pasts: HashMap<(usize, usize), (f64, Vec<f64>)> = HashMap::new();
+    let mut time_ms = 0_u32;
+    for sample in 0..3000_usize {
+        time_ms += match sample {
+            1000 | 2200 => 60_000,
+            _ => 20 + (sample * sample % 31) as u32,
+        };
+        if sample == 1500 {
+            time_ms = 0;
+        }
+        let series = ((sample / 3) % 2, sample % 3);
+        let reading = f64::sin(0.37 * sample as f64) + f64::sin(1.9 * (sample as f64).sqrt());
+        let time_s = f64::from(time_ms) / 1000.0;
+        let (before_s, past) = pasts.entry(series).or_default();
+        if time_s < *before_s || time_s > *before_s + 30.0 {
+            past.clear();
+        }
+        *before_s = time_s;
+        past.push(reading);
+        let force = reading + 0.5 * past[past.len().saturating_sub(3)];
+        let time = match clock {
+            Clock::Seconds => format!("{time_s}"),
+            Clock::Milliseconds => format!("{time_ms}"),
+            Clock::Stamps => {
+                let (minutes, ms) = (time_ms / 60_000, time_ms % 60_000);
+                format!("2026-11-24T10:{minutes:02}:{:02}.{:03}", ms / 1000, ms % 1000)
+            }
+        };
+        let press = ["first", "second"][series.0];
+        writeln!(text, "{time},{press},{},{reading},{force}", series.1 + 1).unwrap();
+    }
+    for name in ["press.csv", "same.csv"] {
+        fs::write(folder.path().join(name), &text).unwrap();
+    }
+    folder
+}
+
+const TRAIN_SERIES: &str = "train --data press.csv --test-data same.csv --time time --group press --row-wire row --inputs u \
+                            --targets force --lags 2 --hidden 3 --starts 1 --epochs 60 --validation-fraction 0";
+
+/// Numbers of the column of a CSV text whose name begins like this.
+fn column(text: &str, name: &str) -> Vec<f64> {
+    let mut lines = text.lines();
+    let column = lines.next().unwrap().split(',').position(|cell| cell.starts_with(name));
+    let number = |line: &str| line.split(',').nth(column.unwrap()).unwrap().parse().unwrap();
+    lines.map(number).collect()
+}
+
+fn r2(found: &[f64], expected: &[f64]) -> f64 {
+    let mean = expected.iter().sum::<f64>() / expected.len() as f64;
+    let squares =
+        |of: &dyn Fn(f64, f64) -> f64| found.iter().zip(expected).map(|(a, b)| of(*a, *b).powi(2)).sum::<f64>();
+    1.0 - squares(&|found, expected| found - expected) / squares(&|_, expected| expected - mean)
+}
+
+/// Every way to decode continues the same states as the training.
+#[test]
+fn files_and_streams_are_decoded_with_the_past_of_training() {
+    for clock in [Clock::Seconds, Clock::Milliseconds, Clock::Stamps] {
+        let folder = several_series(clock);
+        let report = json(&format!("{TRAIN_SERIES} --out n.json --json"), folder.path());
+        let in_training = report["targets"][0]["r2"].as_f64().unwrap();
+        assert!(in_training > 0.9999, "{clock:?}: R² {in_training} in training");
+        let truth = column(&fs::read_to_string(folder.path().join("press.csv")).unwrap(), "force");
+        succeed(
+            "decode --network n.json --input press.csv --output d.csv",
+            folder.path(),
+        );
+        let decoded = column(&fs::read_to_string(folder.path().join("d.csv")).unwrap(), "force");
+        let of_file = r2(&decoded, &truth);
+        assert!(
+            (of_file - in_training).abs() < 1e-9,
+            "{clock:?}: R² {of_file} by decode, {in_training} in training"
+        );
+        let followed = column(
+            &succeed("decode --network n.json --follow --input press.csv", folder.path()),
+            "force",
+        );
+        assert_eq!(followed.len(), decoded.len());
+        for (line, (found, expected)) in followed.iter().zip(&decoded).enumerate() {
+            assert!(
+                (found - expected).abs() < 1e-12,
+                "{clock:?}, sample {line}: {found} and {expected}"
+            );
+        }
+    }
+}
+
+#[test]
+fn a_file_with_rows_out_of_order_is_decoded_in_order_of_time() {
+    let folder = creeping();
+    succeed(&format!("{TRAIN} --memory 0.5s,2s --out n.json"), folder.path());
+    let sorted = fs::read_to_string(folder.path().join("readings.csv")).unwrap();
+    let (header, lines) = sorted.split_once('\n').unwrap();
+    let lines = Vec::from_iter(lines.lines());
+    let shuffled = Vec::from_iter((0..lines.len()).map(|row| lines[row * 181 % lines.len()]));
+    fs::write(
+        folder.path().join("shuffled.csv"),
+        format!("{header}\n{}\n", shuffled.join("\n")),
+    )
+    .unwrap();
+    let decode = |input: &str| {
+        decoupler(
+            &format!("decode --network n.json --input {input} --output d.csv"),
+            folder.path(),
+        )
+    };
+    let warnings = decode("shuffled.csv").stderr;
+    let warnings = String::from_utf8_lossy(&warnings);
+    assert!(warnings.contains("the rows are taken in order of time"), "{warnings}");
+    let of_shuffled = answers(&fs::read_to_string(folder.path().join("d.csv")).unwrap());
+    assert!(decode("readings.csv").stderr.is_empty());
+    let of_sorted = answers(&fs::read_to_string(folder.path().join("d.csv")).unwrap());
+    for (row, found) in of_shuffled.iter().enumerate() {
+        let expected = of_sorted[row * 181 % lines.len()];
+        assert!((found - expected).abs() < 1e-12, "row {row}: {found} and {expected}");
+    }
+}
+
+#[test]
+fn lines_without_a_time_are_left_out_by_file_and_stream_alike() {
+    let folder = creeping();
+    succeed(&format!("{TRAIN} --memory 0.5s,2s --out n.json"), folder.path());
+    let readings = fs::read_to_string(folder.path().join("readings.csv")).unwrap();
+    let damaged = readings.replace("\n5.5,", "\nnan,").replace("\n7.25,", "\n,");
+    fs::write(folder.path().join("damaged.csv"), damaged).unwrap();
+    let output = decoupler(
+        "decode --network n.json --input damaged.csv --output d.csv",
+        folder.path(),
+    );
+    let warnings = String::from_utf8_lossy(&output.stderr);
+    assert!(
+        warnings.contains("2 lines without a time") && warnings.contains("line 112"),
+        "{warnings}"
+    );
+    let decoded = answers(&fs::read_to_string(folder.path().join("d.csv")).unwrap());
+    let output = decoupler("decode --network n.json --follow --input damaged.csv", folder.path());
+    let warnings = String::from_utf8_lossy(&output.stderr);
+    assert!(
+        warnings.contains("598 lines decoded") && warnings.contains("2 bad"),
+        "{warnings}"
+    );
+    assert_eq!(answers(&String::from_utf8(output.stdout).unwrap()), decoded);
+}
+
+#[test]
+fn a_memory_shorter_than_an_interval_is_refused() {
+    let folder = creeping();
+    let press = fs::read_to_string(folder.path().join("press.csv")).unwrap();
+    let (header, lines) = press.split_once('\n').unwrap();
+    let lines = lines.lines().map(|line| {
+        let (time_s, rest) = line.split_once(',').unwrap();
+        format!("{},{rest}\n", 1000.0 * time_s.parse::<f64>().unwrap())
+    });
+    fs::write(
+        folder.path().join("press.csv"),
+        format!("{header}\n{}", lines.collect::<String>()),
+    )
+    .unwrap();
+    let message = refused(&format!("{TRAIN} --memory 0.5s"), folder.path());
+    assert!(
+        message.contains("0.5s is shorter than the usual interval") && message.contains("50.0 s"),
+        "{message}"
+    );
+    succeed(&format!("{TRAIN} --memory 0.5s --unit t=ms"), folder.path());
 }

@@ -49,7 +49,7 @@ fn check(bytes: &[u8], recipe: &Recipe, problem: &Problem, has_rows: bool, path:
     MachineMemory::limit(0.25);
     let networks = if has_rows { ROW_WIRES.len() } else { 1 };
     let memory = problem.memory.as_ref();
-    let memory = memory.map(|memory| MemoryStream::new(memory, problem.inputs.len(), networks).unwrap());
+    let memory = memory.map(|memory| MemoryStream::new(memory, problem.inputs.len()).unwrap());
     let row_wires = has_rows.then(|| ROW_WIRES.to_vec());
     let mut lines = InputLines::new(problem.inputs.clone(), recipe.other_columns(problem), row_wires)
         .with_derived(recipe.derive.clone())

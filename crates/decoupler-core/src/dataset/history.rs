@@ -1,22 +1,19 @@
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 use ndarray::{Array2, ArrayView2, Axis};
 
-use super::{Memory, MemoryError, MemoryState};
+use super::{
+    Memory, MemoryError, MemoryState,
+    continuation::{Continuation, Place, RowOrder, Series, usual_interval_s},
+};
 
-/// Number of usual intervals after which a memory starts again.
-const GAP: f64 = 50.0;
-
-/// Everything that a sensor has read in order of time, including rows that are not samples because a target is missing:
-/// the past, from which the features of a [`Memory`] are computed.
-///
-/// Rows are divided into *stretches*, within which they follow each other. A stretch ends with its group, and where two
-/// times are more than fifty usual intervals apart. Row-wires have stretches of their own.
+/// Everything that a sensor has read, including rows that are not samples because a target is missing: the past, from
+/// which the features of a [`Memory`] are computed. [`Continuation`] decides which rows continue each other.
 #[derive(Clone, Debug, PartialEq)]
 pub struct History {
     /// Rows × channels.
     readings: Array2<f64>,
-    stretches: Vec<usize>,
+    series: Vec<Series>,
     times_s: Option<Vec<f64>>,
     /// Row of each sample.
     samples: Vec<usize>,
@@ -24,14 +21,14 @@ pub struct History {
 }
 
 impl History {
-    /// Creates a history of `readings` (rows × channels) with the group, row-wire and time of each row, where known. Rows
-    /// are in order of time within each group; `samples` are the rows that are samples.
+    /// Creates a history of `readings` (rows × channels) with the group, row-wire and time of each row, where known;
+    /// `samples` are the rows that are samples.
     ///
     /// # Panics
     /// If a part does not have one entry per row, or a sample is not a row.
     pub fn new(
         readings: Array2<f64>,
-        groups: Option<&[usize]>,
+        groups: Option<&[u64]>,
         row_wires: Option<&[usize]>,
         times_s: Option<Vec<f64>>,
         samples: Vec<usize>,
@@ -47,49 +44,43 @@ impl History {
             "one entry per row"
         );
         assert!(samples.iter().all(|&row| row < rows), "samples are rows");
-        let mut run = 0;
-        let keys = Vec::from_iter((0..rows).map(|row| {
-            let group = groups.map_or(0, |groups| groups[row]);
-            let has_changed = row > 0 && groups.is_some_and(|groups| groups[row] != groups[row - 1]);
-            run += usize::from(has_changed);
-            // Times of several groups may overlap, and sorted rows are then interleaved.
-            let stretch = if times_s.is_some() { group } else { run };
-            (stretch, row_wires.map_or(0, |row_wires| row_wires[row]))
-        }));
-        let interval_s = times_s.as_ref().and_then(|times_s| usual_interval(&keys, times_s));
-        let mut latest: HashMap<(usize, usize), (usize, f64)> = HashMap::new();
-        let mut count = 0;
-        let stretches = keys.iter().enumerate().map(|(row, key)| {
-            let time_s = times_s.as_ref().map_or(0.0, |times_s| times_s[row]);
-            let continued = latest
-                .get(key)
-                .filter(|(_, before_s)| follows(time_s - before_s, interval_s));
-            let stretch = continued.map_or(count, |(stretch, _)| *stretch);
-            count = count.max(stretch + 1);
-            latest.insert(*key, (stretch, time_s));
-            stretch
+        let series = (0..rows).map(|row| Series {
+            group: groups.map_or(0, |groups| groups[row]),
+            row_wire: row_wires.map_or(0, |row_wires| row_wires[row]),
         });
-        Self {
-            stretches: stretches.collect(),
+        let mut history = Self {
+            series: series.collect(),
             readings,
             times_s,
             samples,
-            interval_s,
-        }
+            interval_s: None,
+        };
+        let sequence = history.sequence();
+        history.interval_s = history
+            .times_s
+            .as_ref()
+            .and_then(|times_s| usual_interval_s(sequence.iter().map(|&row| (history.series[row], times_s[row]))));
+        history
     }
 
-    /// Appends the rows of another history of the same channels, with stretches of their own. The usual interval stays; times
-    /// are known if both histories know them.
+    /// Appends the rows of another history of the same channels, which do not continue those before. The usual interval
+    /// stays; times are known if both histories know them.
     ///
     /// # Panics
     /// If the numbers of channels differ.
     pub fn append(&mut self, other: &Self) {
         let rows = self.readings.nrows();
-        let next = self.stretches.iter().max().map_or(0, |last| last + 1);
         let appended = self.readings.append(Axis(0), other.readings.view());
         appended.expect("histories of the same channels");
-        self.stretches
-            .extend(other.stretches.iter().map(|stretch| next + stretch));
+        let next = self.series.iter().map(|series| series.group + 1).max().unwrap_or(0);
+        let mut groups = HashMap::new();
+        self.series.extend(other.series.iter().map(|series| {
+            let known = groups.len() as u64;
+            Series {
+                group: next + *groups.entry(series.group).or_insert(known),
+                ..*series
+            }
+        }));
         self.samples.extend(other.samples.iter().map(|row| rows + row));
         self.times_s = self
             .times_s
@@ -106,9 +97,20 @@ impl History {
         self.readings.view()
     }
 
-    /// Stretch of each row.
-    pub fn stretches(&self) -> &[usize] {
-        &self.stretches
+    /// Number of the stretch of each row, in which rows follow each other without a restart.
+    pub fn stretches(&self) -> Vec<usize> {
+        let mut rows = Continuation::new(self.interval_s, usize::MAX);
+        let mut stretches = vec![0; self.series.len()];
+        let mut count = 0;
+        for row in self.sequence() {
+            let (stretch, place) = rows.next(self.series[row], self.time_s(row), || 0);
+            if place.is_restart() {
+                *stretch = count;
+                count += 1;
+            }
+            stretches[row] = *stretch;
+        }
+        stretches
     }
 
     /// Time of each row in seconds, if known.
@@ -121,9 +123,30 @@ impl History {
         &self.samples
     }
 
-    /// Median interval between successive rows of a stretch, in seconds; `None` without times.
+    /// Median interval between successive rows of a series, in seconds; `None` without times.
     pub fn interval_s(&self) -> Option<f64> {
         self.interval_s
+    }
+
+    /// Order of the rows by their times; [`RowOrder::ByTime`] without times.
+    pub fn order(&self) -> RowOrder {
+        match &self.times_s {
+            None => RowOrder::ByTime,
+            Some(times_s) => RowOrder::of(self.series.iter().copied().zip(times_s.iter().copied())),
+        }
+    }
+
+    /// Rows in the order in which they are taken.
+    fn sequence(&self) -> Vec<usize> {
+        let mut sequence = Vec::from_iter(0..self.series.len());
+        if let (RowOrder::Shuffled { .. }, Some(times_s)) = (self.order(), &self.times_s) {
+            sequence.sort_by(|&one, &other| times_s[one].total_cmp(&times_s[other]));
+        }
+        sequence
+    }
+
+    fn time_s(&self, row: usize) -> Option<f64> {
+        self.times_s.as_ref().map(|times_s| times_s[row])
     }
 
     /// Returns `memory` with the usual interval of this history, unless it has one.
@@ -135,87 +158,131 @@ impl History {
         }
     }
 
+    /// As [`Self::resolved`], for a memory that is about to be trained with.
+    ///
+    /// # Errors
+    /// If a span is in seconds and the interval is not known, or a time constant is shorter than the interval.
+    pub fn checked(&self, memory: &Memory) -> Result<Memory, MemoryError> {
+        let resolved = self.resolved(memory);
+        let in_seconds = resolved.spans().find(|span| span.is_in_seconds());
+        if let (Some(span), None) = (in_seconds, resolved.interval_s) {
+            return Err(match self.times_s {
+                Some(_) => MemoryError::NoInterval(span),
+                None => MemoryError::NoClock(span),
+            });
+        }
+        resolved.check_lengths()?;
+        Ok(resolved)
+    }
+
     /// Returns the features of the samples: samples × features.
     ///
     /// # Errors
-    /// If the memory is invalid for these channels; see [`Memory::check`].
+    /// If the memory is invalid for these channels (see [`Memory::check`]), or too many series are interleaved.
     pub fn features(&self, memory: &Memory) -> Result<Array2<f64>, MemoryError> {
         let memory = self.resolved(memory);
         if memory.is_empty() {
             return Ok(self.readings.select(Axis(0), &self.samples));
         }
-        let all = memory.expand(self.readings(), &self.stretches, self.times_s())?;
-        if self.samples.iter().copied().eq(0..self.readings.nrows()) {
+        let (rows, channels) = self.readings.dim();
+        let sequence = self.sequence();
+        let last: HashMap<Series, usize> = sequence.iter().map(|&row| (self.series[row], row)).collect();
+        let mut stream = MemoryStream::new(&memory, channels)?.with_room_for(self.most_open(&sequence, &last))?;
+        let mut all = Array2::zeros((rows, memory.features(channels)));
+        let mut readings = vec![0.0; channels];
+        for row in sequence {
+            readings
+                .iter_mut()
+                .zip(self.readings.row(row))
+                .for_each(|(to, from)| *to = *from);
+            let (features, _) = stream.step(self.series[row], &readings, self.time_s(row));
+            all.row_mut(row)
+                .iter_mut()
+                .zip(features)
+                .for_each(|(to, from)| *to = *from);
+            if last[&self.series[row]] == row {
+                stream.states.end(self.series[row]);
+            }
+        }
+        if self.samples.iter().copied().eq(0..rows) {
             return Ok(all);
         }
         Ok(all.select(Axis(0), &self.samples))
     }
+
+    /// Maximum number of series that have begun and not ended; `last` is the last row of each.
+    fn most_open(&self, sequence: &[usize], last: &HashMap<Series, usize>) -> usize {
+        let mut open = HashSet::new();
+        let mut most = 0;
+        for &row in sequence {
+            let series = self.series[row];
+            open.insert(series);
+            most = most.max(open.len());
+            if last[&series] == row {
+                open.remove(&series);
+            }
+        }
+        most
+    }
 }
 
-/// Median of the positive intervals between rows with the same key.
-fn usual_interval(keys: &[(usize, usize)], times_s: &[f64]) -> Option<f64> {
-    let mut latest = HashMap::new();
-    let intervals = keys.iter().zip(times_s).filter_map(|(key, &time_s)| {
-        let before_s = latest.insert(key, time_s)?;
-        Some(time_s - before_s).filter(|interval_s| *interval_s > 0.0)
-    });
-    let mut intervals = Vec::from_iter(intervals);
-    let middle = intervals.len() / 2;
-    (!intervals.is_empty()).then(|| *intervals.select_nth_unstable_by(middle, f64::total_cmp).1)
-}
-
-/// `true` if a row continues the stretch of the row `elapsed_s` before.
-fn follows(elapsed_s: f64, interval_s: Option<f64>) -> bool {
-    elapsed_s >= 0.0 && interval_s.is_none_or(|interval_s| elapsed_s <= GAP * interval_s)
-}
-
-/// Features of a stream of readings with a [`Memory`]: one state for each row-wire, which starts again where the time goes
-/// backwards or jumps by more than fifty usual intervals.
-///
-/// A row without a time comes one usual interval after the row before, that of the training.
+/// Features of rows of readings as they come, with one state of a [`Memory`] for each [`Series`].
 #[derive(Clone, Debug)]
 pub struct MemoryStream {
-    states: Vec<(MemoryState, Option<f64>)>,
+    start: MemoryState,
+    states: Continuation<MemoryState>,
     interval_s: Option<f64>,
     features: Vec<f64>,
 }
 
 impl MemoryStream {
-    /// Creates the state before the first row of `channels` readings from each of `row_wires` row-wires.
+    /// Creates the state before the first row of `channels` readings. Series beyond the number whose states fit into 80 MB
+    /// take the place of those that ended longest ago.
     ///
     /// # Errors
     /// See [`Memory::check`].
-    pub fn new(memory: &Memory, channels: usize, row_wires: usize) -> Result<Self, MemoryError> {
-        let state = MemoryState::new(memory, channels)?;
-        state.check_streams(row_wires)?;
+    pub fn new(memory: &Memory, channels: usize) -> Result<Self, MemoryError> {
+        let start = MemoryState::new(memory, channels)?;
         Ok(Self {
-            features: vec![0.0; state.features()],
-            states: vec![(state, None); row_wires],
+            features: vec![0.0; start.features()],
+            states: Continuation::new(memory.interval_s, start.states_that_fit()),
+            start,
             interval_s: memory.interval_s,
         })
     }
 
-    /// Takes in the readings of a row-wire, at `time_s` if known, and returns its features.
+    /// Returns the stream with room for the states of `series` series at a time.
     ///
-    /// # Panics
-    /// If there is no such row-wire, or the number of readings is wrong.
-    pub fn step(&mut self, row_index: usize, readings: &[f64], time_s: Option<f64>) -> &[f64] {
-        let (state, before_s) = &mut self.states[row_index];
-        let elapsed_s = time_s.zip(*before_s).map(|(now_s, before_s)| now_s - before_s);
-        if elapsed_s.is_some_and(|elapsed_s| !follows(elapsed_s, self.interval_s)) {
-            state.restart();
-        }
-        *before_s = time_s.or(*before_s);
-        state.step(readings, elapsed_s, &mut self.features);
-        &self.features
+    /// # Errors
+    /// If they do not fit into memory.
+    fn with_room_for(self, series: usize) -> Result<Self, MemoryError> {
+        self.start.check_states(series)?;
+        Ok(Self {
+            states: Continuation::new(self.interval_s, series),
+            ..self
+        })
     }
 
-    /// Forgets the past of all row-wires.
+    /// Takes in the readings of a row, at `time_s` if known. Returns its features, and where it comes in its series.
+    ///
+    /// # Panics
+    /// If the number of readings is wrong.
+    pub fn step(&mut self, series: Series, readings: &[f64], time_s: Option<f64>) -> (&[f64], Place) {
+        let (state, place) = self.states.next(series, time_s, || self.start.clone());
+        let elapsed_s = match place {
+            Place::After(elapsed_s) => elapsed_s,
+            Place::First | Place::AfterPause(_) | Place::AfterStepBack(_) => {
+                state.restart();
+                None
+            }
+        };
+        state.step(readings, elapsed_s, &mut self.features);
+        (&self.features, place)
+    }
+
+    /// Forgets the past of all series.
     pub fn restart(&mut self) {
-        for (state, before_s) in &mut self.states {
-            state.restart();
-            *before_s = None;
-        }
+        self.states.restart();
     }
 }
 
@@ -243,12 +310,38 @@ mod tests {
         );
         let groups = [4, 4, 7, 7, 4, 4];
         let history = History::new(counting(6), Some(&groups), None, None, vec![0, 1, 2, 3, 4, 5]);
-        assert_eq!(history.stretches(), [0, 0, 1, 1, 2, 2]);
+        assert_eq!(
+            history.stretches(),
+            [0, 0, 1, 1, 0, 0],
+            "a group continues after another"
+        );
         // Two sessions whose clocks both start at 0, sorted by time.
         let times_s = vec![0.0, 0.0, 0.1, 0.1, 0.2, 0.2];
         let history = History::new(counting(6), Some(&[0, 1, 0, 1, 0, 1]), None, Some(times_s), vec![5]);
         assert_eq!(history.stretches(), [0, 1, 0, 1, 0, 1]);
         assert_eq!(history.features(&Memory::of_lags(&[1])).unwrap()[[0, 1]], 3.0);
+    }
+
+    #[test]
+    fn a_memory_that_would_do_nothing_is_refused() {
+        let of_times = |times_s: &[f64]| {
+            let rows = times_s.len();
+            History::new(counting(rows), None, None, Some(times_s.to_vec()), (0..rows).collect())
+        };
+        let refused = |history: History, memory: Memory| history.checked(&memory).unwrap_err().to_string();
+        let in_milliseconds = of_times(&[0.0, 10.0, 20.0, 30.0]);
+        let text = refused(in_milliseconds, Memory::of_averages_s(&[0.5]));
+        assert!(
+            text.contains("shorter than the usual interval") && text.contains("10.0 s"),
+            "{text}"
+        );
+        let text = refused(of_times(&[4.0, 4.0]), Memory::of_averages_s(&[3.0]));
+        assert!(
+            text.contains("no time is later") && !text.contains("name the time column"),
+            "{text}"
+        );
+        let untimed = History::new(counting(2), None, None, None, vec![0]);
+        assert!(refused(untimed, Memory::of_averages_s(&[3.0])).contains("name the time column"));
     }
 
     #[test]
@@ -264,13 +357,34 @@ mod tests {
     }
 
     #[test]
+    fn rows_out_of_order_are_taken_in_order_of_time_and_clocks_that_restart_as_they_are() {
+        let times_s = vec![0.3, 0.1, 0.2, 0.0];
+        let shuffled = History::new(counting(4), None, None, Some(times_s), vec![0, 1, 2, 3]);
+        assert!(matches!(
+            shuffled.order(),
+            RowOrder::Shuffled { count: 2, first_row: 1 }
+        ));
+        assert!((shuffled.interval_s().unwrap() - 0.1).abs() < 1e-12);
+        let features = shuffled.features(&Memory::of_lags(&[1])).unwrap();
+        assert_eq!(features.column(1).to_vec(), [2.0, 3.0, 1.0, 3.0]);
+        let twice = Vec::from_iter((0..120).map(|row| f64::from(row % 60)));
+        let restarted = History::new(counting(120), None, None, Some(twice), vec![59, 60, 61]);
+        let features = restarted.features(&Memory::of_lags(&[1])).unwrap();
+        assert_eq!(features.column(1).to_vec(), [58.0, 60.0, 60.0]);
+    }
+
+    #[test]
     fn row_wires_remember_apart() {
         let row_wires = [0, 1, 2, 0, 1, 2];
         let history = History::new(counting(6), None, Some(&row_wires), None, vec![3, 4, 5]);
         let features = history.features(&Memory::of_lags(&[1])).unwrap();
         assert_eq!(features.column(1).to_vec(), [0.0, 1.0, 2.0]);
-        let mut stream = MemoryStream::new(&Memory::of_lags(&[1]), 1, 3).unwrap();
-        let found = Vec::from_iter((0..6).map(|row| stream.step(row_wires[row], &[row as f64], None)[1]));
+        let mut stream = MemoryStream::new(&Memory::of_lags(&[1]), 1).unwrap();
+        let series = |row: usize| Series {
+            group: 0,
+            row_wire: row_wires[row],
+        };
+        let found = Vec::from_iter((0..6).map(|row| stream.step(series(row), &[row as f64], None).0[1]));
         assert_eq!(found, [0.0, 1.0, 2.0, 0.0, 1.0, 2.0]);
     }
 
@@ -287,16 +401,17 @@ mod tests {
         );
         let memory = history.resolved(&Memory::of_averages_s(&[0.2, 3.0]));
         let expected = history.features(&memory).unwrap();
-        let mut stream = MemoryStream::new(&memory, 1, 1).unwrap();
+        let mut stream = MemoryStream::new(&memory, 1).unwrap();
+        let only = Series::default();
         for (row, &time_s) in times_s.iter().enumerate() {
             assert_eq!(
-                stream.step(0, &[readings[[row, 0]]], Some(time_s)),
+                stream.step(only, &[readings[[row, 0]]], Some(time_s)).0,
                 expected.row(row).to_vec()
             );
         }
         assert_eq!(expected[[5, 1]], expected[[5, 0]], "it starts again after the gap");
         assert_ne!(expected[[6, 1]], expected[[6, 0]]);
         stream.restart();
-        assert_eq!(stream.step(0, &[5.0], None), [5.0; 3]);
+        assert_eq!(stream.step(only, &[5.0], None).0, [5.0; 3]);
     }
 }

@@ -1,14 +1,13 @@
-use std::{
-    collections::{HashMap, HashSet},
-    fmt,
-};
+use std::fmt;
 
-use ndarray::{Array2, ArrayView2};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use super::Span;
-use crate::machine::{OverBudget, ReadingBudget};
+use crate::{
+    machine::{OverBudget, ReadingBudget},
+    text::format_number,
+};
 
 /// Maximum number of samples that a lag reaches back.
 pub const LARGEST_LAG: usize = 100_000;
@@ -28,7 +27,7 @@ const MAX_STATE: usize = 10_000_000;
 /// ```
 ///
 /// which is exact for a reading that is constant over the interval Δt since the sample before, whatever that interval is.
-/// The first sample of a stretch sets all lags and averages to its own readings.
+/// The first sample after a restart sets all lags and averages to its own readings.
 ///
 /// With [`Self::differences`], the past enters as its difference from the current reading: x minus the lagged reading, x minus the
 /// average (a high-pass filter). Without lags and averages it is the difference from the sample before.
@@ -57,6 +56,24 @@ pub enum MemoryError {
     /// A span in seconds without an interval.
     #[error("a memory of {0} needs times: name the time column, or give the memory in samples, as in 20")]
     NoClock(Span),
+    /// A span in seconds, and times that do not advance.
+    #[error(
+        "a memory of {0} needs the usual interval between samples, and no time is later than the one before in the same \
+         group and row-wire: check the columns of times, groups and row-wires"
+    )]
+    NoInterval(Span),
+    /// A time constant that would have no effect.
+    #[error(
+        "a time constant of {span} is shorter than the usual interval between samples{}: it would remember nothing; give a \
+         longer one or, if the times are not in seconds, the unit of the time column",
+        interval_s.map_or_else(String::new, |interval_s| format!(", {} s", format_number(interval_s)))
+    )]
+    TooShort {
+        /// The time constant.
+        span: Span,
+        /// The interval in seconds, if known.
+        interval_s: Option<f64>,
+    },
     /// The interval is not a positive number.
     #[error("the interval of the memory is {0} s: it must be more than 0")]
     Interval(f64),
@@ -84,10 +101,10 @@ pub enum MemoryError {
         state: usize,
     },
     /// The states of several streams do not fit into the memory of the machine.
-    #[error("the lags and averages of {streams} row-wires at once are too large: {source}")]
+    #[error("the lags and averages of {series} groups and row-wires at once are too large: {source}")]
     TooLarge {
-        /// Number of streams of samples.
-        streams: usize,
+        /// Number of series of samples.
+        series: usize,
         /// Memory needed, and the limit.
         source: OverBudget,
     },
@@ -117,7 +134,7 @@ impl Memory {
 
     /// `true` if a span is in seconds.
     pub fn needs_clock(&self) -> bool {
-        self.lags.iter().chain(&self.averages).any(|span| span.is_in_seconds())
+        self.spans().any(Span::is_in_seconds)
     }
 
     /// Number of features of `channels` channels.
@@ -153,52 +170,21 @@ impl Memory {
         MemoryConstants::of(self, channels).map(drop)
     }
 
-    /// Returns the features (samples × features) of `readings` (samples × channels), which are in order of time.
-    ///
-    /// Samples with the same label in `stretches` have followed each other without a gap; stretches may be interleaved, as
-    /// those of row-wires are. Without `times_s`, every interval is [`Self::interval_s`].
-    ///
-    /// # Errors
-    /// If the memory is invalid for the number of channels; see [`Self::check`].
-    ///
-    /// # Panics
-    /// If there is not one stretch and one time for each sample.
-    pub fn expand(
-        &self,
-        readings: ArrayView2<'_, f64>,
-        stretches: &[usize],
-        times_s: Option<&[f64]>,
-    ) -> Result<Array2<f64>, MemoryError> {
-        let (samples, channels) = readings.dim();
-        assert_eq!(stretches.len(), samples, "one stretch for each sample");
-        assert!(
-            times_s.is_none_or(|times_s| times_s.len() == samples),
-            "one time for each sample"
-        );
-        let start = MemoryState::new(self, channels)?;
-        let last: HashMap<usize, usize> = { stretches.iter().copied() }.zip(0..).collect();
-        start.check_streams(most_open(stretches, &last))?;
-        let mut states: HashMap<usize, (MemoryState, Option<f64>)> = HashMap::new();
-        let mut features = Array2::zeros((samples, self.features(channels)));
-        let mut row = vec![0.0; channels];
-        for (sample, mut output) in features.rows_mut().into_iter().enumerate() {
-            row.iter_mut()
-                .zip(readings.row(sample))
-                .for_each(|(to, from)| *to = *from);
-            let time_s = times_s.map(|times_s| times_s[sample]);
-            let (state, previous_s) = states.entry(stretches[sample]).or_insert_with(|| (start.clone(), None));
-            let interval_s = time_s.zip(*previous_s).map(|(now, before)| now - before);
-            state.step(
-                &row,
-                interval_s,
-                output.as_slice_mut().expect("a row of a new array is contiguous"),
-            );
-            *previous_s = time_s;
-            if last.get(&stretches[sample]) == Some(&sample) {
-                states.remove(&stretches[sample]);
-            }
+    /// Checks that every average extends over more than one sample.
+    pub(super) fn check_lengths(&self) -> Result<(), MemoryError> {
+        let too_short = |span: &&Span| span.samples(self.interval_s).is_some_and(|samples| samples < 1.0);
+        match self.averages.iter().find(too_short) {
+            Some(&span) => Err(MemoryError::TooShort {
+                span,
+                interval_s: self.interval_s,
+            }),
+            None => Ok(()),
         }
-        Ok(features)
+    }
+
+    /// Lags and time constants.
+    pub(super) fn spans(&self) -> impl Iterator<Item = Span> {
+        self.lags.iter().chain(&self.averages).copied()
     }
 
     /// Parts of the past, in the order of the features.
@@ -228,20 +214,6 @@ impl fmt::Display for Memory {
             (false, true) => write!(f, "{}, as differences", parts.join(" and ")),
         }
     }
-}
-
-/// Returns the largest number of stretches that have begun and not ended; `last` is the last sample of each.
-fn most_open(stretches: &[usize], last: &HashMap<usize, usize>) -> usize {
-    let mut open = HashSet::new();
-    let mut most = 0;
-    for (sample, stretch) in stretches.iter().enumerate() {
-        open.insert(stretch);
-        most = most.max(open.len());
-        if last.get(stretch) == Some(&sample) {
-            open.remove(stretch);
-        }
-    }
-    most
 }
 
 /// One part of the past.
@@ -368,18 +340,23 @@ impl MemoryState {
         })
     }
 
-    /// Checks that copies of this state for `streams` streams of samples fit into memory.
+    /// Checks that states for so many series fit into memory.
     ///
     /// # Errors
     /// If they do not.
-    pub(super) fn check_streams(&self, streams: usize) -> Result<(), MemoryError> {
+    pub(super) fn check_states(&self, series: usize) -> Result<(), MemoryError> {
         let bytes = (self.constants.state() as u64).saturating_mul(size_of::<f64>() as u64);
         // A state or two are within the limit for one state.
-        if streams <= 2 {
+        if series <= 2 {
             return Ok(());
         }
-        let claimed = ReadingBudget::now().claim(bytes.saturating_mul(streams as u64));
-        claimed.map_err(|source| MemoryError::TooLarge { streams, source })
+        let claimed = ReadingBudget::now().claim(bytes.saturating_mul(series as u64));
+        claimed.map_err(|source| MemoryError::TooLarge { series, source })
+    }
+
+    /// Number of states that take as much memory as the largest.
+    pub(super) fn states_that_fit(&self) -> usize {
+        MAX_STATE / self.constants.state().max(1)
     }
 
     /// Number of features that a step returns.
@@ -387,7 +364,7 @@ impl MemoryState {
         self.constants.features()
     }
 
-    /// Forgets the past: the next sample is the first of a stretch.
+    /// Forgets the past: the next sample is the first.
     pub fn restart(&mut self) {
         self.has_started = false;
     }
@@ -450,14 +427,24 @@ impl MemoryState {
 
 #[cfg(test)]
 mod tests {
-    use ndarray::array;
+    use ndarray::{Array2, ArrayView2, array};
     use rand::RngExt;
 
     use super::*;
-    use crate::dataset::{Seed, Stream};
+    use crate::dataset::{History, Seed, Stream};
 
     fn all(memory: &Memory, readings: ArrayView2<'_, f64>) -> Array2<f64> {
-        memory.expand(readings, &vec![0; readings.nrows()], None).unwrap()
+        of_series(memory, readings, &vec![0; readings.nrows()], None).unwrap()
+    }
+
+    fn of_series(
+        memory: &Memory,
+        readings: ArrayView2<'_, f64>,
+        groups: &[u64],
+        times_s: Option<&[f64]>,
+    ) -> Result<Array2<f64>, MemoryError> {
+        let (samples, times_s) = ((0..readings.nrows()).collect(), times_s.map(<[f64]>::to_vec));
+        History::new(readings.to_owned(), Some(groups), None, times_s, samples).features(memory)
     }
 
     #[test]
@@ -483,23 +470,22 @@ mod tests {
         assert!(!memory.is_empty() && Memory::default().is_empty());
     }
 
-    /// One state of ten channels takes 8 MB, those of all stretches 800 GB.
+    /// One state of ten channels takes 8 MB, those of all groups 800 GB.
     #[test]
-    fn the_past_of_a_stretch_is_dropped_at_its_end() {
-        let stretches = Vec::from_iter(0..100_000);
+    fn the_past_of_a_series_is_dropped_at_its_end() {
+        let groups = Vec::from_iter(0..100_000);
         let memory = Memory::of_lags(&[LARGEST_LAG]);
         let readings = Array2::from_shape_fn((200, 1), |(sample, _)| sample as f64);
-        let found = memory.expand(readings.view(), &stretches[..200], None).unwrap();
+        let found = of_series(&memory, readings.view(), &groups[..200], None).unwrap();
         assert_eq!(found.column(0), found.column(1));
         // All at once, as those of row-wires are.
-        let interleaved = [&stretches[..], &stretches].concat();
+        let interleaved = [&groups[..], &groups].concat();
         let readings = Array2::zeros((interleaved.len(), 10));
-        let refused = memory
-            .expand(readings.view(), &interleaved, None)
+        let refused = of_series(&memory, readings.view(), &interleaved, None)
             .unwrap_err()
             .to_string();
         assert!(
-            refused.contains("100000 row-wires at once") && refused.contains("800.0 GB"),
+            refused.contains("100000 groups and row-wires at once") && refused.contains("800.0 GB"),
             "{refused}"
         );
     }
@@ -518,7 +504,7 @@ mod tests {
     }
 
     #[test]
-    fn lags_reach_back_within_the_stretch_and_begin_with_its_first_sample() {
+    fn lags_reach_back_within_the_series_and_begin_with_its_first_sample() {
         let readings = array![[1.0, 10.0], [2.0, 20.0], [3.0, 30.0], [4.0, 40.0], [5.0, 50.0]];
         let found = all(&Memory::of_lags(&[1, 3]), readings.view());
         let expected = array![
@@ -529,10 +515,8 @@ mod tests {
             [5.0, 50.0, 4.0, 40.0, 2.0, 20.0]
         ];
         assert_eq!(found, expected);
-        // Two interleaved stretches, as of two row-wires.
-        let found = Memory::of_lags(&[1])
-            .expand(readings.view(), &[7, 3, 7, 3, 7], None)
-            .unwrap();
+        // Two interleaved groups.
+        let found = of_series(&Memory::of_lags(&[1]), readings.view(), &[7, 3, 7, 3, 7], None).unwrap();
         assert_eq!(found.column(2).to_vec(), [1.0, 2.0, 1.0, 2.0, 3.0]);
     }
 
@@ -543,10 +527,10 @@ mod tests {
         let mut readings = Array2::ones((times_s.len(), 1));
         readings[[0, 0]] = 0.0;
         let memory = Memory {
-            interval_s: Some(0.1),
+            interval_s: Some(0.5),
             ..Memory::of_averages_s(&[2.0, 0.5])
         };
-        let found = memory.expand(readings.view(), &[0; 7], Some(&times_s)).unwrap();
+        let found = of_series(&memory, readings.view(), &[0; 7], Some(&times_s)).unwrap();
         for (row, time_s) in found.rows().into_iter().zip(times_s) {
             for (average, tau_s) in [(1, 2.0), (2, 0.5)] {
                 let expected = 1.0 - f64::exp(-time_s / tau_s);
@@ -592,12 +576,12 @@ mod tests {
     }
 
     #[test]
-    fn stepping_gives_the_same_bits_as_expanding_also_after_a_restart() {
+    fn stepping_gives_the_same_bits_as_a_history_also_after_a_restart() {
         let mut rng = Seed(3).rng(Stream::Training);
         let readings = Array2::from_shape_simple_fn((200, 3), || rng.random_range(-1.0..1.0));
         let mut times_s = Vec::from_iter((0..200).map(|_| rng.random_range(0.0..5.0)));
         times_s.sort_by(f64::total_cmp);
-        let stretches = Vec::from_iter((0..200).map(|sample| usize::from(sample >= 120)));
+        let groups = Vec::from_iter((0..200).map(|sample| u64::from(sample >= 120)));
         for differences in [false, true] {
             let memory = Memory {
                 lags: vec![Span::Samples(7.0), Span::Samples(1.0), Span::Seconds(0.1)],
@@ -605,7 +589,7 @@ mod tests {
                 differences,
                 interval_s: Some(0.025),
             };
-            let expected = memory.expand(readings.view(), &stretches, Some(&times_s)).unwrap();
+            let expected = of_series(&memory, readings.view(), &groups, Some(&times_s)).unwrap();
             let mut state = MemoryState::new(&memory, 3).unwrap();
             let mut features = vec![0.0; state.features()];
             for sample in 0..200 {

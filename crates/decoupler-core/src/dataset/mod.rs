@@ -4,8 +4,10 @@
 //! Simulated samples are drawn as whole snapshots, with resistances as readings and the absolute coordinates of the
 //! row's nodes as targets; measured samples are built from their parts by [`Dataset::new`]. [`hold_out`], [`Division`]
 //! and [`Folds`] divide a set, and [`Frames`] groups it into whole frames. A [`Memory`] adds inputs from
-//! the past, which it takes from the [`History`] of a recording or from a stream.
+//! the past, which it takes from the [`History`] of a recording or from a [`MemoryStream`]; [`Continuation`] decides in both
+//! which rows continue each other.
 
+mod continuation;
 mod division;
 mod folds;
 mod frames;
@@ -16,6 +18,7 @@ mod seed;
 mod simulation;
 mod span;
 
+pub use continuation::{Continuation, Place, RowOrder, Series};
 pub use division::{DividedSamples, Division, DivisionError, Split, SplitBy, SplitByError, hold_out};
 pub use folds::{FoldUnit, Folds, FoldsError};
 pub use frames::{Frames, FramesError, PerRow};

@@ -14,7 +14,7 @@ use crate::{
 /// A line has the resistances of one row-wire: in columns named as for `decode`, possibly among others; as M4 unnamed
 /// columns; or as M4 + 1 unnamed columns, the first being the number of the row-wire. Or it has those of a whole
 /// snapshot: rows × M4 unnamed columns, row by row. The first line of readings determines the layout; a header may be
-/// repeated, for example when a device restarts.
+/// repeated, for example when a device restarts, and a comma may end a line.
 #[derive(Debug)]
 pub struct LineParser {
     scale: ArrayScale,
@@ -25,6 +25,8 @@ pub struct LineParser {
     is_complete: bool,
     fields: CsvFields,
     layout: Option<Layout>,
+    /// True once a line had readings.
+    has_frames: bool,
     /// Number of single-row lines without a row number so far, valid or not.
     turns: usize,
     readings_ohm: Vec<f64>,
@@ -107,6 +109,7 @@ impl LineParser {
             is_complete,
             fields: CsvFields::default(),
             layout: None,
+            has_frames: false,
             turns: 0,
             readings_ohm: Vec::with_capacity(scale.rows() * scale.columns()),
         })
@@ -134,22 +137,27 @@ impl LineParser {
         self.fields.split(text);
         if self.has_names() {
             let columns = ResistanceColumns::named(&self.fields, self.scale.columns());
-            self.layout = Some(Layout {
-                columns: columns.map_err(|source| LineError::Names { line: number, source })?,
-                has_names: true,
-                is_snapshot: false,
-            });
-            return Ok(ParsedLine::NoReadings);
+            // After a frame, a device that starts again repeats its header whole; other texts are garbage, or an overflow.
+            if !self.has_frames || columns.is_ok() {
+                self.layout = Some(Layout {
+                    columns: columns.map_err(|source| LineError::Names { line: number, source })?,
+                    has_names: true,
+                    is_snapshot: false,
+                });
+                return Ok(ParsedLine::NoReadings);
+            }
         }
         let is_first = self.layout.is_none();
-        let layout = self
-            .layout
-            .get_or_insert_with(|| Layout::unnamed(self.fields.count(), self.scale, self.read.len()));
+        let layout = self.layout.get_or_insert_with(|| {
+            let found = self.fields.count() - usize::from(self.fields.ends_with_comma());
+            Layout::unnamed(found, self.scale, self.read.len())
+        });
         self.readings_ohm.clear();
         let columns = &layout.columns;
         let read = columns.read(number, &self.fields, &mut self.readings_ohm);
         let row_wire = read.and_then(|()| columns.row_wire(number, &self.fields, self.scale.rows()));
         let is_snapshot = layout.is_snapshot;
+        self.has_frames |= row_wire.is_ok();
         match row_wire {
             Err(error) => {
                 self.count_bad();
@@ -376,6 +384,23 @@ mod tests {
         assert_eq!(parser.is_snapshot(), Some(true));
         let message = parser.parse(2, b"1,2,3").unwrap_err().to_string();
         assert!(message.starts_with("line 2: 3 columns where 6"), "{message}");
+    }
+
+    /// Arduino prints ovf for a float that is too large.
+    #[test]
+    fn garbage_after_a_frame_is_a_bad_line_and_lines_may_end_with_a_comma() {
+        for header in ["r_1,r_2,r_3", ""] {
+            let mut parser = parser(Rows::All, true);
+            assert_eq!(parser.parse(1, header.as_bytes()).unwrap(), ParsedLine::NoReadings);
+            assert_eq!(parser.parse(2, b"4,5,6,").unwrap(), row(None, &[4.0, 5.0, 6.0]));
+            for garbage in ["ovf,ovf,ovf", "OL,OL,OL", "-,-,-", "r_1,?,x"] {
+                let error = parser.parse(3, garbage.as_bytes()).unwrap_err();
+                assert!(!error.is_final(), "{garbage}: {error}");
+            }
+            assert_eq!(parser.parse(4, b"7,8,9").unwrap(), row(None, &[7.0, 8.0, 9.0]));
+            assert_eq!(parser.parse(5, b"r_3,r_2,r_1").unwrap(), ParsedLine::NoReadings);
+            assert_eq!(parser.parse(6, b"7,8,9,").unwrap(), row(None, &[9.0, 8.0, 7.0]));
+        }
     }
 
     #[test]

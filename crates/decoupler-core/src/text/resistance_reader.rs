@@ -290,7 +290,7 @@ impl ResistanceColumns {
     /// If the line has the wrong number of columns, or a field is not a resistance.
     pub fn read(&self, line: u64, fields: &CsvFields, resistances_ohm: &mut Vec<f64>) -> Result<(), ReadError> {
         let (found, expected) = (fields.count(), self.width);
-        if found != expected {
+        if !fields.has_width(expected) {
             return Err(ReadError::Width { line, found, expected });
         }
         for &column in &self.resistances {
@@ -398,6 +398,16 @@ impl CsvFields {
     /// Number of fields.
     pub fn count(&self) -> usize {
         self.count
+    }
+
+    /// Returns `true` for a line of `width` fields. An empty field behind them is that of a trailing comma.
+    pub fn has_width(&self, width: usize) -> bool {
+        self.count == width || self.ends_with_comma() && self.count == width + 1
+    }
+
+    /// Returns `true` if the last of several fields is empty.
+    pub fn ends_with_comma(&self) -> bool {
+        self.count > 1 && self.get(self.count - 1).is_empty()
     }
 
     /// Field with this index, without surrounding spaces.

@@ -114,9 +114,7 @@ impl NetworkFile {
         let has_rows = self.network.only().is_none();
         let row_wires = self.row_wires.clone().filter(|_| has_rows);
         let memory = self.problem.memory.as_ref().map(|memory| {
-            let networks = self.network.values().len();
-            MemoryStream::new(memory, self.problem.inputs.len(), networks)
-                .expect("reading and writing check the memory")
+            MemoryStream::new(memory, self.problem.inputs.len()).expect("reading and writing check the memory")
         });
         let derive = import.map(|import| import.derive.clone()).unwrap_or_default();
         let lines = InputLines::new(self.problem.inputs.clone(), others, row_wires);

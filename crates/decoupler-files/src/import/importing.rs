@@ -92,8 +92,7 @@ impl Recipe {
         // The past includes rows that are no samples.
         let mut read = rows.with_readings();
         if let Some(id) = meanings.time {
-            warnings.extend(rows.put_in_order(id, &mut kept));
-            rows.put_in_order(id, &mut read);
+            warnings.extend(rows.put_in_order(id, &mut kept, &mut read)?);
         }
         let times: Option<Vec<f64>> = meanings
             .time
@@ -129,7 +128,7 @@ impl Recipe {
         source.rows = &read;
         let history = past.with_readings(gather(&mut source, &meanings.inputs, &[]));
         let memory = self.memory.as_ref().filter(|memory| !memory.is_empty());
-        let memory = memory.map(|memory| history.resolved(memory));
+        let memory = memory.map(|memory| history.checked(memory)).transpose()?;
         let readings = history.features(memory.as_ref().unwrap_or(&Memory::default()))?;
         let problem = Problem {
             inputs,
@@ -414,7 +413,7 @@ fn read_file(
 /// Measured samples with a description of their channels.
 #[derive(Clone, Debug)]
 pub struct Recording {
-    /// Samples of one file after another, within a file sorted by time or in its order; readings and targets in the order of
+    /// Samples of one file after another, within a file in order of time, or of the file where its clock restarts; readings and targets in the order of
     /// [`Self::inputs`] and [`Self::targets`]. Without a group column, each of several files is a group, or each sample of a
     /// single file.
     pub set: Dataset,
@@ -510,7 +509,8 @@ impl Recording {
     pub fn with_memory(&self, memory: Option<&Memory>) -> Result<Self, MemoryError> {
         let memory = memory
             .filter(|memory| !memory.is_empty())
-            .map(|memory| self.history.resolved(memory));
+            .map(|memory| self.history.checked(memory))
+            .transpose()?;
         let features = self.history.features(memory.as_ref().unwrap_or(&Memory::default()))?;
         let problem = Problem {
             memory,

@@ -1,10 +1,11 @@
 use std::{
+    hash::{DefaultHasher, Hash, Hasher},
     io::{self, Read},
     ops::ControlFlow,
 };
 
 use decoupler_core::{
-    dataset::MemoryStream,
+    dataset::{MemoryStream, Place, Series},
     evaluation::Channel,
     text::{CsvFields, number},
 };
@@ -13,6 +14,8 @@ use thiserror::Error;
 use super::{
     Derived, InputColumns, InputError, OtherColumns, TableError,
     derived_stream::{self, DerivedStream},
+    selection,
+    time_stamp::TimeStamp,
 };
 
 /// Parser of a stream of CSV lines with the inputs of a network. Columns are identified by a header or, without one, are
@@ -27,6 +30,8 @@ pub struct InputLines {
     read: Vec<Channel>,
     /// The derived columns, once the columns of the lines are known.
     derived: Option<DerivedStream>,
+    /// Group of each line of the start, which is waited for.
+    groups_of_start: Vec<u64>,
     /// State of the memory, if there is one.
     memory: Option<MemoryStream>,
     /// Row-wires of the networks, from 0, if each has one.
@@ -34,6 +39,10 @@ pub struct InputLines {
     fields: CsvFields,
     /// Columns of the lines, from the header or the first parsed line.
     columns: Option<InputColumns>,
+    /// `true` once a line had inputs.
+    has_readings: bool,
+    /// First time stamp, if times are stamps.
+    start: Option<TimeStamp>,
     /// Cells of the line as numbers; NaN if they are not numbers.
     cells: Vec<f64>,
     readings: Vec<f64>,
@@ -65,6 +74,8 @@ pub enum InputLine<'a> {
         row_index: usize,
         /// Readings in the order of the inputs; with a memory, their features.
         readings: &'a [f64],
+        /// Where the line comes in its group and row-wire, for a memory.
+        place: Option<Place>,
         /// Time, group and row-wire of the line, as far as it has them.
         kept: &'a [KeptCell],
     },
@@ -91,6 +102,12 @@ pub enum InputLineError {
     /// A cell that is not a finite number.
     #[error("cell {0} is not a finite number")]
     NotFinite(usize),
+    /// A time that is missing or not understood, which a memory needs.
+    #[error("cell {0} is not a time, which the history of readings needs")]
+    NoTime(usize),
+    /// A cell that is not the number of a row-wire, which a memory needs.
+    #[error("cell {0} is not the number of a row-wire, from 1")]
+    RowWire(usize),
     /// A derived column without a value, such as a quotient by zero.
     #[error("the derived column '{0}' has no value")]
     NoValue(String),
@@ -116,10 +133,13 @@ impl InputLines {
             others,
             derive: Vec::new(),
             derived: None,
+            groups_of_start: Vec::new(),
             memory: None,
             row_wires,
             fields: CsvFields::default(),
             columns: None,
+            has_readings: false,
+            start: None,
             cells: Vec::new(),
             readings: Vec::new(),
             kept: Vec::new(),
@@ -142,10 +162,11 @@ impl InputLines {
         Self { read, derive, ..self }
     }
 
-    /// Returns the parser with a memory, whose state continues from `memory`: it has one state for each network.
+    /// Returns the parser with a memory, whose state continues from `memory` as it does in training: by the group, row-wire
+    /// and time of each line.
     ///
-    /// A line comes at the time in its time column. In a stream without one, a line comes one usual interval of the training
-    /// after the line before, so that a stream is decoded like a file with the same lines, however it arrives.
+    /// In a stream without a time column, a line comes one usual interval of the training after the line before, so that a
+    /// stream is decoded like a file with the same lines, however it arrives.
     #[must_use]
     pub fn with_memory(self, memory: Option<MemoryStream>) -> Self {
         Self { memory, ..self }
@@ -165,6 +186,7 @@ impl InputLines {
         self.cells.clear();
         self.cells
             .extend(self.fields.iter().map(|field| number(field).unwrap_or(f64::NAN)));
+        self.read_stamp();
         // Only the first line, or a line with cells that are not numbers, may be a header: other lines need no strings.
         if self.columns.is_none() || self.cells.iter().any(|value| value.is_nan()) {
             let cells: Vec<String> = self
@@ -172,22 +194,34 @@ impl InputLines {
                 .iter()
                 .map(|field| String::from_utf8_lossy(field).into_owned())
                 .collect();
-            if InputColumns::is_header(&cells, &self.read, line == 1) {
+            // After a line with inputs, a device that starts again repeats its header whole; other texts are garbage, or an
+            // overflow of the device.
+            let is_header = if self.has_readings {
+                InputColumns::has_all(&cells, &self.read)
+            } else {
+                InputColumns::is_header(&cells, &self.read, line == 1)
+            };
+            if is_header {
                 self.find_columns(&cells).map_err(InputLineError::Header)?;
                 return Ok(InputLine::NoReadings);
             }
         }
         if self.columns.is_none() {
+            if self.fields.ends_with_comma() {
+                self.cells.pop();
+            }
             self.find_columns(&[]).map_err(InputLineError::Unnamed)?;
+            self.read_stamp();
         }
         let Some(columns) = &self.columns else {
             return Ok(InputLine::NoReadings);
         };
         let width = columns.width;
-        if self.cells.len() != width {
+        if !self.fields.has_width(width) {
             let (found, expected) = (self.cells.len(), width);
             return Err(InputLineError::Cells { found, expected });
         }
+        self.cells.truncate(width);
         let has_rows = self.row_wires.is_some();
         let rows = columns.row_wire.into_iter().filter(|_| has_rows);
         let read = columns.inputs.iter().copied().filter(|&column| column < width);
@@ -199,11 +233,19 @@ impl InputLines {
         {
             return Err(InputLineError::NotFinite(column + 1));
         }
+        if self.memory.is_some() {
+            columns.check_place(&self.cells)?;
+        }
         let row_index = self.row_index(columns, &self.cells)?;
+        let group = columns.group.filter(|&column| column < width);
+        let group = group.map_or(0, |column| key(self.fields.get(column)));
         if let Some(derived) = &mut self.derived {
             let taken = derived.take(&mut self.cells);
             match taken.map_err(|error| InputLineError::Header(InputError::Derived(error.to_string())))? {
-                derived_stream::Progress::Start { is_first } => return Ok(InputLine::Start { is_first }),
+                derived_stream::Progress::Start { is_first } => {
+                    self.groups_of_start.push(group);
+                    return Ok(InputLine::Start { is_first });
+                }
                 derived_stream::Progress::Complete(start) => self.remember(&start),
             }
         }
@@ -215,6 +257,7 @@ impl InputLines {
             return Err(InputLineError::NoValue(name.to_owned()));
         }
         columns.gather(&self.cells, &mut self.readings);
+        self.has_readings = true;
         for (&(column, _), kept) in columns.kept.iter().zip(&mut self.kept) {
             kept.text.clear();
             if column < width {
@@ -223,15 +266,34 @@ impl InputLines {
                 kept.text.push_str(&self.cells[column].to_string());
             }
         }
-        let readings = match &mut self.memory {
-            None => &self.readings,
-            Some(memory) => memory.step(row_index, &self.readings, columns.time_s(&self.cells)),
+        let (readings, place) = match &mut self.memory {
+            None => (&*self.readings, None),
+            Some(memory) => {
+                let series = columns.series(group, &self.cells);
+                let (features, place) = memory.step(series, &self.readings, columns.time_s(&self.cells));
+                (features, Some(place))
+            }
         };
         Ok(InputLine::Readings {
             row_index,
             readings,
+            place,
             kept: &self.kept,
         })
+    }
+
+    /// Replaces a time stamp by the seconds since the first.
+    fn read_stamp(&mut self) {
+        let time = self.columns.as_ref().and_then(|columns| columns.time);
+        let Some(time) = time.filter(|time| time.column < self.cells.len().min(self.fields.count())) else {
+            return;
+        };
+        if let Some(stamp) = TimeStamp::parse(self.fields.get(time.column)) {
+            let start = *self.start.get_or_insert(stamp);
+            if start.has_zone == stamp.has_zone {
+                self.cells[time.column] = stamp.seconds_since(start);
+            }
+        }
     }
 
     /// Takes the lines of the start into the memory; those without all inputs are no samples.
@@ -239,13 +301,10 @@ impl InputLines {
         let (Some(columns), Some(mut memory)) = (&self.columns, self.memory.take()) else {
             return;
         };
-        for cells in start {
+        for (cells, group) in start.iter().zip(self.groups_of_start.drain(..)) {
             columns.gather(cells, &mut self.readings);
-            if let (true, Ok(row_index)) = (
-                self.readings.iter().all(|reading| reading.is_finite()),
-                self.row_index(columns, cells),
-            ) {
-                memory.step(row_index, &self.readings, columns.time_s(cells));
+            if self.readings.iter().all(|reading| reading.is_finite()) {
+                memory.step(columns.series(group, cells), &self.readings, columns.time_s(cells));
             }
         }
         self.memory = Some(memory);
@@ -294,6 +353,38 @@ impl InputLines {
             (self.columns, self.derived) = (Some(columns), derived);
         }
         Ok(())
+    }
+}
+
+/// Number of a group, from its text.
+fn key(group: &[u8]) -> u64 {
+    let mut hasher = DefaultHasher::new();
+    group.hash(&mut hasher);
+    hasher.finish()
+}
+
+impl InputColumns {
+    /// Checks that a memory can place the line: it has a time and a row-wire, if there are such columns.
+    fn check_place(&self, cells: &[f64]) -> Result<(), InputLineError> {
+        if let Some(time) = self.time
+            && !cells[time.column].is_finite()
+        {
+            return Err(InputLineError::NoTime(time.column + 1));
+        }
+        match self.row_wire {
+            Some(column) if selection::row_wire("", cells[column]).is_err() => Err(InputLineError::RowWire(column + 1)),
+            _ => Ok(()),
+        }
+    }
+
+    fn series(&self, group: u64, cells: &[f64]) -> Series {
+        let row_wire = self
+            .row_wire
+            .and_then(|column| selection::row_wire("", cells[column]).ok());
+        Series {
+            group,
+            row_wire: row_wire.unwrap_or(0),
+        }
     }
 }
 
@@ -396,8 +487,73 @@ mod tests {
         assert_eq!(readings(&mut unnamed, 1, "1,2"), Some((0, vec![1.0, 2.0])));
         let other = unnamed.parse(2, b"1,2,3").unwrap_err();
         assert_eq!(other, InputLineError::Cells { found: 3, expected: 2 });
-        let missing = unnamed.parse(3, b"time,u1,v2").unwrap_err();
+        let mut renamed = InputLines::new(channels(&["u1", "u2"]), OtherColumns::default(), None);
+        let missing = renamed.parse(1, b"time,u1,v2").unwrap_err();
         assert!(missing.is_final() && missing.to_string().contains("u2"), "{missing}");
+    }
+
+    /// Arduino prints ovf for a float that is too large, multimeters print OL.
+    #[test]
+    fn garbage_after_the_first_line_is_a_bad_line_and_a_whole_header_still_counts() {
+        for (header, garbage) in [
+            ("u1,u2", "ovf,ovf"),
+            ("u1,u2", "OL,OL"),
+            ("u1,u2", "-,-"),
+            ("u1,u2", "ERR"),
+            ("u1,u2", "u1,\u{fffd}x"),
+            ("", "ovf,ovf"),
+        ] {
+            let mut lines = InputLines::new(channels(&["u1", "u2"]), OtherColumns::default(), None);
+            assert_eq!(readings(&mut lines, 1, header), None);
+            assert_eq!(readings(&mut lines, 2, "93,91"), Some((0, vec![93.0, 91.0])));
+            let error = lines.parse(3, garbage.as_bytes()).unwrap_err();
+            assert!(!error.is_final(), "{garbage}: {error}");
+            assert_eq!(readings(&mut lines, 4, "93,90"), Some((0, vec![93.0, 90.0])));
+            assert_eq!(readings(&mut lines, 5, "time,u2,u1"), None);
+            assert_eq!(readings(&mut lines, 6, "0.1,2,1"), Some((0, vec![1.0, 2.0])));
+        }
+    }
+
+    #[test]
+    fn a_line_may_end_with_a_comma() {
+        for header in ["u1,u2", "u1,u2,", ""] {
+            let mut lines = InputLines::new(channels(&["u1", "u2"]), OtherColumns::default(), None);
+            assert_eq!(readings(&mut lines, 1, header), None);
+            assert_eq!(readings(&mut lines, 2, "1,2,"), Some((0, vec![1.0, 2.0])), "{header}");
+            assert_eq!(readings(&mut lines, 3, "3,4,"), Some((0, vec![3.0, 4.0])), "{header}");
+            assert!(lines.parse(4, b"1,2,3,4").is_err());
+        }
+    }
+
+    #[test]
+    fn a_line_that_a_memory_cannot_place_is_bad() {
+        let others = OtherColumns {
+            time: Some("t".to_owned()),
+            row_wire: Some("row".to_owned()),
+            ..OtherColumns::default()
+        };
+        let stream = MemoryStream::new(&Memory::of_lags(&[1]), 1).unwrap();
+        let mut lines = InputLines::new(channels(&["u"]), others, None).with_memory(Some(stream));
+        assert_eq!(readings(&mut lines, 1, "t,row,u"), None);
+        assert_eq!(
+            readings(&mut lines, 2, "2026-11-24T12:00:00Z,1,5"),
+            Some((0, vec![5.0, 5.0]))
+        );
+        for (text, expected) in [
+            ("2026-11-24T12:61:00Z,1,5", InputLineError::NoTime(1)),
+            ("nan,1,5", InputLineError::NoTime(1)),
+            ("2026-11-24T12:00:00.1Z,0.5,5", InputLineError::RowWire(2)),
+        ] {
+            assert_eq!(lines.parse(3, text.as_bytes()).unwrap_err(), expected, "{text}");
+        }
+        assert_eq!(
+            readings(&mut lines, 4, "2026-11-24T12:00:00.2Z,2,6"),
+            Some((0, vec![6.0, 6.0]))
+        );
+        assert_eq!(
+            readings(&mut lines, 5, "2026-11-24T12:00:00.3Z,1,7"),
+            Some((0, vec![7.0, 5.0]))
+        );
     }
 
     #[test]
@@ -439,7 +595,7 @@ mod tests {
             ..OtherColumns::default()
         };
         let new = |stream| InputLines::new(channels(&["u"]), others.clone(), None).with_memory(Some(stream));
-        let start = MemoryStream::new(&memory, 1, 1).unwrap();
+        let start = MemoryStream::new(&memory, 1).unwrap();
         let mut lines = new(start.clone());
         let average = |elapsed_s: f64| 1.0 - f64::exp(-elapsed_s / 2.0);
         let mut check = |line: u64, text: &str, expected: f64| {

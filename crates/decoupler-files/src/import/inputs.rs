@@ -1,9 +1,9 @@
-use std::{collections::BTreeSet, path::Path};
+use std::path::Path;
 
 use decoupler_core::{
-    dataset::MemoryStream,
+    dataset::{History, RowOrder},
     evaluation::{Channel, Problem},
-    text::clean_name,
+    text::{clean_name, counted},
 };
 use ndarray::Array2;
 use thiserror::Error;
@@ -24,6 +24,8 @@ pub struct InputTable {
     pub lines: Vec<u64>,
     /// Last line of a text file, if it is cut off and therefore left out.
     pub torn_line: Option<u64>,
+    /// Notes on times, which a memory needs: lines that are left out, and the order of the lines.
+    pub warnings: Vec<String>,
     /// Columns of the recipe that say when or to what a sample belongs, as far as the file has them: time, group and
     /// row-wire.
     pub kept: Vec<KeptColumn>,
@@ -47,6 +49,8 @@ pub struct InputColumns {
     pub row_wire: Option<usize>,
     /// Time column, if there is one.
     pub time: Option<InputTime>,
+    /// Index of the group column, if a memory needs it and there is one.
+    pub group: Option<usize>,
     /// Columns copied to the output, with their titles.
     pub kept: Vec<(usize, String)>,
     /// Number of columns of the table.
@@ -71,6 +75,8 @@ pub struct OtherColumns {
     pub time: Option<String>,
     /// Unit of the times, if the header does not give it.
     pub time_unit: Option<String>,
+    /// Column of groups, which a memory needs.
+    pub group: Option<String>,
     /// Columns that say when or to what a sample belongs and are copied to the output.
     pub kept: Vec<String>,
 }
@@ -168,6 +174,7 @@ impl InputColumns {
             inputs: (before..width).collect(),
             row_wire: has_row_wire.then_some(0),
             time: None,
+            group: None,
             kept: Vec::new(),
             width,
         })
@@ -182,10 +189,14 @@ impl InputColumns {
             cells.iter().filter(|cell| is_name(cell)).count(),
             cells.iter().filter(is_text).count(),
         );
-        let has_all = names >= inputs.len() && Self::of_header(cells, inputs, &OtherColumns::default()).is_ok();
-        has_all
+        (names >= inputs.len() && Self::has_all(cells, inputs))
             || (names > 0 && texts > 0)
             || (texts == cells.len() && texts >= inputs.len() && (texts > 1 || is_first_line))
+    }
+
+    /// Returns `true` if the cells are a header with the names of all inputs.
+    pub fn has_all(cells: &[String], inputs: &[Channel]) -> bool {
+        Self::of_header(cells, inputs, &OtherColumns::default()).is_ok()
     }
 
     /// Replaces `readings` by the inputs of a line.
@@ -240,6 +251,7 @@ impl InputColumns {
         Ok(Self {
             kept: kept.collect(),
             row_wire: other(&others.row_wire),
+            group: other(&others.group),
             inputs: found,
             time,
             width: columns.len(),
@@ -249,8 +261,8 @@ impl InputColumns {
 
 impl Recipe {
     /// Reads the inputs of a network of `problem` from the file at `path`: the columns with their names or, without a header,
-    /// as many columns as there are inputs, after the number of the row-wire if `has_row_wire`. The state of a memory starts
-    /// again where the group changes and at gaps in time, if the file has these columns.
+    /// as many columns as there are inputs, after the number of the row-wire if `has_row_wire`. A memory continues as in
+    /// training, by the group, row-wire and time of each line, if the file has these columns.
     ///
     /// # Errors
     /// If the file cannot be read, a column is missing or has a different unit, or a cell is missing or not a number.
@@ -279,6 +291,7 @@ impl Recipe {
             inputs: columns,
             row_wire,
             time,
+            group,
             kept,
             ..
         } = found.map_err(|source| ImportError::Inputs {
@@ -286,12 +299,14 @@ impl Recipe {
             source,
         })?;
         let files = [file];
+        // A memory cannot place a row without a time.
+        let time = time.filter(|_| problem.memory.is_some());
         let time_column = time.map(|time| time.column);
         for &column in columns.iter().chain(&row_wire).chain(&time_column) {
             super::selection::not_a_number(&files, &names, ColumnId { file: 0, column })?;
         }
         let table = &files[0].1;
-        for &column in columns.iter().chain(&row_wire).chain(&time_column) {
+        for &column in columns.iter().chain(&row_wire) {
             let cells = &table.columns[column].cells;
             if let Some(row) = (0..table.rows).find(|&row| cells.is_missing(row)) {
                 return Err(ImportError::MissingInput {
@@ -301,51 +316,55 @@ impl Recipe {
                 });
             }
         }
-        let readings = Array2::from_shape_fn((table.rows, columns.len()), |(row, input)| {
-            table.columns[columns[input]].cells.number(row)
+        let cells = |column: usize| &table.columns[column].cells;
+        let is_placed = |row: &usize| time.is_none_or(|time| !cells(time.column).is_missing(*row));
+        let rows = Vec::from_iter((0..table.rows).filter(is_placed));
+        let mut warnings = Vec::new();
+        if let Some(row) = (0..table.rows).find(|row| !is_placed(row)) {
+            warnings.push(format!(
+                "{} without a time, which the history of readings needs, {} left out; the first is line {}",
+                counted(table.rows - rows.len(), "line"),
+                if table.rows - rows.len() == 1 { "is" } else { "are" },
+                table.line(row)
+            ));
+        }
+        let mut readings = Array2::from_shape_fn((rows.len(), columns.len()), |(row, input)| {
+            cells(columns[input]).number(rows[row])
         });
         let row_wires: Option<Vec<usize>> = match row_wire {
             None => None,
             Some(column) => {
                 let name = &table.columns[column].name;
-                let of = |row| super::selection::row_wire(name, table.columns[column].cells.number(row));
-                Some((0..table.rows).map(of).collect::<Result<_, _>>()?)
+                let of = |&row: &usize| super::selection::row_wire(name, cells(column).number(row));
+                Some(rows.iter().map(of).collect::<Result<_, _>>()?)
             }
         };
-        let readings = match &problem.memory {
-            None => readings,
-            Some(memory) => {
-                let group = self.group.as_ref().and_then(|group| names.find(group).ok());
-                let group = group.map(|id| &table.columns[id.column].cells);
-                // A state for each row-wire that occurs, whatever its number.
-                let found = BTreeSet::from_iter(row_wires.iter().flatten().copied());
-                let found = Vec::from_iter(found);
-                let stream = MemoryStream::new(memory, columns.len(), found.len().max(1));
-                let mut stream = stream.map_err(|error| ImportError::from(error).of_file(path))?;
-                let mut features = Array2::zeros((table.rows, problem.feature_count()));
-                for (row, mut features) in features.rows_mut().into_iter().enumerate() {
-                    if row > 0 && group.is_some_and(|group| group.group(row) != group.group(row - 1)) {
-                        stream.restart();
-                    }
-                    let row_wire = row_wires.as_ref().map(|row_wires| row_wires[row]);
-                    let state = row_wire.and_then(|row_wire| found.binary_search(&row_wire).ok());
-                    let time_s = time.map(|time| time.unit_s * table.columns[time.column].cells.number(row));
-                    let of_row = stream.step(state.unwrap_or(0), &readings.row(row).to_vec(), time_s);
-                    features.iter_mut().zip(of_row).for_each(|(to, from)| *to = *from);
-                }
-                features
+        if let Some(memory) = &problem.memory {
+            let groups = group.map(|column| Vec::from_iter(rows.iter().map(|&row| cells(column).group(row))));
+            let times_s = time.map(|time| {
+                let times_s = rows.iter().map(|&row| time.unit_s * cells(time.column).number(row));
+                times_s.collect()
+            });
+            let samples = (0..rows.len()).collect();
+            let history = History::new(readings, groups.as_deref(), row_wires.as_deref(), times_s, samples);
+            if let order @ (RowOrder::Restarts { first_row, .. } | RowOrder::Shuffled { first_row, .. }) =
+                history.order()
+            {
+                warnings.extend(super::selection::order_note(order, table.line(rows[first_row])));
             }
-        };
+            let features = history.features(memory);
+            readings = features.map_err(|error| ImportError::from(error).of_file(path))?;
+        }
         let kept = kept.into_iter().map(|(column, title)| {
-            let cells = &table.columns[column].cells;
-            let cells = (0..table.rows).map(|row| cells.text(row)).collect();
+            let cells = rows.iter().map(|&row| cells(column).text(row)).collect();
             KeptColumn { title, cells }
         });
         Ok(InputTable {
             readings,
             row_wires,
-            lines: (0..table.rows).map(|row| table.line(row)).collect(),
+            lines: rows.iter().map(|&row| table.line(row)).collect(),
             torn_line: table.torn_line,
+            warnings,
             kept: kept.collect(),
         })
     }
@@ -359,6 +378,7 @@ impl Recipe {
         OtherColumns {
             kept: kept.cloned().collect(),
             row_wire: self.row_wire.clone(),
+            group: self.group.clone().filter(|_| problem.memory.is_some()),
             time_unit: time.as_ref().and_then(|time| self.units.get(time).cloned()),
             time,
         }

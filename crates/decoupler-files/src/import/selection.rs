@@ -7,8 +7,9 @@ use super::{
     suggestion::Meanings,
 };
 use decoupler_core::{
-    dataset::{History, Memory},
+    dataset::{History, Memory, RowOrder, Series},
     evaluation::Channel,
+    text::counted,
 };
 use ndarray::Array2;
 
@@ -169,15 +170,39 @@ impl Rows<'_> {
             }
         };
         Ok(Past {
-            groups: self.meanings.group.map(|_| self.groups(read).0),
+            groups: self.group_keys(read),
             row_wires: self.row_wires(read)?,
             times_s,
             samples: kept.iter().map(|row| place[row]).collect(),
         })
     }
 
-    /// Sorts the rows by time; returns a note if they were not in order.
-    pub(super) fn put_in_order(&self, time: ColumnId, kept: &mut [usize]) -> Option<String> {
+    /// Puts the samples `kept` and the rows `read` in order of time, unless the clock restarts; returns a note if they were
+    /// not in order.
+    pub(super) fn put_in_order(
+        &self,
+        time: ColumnId,
+        kept: &mut [usize],
+        read: &mut [usize],
+    ) -> Result<Option<String>, ImportError> {
+        let (groups, row_wires) = (self.group_keys(read), self.row_wires(read)?);
+        let rows = read.iter().enumerate().map(|(place, &row)| {
+            let series = Series {
+                group: groups.as_ref().map_or(0, |groups| groups[place]),
+                row_wire: row_wires.as_ref().map_or(0, |row_wires| row_wires[place]),
+            };
+            (series, self.number(time, row))
+        });
+        let order = RowOrder::of(rows);
+        if let RowOrder::Restarts { first_row, .. } = order {
+            return Ok(order_note(order, self.files[0].1.line(read[first_row])));
+        }
+        let note = self.sort(time, kept);
+        self.sort(time, read);
+        Ok(note)
+    }
+
+    fn sort(&self, time: ColumnId, kept: &mut [usize]) -> Option<String> {
         let falls = |pair: &[usize]| self.number(time, pair[1]) < self.number(time, pair[0]);
         let first = kept.windows(2).find(|pair| falls(pair))?[1];
         let count = kept.windows(2).filter(|pair| falls(pair)).count();
@@ -205,6 +230,12 @@ impl Rows<'_> {
             })
         });
         (numbers.collect(), names)
+    }
+
+    /// Number of the group of each row, if there is a group column.
+    fn group_keys(&self, rows: &[usize]) -> Option<Vec<u64>> {
+        self.meanings.group?;
+        Some(self.groups(rows).0.into_iter().map(|group| group as u64).collect())
     }
 
     pub(super) fn row_wires(&self, kept: &[usize]) -> Result<Option<Vec<usize>>, ImportError> {
@@ -255,7 +286,7 @@ impl Rows<'_> {
 
 /// Rows of a history, before their readings are moved.
 pub(super) struct Past {
-    groups: Option<Vec<usize>>,
+    groups: Option<Vec<u64>>,
     row_wires: Option<Vec<usize>>,
     times_s: Option<Vec<f64>>,
     samples: Vec<usize>,
@@ -265,6 +296,22 @@ impl Past {
     pub(super) fn with_readings(self, readings: Array2<f64>) -> History {
         let (groups, row_wires) = (self.groups.as_deref(), self.row_wires.as_deref());
         History::new(readings, groups, row_wires, self.times_s, self.samples)
+    }
+}
+
+/// Returns a note on times that step back, first on `line`.
+pub(super) fn order_note(order: RowOrder, line: u64) -> Option<String> {
+    match order {
+        RowOrder::ByTime => None,
+        RowOrder::Restarts { count, .. } => Some(format!(
+            "the times go backwards {}, first on line {line}, as where a clock is restarted: the rows keep their order, and no \
+             history of readings goes across",
+            counted(count, "time")
+        )),
+        RowOrder::Shuffled { count, .. } => Some(format!(
+            "the times go backwards {}, first on line {line}: the rows are taken in order of time",
+            counted(count, "time")
+        )),
     }
 }
 

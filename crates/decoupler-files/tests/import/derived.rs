@@ -34,7 +34,7 @@ fn text(rows: usize) -> String {
 
 fn lines(recipe: &Recipe, problem: &Problem) -> InputLines {
     let memory = problem.memory.as_ref();
-    let memory = memory.map(|memory| MemoryStream::new(memory, problem.inputs.len(), 1).unwrap());
+    let memory = memory.map(|memory| MemoryStream::new(memory, problem.inputs.len()).unwrap());
     InputLines::new(problem.inputs.clone(), recipe.other_columns(problem), None)
         .with_derived(recipe.derive.clone())
         .with_memory(memory)

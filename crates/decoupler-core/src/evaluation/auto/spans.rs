@@ -54,7 +54,8 @@ fn rounded(value: f64) -> f64 {
 fn correlation_time(samples: &AutoSamples<'_>) -> f64 {
     let Some(past) = &samples.past else { return 1.0 };
     let row = |sample: usize| past.history.samples()[past.samples[sample]];
-    let stretch = |sample: usize| past.history.stretches()[row(sample)];
+    let of_rows = past.history.stretches();
+    let stretch = |sample: usize| of_rows[row(sample)];
     // Rows of groups whose times overlap are interleaved.
     let mut order = Vec::from_iter(0..samples.set.samples());
     order.sort_by_key(|&sample| (stretch(sample), row(sample)));

@@ -337,10 +337,11 @@ mod tests {
     use std::{fmt::Write as _, fs, path::Path, sync::mpsc::channel};
 
     use decoupler_core::{
+        dataset::Memory,
         evaluation::{Measured, RunSettings},
         scene::RowModel,
     };
-    use decoupler_files::import::{Plan, Recipe, Setup};
+    use decoupler_files::import::{Plan, Recipe, Recorded, Setup};
 
     use super::*;
     use crate::window::{
@@ -410,6 +411,61 @@ mod tests {
         assert_eq!(targets.values(), expected);
         assert_eq!(targets.problem.targets[0].title(), "x (mm)");
         assert_eq!((shown.counts.decoded, shown.replay.unwrap().length_s), (1, 0.02));
+    }
+
+    /// Three row-wires that share a network take turns, and the time steps back in the middle.
+    #[test]
+    fn a_replay_and_a_stream_have_the_past_of_training() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("press.csv");
+        let mut text = "time,row,u,x\n".to_owned();
+        for sample in 0..600_u32 {
+            let (time_s, row) = (0.1 * f64::from(sample % 300), sample % 3 + 1);
+            writeln!(text, "{time_s},{row},{},1", f64::from(sample).sin()).unwrap();
+        }
+        fs::write(&path, text.replace(",1\n", ",2\n")).unwrap();
+        let import = Recipe {
+            data: path.clone(),
+            inputs: vec!["u".to_owned()],
+            targets: vec!["x".to_owned()],
+            time: Some("time".to_owned()),
+            row_wire: Some("row".to_owned()),
+            memory: Some(Memory::of_lags(&[2])),
+            ..Recipe::default()
+        };
+        let trained = import
+            .import(Path::new(""), &mut |_| ControlFlow::Continue(()))
+            .unwrap();
+        let file = NetworkFile {
+            problem: trained.problem(),
+            recorded: Some(Recorded {
+                plan: Plan {
+                    import,
+                    ..Plan::default()
+                },
+                ..network(folder.path()).0.recorded.clone().unwrap()
+            }),
+            ..NetworkFile::clone(&network(folder.path()).0)
+        };
+        fs::write(&path, text).unwrap();
+        let of_training = |sample: usize| trained.set.sample_readings(sample).to_vec();
+        let mut tally = Tally::new(Instant::now());
+        let mut found = [0.0; 3];
+        let replayed = read(&file, &path, &|| true).unwrap();
+        let source: Source = path.display().to_string().parse().unwrap();
+        let mut stream = TargetLines::new(&source, Box::new(fs::File::open(&path).unwrap()), &file).unwrap();
+        for sample in 0..600 {
+            assert_eq!(
+                replayed.frame_ohm(sample).row(0).to_vec()[1..],
+                of_training(sample),
+                "sample {sample}"
+            );
+            while !matches!(
+                stream.next(Duration::from_secs(60), &mut found, &mut tally),
+                Next::Frame(_)
+            ) {}
+            assert_eq!(found[1..], of_training(sample), "sample {sample}");
+        }
     }
 
     #[test]

@@ -25,7 +25,7 @@ impl ExportedMemory {
             _ => format!("    double averages[{upper}_AVERAGES][{upper}_READINGS];\n"),
         };
         format!(
-            "/* The memory of {name}_decode: computes its features from readings as they come. */\n\
+            "/* The memory of {name}_decode: computes its features from readings as they come.\n{restarts} */\n\
              #ifndef {upper}_MEMORY_H\n#define {upper}_MEMORY_H\n\n\
              #define {upper}_READINGS {channels}\n#define {upper}_FEATURES {features}\n\
              #define {upper}_KEPT {kept}\n#define {upper}_AVERAGES {count}\n\
@@ -40,6 +40,7 @@ impl ExportedMemory {
              void {name}_memory_step({name}_memory *memory, const double readings[{upper}_READINGS],\n    \
              double interval_s, double features[{upper}_FEATURES]);\n\n\
              #endif\n",
+            restarts = self.restarts(),
             channels = constants.channels,
             features = constants.features(),
             kept = self.kept(),

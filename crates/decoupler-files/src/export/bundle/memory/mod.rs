@@ -12,7 +12,10 @@ mod scripts;
 
 use std::fmt::Write;
 
-use decoupler_core::dataset::{Memory, MemoryConstants, MemoryError, MemoryState, Seed, Span, Stream};
+use decoupler_core::{
+    dataset::{Memory, MemoryConstants, MemoryError, MemoryState, Seed, Span, Stream},
+    text::format_number,
+};
 use rand::RngExt;
 
 use self::graph::sequence_of_graph;
@@ -144,7 +147,7 @@ impl ExportedMemory {
             BundleFormat::C99 => format!(
                 "    #include \"{name}_memory.h\"\n    {name}_memory memory;\n    {name}_memory_init(&memory);\n    \
                  {name}_memory_step(&memory, readings, interval_s, features);\n    {name}_decode(features, targets);\n\n\
-                 A copy of the struct is a state to continue from. Each row-wire needs a struct of its own.\n"
+                 A copy of the struct is a state to continue from.\n"
             ),
             BundleFormat::NumPy => "    from memory import Memory\n    memory = Memory()\n    \
                  features = memory.step(readings, interval_s)\n    targets = decode(features[None])[0]\n\n\
@@ -160,12 +163,23 @@ impl ExportedMemory {
                 .to_owned(),
             BundleFormat::Json => String::new(),
         };
+        let restarts = self.restarts();
         format!(
             "\nMemory\n\nThe inputs of the network are features: readings and values from their past. They are computed from\n\
              the {} readings of each sample, interval_s seconds after the sample before (in training usually {} s):\n\n{usage}\n\
+             {restarts}\n\n\
              sequence.csv has samples in order with their intervals, features and targets; the state starts again where\n\
              restart is 1.\n",
             self.constants.channels, self.constants.interval_s
+        )
+    }
+
+    /// Tells the caller where the state has to restart, which the program does by itself.
+    fn restarts(&self) -> String {
+        format!(
+            "Keep one state for each group and row-wire, and restart it where the time steps back and after a pause of more\n\
+             than {} s (50 usual intervals): it does not restart by itself.",
+            format_number(50.0 * self.constants.interval_s)
         )
     }
 

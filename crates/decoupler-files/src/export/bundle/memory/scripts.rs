@@ -7,7 +7,7 @@ impl ExportedMemory {
         let list = |values: Vec<f64>| format!("{values:?}");
         let (rates, of_samples): (Vec<f64>, Vec<f64>) = self.exponents().unzip();
         format!(
-            "\"\"\"The memory of the network: computes its features from readings as they come.\"\"\"\n\n\
+            "\"\"\"The memory of the network: computes its features from readings as they come.\n\n{restarts}\n\"\"\"\n\n\
              import numpy as np\n\n\
              CHANNELS, KEPT = {channels}, {kept}\n\
              LAGS = {lags:?}\n\
@@ -33,6 +33,7 @@ impl ExportedMemory {
              averages += weights[:, None] * (readings - averages)\n        \
              past = np.concatenate([kept[LAGS], averages]) if LAGS else averages\n        \
              return np.concatenate([readings, {past}])\n",
+            restarts = self.restarts(),
             channels = constants.channels,
             kept = self.kept(),
             lags = constants.lags,
