@@ -17,6 +17,7 @@ pub struct History {
     /// Rows × channels.
     readings: Array2<f64>,
     stretches: Vec<usize>,
+    stretch_count: usize,
     times_s: Option<Vec<f64>>,
     /// Row of each sample.
     samples: Vec<usize>,
@@ -59,7 +60,7 @@ impl History {
         let interval_s = times_s.as_ref().and_then(|times_s| usual_interval(&keys, times_s));
         let mut latest: HashMap<(usize, usize), (usize, f64)> = HashMap::new();
         let mut count = 0;
-        let stretches = keys.iter().enumerate().map(|(row, key)| {
+        let stretches = Vec::from_iter(keys.iter().enumerate().map(|(row, key)| {
             let time_s = times_s.as_ref().map_or(0.0, |times_s| times_s[row]);
             let continued = latest
                 .get(key)
@@ -68,9 +69,10 @@ impl History {
             count = count.max(stretch + 1);
             latest.insert(*key, (stretch, time_s));
             stretch
-        });
+        }));
         Self {
-            stretches: stretches.collect(),
+            stretches,
+            stretch_count: count,
             readings,
             times_s,
             samples,
@@ -85,11 +87,12 @@ impl History {
     /// If the numbers of channels differ.
     pub fn append(&mut self, other: &Self) {
         let rows = self.readings.nrows();
-        let next = self.stretches.iter().max().map_or(0, |last| last + 1);
+        let next = self.stretch_count;
         let appended = self.readings.append(Axis(0), other.readings.view());
         appended.expect("histories of the same channels");
         self.stretches
             .extend(other.stretches.iter().map(|stretch| next + stretch));
+        self.stretch_count += other.stretch_count;
         self.samples.extend(other.samples.iter().map(|row| rows + row));
         self.times_s = self
             .times_s

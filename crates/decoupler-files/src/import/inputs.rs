@@ -359,7 +359,7 @@ impl Recipe {
         OtherColumns {
             kept: kept.cloned().collect(),
             row_wire: self.row_wire.clone(),
-            time_unit: time.as_ref().and_then(|time| self.units.get(time).cloned()),
+            time_unit: time.as_deref().and_then(|time| self.unit_of(time)).map(str::to_owned),
             time,
         }
     }

@@ -1,19 +1,51 @@
 //! Damaged files are refused: no changed bit and no missing end changes a number or loses a column silently.
 
-use std::{fs, ops::ControlFlow, path::Path};
+use std::{
+    fs,
+    io::{self, Cursor},
+    ops::ControlFlow,
+    path::Path,
+};
 
 use decoupler_files::import::{Cells, DialectChoice, Table, read_table};
+use zip::{CompressionMethod, ZipArchive, ZipWriter, write::SimpleFileOptions};
 
 /// Formats with a checksum.
-const CHECKED: [&str; 3] = ["plain.npz", "deflated.npz", "deflated.mat"];
+const CHECKED: [&str; 7] = [
+    "plain.npz",
+    "deflated.npz",
+    "deflated.mat",
+    "press.xlsx",
+    "stamps.xlsx",
+    "press.ods",
+    STORED,
+];
+/// press.xlsx without compression, where any digit may become another.
+const STORED: &str = "stored.xlsx";
 
 fn fixture(name: &str) -> Vec<u8> {
+    if name == STORED {
+        return stored(&fixture("press.xlsx"));
+    }
     fs::read(
         Path::new(env!("CARGO_MANIFEST_DIR"))
             .join("tests/fixtures/import")
             .join(name),
     )
     .unwrap()
+}
+
+/// Returns a zip archive without compression.
+fn stored(archive: &[u8]) -> Vec<u8> {
+    let mut source = ZipArchive::new(Cursor::new(archive)).unwrap();
+    let mut target = ZipWriter::new(Cursor::new(Vec::new()));
+    for index in 0..source.len() {
+        let mut entry = source.by_index(index).unwrap();
+        let options = SimpleFileOptions::default().compression_method(CompressionMethod::Stored);
+        target.start_file(entry.name().unwrap().into_owned(), options).unwrap();
+        io::copy(&mut entry, &mut target).unwrap();
+    }
+    target.finish().unwrap().into_inner()
 }
 
 /// Names of columns, bits of their numbers, and notes.
