@@ -1,6 +1,6 @@
 use std::collections::HashMap;
 
-use ndarray::{Array2, ArrayView2, Axis};
+use ndarray::{ArcArray2, Array2, ArrayView2, Axis};
 
 use super::{Memory, MemoryError, MemoryState};
 
@@ -14,8 +14,8 @@ const GAP: f64 = 50.0;
 /// times are more than fifty usual intervals apart. Row-wires have stretches of their own.
 #[derive(Clone, Debug, PartialEq)]
 pub struct History {
-    /// Rows × channels.
-    readings: Array2<f64>,
+    /// Rows × channels, shared with the samples.
+    readings: ArcArray2<f64>,
     stretches: Vec<usize>,
     stretch_count: usize,
     times_s: Option<Vec<f64>>,
@@ -73,7 +73,7 @@ impl History {
         Self {
             stretches,
             stretch_count: count,
-            readings,
+            readings: readings.into_shared(),
             times_s,
             samples,
             interval_s,
@@ -88,8 +88,10 @@ impl History {
     pub fn append(&mut self, other: &Self) {
         let rows = self.readings.nrows();
         let next = self.stretch_count;
-        let appended = self.readings.append(Axis(0), other.readings.view());
+        let mut readings = std::mem::take(&mut self.readings).into_owned();
+        let appended = readings.append(Axis(0), other.readings.view());
         appended.expect("histories of the same channels");
+        self.readings = readings.into_shared();
         self.stretches
             .extend(other.stretches.iter().map(|stretch| next + stretch));
         self.stretch_count += other.stretch_count;
@@ -142,16 +144,17 @@ impl History {
     ///
     /// # Errors
     /// If the memory is invalid for these channels; see [`Memory::check`].
-    pub fn features(&self, memory: &Memory) -> Result<Array2<f64>, MemoryError> {
+    pub fn features(&self, memory: &Memory) -> Result<ArcArray2<f64>, MemoryError> {
         let memory = self.resolved(memory);
-        if memory.is_empty() {
-            return Ok(self.readings.select(Axis(0), &self.samples));
-        }
-        let all = memory.expand(self.readings(), &self.stretches, self.times_s())?;
+        let all = if memory.is_empty() {
+            self.readings.clone()
+        } else {
+            memory.expand(self.readings(), &self.stretches, self.times_s())?.into_shared()
+        };
         if self.samples.iter().copied().eq(0..self.readings.nrows()) {
             return Ok(all);
         }
-        Ok(all.select(Axis(0), &self.samples))
+        Ok(all.select(Axis(0), &self.samples).into_shared())
     }
 }
 

@@ -156,8 +156,8 @@ impl Rows<'_> {
 
     /// Describes the rows `read` in order of time, of which those in `kept` are samples.
     pub(super) fn past(&self, read: &[usize], kept: &[usize]) -> Result<Past, ImportError> {
-        let mut place = HashMap::with_capacity(read.len());
-        place.extend(read.iter().enumerate().map(|(place, &row)| (row, place)));
+        let mut places = vec![0; self.files[0].1.rows];
+        read.iter().enumerate().for_each(|(place, &row)| places[row] = place);
         let times_s = match self.meanings.time {
             None => None,
             Some(id) => {
@@ -174,7 +174,7 @@ impl Rows<'_> {
             groups: self.meanings.group.map(|_| self.groups(read).0),
             row_wires: self.row_wires(read)?,
             times_s,
-            samples: kept.iter().map(|row| place[row]).collect(),
+            samples: kept.iter().map(|&row| places[row]).collect(),
         })
     }
 

@@ -116,6 +116,21 @@ fn number(element: &BytesStart<'_>, name: &str) -> Option<u64> {
     element.try_get_attribute(name).ok()??.value.trim().parse().ok()
 }
 
+/// Refuses an element whose attributes the reader of spreadsheets may read in another way, or whose reference is to no cell.
+fn check_attributes(element: &BytesStart<'_>) -> Result<(), TableError> {
+    for attribute in element.attributes().with_checks(false) {
+        match attribute {
+            Ok(found) if found.key.as_ref() == "r" && !is_inside(&found.value) => return Err(outside(&found.value)),
+            Ok(_) => {}
+            Err(error) => {
+                let reason = format!("{error}; save it again, or as CSV");
+                return Err(TableError::damaged("the spreadsheet", reason));
+            }
+        }
+    }
+    Ok(())
+}
+
 /// Returns `true` for a reference to a row or a cell that a sheet can have, such as 12 or B12. The reader of spreadsheets takes
 /// larger numbers for others.
 fn is_inside(reference: &str) -> bool {
@@ -142,23 +157,20 @@ impl Sheet {
                 let texts = number(element, "uniqueCount").unwrap_or(0);
                 budget.claim(texts.saturating_mul(OF_TEXT))?;
             }
-            "row" | "c" => {
-                let reference = element.try_get_attribute("r").ok().flatten();
-                if let Some(reference) = reference.filter(|reference| !is_inside(&reference.value)) {
-                    return Err(outside(&reference.value));
-                }
-            }
+            "row" | "c" => check_attributes(element)?,
             "table" => {
                 self.end(budget)?;
                 *self = Self::default();
             }
             "table-row" => {
+                check_attributes(element)?;
                 self.next = [self.next[0] + self.row_repeats, 0];
                 let repeats = number(element, "table:number-rows-repeated");
                 self.row_repeats = repeats.unwrap_or(1).min(LARGEST[0]);
                 (self.repeats, self.claimed) = (0, 0);
             }
             "table-cell" | "covered-table-cell" => {
+                check_attributes(element)?;
                 self.next[1] += self.repeats;
                 let repeats = number(element, "table:number-columns-repeated");
                 self.repeats = repeats.unwrap_or(1).min(LARGEST[1]);
@@ -241,6 +253,9 @@ mod tests {
             ("A", false),
         ] {
             assert_eq!(is_inside(reference), expected, "{reference}");
+        }
+        for malformed in ["<c r r=\"A1\"/>", "<c r=\"A1\" r=\"A0\"/>", "<table:table-cell x table:y=\"1\"/>"] {
+            assert_eq!(claimed(malformed), u64::MAX, "{malformed}");
         }
         assert_eq!(claimed("<sst uniqueCount=\"1000000\"><si/></sst>"), 1_000_000 * OF_TEXT);
     }

@@ -65,6 +65,11 @@ fn read(bytes: &[u8], path: &Path) -> Result<Content, String> {
     Ok((names, numbers, notes))
 }
 
+/// Every byte of a small file, and an odd number of bytes apart in a larger one, so that all bits have their turn.
+fn step(file: &[u8]) -> usize {
+    1 + 2 * (file.len() / 3000)
+}
+
 #[test]
 fn no_changed_bit_changes_a_number_or_a_name() {
     let folder = tempfile::tempdir().unwrap();
@@ -72,7 +77,7 @@ fn no_changed_bit_changes_a_number_or_a_name() {
         let (path, good) = (folder.path().join(name), fixture(name));
         let expected = read(&good, &path).unwrap();
         let (mut accepted, mut refused) = (0, 0);
-        for place in 0..good.len() {
+        for place in (0..good.len()).step_by(step(&good)) {
             // Neighbours differ in their bit.
             let bit = place * 3 % 8;
             let mut bytes = good.clone();
@@ -96,7 +101,7 @@ fn a_missing_end_is_noticed() {
     for name in [&CHECKED[..], &["plain.mat", "f8.npy", "i2.npy"]].concat() {
         let (path, good) = (folder.path().join(name), fixture(name));
         let (names, numbers, _) = read(&good, &path).unwrap();
-        for length in 0..good.len() {
+        for length in (0..good.len()).step_by(step(&good)) {
             let Ok((found, values, _)) = read(&good[..length], &path) else {
                 continue;
             };
