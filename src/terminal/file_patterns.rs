@@ -51,7 +51,11 @@ fn matching(pattern: &str) -> Result<Vec<PathBuf>, PatternError> {
     };
     let (rest, mut found) = (parts[place + 1..].join("/"), Vec::new());
     while let Some(folder) = folders.pop() {
-        let readable = if folder == Path::new("") { Path::new(".") } else { &folder };
+        let readable = if folder == Path::new("") {
+            Path::new(".")
+        } else {
+            &folder
+        };
         for entry in readable.read_dir().into_iter().flatten().flatten() {
             if entry.file_type().is_ok_and(|kind| kind.is_dir()) {
                 folders.push(folder.join(entry.file_name()));

@@ -223,5 +223,8 @@ fn names_in_the_golden_sequence_are_no_formulas() {
     succeed(&format!("{train} --lags 3 --out n.json"), folder.path());
     succeed("export --network n.json --format numpy --out numpy", folder.path());
     let sequence = fs::read_to_string(folder.path().join("numpy/sequence.csv")).unwrap();
-    assert!(sequence.starts_with("restart,interval_s,\"'=1+u\",\"'=1+u[-3]\","), "{sequence}");
+    assert!(
+        sequence.starts_with("restart,interval_s,\"'=1+u\",\"'=1+u[-3]\","),
+        "{sequence}"
+    );
 }

@@ -195,7 +195,14 @@ const BOMBS: [Bomb; 19] = [
     (
         // As 32 bits, a row far below.
         "below_the_sheet.xlsx",
-        |path| excel(path, r#"<row><c r="A1"><v>1</v></c><c r="A99999999999999999999"><v>1</v></c></row>"#, "<sst/>", 0),
+        |path| {
+            excel(
+                path,
+                r#"<row><c r="A1"><v>1</v></c><c r="A99999999999999999999"><v>1</v></c></row>"#,
+                "<sst/>",
+                0,
+            )
+        },
         "cell A99999999999999999999 is outside of a sheet",
     ),
     (
@@ -206,7 +213,14 @@ const BOMBS: [Bomb; 19] = [
     ),
     (
         "row_below_the_sheet.xlsx",
-        |path| excel(path, r#"<row r="1"><c><v>1</v></c></row><row r="A99999999"><c><v>1</v></c></row>"#, "<sst/>", 0),
+        |path| {
+            excel(
+                path,
+                r#"<row r="1"><c><v>1</v></c></row><row r="A99999999"><c><v>1</v></c></row>"#,
+                "<sst/>",
+                0,
+            )
+        },
         "A99999999 is outside of a sheet",
     ),
     (

@@ -203,11 +203,7 @@ impl Sweep {
                     writeln!(output, "unreadable: {message}")?;
                 }
                 let trials = counted(merged.trials.len(), "trial");
-                writeln!(
-                    output,
-                    "{trials}; digest of options and results: {}",
-                    merged.digest
-                )
+                writeln!(output, "{trials}; digest of options and results: {}", merged.digest)
             })?;
         }
         if merged.is_whole() {

@@ -149,7 +149,9 @@ impl History {
         let all = if memory.is_empty() {
             self.readings.clone()
         } else {
-            memory.expand(self.readings(), &self.stretches, self.times_s())?.into_shared()
+            memory
+                .expand(self.readings(), &self.stretches, self.times_s())?
+                .into_shared()
         };
         if self.samples.iter().copied().eq(0..self.readings.nrows()) {
             return Ok(all);

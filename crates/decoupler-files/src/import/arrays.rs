@@ -88,7 +88,10 @@ pub(super) fn table(
         variables.push(variable(columns.len()));
     }
     let roles = reading.roles(&columns);
-    columns.iter_mut().zip(roles).for_each(|(column, role)| give_role(column, &role));
+    columns
+        .iter_mut()
+        .zip(roles)
+        .for_each(|(column, role)| give_role(column, &role));
     variables.retain(|variable| !variable.name.is_empty());
     Ok(Table {
         stem: stem(path),
@@ -142,7 +145,9 @@ fn side_by_side(columns: Vec<Vec<f64>>, each: usize) -> Vec<Vec<f64>> {
 
 /// Marks the cells that are missing or infinite, and turns the cells of a group into labels.
 fn give_role(column: &mut Column, role: &Role<'_>) {
-    let Cells::Numbers(numbers) = &mut column.cells else { return };
+    let Cells::Numbers(numbers) = &mut column.cells else {
+        return;
+    };
     for (row, number) in numbers.iter_mut().enumerate() {
         if number.is_nan() || role.missing.iter().any(|rule| rule.is_number(*number)) {
             column.missing += 1;

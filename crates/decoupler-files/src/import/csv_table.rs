@@ -52,7 +52,8 @@ impl<'a> Reading<'a> {
         let find = |name: &String| column_called(columns, name);
         let labels = Vec::from_iter(self.labels.iter().filter_map(find));
         let markers = self.missing.iter();
-        let markers = Vec::from_iter(markers.map(|(name, missing)| (name.is_none(), name.as_ref().and_then(find), *missing)));
+        let markers =
+            Vec::from_iter(markers.map(|(name, missing)| (name.is_none(), name.as_ref().and_then(find), *missing)));
         let role = |column| Role {
             missing: markers
                 .iter()

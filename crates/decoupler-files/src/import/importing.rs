@@ -329,10 +329,7 @@ fn notes(files: &[(PathBuf, Table)]) -> Vec<String> {
                 table.too_short,
                 "with fewer cells than there are columns, which are missing",
             ),
-            (
-                table.too_long,
-                "with more cells than there are columns, left out",
-            ),
+            (table.too_long, "with more cells than there are columns, left out"),
         ] {
             if let Some(line) = excess.first_line {
                 notes.push(format!(

@@ -245,7 +245,11 @@ impl Recipe {
         if joined.len() != self.join.len() {
             return Err(ImportError::Join {
                 path: data.to_owned(),
-                reason: format!("it needs {} and has {}", counted(self.join.len(), "joined file"), joined.len()),
+                reason: format!(
+                    "it needs {} and has {}",
+                    counted(self.join.len(), "joined file"),
+                    joined.len()
+                ),
                 cure: Cure::GiveJoinedFiles,
             });
         }

@@ -330,7 +330,10 @@ pub(super) fn not_a_number(files: &[(PathBuf, Table)], names: &Names, id: Column
         reason: not_understood(&first.text, *start),
         others: match faults.count {
             1 => String::new(),
-            count => format!(", and {} of the column cannot be read either", counted(count - 1, "other cell")),
+            count => format!(
+                ", and {} of the column cannot be read either",
+                counted(count - 1, "other cell")
+            ),
         },
     })
 }
@@ -339,7 +342,9 @@ pub(super) fn not_a_number(files: &[(PathBuf, Table)], names: &Names, id: Column
 fn not_understood(cell: &str, start: Option<TimeStamp>) -> &'static str {
     let is_meant_as_stamp = cell.contains(':') || ["-", "/"].iter().any(|sign| cell.matches(sign).count() == 2);
     match (TimeStamp::parse(cell.as_bytes()), start) {
-        (Some(TimeStamp { has_zone: true, .. }), Some(_)) => "has a time zone, and the first time stamp of the column has none",
+        (Some(TimeStamp { has_zone: true, .. }), Some(_)) => {
+            "has a time zone, and the first time stamp of the column has none"
+        }
         (Some(_), Some(_)) => "has no time zone, and the first time stamp of the column has one",
         (Some(_), None) => "is a time stamp after numbers",
         (None, start) if start.is_some() || is_meant_as_stamp => {

@@ -104,7 +104,10 @@ impl Setup {
     /// Returns the setup of a run that is read from a file, which may name regular files only.
     #[must_use]
     pub(crate) fn stored(self) -> Self {
-        Self { is_stored: true, ..self }
+        Self {
+            is_stored: true,
+            ..self
+        }
     }
 
     fn check_files(&self) -> Result<(), ImportError> {

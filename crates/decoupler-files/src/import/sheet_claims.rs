@@ -146,7 +146,9 @@ fn is_inside(reference: &str) -> bool {
 
 pub(super) fn outside(cell: &str) -> TableError {
     let [rows, columns] = LARGEST;
-    let reason = format!("cell {cell} is outside of a sheet, which has {rows} rows and {columns} columns; save it again, or as CSV");
+    let reason = format!(
+        "cell {cell} is outside of a sheet, which has {rows} rows and {columns} columns; save it again, or as CSV"
+    );
     TableError::array("spreadsheet", reason)
 }
 
@@ -227,9 +229,7 @@ mod tests {
     use super::*;
 
     fn claimed(xml: &str) -> u64 {
-        let claims = |limit| {
-            claim_part(xml.as_bytes(), false, &mut ReadingBudget::of(limit, true)).is_ok()
-        };
+        let claims = |limit| claim_part(xml.as_bytes(), false, &mut ReadingBudget::of(limit, true)).is_ok();
         // Bisection: the smallest budget that suffices.
         let (mut low, mut high) = (0, u64::MAX);
         while high - low > 1 {
@@ -254,7 +254,11 @@ mod tests {
         ] {
             assert_eq!(is_inside(reference), expected, "{reference}");
         }
-        for malformed in ["<c r r=\"A1\"/>", "<c r=\"A1\" r=\"A0\"/>", "<table:table-cell x table:y=\"1\"/>"] {
+        for malformed in [
+            "<c r r=\"A1\"/>",
+            "<c r=\"A1\" r=\"A0\"/>",
+            "<table:table-cell x table:y=\"1\"/>",
+        ] {
             assert_eq!(claimed(malformed), u64::MAX, "{malformed}");
         }
         assert_eq!(claimed("<sst uniqueCount=\"1000000\"><si/></sst>"), 1_000_000 * OF_TEXT);

@@ -451,7 +451,13 @@ fn a_recipe_of_an_array_has_only_differences_from_the_papers_array() {
 /// Makes a pipe that nobody writes to.
 #[cfg(unix)]
 fn pipe(path: &Path) {
-    assert!(std::process::Command::new("mkfifo").arg(path).status().unwrap().success());
+    assert!(
+        std::process::Command::new("mkfifo")
+            .arg(path)
+            .status()
+            .unwrap()
+            .success()
+    );
 }
 
 #[cfg(unix)]
@@ -469,6 +475,8 @@ fn a_pipe_named_by_a_file_is_refused_before_it_is_opened() {
     assert!(error.contains("data.csv' is a pipe or device"), "{error}");
     let error = file.test_set().unwrap_err().to_string();
     assert!(error.contains("data.csv' is a pipe or device"), "{error}");
-    let error = file_crc32(&data, &mut |_| std::ops::ControlFlow::Continue(())).unwrap_err().to_string();
+    let error = file_crc32(&data, &mut |_| std::ops::ControlFlow::Continue(()))
+        .unwrap_err()
+        .to_string();
     assert!(error.contains("data.csv' is a pipe or device"), "{error}");
 }

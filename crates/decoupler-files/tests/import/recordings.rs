@@ -586,8 +586,14 @@ fn time_stamps_that_are_not_understood_say_which_are() {
         ("11/24/2026", understood),
         ("2026-11-24 12:00\n2026-11-24 25:00", understood),
         ("2026-11-24 12:00\nsoon", understood),
-        ("2026-11-24 12:00Z\n2026-11-24 12:00", "has no time zone, and the first time stamp of the column has one"),
-        ("2026-11-24 12:00\n2026-11-24 12:00Z", "has a time zone, and the first time stamp of the column has none"),
+        (
+            "2026-11-24 12:00Z\n2026-11-24 12:00",
+            "has no time zone, and the first time stamp of the column has one",
+        ),
+        (
+            "2026-11-24 12:00\n2026-11-24 12:00Z",
+            "has a time zone, and the first time stamp of the column has none",
+        ),
         ("5\n2026-11-24 12:00", "is a time stamp after numbers"),
         ("1.2.3", "is not a finite number"),
     ] {
@@ -611,7 +617,11 @@ fn a_time_zone_in_the_header_is_no_unit() {
         wanted.time = Some("time".to_owned());
         wanted.memory = Some(Memory::of_averages_s(&[2.0]));
         let recording = import(&wanted, &folder).unwrap();
-        assert_eq!(recording.history().times_s().map(|times| times[1] - times[0]), Some(0.5), "{text}");
+        assert_eq!(
+            recording.history().times_s().map(|times| times[1] - times[0]),
+            Some(0.5),
+            "{text}"
+        );
     }
 }
 
@@ -619,12 +629,22 @@ fn a_time_zone_in_the_header_is_no_unit() {
 fn only_rows_that_are_used_have_markers_of_missing_values() {
     let mut text = "x,y,ok\n".to_owned();
     for row in 0..60 {
-        let y = if row < 10 { "-1".to_owned() } else { format!("{}", 3.5 + 0.37 * f64::from(row)) };
+        let y = if row < 10 {
+            "-1".to_owned()
+        } else {
+            format!("{}", 3.5 + 0.37 * f64::from(row))
+        };
         text += &format!("{row},{y},{}\n", u8::from(row >= 10));
     }
     let folder = folder(&[("data.csv", &text)]);
     let mut wanted = recipe("x", "y");
-    let warned = |wanted: &Recipe| import(wanted, &folder).unwrap().warnings.join("\n").contains("mark it as missing");
+    let warned = |wanted: &Recipe| {
+        import(wanted, &folder)
+            .unwrap()
+            .warnings
+            .join("\n")
+            .contains("mark it as missing")
+    };
     assert!(warned(&wanted));
     wanted.conditions = vec!["ok==1".parse().unwrap()];
     assert!(!warned(&wanted));

@@ -60,8 +60,8 @@ pub(super) fn write(name: &str, portable: &Portable, weights: &Weights) -> Strin
             "%{upper} Decodes readings of a tactile array into the coordinates of its nodes.\n\
              %   {upper_output} = {upper}({upper_input}{upper_argument}) has a line of {of_outputs} in mm (x_1, y_1, z_1, to {last})\n\
              %   for each line of {of_channels} in ohm (r_1 to r_{channels}).\n",
-             of_outputs = counted(outputs, "coordinate"),
-             of_channels = counted(channels, "resistance"),
+            of_outputs = counted(outputs, "coordinate"),
+            of_channels = counted(channels, "resistance"),
             last = portable.meaning.targets().last().map_or("", |target| &target.name),
         ),
         own @ Meaning::Own { .. } => format!(
