@@ -146,7 +146,8 @@ impl Network {
             times.clone(),
             samples,
         );
-        history.features(memory).map(Some).map_err(value_error)
+        let features = history.features(memory).map_err(value_error)?;
+        Ok(Some(features.into_owned()))
     }
 
     fn decode(&self, py: Python<'_>, readings: &Matrix<'_>, past: Past) -> PyResult<Array2<f64>> {

@@ -12,6 +12,7 @@ use decoupler_core::{
     calibration::{Calibration, ParameterStatus, PressLimits, SensorParameter},
     evaluation::pressed_rows,
     sensor::{ArrayScale, SensorModel},
+    text::counted,
 };
 use decoupler_files::export::{SensorFile, check_writable, format_number};
 
@@ -94,9 +95,10 @@ impl Calibrate {
         print(|out| {
             writeln!(
                 out,
-                "{} readings of {} row-wires in {snapshots} frames",
-                calibration.readings,
-                frames.samples()
+                "{} of {} in {}",
+                counted(calibration.readings, "reading"),
+                counted(frames.samples(), "row-wire"),
+                counted(snapshots, "frame")
             )?;
             for parameter in &calibration.parameters {
                 writeln!(out, "  {parameter}")?;

@@ -12,7 +12,7 @@ use decoupler_core::{
     live::{LineError, Source, SourceError},
     scene::Rows,
     sensor::SensorError,
-    text::{ReadError, system_cause},
+    text::{ReadError, counted, system_cause},
     training::SettingError,
 };
 use decoupler_files::{
@@ -68,7 +68,7 @@ pub(super) enum Failure {
     InterruptedTrials { done: usize, trials: usize },
     #[error("{place}: {cause}; only earlier results are printed")]
     TradeOff { place: String, cause: Box<Failure> },
-    #[error("interrupted after {done} points")]
+    #[error("interrupted after {}", counted(*.done, "point"))]
     InterruptedTrade { done: usize },
     #[error("interrupted")]
     InterruptedFollow { status: u8 },

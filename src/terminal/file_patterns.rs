@@ -1,8 +1,9 @@
 //! Files given as arguments: several, a pattern such as `runs/*.csv`, or a folder.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use decoupler_files::import::{FileSet, Format};
+use glob::{Pattern, PatternError};
 
 use super::failure::Failure;
 
@@ -24,17 +25,48 @@ pub(super) fn expanded(argument: &str, given: &[PathBuf]) -> Result<Vec<PathBuf>
             }
             files.append(&mut found);
         } else if is_pattern && !path.exists() {
-            let found = glob::glob(&text).map_err(|error| refuse(&format!("is not a valid pattern: {error}")))?;
-            let before = files.len();
-            files.extend(found.filter_map(Result::ok).filter(|path| path.is_file()));
-            if files.len() == before {
+            let mut found = matching(&text).map_err(|error| refuse(&format!("is not a valid pattern: {error}")))?;
+            if found.is_empty() {
                 return Err(refuse("matches no file"));
             }
+            files.append(&mut found);
         } else {
             files.push(path.clone());
         }
     }
     Ok(files)
+}
+
+/// Returns the files that match a pattern, sorted by name. `**` does not enter linked folders, which may lead back to it.
+fn matching(pattern: &str) -> Result<Vec<PathBuf>, PatternError> {
+    let paths = |pattern: &str| Ok(glob::glob(pattern)?.filter_map(Result::ok));
+    let parts = Vec::from_iter(pattern.split(std::path::is_separator));
+    let Some(place) = parts.iter().position(|part| *part == "**") else {
+        return Ok(paths(pattern)?.filter(|path| path.is_file()).collect());
+    };
+    let mut folders = match parts[..place].join("/") {
+        before if place == 0 => vec![PathBuf::from(before)],
+        before if before.is_empty() => vec![PathBuf::from("/")],
+        before => paths(&before)?.filter(|path| path.is_dir()).collect(),
+    };
+    let (rest, mut found) = (parts[place + 1..].join("/"), Vec::new());
+    while let Some(folder) = folders.pop() {
+        let readable = if folder == Path::new("") {
+            Path::new(".")
+        } else {
+            &folder
+        };
+        for entry in readable.read_dir().into_iter().flatten().flatten() {
+            if entry.file_type().is_ok_and(|kind| kind.is_dir()) {
+                folders.push(folder.join(entry.file_name()));
+            }
+        }
+        let escaped = Pattern::escape(&folder.to_string_lossy());
+        found.append(&mut matching(&Path::new(&escaped).join(&rest).to_string_lossy())?);
+    }
+    found.sort();
+    found.dedup();
+    Ok(found)
 }
 
 /// Divides the joined files among the data files, in order; `kind` is "test-" for those of the test.
@@ -75,6 +107,31 @@ mod tests {
         assert_eq!(found, [at("a.csv"), at("b.csv"), at("missing.csv")]);
         let error = expanded("--data", &[at("*.mat")]).unwrap_err().to_string();
         assert!(error.contains("matches no file"), "{error}");
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn two_stars_find_each_file_once_and_follow_no_links() {
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name);
+        for name in ["a", "a/b", "a/[c]"] {
+            std::fs::create_dir(at(name)).unwrap();
+        }
+        for name in ["1.csv", "a/2.csv", "a/b/3.csv", "a/[c]/4.csv", "a/b/5.txt"] {
+            std::fs::write(at(name), "1").unwrap();
+        }
+        std::os::unix::fs::symlink(folder.path(), at("a/b/back")).unwrap();
+        let of = |names: &[&str]| Vec::from_iter(names.iter().map(|name| at(name)));
+        for (pattern, expected) in [
+            ("**/*.csv", of(&["1.csv", "a/2.csv", "a/[c]/4.csv", "a/b/3.csv"])),
+            ("*/**/*.csv", of(&["a/2.csv", "a/[c]/4.csv", "a/b/3.csv"])),
+            ("**/b/**/*.*", of(&["a/b/3.csv", "a/b/5.txt"])),
+            // A link that is named is followed.
+            ("a/*/back/*.csv", of(&["a/b/back/1.csv"])),
+        ] {
+            assert_eq!(expanded("--data", &[at(pattern)]).unwrap(), expected, "{pattern}");
+        }
+        assert!(expanded("--data", &[at("**")]).is_err());
     }
 
     #[test]

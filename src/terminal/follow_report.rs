@@ -8,6 +8,7 @@ use clap::ValueEnum;
 use decoupler_core::{
     decoupling::{CompiledNetworks, Decoder},
     live::{Latencies, LeftOutDecoder, ParsedLine, Source},
+    text::counted,
 };
 use decoupler_files::{
     export::{NetworkFile, write_decoded},
@@ -145,7 +146,8 @@ impl Report {
         // There is no one to report to if this fails.
         let _ = writeln!(
             messages(),
-            "{decoded} lines decoded in {seconds:.1} s ({rate:.0} per second), {bad} bad, {dropped} dropped; {latencies}"
+            "{} decoded in {seconds:.1} s ({rate:.0} per second), {bad} bad, {dropped} dropped; {latencies}",
+            counted(decoded, "line")
         );
     }
 }

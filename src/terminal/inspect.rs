@@ -139,8 +139,8 @@ fn columns_table(columns: &[ColumnSummary]) -> Table {
             column.duplicate_of.as_ref().map(|other| format!("the same as {other}")),
             column.first_text.as_ref().map(|(line, text)| {
                 format!(
-                    "{} cells are not numbers, the first is '{text}' on line {line}",
-                    column.texts
+                    "{} not a number, the first is '{text}' on line {line}",
+                    counted(column.texts, "cell")
                 )
             }),
         ];
@@ -199,9 +199,9 @@ fn write_time(time: &TimeSummary, out: &mut impl Write) -> io::Result<()> {
     match time.median_interval {
         Some(median) => write!(
             out,
-            "median interval {}, {} gaps of more than 5 times that",
+            "median interval {}, {} of more than 5 times that",
             format_number(median),
-            time.gaps
+            counted(time.gaps, "gap")
         )?,
         None => write!(out, "all times are equal")?,
     }
@@ -209,7 +209,7 @@ fn write_time(time: &TimeSummary, out: &mut impl Write) -> io::Result<()> {
         write!(out, ", the longest {} after line {line}", format_number(longest))?;
     }
     if time.backwards > 0 {
-        write!(out, "; it runs backwards {} times", time.backwards)?;
+        write!(out, "; it runs backwards {}", counted(time.backwards, "time"))?;
     }
     writeln!(out)
 }
@@ -328,10 +328,10 @@ pub(super) fn write_files(
     for file in files {
         writeln!(
             out,
-            "{}: {} rows × {} columns, {}",
+            "{}: {} × {}, {}",
             file.path.display(),
-            file.rows,
-            file.columns,
+            counted(file.rows, "row"),
+            counted(file.columns, "column"),
             file.format
         )?;
         if let Some(join) = file.join {
@@ -340,9 +340,9 @@ pub(super) fn write_files(
             });
             writeln!(
                 out,
-                "  joined by time within {}{offset}; {} rows without partner, {} of its rows unused",
+                "  joined by time within {}{offset}; {} without partner, {} of its rows unused",
                 format_number(join.limit),
-                join.without_partner,
+                counted(join.without_partner, "row"),
                 join.unused
             )?;
         }

@@ -19,6 +19,7 @@ use super::{
 use decoupler_core::{
     decoupling::DecoderKind,
     evaluation::{DecoderReport, DecoderSet, Run, RunError, Source, auto::DEFAULT_BUDGET_S},
+    text::counted,
     training::TrainingSettings,
 };
 use decoupler_files::{
@@ -26,7 +27,7 @@ use decoupler_files::{
         CheckpointFile, NetworkFile, SensorFile, check_writable, format_number, is_same,
         report::{RunReport, quoted},
     },
-    import::{ChoosingProgress, ChosenSetup, Setup, SetupError, SetupSets},
+    import::{ChoosingProgress, ChosenSetup, ImportError, Setup, SetupError, SetupSets},
 };
 
 /// Train a network and print its errors
@@ -243,6 +244,9 @@ impl Train {
         let training = self.training.resumed(&saved)?;
         if let Some(recorded) = &mut file.recorded {
             *recorded = self.import.relocated(recorded)?;
+            if let Some(file) = recorded.plan.irregular().filter(|_| self.import.data.is_empty()) {
+                return Err(ImportError::Irregular(file.clone()).into());
+            }
             if let Some(missing) = recorded.missing().first() {
                 return Err(Failure::MissingRecording {
                     checkpoint: path.to_owned(),
@@ -271,9 +275,9 @@ impl Train {
         if training.method != saved.method {
             run.continue_with(training.method)?;
             if run.stop_reason().is_some() {
-                let epochs = training.stopping.epochs;
+                let epochs = counted(training.stopping.epochs, "epoch");
                 return Err(Failure::Arguments(format!(
-                    "the checkpoint has run all of its {epochs} epochs: give more with --epochs to continue with another method"
+                    "the checkpoint has run all of its {epochs}: give more with --epochs to continue with another method"
                 )));
             }
         }

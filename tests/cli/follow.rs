@@ -160,7 +160,7 @@ fn garbage_is_counted_reported_and_skipped() {
     assert_same(found.lines(), expected);
     let report = String::from_utf8(output.stderr).unwrap();
     for words in [
-        "warning: line 10: 1 columns where 7",
+        "warning: line 10: 1 column where 7",
         "warning: line 20: 2 columns where 7",
         "warning: line 40, column 2: 'nan' is not a resistance",
         "warning: line 41: it is longer than 1048576 bytes",
@@ -394,7 +394,7 @@ fn a_header_without_a_resistance_and_a_stream_without_a_frame_end_with_an_error(
         (format!("{names}\n"), "no line could be decoded"),
         (
             "hello\n1,2\n".to_owned(),
-            "no line could be decoded: line 1: 1 columns where 6",
+            "no line could be decoded: line 1: 1 column where 6",
         ),
     ] {
         fs::write(folder.path().join("bad.csv"), &text).unwrap();

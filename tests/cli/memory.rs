@@ -213,6 +213,22 @@ fn inspect_reports_whether_the_past_helps() {
     );
 }
 
+#[test]
+fn names_in_the_golden_sequence_are_no_formulas() {
+    let folder = creeping();
+    let path = folder.path().join("press.csv");
+    let text = fs::read_to_string(&path).unwrap();
+    fs::write(&path, text.replacen("t,u,", "t,=1+u,", 1)).unwrap();
+    let train = TRAIN.replace("--inputs u", "--inputs =1+u");
+    succeed(&format!("{train} --lags 3 --out n.json"), folder.path());
+    succeed("export --network n.json --format numpy --out numpy", folder.path());
+    let sequence = fs::read_to_string(folder.path().join("numpy/sequence.csv")).unwrap();
+    assert!(
+        sequence.starts_with("restart,interval_s,\"'=1+u\",\"'=1+u[-3]\","),
+        "{sequence}"
+    );
+}
+
 /// How the times of a recording are written.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Clock {

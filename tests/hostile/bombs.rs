@@ -107,7 +107,7 @@ type Bomb = (&'static str, fn(&Path), &'static str);
 
 const CELL: &str = r#"<table:table-cell table:number-columns-repeated="16384" office:value-type="float" office:value="1"></table:table-cell>"#;
 
-const BOMBS: [Bomb; 16] = [
+const BOMBS: [Bomb; 19] = [
     (
         "sparse.npy",
         |path| {
@@ -191,6 +191,37 @@ const BOMBS: [Bomb; 16] = [
             excel(path, far, "<sst/>", 0);
         },
         OVER_BUDGET,
+    ),
+    (
+        // As 32 bits, a row far below.
+        "below_the_sheet.xlsx",
+        |path| {
+            excel(
+                path,
+                r#"<row><c r="A1"><v>1</v></c><c r="A99999999999999999999"><v>1</v></c></row>"#,
+                "<sst/>",
+                0,
+            )
+        },
+        "cell A99999999999999999999 is outside of a sheet",
+    ),
+    (
+        // As 32 bits, the first row.
+        "wrapped.xlsx",
+        |path| excel(path, r#"<row><c r="A4294967297"><v>1</v></c></row>"#, "<sst/>", 0),
+        "cell A4294967297 is outside of a sheet",
+    ),
+    (
+        "row_below_the_sheet.xlsx",
+        |path| {
+            excel(
+                path,
+                r#"<row r="1"><c><v>1</v></c></row><row r="A99999999"><c><v>1</v></c></row>"#,
+                "<sst/>",
+                0,
+            )
+        },
+        "A99999999 is outside of a sheet",
     ),
     (
         "many_strings.xlsx",

@@ -6,7 +6,10 @@ use faer::Mat;
 use glam::DVec3;
 use thiserror::Error;
 
-use crate::sensor::{Axes, RelativeNoise, RowConductance, SensorError, SensorModel};
+use crate::{
+    sensor::{Axes, RelativeNoise, RowConductance, SensorError, SensorModel},
+    text::counted,
+};
 
 /// Deformation patterns that the readings of one row-wire determine, from the singular values of the Jacobian of ln
 /// R.
@@ -256,8 +259,9 @@ impl fmt::Display for IdentifiabilityWarning {
         match *self {
             Self::TooFewReadings { equations, unknowns } => write!(
                 f,
-                "a row has {unknowns} unknowns but only {equations} readings: some deformations cannot be determined; use at \
-                 least {unknowns} column-wires, or let nodes move along z only"
+                "a row has {unknowns} unknowns but only {}: some deformations cannot be determined; use at \
+                 least {unknowns} column-wires, or let nodes move along z only",
+                counted(equations, "reading")
             ),
             Self::RowsAlike { pair, noise } => {
                 let (first, second) = (pair.first + 1, pair.second + 1);

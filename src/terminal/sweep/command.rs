@@ -12,7 +12,7 @@ use std::{
 };
 
 use clap::Args;
-use decoupler_core::evaluation::experiments::worker_threads;
+use decoupler_core::{evaluation::experiments::worker_threads, text::counted};
 use decoupler_files::export::{
     MergedSweep, SweepTableFormat, Trial, TrialId, WriteError, atomic_write, check_writable, format_duration,
 };
@@ -156,7 +156,8 @@ impl Sweep {
             print(|output| {
                 writeln!(
                     output,
-                    "{of_shard} trials: {present} already done, {trained} trained, {failed} failed, in {time}"
+                    "{}: {present} already done, {trained} trained, {failed} failed, in {time}",
+                    counted(of_shard, "trial")
                 )
             })?;
         }
@@ -201,12 +202,8 @@ impl Sweep {
                 for message in &merged.damaged {
                     writeln!(output, "unreadable: {message}")?;
                 }
-                let trials = merged.trials.len();
-                writeln!(
-                    output,
-                    "{trials} trials; digest of options and results: {}",
-                    merged.digest
-                )
+                let trials = counted(merged.trials.len(), "trial");
+                writeln!(output, "{trials}; digest of options and results: {}", merged.digest)
             })?;
         }
         if merged.is_whole() {

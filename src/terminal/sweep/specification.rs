@@ -78,6 +78,10 @@ impl Specification {
             axes: Vec::new(),
             recording: layout.recording.map(|plan| plan.within(folder(path)).absolute()),
         };
+        if let Some(file) = specification.recording.as_ref().and_then(Plan::irregular) {
+            let message = format!("'{}' is a pipe or device; give a file", file.display());
+            return Err(specification.error("recording".to_owned(), message));
+        }
         for (option, value) in &layout.train.0 {
             let words = specification.words(option, value, &format!("train.{option}"), train)?;
             specification.shared.extend(words);

@@ -14,7 +14,10 @@ pub use report::{CalibratedParameter, Calibration, CalibrationWarning, Parameter
 
 use thiserror::Error;
 
-use crate::sensor::{DVec3, SensorError, short};
+use crate::{
+    sensor::{DVec3, SensorError, short},
+    text::counted,
+};
 
 /// Readings of one row-wire under a known deformation.
 #[derive(Clone, Debug, PartialEq)]
@@ -134,7 +137,7 @@ pub enum CalibrationError {
         row: usize,
     },
     /// There are fewer readings than parameters, or none.
-    #[error("{readings} readings are too few to fit {parameters} parameters; give more frames")]
+    #[error("too few readings ({readings}) to fit {}; give more frames", counted(*.parameters, "parameter"))]
     TooFew {
         /// Number of readings.
         readings: usize,

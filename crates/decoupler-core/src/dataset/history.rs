@@ -1,6 +1,6 @@
 use std::collections::{HashMap, HashSet};
 
-use ndarray::{Array2, ArrayView2, Axis};
+use ndarray::{ArcArray2, Array2, ArrayView2, Axis};
 
 use super::{
     Memory, MemoryError, MemoryState,
@@ -11,8 +11,8 @@ use super::{
 /// which the features of a [`Memory`] are computed. [`Continuation`] decides which rows continue each other.
 #[derive(Clone, Debug, PartialEq)]
 pub struct History {
-    /// Rows × channels.
-    readings: Array2<f64>,
+    /// Rows × channels, shared with the samples.
+    readings: ArcArray2<f64>,
     series: Vec<Series>,
     times_s: Option<Vec<f64>>,
     /// Row of each sample.
@@ -50,7 +50,7 @@ impl History {
         });
         let mut history = Self {
             series: series.collect(),
-            readings,
+            readings: readings.into_shared(),
             times_s,
             samples,
             interval_s: None,
@@ -70,8 +70,10 @@ impl History {
     /// If the numbers of channels differ.
     pub fn append(&mut self, other: &Self) {
         let rows = self.readings.nrows();
-        let appended = self.readings.append(Axis(0), other.readings.view());
+        let mut readings = std::mem::take(&mut self.readings).into_owned();
+        let appended = readings.append(Axis(0), other.readings.view());
         appended.expect("histories of the same channels");
+        self.readings = readings.into_shared();
         let next = self.series.iter().map(|series| series.group + 1).max().unwrap_or(0);
         let mut groups = HashMap::new();
         self.series.extend(other.series.iter().map(|series| {
@@ -179,10 +181,10 @@ impl History {
     ///
     /// # Errors
     /// If the memory is invalid for these channels (see [`Memory::check`]), or too many series are interleaved.
-    pub fn features(&self, memory: &Memory) -> Result<Array2<f64>, MemoryError> {
+    pub fn features(&self, memory: &Memory) -> Result<ArcArray2<f64>, MemoryError> {
         let memory = self.resolved(memory);
         if memory.is_empty() {
-            return Ok(self.readings.select(Axis(0), &self.samples));
+            return Ok(self.of_samples(self.readings.clone()));
         }
         let (rows, channels) = self.readings.dim();
         let sequence = self.sequence();
@@ -204,10 +206,14 @@ impl History {
                 stream.states.end(self.series[row]);
             }
         }
-        if self.samples.iter().copied().eq(0..rows) {
-            return Ok(all);
+        Ok(self.of_samples(all.into_shared()))
+    }
+
+    fn of_samples(&self, rows: ArcArray2<f64>) -> ArcArray2<f64> {
+        if self.samples.iter().copied().eq(0..rows.nrows()) {
+            return rows;
         }
-        Ok(all.select(Axis(0), &self.samples))
+        rows.select(Axis(0), &self.samples).into_shared()
     }
 
     /// Maximum number of series that have begun and not ended; `last` is the last row of each.

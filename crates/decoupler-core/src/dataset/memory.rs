@@ -427,7 +427,7 @@ impl MemoryState {
 
 #[cfg(test)]
 mod tests {
-    use ndarray::{Array2, ArrayView2, array};
+    use ndarray::{ArcArray2, Array2, ArrayView2, array};
     use rand::RngExt;
 
     use super::*;
@@ -444,7 +444,9 @@ mod tests {
         times_s: Option<&[f64]>,
     ) -> Result<Array2<f64>, MemoryError> {
         let (samples, times_s) = ((0..readings.nrows()).collect(), times_s.map(<[f64]>::to_vec));
-        History::new(readings.to_owned(), Some(groups), None, times_s, samples).features(memory)
+        History::new(readings.to_owned(), Some(groups), None, times_s, samples)
+            .features(memory)
+            .map(ArcArray2::into_owned)
     }
 
     #[test]

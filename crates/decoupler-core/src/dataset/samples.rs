@@ -1,7 +1,7 @@
 use std::{collections::HashMap, sync::Arc};
 
 use glam::DVec3;
-use ndarray::{Array2, ArrayView2, Axis};
+use ndarray::{ArcArray2, ArrayView2, Axis};
 use thiserror::Error;
 
 use crate::{
@@ -19,10 +19,10 @@ pub const LARGEST_SAMPLES: usize = 1_000_000;
 /// the row's nodes in millimetres (x, y, z node by node). Measured samples contain any quantities.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Dataset {
-    /// Samples × channels, in standard (row-major) layout.
-    readings: Array2<f64>,
-    /// Samples × outputs, in standard layout.
-    targets: Array2<f64>,
+    /// Samples × channels, in standard (row-major) layout; shared with copies of the set.
+    readings: ArcArray2<f64>,
+    /// Samples × outputs, likewise.
+    targets: ArcArray2<f64>,
     /// `None` if there are no row-wires, or the row-wires of the samples are unknown.
     rows: Option<SampleRows>,
     /// Group of each sample, which divisions keep together: its snapshot where row-wires are read together.
@@ -80,11 +80,12 @@ impl Dataset {
     /// # Errors
     /// If a part is empty, or the parts differ in length.
     pub fn new(
-        readings: Array2<f64>,
-        targets: Array2<f64>,
+        readings: impl Into<ArcArray2<f64>>,
+        targets: impl Into<ArcArray2<f64>>,
         row_wires: Option<&[usize]>,
         groups: Vec<usize>,
     ) -> Result<Self, DatasetError> {
+        let (readings, targets) = (standard(readings), standard(targets));
         for (what, values) in [("readings", &readings), ("targets", &targets)] {
             let (samples, columns) = values.dim();
             if samples == 0 || columns == 0 {
@@ -101,8 +102,8 @@ impl Dataset {
             return Err(DatasetError::Length { what, found, samples });
         }
         let set = Self {
-            readings: readings.as_standard_layout().into_owned(),
-            targets: targets.as_standard_layout().into_owned(),
+            readings,
+            targets,
             rows: None,
             groups,
         };
@@ -225,8 +226,8 @@ impl Dataset {
     #[must_use]
     pub fn select(&self, samples: &[usize]) -> Self {
         Self {
-            readings: self.readings.select(Axis(0), samples),
-            targets: self.targets.select(Axis(0), samples),
+            readings: self.readings.select(Axis(0), samples).into_shared(),
+            targets: self.targets.select(Axis(0), samples).into_shared(),
             rows: self.rows.as_ref().map(|rows| SampleRows {
                 read: Arc::clone(&rows.read),
                 indices: samples.iter().map(|&sample| rows.indices[sample]).collect(),
@@ -252,11 +253,7 @@ impl Dataset {
     pub fn of_channels(&self, channels: &[usize]) -> Self {
         assert!(!channels.is_empty(), "a sample has at least one reading");
         Self {
-            readings: self
-                .readings
-                .select(Axis(1), channels)
-                .as_standard_layout()
-                .into_owned(),
+            readings: standard(self.readings.select(Axis(1), channels)),
             ..self.clone()
         }
     }
@@ -266,11 +263,12 @@ impl Dataset {
     /// # Panics
     /// If there is not one row of readings for each sample, or there are no channels.
     #[must_use]
-    pub fn with_readings(&self, readings: Array2<f64>) -> Self {
+    pub fn with_readings(&self, readings: impl Into<ArcArray2<f64>>) -> Self {
+        let readings = standard(readings);
         assert_eq!(readings.nrows(), self.samples(), "one row of readings for each sample");
         assert!(readings.ncols() > 0, "a sample has at least one reading");
         Self {
-            readings: readings.as_standard_layout().into_owned(),
+            readings,
             targets: self.targets.clone(),
             rows: self.rows.clone(),
             groups: self.groups.clone(),
@@ -288,7 +286,17 @@ impl Dataset {
     }
 }
 
-fn contiguous(values: &Array2<f64>, sample: usize) -> &[f64] {
+/// Returns the values in standard layout, without a copy if they have it.
+fn standard(values: impl Into<ArcArray2<f64>>) -> ArcArray2<f64> {
+    let values = values.into();
+    if values.is_standard_layout() {
+        values
+    } else {
+        values.as_standard_layout().into_owned().into_shared()
+    }
+}
+
+fn contiguous(values: &ArcArray2<f64>, sample: usize) -> &[f64] {
     let all = values.as_slice().expect("kept in standard layout");
     &all[sample * values.ncols()..(sample + 1) * values.ncols()]
 }
@@ -334,6 +342,8 @@ impl Dataset {
 
 #[cfg(test)]
 mod tests {
+    use ndarray::Array2;
+
     use super::*;
 
     /// Readings and targets that identify their sample.

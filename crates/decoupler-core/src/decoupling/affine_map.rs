@@ -56,7 +56,7 @@ impl AffineMap {
         let y = outputs.scale(training.targets());
         let units = Units::of(training, inputs.of(training.readings()), y);
         let changes = inputs.changes_of(&channel_noise(inputs.quantity(), training.readings(), unseen));
-        let fit = LinearFit::new(&inputs, &units, changes.view())?;
+        let fit = LinearFit::new(&inputs, units, changes.view())?;
         Ok(Self::folded(&inputs, &fit.coefficients(), &outputs))
     }
 
@@ -266,16 +266,17 @@ pub(super) struct LinearFit {
 impl LinearFit {
     /// Fits to `units` of the scaled inputs and outputs. `unseen` (sources × inputs) are the changes of the inputs by
     /// one standard deviation of each noise source that the training samples lack.
-    pub fn new(inputs: &Inputs, units: &Units, unseen: ArrayView2<'_, f64>) -> Result<Self, ScalingError> {
+    pub fn new(inputs: &Inputs, units: Units, unseen: ArrayView2<'_, f64>) -> Result<Self, ScalingError> {
         let sizes = Array1::from(inputs.deviations());
         let largest = sizes.iter().copied().fold(0.0, f64::max);
         let sizes = sizes / largest;
-        let x = &units.x * &sizes;
-        let ridge = Ridge::new(x.view(), units.y.view(), &units.weights, (&unseen * &sizes).view())?;
+        let Units { x, y, weights } = units;
+        let x = x * &sizes;
+        let ridge = Ridge::new(x.view(), y.view(), &weights, (&unseen * &sizes).view())?;
         Ok(Self {
             ridge,
             sizes,
-            samples: units.weights.iter().sum(),
+            samples: weights.iter().sum(),
         })
     }
 

@@ -2,7 +2,7 @@ use ndarray::Array2;
 use thiserror::Error;
 
 use super::RowProblemDescription;
-use crate::network::Quantity;
+use crate::{network::Quantity, text::counted};
 
 /// What a decoder computes, as plain numbers and a few kinds of steps, for programs that decode without this one.
 #[derive(Clone, Debug, PartialEq)]
@@ -65,7 +65,8 @@ pub enum NotDescribed {
     Posterior,
     /// There are no more equations than unknowns.
     #[error(
-        "a row has {readings} readings for {unknowns} unknown displacements, too few for the equations to have one solution: take another decoder"
+        "a row has {} for {unknowns} unknown displacements, too few for the equations to have one solution: take another decoder",
+        counted(*.readings, "reading")
     )]
     Undetermined {
         /// Number of readings of a row.

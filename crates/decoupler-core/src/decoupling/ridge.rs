@@ -81,6 +81,7 @@ impl Ridge {
         });
         let b = Mat::from_fn(samples, y.ncols(), |s, t| roots[s] * (y[[s, t]] - y_mean[t]));
         let svd = a.thin_svd().map_err(|_| ScalingError::NotConverged)?;
+        drop(a);
         let mut singular: Vec<f64> = svd.S().column_vector().iter().copied().collect();
         let smallest = f64::EPSILON * inputs as f64 * singular.first().copied().unwrap_or(0.0);
         singular.retain(|&value| value > smallest);

@@ -19,6 +19,7 @@ use crate::{dataset::Dataset, scene::NoiseSource};
 ///
 /// Other equal samples of coarse channels are not copies: that two of a thousand readings of a switch agree is
 /// expected by chance, and each is independent evidence.
+#[derive(Clone)]
 pub(super) struct Units {
     /// Inputs: units × inputs.
     pub x: Array2<f64>,
@@ -37,14 +38,13 @@ impl Units {
 
     /// Gathers the samples of `training`, whose inputs are `x` (samples × inputs) and outputs `y` (samples × outputs).
     pub fn of(training: &Dataset, x: Array2<f64>, y: Array2<f64>) -> Self {
-        let members = Self::members(training.readings(), training.targets());
-        if members.len() == x.nrows() {
+        let Some(members) = Self::members(training.readings(), training.targets()) else {
             return Self {
-                weights: vec![1.0; members.len()],
+                weights: vec![1.0; x.nrows()],
                 x,
                 y,
             };
-        }
+        };
         let first: Vec<usize> = members.iter().map(|samples| samples[0]).collect();
         Self {
             x: x.select(Axis(0), &first),
@@ -53,24 +53,24 @@ impl Units {
         }
     }
 
-    /// Samples of each unit, in order of first occurrence.
-    fn members(readings: ArrayView2<'_, f64>, targets: ArrayView2<'_, f64>) -> Vec<Vec<usize>> {
+    /// Samples of each unit, in order of first occurrence; `None` if each sample is a unit.
+    fn members(readings: ArrayView2<'_, f64>, targets: ArrayView2<'_, f64>) -> Option<Vec<Vec<usize>>> {
         let samples = readings.nrows();
-        let singles = || (0..samples).map(|sample| vec![sample]).collect();
+        let key = |sample: usize| bits(readings.row(sample)).chain(bits(targets.row(sample)));
+        // Sorted rather than hashed: the keys would take more memory than the samples.
+        let mut order: Vec<usize> = (0..samples).collect();
+        order.sort_by(|&one, &other| key(one).cmp(key(other)));
         // For each sample, the index of the first equal one.
-        let mut seen = HashMap::new();
-        let pairs = readings.rows().into_iter().zip(targets.rows()).enumerate();
-        let first: Vec<usize> = pairs
-            .map(|(sample, (readings, targets))| {
-                let key = (bits(readings), bits(targets));
-                *seen.entry(key).or_insert(sample)
-            })
-            .collect();
-        if seen.len() == samples {
-            return singles();
+        let (mut first, mut distinct) = (vec![0; samples], 0);
+        for equal in order.chunk_by(|&one, &other| key(one).eq(key(other))) {
+            equal.iter().for_each(|&sample| first[sample] = equal[0]);
+            distinct += 1;
+        }
+        if distinct == samples {
+            return None;
         }
         let mut units: Vec<Vec<usize>> = Vec::new();
-        if seen.len() >= Self::MIN_UNITS && Self::is_identified(readings, seen.len()) {
+        if distinct >= Self::MIN_UNITS && Self::is_identified(readings, distinct) {
             let mut unit_of = HashMap::new();
             for (sample, first) in first.into_iter().enumerate() {
                 let unit = *unit_of.entry(first).or_insert(units.len());
@@ -84,25 +84,21 @@ impl Units {
             let runs = order.chunk_by(|&one, &next| first[one] == first[next]);
             units.extend(runs.map(<[usize]>::to_vec));
         }
-        if units.len() < Self::MIN_UNITS {
-            singles()
-        } else {
-            units
-        }
+        (units.len() >= Self::MIN_UNITS && units.len() < samples).then_some(units)
     }
 
     /// Returns `true` if a channel has nearly as many distinct values as there are `distinct` samples.
     fn is_identified(readings: ArrayView2<'_, f64>, distinct: usize) -> bool {
         let enough = Self::IDENTIFYING * distinct as f64;
-        let values = |channel: ArrayView1<'_, f64>| bits(channel).into_iter().collect::<HashSet<_>>().len();
+        let values = |channel: ArrayView1<'_, f64>| bits(channel).collect::<HashSet<_>>().len();
         let mut channels = readings.columns().into_iter();
         channels.any(|channel| values(channel) as f64 >= enough)
     }
 }
 
 /// Bits of the values, which are the same for both zeros.
-fn bits(values: ArrayView1<'_, f64>) -> Vec<u64> {
-    values.iter().map(|value| (value + 0.0).to_bits()).collect()
+fn bits(values: ArrayView1<'_, f64>) -> impl Iterator<Item = u64> {
+    values.into_iter().map(|value| (value + 0.0).to_bits())
 }
 
 /// Returns `training` with the noise that its readings lack: a nonlinear map learns the effect of noise from samples.
@@ -278,6 +274,6 @@ mod tests {
 
     #[test]
     fn both_zeros_are_equal() {
-        assert_eq!(bits(array![0.0, -0.0].view()), [0, 0]);
+        assert!(bits(array![0.0, -0.0].view()).eq([0, 0]));
     }
 }

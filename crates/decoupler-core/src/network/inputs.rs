@@ -151,7 +151,7 @@ impl Inputs {
         if let Some(((sample, channel), &value)) = invalid {
             return Err(ScalingError::Reading { sample, channel, value });
         }
-        let values = resistances_ohm.mapv(|ohm| quantity.of(ohm));
+        let values = quantity.of_all(resistances_ohm);
         let scaling = match choice.scaling {
             ScalingChoice::MinMax => InputScaling::MinMax(MinMax::fit(values.view())?),
             ScalingChoice::Whitening => {
@@ -196,7 +196,7 @@ impl Inputs {
 
     /// Returns the inputs (samples × inputs) for resistances in ohm (samples × M4).
     pub fn of(&self, resistances_ohm: ArrayView2<'_, f64>) -> Array2<f64> {
-        let values = resistances_ohm.mapv(|ohm| self.quantity.of(ohm));
+        let values = self.quantity.of_all(resistances_ohm);
         match &self.scaling {
             InputScaling::MinMax(scaling) => scaling.scale(values.view()),
             InputScaling::Whitening(scaling) => scaling.scale(values.view()),

@@ -1,6 +1,6 @@
 use std::{fmt, str::FromStr};
 
-use ndarray::{ArrayView1, ArrayView2};
+use ndarray::{ArrayView1, ArrayView2, CowArray, Ix2};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
@@ -37,6 +37,14 @@ impl Quantity {
             Self::Resistance | Self::Raw => resistance_ohm,
             Self::Conductance => 1.0 / resistance_ohm,
             Self::LogResistance => resistance_ohm.ln(),
+        }
+    }
+
+    /// Returns the values for resistances in ohm, without a copy if they are the same.
+    pub(crate) fn of_all(self, resistances_ohm: ArrayView2<'_, f64>) -> CowArray<'_, f64, Ix2> {
+        match self {
+            Self::Resistance | Self::Raw => resistances_ohm.into(),
+            Self::Conductance | Self::LogResistance => resistances_ohm.mapv(|ohm| self.of(ohm)).into(),
         }
     }
 

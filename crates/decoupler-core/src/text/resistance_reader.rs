@@ -4,7 +4,7 @@ use csv_core::{ReadRecordResult, Reader};
 use ndarray::Array2;
 use thiserror::Error;
 
-use super::system_cause;
+use super::{counted, system_cause};
 
 /// Reads resistances from CSV block by block, so that large files need little memory.
 ///
@@ -57,7 +57,7 @@ pub enum ReadError {
     #[error("there are two columns r_{0}; keep one")]
     Twice(usize),
     /// The number of columns in a row is wrong.
-    #[error("line {line}: {found} columns where {expected} are needed, separated by commas")]
+    #[error("line {line}: {} where {expected} are needed, separated by commas", counted(*.found, "column"))]
     Width {
         /// Line number.
         line: u64,
@@ -533,7 +533,7 @@ mod tests {
             ("a channel too few", "r_1,b\n1,2\n", "no column r_2"),
             ("other names", "a,b\n1,2\n", "no column r_1"),
             ("a channel twice", "r_1,r_2,r_2\n", "two columns r_2"),
-            ("a short row", "r_1,r_2\n1,2\n3\n", "line 3: 1 columns where 2"),
+            ("a short row", "r_1,r_2\n1,2\n3\n", "line 3: 1 column where 2"),
             ("too many columns", "1,2,3\n", "line 1: 3 columns where 2"),
             ("semicolons", "r_1;r_2\n1;2\n", "no column r_1"),
             ("a word", "1,2\n3,many\n", "line 2, column 2: 'many'"),

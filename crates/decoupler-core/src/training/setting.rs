@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use super::{EpochRecord, Method, Trainer};
-use crate::sensor::short;
+use crate::{sensor::short, text::counted};
 
 /// Numeric setting, as offered by the window and the terminal.
 #[derive(Debug)]
@@ -230,7 +230,8 @@ impl fmt::Display for TrainingDefect {
             )?,
             (None, _) => write!(
                 f,
-                "the network is no better than its random start after {epochs} epochs ({})",
+                "the network is no better than its random start after {} ({})",
+                counted(*epochs, "epoch"),
                 self.reason
             )?,
         }

@@ -21,8 +21,8 @@
 //! *Recipe* (`decoupler recipe`, [`RecipeFile`]), to be written by hand too: `source`, which is either `simulated` (sensor,
 //! scene and numbers of samples, each with a default) or `recording` (files, meanings of columns, division of the samples).
 //!
-//! *Sensor file* (`decoupler sensor`, [`SensorFile`]), to be written by hand too: `sensor` with the array scale, the geometry and
-//! the resistance per millimetre, such as `decoupler calibrate` fits.
+//! *Sensor file* (`decoupler sensor`, [`SensorFile`]), to be written by hand too, then with the field `sensor` instead of `crc32`
+//! and `run`: the array scale, the geometry and the resistance per millimetre, such as `decoupler calibrate` fits.
 //!
 //! *Run folder* ([`RunFolder`]): `run-N.json` is the network file of run N, `run-N.name.json` its name, and `pinned.json` the
 //! numbers of the two runs that are compared; the last two are of the kind `decoupler run list`.

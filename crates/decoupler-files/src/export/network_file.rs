@@ -124,7 +124,8 @@ impl NetworkFile {
     /// Setup of the run.
     pub fn setup(&self) -> Setup {
         let plan = self.recorded.as_ref().map(|recorded| recorded.plan.clone());
-        Setup::of(self.settings, plan).expect("reading and writing check that a recording has its plan")
+        let setup = Setup::of(self.settings, plan).expect("reading and writing check that a recording has its plan");
+        setup.stored()
     }
 
     /// Returns the test set of the run, drawn or read again, as a report of it needs.

@@ -96,7 +96,16 @@ impl RecipeFile {
         let document: Document =
             serde_json::from_slice(&bytes).map_err(|error| KIND.damaged(path, error.to_string()))?;
         match document.source {
-            RecipeSource::Recording(plan) => Ok(RecipeSource::Recording(plan.restored(folder_of(path)))),
+            RecipeSource::Recording(plan) => {
+                let plan = plan.restored(folder_of(path));
+                match plan.irregular() {
+                    None => Ok(RecipeSource::Recording(plan)),
+                    Some(file) => {
+                        let defect = format!("'{}' is a pipe or device, not a file", file.display());
+                        Err(KIND.damaged(path, defect))
+                    }
+                }
+            }
             RecipeSource::Simulated(simulation) => {
                 check(simulation).map_err(|error| KIND.damaged(path, error))?;
                 Ok(RecipeSource::Simulated(simulation))

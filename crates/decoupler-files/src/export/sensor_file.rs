@@ -1,22 +1,28 @@
 use std::path::Path;
 
-use serde::{Deserialize, Serialize};
+use serde::Deserialize;
+use serde_json::value::to_raw_value;
 
-use super::{DocumentError, DocumentKind, WriteError, atomic_write, document::PROGRAM};
+use super::{AtomicFile, DocumentError, DocumentKind, WriteError, document::PROGRAM, network_file::Sealed};
 use decoupler_core::sensor::SensorModel;
 
 const KIND: DocumentKind = DocumentKind::Sensor;
 
-/// A sensor model, such as one that was calibrated. The file is JSON to be read and changed by hand.
+/// A sensor model, such as one that was calibrated. The file is JSON with a checksum; one that is written by hand has the
+/// model in the field `sensor` instead, without a checksum.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SensorFile;
 
-#[derive(Serialize, Deserialize)]
+/// Layout without a checksum.
+#[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Document {
-    format: String,
-    version: u64,
-    program: String,
+    #[serde(rename = "format")]
+    _format: String,
+    #[serde(rename = "version")]
+    _version: u64,
+    #[serde(rename = "program")]
+    _program: String,
     sensor: SensorModel,
 }
 
@@ -26,16 +32,8 @@ impl SensorFile {
     /// # Errors
     /// The path cannot be written.
     pub fn save(sensor: &SensorModel, path: &Path) -> Result<(), WriteError> {
-        let document = Document {
-            format: KIND.format().to_owned(),
-            version: KIND.version(),
-            program: PROGRAM.to_owned(),
-            sensor: *sensor,
-        };
-        atomic_write(path, |writer| {
-            serde_json::to_writer_pretty(&mut *writer, &document)?;
-            writeln!(writer)
-        })
+        let sensor = to_raw_value(sensor).map_err(|error| WriteError::io(path, error.into()))?;
+        Sealed::new(KIND, PROGRAM, &sensor).save(path, AtomicFile::commit)
     }
 
     /// Reads the sensor in the file at `path`.
@@ -44,10 +42,18 @@ impl SensorFile {
     /// The file cannot be read, is of another kind or version, or its sensor is impossible.
     pub fn load(path: &Path) -> Result<SensorModel, DocumentError> {
         let bytes = KIND.read(path)?;
-        let document: Document =
-            serde_json::from_slice(&bytes).map_err(|error| KIND.damaged(path, error.to_string()))?;
-        let sensor = document.sensor;
-        sensor.check().map_err(|error| KIND.damaged(path, error.to_string()))?;
+        Self::parse(&bytes).map_err(|defect| KIND.damaged(path, defect))
+    }
+
+    fn parse(bytes: &[u8]) -> Result<SensorModel, String> {
+        let text = |error: serde_json::Error| error.to_string();
+        let has_checksum = String::from_utf8_lossy(bytes).contains("\"crc32\"");
+        let sensor = if has_checksum {
+            serde_json::from_str(Sealed::read(bytes)?.run.get()).map_err(text)?
+        } else {
+            serde_json::from_slice::<Document>(bytes).map_err(text)?.sensor
+        };
+        sensor.check().map_err(|error| error.to_string())?;
         Ok(sensor)
     }
 }

@@ -6,7 +6,7 @@ use decoupler_core::text::{clean_name, original_name};
 
 use super::{
     Cells, Column, Fault, Format, Table, TableError, Variable,
-    csv_table::Reading,
+    csv_table::{Reading, Role},
     format::Array,
     table::{Excess, Labels, Lines, stem},
 };
@@ -80,11 +80,18 @@ pub(super) fn table(
             };
             columns.push(Column {
                 original: original.clone(),
-                ..column(name, numbers, reading)
+                name,
+                cells: Cells::Numbers(numbers),
+                ..Column::default()
             });
         }
         variables.push(variable(columns.len()));
     }
+    let roles = reading.roles(&columns);
+    columns
+        .iter_mut()
+        .zip(roles)
+        .for_each(|(column, role)| give_role(column, &role));
     variables.retain(|variable| !variable.name.is_empty());
     Ok(Table {
         stem: stem(path),
@@ -136,18 +143,13 @@ fn side_by_side(columns: Vec<Vec<f64>>, each: usize) -> Vec<Vec<f64>> {
     (0..each).flat_map(part).collect()
 }
 
-fn column(name: String, mut numbers: Vec<f64>, reading: &Reading<'_>) -> Column {
-    let rules = reading
-        .missing
-        .iter()
-        .filter(|(column, _)| column.as_ref().is_none_or(|column| *column == name));
-    let rules: Vec<_> = rules.map(|(_, rule)| *rule).collect();
-    let mut column = Column {
-        name,
-        ..Column::default()
+/// Marks the cells that are missing or infinite, and turns the cells of a group into labels.
+fn give_role(column: &mut Column, role: &Role<'_>) {
+    let Cells::Numbers(numbers) = &mut column.cells else {
+        return;
     };
     for (row, number) in numbers.iter_mut().enumerate() {
-        if number.is_nan() || rules.iter().any(|rule| rule.is_number(*number)) {
+        if number.is_nan() || role.missing.iter().any(|rule| rule.is_number(*number)) {
             column.missing += 1;
             *number = f64::NAN;
         } else if number.is_infinite() {
@@ -159,14 +161,11 @@ fn column(name: String, mut numbers: Vec<f64>, reading: &Reading<'_>) -> Column 
             *number = f64::NAN;
         }
     }
-    if reading.labels.contains(&column.name) {
+    if role.has_labels {
         let mut labels = Labels::default();
-        for &number in &numbers {
+        for &number in &*numbers {
             labels.push((!number.is_nan()).then_some((&number.to_string(), Some(number))));
         }
         column.cells = labels.into_cells();
-    } else {
-        column.cells = Cells::Numbers(numbers);
     }
-    column
 }

@@ -11,7 +11,7 @@ use super::{
     format::{Cell, parse},
     input_lines::table_error,
     rows::Rows,
-    table::{Excess, Labels, Lines, name_and_unit, stem},
+    table::{Excess, Labels, Lines, column_called, name_and_unit, stem},
     time_stamp::TimeStamp,
 };
 use decoupler_core::{
@@ -38,6 +38,32 @@ pub(super) struct Reading<'a> {
     pub(super) labels: Vec<String>,
     /// Columns or ranges that are used, which choose among the arrays of a file.
     pub(super) used: Vec<String>,
+}
+
+/// Markers and kind of the cells of a column.
+pub(super) struct Role<'a> {
+    pub(super) missing: Vec<&'a Missing>,
+    pub(super) has_labels: bool,
+}
+
+impl<'a> Reading<'a> {
+    /// Returns the role of each column.
+    pub(super) fn roles(&self, columns: &[Column]) -> Vec<Role<'a>> {
+        let find = |name: &String| column_called(columns, name);
+        let labels = Vec::from_iter(self.labels.iter().filter_map(find));
+        let markers = self.missing.iter();
+        let markers =
+            Vec::from_iter(markers.map(|(name, missing)| (name.is_none(), name.as_ref().and_then(find), *missing)));
+        let role = |column| Role {
+            missing: markers
+                .iter()
+                .filter(|(is_of_all, of, _)| *is_of_all || *of == Some(column))
+                .map(|(.., missing)| *missing)
+                .collect(),
+            has_labels: labels.contains(&column),
+        };
+        (0..columns.len()).map(role).collect()
+    }
 }
 
 /// Reads a table from text. `budget` limits its memory.
@@ -170,9 +196,12 @@ impl<'a> Body<'a> {
         };
         let empty_end = self.dialect.trailing_separator && headers.last().is_none_or(String::is_empty);
         let width = width - usize::from(empty_end && width > 1);
-        self.builders = named(headers, width)
+        let columns = named(headers, width);
+        let roles = self.reading.roles(&columns);
+        self.builders = columns
             .into_iter()
-            .map(|column| Builder::new(column, self.reading))
+            .zip(roles)
+            .map(|(column, role)| Builder::new(column, role))
             .collect();
         for (line, cells) in waiting {
             self.add(line, cells.len(), cells.iter().map(Vec::as_slice))?;
@@ -238,15 +267,10 @@ fn torn(line: u64) -> String {
 }
 
 impl<'a> Builder<'a> {
-    fn new(column: Column, reading: &Reading<'a>) -> Self {
-        let missing = reading.missing.iter();
-        let is_here = |name: &Option<String>| name.as_ref().is_none_or(|name| *name == column.name);
+    fn new(column: Column, role: Role<'a>) -> Self {
         Self {
-            missing: missing
-                .filter(|(name, _)| is_here(name))
-                .map(|(_, missing)| *missing)
-                .collect(),
-            labels: reading.labels.contains(&column.name).then(Labels::default),
+            missing: role.missing,
+            labels: role.has_labels.then(Labels::default),
             numbers: Vec::new(),
             has_numbers: false,
             column,
@@ -304,7 +328,8 @@ impl<'a> Builder<'a> {
 
     fn finish(mut self) -> Column {
         if self.column.start.is_some() {
-            self.column.unit.get_or_insert_with(|| "s".to_owned());
+            // Whatever the header says, such as a time zone.
+            self.column.unit = Some("s".to_owned());
         }
         Column {
             cells: match self.labels {

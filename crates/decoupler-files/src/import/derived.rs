@@ -5,7 +5,7 @@ use std::{fmt, str::FromStr};
 use decoupler_core::text::{in_one_line, is_unprintable};
 use serde::{Deserialize, Serialize};
 
-use super::{Cells, Column, Faults, ImportError, Table, selection::seconds};
+use super::{Cells, Column, Faults, ImportError, Table, selection::seconds, table::column_called};
 
 /// Column computed from others of the same file: a difference, a ratio, or either with the mean at the start of the file.
 ///
@@ -65,7 +65,7 @@ impl Derived {
         own: impl Fn(&str) -> Option<String>,
         time: Option<TimeColumn<'_>>,
     ) -> Result<Option<LocatedDerived>, ImportError> {
-        let find = |name: &str| columns.iter().position(|column| column.name == name);
+        let find = |name: &str| column_called(columns, name);
         let Some(column) = own(&self.column).and_then(|name| find(&name)) else {
             return Ok(None);
         };
@@ -84,7 +84,8 @@ impl Derived {
                 let found = time.and_then(|time| Some((find(time.name)?, time.given_unit)));
                 let (time, given_unit) = found
                     .ok_or_else(|| self.refused("seconds need the time column; give a number of rows".to_owned()))?;
-                let of_times = given_unit.or(columns[time].unit.as_deref());
+                let of_stamps = columns[time].start.map(|_| "s");
+                let of_times = of_stamps.or(given_unit).or(columns[time].unit.as_deref());
                 let unit_s = seconds(of_times)
                     .ok_or_else(|| self.refused(format!("'{}' has no unit of time", columns[time].name)))?;
                 let reference = LocatedReference::Seconds {

@@ -1,5 +1,6 @@
 use std::{fmt, io::Read, str::FromStr};
 
+use decoupler_core::text::counted;
 use encoding_rs::{UTF_16BE, UTF_16LE};
 use encoding_rs_io::DecodeReaderBytesBuilder;
 use serde::{Deserialize, Serialize};
@@ -216,7 +217,7 @@ impl fmt::Display for Dialect {
             write!(f, ", a separator at the end of each row")?;
         }
         if self.skipped_lines > 0 {
-            write!(f, ", {} lines before the table", self.skipped_lines)?;
+            write!(f, ", {} before the table", counted(self.skipped_lines, "line"))?;
         }
         if self.carriage_returns {
             write!(f, ", lines end with CR")?;

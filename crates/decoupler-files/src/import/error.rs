@@ -24,6 +24,9 @@ pub enum ImportError {
         /// Error of the operating system.
         source: io::Error,
     },
+    /// A stored plan names a pipe or device.
+    #[error("'{}' is a pipe or device, which is read only when it is given as an argument; write its data to a file", .0.display())]
+    Irregular(PathBuf),
     /// The contents of a file are not a table.
     #[error("'{}': {source}", .path.display())]
     File {
@@ -67,7 +70,7 @@ pub enum ImportError {
     #[error("no column is {0}; name at least one")]
     NoColumns(&'static str),
     /// A cell of a used column is not a number.
-    #[error("'{}': line {line}, column {column} ('{name}'): '{text}' is not a finite number{others}; {}", .path.display(), Cure::CallMissing(.text.clone()))]
+    #[error("'{}': line {line}, column {column} ('{name}'): '{text}' {reason}{others}; {}", .path.display(), Cure::CallMissing(.text.clone()))]
     NotANumber {
         /// The file.
         path: PathBuf,
@@ -79,7 +82,9 @@ pub enum ImportError {
         name: String,
         /// Text of the cell.
         text: String,
-        /// Number of further cells of this column that are not numbers, as a phrase.
+        /// What is wrong with it, as a phrase.
+        reason: &'static str,
+        /// Number of further cells of this column that cannot be read, as a phrase.
         others: String,
     },
     /// The columns of a file are not the inputs of a network.
@@ -150,7 +155,7 @@ pub enum ImportError {
     #[error("'{}' is trained on, so it cannot be a test file; give another one", .0.display())]
     TrainedOn(PathBuf),
     /// No row is left.
-    #[error("none of the {rows} rows is left: {reasons}")]
+    #[error("no row of {rows} is left: {reasons}")]
     NoRows {
         /// Number of rows read.
         rows: usize,

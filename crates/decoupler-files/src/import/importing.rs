@@ -9,7 +9,7 @@ use decoupler_core::{
     dataset::{Dataset, History, Memory, MemoryError},
     evaluation::{Channel, Problem, TargetPosition},
     machine::ReadingBudget,
-    text::in_one_line,
+    text::{counted, in_one_line},
 };
 use serde::Serialize;
 
@@ -29,7 +29,7 @@ use super::{
     sentinel::{Sentinel, is_rounding, rounding_warning},
     sheet::Spreadsheet,
     suggestion::Meanings,
-    table::stem,
+    table::{column_called, stem},
 };
 
 impl Recipe {
@@ -56,8 +56,13 @@ impl Recipe {
         let mut parts = vec![first.map_err(|error| error.of_file(&self.data))?];
         // Lags in seconds have as many samples in all files.
         let memory = parts[0].recording.memory().cloned();
+        // Without the further files, of which each recipe of one of them would have a copy.
+        let of_one = Self {
+            append: Vec::new(),
+            ..self.clone()
+        };
         for FileSet { data, join } in &self.append {
-            let mut recipe = self.of_files(data, join)?;
+            let mut recipe = of_one.of_files(data, join)?;
             recipe.memory.clone_from(&memory);
             let part = recipe.import_set(folder, watch);
             parts.push(part.map_err(|error| error.of_file(data))?);
@@ -108,9 +113,8 @@ impl Recipe {
             None => Vec::new(),
         };
         for &id in meanings.inputs.iter().chain(&meanings.targets) {
-            if let Cells::Numbers(numbers) = &files[id.file].1.columns[id.column].cells {
-                warnings.extend(Sentinel::find(numbers).map(|found| found.warning(names.name(id))));
-            }
+            let used = Vec::from_iter(kept.iter().map(|&row| rows.number(id, row)));
+            warnings.extend(Sentinel::find(&used).map(|found| found.warning(names.name(id))));
         }
         let reports = rows.reports();
         let total = files[0].1.rows + files[0].1.too_long.rows;
@@ -226,10 +230,9 @@ impl Recipe {
         let time = time.as_deref().map(|name| TimeColumn {
             name,
             given_unit: match prefix {
-                None => self.units.get(name),
-                Some(stem) => self.units.get(&format!("{stem}.{name}")),
-            }
-            .map(String::as_str),
+                None => self.unit_of(name),
+                Some(stem) => self.unit_of(&format!("{stem}.{name}")),
+            },
         });
         for derived in &self.derive {
             derived.add_to(&mut table, own_name, time)?;
@@ -259,14 +262,13 @@ impl Recipe {
         let main = &files[0].1;
         let Some(time) = meanings.time else {
             if table.rows != main.rows {
-                let reason = format!("it has {} rows and the other file {}", table.rows, main.rows);
+                let reason = format!("it has {} and the other file {}", counted(table.rows, "row"), main.rows);
                 return Err(refuse(reason, Cure::NameTimes));
             }
             return Ok(None);
         };
         let wanted = joined.time.as_deref().or(self.time.as_deref()).unwrap_or_default();
-        let found = table.columns.iter().position(|column| column.name == wanted.trim());
-        let Some(column) = found else {
+        let Some(column) = column_called(&table.columns, wanted) else {
             let all: Vec<&str> = table
                 .columns
                 .iter()
@@ -324,17 +326,14 @@ fn notes(files: &[(PathBuf, Table)]) -> Vec<String> {
         for (excess, what) in [
             (
                 table.too_short,
-                "end before the last column; their other cells are missing",
+                "with fewer cells than there are columns, which are missing",
             ),
-            (
-                table.too_long,
-                "have more cells than there are columns and are left out",
-            ),
+            (table.too_long, "with more cells than there are columns, left out"),
         ] {
             if let Some(line) = excess.first_line {
                 notes.push(format!(
-                    "'{file}': {} rows, the first on line {line}, {what}",
-                    excess.rows
+                    "'{file}': {} {what}, the first on line {line}",
+                    counted(excess.rows, "row")
                 ));
             }
         }

@@ -353,7 +353,9 @@ impl Recipe {
                 warnings.extend(super::selection::order_note(order, table.line(rows[first_row])));
             }
             let features = history.features(memory);
-            readings = features.map_err(|error| ImportError::from(error).of_file(path))?;
+            readings = features
+                .map_err(|error| ImportError::from(error).of_file(path))?
+                .into_owned();
         }
         let kept = kept.into_iter().map(|(column, title)| {
             let cells = rows.iter().map(|&row| cells(column).text(row)).collect();
@@ -379,7 +381,7 @@ impl Recipe {
             kept: kept.cloned().collect(),
             row_wire: self.row_wire.clone(),
             group: self.group.clone().filter(|_| problem.memory.is_some()),
-            time_unit: time.as_ref().and_then(|time| self.units.get(time).cloned()),
+            time_unit: time.as_deref().and_then(|time| self.unit_of(time)).map(str::to_owned),
             time,
         }
     }

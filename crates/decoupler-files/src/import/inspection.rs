@@ -3,6 +3,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
+use decoupler_core::text::counted;
 use serde::Serialize;
 
 use super::{
@@ -11,6 +12,7 @@ use super::{
     join::median_interval,
     read_table,
     sentinel::{Sentinel, is_rounding, rounding_warning},
+    table::column_called,
 };
 
 /// Number of bars of a histogram.
@@ -135,15 +137,15 @@ impl Inspection {
         let rounded = columns.iter().filter(|column| column.is_rounding);
         warnings.extend(rounded.map(|column| rounding_warning(&column.name)));
         if let Some(line) = table.too_short.first_line {
-            let rows = table.too_short.rows;
+            let rows = counted(table.too_short.rows, "row");
             warnings.push(format!(
-                "{rows} rows, the first on line {line}, end before the last column"
+                "{rows} with fewer cells than there are columns, the first on line {line}"
             ));
         }
         if let Some(line) = table.too_long.first_line {
-            let rows = table.too_long.rows;
+            let rows = counted(table.too_long.rows, "row");
             warnings.push(format!(
-                "{rows} rows, the first on line {line}, have more cells than there are columns and are left out"
+                "left out: {rows} with more cells than there are columns, the first on line {line}"
             ));
         }
         Ok(Self {
@@ -350,8 +352,7 @@ impl Recipe {
         for (number, joined) in self.join.iter().enumerate() {
             let time = joined.time.as_ref().or(self.time.as_ref());
             let columns = &tables[number + 1].columns;
-            let found = time.and_then(|time| columns.iter().position(|column| column.name == time.trim()));
-            if let Some(column) = found {
+            if let Some(column) = time.and_then(|time| column_called(columns, time)) {
                 inspected[number + 1].meanings[column] = Meaning::Time;
             }
         }

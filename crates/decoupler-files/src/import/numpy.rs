@@ -208,7 +208,7 @@ pub(super) fn read_archive(
 
 /// Checks that the name of each entry is the same at its data and in the directory at the end of the archive, so that a damaged
 /// name does not become the name of a column.
-fn check_names(source: &mut (impl Read + Seek)) -> Result<(), TableError> {
+pub(super) fn check_names(source: &mut (impl Read + Seek)) -> Result<(), TableError> {
     /// Length of a header before the name of its entry.
     const HEADER: usize = 30;
     let mut archive = ZipArchive::new(&mut *source).map_err(|error| defect("the archive", error))?;
@@ -235,7 +235,7 @@ fn check_names(source: &mut (impl Read + Seek)) -> Result<(), TableError> {
 }
 
 /// Returns the error of reading the entry `name` of an archive.
-fn damage(name: &str, error: io::Error) -> TableError {
+pub(super) fn damage(name: &str, error: io::Error) -> TableError {
     match error.kind() {
         io::ErrorKind::InvalidData | io::ErrorKind::InvalidInput | io::ErrorKind::UnexpectedEof => {
             TableError::damaged(name, "its contents do not match its checksum; copy it again")
@@ -247,7 +247,7 @@ fn damage(name: &str, error: io::Error) -> TableError {
 fn defect(what: &str, error: ZipError) -> TableError {
     match error {
         ZipError::Io(error) => table_error(error),
-        error => TableError::damaged(what, format!("{error}; save it again with numpy.savez")),
+        error => TableError::damaged(what, format!("{error}; copy it again, or save it again")),
     }
 }
 

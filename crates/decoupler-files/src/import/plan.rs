@@ -1,12 +1,18 @@
-use std::path::{Path, PathBuf};
+use std::{
+    collections::HashSet,
+    path::{Path, PathBuf},
+};
 
 use serde::{Deserialize, Serialize};
 
 use super::{
     Cure, FileSet, ImportError, Joined, Recipe, Recording, Watch,
-    recipe::{restored, stored},
+    recipe::{is_irregular, restored, stored},
 };
-use decoupler_core::dataset::{Dataset, Division, Seed, Split, SplitBy};
+use decoupler_core::{
+    dataset::{Dataset, Division, Seed, Split, SplitBy},
+    text::counted,
+};
 
 /// Files, the meanings of their columns, and the split of their samples: everything needed to repeat a run on measured
 /// samples.
@@ -106,7 +112,7 @@ impl Plan {
     /// time.
     fn check_test_files(&self, folder: &Path, tests: &TestFiles) -> Result<(), ImportError> {
         let real = |path: &PathBuf| folder.join(path).canonicalize().ok();
-        let trained = Vec::from_iter(self.import.data_files().filter_map(real));
+        let trained = HashSet::<PathBuf>::from_iter(self.import.data_files().filter_map(real));
         let tested = std::iter::once(&tests.data).chain(tests.append.iter().map(|set| &set.data));
         let is_trained = |path: &&PathBuf| real(path).is_some_and(|path| trained.contains(&path));
         match { tested }.find(is_trained) {
@@ -182,6 +188,11 @@ impl Plan {
             .chain(tests)
     }
 
+    /// Returns the first file that is a pipe or device, which only a user may name: one in a stored plan could block for ever.
+    pub fn irregular(&self) -> Option<&PathBuf> {
+        self.files().find(|path| is_irregular(path))
+    }
+
     /// Returns this plan with absolute paths.
     #[must_use]
     pub fn absolute(&self) -> Self {
@@ -234,7 +245,11 @@ impl Recipe {
         if joined.len() != self.join.len() {
             return Err(ImportError::Join {
                 path: data.to_owned(),
-                reason: format!("it needs {} joined files and has {}", self.join.len(), joined.len()),
+                reason: format!(
+                    "it needs {} and has {}",
+                    counted(self.join.len(), "joined file"),
+                    joined.len()
+                ),
                 cure: Cure::GiveJoinedFiles,
             });
         }

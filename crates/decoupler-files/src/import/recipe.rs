@@ -2,7 +2,7 @@
 
 use std::{
     collections::BTreeMap,
-    fs::File,
+    fs::{self, File},
     io::Read as _,
     path::{Component, Path, PathBuf},
 };
@@ -16,6 +16,7 @@ use serde::{Deserialize, Serialize};
 use super::{
     Condition, Derived, DialectChoice, ImportError, Missing, Plan, PlannedSets, TableError, Watch,
     input_lines::{Watched, table_error},
+    table::name_and_unit,
 };
 
 /// Recipe for importing samples: the files to read and to join, and the meaning of each column.
@@ -175,6 +176,15 @@ fn normal(path: &Path) -> PathBuf {
     normal
 }
 
+impl Recipe {
+    /// Returns the unit given for a column, which either may name with its unit.
+    pub(super) fn unit_of(&self, column: &str) -> Option<&str> {
+        let bare = |name| name_and_unit(name).0;
+        let found = self.units.iter().find(|(name, _)| bare(name) == bare(column));
+        found.map(|(_, unit)| unit.as_str())
+    }
+}
+
 /// Origin of recorded samples: the plan that reads them, and checksums that identify its files and samples.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -266,6 +276,11 @@ impl Recorded {
     }
 }
 
+/// Returns `true` for a pipe or device, of which a reader may wait for ever.
+pub(super) fn is_irregular(path: &Path) -> bool {
+    fs::metadata(path).is_ok_and(|found| !found.is_file() && !found.is_dir())
+}
+
 /// Returns the CRC-32 of the bytes of a file, as hexadecimal digits.
 ///
 /// # Errors
@@ -278,6 +293,9 @@ pub fn file_crc32(path: &Path, watch: Watch<'_>) -> Result<String, ImportError> 
         },
         _ => ImportError::Cancelled,
     };
+    if is_irregular(path) {
+        return Err(ImportError::Irregular(path.to_owned()));
+    }
     let mut hasher = crc32fast::Hasher::new();
     let file = File::open(path).map_err(refused)?;
     let size = file.metadata().map_err(refused)?.len();

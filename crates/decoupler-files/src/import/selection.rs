@@ -1,10 +1,11 @@
 use std::{collections::HashMap, path::PathBuf};
 
 use super::{
-    Cells, Dropped, FileReport, ImportError, JoinReport, Recipe, Table,
+    Cells, Column, Dropped, FileReport, ImportError, JoinReport, Recipe, Table,
     inputs::{ColumnId, Names},
     join::Partners,
     suggestion::Meanings,
+    time_stamp::TimeStamp,
 };
 use decoupler_core::{
     dataset::{History, Memory, RowOrder, Series},
@@ -77,7 +78,7 @@ impl Rows<'_> {
         });
         let mut dropped = Counts::default();
         if main.too_long.rows > 0 {
-            let reason = format!("more cells than the {} columns", main.columns.len());
+            let reason = format!("more cells than the {}", counted(main.columns.len(), "column"));
             let first_line = main.too_long.first_line.unwrap_or(1);
             dropped.0.push((
                 Reason::TooLong,
@@ -155,8 +156,8 @@ impl Rows<'_> {
 
     /// Describes the rows `read` in order of time, of which those in `kept` are samples.
     pub(super) fn past(&self, read: &[usize], kept: &[usize]) -> Result<Past, ImportError> {
-        let mut place = HashMap::with_capacity(read.len());
-        place.extend(read.iter().enumerate().map(|(place, &row)| (row, place)));
+        let mut places = vec![0; self.files[0].1.rows];
+        read.iter().enumerate().for_each(|(place, &row)| places[row] = place);
         let times_s = match self.meanings.time {
             None => None,
             Some(id) => {
@@ -173,7 +174,7 @@ impl Rows<'_> {
             groups: self.group_keys(read),
             row_wires: self.row_wires(read)?,
             times_s,
-            samples: kept.iter().map(|row| place[row]).collect(),
+            samples: kept.iter().map(|&row| places[row]).collect(),
         })
     }
 
@@ -208,7 +209,8 @@ impl Rows<'_> {
         let count = kept.windows(2).filter(|pair| falls(pair)).count();
         kept.sort_by(|&one, &other| self.number(time, one).total_cmp(&self.number(time, other)));
         Some(format!(
-            "the times go backwards {count} times, first on line {}; the samples are sorted by time",
+            "the times go backwards {}, first on line {}; the samples are sorted by time",
+            counted(count, "time"),
             self.files[0].1.line(first)
         ))
     }
@@ -250,7 +252,10 @@ impl Rows<'_> {
         let column = &self.files[id.file].1.columns[id.column];
         Channel {
             name: self.names.name(id).to_owned(),
-            unit: self.meanings.units.get(&id).or(column.unit.as_ref()).cloned(),
+            unit: match column.start {
+                Some(_) => column.unit.clone(),
+                None => self.meanings.units.get(&id).or(column.unit.as_ref()).cloned(),
+            },
             original: column.original.clone(),
         }
     }
@@ -315,10 +320,12 @@ pub(super) fn order_note(order: RowOrder, line: u64) -> Option<String> {
     }
 }
 
-/// Returns the number of seconds in the unit of a time column; times without a unit are in seconds.
+/// Returns the number of seconds in the unit of a time column; times without a unit, or with a time zone or clock in its place,
+/// are in seconds.
 pub(super) fn seconds(unit: Option<&str>) -> Option<f64> {
     Some(match unit.map(str::trim) {
         None | Some("" | "s" | "sec" | "secs" | "second" | "seconds") => 1.0,
+        Some("UTC" | "utc" | "GMT" | "gmt" | "Unix" | "unix" | "local") => 1.0,
         Some("ms" | "msec" | "millisecond" | "milliseconds") => 1e-3,
         Some("us" | "µs" | "μs" | "usec" | "microsecond" | "microseconds") => 1e-6,
         Some("ns" | "nanosecond" | "nanoseconds") => 1e-9,
@@ -358,7 +365,7 @@ impl Counts {
 /// Refuses a column with cells that are neither numbers nor missing.
 pub(super) fn not_a_number(files: &[(PathBuf, Table)], names: &Names, id: ColumnId) -> Result<(), ImportError> {
     let (path, table) = &files[id.file];
-    let faults = &table.columns[id.column].faults;
+    let Column { faults, start, .. } = &table.columns[id.column];
     let Some(first) = &faults.first else { return Ok(()) };
     Err(ImportError::NotANumber {
         path: path.clone(),
@@ -366,11 +373,31 @@ pub(super) fn not_a_number(files: &[(PathBuf, Table)], names: &Names, id: Column
         column: id.column + 1,
         name: names.name(id).to_owned(),
         text: first.text.clone(),
+        reason: not_understood(&first.text, *start),
         others: match faults.count {
             1 => String::new(),
-            count => format!(", nor are {} other cells of the column", count - 1),
+            count => format!(
+                ", and {} of the column cannot be read either",
+                counted(count - 1, "other cell")
+            ),
         },
     })
+}
+
+/// Describes what is wrong with a cell of a column whose first time stamp is `start`.
+fn not_understood(cell: &str, start: Option<TimeStamp>) -> &'static str {
+    let is_meant_as_stamp = cell.contains(':') || ["-", "/"].iter().any(|sign| cell.matches(sign).count() == 2);
+    match (TimeStamp::parse(cell.as_bytes()), start) {
+        (Some(TimeStamp { has_zone: true, .. }), Some(_)) => {
+            "has a time zone, and the first time stamp of the column has none"
+        }
+        (Some(_), Some(_)) => "has no time zone, and the first time stamp of the column has one",
+        (Some(_), None) => "is a time stamp after numbers",
+        (None, start) if start.is_some() || is_meant_as_stamp => {
+            "is not a time stamp such as 2026-11-24T12:00:00.5+01:00 or 2026-11-24 12:00"
+        }
+        (None, _) => "is not a finite number",
+    }
 }
 
 /// Returns the index of the row-wire with the number `value`.

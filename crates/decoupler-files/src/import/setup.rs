@@ -15,10 +15,18 @@ use decoupler_core::{
 };
 
 /// Everything needed to repeat a run: its settings and, for a recording, the plan that reads it.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug)]
 pub struct Setup {
     settings: RunSettings,
     plan: Option<Plan>,
+    /// `true` if a file names the recording, not the user.
+    is_stored: bool,
+}
+
+impl PartialEq for Setup {
+    fn eq(&self, other: &Self) -> bool {
+        self.settings == other.settings && self.plan == other.plan
+    }
 }
 
 /// Datasets of a setup, and the origin of recorded samples.
@@ -61,6 +69,7 @@ impl From<SimulatedSettings> for Setup {
         Self {
             settings: settings.into(),
             plan: None,
+            is_stored: false,
         }
     }
 }
@@ -78,13 +87,32 @@ impl Setup {
         Self {
             settings,
             plan: Some(plan),
+            is_stored: false,
         }
     }
 
     /// Returns the setup with these settings; `None` unless a plan is given for a measured source and only for that.
     pub fn of(settings: RunSettings, plan: Option<Plan>) -> Option<Self> {
         let is_recording = matches!(settings.source, Source::Measured(_));
-        (is_recording == plan.is_some()).then_some(Self { settings, plan })
+        (is_recording == plan.is_some()).then_some(Self {
+            settings,
+            plan,
+            is_stored: false,
+        })
+    }
+
+    /// Returns the setup of a run that is read from a file, which may name regular files only.
+    #[must_use]
+    pub(crate) fn stored(self) -> Self {
+        Self {
+            is_stored: true,
+            ..self
+        }
+    }
+
+    fn check_files(&self) -> Result<(), ImportError> {
+        let found = self.plan.as_ref().filter(|_| self.is_stored).and_then(Plan::irregular);
+        found.map_or(Ok(()), |path| Err(ImportError::Irregular(path.clone())))
     }
 
     /// Returns the settings of the run.
@@ -98,6 +126,7 @@ impl Setup {
         Self {
             settings,
             plan: self.plan.clone(),
+            is_stored: self.is_stored,
         }
     }
 
@@ -137,6 +166,7 @@ impl Setup {
             let sets = settings.checked_sets_unless(is_cancelled)?;
             return Ok(sets.map(|sets| SetupSets { sets, recordings: None }));
         };
+        self.check_files()?;
         let watch = &mut watch(is_cancelled, on_progress);
         let planned = plan.sets(folder, self.settings.seed, watch);
         match planned.and_then(|planned| SetupSets::of_plan(plan, folder, planned, watch)) {
@@ -172,6 +202,7 @@ impl Setup {
         let Some(plan) = &self.plan else {
             return Ok(Some(TrialSamples::Drawn));
         };
+        self.check_files()?;
         let (recording, test) = match plan.recordings(folder, &mut watch(is_cancelled, on_progress)) {
             Err(_) if is_cancelled() => return Ok(None),
             read => read?,

@@ -8,7 +8,7 @@ use std::{
     path::Path,
 };
 
-use calamine::{Data, Ods, Range, Reader, Xls, Xlsx, open_workbook_from_rs};
+use calamine::{Cell, Data, DataRef, Ods, Range, Reader, Xls, Xlsx, XlsxError, open_workbook_from_rs};
 use decoupler_core::{machine::ReadingBudget, text::clean_name};
 use zip::ZipArchive;
 
@@ -16,7 +16,9 @@ use super::{
     Decimal, DialectChoice, Encoding, Format, Progress, Separator, Table, TableError, Watch,
     csv_table::{self, Reading},
     input_lines::Watched,
-    sheet_claims, xls_claims,
+    numpy::check_names,
+    sheet_claims::{self, LARGEST, OF_CELL, Rectangle, outside},
+    xls_claims,
 };
 
 /// Kind of spreadsheet.
@@ -70,6 +72,7 @@ impl Spreadsheet {
         match self {
             Self::Xls => xls_claims::claim(&file, budget)?,
             Self::Xlsx | Self::Ods => {
+                check_names(&mut BufReader::new(&file))?;
                 let is_strict = matches!(self, Self::Ods);
                 sheet_claims::claim(BufReader::new(&file), is_strict, budget, watch)?;
             }
@@ -78,9 +81,13 @@ impl Spreadsheet {
         let source = BufReader::new(file);
         // The reader of spreadsheets may panic on a file whose parts contradict each other.
         let read = catch_unwind(AssertUnwindSafe(|| match self {
-            Self::Xlsx => Sheets::read::<Xlsx<_>, _>(source, watch),
-            Self::Xls => Sheets::read::<Xls<_>, _>(source, watch),
-            Self::Ods => Sheets::read::<Ods<_>, _>(source, watch),
+            Self::Xlsx => Sheets::read(source, watch, |workbook, name| cells(workbook, name, budget)),
+            Self::Xls => Sheets::read(source, watch, |workbook: &mut Xls<_>, name| {
+                workbook.worksheet_range(name).map_err(damaged)
+            }),
+            Self::Ods => Sheets::read(source, watch, |workbook: &mut Ods<_>, name| {
+                workbook.worksheet_range(name).map_err(damaged)
+            }),
         }));
         let sheets = read.unwrap_or_else(|_| {
             let reason = "its parts contradict each other; save it again, or as CSV";
@@ -128,14 +135,17 @@ struct Sheets {
 }
 
 impl Sheets {
-    /// Reads all sheets, of which no more than two are in memory at once.
-    fn read<R, S>(source: S, watch: Watch<'_>) -> Result<Self, TableError>
+    /// Reads all sheets, each by its name with `range_of`; no more than two are in memory at once.
+    fn read<R, S>(
+        source: S,
+        watch: Watch<'_>,
+        mut range_of: impl FnMut(&mut R, &str) -> Result<Range<Data>, TableError>,
+    ) -> Result<Self, TableError>
     where
         R: Reader<S>,
         S: Read + Seek,
         R::Error: std::fmt::Display,
     {
-        let damaged = |error: R::Error| TableError::array("spreadsheet", format!("{error}; save it again, or as CSV"));
         let mut workbook: R = open_workbook_from_rs(source).map_err(damaged)?;
         let numbers = |range: &Range<Data>| {
             let is_number = |(_, _, cell): &(usize, usize, &Data)| matches!(cell, Data::Int(_) | Data::Float(_));
@@ -147,7 +157,7 @@ impl Sheets {
             if watch(Progress { bytes: 0, of: None }).is_break() {
                 return Err(TableError::Cancelled);
             }
-            let range = workbook.worksheet_range(&name).map_err(damaged)?;
+            let range = range_of(&mut workbook, &name)?;
             let count = numbers(&range);
             let name = clean_name(&name);
             let other = if sheets.chosen.is_none() || count > most {
@@ -163,6 +173,39 @@ impl Sheets {
         }
         Ok(sheets)
     }
+}
+
+fn damaged(error: impl std::fmt::Display) -> TableError {
+    TableError::array("spreadsheet", format!("{error}; save it again, or as CSV"))
+}
+
+/// Reads a sheet of an Excel file cell by cell: the reader of spreadsheets would allocate the whole rectangle between the first
+/// and the last cell unasked.
+fn cells<S: Read + Seek>(
+    workbook: &mut Xlsx<S>,
+    name: &str,
+    budget: &mut ReadingBudget,
+) -> Result<Range<Data>, TableError> {
+    let mut reader = match workbook.worksheet_cells_reader(name) {
+        Err(XlsxError::NotAWorksheet(_)) => return Ok(Range::default()),
+        reader => reader.map_err(damaged)?,
+    };
+    let (mut cells, mut rectangle) = (Vec::new(), Rectangle::default());
+    while let Some(cell) = reader.next_cell().map_err(damaged)? {
+        if matches!(cell.get_value(), DataRef::Empty) {
+            continue;
+        }
+        let (row, column) = cell.get_position();
+        let place = [row, column].map(u64::from);
+        if place[0] >= LARGEST[0] || place[1] >= LARGEST[1] {
+            return Err(outside(&format!("{} of row {}", place[1] + 1, place[0] + 1)));
+        }
+        budget.claim(OF_CELL)?;
+        rectangle.include(place, [1, 1]);
+        cells.push(Cell::new((row, column), Data::from(cell.get_value().clone())));
+    }
+    budget.claim(rectangle.memory())?;
+    Ok(Range::from_sparse(cells))
 }
 
 /// Writes a sheet as CSV; its first line is row 1 of the sheet.

@@ -1,33 +1,34 @@
-//! Memory that the sheets of a zip archive will take, found before they are read: the reader of spreadsheets allocates the whole
-//! rectangle between the first and the last cell, which a file of a few hundred bytes can make larger than any memory.
+//! Checksums and memory of the parts of a zip archive with sheets, before they are read: the reader of spreadsheets does not
+//! read parts to their end, where their checksum is, and allocates the whole rectangle between the first and the last cell of
+//! an OpenDocument file, which a few hundred bytes can make larger than any memory.
 
-use std::io::{BufReader, Read, Seek};
+use std::io::{self, BufRead, BufReader, Read, Seek};
 
-use decoupler_core::machine::{OverBudget, ReadingBudget};
+use decoupler_core::machine::ReadingBudget;
 use quick_xml::{
     Reader,
     events::{BytesStart, Event},
 };
 use zip::ZipArchive;
 
-use super::{TableError, Watch, input_lines::Watched};
+use super::{TableError, Watch, input_lines::Watched, numpy::damage};
 
 /// Memory of a byte of XML: strings of one letter, in a vector that has just doubled.
 const OF_BYTE: u64 = 4;
 /// Memory of a cell that has a value, with its text.
-const OF_CELL: u64 = 128;
+pub(super) const OF_CELL: u64 = 128;
 /// Memory of a cell of the rectangle, empty or not, as it is copied.
 const OF_PLACE: u64 = 72;
 /// Memory of a text without its letters.
 const OF_TEXT: u64 = size_of::<String>() as u64;
 /// Maximum number of rows and columns of a sheet.
-const LARGEST: [u64; 2] = [1 << 20, 1 << 14];
+pub(super) const LARGEST: [u64; 2] = [1 << 20, 1 << 14];
 
-/// Claims the memory of all sheets of the archive. With `is_strict`, elements of its sheets must end: the reader of OpenDocument
-/// files waits for their ends for ever.
+/// Claims the memory of all parts of the archive, except the cells of Excel files, and verifies their checksums. With
+/// `is_strict`, elements of its sheets must end: the reader of OpenDocument files waits for their ends for ever.
 ///
 /// # Errors
-/// If it exceeds the budget, or an element does not end.
+/// If it exceeds the budget, a part is damaged, or an element does not end.
 pub(super) fn claim(
     source: impl Read + Seek,
     is_strict: bool,
@@ -39,9 +40,12 @@ pub(super) fn claim(
         return Ok(());
     };
     for index in 0..archive.len() {
-        let Ok(entry) = archive.by_index(index) else { continue };
+        let entry = archive
+            .by_index(index)
+            .map_err(|error| TableError::damaged("the archive", format!("{error}; copy it again")))?;
         let size = entry.size();
-        let is_strict = is_strict && entry.name().is_ok_and(|name| name == "content.xml");
+        let name = String::from_utf8_lossy(entry.name_raw()).into_owned();
+        let is_strict = is_strict && name == "content.xml";
         budget.claim(size.saturating_mul(OF_BYTE))?;
         let mut is_cancelled = false;
         let mut watched = |progress| {
@@ -49,18 +53,24 @@ pub(super) fn claim(
             is_cancelled |= flow.is_break();
             flow
         };
-        let xml = BufReader::new(Watched::new(entry, Some(size), &mut watched));
-        let claimed = claim_part(xml, is_strict, budget);
+        let mut xml = BufReader::new(Watched::new(entry, Some(size), &mut watched));
+        let claimed = claim_part(&mut xml, is_strict, budget);
+        // Without its end, a part may be larger than memory or endless.
+        let ended = match claimed {
+            Err(TableError::OverBudget(_)) => Ok(0),
+            _ => io::copy(&mut xml, &mut io::sink()),
+        };
         if is_cancelled {
             return Err(TableError::Cancelled);
         }
+        ended.map_err(|error| damage(&name, error))?;
         claimed?;
     }
     Ok(())
 }
 
 /// Claims the memory of one part of the archive, up to its end or its first error.
-fn claim_part(xml: BufReader<impl Read>, is_strict: bool, budget: &mut ReadingBudget) -> Result<(), TableError> {
+fn claim_part(xml: impl BufRead, is_strict: bool, budget: &mut ReadingBudget) -> Result<(), TableError> {
     let mut reader = Reader::from_reader(xml);
     // As the reader of the sheets.
     let config = reader.config_mut();
@@ -85,7 +95,7 @@ fn claim_part(xml: BufReader<impl Read>, is_strict: bool, budget: &mut ReadingBu
             Ok(_) => {}
         }
     }
-    Ok(sheet.end(budget)?)
+    sheet.end(budget)
 }
 
 /// Rectangle of a sheet, or of one table of an OpenDocument file.
@@ -106,50 +116,63 @@ fn number(element: &BytesStart<'_>, name: &str) -> Option<u64> {
     element.try_get_attribute(name).ok()??.value.trim().parse().ok()
 }
 
-/// Returns row and column, from 0, of a reference such as B12.
-fn place(reference: &str) -> Option<[u64; 2]> {
-    let letters = reference.bytes().take_while(u8::is_ascii_alphabetic);
-    let column = letters.fold(0_u64, |column, letter| {
+/// Refuses an element whose attributes the reader of spreadsheets may read in another way, or whose reference is to no cell.
+fn check_attributes(element: &BytesStart<'_>) -> Result<(), TableError> {
+    for attribute in element.attributes().with_checks(false) {
+        match attribute {
+            Ok(found) if found.key.as_ref() == "r" && !is_inside(&found.value) => return Err(outside(&found.value)),
+            Ok(_) => {}
+            Err(error) => {
+                let reason = format!("{error}; save it again, or as CSV");
+                return Err(TableError::damaged("the spreadsheet", reason));
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Returns `true` for a reference to a row or a cell that a sheet can have, such as 12 or B12. The reader of spreadsheets takes
+/// larger numbers for others.
+fn is_inside(reference: &str) -> bool {
+    let letters = reference.bytes().take_while(u8::is_ascii_alphabetic).count();
+    let (letters, digits) = reference.split_at(letters);
+    let column = letters.bytes().fold(0_u64, |column, letter| {
         column
             .saturating_mul(26)
             .saturating_add(u64::from(letter.to_ascii_uppercase() - b'A') + 1)
     });
-    let row: u64 = reference
-        .trim_start_matches(|c: char| c.is_ascii_alphabetic())
-        .parse()
-        .ok()?;
-    Some([row.checked_sub(1)?, column.checked_sub(1)?])
+    column <= LARGEST[1] && digits.parse().is_ok_and(|row: u64| (1..=LARGEST[0]).contains(&row))
+}
+
+pub(super) fn outside(cell: &str) -> TableError {
+    let [rows, columns] = LARGEST;
+    let reason = format!(
+        "cell {cell} is outside of a sheet, which has {rows} rows and {columns} columns; save it again, or as CSV"
+    );
+    TableError::array("spreadsheet", reason)
 }
 
 impl Sheet {
-    fn take(&mut self, element: &BytesStart<'_>, budget: &mut ReadingBudget) -> Result<(), OverBudget> {
+    fn take(&mut self, element: &BytesStart<'_>, budget: &mut ReadingBudget) -> Result<(), TableError> {
         match element.local_name().as_ref() {
             "sst" => {
                 let texts = number(element, "uniqueCount").unwrap_or(0);
                 budget.claim(texts.saturating_mul(OF_TEXT))?;
             }
-            "row" => {
-                let row = number(element, "r").and_then(|row| row.checked_sub(1));
-                self.next = [row.unwrap_or(self.next[0] + 1), 0];
-            }
-            "c" => {
-                let reference = element.try_get_attribute("r").ok().flatten();
-                self.next = reference.and_then(|r| place(&r.value)).unwrap_or(self.next);
-                self.rectangle.include(self.next, [1, 1]);
-                budget.claim(OF_CELL)?;
-                self.next[1] += 1;
-            }
+            "row" | "c" => check_attributes(element)?,
             "table" => {
                 self.end(budget)?;
                 *self = Self::default();
             }
             "table-row" => {
+                check_attributes(element)?;
                 self.next = [self.next[0] + self.row_repeats, 0];
                 let repeats = number(element, "table:number-rows-repeated");
                 self.row_repeats = repeats.unwrap_or(1).min(LARGEST[0]);
                 (self.repeats, self.claimed) = (0, 0);
             }
             "table-cell" | "covered-table-cell" => {
+                check_attributes(element)?;
                 self.next[1] += self.repeats;
                 let repeats = number(element, "table:number-columns-repeated");
                 self.repeats = repeats.unwrap_or(1).min(LARGEST[1]);
@@ -170,8 +193,8 @@ impl Sheet {
     }
 
     /// Claims the rectangle.
-    fn end(&self, budget: &mut ReadingBudget) -> Result<(), OverBudget> {
-        budget.claim(self.rectangle.memory())
+    fn end(&self, budget: &mut ReadingBudget) -> Result<(), TableError> {
+        Ok(budget.claim(self.rectangle.memory())?)
     }
 }
 
@@ -206,14 +229,7 @@ mod tests {
     use super::*;
 
     fn claimed(xml: &str) -> u64 {
-        let claims = |limit| {
-            claim_part(
-                BufReader::new(xml.as_bytes()),
-                false,
-                &mut ReadingBudget::of(limit, true),
-            )
-            .is_ok()
-        };
+        let claims = |limit| claim_part(xml.as_bytes(), false, &mut ReadingBudget::of(limit, true)).is_ok();
         // Bisection: the smallest budget that suffices.
         let (mut low, mut high) = (0, u64::MAX);
         while high - low > 1 {
@@ -224,11 +240,27 @@ mod tests {
     }
 
     #[test]
-    fn sheets_claim_the_rectangle_between_their_first_and_last_cell() {
-        let corners = "<sheetData><row r=\"2\"><c r=\"B2\"/></row><row r=\"1001\"><c r=\"AA1001\"/></row></sheetData>";
-        assert_eq!(claimed(corners), 1000 * 26 * OF_PLACE + 2 * OF_CELL);
-        let in_order = "<row><c/><c/></row><row><c/></row>";
-        assert_eq!(claimed(in_order), 4 * OF_PLACE + 3 * OF_CELL);
+    fn references_beyond_the_last_row_or_column_are_refused() {
+        for (reference, expected) in [
+            ("XFD1048576", true),
+            ("12", true),
+            ("XFE1", false),
+            ("A1048577", false),
+            // In 32 bits, the first row.
+            ("A4294967297", false),
+            ("A99999999999999999999", false),
+            ("A0", false),
+            ("A", false),
+        ] {
+            assert_eq!(is_inside(reference), expected, "{reference}");
+        }
+        for malformed in [
+            "<c r r=\"A1\"/>",
+            "<c r=\"A1\" r=\"A0\"/>",
+            "<table:table-cell x table:y=\"1\"/>",
+        ] {
+            assert_eq!(claimed(malformed), u64::MAX, "{malformed}");
+        }
         assert_eq!(claimed("<sst uniqueCount=\"1000000\"><si/></sst>"), 1_000_000 * OF_TEXT);
     }
 

@@ -274,6 +274,13 @@ impl Labels {
     }
 }
 
+/// Returns the index of the column with this name, with or without the unit of its header.
+pub(super) fn column_called(columns: &[Column], given: &str) -> Option<usize> {
+    let given = clean_name(given.trim());
+    let named = |name: &str| columns.iter().position(|column| column.name == name);
+    named(&given).or_else(|| named(name_and_unit(&given).0))
+}
+
 /// Splits a header such as "x (mm)" or "x [mm]" into name and unit.
 pub(super) fn name_and_unit(header: &str) -> (&str, Option<&str>) {
     let header = header.trim();

@@ -5,4 +5,5 @@
 mod checkpoint_file;
 mod network_file;
 mod run_folder;
+mod sensor_file;
 mod versions;

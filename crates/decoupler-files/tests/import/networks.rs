@@ -15,7 +15,7 @@ use decoupler_files::{
     export::{
         CheckpointFile, DocumentError, NetworkFile, RecipeFile, RecipeSource, RunFolder, describe_worse_than_ridge,
     },
-    import::{Plan, Recipe, Setup, SetupError, SetupSets},
+    import::{Plan, Recipe, Setup, SetupError, SetupSets, file_crc32},
 };
 use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
 
@@ -446,4 +446,37 @@ fn a_recipe_of_an_array_has_only_differences_from_the_papers_array() {
     assert_eq!(RecipeFile::load(&path).unwrap(), RecipeSource::Simulated(expected));
     let error = RecipeFile::load_recording(&path).unwrap_err();
     assert!(matches!(error, DocumentError::SimulatedRecipe(_)), "{error}");
+}
+
+/// Makes a pipe that nobody writes to.
+#[cfg(unix)]
+fn pipe(path: &Path) {
+    assert!(
+        std::process::Command::new("mkfifo")
+            .arg(path)
+            .status()
+            .unwrap()
+            .success()
+    );
+}
+
+#[cfg(unix)]
+#[test]
+fn a_pipe_named_by_a_file_is_refused_before_it_is_opened() {
+    let folder = tempfile::tempdir().unwrap();
+    let plan = curved(folder.path()).within(folder.path());
+    let recipe = folder.path().join("recipe.json");
+    RecipeFile::save(&plan, &recipe).unwrap();
+    let file = trained(folder.path());
+    let data = plan.import.data;
+    fs::remove_file(&data).unwrap();
+    pipe(&data);
+    let error = RecipeFile::load(&recipe).unwrap_err().to_string();
+    assert!(error.contains("data.csv' is a pipe or device"), "{error}");
+    let error = file.test_set().unwrap_err().to_string();
+    assert!(error.contains("data.csv' is a pipe or device"), "{error}");
+    let error = file_crc32(&data, &mut |_| std::ops::ControlFlow::Continue(()))
+        .unwrap_err()
+        .to_string();
+    assert!(error.contains("data.csv' is a pipe or device"), "{error}");
 }

@@ -2,6 +2,7 @@
 
 use std::{fs, ops::ControlFlow, path::Path};
 
+use decoupler_core::dataset::Memory;
 use decoupler_files::import::{
     Cells, ColumnKind, Decimal, DialectChoice, Encoding, Inspection, Joined, Progress, Recipe, Recording, Separator,
     Table, read_table,
@@ -403,7 +404,7 @@ fn samples_are_in_the_order_of_their_times() {
     let recording = import(&wanted, &folder).unwrap();
     assert_eq!(recording.set.readings().column(0).to_vec(), [10.0, 20.0, 30.0]);
     assert!(
-        recording.warnings[0].contains("backwards 1 times, first on line 3"),
+        recording.warnings[0].contains("backwards 1 time, first on line 3"),
         "{:?}",
         recording.warnings
     );
@@ -451,7 +452,7 @@ fn having_no_rows_left_is_an_error_with_counted_reasons() {
     wanted.conditions = vec!["c1>2".parse().unwrap()];
     let error = import(&wanted, &folder).unwrap_err();
     assert!(
-        error.contains("none of the 2 rows is left: 1: c1>2 is not met; 1: c2 is missing"),
+        error.contains("no row of 2 is left: 1: c1>2 is not met; 1: c2 is missing"),
         "{error}"
     );
 }
@@ -543,4 +544,108 @@ fn derived_columns_are_differences_and_ratios_also_with_the_start_of_the_file() 
         error.contains("r=a / start(1s)") && error.contains("time column"),
         "{error}"
     );
+}
+
+#[test]
+fn every_column_may_be_named_by_its_whole_header() {
+    let folder = folder(&[
+        (
+            "data.csv",
+            "t (ms),x (V),press (id),y (N)\n0,1,a,1\n1000,2,a,-1\n2000,3,b,3\n3000,5,b,4\n",
+        ),
+        ("more.csv", "when (ms),z (mm)\n0,10\n1000,20\n2000,30\n3000,40\n"),
+    ]);
+    let wanted = Recipe {
+        group: Some("press (id)".to_owned()),
+        time: Some("t (ms)".to_owned()),
+        missing: vec!["y (N)=-1".parse().unwrap(), "more.z (mm)=40".parse().unwrap()],
+        derive: vec!["d=x (V) / start(1.5s)".parse().unwrap()],
+        conditions: vec!["x (V)<5".parse().unwrap()],
+        units: [("t".to_owned(), "ms".to_owned())].into(),
+        join: vec![Joined {
+            file: "more.csv".into(),
+            time: Some("when (ms)".to_owned()),
+            ..Joined::default()
+        }],
+        inputs: vec!["x (V)".to_owned(), "d".to_owned(), "more.z (mm)".to_owned()],
+        ..recipe("", "y")
+    };
+    let recording = import(&wanted, &folder).unwrap();
+    assert_eq!(recording.set.groups(), [0, 1]);
+    assert_eq!(recording.set.targets().column(0).to_vec(), [1.0, 3.0]);
+    assert_eq!(recording.set.readings().column(1).to_vec(), [1.0 / 1.5, 2.0]);
+    assert_eq!(recording.set.readings().column(2).to_vec(), [10.0, 30.0]);
+}
+
+#[test]
+fn time_stamps_that_are_not_understood_say_which_are() {
+    let understood = "is not a time stamp such as 2026-11-24T12:00:00.5+01:00 or 2026-11-24 12:00";
+    for (cells, expected) in [
+        ("24.11.2026 12:00:00", understood),
+        ("2026-11-24", understood),
+        ("11/24/2026", understood),
+        ("2026-11-24 12:00\n2026-11-24 25:00", understood),
+        ("2026-11-24 12:00\nsoon", understood),
+        (
+            "2026-11-24 12:00Z\n2026-11-24 12:00",
+            "has no time zone, and the first time stamp of the column has one",
+        ),
+        (
+            "2026-11-24 12:00\n2026-11-24 12:00Z",
+            "has a time zone, and the first time stamp of the column has none",
+        ),
+        ("5\n2026-11-24 12:00", "is a time stamp after numbers"),
+        ("1.2.3", "is not a finite number"),
+    ] {
+        let rows = cells.replace('\n', ",1,2\n");
+        let folder = folder(&[("data.csv", &format!("when,x,y\n{rows},1,2\n"))]);
+        let mut wanted = recipe("x", "y");
+        wanted.time = Some("when".to_owned());
+        let error = import(&wanted, &folder).unwrap_err();
+        let last = cells.lines().last().unwrap();
+        assert!(error.contains(&format!("'{last}' {expected}; ")), "{cells}: {error}");
+    }
+}
+
+#[test]
+fn a_time_zone_in_the_header_is_no_unit() {
+    let stamps = |unit: &str| format!("time ({unit}),x,y\n2026-11-24 12:00:00,1,2\n2026-11-24 12:00:00.5,3,4\n");
+    let numbers = "time (UTC),x,y\n100,1,2\n100.5,3,4\n".to_owned();
+    for text in [stamps("UTC"), stamps("ms"), stamps("yyyy-mm-dd hh:mm:ss"), numbers] {
+        let folder = folder(&[("data.csv", &text)]);
+        let mut wanted = recipe("x", "y");
+        wanted.time = Some("time".to_owned());
+        wanted.memory = Some(Memory::of_averages_s(&[2.0]));
+        let recording = import(&wanted, &folder).unwrap();
+        assert_eq!(
+            recording.history().times_s().map(|times| times[1] - times[0]),
+            Some(0.5),
+            "{text}"
+        );
+    }
+}
+
+#[test]
+fn only_rows_that_are_used_have_markers_of_missing_values() {
+    let mut text = "x,y,ok\n".to_owned();
+    for row in 0..60 {
+        let y = if row < 10 {
+            "-1".to_owned()
+        } else {
+            format!("{}", 3.5 + 0.37 * f64::from(row))
+        };
+        text += &format!("{row},{y},{}\n", u8::from(row >= 10));
+    }
+    let folder = folder(&[("data.csv", &text)]);
+    let mut wanted = recipe("x", "y");
+    let warned = |wanted: &Recipe| {
+        import(wanted, &folder)
+            .unwrap()
+            .warnings
+            .join("\n")
+            .contains("mark it as missing")
+    };
+    assert!(warned(&wanted));
+    wanted.conditions = vec!["ok==1".parse().unwrap()];
+    assert!(!warned(&wanted));
 }

@@ -119,7 +119,7 @@ fn a_file_with_other_columns_is_refused_by_name() {
     let error = error_with("t,r\n0,1\n0.1,bad\n");
     assert!(error.contains("1/sensor.csv': line 3"), "{error}");
     let error = error_with("t,r\n50,1\n51,2\n");
-    assert!(error.contains("1/sensor.csv': none of the 2 rows is left"), "{error}");
+    assert!(error.contains("1/sensor.csv': no row of 2 is left"), "{error}");
     let without_joined = Recipe {
         append: vec![FileSet {
             data: "1/sensor.csv".into(),
@@ -128,7 +128,7 @@ fn a_file_with_other_columns_is_refused_by_name() {
         ..recipe(1)
     };
     let error = import(&without_joined, &folder).unwrap_err().to_string();
-    assert!(error.contains("needs 1 joined files and has 0"), "{error}");
+    assert!(error.contains("needs 1 joined file and has 0"), "{error}");
 }
 
 #[test]

@@ -70,7 +70,7 @@ impl TakagiSugeno {
         let y = outputs.scale(training.targets());
         let units = Units::of(&training, inputs.of(training.readings()), y);
         let none = Array2::zeros((0, inputs.count()));
-        let noise = LinearFit::new(&inputs, &units, none.view())?.variances();
+        let noise = LinearFit::new(&inputs, units.clone(), none.view())?.variances();
         let choice = selection::choose(&units, &noise, rng);
         let scaled = consequents::fit_consequents(&choice.antecedents, &units, &choice.penalties, &noise)?;
         Ok(Self::new(&inputs, &choice.antecedents, &scaled, &outputs))

@@ -8,7 +8,10 @@ use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use super::{CrossValidated, Run, RunError, RunSettings, recorded::Evidence};
-use crate::dataset::{Dataset, Folds, FoldsError, Seed, SplitBy, Stream};
+use crate::{
+    dataset::{Dataset, Folds, FoldsError, Seed, SplitBy, Stream},
+    text::counted,
+};
 pub use half_width::HalfWidth;
 
 /// Prediction intervals of decoded values: the answer plus or minus a half-width, target by target.
@@ -188,7 +191,7 @@ pub enum NoIntervals {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
 pub enum IntervalsDefect {
     /// The number of intervals is not the number of targets.
-    #[error("{found} intervals for {expected} targets")]
+    #[error("{} for {}", counted(*.found, "interval"), counted(*.expected, "target"))]
     Targets {
         /// Number of intervals.
         found: usize,

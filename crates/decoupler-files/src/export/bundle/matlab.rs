@@ -12,6 +12,7 @@ use super::{
 use decoupler_core::{
     decoupling::{AffineLayer, Layer},
     network::Quantity,
+    text::counted,
 };
 
 /// Writes the function `name`. The matrices of the rows are stacked vertically.
@@ -32,7 +33,7 @@ pub(super) fn write(name: &str, portable: &Portable, weights: &Weights) -> Strin
     } else {
         ("", String::new(), "row = ones(samples, 1);\n".to_owned())
     };
-    let counted = match ranges {
+    let also = match ranges {
         Some(_) => {
             "the number of readings of each\n%   sample that lie beyond the range seen in training by more than a tenth of it"
         }
@@ -57,14 +58,18 @@ pub(super) fn write(name: &str, portable: &Portable, weights: &Weights) -> Strin
     let purpose = match &portable.meaning {
         Meaning::Array(_) => format!(
             "%{upper} Decodes readings of a tactile array into the coordinates of its nodes.\n\
-             %   {upper_output} = {upper}({upper_input}{upper_argument}) has a line of {outputs} coordinates in mm (x_1, y_1, z_1, to {last})\n\
-             %   for each line of {channels} resistances in ohm (r_1 to r_{channels}).\n",
+             %   {upper_output} = {upper}({upper_input}{upper_argument}) has a line of {of_outputs} in mm (x_1, y_1, z_1, to {last})\n\
+             %   for each line of {of_channels} in ohm (r_1 to r_{channels}).\n",
+            of_outputs = counted(outputs, "coordinate"),
+            of_channels = counted(channels, "resistance"),
             last = portable.meaning.targets().last().map_or("", |target| &target.name),
         ),
         own @ Meaning::Own { .. } => format!(
             "%{upper} Decodes readings into targets.\n\
-             %   {upper_output} = {upper}({upper_input}{upper_argument}) has a line of {outputs} targets for each line of {channels} readings.\n\
+             %   {upper_output} = {upper}({upper_input}{upper_argument}) has a line of {of_outputs} for each line of {of_channels}.\n\
              %   {legend}\n",
+            of_outputs = counted(outputs, "target"),
+            of_channels = counted(channels, "reading"),
             legend = own.legend().join("\n%   "),
         ),
     };
@@ -72,7 +77,7 @@ pub(super) fn write(name: &str, portable: &Portable, weights: &Weights) -> Strin
         "function [{output}, readings_outside] = {name}({input}{argument})\n\
          {purpose}\
          {help}\
-         %   [{upper_output}, READINGS_OUTSIDE] = ... also has {counted}.\n\
+         %   [{upper_output}, READINGS_OUTSIDE] = ... also has {also}.\n\
          \n\
          samples = size({input}, 1);\n\
          if size({input}, 2) ~= {channels} || ~all({is_reading})\n    \

@@ -4,6 +4,7 @@ use decoupler_core::{
     dataset::Memory,
     decoupling::NotDescribed,
     evaluation::{Channel, RunError},
+    text::counted,
 };
 use thiserror::Error;
 
@@ -151,16 +152,16 @@ pub(super) fn readme(name: &str, portable: &Portable, fixed: Option<&FixedNetwor
     );
     text += &match meaning {
         Meaning::Array(_) => format!(
-            "It converts the {channels} readings of one row-wire (r_1 to r_{channels}, in ohm) into the {outputs} coordinates of\n\
+            "It converts the {channels} of one row-wire (r_1 to r_{channels}, in ohm) into the {outputs} of\n\
              its nodes (x_1, y_1, z_1, x_2, ... {last}, in mm).",
-            channels = portable.channels,
-            outputs = portable.outputs,
+            channels = counted(portable.channels, "reading"),
+            outputs = counted(portable.outputs, "coordinate"),
             last = meaning.targets().last().map_or("", |target| &target.name),
         ),
         Meaning::Own { .. } => format!(
-            "It converts {channels} readings into {outputs} targets.\n\n{legend}",
-            channels = portable.channels,
-            outputs = portable.outputs,
+            "It converts {channels} into {outputs}.\n\n{legend}",
+            channels = counted(portable.channels, "reading"),
+            outputs = counted(portable.outputs, "target"),
             legend = meaning.legend().join("\n"),
         ),
     };

@@ -14,7 +14,7 @@ use std::fmt::Write;
 
 use decoupler_core::{
     dataset::{Memory, MemoryConstants, MemoryError, MemoryState, Seed, Span, Stream},
-    text::format_number,
+    text::{counted, format_number, inert},
 };
 use rand::RngExt;
 
@@ -166,11 +166,12 @@ impl ExportedMemory {
         let restarts = self.restarts();
         format!(
             "\nMemory\n\nThe inputs of the network are features: readings and values from their past. They are computed from\n\
-             the {} readings of each sample, interval_s seconds after the sample before (in training usually {} s):\n\n{usage}\n\
+             the {} of each sample, interval_s seconds after the sample before (in training usually {} s):\n\n{usage}\n\
              {restarts}\n\n\
              sequence.csv has samples in order with their intervals, features and targets; the state starts again where\n\
              restart is 1.\n",
-            self.constants.channels, self.constants.interval_s
+            counted(self.constants.channels, "reading"),
+            self.constants.interval_s
         )
     }
 
@@ -187,7 +188,7 @@ impl ExportedMemory {
     fn csv(&self, portable: &Portable) -> String {
         let quoted = |name: String| format!("\"{}\"", name.replace('"', "\"\""));
         let titles = portable.meaning.inputs().into_iter().chain(portable.meaning.targets());
-        let titles = Vec::from_iter(titles.map(|channel| quoted(channel.title())));
+        let titles = Vec::from_iter(titles.map(|channel| quoted(inert(&channel.title()))));
         let mut text = format!("restart,interval_s,{}\n", titles.join(","));
         for frame in &self.frames {
             let _ = write!(text, "{},{:e}", u8::from(frame.is_first), frame.interval_s);

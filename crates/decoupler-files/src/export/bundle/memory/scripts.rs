@@ -1,3 +1,5 @@
+use decoupler_core::text::counted;
+
 use super::ExportedMemory;
 
 impl ExportedMemory {
@@ -60,8 +62,8 @@ impl ExportedMemory {
         format!(
             "function [features, state] = {name}_memory(readings, interval_s, state)\n\
              %{upper}_MEMORY Computes the features of {upper}_DECODE from readings in order of time.\n\
-             %   [FEATURES, STATE] = {upper}_MEMORY(READINGS, INTERVAL_S, STATE) has a line of {count} features for each line\n\
-             %   of {channels} readings, each INTERVAL_S seconds after the one before (a scalar applies to all; in training\n\
+             %   [FEATURES, STATE] = {upper}_MEMORY(READINGS, INTERVAL_S, STATE) has a line of {features} for each line\n\
+             %   of {readings}, each INTERVAL_S seconds after the one before (a scalar applies to all; in training\n\
              %   it was usually {interval:?}). STATE is [] at the start, and continues from an earlier call.\n\n\
              samples = size(readings, 1);\n\
              if size(readings, 2) ~= {channels}\n    error('readings: give {channels} columns');\nend\n\
@@ -82,6 +84,8 @@ impl ExportedMemory {
              features(sample, :) = [now, reshape(past', 1, [])];\n\
              end\nend\n",
             count = constants.features(),
+            features = counted(constants.features(), "feature"),
+            readings = counted(channels, "reading"),
             interval = constants.interval_s,
             last = kept + 1,
             before = kept,
