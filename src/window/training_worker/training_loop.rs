@@ -188,10 +188,12 @@ impl<'a> TrainingLoop<'a> {
             };
             let (recorded, drift, calibration) =
                 (sets.recorded().cloned(), sets.drift_reference(), Calibration::of(&sets));
+            let of_samples = describe_samples(&sets);
             Ok(run(sets, is_cancelled)?.map(|run| TrainedRun {
                 run,
                 recorded,
                 drift,
+                of_samples,
                 calibration,
             }))
         })

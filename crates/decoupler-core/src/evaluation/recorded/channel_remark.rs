@@ -303,7 +303,7 @@ pub(super) fn rmse_ratio(
         .zip(&theirs)
         .map(|(ours, theirs)| (ours - ratio * theirs) / total);
     let spread = Evidence::of(set, by).variance(&influences.collect::<Vec<_>>());
-    Some(Interval::of_ratio(ratio, spread, Interval::MAX_FACTOR)?.map(f64::sqrt))
+    Some(Interval::of_ratio(ratio, spread)?.map(f64::sqrt))
 }
 
 impl ChannelImportance {

@@ -5,6 +5,7 @@ use super::{
     FittedModel, Interval,
     channel_remark::rmse_ratio,
     evidence::{Evidence, SumVariance},
+    split_comparison::student_quantile,
 };
 use crate::{
     dataset::{Dataset, SplitBy},
@@ -54,7 +55,7 @@ pub enum Undetermined {
         /// Number of independent stretches or groups.
         units: usize,
     },
-    /// The error is NaN, or is not known within a factor of 100 and may exceed half of the variance.
+    /// The error is NaN, or neither negligible nor known within a factor of 100.
     #[error(
         "its R² is not determined by {units} independent stretches or groups: record longer, or record more groups"
     )]
@@ -67,9 +68,7 @@ pub enum Undetermined {
 impl Determination {
     /// Minimum number of units for a reliable interval.
     pub const FEW_UNITS: usize = 10;
-    /// Value of 1 − R² below which the readings determine the target.
-    const SMALL: f64 = 0.5;
-    /// Value of 1 − R² below which more units would not change the verdict.
+    /// Largest value of 1 − R² at which more units would not change the verdict.
     const NEGLIGIBLE: f64 = 0.01;
 
     /// Measures `answers` (samples × outputs) against the targets of `set`, target by target. The independent units are
@@ -125,17 +124,15 @@ impl Determination {
             // From the square of the mean: the mean of few units differs from the true mean.
             + 2.0 * (of_mean.variance * unexplained / count).powi(2)
             + of_fits(evidence, &off, &centred(answers), scale);
-        let ratio = if unexplained == 0.0 {
-            Some(Interval {
-                value: 0.0,
-                low: 0.0,
-                high: 0.0,
-            })
-        } else {
-            // However uncertain a very small error is, it may be certain that it is small.
-            let max_factor = (Self::SMALL / unexplained).max(Interval::MAX_FACTOR);
-            Interval::of_ratio(unexplained, SumVariance { variance, ..spread }, max_factor)
+        let spread = SumVariance { variance, ..spread };
+        // The logarithm of a very small error can be uncertain although the error is certainly small.
+        let high = unexplained + student_quantile(spread.freedom) * variance.sqrt();
+        let small = Interval {
+            value: unexplained,
+            low: 0.0,
+            high,
         };
+        let ratio = Interval::of_ratio(unexplained, spread).or((high <= Self::NEGLIGIBLE).then_some(small));
         Ok(Self {
             r2: ratio.ok_or(Undetermined::Unbounded { units })?.map(|ratio| 1.0 - ratio),
             units,
@@ -149,7 +146,7 @@ impl Determination {
             Determinacy::NotDetermined
         } else if self.r2.low <= 0.0 {
             Determinacy::Uncertain
-        } else if self.r2.value < 1.0 - Self::SMALL {
+        } else if self.r2.value < 0.5 {
             Determinacy::WeaklyDetermined
         } else {
             Determinacy::Determined
@@ -162,22 +159,20 @@ impl Determination {
     /// Good answers show that the readings determine a target. Bad ones show only that the models that were tried have
     /// failed.
     pub fn sentence(&self, name: &str, tried: &[FittedModel]) -> String {
-        let is_determined = self.determinacy() == Determinacy::Determined;
         let claim = match self.determinacy() {
             Determinacy::Determined => format!("the readings determine {name}"),
             Determinacy::WeaklyDetermined => format!("{} little of {name}", explains(tried)),
             Determinacy::Uncertain => format!("it is uncertain how much of {name} {}", explains(tried)),
             Determinacy::NotDetermined => format!("{} almost nothing of {name}", explains(tried)),
         };
-        let few = if self.units < Self::FEW_UNITS && self.r2.low < 1.0 - Self::NEGLIGIBLE {
-            format!(
-                ", from only {} independent stretches or groups: give a longer recording",
-                self.units
-            )
+        let is_open = self.r2.low < 1.0 - Self::NEGLIGIBLE;
+        let is_few = is_open && self.units < Self::FEW_UNITS;
+        let few = if is_few {
+            format!(", from only {} independent stretches or groups", self.units)
         } else {
             String::new()
         };
-        let tails = if self.is_heavy_tailed {
+        let tails = if is_open && self.is_heavy_tailed {
             ", where a few samples make up most of the error: the true R² may well lie outside"
         } else {
             ""
@@ -186,12 +181,14 @@ impl Determination {
         // Enough decimals to show how far a good R² is from 1.
         let digits = (1.0 - (1.0 - value).abs().max(1e-9).log10().floor()).clamp(2.0, 6.0) as usize;
         let [value, low, high] = [value, low, high].map(|r2| format_below_one(r2, digits));
-        let others = if is_determined {
-            ""
-        } else {
-            "; another decoder may explain more"
+        let advice = match (self.determinacy(), is_few) {
+            (Determinacy::Uncertain, _) => "; record longer, or cross-validate all samples",
+            (Determinacy::Determined, true) => "; record longer",
+            (Determinacy::Determined, false) => "",
+            (_, true) => "; record longer; another decoder may explain more",
+            (_, false) => "; another decoder may explain more",
         };
-        format!("{claim} (R² {value}, {low} to {high}){few}{tails}{others}")
+        format!("{claim} (R² {value}, {low} to {high}){few}{tails}{advice}")
     }
 }
 

@@ -283,7 +283,7 @@ fn squared_errors(
     model: FittedModel,
     is_cancelled: &dyn Fn() -> bool,
 ) -> Result<Option<ndarray::Array2<f64>>, RunError> {
-    // A stretch may have no variation to learn from: its mean is then the answer.
+    // A stretch may have no variation to learn from: ridge regression then answers with its mean.
     let has_variation = split.training.has_varying_target();
     let answers = match model {
         FittedModel::Network if has_variation => {

@@ -99,7 +99,7 @@ impl SplitComparison {
                 units: random.1.units.min(honest.1.units),
                 freedom: random.1.freedom.min(honest.1.freedom),
             };
-            Some(Interval::of_ratio(ratio, spread, Interval::MAX_FACTOR)?.map(f64::sqrt))
+            Some(Interval::of_ratio(ratio, spread)?.map(f64::sqrt))
         };
         let ratios = (0..set.outputs()).map(ratio).collect();
         Some(Self::of(set, by, scores, ratios))
@@ -157,7 +157,11 @@ impl SplitComparison {
                 100.0 * (1.0 - ratio.value),
                 self.cause(target)
             ),
-            _ => format!(
+            None => format!(
+                "split at random, the RMSE of {name} is {random:.4}, and split by {by} {honest:.4}: too few independent \
+                 samples to judge the difference"
+            ),
+            Some(_) => format!(
                 "no significant difference between a random split (RMSE {random:.4} for {name}) and a split by {by} \
                  ({honest:.4})"
             ),
@@ -359,16 +363,15 @@ pub struct Interval {
 impl Interval {
     /// Minimum number of independent units for an interval.
     pub(super) const FEWEST_UNITS: usize = 3;
-    /// Usual maximum factor between an end and the figure; beyond it, the figure is not determined.
-    pub(super) const MAX_FACTOR: f64 = 100.0;
+    /// Maximum factor between an end and the figure; beyond it, the figure is not determined.
+    const MAX_FACTOR: f64 = 100.0;
 
     /// Returns the interval of a positive ratio with sampling variance `spread`: a Student's t interval in the
-    /// logarithm, in which the ratio of two sums of squares is nearly normal. `None` if the ratio is not determined
-    /// within `max_factor`.
-    pub(super) fn of_ratio(ratio: f64, spread: SumVariance, max_factor: f64) -> Option<Self> {
+    /// logarithm, in which the ratio of two sums of squares is nearly normal. `None` if the ratio is not determined.
+    pub(super) fn of_ratio(ratio: f64, spread: SumVariance) -> Option<Self> {
         let reach = student_quantile(spread.freedom) * spread.variance.sqrt() / ratio;
         // False for NaN.
-        let is_determined = ratio.is_finite() && ratio > 0.0 && reach <= max_factor.ln();
+        let is_determined = ratio.is_finite() && ratio > 0.0 && reach <= Self::MAX_FACTOR.ln();
         (is_determined && spread.units >= Self::FEWEST_UNITS).then(|| Self {
             value: ratio,
             low: ratio * (-reach).exp(),
@@ -458,7 +461,7 @@ mod tests {
             units,
             freedom,
         };
-        Interval::of_ratio(ratio, spread, Interval::MAX_FACTOR)
+        Interval::of_ratio(ratio, spread)
     }
 
     #[test]

@@ -216,8 +216,8 @@ fn channels_ui(ui: &mut Ui, found: &RecordingFindings) {
     dim_ui(
         ui,
         &format!(
-            "RMSE without a channel, relative to the RMSE with all channels; {} is fitted again for each. Dim: dispensable, \
-             because other channels replace it.",
+            "RMSE without a channel, relative to the RMSE with all channels; {} is fitted again for each. Dim: \
+             dispensable, because no error grows significantly without it.",
             name_of(found.findings.model)
         ),
     );
