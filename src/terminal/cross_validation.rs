@@ -17,11 +17,11 @@ use decoupler_core::{
     dataset::{Division, Folds, SplitBy, Stream},
     evaluation::{
         Channel, CrossValidated, ErrorTable, Problem, Run, RunError, RunSettings, Scores, TestErrors,
-        recorded::{Determination, NonlinearGain, SplitComparison},
+        recorded::{Determination, NonlinearGain, SplitComparison, channel_remarks},
     },
 };
 use decoupler_files::{
-    export::{describe_determinacy, error_table},
+    export::{describe_channels, describe_determinacy, error_table},
     import::{Dropped, Plan, Recording, Setup, SetupSets},
 };
 
@@ -127,11 +127,8 @@ impl Train {
         if honest.stop_reason().is_none() {
             return Err(Failure::InterruptedComparison { by });
         }
-        let scores = [&honest, run].map(|run| run.scores().expect("a run without folds has baselines"));
-        Ok(sentences(
-            &SplitComparison::of(set, by, scores),
-            &recordings.training.targets,
-        ))
+        let comparison = SplitComparison::of_runs(set, by, [&honest, run]).expect("a run without folds has baselines");
+        Ok(sentences(&comparison, &recordings.training.targets))
     }
 }
 
@@ -185,6 +182,11 @@ fn print_folds(
     let gains = NonlinearGain::of_validated(set, validated, by);
     let better = better(&problem, &scores);
     let mut warnings = recording.warnings.clone();
+    warnings.extend(describe_channels(
+        &recording.inputs,
+        channels,
+        &channel_remarks(set, by),
+    ));
     warnings.extend(optimism);
     warnings.extend(describe_determinacy(channels, &determined));
     let remarks = channels.iter().zip(gains);
@@ -192,7 +194,7 @@ fn print_folds(
     let fallbacks = channels.iter().zip(&better).filter(|(_, better)| **better != NETWORK);
     warnings.extend(fallbacks.map(|(channel, better)| {
         format!(
-            "for {}, the {better} is better than the network: its held-out error is lower",
+            "the held-out error of the {better} is lower than that of the network for {}",
             channel.name
         )
     }));

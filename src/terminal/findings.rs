@@ -23,7 +23,7 @@ use decoupler_core::{
     text::capitalised,
 };
 use decoupler_files::{
-    export::{Cell, Table, describe_target, describe_warnings, format_duration, format_number},
+    export::{Cell, Table, describe_target, describe_warnings, format_below_one, format_duration, format_number},
     import::{Dropped, ImportError, Plan, Recording},
 };
 use serde::Serialize;
@@ -230,7 +230,7 @@ struct Target<'a> {
     /// R² of the better of network and ridge.
     r2: Option<Figure>,
     better: Option<&'static str>,
-    /// `determined`, `weakly determined` or `not determined`.
+    /// `determined`, `weakly determined`, `uncertain` or `not determined`.
     standing: Option<&'static str>,
     sentence: String,
     r2_network: Option<Figure>,
@@ -360,7 +360,7 @@ impl<'a> Report<'a> {
     fn write_targets(&self, out: &mut impl Write) -> io::Result<()> {
         for target in &self.targets {
             write!(out, "{}", capitalised(&target.sentence))?;
-            let of = |name: &str, r2: Option<Figure>| r2.map(|r2| format!("{name} {:.2}", r2.value));
+            let of = |name: &str, r2: Option<Figure>| r2.map(|r2| format!("{name} {}", format_below_one(r2.value, 2)));
             let of: Vec<String> = [of("network", target.r2_network), of("ridge", target.r2_ridge)]
                 .into_iter()
                 .flatten()
@@ -470,6 +470,7 @@ impl<'a> Target<'a> {
             standing: best.map(|(_, determination)| match determination.determinacy() {
                 Determinacy::Determined => "determined",
                 Determinacy::WeaklyDetermined => "weakly determined",
+                Determinacy::Uncertain => "uncertain",
                 Determinacy::NotDetermined => "not determined",
             }),
             sentence: describe_target(name, of),

@@ -28,8 +28,8 @@ use decoupler_core::{
 };
 use decoupler_files::{
     export::{
-        NetworkFile, TrainingRecord, decoder_table, describe_coverage, describe_determinacy, describe_search,
-        describe_worse_than_ridge, error_table, format_duration, search_table,
+        NetworkFile, TrainingRecord, decoder_table, describe_coverage, describe_determinacy, describe_samples,
+        describe_search, describe_worse_than_ridge, error_table, format_duration, search_table,
     },
     import::{Recording, SetupSets},
 };
@@ -298,6 +298,7 @@ impl<'a> Trained<'a> {
                 self.extrapolation()
                     .and_then(|(found, recording)| found.warning(&recording.inputs, &recording.targets)),
             )
+            .chain(describe_samples(self.sets))
             .chain(search(self.file).and_then(AutoRecord::remark))
             .chain(self.optimism.iter().cloned())
             .chain(self.run.defect().map(|defect| defect.to_string()))

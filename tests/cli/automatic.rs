@@ -74,3 +74,20 @@ fn test_samples_take_no_part_in_the_choice() {
     assert_eq!(one["search"], other["search"]);
     assert_ne!(one["targets"], other["targets"]);
 }
+
+#[test]
+fn the_sample_recording_raises_no_warning() {
+    let folder = tempfile::tempdir().unwrap();
+    let sample = concat!(env!("CARGO_MANIFEST_DIR"), "/assets/samples/soft_skin.csv");
+    fs::copy(sample, folder.path().join("skin.csv")).unwrap();
+    let train =
+        "train --data skin.csv --inputs b1,b2,b3,b4,b5,b6,b7 --targets force,x,y --time time --group press --json";
+    let report = json(train, folder.path());
+    assert_eq!(report["warnings"], serde_json::json!([]));
+    for target in report["targets"].as_array().unwrap() {
+        assert!(
+            number(target, "r2") > 0.9 && target["r2_interval"][0].as_f64().unwrap() > 0.5,
+            "{target}"
+        );
+    }
+}

@@ -106,7 +106,7 @@ fn the_sample_recording_is_trained_on_after_three_clicks() {
         ("x", "target"),
     ];
     assert_meanings(&driver, &meanings);
-    assert!(driver.has("7 inputs, 3 targets, 600 samples"), "{:#?}", driver.texts());
+    assert!(driver.has("7 inputs, 3 targets, 900 samples"), "{:#?}", driver.texts());
     driver.limit_epochs("30");
     driver.train_recording();
     let errors = &driver.state().result().unwrap().errors;

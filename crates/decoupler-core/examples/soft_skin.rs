@@ -1,5 +1,5 @@
 //! Writes `assets/samples/soft_skin.csv`: a simulated recording of a soft skin with seven magnetometer-like channels over a
-//! 20 mm × 20 mm pad, pressed by a finger at forty places: `cargo run --example soft_skin > assets/samples/soft_skin.csv`.
+//! 20 mm × 20 mm pad, pressed by a finger at sixty places: `cargo run --example soft_skin > assets/samples/soft_skin.csv`.
 //!
 //! The pad is viscoelastic. With the force f(t) of the finger, its compression u follows the standard linear solid
 //! u = f/k + w, τ dw/dt = f/k₂ − w, so that loading and unloading differ (hysteresis). Channel i at (xᵢ, yᵢ) reads
@@ -9,7 +9,7 @@
 use std::f64::consts::PI;
 
 /// Positions pressed, samples of each press, and the time between samples in seconds.
-const PRESSES: usize = 40;
+const PRESSES: usize = 60;
 const SAMPLES: usize = 15;
 const INTERVAL_S: f64 = 0.02;
 /// Channels: position in millimetres, offset in millitesla, sensitivity in millitesla per millimetre.

@@ -9,7 +9,7 @@ use decoupler_core::{
     decoupling::DecoderKind,
     evaluation::{ErrorBlock, ErrorMeasure, ErrorRow, ErrorTable},
 };
-use decoupler_files::export::format_number;
+use decoupler_files::export::{format_number, format_r2};
 
 /// Name of the network's row.
 const NETWORK: &str = "network";
@@ -57,12 +57,16 @@ pub fn error_table_ui(ui: &mut Ui, table: &ErrorTable) {
     for block in &table.blocks {
         let judged = |row: &ErrorRow| judged.and_then(|place| row.errors.get(place).copied().flatten());
         let of_network = block.rows.iter().find(|row| row.name == NETWORK).and_then(judged);
+        let figure = |row: &ErrorRow, place: usize| match table.measures[place] {
+            ErrorMeasure::R2 => format_r2(row.errors[place]),
+            _ => format_number(row.errors[place]),
+        };
         let row = |row: &ErrorRow| {
             let name = match &block.target {
                 Some(target) => format!("{}, {}", target.title(), row.name),
                 None => row.name.to_owned(),
             };
-            TableRow::figures(row.name, shown.iter().map(|&place| format_number(row.errors[place])))
+            TableRow::figures(row.name, shown.iter().map(|&place| figure(row, place)))
                 .named(name)
                 .meaning(row_meaning(row.name))
                 .colour(match row.name {

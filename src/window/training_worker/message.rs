@@ -90,6 +90,8 @@ pub struct TrainedRun {
     pub recorded: Option<Recorded>,
     /// Training readings of a recording, by which a later drift is detected.
     pub drift: Option<DriftReference>,
+    /// Remarks on the samples of a recording.
+    pub of_samples: Vec<String>,
     /// Calibration of its intervals when it has ended; `None` for a simulated array.
     pub calibration: Option<Calibration>,
 }

@@ -31,7 +31,10 @@ use decoupler_core::{
     training::TrainingSettings,
 };
 use decoupler_files::{
-    export::{CheckpointFile, NetworkFile, describe_coverage, describe_determinacy, describe_worse_than_ridge},
+    export::{
+        CheckpointFile, NetworkFile, describe_coverage, describe_determinacy, describe_samples,
+        describe_worse_than_ridge,
+    },
     import::{ChoosingProgress, Plan, Progress, Setup, SetupSets},
 };
 
@@ -185,10 +188,12 @@ impl<'a> TrainingLoop<'a> {
             };
             let (recorded, drift, calibration) =
                 (sets.recorded().cloned(), sets.drift_reference(), Calibration::of(&sets));
+            let of_samples = describe_samples(&sets);
             Ok(run(sets, is_cancelled)?.map(|run| TrainedRun {
                 run,
                 recorded,
                 drift,
+                of_samples,
                 calibration,
             }))
         })
@@ -418,7 +423,8 @@ impl<'a> TrainingLoop<'a> {
         };
         let run = &trained.run;
         let determined = Determination::measure(run.test(), answers.view(), recorded.plan.division.by);
-        let mut remarks = describe_determinacy(&run.problem().targets, &determined);
+        let mut remarks = trained.of_samples.clone();
+        remarks.extend(describe_determinacy(&run.problem().targets, &determined));
         if let Some(baselines) = run.baselines() {
             let scores = Scores {
                 network: errors.clone(),
@@ -482,6 +488,7 @@ impl TrainedRun {
             run,
             recorded: sets.recorded().cloned(),
             drift: sets.drift_reference(),
+            of_samples: describe_samples(sets),
             calibration: Calibration::of(sets),
         }
     }

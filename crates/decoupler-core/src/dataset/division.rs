@@ -76,19 +76,21 @@ impl Division {
     /// (a sample or a group) each; a part that cannot be filled exactly with whole groups gets the number of samples
     /// nearest to its share. Nothing is held out for validation if only one unit remains.
     ///
+    /// If every target would be constant in the training samples, as with a single press near the end of a recording, the
+    /// first units are held out in place of the last.
+    ///
     /// # Errors
     /// If a share is out of range, or the set is a single unit.
     pub fn divide(&self, set: &Dataset, rng: &mut impl Rng) -> Result<DividedSamples, DivisionError> {
         self.check()?;
-        let mut units = self.by.ordered_units(set, rng);
+        let units = self.by.ordered_units(set, rng);
         if units.len() < 2 {
             return Err(DivisionError::TooFew {
                 samples: set.samples(),
                 unit: self.by.unit_name(units.len(), set.samples()),
             });
         }
-        let test = take_last(&mut units, self.test_fraction);
-        Ok(self.parts(units, test))
+        Ok(self.parts_with_variation(set, units, self.test_fraction))
     }
 
     /// Divides `set` into training and validation samples, for a separate test set; see [`Self::divide`].
@@ -97,7 +99,7 @@ impl Division {
     /// If a share is out of range.
     pub fn divide_for_training(&self, set: &Dataset, rng: &mut impl Rng) -> Result<DividedSamples, DivisionError> {
         self.check()?;
-        Ok(self.parts(self.by.ordered_units(set, rng), Vec::new()))
+        Ok(self.parts_with_variation(set, self.by.ordered_units(set, rng), 0.0))
     }
 
     /// Divides `set` for a run with this seed, and returns its training, validation and test samples: those of `test` if it is
@@ -120,7 +122,27 @@ impl Division {
         })
     }
 
-    fn parts(&self, mut units: Vec<Vec<usize>>, test: Vec<usize>) -> DividedSamples {
+    /// Holds out the last units, or the first if no target varies in what the last leave.
+    fn parts_with_variation(&self, set: &Dataset, mut units: Vec<Vec<usize>>, test_fraction: f64) -> DividedSamples {
+        let targets = set.targets();
+        let varies = |parts: &DividedSamples| {
+            let mut training = parts.training.windows(2);
+            training.any(|pair| targets.row(pair[0]) != targets.row(pair[1]))
+        };
+        let parts = self.parts(units.clone(), test_fraction);
+        if varies(&parts) {
+            return parts;
+        }
+        units.reverse();
+        Some(self.parts(units, test_fraction)).filter(varies).unwrap_or(parts)
+    }
+
+    fn parts(&self, mut units: Vec<Vec<usize>>, test_fraction: f64) -> DividedSamples {
+        let test = if test_fraction > 0.0 {
+            take_last(&mut units, test_fraction)
+        } else {
+            Vec::new()
+        };
         let validation = if units.len() > 1 && self.validation_fraction > 0.0 {
             take_last(&mut units, self.validation_fraction)
         } else {
@@ -238,7 +260,8 @@ pub fn hold_out(set: Dataset, held_out: usize, rng: &mut impl Rng) -> Split {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum SplitBy {
-    /// Blocks in the order of the samples, the last one for the test. Consecutive samples of one group stay together.
+    /// Blocks in the order of the samples, the last one for the test (the first, if only the last has changes of the
+    /// targets). Consecutive samples of one group stay together.
     #[default]
     Time,
     /// Whole groups, drawn at random: no group is in two parts.
@@ -386,6 +409,20 @@ mod tests {
         let parts = divide(&set(groups), SplitBy::Time, 0).unwrap();
         assert_eq!(parts.test, Vec::from_iter(90..100));
         assert_eq!(parts.validation, Vec::from_iter(60..90));
+    }
+
+    #[test]
+    fn the_only_change_of_the_targets_is_in_the_training_samples() {
+        let pressed = |press: std::ops::Range<usize>| {
+            let targets = Array2::from_shape_fn((100, 1), |(sample, _)| f64::from(u8::from(press.contains(&sample))));
+            Dataset::new(targets.clone(), targets, None, (0..100).collect()).unwrap()
+        };
+        for (press, test) in [(10..20, 80..100), (50..85, 80..100), (85..95, 0..20), (66..78, 0..20)] {
+            let set = pressed(press.clone());
+            let parts = divide(&set, SplitBy::Time, 0).unwrap();
+            assert_eq!(parts.test, Vec::from_iter(test), "{press:?}");
+            assert!(set.select(&parts.training).has_varying_target(), "{press:?}");
+        }
     }
 
     #[test]

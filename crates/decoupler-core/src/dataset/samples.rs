@@ -183,6 +183,12 @@ impl Dataset {
         self.targets.ncols()
     }
 
+    /// Returns `true` if a target is not the same in all samples.
+    pub fn has_varying_target(&self) -> bool {
+        let first = self.targets.row(0);
+        self.targets.rows().into_iter().any(|targets| targets != first)
+    }
+
     /// Row-wires read, from 0 in ascending order; `None` if unknown.
     pub fn row_wires_read(&self) -> Option<&[usize]> {
         self.rows.as_ref().map(|rows| &*rows.read)

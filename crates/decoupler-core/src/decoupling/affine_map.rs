@@ -312,10 +312,13 @@ impl TrainingMean {
     /// # Panics
     /// If there are no samples.
     pub fn fit(training: &Dataset) -> Self {
-        let targets = training.targets().mean_axis(Axis(0));
+        let targets = training.targets();
+        // As the mean of deviations, so that a large offset does not hide small changes.
+        let first = targets.row(0);
+        let off = (&targets - &first).mean_axis(Axis(0));
         Self {
             channels: training.channels(),
-            targets: targets.expect("a training set has samples"),
+            targets: off.expect("a training set has samples") + first,
         }
     }
 }

@@ -68,7 +68,11 @@ impl Ridge {
         }
         let total: f64 = weights.iter().sum();
         let column = ArrayView2::from_shape((samples, 1), weights).expect("as many as samples");
-        let mean = |values: &ArrayView2<'_, f64>| (values * &column).sum_axis(Axis(0)) / total;
+        // As the mean of deviations, so that a large offset does not hide small changes.
+        let mean = |values: &ArrayView2<'_, f64>| {
+            let first = values.row(0);
+            ((values - &first) * column).sum_axis(Axis(0)) / total + first
+        };
         let (x_mean, y_mean) = (mean(&x), mean(&y));
         let roots: Vec<f64> = weights.iter().map(|weight| weight.sqrt()).collect();
         // The squared error that noise adds, summed over all samples, is that of these additional rows.

@@ -8,6 +8,7 @@ use super::{Baselines, Run, RunError, RunSettings, Scores, TestErrors, baselines
 use crate::{
     dataset::{Dataset, FoldUnit, Folds, Seed, Split, Stream},
     decoupling::decode_set,
+    training::TrainingError,
 };
 
 /// k-fold cross-validation, repeated with the samples reshuffled; [`CrossValidated::on_folds`] accepts other folds.
@@ -127,13 +128,21 @@ impl CrossValidated {
             let (samples, test) = (folds.test(fold), tested.select(folds.test(fold)));
             let split = split(set, &folds, fold, holds_out);
             let (mut of_mean, mut of_linear) = fit_baselines(&split.training, settings)?;
-            scatter(&mut mean, samples, &decode_set(&mut of_mean, &test)?);
+            let answers_of_mean = decode_set(&mut of_mean, &test)?;
+            scatter(&mut mean, samples, &answers_of_mean);
             scatter(&mut linear, samples, &decode_set(&mut of_linear, &test)?);
             let settings = RunSettings {
                 seed: nth_seed(settings.seed, fold),
                 ..*settings
             };
-            let mut run = Run::of_networks_on_sets(settings, split, test)?;
+            let mut run = match Run::of_networks_on_sets(settings, split, test) {
+                // Every target is constant without this fold: the constant is the answer.
+                Err(RunError::Training(TrainingError::NothingVaries)) if set.has_varying_target() => {
+                    scatter(&mut network, samples, &answers_of_mean);
+                    continue;
+                }
+                run => run?,
+            };
             let Some(of_fold) = Effort::train(&mut run, &is_cancelled) else {
                 return Ok(None);
             };

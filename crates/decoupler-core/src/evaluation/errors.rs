@@ -249,12 +249,8 @@ impl TargetErrors {
 
     fn of_one(targets: ArrayView1<'_, f64>, answers: ArrayView1<'_, f64>) -> Self {
         let count = targets.len() as f64;
-        let mean = targets.sum() / count;
-        let (lowest, highest) = targets
-            .iter()
-            .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), &value| {
-                (low.min(value), high.max(value))
-            });
+        let mean = mean(targets);
+        let (lowest, highest) = extremes(targets);
         let (mut squares, mut sum, mut worst, mut worst_sample, mut variation) = (0.0, 0.0, 0.0_f64, 0, 0.0);
         for (sample, (target, answer)) in targets.iter().zip(answers).enumerate() {
             let error = (answer - target).abs();
@@ -265,7 +261,7 @@ impl TargetErrors {
             }
             variation += (target - mean) * (target - mean);
         }
-        let varies = highest > lowest;
+        let varies = varies(targets);
         Self {
             rmse: (squares / count).sqrt(),
             mae: sum / count,
@@ -276,6 +272,31 @@ impl TargetErrors {
                 .filter(|percent| varies && percent.is_finite()),
         }
     }
+}
+
+/// Returns the mean as that of the deviations from the first value, so that a large offset does not hide small
+/// differences; NaN without values.
+pub(crate) fn mean(values: ArrayView1<'_, f64>) -> f64 {
+    let first = values.first().copied().unwrap_or(f64::NAN);
+    first
+        + values
+            .iter()
+            .map(|value| (value - first) / values.len() as f64)
+            .sum::<f64>()
+}
+
+fn extremes(values: ArrayView1<'_, f64>) -> (f64, f64) {
+    values
+        .iter()
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), &value| {
+            (low.min(value), high.max(value))
+        })
+}
+
+/// Returns `true` if the values differ by more than rounding.
+pub(crate) fn varies(values: ArrayView1<'_, f64>) -> bool {
+    let (low, high) = extremes(values);
+    high - low > 4.0 * f64::EPSILON * high.abs().max(low.abs())
 }
 
 /// Minimum, quartiles and maximum of a set of numbers.

@@ -1,6 +1,7 @@
 use faer::{Mat, Side, linalg::solvers::Solve};
 use ndarray::{Array2, ArrayView2};
 
+use super::errors::mean;
 use crate::dataset::Folds;
 
 /// Penalties of the standardised inputs, in units of the number of samples.
@@ -15,6 +16,8 @@ pub(super) struct RidgePath {
     standard: Vec<(f64, f64)>,
     /// Products AᵀA and AᵀY of each fold, with a last column of ones in A.
     products: Vec<(Mat<f64>, Mat<f64>)>,
+    /// Mean of each target, which is subtracted first: squares of a large offset would hide the changes.
+    offsets: Vec<f64>,
     samples: f64,
     /// Index of the best penalty of each target.
     best: Vec<usize>,
@@ -39,13 +42,14 @@ impl RidgePath {
                 (mean, if varies { 1.0 / deviation } else { 0.0 })
             })
             .collect();
+        let offsets: Vec<f64> = targets.columns().into_iter().map(mean).collect();
         let part = |fold: usize| {
             let test = folds.test(fold);
             let a = Mat::from_fn(test.len(), n + 1, |row, i| match standard.get(i) {
                 Some((mean, scale)) => (inputs[[test[row], i]] - mean) * scale,
                 None => 1.0,
             });
-            let y = Mat::from_fn(test.len(), m, |row, t| targets[[test[row], t]]);
+            let y = Mat::from_fn(test.len(), m, |row, t| targets[[test[row], t]] - offsets[t]);
             (a, y)
         };
         let parts: Vec<(Mat<f64>, Mat<f64>)> = (0..folds.count()).map(part).collect();
@@ -84,6 +88,7 @@ impl RidgePath {
             squares: squares.iter().map(of_fold).collect(),
             standard,
             products,
+            offsets,
             samples,
             best,
         })
@@ -102,7 +107,7 @@ impl RidgePath {
         let mut coefficients = Array2::zeros((n + 1, m));
         for (t, &penalty) in self.best.iter().enumerate() {
             let map = solve(&gram, &right, PENALTIES[penalty] * self.samples)?;
-            let mut constant = map[(n, t)];
+            let mut constant = self.offsets[t] + map[(n, t)];
             for (i, (mean, scale)) in self.standard.iter().enumerate() {
                 coefficients[[i, t]] = map[(i, t)] * scale;
                 constant -= mean * coefficients[[i, t]];

@@ -30,25 +30,28 @@ pub fn format_number(value: impl Into<Option<f64>>) -> String {
     format!("{value:.*}", usize::try_from(decimals).unwrap_or(0))
 }
 
-/// Formats a number with `decimals` decimals, where the distance from a round value matters, as for R² near 1:
-/// `0.9987`. A number of 10000 or more in magnitude, or a missing one, is formatted as by [`format_number`].
-pub fn format_decimals(value: impl Into<Option<f64>>, decimals: usize) -> String {
+/// Formats R², the coefficient of determination: as [`format_number`], with more digits where a value below 1 would be
+/// rounded to 1: `0.951`, `0.9998`, `0.9999997`.
+pub fn format_r2(value: impl Into<Option<f64>>) -> String {
     match value.into() {
-        Some(value) if value.abs() < 1e4 => {
-            let text = format!("{value:.decimals$}");
-            // No -0.0000.
-            match text.strip_prefix('-') {
-                Some(zero) if zero.chars().all(|digit| "0.".contains(digit)) => zero.to_owned(),
-                _ => text,
-            }
-        }
+        Some(value) if (0.9995..1.0).contains(&value) => format_below_one(value, 4),
         value => format_number(value),
     }
 }
 
-/// Formats R², the coefficient of determination, with four decimals.
-pub fn format_r2(value: impl Into<Option<f64>>) -> String {
-    format_decimals(value, 4)
+/// Formats a number with `decimals` decimals, or as many more as show that it is below 1.
+pub fn format_below_one(value: f64, decimals: usize) -> String {
+    let text = |decimals: usize| format!("{value:.decimals$}");
+    let is_one =
+        |decimals: &usize| value < 1.0 && text(*decimals) == format!("{:.decimals$}", 1.0, decimals = *decimals);
+    /// Decimals of the largest number below 1.
+    const MAX: usize = 16;
+    let text = text((decimals..MAX).find(|decimals| !is_one(decimals)).unwrap_or(MAX));
+    // No -0.00.
+    match text.strip_prefix('-') {
+        Some(zero) if zero.chars().all(|digit| "0.".contains(digit)) => zero.to_owned(),
+        _ => text,
+    }
 }
 
 /// Formats a number as [`format_number`] does, with a percent sign.
@@ -279,20 +282,25 @@ mod tests {
     }
 
     #[test]
-    fn requested_decimals_are_kept() {
+    fn r2_is_rounded_to_one_only_if_it_is_one() {
         let cases = [
-            (Some(0.998_76), "0.9988"),
-            (Some(1.0), "1.0000"),
-            (Some(-0.12), "-0.1200"),
-            (Some(-1e-7), "0.0000"),
-            (Some(-123_456.0), "-1.23e5"),
-            (Some(f64::NAN), "–"),
+            (Some(0.951_2), "0.951"),
+            (Some(0.999_4), "0.999"),
+            (Some(0.999_76), "0.9998"),
+            (Some(0.999_98), "0.99998"),
+            (Some(1.0 - 3e-9), "0.999999997"),
+            (Some(1.0 - f64::EPSILON / 2.0), "0.9999999999999999"),
+            (Some(1.0), "1.00"),
+            (Some(-0.12), "-0.120"),
             (Some(f64::NEG_INFINITY), "–"),
             (None, "–"),
         ];
         for (value, text) in cases {
             assert_eq!(format_r2(value), text);
         }
+        assert_eq!(format_below_one(-1e-7, 2), "0.00");
+        assert_eq!(format_below_one(0.998, 2), "0.998");
+        assert_eq!(format_below_one(1.002, 2), "1.00");
     }
 
     #[test]

@@ -55,7 +55,9 @@ pub enum TrainingError {
     #[error(transparent)]
     Setting(#[from] SettingError),
     /// No target varies.
-    #[error("every target is constant in the training set: there is nothing to learn; draw more samples")]
+    #[error(
+        "every target is constant in the training set: there is nothing to learn; give samples in which a target changes by more than rounding"
+    )]
     NothingVaries,
     /// The network has no hidden nodes.
     #[error("the network has no hidden nodes: give at least 1")]

@@ -50,7 +50,7 @@ mod unfinished;
 
 pub use atomic::{AtomicFile, WriteError, atomic_write, check_writable, is_same};
 pub use checkpoint_file::CheckpointFile;
-pub use decoupler_core::text::{format_decimals, format_duration, format_number, format_percent, format_r2};
+pub use decoupler_core::text::{format_below_one, format_duration, format_number, format_percent, format_r2};
 pub use document::{DocumentError, DocumentKind};
 pub use experiment_tables::{
     ExperimentColumn, ExperimentColumnKind, ExperimentTable, cells_table, describe_conditions, describe_failures,
@@ -68,8 +68,8 @@ pub use sweep::{
 };
 pub use table::{Cell, Table, TableColumn, TableForm};
 pub use tables::{
-    decoder_table, describe_coverage, describe_determinacy, describe_positions, describe_target, describe_warnings,
-    describe_worse_than_ridge, error_table, write_loss_curves,
+    decoder_table, describe_channels, describe_coverage, describe_determinacy, describe_positions, describe_samples,
+    describe_target, describe_warnings, describe_worse_than_ridge, error_table, write_loss_curves,
 };
 pub use trade_tables::{describe_recorded_workload, describe_workload, trade_off_points, trade_off_summary};
 pub use unfinished::exit_leaving_nothing;

@@ -1,10 +1,14 @@
 use std::io::{self, Write};
 
 use decoupler_core::{
+    dataset::{Dataset, Seed, SplitBy, Stream},
     evaluation::{
         Channel, Coverage, DecoderReport, ErrorBlock, ErrorMeasure, ErrorRow, ErrorTable, Errors, Problem, Scores,
         TargetErrors, TargetPosition, TestErrors,
-        recorded::{Determinacy, Determination, Findings, FittedModel, TargetFindings, Undetermined},
+        recorded::{
+            ChannelRemark, Determinacy, Determination, Findings, FittedModel, TargetFindings, Undetermined,
+            target_remarks,
+        },
     },
     text::in_one_line,
     training::EpochRecord,
@@ -13,6 +17,7 @@ use serde::Deserialize;
 use serde_json::error::Category;
 
 use super::{Cell, Table, TableColumn, format_number};
+use crate::import::{Recording, SetupSets};
 
 /// Returns the error table: a row for each decoder and baseline; for a recording, a row for each of them and each
 /// target.
@@ -22,7 +27,7 @@ pub fn error_table(table: &ErrorTable) -> Table {
     let measures = table.measures.iter().copied().map(error_column);
     let row = |block: &ErrorBlock, row: &ErrorRow| -> Vec<Cell> {
         let target = has_targets.then(|| block.target.as_ref().map_or(String::new(), Channel::title).into());
-        let errors = row.errors.iter().copied().map(Cell::from);
+        let errors = row.errors.iter().zip(table.measures).map(error_cell);
         target.into_iter().chain([row.name.into()]).chain(errors).collect()
     };
     let rows = table
@@ -94,7 +99,7 @@ fn recording_decoder_table(problem: &Problem, reports: &[DecoderReport]) -> Tabl
     let measures = [ErrorMeasure::Rmse, ErrorMeasure::R2, ErrorMeasure::RangePercent];
     let row = |report: &DecoderReport, target: &Channel, errors: &TargetErrors| {
         let names = [report.kind.name(report.precision).into(), target.title().into()];
-        let errors = measures.map(|measure| measure.of_target(errors).into());
+        let errors = measures.map(|measure| error_cell((&measure.of_target(errors), &measure)));
         let times = [report.cost.frame_us.into(), report.cost.fit_seconds.into()];
         Vec::from_iter(names.into_iter().chain(errors).chain(times))
     };
@@ -112,6 +117,13 @@ fn recording_decoder_table(problem: &Problem, reports: &[DecoderReport]) -> Tabl
     Table {
         columns: names.into_iter().chain(errors).chain(times).collect(),
         rows: rows.collect(),
+    }
+}
+
+fn error_cell((error, measure): (&Option<f64>, &ErrorMeasure)) -> Cell {
+    match measure {
+        ErrorMeasure::R2 => Cell::R2(*error),
+        _ => Cell::Number(*error),
     }
 }
 
@@ -280,11 +292,56 @@ pub fn describe_target(name: &str, found: &TargetFindings) -> String {
     }
 }
 
-/// Warns of channels that carry less information than they should, and of targets for which a network is no better than
-/// ridge.
-pub fn describe_warnings(inputs: &[Channel], targets: &[Channel], findings: &Findings) -> Vec<String> {
+/// Describes remarks on channels and targets.
+pub fn describe_channels(inputs: &[Channel], targets: &[Channel], remarks: &[ChannelRemark]) -> Vec<String> {
     let name = |channel: usize| inputs[channel].name.clone();
-    let mut warnings: Vec<String> = findings.remarks.iter().map(|remark| remark.sentence(name)).collect();
+    let target_name = |target: usize| targets[target].name.clone();
+    remarks
+        .iter()
+        .map(|remark| remark.sentence(name, target_name))
+        .collect()
+}
+
+/// Warns of readings that may be leaks, and of changes of the targets that were not tested, in the samples of a recording.
+pub fn describe_samples(sets: &SetupSets) -> Vec<String> {
+    let Some(recordings) = &sets.recordings else {
+        return Vec::new();
+    };
+    let (training, test) = (&sets.sets.split.training, &sets.sets.test);
+    let Recording {
+        inputs, targets, set, ..
+    } = &recordings.training;
+    let division = recordings.recorded.plan.division;
+    // With a memory, the readings are followed by values from the past.
+    let remarks = target_remarks(training, inputs.len().min(training.channels()), division.by);
+    let mut warnings = describe_channels(inputs, targets, &remarks);
+    let parts = division.divide(set, &mut Seed(0).rng(Stream::Split));
+    let tests_first = parts.is_ok_and(|parts| parts.test.first() == Some(&0));
+    if division.by == SplitBy::Time && recordings.test.is_none() && tests_first {
+        let text = "all changes of the targets are in the last part of the recording, so that the first part was held out \
+                    for testing in its place";
+        warnings.push(text.to_owned());
+    }
+    let is_constant = |set: &Dataset, target: usize| {
+        let values = set.targets();
+        let values = values.column(target);
+        values.iter().all(|value| *value == values[0])
+    };
+    let untrained = targets.iter().enumerate();
+    let untrained = untrained.filter(|(target, _)| is_constant(training, *target) && !is_constant(test, *target));
+    warnings.extend(untrained.map(|(_, target)| {
+        format!(
+            "{} is constant in the training samples, so that the network always answers this constant: record its changes, \
+             or split another way",
+            target.name
+        )
+    }));
+    warnings
+}
+
+/// Warns of remarks on channels and targets, and of targets for which a network is no better than ridge.
+pub fn describe_warnings(inputs: &[Channel], targets: &[Channel], findings: &Findings) -> Vec<String> {
+    let mut warnings = describe_channels(inputs, targets, &findings.remarks);
     for (target, found) in targets.iter().zip(&findings.targets) {
         warnings.extend(found.gain.and_then(|gain| gain.remark(&target.name)));
     }

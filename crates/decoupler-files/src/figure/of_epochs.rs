@@ -456,6 +456,7 @@ mod tests {
             points: vec![point(100), point(200), point(400)],
             law: Some(law),
             doubling: None,
+            deviation: 1.0,
         };
         let figure = learning_curve_figure(&curve, "force", Some("N"));
         let [law, measured] = &figure.plots[0].series[..] else {

@@ -8,7 +8,7 @@ use decoupler_core::{
     scene::{Loading, Movement, Noise, NoisySets, Rows, Scene},
 };
 use decoupler_files::{
-    export::{Table, TableColumn, format_duration, format_number},
+    export::{Table, TableColumn, format_duration, format_number, format_r2},
     figure::{
         Figure, PlotFigure, compared_losses_figure,
         surface::{Surface, SurfaceFigure},
@@ -476,7 +476,7 @@ fn target_figures(runs: &RunList) -> Vec<(String, [Option<String>; 2])> {
         let title = target.title();
         [
             (format!("RMSE of {title}"), of(|errors| format_number(errors.rmse))),
-            (format!("R² of {title}"), of(|errors| format_number(errors.r2))),
+            (format!("R² of {title}"), of(|errors| format_r2(errors.r2))),
         ]
     };
     targets.into_iter().flat_map(figures).collect()

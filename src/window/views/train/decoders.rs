@@ -11,7 +11,10 @@ use decoupler_core::{
     evaluation::{DecoderReport, DecoderSet, ErrorMeasure, Errors, Problem, Source},
     network::Networks,
 };
-use decoupler_files::{export::format_number, import::Setup};
+use decoupler_files::{
+    export::{format_number, format_r2},
+    import::Setup,
+};
 use eframe::egui::{Button, CollapsingHeader, Ui, Vec2};
 
 use crate::window::{
@@ -321,6 +324,7 @@ fn measured_ui(
         let cells = figures.iter().map(|figure| match &result.report {
             None => "…".to_owned(),
             Some(Err(_)) => format_number(None),
+            Some(Ok(report)) if *figure == Figure::R2 => format_r2(figure.value(report, limit, target)),
             Some(Ok(report)) => format_number(figure.value(report, limit, target)),
         });
         let colour = if result.kind == DecoderKind::Network {

@@ -1,5 +1,6 @@
-use ndarray::ArrayView2;
+use ndarray::{ArrayView1, ArrayView2};
 
+use super::super::errors::{mean, varies};
 use crate::dataset::Folds;
 
 /// Errors of held-out answers, fold by fold, relative to the spread of the targets.
@@ -72,15 +73,12 @@ impl FoldErrors {
 
 /// Variance of each target; 0 for one that does not vary, or only by rounding.
 pub(super) fn variances(targets: ArrayView2<'_, f64>) -> Vec<f64> {
-    let of_target = |column: ndarray::ArrayView1<'_, f64>| {
-        let count = column.len() as f64;
-        let mean = column.sum() / count;
-        let variance = column.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / count;
-        if variance.sqrt() > 1e-12 * mean.abs() {
-            variance
-        } else {
-            0.0
+    let of_target = |column: ArrayView1<'_, f64>| {
+        if !varies(column) {
+            return 0.0;
         }
+        let mean = mean(column);
+        column.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / column.len() as f64
     };
     targets.columns().into_iter().map(of_target).collect()
 }

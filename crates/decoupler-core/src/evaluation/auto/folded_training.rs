@@ -14,7 +14,7 @@ use crate::{
     dataset::{Dataset, Folds},
     network::{Inputs, MinMax, Shape, nguyen_widrow},
     scene::NoiseSource,
-    training::{Examples, Problem, StoppingRules, Trainer, TrainingSettings},
+    training::{Examples, Problem, StoppingRules, Trainer, TrainingError, TrainingSettings},
 };
 
 /// Committees trained on all folds but one, for each fold, which advance together epoch by epoch: the epoch at which to
@@ -43,6 +43,7 @@ pub(super) struct BestEpoch {
 
 /// Trainings without one fold.
 struct Part {
+    /// Empty if every target is constant without the fold: the constant is then the answer.
     trainers: Vec<Trainer>,
     /// Scaled inputs of the held-out samples.
     inputs: Array2<f64>,
@@ -70,12 +71,13 @@ impl<'a> FoldedTraining<'a> {
             Part::new(settings, &set.select(&thinned), &set.select(folds.test(fold)), fold)
         });
         let parts: Vec<Part> = parts.collect::<Result<_, _>>()?;
+        if parts.iter().all(|part| part.trainers.is_empty()) {
+            return Err(TrainingError::NothingVaries.into());
+        }
         let of_part = |part: &Part| {
-            let shape = part.trainers[0].present().shape();
-            let training = settings
-                .training
-                .method
-                .epoch_multiplications(shape, part.trainers[0].samples());
+            let Some(first) = part.trainers.first() else { return 0.0 };
+            let shape = first.present().shape();
+            let training = settings.training.method.epoch_multiplications(shape, first.samples());
             let answers = part.inputs.nrows() * (shape.weights() + TANH * shape.hidden);
             settings.starts as f64 * (training + answers as f64)
         };
@@ -146,6 +148,7 @@ impl Part {
         let (x, y) = (scaled(training.readings()), outputs.scale(training.targets()));
         let linear = match settings.initialization {
             Initialization::Random => None,
+            Initialization::Ridge if outputs.varying().is_empty() => None,
             Initialization::Ridge => LinearStart::fit(x.view(), y.view(), LinearStart::nodes(settings.hidden)),
         };
         let examples = Examples::new(x.view(), y.view());
@@ -167,21 +170,26 @@ impl Part {
             },
         };
         let seed = nth_seed(settings.seed, fold);
-        let trainers = (0..settings.starts).map(|start| {
+        let starts = if shape.outputs == 0 { 0 } else { settings.starts };
+        let trainers = (0..starts).map(|start| {
             let mut mlp = nguyen_widrow(shape, &mut seed.start_rng(start));
             if let Some(linear) = &linear {
                 linear.apply(&mut mlp);
             }
             Trainer::new(mlp, problem.clone(), rules)
         });
-        Ok(Self {
+        let mut part = Self {
             trainers: trainers.collect::<Result<_, _>>()?,
             inputs: scaled(test.readings()),
             outputs,
             targets: test.targets().to_owned(),
             answers: Array2::zeros(test.targets().dim()),
             squares: vec![f64::INFINITY; test.outputs()],
-        })
+        };
+        if part.trainers.is_empty() {
+            part.answer(Array2::zeros((test.samples(), 0)));
+        }
+        Ok(part)
     }
 
     fn step(&mut self) {
@@ -195,8 +203,14 @@ impl Part {
             });
         }
         let count = self.trainers.len() as f64;
-        let Some(sum) = sum else { return };
-        self.answers = self.outputs.restore((sum / count).view());
+        if let Some(sum) = sum {
+            self.answer(sum / count);
+        }
+    }
+
+    /// Sets the answers from scaled ones, and their squared errors.
+    fn answer(&mut self, scaled: Array2<f64>) {
+        self.answers = self.outputs.restore(scaled.view());
         for (target, square) in self.squares.iter_mut().enumerate() {
             let (answers, targets) = (self.answers.column(target), self.targets.column(target));
             let errors = answers

@@ -28,6 +28,7 @@ use super::{Initialization, RunError, RunSettings};
 use crate::{
     dataset::{Dataset, Folds, History, Memory, Span, SplitBy},
     network::{InputChoice, Quantity, ScalingChoice},
+    text::format_percent,
     training::Method,
 };
 use fold_errors::FoldErrors;
@@ -114,7 +115,7 @@ impl fmt::Display for AutoProgress {
         } = self;
         write!(f, "Trying candidate {candidate} of {candidates}: {name}")?;
         match best {
-            Some(best) => write!(f, ", best error so far {:.1} %", 100.0 * best),
+            Some(best) => write!(f, ", best error so far {}", format_percent(100.0 * best)),
             None => Ok(()),
         }
     }
@@ -248,11 +249,11 @@ impl AutoRecord {
         let (choice, ridge) = (self.choice()?, self.ridge()?);
         (choice.error >= ridge.error).then(|| {
             format!(
-                "in cross-validation, no network that was tried is better than ridge regression: error {:.1} % of the spread \
-                 of the targets, ridge ({}) {:.1} %",
-                100.0 * choice.error,
+                "in cross-validation, no network that was tried is better than ridge regression: error {} of the spread of \
+                 the targets, ridge ({}) {}",
+                format_percent(100.0 * choice.error),
                 ridge.features(),
-                100.0 * ridge.error
+                format_percent(100.0 * ridge.error)
             )
         })
     }

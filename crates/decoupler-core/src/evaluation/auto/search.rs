@@ -2,13 +2,13 @@ use super::{
     super::{Combination, Initialization, RunError, RunSettings},
     AutoChoice, AutoFixed, AutoProgress, AutoRecord, AutoSamples, MULTIPLICATIONS_PER_SECOND, Tried, TriedModel,
     describe_features, describe_network,
-    fold_errors::FoldErrors,
+    fold_errors::{FoldErrors, variances},
     folded_training::{BestEpoch, FoldedTraining},
 };
 use crate::{
     dataset::{Dataset, Folds, Memory, Seed, SplitBy, Stream},
     network::{InputChoice, InputScaling, Inputs, LARGEST_HIDDEN, ScalingChoice, Shape},
-    training::Method,
+    training::{Method, TrainingError},
 };
 
 /// Number of blocks or sets of groups in the cross-validation.
@@ -93,6 +93,9 @@ impl<'a> Search<'a> {
         is_cancelled: &'a dyn Fn() -> bool,
         on_progress: &'a mut dyn FnMut(AutoProgress),
     ) -> Result<Self, RunError> {
+        if variances(samples.set.targets()).iter().all(|variance| *variance == 0.0) {
+            return Err(TrainingError::NothingVaries.into());
+        }
         let folds = folds(samples, base.seed)?;
         Ok(Self {
             base: *base,

@@ -1,6 +1,9 @@
 use crate::dataset::{Memory, Span};
 
-use super::AutoSamples;
+use super::{
+    super::errors::{mean, varies},
+    AutoSamples,
+};
 
 /// Shortest time constant in samples.
 const SHORTEST: f64 = 2.0;
@@ -63,12 +66,12 @@ fn correlation_time(samples: &AutoSamples<'_>) -> f64 {
     let count = samples.set.samples();
     let mut times: Vec<f64> = Vec::new();
     for column in samples.set.targets().columns() {
-        let mean = column.sum() / count as f64;
-        let values: Vec<f64> = order.iter().map(|&sample| column[sample] - mean).collect();
-        let variance = values.iter().map(|value| value * value).sum::<f64>() / count as f64;
-        if variance.sqrt() <= 1e-12 * mean.abs() {
+        if !varies(column) {
             continue;
         }
+        let mean = mean(column);
+        let values: Vec<f64> = order.iter().map(|&sample| column[sample] - mean).collect();
+        let variance = values.iter().map(|value| value * value).sum::<f64>() / count as f64;
         let correlation = |lag: usize| {
             let (mut sum, mut pairs) = (0.0, 0_usize);
             for sample in lag..count {

@@ -1,14 +1,19 @@
-use ndarray::ArrayView2;
+use ndarray::{ArrayView1, ArrayView2};
 use thiserror::Error;
 
 use super::{
     FittedModel, Interval,
     channel_remark::rmse_ratio,
     evidence::{Evidence, SumVariance},
+    split_comparison::student_quantile,
 };
 use crate::{
     dataset::{Dataset, SplitBy},
-    evaluation::CrossValidated,
+    evaluation::{
+        CrossValidated,
+        errors::{mean, varies},
+    },
+    text::format_below_one,
 };
 
 /// Coefficient of determination R² of held-out answers for one target: the share of its variance explained by the
@@ -23,15 +28,17 @@ pub struct Determination {
     pub is_heavy_tailed: bool,
 }
 
-/// Degree to which readings determine a target.
+/// Degree to which readings determine a target, by R² and its interval.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Determinacy {
     /// R² ≥ 0.5 and its interval excludes 0.
     Determined,
-    /// R² is below 0.5: the readings explain less than half of the target's variance.
+    /// R² is below 0.5, its interval excludes 0 and reaches 0.1 or more.
     WeaklyDetermined,
-    /// The interval of R² includes 0, so that always answering the mean may be as good; or R² is below 0.1, so that the
-    /// error is within 5 % (√0.9) of that of the mean.
+    /// The interval of R² includes both 0 and 0.1: always answering the mean may be as good, or clearly worse.
+    Uncertain,
+    /// The whole interval of R² is below 0.1: the error is within 5 % (√0.9) of that of always answering the mean, or
+    /// worse.
     NotDetermined,
 }
 
@@ -40,7 +47,7 @@ pub enum Determinacy {
 #[non_exhaustive]
 pub enum Undetermined {
     /// The target is constant.
-    #[error("it is constant in the analysed samples")]
+    #[error("it is constant in the samples judged, so that their errors do not show how well its changes are decoded")]
     Constant,
     /// There are too few independent units for an interval.
     #[error("there are fewer than 3 independent stretches or groups: record longer, or record more groups")]
@@ -48,7 +55,7 @@ pub enum Undetermined {
         /// Number of independent stretches or groups.
         units: usize,
     },
-    /// The error is not known within a factor of 100, or is NaN.
+    /// The error is NaN, or neither negligible nor known within a factor of 100.
     #[error(
         "its R² is not determined by {units} independent stretches or groups: record longer, or record more groups"
     )]
@@ -61,6 +68,8 @@ pub enum Undetermined {
 impl Determination {
     /// Minimum number of units for a reliable interval.
     pub const FEW_UNITS: usize = 10;
+    /// Largest value of 1 − R² at which more units would not change the verdict.
+    const NEGLIGIBLE: f64 = 0.01;
 
     /// Measures `answers` (samples × outputs) against the targets of `set`, target by target. The independent units are
     /// groups if `by` is [`SplitBy::Group`], otherwise stretches in the order of the samples.
@@ -78,7 +87,7 @@ impl Determination {
         let evidence = Evidence::of(set, by);
         let columns = set.targets().into_owned();
         let columns = columns.columns().into_iter().zip(answers.columns());
-        let of = |(truth, answers): (ndarray::ArrayView1<'_, f64>, ndarray::ArrayView1<'_, f64>)| {
+        let of = |(truth, answers): (ArrayView1<'_, f64>, ArrayView1<'_, f64>)| {
             Self::of_one(&evidence, &truth.to_vec(), &answers.to_vec())
         };
         columns.map(of).collect()
@@ -87,10 +96,7 @@ impl Determination {
     fn of_one(evidence: &Evidence, truth: &[f64], answers: &[f64]) -> Result<Self, Undetermined> {
         let off = centred(truth);
         let scale = off.iter().copied().map(f64::abs).fold(0.0, f64::max);
-        let min = truth.iter().copied().fold(f64::INFINITY, f64::min);
-        let max = truth.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-        // The values differ by no more than rounding.
-        if max - min <= 4.0 * f64::EPSILON * max.abs().max(min.abs()) {
+        if !varies(ArrayView1::from(truth)) {
             return Err(Undetermined::Constant);
         }
         // Scaled by the largest deviation to avoid overflow.
@@ -118,15 +124,15 @@ impl Determination {
             // From the square of the mean: the mean of few units differs from the true mean.
             + 2.0 * (of_mean.variance * unexplained / count).powi(2)
             + of_fits(evidence, &off, &centred(answers), scale);
-        let ratio = if unexplained == 0.0 {
-            Some(Interval {
-                value: 0.0,
-                low: 0.0,
-                high: 0.0,
-            })
-        } else {
-            Interval::of_ratio(unexplained, SumVariance { variance, ..spread })
+        let spread = SumVariance { variance, ..spread };
+        // The logarithm of a very small error can be uncertain although the error is certainly small.
+        let high = unexplained + student_quantile(spread.freedom) * variance.sqrt();
+        let small = Interval {
+            value: unexplained,
+            low: 0.0,
+            high,
         };
+        let ratio = Interval::of_ratio(unexplained, spread).or((high <= Self::NEGLIGIBLE).then_some(small));
         Ok(Self {
             r2: ratio.ok_or(Undetermined::Unbounded { units })?.map(|ratio| 1.0 - ratio),
             units,
@@ -136,8 +142,10 @@ impl Determination {
 
     /// Returns the degree to which the readings determine the target.
     pub fn determinacy(&self) -> Determinacy {
-        if self.r2.value < 0.1 || self.r2.low <= 0.0 {
+        if self.r2.high < 0.1 {
             Determinacy::NotDetermined
+        } else if self.r2.low <= 0.0 {
+            Determinacy::Uncertain
         } else if self.r2.value < 0.5 {
             Determinacy::WeaklyDetermined
         } else {
@@ -151,38 +159,36 @@ impl Determination {
     /// Good answers show that the readings determine a target. Bad ones show only that the models that were tried have
     /// failed.
     pub fn sentence(&self, name: &str, tried: &[FittedModel]) -> String {
-        let is_determined = self.determinacy() == Determinacy::Determined;
         let claim = match self.determinacy() {
             Determinacy::Determined => format!("the readings determine {name}"),
             Determinacy::WeaklyDetermined => format!("{} little of {name}", explains(tried)),
-            // Good answers whose interval is wide.
-            Determinacy::NotDetermined if self.r2.value >= 0.5 => {
-                format!("it is uncertain whether {} anything of {name}", explains(tried))
-            }
-            Determinacy::NotDetermined => format!("{} nothing of {name}", explains(tried)),
+            Determinacy::Uncertain => format!("it is uncertain how much of {name} {}", explains(tried)),
+            Determinacy::NotDetermined => format!("{} almost nothing of {name}", explains(tried)),
         };
-        let few = if self.units < Self::FEW_UNITS {
-            format!(
-                ", from only {} independent stretches or groups: give a longer recording",
-                self.units
-            )
+        let is_open = self.r2.low < 1.0 - Self::NEGLIGIBLE;
+        let is_few = is_open && self.units < Self::FEW_UNITS;
+        let few = if is_few {
+            format!(", from only {} independent stretches or groups", self.units)
         } else {
             String::new()
         };
-        let tails = if self.is_heavy_tailed {
+        let tails = if is_open && self.is_heavy_tailed {
             ", where a few samples make up most of the error: the true R² may well lie outside"
         } else {
             ""
         };
-        // Enough decimals to show how far a good R² is from 1.
-        let digits = (1.0 - (1.0 - self.r2.value).abs().max(1e-9).log10().floor()).clamp(2.0, 6.0) as usize;
         let Interval { value, low, high } = self.r2;
-        let others = if is_determined {
-            ""
-        } else {
-            "; another decoder may explain more"
+        // Enough decimals to show how far a good R² is from 1.
+        let digits = (1.0 - (1.0 - value).abs().max(1e-9).log10().floor()).clamp(2.0, 6.0) as usize;
+        let [value, low, high] = [value, low, high].map(|r2| format_below_one(r2, digits));
+        let advice = match (self.determinacy(), is_few) {
+            (Determinacy::Uncertain, _) => "; record longer, or cross-validate all samples",
+            (Determinacy::Determined, true) => "; record longer",
+            (Determinacy::Determined, false) => "",
+            (_, true) => "; record longer; another decoder may explain more",
+            (_, false) => "; another decoder may explain more",
         };
-        format!("{claim} (R² {value:.digits$}, {low:.digits$} to {high:.digits$}){few}{tails}{others}")
+        format!("{claim} (R² {value}, {low} to {high}){few}{tails}{advice}")
     }
 }
 
@@ -194,7 +200,7 @@ fn explains(tried: &[FittedModel]) -> String {
 }
 
 fn centred(values: &[f64]) -> Vec<f64> {
-    let mean = values.iter().map(|value| value / values.len() as f64).sum::<f64>();
+    let mean = mean(ArrayView1::from(values));
     values.iter().map(|value| value - mean).collect()
 }
 
@@ -460,8 +466,12 @@ mod tests {
         for (share, tried, words) in [
             (0.9, &both[..], "the readings determine y (R² 0."),
             (0.3, &both[..1], "ridge regression explains little of y"),
-            (0.01, &both[1..], "the network explains nothing of y"),
-            (0.01, &both[..], "ridge regression and the network explain nothing of y"),
+            (0.01, &both[1..], "the network explains almost nothing of y"),
+            (
+                0.01,
+                &both[..],
+                "ridge regression and the network explain almost nothing of y",
+            ),
         ] {
             let (set, answers) = recording(4000, 0.0, share, 5);
             let sentence = measure(&set, &answers, SplitBy::Time).unwrap().sentence("y", tried);
@@ -475,6 +485,89 @@ mod tests {
             .unwrap()
             .sentence("y", &both);
         assert!(sentence.contains("from only 5 independent"), "{sentence}");
+    }
+
+    #[test]
+    fn the_verdict_fits_the_estimate_and_its_interval() {
+        let of = |value, low, high| Determination {
+            r2: Interval { value, low, high },
+            units: 50,
+            is_heavy_tailed: false,
+        };
+        for (found, verdict, words) in [
+            (
+                of(0.9, 0.2, 0.95),
+                Determinacy::Determined,
+                "the readings determine y (R² 0.90, ",
+            ),
+            (
+                of(0.23, 0.1, 0.4),
+                Determinacy::WeaklyDetermined,
+                "the network explains little of y",
+            ),
+            (
+                of(0.05, 0.01, 0.12),
+                Determinacy::WeaklyDetermined,
+                "the network explains little of y",
+            ),
+            (
+                of(0.23, -0.1, 0.5),
+                Determinacy::Uncertain,
+                "it is uncertain how much of y the network explains (R² 0.23, -0.10 to 0.50)",
+            ),
+            (
+                of(0.89, -0.28, 0.998),
+                Determinacy::Uncertain,
+                "it is uncertain how much of y the network explains (R² 0.89, -0.28 to 0.998)",
+            ),
+            (
+                of(-0.5, -2.0, 0.6),
+                Determinacy::Uncertain,
+                "it is uncertain how much of y",
+            ),
+            (
+                of(0.02, -0.05, 0.08),
+                Determinacy::NotDetermined,
+                "explains almost nothing of y",
+            ),
+            (
+                of(-3.0, -5.0, -1.0),
+                Determinacy::NotDetermined,
+                "explains almost nothing of y",
+            ),
+        ] {
+            let sentence = found.sentence("y", &[FittedModel::Network]);
+            assert_eq!(found.determinacy(), verdict, "{sentence}");
+            assert!(sentence.contains(words), "{sentence}");
+        }
+    }
+
+    #[test]
+    fn nearly_perfect_answers_ask_for_no_longer_recording() {
+        // Errors of 1e-5 whose size changes slowly by large factors: their sum is uncertain by more than 100 times.
+        let (set, _) = recording(400, 0.99, 0.6, 2);
+        let size = |sample: usize| 1e-5 * (4.0 * (0.01 * sample as f64).sin()).exp();
+        let errors = Array2::from_shape_fn((400, 1), |(sample, _)| size(sample));
+        let answers = &set.targets() + &errors;
+        let found = measure(&set, &answers, SplitBy::Time).unwrap();
+        let sentence = found.sentence("y", &[FittedModel::Network]);
+        assert_eq!(found.determinacy(), Determinacy::Determined, "{sentence}");
+        assert!(
+            !sentence.contains("longer") && !sentence.contains("R² 1.0"),
+            "{sentence}"
+        );
+    }
+
+    #[test]
+    fn a_large_offset_changes_no_r2() {
+        let (set, answers) = recording(400, 0.0, 0.6, 4);
+        let usual = measure(&set, &answers, SplitBy::Time).unwrap();
+        let shifted = |values: ArrayView2<'_, f64>| values.mapv(|value| value + 1e14);
+        let targets = shifted(set.targets());
+        let offset = Dataset::new(targets.clone(), targets, None, set.groups().to_vec()).unwrap();
+        let found = measure(&offset, &shifted(answers.view()), SplitBy::Time).unwrap();
+        // 1e14 is resolved to 1/64.
+        assert!((found.r2.value - usual.r2.value).abs() < 0.01, "{found:?} {usual:?}");
     }
 
     #[test]

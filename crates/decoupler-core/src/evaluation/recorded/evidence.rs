@@ -74,6 +74,14 @@ impl Evidence {
 }
 
 impl Evidence {
+    /// Returns the mean of positive `values`, and the variance of its logarithm.
+    pub(super) fn variance_of_log_mean(&self, values: &[f64]) -> (f64, SumVariance) {
+        let total: f64 = values.iter().sum();
+        let mean = total / values.len() as f64;
+        let influences: Vec<f64> = values.iter().map(|value| (value - mean) / total).collect();
+        (mean, self.variance(&influences))
+    }
+
     /// Returns the number of independent samples whose mean would be as uncertain as the mean of `values`, at most the
     /// number of values; 1 for a single group, which says nothing about others.
     pub(crate) fn effective_samples(&self, values: &[f64]) -> f64 {

@@ -82,7 +82,7 @@ impl Extrapolation {
         ];
         Some(format!(
             "{:.0} % of the test samples ({} of {}) are outside the range of the training samples by more than a tenth of \
-             it ({}); the network extrapolates there, and its error says little about the accuracy within the range",
+             it ({}); the network extrapolates there, so that its error within the range may be smaller",
             100.0 * self.share(),
             self.outside,
             self.samples,

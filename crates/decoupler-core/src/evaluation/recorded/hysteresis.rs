@@ -1,6 +1,7 @@
 use ndarray::ArrayView2;
 use serde::Serialize;
 
+use super::split_comparison::student_quantile;
 use crate::{
     dataset::{Dataset, SplitBy},
     evaluation::TargetErrors,
@@ -13,9 +14,13 @@ use crate::{
 /// counts if the target then reverses by at least 10 % of its range, so that noise and jitter do not; this needs no
 /// clock. Samples within 2 % of the range of a turning point are at rest there and are left out.
 ///
+/// Excursions of fewer than 5 samples off rest do not count: if most are that short, as with presses in random order, there
+/// is no loading and unloading to compare.
+///
 /// Each excursion is divided into levels of the target. The branches are the mean decoded values at each level while
 /// loading and while unloading, and the hysteresis is the largest difference of the branches in percent of the target's
-/// range. Noise of the decoded values with standard deviation s adds up to about 2·s/√n with n samples on a level.
+/// range. Noise of the decoded values with standard deviation s adds up to about 2·s/√n with n samples on a level, so there
+/// is no loop unless the mean errors of the loading and unloading excursions differ significantly (Student's t, 95 %).
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct HysteresisLoop {
     /// Errors while loading.
@@ -47,6 +52,12 @@ enum Direction {
     Unloading,
 }
 
+/// Part of an excursion off its turning points.
+struct Passage {
+    direction: Direction,
+    samples: Vec<usize>,
+}
+
 impl HysteresisLoop {
     /// Reversal that makes a turning point, relative to the range.
     const REVERSAL: f64 = 0.1;
@@ -57,10 +68,14 @@ impl HysteresisLoop {
     /// Minimum number of samples of each branch on a level, and minimum number of such levels.
     const MIN_SAMPLES: usize = 3;
     const MIN_LEVELS: usize = 5;
+    /// Minimum number of samples of an excursion, off rest.
+    const MIN_PASSAGE: usize = 5;
+    /// Minimum hysteresis in percent of the range, to tell it from rounding.
+    const MIN_PERCENT: f64 = 0.05;
 
     /// Measures `answers` against `targets` (both samples × outputs), target by target. Samples are in order of time
     /// within each stretch, whose number is in `stretches` (one for each sample). `None` for a target that does not
-    /// rise and fall through enough levels.
+    /// rise and fall through enough levels, or whose branches do not differ significantly.
     ///
     /// # Panics
     /// If the shapes differ.
@@ -98,21 +113,30 @@ impl HysteresisLoop {
             return None;
         }
         let samples: Vec<usize> = (0..actual.len()).collect();
-        let mut directions = vec![None; actual.len()];
+        let mut passages = Vec::new();
         for stretch in samples.chunk_by(|&one, &next| stretches[one] == stretches[next]) {
-            let first = stretch[0];
-            let of_stretch = directions_of(&actual[first..first + stretch.len()], range);
-            directions[first..first + stretch.len()].copy_from_slice(&of_stretch);
+            passages.extend(passages_of(actual, stretch, range));
+        }
+        let excursions = passages.len();
+        passages.retain(|passage| passage.samples.len() >= Self::MIN_PASSAGE);
+        if 2 * passages.len() < excursions {
+            return None;
         }
         let branches = [Direction::Loading, Direction::Unloading].map(|direction| {
-            let is_of_branch = |&sample: &usize| directions[sample] == Some(direction);
-            samples.iter().copied().filter(is_of_branch).collect::<Vec<_>>()
+            let of_branch = passages.iter().filter(|passage| passage.direction == direction);
+            of_branch
+                .flat_map(|passage| &passage.samples)
+                .copied()
+                .collect::<Vec<_>>()
         });
+        let level_of = |sample: usize| {
+            let level = ((actual[sample] - lowest) / range * Self::LEVELS as f64) as usize;
+            level.min(Self::LEVELS - 1)
+        };
         let levels_of = branches.each_ref().map(|samples| {
             let mut levels = vec![(0, 0.0); Self::LEVELS];
             for &sample in samples {
-                let level = ((actual[sample] - lowest) / range * Self::LEVELS as f64) as usize;
-                let (count, sum) = &mut levels[level.min(Self::LEVELS - 1)];
+                let (count, sum) = &mut levels[level_of(sample)];
                 *count += 1;
                 // The mean error does not depend on where the samples are within the level.
                 *sum += decoded[sample] - actual[sample];
@@ -120,6 +144,19 @@ impl HysteresisLoop {
             levels
         });
         let [loading, unloading] = levels_of;
+        // Error in the middle of the branches at each level that both have.
+        let middles = Vec::from_iter(loading.iter().zip(&unloading).map(|(loading, unloading)| {
+            let is_common = loading.0.min(unloading.0) >= Self::MIN_SAMPLES;
+            is_common.then(|| 0.5 * (loading.1 / loading.0 as f64 + unloading.1 / unloading.0 as f64))
+        }));
+        let off_middle = |passage: &Passage| {
+            let off = |&sample: &usize| Some(decoded[sample] - actual[sample] - middles[level_of(sample)]?);
+            let off = Vec::from_iter(passage.samples.iter().filter_map(off));
+            (!off.is_empty()).then(|| (passage.direction, off.iter().sum::<f64>() / off.len() as f64))
+        };
+        if !differ(&passages.iter().filter_map(off_middle).collect::<Vec<_>>()) {
+            return None;
+        }
         let levels = loading.iter().zip(&unloading).enumerate();
         let levels: Vec<LoopLevel> = levels
             .filter(|(_, (loading, unloading))| loading.0.min(unloading.0) >= Self::MIN_SAMPLES)
@@ -136,6 +173,10 @@ impl HysteresisLoop {
             return None;
         }
         let apart = levels.iter().map(|level| (level.loading - level.unloading).abs());
+        let percent_of_range = 100.0 * apart.fold(0.0, f64::max) / range;
+        if percent_of_range < Self::MIN_PERCENT {
+            return None;
+        }
         let errors = branches.each_ref().map(|samples| {
             let column = |values: &[f64]| samples.iter().map(|&sample| values[sample]).collect::<Vec<_>>();
             let of = |values: Vec<f64>| ndarray::Array2::from_shape_vec((samples.len(), 1), values).ok();
@@ -147,7 +188,7 @@ impl HysteresisLoop {
             loading: loading?,
             unloading: unloading?,
             samples: branches.each_ref().map(Vec::len),
-            percent_of_range: 100.0 * apart.fold(0.0, f64::max) / range,
+            percent_of_range,
             levels,
         })
     }
@@ -162,9 +203,30 @@ impl HysteresisLoop {
     }
 }
 
-/// Returns the direction of each sample of one stretch; `None` at rest, and before the first and after the last turning
-/// point that are certain.
-fn directions_of(actual: &[f64], range: f64) -> Vec<Option<Direction>> {
+/// Returns `true` if the means of the loading and unloading excursions differ significantly.
+fn differ(means: &[(Direction, f64)]) -> bool {
+    let of = |direction| Vec::from_iter(means.iter().filter(|(of, _)| *of == direction).map(|(_, mean)| *mean));
+    let branches = [Direction::Loading, Direction::Unloading].map(of);
+    let freedom = means.len() as f64 - 2.0;
+    if branches.iter().any(|branch| branch.len() < 2) {
+        return false;
+    }
+    let [loading, unloading] = branches
+        .each_ref()
+        .map(|branch| branch.iter().sum::<f64>() / branch.len() as f64);
+    let squares = means.iter().map(|(direction, mean)| match direction {
+        Direction::Loading => (mean - loading).powi(2),
+        Direction::Unloading => (mean - unloading).powi(2),
+    });
+    let counts = branches.iter().map(|branch| 1.0 / branch.len() as f64).sum::<f64>();
+    let standard_error = (squares.sum::<f64>() / freedom * counts).sqrt();
+    (loading - unloading).abs() > student_quantile(freedom) * standard_error
+}
+
+/// Returns the excursions of one stretch between the first and the last turning point that are certain.
+fn passages_of(all: &[f64], stretch: &[usize], range: f64) -> Vec<Passage> {
+    let first = stretch[0];
+    let actual = &all[first..first + stretch.len()];
     let (reversal, rest) = (HysteresisLoop::REVERSAL * range, HysteresisLoop::REST * range);
     let mut turning_points = Vec::new();
     let (mut lowest, mut highest) = (0, 0);
@@ -194,26 +256,28 @@ fn directions_of(actual: &[f64], range: f64) -> Vec<Option<Direction>> {
         Some(Direction::Unloading) => Some(lowest),
         None => None,
     });
-    let mut directions = vec![None; actual.len()];
-    for pair in turning_points.windows(2) {
+    let passage = |pair: &[usize]| {
         let (from, to) = (actual[pair[0]], actual[pair[1]]);
-        let direction = if to > from {
-            Direction::Loading
-        } else {
-            Direction::Unloading
-        };
-        for sample in pair[0]..=pair[1] {
-            let is_at_rest = (actual[sample] - from).abs() < rest || (actual[sample] - to).abs() < rest;
-            directions[sample] = (!is_at_rest).then_some(direction);
+        let is_moving = |sample: &usize| (actual[*sample] - from).abs() >= rest && (actual[*sample] - to).abs() >= rest;
+        Passage {
+            direction: if to > from {
+                Direction::Loading
+            } else {
+                Direction::Unloading
+            },
+            samples: (pair[0]..=pair[1])
+                .filter(is_moving)
+                .map(|sample| first + sample)
+                .collect(),
         }
-    }
-    directions
+    };
+    turning_points.windows(2).map(passage).collect()
 }
 
 #[cfg(test)]
 mod tests {
     use ndarray::Array2;
-    use rand::{SeedableRng, rngs::ChaCha8Rng};
+    use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
 
     use super::*;
     use crate::scene::standard_normal;
@@ -280,7 +344,7 @@ mod tests {
     }
 
     #[test]
-    fn noise_without_hysteresis_leaves_little() {
+    fn noise_without_hysteresis_is_no_loop() {
         let mut rng = ChaCha8Rng::seed_from_u64(1);
         // The target jitters as well.
         let actual: Vec<f64> = cycles(400)
@@ -291,9 +355,24 @@ mod tests {
             .iter()
             .map(|value| value + 0.2 * standard_normal(&mut rng))
             .collect();
-        let found = measure(&actual, &decoded).unwrap();
-        assert!(found.percent_of_range < 2.0, "{found:?}");
-        assert!((found.loading.rmse - 0.2).abs() < 0.02, "{found:?}");
+        assert_eq!(measure(&actual, &decoded), None);
+    }
+
+    #[test]
+    fn presses_in_random_order_have_no_loading_and_unloading() {
+        let found = (0..40).filter(|&seed| {
+            let mut rng = ChaCha8Rng::seed_from_u64(seed);
+            let actual: Vec<f64> = (0..2000)
+                .map(|sample| {
+                    let peak: f64 = rng.random_range(0.0..10.0);
+                    // Half of the sets are presses between rests.
+                    if seed % 2 == 0 || sample % 3 == 0 { peak } else { 0.0 }
+                })
+                .collect();
+            let decoded = actual.iter().map(|value| value + 0.2 * standard_normal(&mut rng));
+            measure(&actual, &decoded.collect::<Vec<_>>()).is_some()
+        });
+        assert_eq!(found.count(), 0);
     }
 
     #[test]
@@ -310,15 +389,18 @@ mod tests {
             }
             actual.extend([0.0; 200]);
         }
-        for &value in &actual {
+        for (sample, &value) in actual.iter().enumerate() {
             decoded.push(if value == 0.0 || value == 1.0 {
                 value + 5.0
+            } else if actual[sample - 1] < value {
+                value + 0.25
             } else {
                 value
             });
         }
         let found = measure(&actual, &decoded).unwrap();
-        assert_eq!((found.loading.worst, found.unloading.worst), (0.0, 0.0), "{found:?}");
+        assert!((found.loading.worst - 0.25).abs() < 1e-9, "{found:?}");
+        assert_eq!(found.unloading.worst, 0.0, "{found:?}");
     }
 
     #[test]

@@ -5,6 +5,7 @@ use crate::{
     dataset::{Dataset, DividedSamples, Seed, Split, SplitBy, Stream},
     decoupling::decode_set,
     evaluation::{Run, RunError, RunSettings, baselines::fit_baselines, cross_validation::nth_seed},
+    text::format_percent,
 };
 
 /// Test error as a function of the number of training samples, for one target.
@@ -16,6 +17,8 @@ pub struct LearningCurve {
     pub law: Option<PowerLaw>,
     /// Gain from twice the training samples; `None` without a law.
     pub doubling: Option<Doubling>,
+    /// Standard deviation of the target in the test samples.
+    pub deviation: f64,
 }
 
 /// RMSE at one number of training samples.
@@ -57,6 +60,8 @@ impl LearningCurve {
     const MIN_SAMPLES: usize = 8;
     /// Minimum relative reduction of the error with twice the samples that counts as a gain.
     const MIN_GAIN: f64 = 0.01;
+    /// Error relative to the standard deviation of the target below which no more samples are asked for.
+    const NEGLIGIBLE: f64 = 1e-3;
 
     /// Fits `model` to all training samples of `parts`, to 1/√2 of them, and so on down to an eighth, and measures the
     /// error on the test samples, target by target; `None` if cancelled. Subsets of the training set are stretches of
@@ -159,19 +164,36 @@ impl LearningCurve {
             let ratio = Interval::of_replicates(*finite.get(finite.len() / 2)?, &replicates)?;
             Some(Doubling { ratio })
         });
-        Self { points, law, doubling }
+        let deviation = test.targets().column(target).std(0.0);
+        Self {
+            points,
+            law,
+            doubling,
+            deviation,
+        }
+    }
+
+    /// Returns `true` if the error with all samples is at most a thousandth of the target's standard deviation.
+    fn is_negligible(&self) -> bool {
+        self.points
+            .last()
+            .is_some_and(|all| all.rmse <= Self::NEGLIGIBLE * self.deviation)
     }
 
     /// Returns `true` if twice the samples would lower the error significantly.
     pub fn gains(&self) -> bool {
-        self.doubling
-            .is_some_and(|doubling| doubling.ratio.high < 1.0 - Self::MIN_GAIN)
+        let is_significant = |doubling: Doubling| doubling.ratio.high < 1.0 - Self::MIN_GAIN;
+        !self.is_negligible() && self.doubling.is_some_and(is_significant)
     }
 
     /// Returns a sentence on the gain from twice the samples for the target of this name.
     pub fn sentence(&self, name: &str) -> String {
         let percent = |ratio: f64| 100.0 * (1.0 - ratio);
         match self.doubling {
+            _ if self.is_negligible() => {
+                let percent = format_percent(self.points.last().map(|all| 100.0 * all.rmse / self.deviation));
+                format!("the error of {name} is {percent} of its standard deviation: no more samples are needed")
+            }
             None => format!("too few samples to estimate the gain from more for {name}"),
             Some(Doubling { ratio }) if self.gains() => format!(
                 "twice the samples would lower the error of {name} by about {:.0} % ({:.0} to {:.0} %)",
@@ -261,12 +283,10 @@ fn squared_errors(
     model: FittedModel,
     is_cancelled: &dyn Fn() -> bool,
 ) -> Result<Option<ndarray::Array2<f64>>, RunError> {
+    // A stretch may have no variation to learn from: ridge regression then answers with its mean.
+    let has_variation = split.training.has_varying_target();
     let answers = match model {
-        FittedModel::Ridge => {
-            let (_, mut ridge) = fit_baselines(&split.training, settings)?;
-            decode_set(&mut ridge, test)?
-        }
-        FittedModel::Network => {
+        FittedModel::Network if has_variation => {
             let mut run = Run::of_networks_on_sets(RunSettings { seed, ..*settings }, split, test.clone())?;
             while run.step().is_none() {
                 if is_cancelled() {
@@ -274,6 +294,10 @@ fn squared_errors(
                 }
             }
             run.decouple_test()
+        }
+        _ => {
+            let (_, mut ridge) = fit_baselines(&split.training, settings)?;
+            decode_set(&mut ridge, test)?
         }
     };
     Ok(Some((answers - test.targets()).mapv(|error| error * error)))
@@ -381,6 +405,31 @@ mod tests {
                 );
             }
         }
+    }
+
+    #[test]
+    fn no_more_samples_are_asked_for_when_the_error_is_negligible() {
+        let ratio = Interval {
+            value: 0.5,
+            low: 0.4,
+            high: 0.6,
+        };
+        let curve = |rmse| LearningCurve {
+            points: vec![LearningPoint {
+                samples: 100,
+                rmse,
+                range: [rmse; 2],
+            }],
+            law: None,
+            doubling: Some(Doubling { ratio }),
+            deviation: 2.0,
+        };
+        assert!(curve(0.02).gains() && curve(0.02).sentence("y").starts_with("twice the samples would lower"));
+        assert!(!curve(1e-4).gains());
+        assert_eq!(
+            curve(1e-4).sentence("y"),
+            "the error of y is 0.00500 % of its standard deviation: no more samples are needed"
+        );
     }
 
     #[test]

@@ -14,7 +14,7 @@ mod learning_curve;
 mod memory_gain;
 mod split_comparison;
 
-pub use channel_remark::{ChannelImportance, ChannelRemark, channel_importance, channel_remarks};
+pub use channel_remark::{ChannelImportance, ChannelRemark, channel_importance, channel_remarks, target_remarks};
 pub use determination::{Determinacy, Determination, NonlinearGain, Undetermined};
 pub(crate) use evidence::Evidence;
 pub use evidence::FittedModel;

@@ -4,11 +4,14 @@ use ndarray::{Array2, ArrayView1};
 
 use super::{
     ChannelImportance, ChannelRemark, Determinacy, Determination, FittedModel, LearningCurve, NonlinearGain,
-    Undetermined, channel_importance, channel_remarks, evidence::SumVariance,
+    Undetermined, channel_importance,
+    channel_remark::rmse_ratio,
+    channel_remarks,
+    evidence::{Evidence, SumVariance},
 };
 use crate::{
     dataset::{Dataset, Division, Folds, SplitBy, Stream},
-    evaluation::{CrossValidated, RunError, RunSettings, Scores, TargetErrors},
+    evaluation::{CrossValidated, Run, RunError, RunSettings, Scores, TargetErrors, errors::mean},
 };
 
 /// Held-out errors with the same settings and samples, for folds by group (by time without groups) and for random
@@ -25,6 +28,9 @@ pub struct SplitComparison {
     pub random_network: Vec<TargetErrors>,
     /// Errors of ridge regression on random folds.
     pub random_ridge: Vec<TargetErrors>,
+    /// Ratio of the RMSE of the network on random folds to that by [`Self::by`] for each target, with its interval: below 1
+    /// if random folds are optimistic. `None` if it is not determined.
+    pub ratios: Vec<Option<Interval>>,
     /// Correlation of each target between successive samples of the recording; `None` for a constant target.
     pub successive: Vec<Option<f64>>,
 }
@@ -48,25 +54,58 @@ impl SplitComparison {
         (by, validated): (SplitBy, &CrossValidated),
         is_cancelled: &dyn Fn() -> bool,
     ) -> Result<Option<Self>, RunError> {
-        let scores = |rule: SplitBy| -> Result<Option<Scores>, RunError> {
+        let validate = |rule: SplitBy| -> Result<Option<CrossValidated>, RunError> {
             if rule == by {
-                return Ok(Some(validated.scores(set)));
+                return Ok(Some(validated.clone()));
             }
             let folds = rule.folds_of(set, folds);
             let folds = Folds::by(set, folds, rule, &mut settings.seed.rng(Stream::Split))?;
-            let validated = CrossValidated::on_folds(settings, set, folds, is_cancelled)?;
-            Ok(validated.map(|validated| validated.scores(set)))
+            CrossValidated::on_folds(settings, set, folds, is_cancelled)
         };
         let honest = SplitBy::honest(set);
-        let Some(of_honest) = scores(honest)? else {
+        let Some(of_honest) = validate(honest)? else {
             return Ok(None);
         };
-        let random = scores(SplitBy::Random)?;
-        Ok(random.map(|random| Self::of(set, honest, [of_honest, random])))
+        let Some(random) = validate(SplitBy::Random)? else {
+            return Ok(None);
+        };
+        let answers = [random.network.view(), of_honest.network.view()];
+        let ratio = |target| rmse_ratio(set, answers, target, honest);
+        let ratios = (0..set.outputs()).map(ratio).collect();
+        let scores = [of_honest.scores(set), random.scores(set)];
+        Ok(Some(Self::of(set, honest, scores, ratios)))
     }
 
-    /// Compares the errors of two runs or cross-validations on `set`, split by `by` and at random.
-    pub fn of(set: &Dataset, by: SplitBy, [honest, random]: [Scores; 2]) -> Self {
+    /// Compares the test errors of two runs on parts of `set`, split by `by` and at random; `None` if a run is of a single fold.
+    pub fn of_runs(set: &Dataset, by: SplitBy, [honest, random]: [&Run; 2]) -> Option<Self> {
+        let scores = [honest.scores()?, random.scores()?];
+        let spreads = [random, honest].map(|run| {
+            let (test, answers) = (run.test(), run.decouple_test());
+            let evidence = Evidence::of(test, by);
+            let of_target = move |target: usize| {
+                let truth = test.targets();
+                let pairs = answers.column(target).into_iter().zip(truth.column(target));
+                let squares = Vec::from_iter(pairs.map(|(answer, truth)| (answer - truth).powi(2)));
+                evidence.variance_of_log_mean(&squares)
+            };
+            (0..set.outputs()).map(of_target).collect::<Vec<_>>()
+        });
+        // The test samples differ, so that the variances of the logarithms add up.
+        let ratio = |target: usize| {
+            let [random, honest] = [&spreads[0][target], &spreads[1][target]];
+            let ratio = random.0 / honest.0;
+            let spread = SumVariance {
+                variance: ratio * ratio * (random.1.variance + honest.1.variance),
+                units: random.1.units.min(honest.1.units),
+                freedom: random.1.freedom.min(honest.1.freedom),
+            };
+            Some(Interval::of_ratio(ratio, spread)?.map(f64::sqrt))
+        };
+        let ratios = (0..set.outputs()).map(ratio).collect();
+        Some(Self::of(set, by, scores, ratios))
+    }
+
+    fn of(set: &Dataset, by: SplitBy, [honest, random]: [Scores; 2], ratios: Vec<Option<Interval>>) -> Self {
         let errors =
             |scores: Scores| [&scores.baselines.linear, &scores.network].map(|errors| errors.targets().to_vec());
         let ([ridge, network], [random_ridge, random_network]) = (errors(honest), errors(random));
@@ -76,6 +115,7 @@ impl SplitComparison {
             ridge,
             random_network,
             random_ridge,
+            ratios,
             successive: set
                 .targets()
                 .columns()
@@ -83,17 +123,6 @@ impl SplitComparison {
                 .map(successive_correlation)
                 .collect(),
         }
-    }
-
-    /// Returns the ratio of the RMSE of the network on random folds to that on folds by [`Self::by`]: below 1 if random
-    /// folds are optimistic. `None` if the RMSE on folds by [`Self::by`] is 0.
-    pub fn network_ratio(&self, target: usize) -> Option<f64> {
-        ratio(&self.random_network[target], &self.network[target])
-    }
-
-    /// As [`Self::network_ratio`], for ridge regression.
-    pub fn ridge_ratio(&self, target: usize) -> Option<f64> {
-        ratio(&self.random_ridge[target], &self.ridge[target])
     }
 
     /// Returns a clause on the cause of the optimism, as far as it was measured: alike neighbours leak from the training into
@@ -111,7 +140,7 @@ impl SplitComparison {
             }
             Some(correlation) => format!(
                 "; successive values of the target correlate by {correlation:.2} only, so that the relation of readings \
-                 and target must change {over}"
+                 and target seems to change {over}"
             ),
             None => String::new(),
         }
@@ -121,15 +150,20 @@ impl SplitComparison {
     pub fn sentence(&self, target: usize, name: &str) -> String {
         let (honest, random) = (self.network[target].rmse, self.random_network[target].rmse);
         let by = self.by;
-        match self.network_ratio(target) {
-            Some(ratio) if ratio < 1.0 - Self::MIN_OPTIMISM => format!(
+        match self.ratios[target] {
+            Some(ratio) if ratio.high < 1.0 && ratio.value < 1.0 - Self::MIN_OPTIMISM => format!(
                 "a random split would report an RMSE of {random:.4} for {name}; split by {by} it is {honest:.4}: the random \
                  split is optimistic by {:.0} %{}",
-                100.0 * (1.0 - ratio),
+                100.0 * (1.0 - ratio.value),
                 self.cause(target)
             ),
-            _ => format!(
-                "a random split is not optimistic here: RMSE {random:.4} for {name}, and {honest:.4} split by {by}"
+            None => format!(
+                "split at random, the RMSE of {name} is {random:.4}, and split by {by} {honest:.4}: too few independent \
+                 samples to judge the difference"
+            ),
+            Some(_) => format!(
+                "no significant difference between a random split (RMSE {random:.4} for {name}) and a split by {by} \
+                 ({honest:.4})"
             ),
         }
     }
@@ -137,15 +171,11 @@ impl SplitComparison {
 
 /// Correlation of successive values; `None` if they are all equal.
 fn successive_correlation(values: ArrayView1<'_, f64>) -> Option<f64> {
-    let mean = values.mean()?;
+    let mean = mean(values);
     let variance: f64 = values.iter().map(|value| (value - mean).powi(2)).sum();
     let pairs = values.iter().zip(values.iter().skip(1));
     let products: f64 = pairs.map(|(one, next)| (one - mean) * (next - mean)).sum();
     (variance > 0.0).then(|| products / variance)
-}
-
-fn ratio(random: &TargetErrors, honest: &TargetErrors) -> Option<f64> {
-    Some(random.rmse / honest.rmse).filter(|ratio| ratio.is_finite())
 }
 
 /// Findings on a recording: for each target, for each channel, and with more samples.
@@ -155,7 +185,7 @@ pub struct Findings {
     pub model: FittedModel,
     /// Findings on each target.
     pub targets: Vec<TargetFindings>,
-    /// Constant, duplicated and saturated channels.
+    /// Channels with too little or too much information, and targets whose changes cannot be held out.
     pub remarks: Vec<ChannelRemark>,
     /// Importance of each channel; empty if there is only one.
     pub importance: Vec<ChannelImportance>,
@@ -257,9 +287,12 @@ impl Findings {
         }
         // If the readings determine nothing, the better answer is only closer to the mean.
         let is_worth_it = gains.iter().zip(&network).any(|(gain, network)| {
-            let is_told = network
-                .as_ref()
-                .is_some_and(|network| network.determinacy() != Determinacy::NotDetermined);
+            let is_told = network.as_ref().is_some_and(|network| {
+                matches!(
+                    network.determinacy(),
+                    Determinacy::Determined | Determinacy::WeaklyDetermined
+                )
+            });
             is_told && gain.as_ref().is_some_and(NonlinearGain::is_supported)
         });
         let best = if is_worth_it {
@@ -296,7 +329,7 @@ impl Findings {
         Ok(Some(Self {
             model,
             targets: targets.map(target).collect(),
-            remarks: channel_remarks(set),
+            remarks: channel_remarks(set, by),
             importance,
             comparison,
             left_out,

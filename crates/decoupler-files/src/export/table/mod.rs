@@ -10,7 +10,7 @@ use std::io::{self, Write};
 use decoupler_core::text::{begins_formula, inert};
 use serde::ser::{Serialize, SerializeMap as _, SerializeSeq as _, Serializer};
 
-use crate::export::{format_decimals, format_number};
+use crate::export::{format_number, format_r2};
 
 /// Contents of a table, independent of the form in which it is written.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -75,24 +75,18 @@ pub enum Cell {
     Count(u64),
     /// A number; `None` where there is none.
     Number(Option<f64>),
-    /// A number shown to readers with this many decimals, such as R²; `None` where there is none.
-    Decimals(Option<f64>, usize),
+    /// A coefficient of determination, near 1 with more digits for readers; `None` where there is none.
+    R2(Option<f64>),
 }
 
 impl Cell {
-    /// A coefficient of determination, with four decimals for readers: near 1 its distance from 1 matters.
-    pub fn r2(value: impl Into<Option<f64>>) -> Self {
-        Self::Decimals(value.into(), 4)
-    }
-
-    /// Returns the cell for readers: numbers with three significant digits, or with their decimals; a dash where there is
-    /// none.
+    /// Returns the cell for readers: numbers with three significant digits; a dash where there is none.
     pub fn rounded(&self) -> String {
         match self {
             Self::Text(text) => text.clone(),
             Self::Count(count) => count.to_string(),
             Self::Number(number) => format_number(*number),
-            Self::Decimals(number, decimals) => format_decimals(*number, *decimals),
+            Self::R2(number) => format_r2(*number),
         }
     }
 
@@ -100,7 +94,7 @@ impl Cell {
     pub(super) fn for_spreadsheet(&self) -> String {
         match self {
             Self::Text(text) => inert(text),
-            Self::Count(_) | Self::Number(_) | Self::Decimals(..) => self.exact(),
+            Self::Count(_) | Self::Number(_) | Self::R2(_) => self.exact(),
         }
     }
 
@@ -109,7 +103,7 @@ impl Cell {
         match self {
             Self::Text(text) => text.clone(),
             Self::Count(count) => count.to_string(),
-            Self::Number(number) | Self::Decimals(number, _) => {
+            Self::Number(number) | Self::R2(number) => {
                 let number = number.filter(|number| number.is_finite());
                 number.map_or_else(String::new, |number| format!("{number:?}"))
             }
@@ -225,9 +219,7 @@ impl Serialize for Cell {
         match self {
             Self::Text(text) => serializer.serialize_str(text),
             Self::Count(count) => serializer.serialize_u64(*count),
-            Self::Number(number) | Self::Decimals(number, _) => {
-                number.filter(|number| number.is_finite()).serialize(serializer)
-            }
+            Self::Number(number) | Self::R2(number) => number.filter(|number| number.is_finite()).serialize(serializer),
         }
     }
 }
@@ -260,7 +252,7 @@ pub(super) fn latex(table: &Table) -> String {
     text += "\\midrule\n";
     for row in &table.rows {
         let cells = row.iter().enumerate().map(|(column, cell)| match cell {
-            Cell::Number(number) | Cell::Decimals(number, _)
+            Cell::Number(number) | Cell::R2(number)
                 if table.is_numeric(column) && !number.is_some_and(f64::is_finite) =>
             {
                 format!("{{{}}}", cell.rounded())
@@ -374,8 +366,13 @@ mod tests {
                 TableColumn::new("epochs", "epochs", ""),
             ],
             rows: vec![
-                vec!["a \"b\"".into(), (0.1 + 0.2).into(), Cell::r2(0.99999), 3_usize.into()],
-                vec!["=1".into(), f64::NAN.into(), Cell::r2(None), 0_usize.into()],
+                vec![
+                    "a \"b\"".into(),
+                    (0.1 + 0.2).into(),
+                    Cell::R2(Some(0.99999)),
+                    3_usize.into(),
+                ],
+                vec!["=1".into(), f64::NAN.into(), Cell::R2(None), 0_usize.into()],
             ],
         };
         let expected = "[{\"name\":\"a \\\"b\\\"\",\"z_percent\":0.30000000000000004,\"r2\":0.99999,\"epochs\":3},\

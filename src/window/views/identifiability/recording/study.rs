@@ -8,10 +8,13 @@ use decoupler_core::{
     dataset::{Folds, SplitBy, Stream},
     evaluation::{
         Channel, CrossValidated, ErrorTable,
-        recorded::{Determination, Findings, FittedModel, NonlinearGain, SplitComparison, StudyStep},
+        recorded::{Determination, Findings, FittedModel, NonlinearGain, SplitComparison, StudyStep, channel_remarks},
     },
 };
-use decoupler_files::import::{Plan, Progress, Recording, Setup};
+use decoupler_files::{
+    export::describe_channels,
+    import::{Plan, Progress, Recording, Setup},
+};
 
 use crate::window::{
     job::{Job, Report, Wake},
@@ -276,7 +279,7 @@ fn validate(
     };
     let determined = Determination::measure(set, validated.network.view(), by);
     let gains = NonlinearGain::of_validated(set, &validated, by);
-    let mut remarks = Vec::new();
+    let mut remarks = describe_channels(&recording.inputs, &recording.targets, &channel_remarks(set, by));
     for (target, channel) in recording.targets.iter().enumerate() {
         let name = &channel.name;
         remarks.push(match &determined[target] {

@@ -9,8 +9,8 @@ use decoupler_core::{
 };
 use decoupler_files::{
     export::{
-        Cell, Table, TableColumn as ExportColumn, describe_target, describe_warnings, error_table, format_duration,
-        format_number,
+        Cell, Table, TableColumn as ExportColumn, describe_target, describe_warnings, error_table, format_below_one,
+        format_duration, format_number,
     },
     figure::{Figure, PlotFigure, learning_curve_figure},
     import::Setup,
@@ -184,7 +184,7 @@ fn targets_ui(ui: &mut Ui, found: &RecordingFindings) {
         let r2 = [("network", of_target.network), ("ridge", of_target.ridge.ok())];
         let r2: Vec<String> = r2
             .into_iter()
-            .filter_map(|(name, r2)| Some(format!("{name} {:.3}", r2?.r2.value)))
+            .filter_map(|(name, r2)| Some(format!("{name} {}", format_below_one(r2?.r2.value, 3))))
             .collect();
         if r2.len() > 1 {
             dim_ui(ui, &format!("R² of the {}", r2.join(", of ")));
@@ -216,8 +216,8 @@ fn channels_ui(ui: &mut Ui, found: &RecordingFindings) {
     dim_ui(
         ui,
         &format!(
-            "RMSE without a channel, relative to the RMSE with all channels; {} is fitted again for each. Dim: dispensable, \
-             because other channels replace it.",
+            "RMSE without a channel, relative to the RMSE with all channels; {} is fitted again for each. Dim: \
+             dispensable, because no error grows significantly without it.",
             name_of(found.findings.model)
         ),
     );

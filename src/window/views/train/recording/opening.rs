@@ -16,7 +16,9 @@ use decoupler_core::{
     },
 };
 use decoupler_files::{
-    export::{CheckpointFile, DocumentKind, NetworkFile, RecipeFile, RecipeSource, describe_positions},
+    export::{
+        CheckpointFile, DocumentKind, NetworkFile, RecipeFile, RecipeSource, describe_channels, describe_positions,
+    },
     import::{
         Dropped, FileReport, FileSet, Format, InspectedFile, Joined, Plan, Progress, Recipe, Recording, Watch,
         holds_positions, suggested_plan, suggested_plan_in_order,
@@ -459,7 +461,11 @@ fn check(plan: &Plan, seed: Seed, report: &Report<CheckingEvent>) -> Result<Box<
     let mut warnings: Vec<String> = recordings()
         .flat_map(|recording| recording.warnings.iter().cloned())
         .collect();
-    warnings.extend(channels(&sets.recording));
+    let Recording {
+        inputs, targets, set, ..
+    } = &sets.recording;
+    let remarks = channel_remarks(set, plan.division.by);
+    warnings.extend(describe_channels(inputs, targets, &remarks));
     let outside = Extrapolation::measure(&sets.split.training, &sets.test);
     warnings.extend(outside.warning(&sets.recording.inputs, &sets.recording.targets));
     let validation = sets.split.validation.as_ref().map_or(0, Dataset::samples);
@@ -479,13 +485,4 @@ fn check(plan: &Plan, seed: Seed, report: &Report<CheckingEvent>) -> Result<Box<
         positions: describe_positions(&sets.recording.positions),
         warnings,
     }))
-}
-
-/// Remarks on inputs that carry little or no information.
-fn channels(recording: &Recording) -> Vec<String> {
-    let name = |channel: usize| recording.inputs[channel].name.clone();
-    channel_remarks(&recording.set)
-        .iter()
-        .map(|remark| remark.sentence(name))
-        .collect()
 }
