@@ -250,7 +250,7 @@ fn answers_are_immediate_and_signals_are_handled() {
         report.clear();
         stderr.read_line(&mut report).unwrap();
     }
-    assert!(report.starts_with("1 lines decoded"), "{report}");
+    assert!(report.starts_with("1 line decoded"), "{report}");
     running.input.write_all(lines[1].as_bytes()).unwrap();
     assert_same([running.line().as_str()], expected.next());
     running.signal("-INT");
@@ -271,7 +271,7 @@ fn a_terminated_program_prints_its_report() {
     running.signal("-TERM");
     assert_eq!(running.child.wait().unwrap().code(), Some(143));
     let report = running.stderr();
-    assert!(report.contains("1 lines decoded"), "{report}");
+    assert!(report.contains("1 line decoded"), "{report}");
 }
 
 #[test]

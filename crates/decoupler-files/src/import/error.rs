@@ -70,7 +70,7 @@ pub enum ImportError {
     #[error("no column is {0}; name at least one")]
     NoColumns(&'static str),
     /// A cell of a used column is not a number.
-    #[error("'{}': line {line}, column {column} ('{name}'): '{text}' {reason}{others}; {}", .path.display(), Cure::CallMissing(.text.clone()))]
+    #[error("'{}': line {line}, column {column} ('{name}'): '{text}' {reason}; {}", .path.display(), Cure::CallMissing(.text.clone()))]
     NotANumber {
         /// The file.
         path: PathBuf,
@@ -82,10 +82,8 @@ pub enum ImportError {
         name: String,
         /// Text of the cell.
         text: String,
-        /// What is wrong with it, as a phrase.
-        reason: &'static str,
-        /// Number of further cells of this column that cannot be read, as a phrase.
-        others: String,
+        /// What is wrong with it and with further cells of this column, as a phrase.
+        reason: String,
     },
     /// The columns of a file are not the inputs of a network.
     #[error("'{}': {source}", .path.display())]

@@ -367,20 +367,18 @@ pub(super) fn not_a_number(files: &[(PathBuf, Table)], names: &Names, id: Column
     let (path, table) = &files[id.file];
     let Column { faults, start, .. } = &table.columns[id.column];
     let Some(first) = &faults.first else { return Ok(()) };
+    let mut reason = not_understood(&first.text, *start).to_owned();
+    if faults.count > 1 {
+        let others = counted(faults.count - 1, "other cell");
+        reason += &format!(", and {others} of the column cannot be read either");
+    }
     Err(ImportError::NotANumber {
         path: path.clone(),
         line: first.line,
         column: id.column + 1,
         name: names.name(id).to_owned(),
         text: first.text.clone(),
-        reason: not_understood(&first.text, *start),
-        others: match faults.count {
-            1 => String::new(),
-            count => format!(
-                ", and {} of the column cannot be read either",
-                counted(count - 1, "other cell")
-            ),
-        },
+        reason,
     })
 }
 
