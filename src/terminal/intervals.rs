@@ -106,7 +106,7 @@ impl<'a> DriftWarnings<'a> {
         self.lines += 1;
         match monitor.take(line, readings) {
             Some(DriftEvent::Began(drift)) if self.is_stream => {
-                let lines = format!("line {line}: since line {}", drift.first);
+                let lines = format!("line {line} (since line {})", drift.first);
                 note(&self.warning(&lines, &drift));
             }
             Some(DriftEvent::Ended(drift)) if self.is_stream => note(&format!(
