@@ -27,7 +27,7 @@ use super::{
     failure::Failure,
     follow::Follow,
     import_arguments::ImportArguments,
-    intervals::Drift,
+    intervals::DriftWarnings,
     output::{Readings, messages, print, print_object, progress_bar, read},
     samples::{with_bar, working_folder},
 };
@@ -42,10 +42,13 @@ use super::{
 /// lines. With --follow, frames are decoded as they arrive, also from standard input, a serial port or a socket. The
 /// network of a recording (train --data) reads columns named like its inputs (or as many unnamed columns) from CSV, .npy,
 /// .npz or .mat, and writes its targets under their names, after the time, group and row columns of the input. The column
-/// TARGET_half_width_90 has the half-width of the 90 % prediction interval: the true value is within TARGET ± this half-width
-/// with a probability of 90 %, as long as the readings are like those of the training. A warning says from which line on they
-/// no longer are. In readings that are, a false warning occurs on average at most once in 10 000 blocks, and in n blocks with
-/// a probability of at most n / 10 000; a block is five times as long as neighbouring readings are correlated.
+/// TARGET_half_width_90 has the half-width of the 90 % prediction interval of this answer: the true value is within TARGET ±
+/// this half-width with a probability of 90 %, as long as the readings are like those of the training. A warning lists the
+/// lines in which they are not: in several consecutive blocks of readings, the means, the spread or the relation of the inputs
+/// are beyond those of all training blocks; with --follow, a note says when they are back. A block is at least five times as
+/// long as neighbouring readings are correlated. In readings like those of the training, a false warning occurs on average at
+/// most once in 10 000 blocks. A note gives the reason if readings are not monitored, such as too few independent training
+/// readings (50 to 100 are needed).
 #[derive(Args)]
 pub(super) struct Decode {
     /// Network saved by train --out or by the window
@@ -96,7 +99,7 @@ fn decode_file(file: &NetworkFile, input: &Path, output: &Path) -> Result<(), Fa
     let mut written = AtomicFile::create(output)?;
     let refused = |source| WriteError::io(output, source);
     let mut has_heading = false;
-    let mut drift = Drift::new(file);
+    let mut drift = DriftWarnings::new(file, false);
     let mut values = Vec::new();
     let mut outside = OutsideTraining::new(&file.problem);
     let mut compiled = CompiledNetworks::<f64>::new(&file.network, rows_read(file)?);
@@ -134,6 +137,7 @@ fn decode_file(file: &NetworkFile, input: &Path, output: &Path) -> Result<(), Fa
     })?;
     written.commit()?;
     outside.warn();
+    drift.end();
     Ok(())
 }
 

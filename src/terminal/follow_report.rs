@@ -20,7 +20,7 @@ use serde_json::{Map, Value, json};
 use super::{
     decode::{OutsideTraining, rows_read, with_half_widths, write_cell, write_heading},
     failure::Failure,
-    intervals::Drift,
+    intervals::DriftWarnings,
     output::messages,
 };
 
@@ -170,7 +170,7 @@ pub(super) struct Answers<'a> {
     answer: Vec<f64>,
     /// Answers with the half-widths of their intervals.
     values: Vec<f64>,
-    drift: Drift,
+    drift: DriftWarnings<'a>,
     outside: OutsideTraining<'a>,
     form: Form,
     has_heading: bool,
@@ -186,7 +186,7 @@ impl<'a> Answers<'a> {
             rows,
             answer: vec![0.0; rows * file.problem.targets.len()],
             values: Vec::new(),
-            drift: Drift::new(file),
+            drift: DriftWarnings::new(file, true),
             outside: OutsideTraining::new(&file.problem),
             form,
             has_heading: form == Form::Jsonl,

@@ -4,8 +4,8 @@ use std::io::Write;
 
 use clap::ValueEnum;
 use decoupler_core::{
-    evaluation::{Intervals, NoIntervals, Run, RunError},
-    live::DriftMonitor,
+    evaluation::{Channel, Intervals, NoIntervals, Run, RunError},
+    live::{Drift, DriftEvent, DriftMonitor},
 };
 use decoupler_files::{
     export::{NetworkFile, format_duration},
@@ -26,12 +26,7 @@ pub(super) enum WhenCalibrated {
 
 /// Sets the intervals of a finished `run` on a recording: those that its choice of settings has already given, or
 /// otherwise by cross-validation of its training samples. Ctrl-C leaves them out.
-pub(super) fn calibrate(
-    run: &mut Run,
-    sets: &SetupSets,
-    chosen: Option<Result<Intervals, NoIntervals>>,
-    when: WhenCalibrated,
-) -> Result<(), RunError> {
+pub(super) fn calibrate(run: &mut Run, sets: &SetupSets, when: WhenCalibrated) -> Result<(), RunError> {
     let Some(recordings) = &sets.recordings else {
         return Ok(());
     };
@@ -40,7 +35,7 @@ pub(super) fn calibrate(
     }
     let by = recordings.recorded.plan.division.by;
     // A training that failed is not one of those that gave the held-out answers.
-    let calibrated = match chosen.filter(|_| run.defect().is_none()) {
+    let calibrated = match sets.chosen_intervals().filter(|_| run.defect().is_none()) {
         Some(calibrated) => calibrated,
         None => {
             let time = Intervals::time(run);
@@ -75,25 +70,86 @@ fn note(message: &str) {
     let _ = writeln!(messages(), "{message}");
 }
 
-/// Monitor of the readings of a decoded input, which warns on standard error.
-pub(super) struct Drift(Option<DriftMonitor>);
+/// Reports why drift of the readings of a recording's network is not monitored, if it is not.
+pub(super) fn note_unmonitored(file: &NetworkFile) {
+    if let (Err(reason), None) = (&file.drift, file.settings.simulated()) {
+        note(&format!("Drift of the readings is not monitored: {reason}"));
+    }
+}
 
-impl Drift {
-    pub(super) fn new(file: &NetworkFile) -> Self {
-        Self(file.drift.clone().map(DriftMonitor::new))
+/// Monitor of the readings of a decoded input, which warns on standard error.
+pub(super) struct DriftWarnings<'a> {
+    monitor: Option<DriftMonitor>,
+    inputs: &'a [Channel],
+    /// Warns at once, and not in [`Self::end`].
+    is_stream: bool,
+    lines: u64,
+    ended: Vec<Drift>,
+}
+
+impl<'a> DriftWarnings<'a> {
+    /// Monitors the readings of a file or of a stream, or reports why they cannot be monitored.
+    pub(super) fn new(file: &'a NetworkFile, is_stream: bool) -> Self {
+        note_unmonitored(file);
+        Self {
+            monitor: file.drift.clone().ok().map(DriftMonitor::new),
+            inputs: &file.problem.inputs,
+            is_stream,
+            lines: 0,
+            ended: Vec::new(),
+        }
     }
 
-    /// Takes the readings of a line, and warns once if the readings have drifted.
+    /// Takes the readings of a line.
     pub(super) fn take(&mut self, line: u64, readings: &[f64]) {
-        let Some(monitor) = &mut self.0 else { return };
-        if monitor.take(readings) {
-            let block = monitor.reference().readings_per_block();
+        let Some(monitor) = &mut self.monitor else { return };
+        self.lines += 1;
+        match monitor.take(line, readings) {
+            Some(DriftEvent::Began(drift)) if self.is_stream => {
+                let lines = format!("line {line} (since line {})", drift.first);
+                note(&self.warning(&lines, &drift));
+            }
+            Some(DriftEvent::Ended(drift)) if self.is_stream => note(&format!(
+                "line {line}: since line {}, the readings look like the training readings again",
+                drift.last + 1
+            )),
+            Some(DriftEvent::Ended(drift)) => self.ended.push(drift),
+            _ => {}
+        }
+    }
+
+    /// Warns of the lines of a file whose readings drifted.
+    pub(super) fn end(&self) {
+        /// Maximum number of parts of the file that are listed.
+        const MAX_LISTED: usize = 5;
+        let Some(monitor) = &self.monitor else { return };
+        let needed = (monitor.reference().readings_per_block() * monitor.reference().blocks_in_a_row()) as u64;
+        if self.lines < needed {
             note(&format!(
-                "warning: line {line}: the latest readings no longer look like the training readings, and the prediction \
-                 intervals no longer hold: recalibrate (re-zero the sensor, or train with recent samples); in readings like \
-                 those of the training, a false alarm occurs on average once in {} lines or less often",
-                DriftMonitor::BLOCKS_BETWEEN_FALSE_ALARMS * block as f64
+                "Drift of the readings is not monitored: this takes at least {needed} lines, and there are {}",
+                self.lines
             ));
         }
+        let drifts = self.ended.iter().chain(monitor.drift());
+        for drift in drifts.clone().take(MAX_LISTED) {
+            note(&self.warning(&format!("lines {} to {}", drift.first, drift.last), drift));
+        }
+        if let more @ 1.. = drifts.count().saturating_sub(MAX_LISTED) {
+            note(&format!("warning: and {more} more such parts of the file"));
+        }
+    }
+
+    fn warning(&self, lines: &str, drift: &Drift) -> String {
+        let block = self
+            .monitor
+            .as_ref()
+            .map_or(1, |monitor| monitor.reference().readings_per_block());
+        format!(
+            "warning: {lines}: the readings no longer look like the training readings ({}), and the prediction intervals do \
+             not hold: check the sensor and its connection, re-zero it, or train with recent samples; in readings like those \
+             of the training, a false alarm occurs on average once in {} lines or less often",
+            drift.describe(self.inputs),
+            DriftMonitor::BLOCKS_BETWEEN_FALSE_ALARMS * block as f64
+        )
     }
 }

@@ -10,7 +10,7 @@ use super::{
     failure::{Failure, Interruption},
     import_arguments::ImportArguments,
     interruption::{CheckpointArguments, Checkpointing, Graceful},
-    intervals::{WhenCalibrated, calibrate},
+    intervals::{WhenCalibrated, calibrate, note_unmonitored},
     output::{messages, progress_bar},
     samples::{announce, announce_recording, following, sets, working_folder},
     train_report::Trained,
@@ -76,11 +76,8 @@ impl Train {
         self.checkpoint.check()?;
         self.check_paths()?;
         let resumed = self.checkpoint.checkpoint.as_ref().filter(|_| self.checkpoint.resume);
-        let (mut run, sets, intervals) = match resumed {
-            Some(path) => {
-                let (run, sets) = self.resume(path)?;
-                (run, sets, None)
-            }
+        let (mut run, sets) = match resumed {
+            Some(path) => self.resume(path)?,
             None => {
                 let setup = self.setup()?;
                 if let Some(folds) = self.import.folds {
@@ -88,31 +85,31 @@ impl Train {
                         .refuse_auto("--folds measures the same settings in every fold")?;
                     return self.cross_validate(&setup, folds);
                 }
-                let (setup, sets, intervals) = match self.chooses(&setup)? {
+                let (setup, sets) = match self.chooses(&setup)? {
                     true => {
                         let chosen = self.choose(&setup)?;
-                        let intervals = chosen.intervals();
-                        (chosen.setup, chosen.sets, intervals)
+                        (chosen.setup, chosen.sets)
                     }
                     false => {
                         let sets = sets(&setup, self.json)?;
-                        (setup, sets, None)
+                        (setup, sets)
                     }
                 };
                 self.import.save_recipe(&setup)?;
                 announce_recording(&setup, &sets);
                 let run = sets.run(&setup, &|| false)?.expect("nothing cancels it");
-                (run, sets, intervals)
+                (run, sets)
             }
         };
         let mut end = self.train(&mut run, self.checkpoint.checkpointing(sets.recorded()));
         if end.is_ok()
-            && let Err(error) = calibrate(&mut run, &sets, intervals, self.intervals)
+            && let Err(error) = calibrate(&mut run, &sets, self.intervals)
         {
             end = Err(error.into());
         }
         let mut file = NetworkFile::from_run(&run, sets.recorded())?;
         file.drift = sets.drift_reference();
+        note_unmonitored(&file);
         // The figures are printed even if something fails from here on.
         let saved = self.out.as_ref().map_or(Ok(()), |path| file.save(path));
         let (mut decoders, mut optimism, mut measured) = (Vec::new(), Vec::new(), Ok(()));
@@ -258,13 +255,16 @@ impl Train {
         let resumed = following(&saved, self.json, |on_progress| {
             file.resume_unless(&|| false, on_progress)
         });
-        let (mut run, sets) = resumed.map_err(|error| match error {
+        let (mut run, mut sets) = resumed.map_err(|error| match error {
             SetupError::Run(source) => Failure::Resume {
                 path: path.to_owned(),
                 source,
             },
             error => error.into(),
         })?;
+        if training != saved.settings().training {
+            sets.forget_choice();
+        }
         self.continue_run(&mut run, saved.settings().training, training)?;
         Ok((run, sets))
     }

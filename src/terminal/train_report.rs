@@ -28,8 +28,8 @@ use decoupler_core::{
 };
 use decoupler_files::{
     export::{
-        NetworkFile, TrainingRecord, decoder_table, describe_coverage, describe_determinacy, describe_samples,
-        describe_search, describe_worse_than_ridge, error_table, format_duration, search_table,
+        NetworkFile, TrainingRecord, decoder_table, describe_coverage, describe_determinacy, describe_half_widths,
+        describe_samples, describe_search, describe_worse_than_ridge, error_table, format_duration, search_table,
     },
     import::{Recording, SetupSets},
 };
@@ -372,6 +372,11 @@ impl<'a> Trained<'a> {
             if let Some(found) = found {
                 writeln!(out, "{}", found.sentence(&target.name))?;
             }
+        }
+        let half_widths =
+            (file.intervals.as_ref()).and_then(|intervals| describe_half_widths(&file.problem.targets, intervals));
+        if let Some(sentence) = half_widths {
+            writeln!(out, "{sentence}")?;
         }
         write_warnings(&self.warnings(&self.determined()), out)?;
         write_warnings(&self.remarks(), out)?;

@@ -150,7 +150,32 @@ fn answers_have_calibrated_intervals_and_drift_is_reported() {
     fs::write(folder.path().join("shifted.csv"), shifted).unwrap();
     const DRIFTED: &str = "no longer look like the training readings";
     let (_, message) = decode("shifted.csv");
-    assert!(message.contains(DRIFTED), "{message}");
+    assert!(
+        message.contains(DRIFTED) && message.contains("lines 2 to "),
+        "{message}"
+    );
+    // Frozen from line 101 to line 200.
+    let frozen = Vec::from_iter(fs::read_to_string(&path).unwrap().lines().map(str::to_owned));
+    let lines = frozen.iter().zip(1..).map(|(line, number)| match number {
+        101..=200 => format!("{number},{}", frozen[99].split_once(',').unwrap().1),
+        _ => line.clone(),
+    });
+    fs::write(folder.path().join("frozen.csv"), lines.collect::<Vec<_>>().join("\n")).unwrap();
+    let (_, message) = decode("frozen.csv");
+    let warning = message.lines().find(|line| line.contains(DRIFTED)).unwrap();
+    let lines = warning
+        .strip_prefix("warning: lines ")
+        .unwrap()
+        .split_once(':')
+        .unwrap()
+        .0;
+    let (first, last) = lines.split_once(" to ").unwrap();
+    let [first, last] = [first, last].map(|line| line.parse::<i32>().unwrap());
+    assert!((first - 101).abs() <= 20 && (last - 200).abs() <= 20, "{message}");
+    assert!(
+        warning.contains("less than in training") && message.matches(DRIFTED).count() == 1,
+        "{message}"
+    );
     // A stream has the same answers and half-widths as the file, and the same warning.
     let follow = |input: &str| {
         let output = decoupler(
@@ -172,7 +197,12 @@ fn answers_have_calibrated_intervals_and_drift_is_reported() {
         );
     }
     let (_, message) = follow("shifted.csv");
-    assert!(message.contains(DRIFTED), "{message}");
+    assert!(message.contains(DRIFTED) && !message.contains("again"), "{message}");
+    let (_, message) = follow("frozen.csv");
+    assert!(
+        message.contains(DRIFTED) && message.contains("look like the training readings again"),
+        "{message}"
+    );
     json(
         "export --network n.json --format json --json --out bundle",
         folder.path(),
@@ -182,9 +212,36 @@ fn answers_have_calibrated_intervals_and_drift_is_reported() {
 }
 
 #[test]
+fn readings_without_a_drift_monitor_give_the_reason() {
+    let folder = recording();
+    let path = folder.path();
+    for (inputs, rows, reason) in [
+        ("e", 300, "every input is constant in the training samples"),
+        ("a,b", 40, "there are "),
+    ] {
+        let text = fs::read_to_string(path.join("r.csv")).unwrap();
+        let lines = text.lines().take(1 + rows).map(|line| format!("{line}\n"));
+        fs::write(path.join("some.csv"), lines.collect::<String>()).unwrap();
+        let train = format!("train --data some.csv --inputs {inputs} --targets y --hidden 2 --epochs 5 --out n.json");
+        for command in [
+            &train,
+            "decode --network n.json --input some.csv --output out.csv",
+            "decode --network n.json --follow --input some.csv",
+        ] {
+            let output = decoupler(command, path);
+            let message = String::from_utf8(output.stderr).unwrap();
+            assert!(output.status.success(), "{command}: {message}");
+            let reason = format!("Drift of the readings is not monitored: {reason}");
+            assert!(message.contains(&reason), "{command}: {message}");
+        }
+    }
+}
+
+#[test]
 fn a_choice_of_settings_gives_the_intervals() {
     let folder = recording();
-    let train = "train --data r.csv --inputs a,b --targets x --hidden auto --budget 1 --json --out n.json";
+    let train =
+        "train --data r.csv --inputs a,b --targets x --hidden auto --budget 1 --json --out n.json --checkpoint c.json";
     let output = decoupler(train, folder.path());
     let report: Value = serde_json::from_slice(&output.stdout).unwrap();
     // 90 % of the noise is within 0.9 × 0.05.
@@ -201,9 +258,18 @@ fn a_choice_of_settings_gives_the_intervals() {
     let by_cross_validation = Intervals::cross_validate(&file.settings, training, by, &|| false).unwrap();
     assert_ne!(file.intervals, Some(by_cross_validation));
     assert_eq!(
-        file.intervals.unwrap().targets[0].as_ref().unwrap().samples,
+        file.intervals.as_ref().unwrap().targets[0].as_ref().unwrap().samples,
         training.samples()
     );
+    // So they are when the finished training is resumed, but not when it continues with other settings.
+    let resumed = |options: &str| {
+        let command = format!("train --checkpoint c.json --resume --json --out again.json {options}");
+        json(&command, folder.path());
+        NetworkFile::load(&folder.path().join("again.json")).unwrap()
+    };
+    let again = resumed("");
+    assert_eq!((again.intervals, again.network), (file.intervals.clone(), file.network));
+    assert_ne!(resumed("--epochs 500").intervals, file.intervals);
 }
 
 #[test]

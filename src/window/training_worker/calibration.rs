@@ -3,10 +3,7 @@ use decoupler_core::{
     evaluation::{Intervals, NoIntervals, Run},
     training::StopReason,
 };
-use decoupler_files::{
-    export::format_duration,
-    import::{ChosenSetup, SetupSets},
-};
+use decoupler_files::{export::format_duration, import::SetupSets};
 
 /// Calibration of the prediction intervals of a training on a recording, when it has ended.
 pub struct Calibration {
@@ -25,15 +22,7 @@ impl Calibration {
         Some(Self {
             training: sets.sets.split.training.clone(),
             by,
-            chosen: None,
-        })
-    }
-
-    /// Prepares the calibration of a training with chosen settings.
-    pub fn of_choice(chosen: &ChosenSetup) -> Option<Self> {
-        Some(Self {
-            chosen: chosen.intervals(),
-            ..Self::of(&chosen.sets)?
+            chosen: sets.chosen_intervals(),
         })
     }
 

@@ -15,7 +15,7 @@ use decoupler_core::{
         Baselines, Coverage, PastNetworks, Problem, Run, RunDefect, RunError, RunSettings, StartRecord, TestErrors,
         auto::{AutoProgress, AutoRecord},
     },
-    live::DriftReference,
+    live::{DriftReference, NoDriftMonitor},
     network::Networks,
     training::{EpochRecord, Stage, StopReason, StoppingRules, TrainerState, TrainingError, TrainingSettings},
 };
@@ -88,8 +88,8 @@ pub struct TrainedRun {
     pub run: Run,
     /// Origin of recorded samples; `None` for a simulated array.
     pub recorded: Option<Recorded>,
-    /// Training readings of a recording, by which a later drift is detected.
-    pub drift: Option<DriftReference>,
+    /// Training readings of a recording, by which a later drift is detected, or the reason why they are not monitored.
+    pub drift: Result<DriftReference, NoDriftMonitor>,
     /// Remarks on the samples of a recording.
     pub of_samples: Vec<String>,
     /// Calibration of its intervals when it has ended; `None` for a simulated array.

@@ -213,10 +213,7 @@ impl<'a> TrainingLoop<'a> {
             let chosen = setup.choose(&fixed, DEFAULT_BUDGET_S, folder, is_cancelled, &mut on_choosing)?;
             let Some(chosen) = chosen else { return Ok(None) };
             let run = chosen.sets.run(&chosen.setup, is_cancelled)?;
-            Ok(run.map(|run| TrainedRun {
-                calibration: Calibration::of_choice(&chosen),
-                ..TrainedRun::new(run, &chosen.sets)
-            }))
+            Ok(run.map(|run| TrainedRun::new(run, &chosen.sets)))
         })
     }
 
@@ -262,9 +259,15 @@ impl<'a> TrainingLoop<'a> {
 
     fn continue_training(&mut self, training: TrainingSettings) {
         let continued = match &mut self.run {
-            Some(TrainedRun { run, calibration, .. }) => continue_run(run, training)
+            Some(TrainedRun {
+                run,
+                recorded,
+                calibration,
+                ..
+            }) => continue_run(run, training)
                 .map(|()| {
-                    if let Some(calibration) = calibration {
+                    if let (Some(recorded), Some(calibration)) = (recorded, calibration) {
+                        recorded.chosen_intervals = None;
                         calibration.forget_choice();
                     }
                     *run.settings()

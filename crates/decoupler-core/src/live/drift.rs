@@ -1,139 +1,287 @@
-use faer::{Mat, Side};
-use ndarray::{ArrayView2, Axis};
-use serde::{Deserialize, Serialize};
+use std::collections::VecDeque;
 
-/// Description of the training readings against which [`DriftMonitor`] compares later readings.
+use faer::{Mat, Side};
+use ndarray::{ArrayView1, ArrayView2};
+use serde::{Deserialize, Serialize};
+use thiserror::Error;
+
+use crate::evaluation::Channel;
+
+/// Description of the training readings against which [`DriftMonitor`] compares later readings: the range over blocks of
+/// training readings of
 ///
-/// The distance of a reading is its squared Mahalanobis distance from the training readings, divided by the number of
-/// channels. Distances are averaged over blocks that are five times as long as their integrated autocorrelation time,
-/// so that blocks are nearly independent also where neighbouring readings are nearly the same.
+/// - the variance of each input within a block, and their mean over the inputs,
+/// - the mean of each input,
+/// - the mean square of each input given the inputs before it (squared Mahalanobis distance, term by term), and their
+///   mean over the inputs.
+///
+/// A block is at least five times as long as neighbouring readings are correlated, so that blocks are nearly independent.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct DriftReference {
-    metric: Metric,
-    /// Number of readings in a block.
-    block: usize,
-    /// Mean distance of each training block, measured with a metric that was fitted to other blocks; ascending.
-    distances: Vec<f64>,
-}
-
-/// Mean, scale and correlation of the channels.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct Metric {
     means: Vec<f64>,
-    /// Reciprocal of the standard deviation of each channel; 0 if it is constant.
+    /// Reciprocal of the standard deviation of each input; 0 if it is constant.
     inverse_deviations: Vec<f64>,
     /// Lower Cholesky factor of the correlation matrix plus [`RIDGE`] times the identity, row by row.
     factor: Vec<f64>,
+    /// Number of readings in a block.
+    block: usize,
+    /// Number of training blocks.
+    blocks: usize,
+    /// Smallest and largest value of each [`Statistic`] in the training blocks, widened by [`LEVEL_MARGIN`] or
+    /// [`RATIO_MARGIN`].
+    ranges: Vec<[f64; 2]>,
+}
+
+/// Reason why the readings of a network are not monitored.
+#[derive(Clone, Debug, PartialEq, Eq, Error, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum NoDriftMonitor {
+    /// No input varies.
+    #[error("every input is constant in the training samples")]
+    Constant,
+    /// There are too few independent training readings.
+    #[error(
+        "there are {blocks} independent blocks of training readings, each {block} long, which is five times as long as \
+         neighbouring readings are correlated, and {} are needed: record longer",
+        DriftReference::MIN_BLOCKS
+    )]
+    TooFewReadings {
+        /// Number of independent blocks.
+        blocks: usize,
+        /// Number of readings in a block.
+        block: usize,
+    },
+    /// There are too many inputs.
+    #[error(
+        "the network has {found} inputs, and at most {} can be monitored",
+        DriftReference::MAX_CHANNELS
+    )]
+    TooManyInputs {
+        /// Number of inputs.
+        found: usize,
+    },
+    /// Readings are NaN, infinite, or too large to compute with.
+    #[error("training readings are not finite, or too large")]
+    NotFinite,
+    /// The row-wires are known, and each has readings of its own.
+    #[error("the network has inputs by row-wire, which are not monitored")]
+    RowWires,
+    /// The training readings were not described.
+    #[error("the network file does not describe the training readings, as those of older versions: train again")]
+    NotDescribed,
 }
 
 /// Regularisation of the correlation matrix.
 const RIDGE: f64 = 0.01;
+/// Margin of the range of a mean in standard deviations of the training readings. Smaller changes are not reported, also
+/// not those by the phase in which a block of a periodic signal begins.
+const LEVEL_MARGIN: f64 = 0.1;
+/// Factor that widens the range of a variance or mean square.
+const RATIO_MARGIN: f64 = 1.1;
+/// Bound of scaled readings, so that their squares are finite.
+const MAX_SCALED: f64 = 1e6;
 
-impl Metric {
-    /// Fits the metric to `readings` (samples × channels) without the samples `left_out`.
-    fn fit(readings: ArrayView2<'_, f64>, left_out: std::ops::Range<usize>) -> Option<Self> {
-        let kept: Vec<usize> = (0..readings.nrows())
-            .filter(|sample| !left_out.contains(sample))
-            .collect();
-        let (count, channels) = (kept.len() as f64, readings.ncols());
-        let kept = readings.select(Axis(0), &kept);
-        let means = kept.mean_axis(Axis(0))?.to_vec();
-        let spread = kept.std_axis(Axis(0), 0.0);
-        let is_constant = |channel: usize| spread[channel] <= 1e-9 * means[channel].abs() || spread[channel] == 0.0;
-        let inverse_deviations: Vec<f64> = (0..channels)
-            .map(|channel| {
-                if is_constant(channel) {
-                    0.0
-                } else {
-                    spread[channel].recip()
-                }
-            })
-            .collect();
-        let scaled = Mat::from_fn(kept.nrows(), channels, |sample, channel| {
-            (kept[[sample, channel]] - means[channel]) * inverse_deviations[channel]
-        });
-        let mut correlation = scaled.transpose() * &scaled;
-        for column in 0..channels {
-            for row in 0..channels {
-                correlation[(row, column)] /= count;
-            }
-            correlation[(column, column)] += RIDGE;
-        }
-        let factor = correlation.llt(Side::Lower).ok()?;
-        let lower = factor.L();
-        let packed = (0..channels).flat_map(|row| (0..=row).map(move |column| lower[(row, column)]));
-        let metric = Self {
-            means,
-            inverse_deviations,
-            factor: packed.collect(),
-        };
-        metric.factor.iter().all(|value| value.is_finite()).then_some(metric)
+/// Quantity computed from each block.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Statistic {
+    MeanVariance,
+    Variance(usize),
+    Mean(usize),
+    MeanSquare,
+    Square(usize),
+}
+
+impl Statistic {
+    /// Number of statistics of so many inputs.
+    fn count(channels: usize) -> usize {
+        3 * channels + 2
     }
 
-    /// Squared Mahalanobis distance of `readings` per channel; `scratch` has one entry for each channel.
-    fn distance(&self, readings: impl Iterator<Item = f64>, scratch: &mut [f64]) -> f64 {
-        let scaled = readings.zip(self.means.iter().zip(&self.inverse_deviations));
-        let mut row_of_factor = 0;
-        let mut sum = 0.0;
-        for (row, (reading, (mean, inverse))) in scaled.enumerate() {
-            let factor = &self.factor[row_of_factor..=row_of_factor + row];
-            let above: f64 = factor.iter().zip(&scratch[..row]).map(|(a, b)| a * b).sum();
-            scratch[row] = ((reading - mean) * inverse - above) / factor[row];
-            sum += scratch[row] * scratch[row];
-            row_of_factor += row + 1;
+    fn at(index: usize, channels: usize) -> Self {
+        match index {
+            0 => Self::MeanVariance,
+            _ if index <= channels => Self::Variance(index - 1),
+            _ if index <= 2 * channels => Self::Mean(index - channels - 1),
+            _ if index == 2 * channels + 1 => Self::MeanSquare,
+            _ => Self::Square(index - 2 * channels - 2),
         }
-        sum / self.means.len() as f64
+    }
+
+    /// Returns the range of later blocks that are like the training blocks. Squares have no lower end: those of the readings
+    /// to which the correlation was fitted are too small.
+    fn widened(self, [low, high]: [f64; 2]) -> [f64; 2] {
+        match self {
+            Self::Mean(_) => [low - LEVEL_MARGIN, high + LEVEL_MARGIN],
+            Self::MeanVariance | Self::Variance(_) => [low / RATIO_MARGIN, high * RATIO_MARGIN],
+            Self::MeanSquare | Self::Square(_) => [0.0, high * RATIO_MARGIN],
+        }
+    }
+}
+
+/// Sums over the readings of a block.
+#[derive(Clone, Debug)]
+struct Block {
+    /// Scaled readings with which the block begins.
+    first: Vec<f64>,
+    /// Sums of the differences from the first readings, of their squares, and of the squares given the inputs before.
+    sums: Vec<[f64; 3]>,
+    count: usize,
+}
+
+impl Block {
+    fn new(channels: usize) -> Self {
+        Self {
+            first: vec![0.0; channels],
+            sums: vec![[0.0; 3]; channels],
+            count: 0,
+        }
+    }
+
+    fn add(&mut self, scaled: &[f64], squares: impl Iterator<Item = f64>) {
+        if self.count == 0 {
+            self.first.copy_from_slice(scaled);
+        }
+        self.count += 1;
+        for (((sums, first), scaled), square) in self.sums.iter_mut().zip(&self.first).zip(scaled).zip(squares) {
+            // Exactly 0 as long as a reading does not change.
+            let difference = scaled - first;
+            *sums = [
+                sums[0] + difference,
+                sums[1] + difference * difference,
+                sums[2] + square,
+            ];
+        }
+    }
+
+    /// Writes the statistics and begins the next block.
+    fn finish(&mut self, statistics: &mut [f64]) {
+        let (channels, count) = (self.first.len(), self.count as f64);
+        let (mut variances, mut squares) = (0.0, 0.0);
+        for (channel, (sums, first)) in self.sums.iter_mut().zip(&self.first).enumerate() {
+            let [mean, square_of_difference, square] = sums.map(|sum| sum / count);
+            let variance = (square_of_difference - mean * mean).max(0.0);
+            statistics[1 + channel] = variance;
+            statistics[1 + channels + channel] = first + mean;
+            statistics[2 + 2 * channels + channel] = square;
+            variances += variance / channels as f64;
+            squares += square / channels as f64;
+            *sums = [0.0; 3];
+        }
+        (statistics[0], statistics[1 + 2 * channels]) = (variances, squares);
+        self.count = 0;
     }
 }
 
 impl DriftReference {
     /// Minimum number of training blocks.
-    const MIN_BLOCKS: usize = 30;
-    /// Length of a block in integrated autocorrelation times.
-    const TIMES: f64 = 5.0;
-    /// Number of parts of the training set; the distances in each are measured with a metric fitted to the others.
+    const MIN_BLOCKS: usize = 10;
+    /// Minimum length of a block in correlation times.
+    const MIN_TIMES: f64 = 5.0;
+    /// Maximum length: longer blocks detect smaller changes, but later.
+    const MAX_TIMES: f64 = 20.0;
+    /// Number of training blocks beyond which blocks become longer instead.
+    const ENOUGH_BLOCKS: f64 = 60.0;
+    /// Number of parts of the training set; the squares of each are measured with the correlation of the others, as
+    /// those of later readings are.
     const PARTS: usize = 5;
     const MAX_CHANNELS: usize = 512;
 
-    /// Describes the training `readings` (samples × channels, in the order of time). Returns `None` if they contain fewer
-    /// than 30 independent blocks, more than 512 channels, or values that are not finite.
-    pub fn of(readings: ArrayView2<'_, f64>) -> Option<Self> {
+    /// Describes the training `readings` (samples × channels, in the order of time).
+    ///
+    /// # Errors
+    /// If there are too few independent readings or too many channels, no channel varies, or a reading is not finite.
+    pub fn of(readings: ArrayView2<'_, f64>) -> Result<Self, NoDriftMonitor> {
         let (samples, channels) = readings.dim();
-        if samples < Self::MIN_BLOCKS || channels > Self::MAX_CHANNELS {
-            return None;
+        if channels > Self::MAX_CHANNELS {
+            return Err(NoDriftMonitor::TooManyInputs { found: channels });
         }
-        if !readings.iter().all(|reading| reading.is_finite()) {
-            return None;
+        let scales: Option<Vec<(f64, f64)>> = readings.columns().into_iter().map(scale).collect();
+        let (means, inverse_deviations): (Vec<f64>, Vec<f64>) =
+            scales.ok_or(NoDriftMonitor::NotFinite)?.into_iter().unzip();
+        if inverse_deviations.iter().all(|inverse| *inverse == 0.0) {
+            return Err(NoDriftMonitor::Constant);
         }
-        let mut scratch = vec![0.0; channels];
-        let mut distances = Vec::with_capacity(samples);
+        let mut reference = Self {
+            means,
+            inverse_deviations,
+            factor: Vec::new(),
+            block: 1,
+            blocks: samples,
+            ranges: vec![[f64::INFINITY, f64::NEG_INFINITY]; Statistic::count(channels)],
+        };
+        let scaled = |sample: usize, channel: usize| reference.scaled(channel, readings[[sample, channel]]);
+        let column = |channel: usize| (0..samples).map(|sample| scaled(sample, channel)).collect();
+        let distance = |sample: usize| (0..channels).map(|channel| scaled(sample, channel).powi(2)).sum();
+        let times = (0..channels).map(|channel| correlation_time(column(channel)));
+        let time = times.fold(correlation_time((0..samples).map(distance).collect()), f64::max);
+        let independent = samples as f64 / time;
+        let length = (independent / Self::ENOUGH_BLOCKS).clamp(Self::MIN_TIMES, Self::MAX_TIMES);
+        let block = (length * time).ceil() as usize;
+        let blocks = samples / block;
+        if blocks < Self::MIN_BLOCKS {
+            return Err(NoDriftMonitor::TooFewReadings { blocks, block });
+        }
+        let part = |part: usize| part * samples / Self::PARTS..(part + 1) * samples / Self::PARTS;
+        let moments = (0..Self::PARTS).map(|index| {
+            let range = part(index);
+            Moments::of(Mat::from_fn(range.len(), channels, |sample, channel| {
+                scaled(range.start + sample, channel)
+            }))
+        });
+        let moments: Vec<Moments> = moments.collect();
+        let (_, factor) = Moments::factor_of(&moments, None).ok_or(NoDriftMonitor::NotFinite)?;
+        (reference.block, reference.blocks, reference.factor) = (block, blocks, factor);
+        reference.measure(readings, &moments)
+    }
+
+    /// Measures the ranges of the statistics.
+    fn measure(mut self, readings: ArrayView2<'_, f64>, moments: &[Moments]) -> Result<Self, NoDriftMonitor> {
+        let (samples, channels) = readings.dim();
+        let mut block = Block::new(channels);
+        let (mut scaled, mut given, mut others) = (vec![0.0; channels], vec![0.0; channels], vec![0.0; channels]);
+        let mut statistics = vec![0.0; self.ranges.len()];
         for part in 0..Self::PARTS {
-            let range = part * samples / Self::PARTS..(part + 1) * samples / Self::PARTS;
-            let metric = Metric::fit(readings, range.clone())?;
-            distances.extend(range.map(|sample| metric.distance(readings.row(sample).iter().copied(), &mut scratch)));
+            let (means, factor) = Moments::factor_of(moments, Some(part)).ok_or(NoDriftMonitor::NotFinite)?;
+            for sample in part * samples / Self::PARTS..(part + 1) * samples / Self::PARTS {
+                for (channel, (scaled, reading)) in scaled.iter_mut().zip(readings.row(sample)).enumerate() {
+                    *scaled = self.scaled(channel, *reading);
+                }
+                whiten(scaled.iter().copied(), &self.factor, &mut given);
+                whiten(
+                    scaled.iter().zip(&means).map(|(scaled, mean)| scaled - mean),
+                    &factor,
+                    &mut others,
+                );
+                let squares = given.iter().zip(&others);
+                block.add(
+                    &scaled,
+                    squares.map(|(given, others)| (given * given).max(others * others)),
+                );
+                if block.count == self.block {
+                    block.finish(&mut statistics);
+                    for ([low, high], &value) in self.ranges.iter_mut().zip(&statistics) {
+                        (*low, *high) = (low.min(value), high.max(value));
+                    }
+                }
+            }
         }
-        let longest = samples as f64 / (Self::MIN_BLOCKS as f64 * Self::TIMES);
-        let block = (Self::TIMES * autocorrelation_time(&distances, longest)).ceil() as usize;
-        let blocks = distances.chunks_exact(block);
-        if blocks.len() < Self::MIN_BLOCKS {
-            return None;
+        for (index, range) in self.ranges.iter_mut().enumerate() {
+            *range = Statistic::at(index, channels).widened(*range);
         }
-        let mut distances: Vec<f64> = blocks
-            .map(|block| block.iter().sum::<f64>() / block.len() as f64)
-            .collect();
-        distances.sort_by(f64::total_cmp);
-        Some(Self {
-            metric: Metric::fit(readings, 0..0)?,
-            block,
-            distances,
-        })
+        Ok(self)
+    }
+
+    fn scaled(&self, channel: usize, reading: f64) -> f64 {
+        match self.inverse_deviations[channel] {
+            0.0 => 0.0,
+            inverse => ((reading - self.means[channel]) * inverse).clamp(-MAX_SCALED, MAX_SCALED),
+        }
     }
 
     /// Number of channels.
     pub fn channels(&self) -> usize {
-        self.metric.means.len()
+        self.means.len()
     }
 
     /// Number of readings in a block: the monitor decides once per block.
@@ -141,128 +289,305 @@ impl DriftReference {
         self.block
     }
 
+    /// Number m of consecutive blocks that begin or end a drift: the smallest for which the probability of a false alarm in
+    /// a block is at most 1 / [`DriftMonitor::BLOCKS_BETWEEN_FALSE_ALARMS`].
+    ///
+    /// Let B be the number of training blocks. If B + m blocks are exchangeable, a statistic is larger in all of the last m
+    /// than in the other B with probability 1 / C(B + m, m), and likewise smaller. The probabilities of all statistics add
+    /// up (Bonferroni).
+    pub fn blocks_in_a_row(&self) -> usize {
+        // Squares are compared with the upper end only.
+        let comparisons = (5 * self.channels() + 3) as f64;
+        let (mut blocks, mut ways) = (0, 1.0);
+        while ways < comparisons * DriftMonitor::BLOCKS_BETWEEN_FALSE_ALARMS {
+            blocks += 1;
+            ways *= (self.blocks + blocks) as f64 / blocks as f64;
+        }
+        blocks
+    }
+
     /// Returns `true` if the parts, which may come from a file, fit together.
     pub fn is_valid(&self) -> bool {
-        let Metric {
+        let Self {
             means,
             inverse_deviations,
             factor,
-        } = &self.metric;
+            block,
+            blocks,
+            ranges,
+        } = self;
         let channels = means.len();
-        let numbers = means
-            .iter()
-            .chain(inverse_deviations)
-            .chain(factor)
-            .chain(&self.distances);
-        let diagonal = (0..channels).map(|row| row * (row + 3) / 2);
+        let numbers = means.iter().chain(inverse_deviations).chain(factor);
+        let mut numbers = numbers.chain(ranges.iter().flatten());
+        let mut diagonal = (0..channels).map(|row| row * (row + 3) / 2);
         (inverse_deviations.len(), factor.len()) == (channels, channels * (channels + 1) / 2)
-            && numbers.clone().all(|number| number.is_finite())
-            && diagonal.clone().all(|place| factor[place] > 0.0)
-            && self.block > 0
-            && self.distances.len() >= Self::MIN_BLOCKS
-            && self.distances.is_sorted()
+            && ranges.len() == Statistic::count(channels)
+            && numbers.all(|number| number.is_finite())
+            && diagonal.all(|place| factor[place] > 0.0)
+            && *block > 0
+            && *blocks >= Self::MIN_BLOCKS
     }
 }
 
-/// Integrated autocorrelation time of `series` in samples, at least 1: the sum of the autocorrelations up to the first
-/// below 0.05, or until it exceeds `limit`.
-fn autocorrelation_time(series: &[f64], limit: f64) -> f64 {
-    const NEGLIGIBLE: f64 = 0.05;
+/// Returns the mean of `readings` and the reciprocal of their standard deviation, which is 0 if they are constant; `None`
+/// if they are not finite.
+fn scale(readings: ArrayView1<'_, f64>) -> Option<(f64, f64)> {
+    let count = readings.len() as f64;
+    // Differences are exact in readings with a large offset, and 0 in constant ones.
+    let first = *readings.first()?;
+    let mean = first + readings.iter().map(|reading| (reading - first) / count).sum::<f64>();
+    let largest = readings
+        .iter()
+        .map(|reading| (reading - mean).abs())
+        .fold(0.0, f64::max);
+    let is_finite = readings.iter().all(|reading| reading.is_finite()) && mean.is_finite() && largest.is_finite();
+    let square = |reading: &f64| ((reading - mean) / largest).powi(2);
+    let deviation = largest * (readings.iter().map(square).sum::<f64>() / count).sqrt();
+    let inverse = deviation.recip();
+    // NaN if all differences are 0, and infinite if they are too small to divide by.
+    let inverse = if inverse.is_finite() { inverse } else { 0.0 };
+    is_finite.then_some((mean, inverse))
+}
+
+/// Returns the number of consecutive values of `series` that carry as much information as one independent value, at least
+/// 1: the largest ratio of the variance of means of 2, 4, 8, … values to that of independent values (Flyvbjerg and Petersen
+/// 1989, doi:10.1063/1.457480).
+fn correlation_time(mut series: Vec<f64>) -> f64 {
+    /// Minimum number of means whose variance is known well enough.
+    const MIN_MEANS: usize = 16;
     let count = series.len() as f64;
     let mean = series.iter().sum::<f64>() / count;
-    let off: Vec<f64> = series.iter().map(|value| value - mean).collect();
-    let variance = off.iter().map(|off| off * off).sum::<f64>() / count;
-    let correlation = |lag: usize| {
-        let products = off[lag..].iter().zip(&off).map(|(one, other)| one * other);
-        products.sum::<f64>() / (count - lag as f64) / variance
-    };
-    let mut time = 1.0;
-    for found in (1..series.len()).map(correlation) {
-        if found < NEGLIGIBLE || time > limit {
-            break;
-        }
-        time += 2.0 * found;
+    series.iter_mut().for_each(|value| *value -= mean);
+    let mean_square = |series: &[f64]| series.iter().map(|value| value * value).sum::<f64>() / series.len() as f64;
+    let variance = mean_square(&series);
+    let (mut time, mut length) = (1.0_f64, 1.0);
+    while variance > 0.0 && series.len() >= 2 * MIN_MEANS {
+        series = series.chunks_exact(2).map(|pair| 0.5 * (pair[0] + pair[1])).collect();
+        length *= 2.0;
+        time = time.max(length * mean_square(&series) / variance);
     }
     time
 }
 
+/// Sums of the scaled readings of a part of the training set, and of their products.
+struct Moments {
+    count: f64,
+    sums: Vec<f64>,
+    products: Mat<f64>,
+}
+
+impl Moments {
+    fn of(scaled: Mat<f64>) -> Self {
+        Self {
+            count: scaled.nrows() as f64,
+            sums: (0..scaled.ncols())
+                .map(|channel| scaled.col(channel).iter().sum())
+                .collect(),
+            products: scaled.transpose() * &scaled,
+        }
+    }
+
+    /// Returns the means and the Cholesky factor of the regularised covariance of all `parts` without `left_out`.
+    fn factor_of(parts: &[Self], left_out: Option<usize>) -> Option<(Vec<f64>, Vec<f64>)> {
+        let kept = || {
+            let parts = parts.iter().enumerate();
+            parts.filter(|(part, _)| Some(*part) != left_out).map(|(_, part)| part)
+        };
+        let count: f64 = kept().map(|part| part.count).sum();
+        let channels = parts.first()?.sums.len();
+        let mean = |channel| kept().map(|part| part.sums[channel]).sum::<f64>() / count;
+        let means: Vec<f64> = (0..channels).map(mean).collect();
+        let covariance = Mat::from_fn(channels, channels, |row, column| {
+            let products: f64 = kept().map(|part| part.products[(row, column)]).sum();
+            products / count - means[row] * means[column] + if row == column { RIDGE } else { 0.0 }
+        });
+        let factor = covariance.llt(Side::Lower).ok()?;
+        let lower = factor.L();
+        let packed = (0..channels).flat_map(|row| (0..=row).map(move |column| lower[(row, column)]));
+        Some((means, packed.collect()))
+    }
+}
+
+/// Solves L y = `scaled` for y, with the packed lower triangular matrix L.
+fn whiten(scaled: impl Iterator<Item = f64>, factor: &[f64], whitened: &mut [f64]) {
+    let mut row_of_factor = 0;
+    for (row, scaled) in scaled.enumerate() {
+        let factor = &factor[row_of_factor..=row_of_factor + row];
+        let above: f64 = factor.iter().zip(&whitened[..row]).map(|(a, b)| a * b).sum();
+        whitened[row] = (scaled - above) / factor[row];
+        row_of_factor += row + 1;
+    }
+}
+
+/// Readings that do not look like the training readings.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Drift {
+    /// Position of the first of these readings.
+    pub first: u64,
+    /// Position of the last of these readings so far.
+    pub last: u64,
+    statistic: Statistic,
+    is_larger: bool,
+}
+
+impl Drift {
+    /// Describes the difference that was found first, for a network with these `inputs`.
+    pub fn describe(&self, inputs: &[Channel]) -> String {
+        let compared = |larger, smaller| if self.is_larger { larger } else { smaller };
+        let name = |channel: usize| inputs.get(channel).map_or("an input", |input| &input.name);
+        match self.statistic {
+            Statistic::MeanVariance => format!("the inputs vary {} than in training", compared("more", "less")),
+            Statistic::Variance(channel) => {
+                format!("{} varies {} than in training", name(channel), compared("more", "less"))
+            }
+            Statistic::Mean(channel) => {
+                format!(
+                    "{} is {} on average than in training",
+                    name(channel),
+                    compared("higher", "lower")
+                )
+            }
+            Statistic::MeanSquare => "the inputs are not related to each other as in training".to_owned(),
+            Statistic::Square(channel) => {
+                format!("{} is not related to the other inputs as in training", name(channel))
+            }
+        }
+    }
+}
+
+/// Change of the state of a [`DriftMonitor`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum DriftEvent {
+    /// The readings no longer look like the training readings.
+    Began(Drift),
+    /// They look like the training readings again.
+    Ended(Drift),
+}
+
 /// Monitor that reports when readings no longer look like the training readings, so that the intervals of the network no
-/// longer hold.
+/// longer hold, and when they do so again.
 ///
-/// The conformal p-value of each block is its rank among the training blocks. Bets against p-values that are too small
-/// accumulate in a Shiryaev-Roberts e-detector (Shin, Ramdas and Rinaldo 2022, arXiv:2203.03532; Vovk et al. 2021,
-/// arXiv:2102.10439): R ← (R + 1) κ p^(κ − 1), averaged over several κ. It alarms when R reaches
-/// [`Self::BLOCKS_BETWEEN_FALSE_ALARMS`], so that with exchangeable blocks the mean time to a false alarm is at least that
-/// number of blocks, and the probability of a false alarm within n blocks at most n divided by it. The bound neglects that
-/// the training blocks are a finite sample: in simulations with 60 training blocks and an autocorrelation of 0.9, 1.3 % of
-/// the sequences of 124 blocks raised a false alarm (bound: 1.2 %).
+/// A drift begins when one statistic is beyond all training blocks, on the same side, in
+/// [`DriftReference::blocks_in_a_row`] consecutive blocks, and ends after as many blocks in which the statistics that
+/// began it are within the training range. With exchangeable blocks, the expected number of false alarms is at most one in
+/// [`Self::BLOCKS_BETWEEN_FALSE_ALARMS`] blocks; this takes the finite number of training blocks into account.
 #[derive(Clone, Debug)]
 pub struct DriftMonitor {
     reference: DriftReference,
-    scratch: Vec<f64>,
-    /// Sum of the distances in the current block, and number of readings.
-    sum: f64,
-    count: usize,
-    /// R for each κ.
-    evidence: [f64; BETS.len()],
-    is_drifted: bool,
+    scaled: Vec<f64>,
+    whitened: Vec<f64>,
+    block: Block,
+    statistics: Vec<f64>,
+    /// Number of consecutive blocks up to the latest in which each statistic is below and above the training blocks.
+    runs: Vec<[usize; 2]>,
+    /// True for runs that have become long enough since the drift began.
+    is_drifted: Vec<[bool; 2]>,
+    blocks_in_a_row: usize,
+    /// Positions of the first readings of the latest blocks.
+    begins: VecDeque<u64>,
+    drift: Option<Drift>,
+    /// Number of consecutive blocks without a sign of the drift.
+    blocks_without: usize,
 }
 
-/// Exponents κ of the bets.
-const BETS: [f64; 3] = [0.1, 0.25, 0.5];
-
 impl DriftMonitor {
-    /// Lower bound on the mean number of blocks to a false alarm.
+    /// Lower bound on the mean number of blocks between false alarms.
     pub const BLOCKS_BETWEEN_FALSE_ALARMS: f64 = 10_000.0;
 
     /// Begins to compare readings with `reference`.
     pub fn new(reference: DriftReference) -> Self {
+        let (channels, statistics) = (reference.channels(), reference.ranges.len());
         Self {
-            scratch: vec![0.0; reference.channels()],
+            scaled: vec![0.0; channels],
+            whitened: vec![0.0; channels],
+            block: Block::new(channels),
+            statistics: vec![0.0; statistics],
+            runs: vec![[0; 2]; statistics],
+            is_drifted: vec![[false; 2]; statistics],
+            blocks_in_a_row: reference.blocks_in_a_row(),
+            begins: VecDeque::new(),
+            drift: None,
+            blocks_without: 0,
             reference,
-            sum: 0.0,
-            count: 0,
-            evidence: [0.0; BETS.len()],
-            is_drifted: false,
         }
     }
 
-    /// Takes the next readings; further values, such as those of a memory, are ignored. Returns `true` once, when the
-    /// readings have drifted.
+    /// Takes the next readings, with their position such as the number of their line; further values, such as those of a
+    /// memory, are ignored, and so are readings that are not finite.
     ///
     /// # Panics
     /// If there are fewer readings than channels.
-    pub fn take(&mut self, readings: &[f64]) -> bool {
+    pub fn take(&mut self, position: u64, readings: &[f64]) -> Option<DriftEvent> {
         let readings = &readings[..self.reference.channels()];
         if !readings.iter().all(|reading| reading.is_finite()) {
-            return false;
+            return None;
         }
-        self.sum += self
-            .reference
-            .metric
-            .distance(readings.iter().copied(), &mut self.scratch);
-        self.count += 1;
-        if self.count < self.reference.block {
-            return false;
+        if self.block.count == 0 {
+            self.begins.push_back(position);
         }
-        let distance = self.sum / self.count as f64;
-        (self.sum, self.count) = (0.0, 0);
-        let distances = &self.reference.distances;
-        let at_least = distances.len() - distances.partition_point(|other| *other < distance);
-        let p = (at_least + 1) as f64 / (distances.len() + 1) as f64;
-        for (evidence, bet) in self.evidence.iter_mut().zip(BETS) {
-            // Evidence beyond the threshold is not needed.
-            *evidence = ((*evidence + 1.0) * bet * p.powf(bet - 1.0)).min(1e9);
+        for (channel, (scaled, reading)) in self.scaled.iter_mut().zip(readings).enumerate() {
+            *scaled = self.reference.scaled(channel, *reading);
         }
-        let mean = self.evidence.iter().sum::<f64>() / BETS.len() as f64;
-        let is_new = !self.is_drifted && mean >= Self::BLOCKS_BETWEEN_FALSE_ALARMS;
-        self.is_drifted |= is_new;
-        is_new
+        whiten(self.scaled.iter().copied(), &self.reference.factor, &mut self.whitened);
+        self.block
+            .add(&self.scaled, self.whitened.iter().map(|value| value * value));
+        if self.block.count < self.reference.block {
+            return None;
+        }
+        self.block.finish(&mut self.statistics);
+        let event = self.judge(position);
+        if self.begins.len() == self.blocks_in_a_row {
+            self.begins.pop_front();
+        }
+        event
     }
 
-    /// Returns `true` once the readings have drifted.
-    pub fn is_drifted(&self) -> bool {
-        self.is_drifted
+    /// Judges the block that ends at `position`.
+    fn judge(&mut self, position: u64) -> Option<DriftEvent> {
+        let mut sign = None;
+        let ranges = self.reference.ranges.iter().zip(&self.statistics);
+        let runs = self.runs.iter_mut().zip(&mut self.is_drifted);
+        for (statistic, (([low, high], value), (runs, is_drifted))) in ranges.zip(runs).enumerate() {
+            for (side, is_beyond) in [value < low, value > high].into_iter().enumerate() {
+                runs[side] = if is_beyond { runs[side] + 1 } else { 0 };
+                is_drifted[side] |= runs[side] >= self.blocks_in_a_row;
+                if is_beyond && is_drifted[side] {
+                    sign.get_or_insert((statistic, side == 1));
+                }
+            }
+        }
+        match (sign, &mut self.drift) {
+            (Some((statistic, is_larger)), None) => {
+                let drift = Drift {
+                    first: *self.begins.front()?,
+                    last: position,
+                    statistic: Statistic::at(statistic, self.reference.channels()),
+                    is_larger,
+                };
+                self.drift = Some(drift);
+                Some(DriftEvent::Began(drift))
+            }
+            (Some(_), Some(drift)) => {
+                drift.last = position;
+                self.blocks_without = 0;
+                None
+            }
+            (None, Some(_)) => {
+                self.blocks_without += 1;
+                if self.blocks_without < self.blocks_in_a_row {
+                    return None;
+                }
+                self.blocks_without = 0;
+                self.is_drifted.fill([false; 2]);
+                self.drift.take().map(DriftEvent::Ended)
+            }
+            (None, None) => None,
+        }
+    }
+
+    /// The present drift; `None` as long as the readings look like the training readings.
+    pub fn drift(&self) -> Option<&Drift> {
+        self.drift.as_ref()
     }
 
     /// Description of the training readings.
@@ -272,79 +597,4 @@ impl DriftMonitor {
 }
 
 #[cfg(test)]
-mod tests {
-    use ndarray::Array2;
-    use rand::{SeedableRng, rngs::ChaCha8Rng};
-
-    use super::*;
-    use crate::scene::standard_normal;
-
-    /// Readings of five correlated channels, with the correlation `memory` of neighbouring readings.
-    fn readings(samples: usize, memory: f64, rng: &mut ChaCha8Rng) -> Array2<f64> {
-        let mut state: Vec<f64> = (0..6).map(|_| standard_normal(rng)).collect();
-        let mut readings = Array2::zeros((samples, 5));
-        for mut row in readings.rows_mut() {
-            for value in &mut state {
-                *value = memory * *value + (1.0 - memory * memory).sqrt() * standard_normal(rng);
-            }
-            for (channel, reading) in row.iter_mut().enumerate() {
-                *reading = 100.0 * (channel + 1) as f64 + state[channel] + state[5];
-            }
-        }
-        readings
-    }
-
-    /// Number of readings until the alarm, if there is one.
-    fn alarm(reference: &DriftReference, readings: &Array2<f64>) -> Option<usize> {
-        let mut monitor = DriftMonitor::new(reference.clone());
-        let mut rows = readings.rows().into_iter();
-        rows.position(|row| monitor.take(&row.to_vec())).map(|row| row + 1)
-    }
-
-    #[test]
-    fn only_readings_that_differ_from_the_training_raise_an_alarm() {
-        // Each sequence of 20 blocks raises a false alarm with a probability of about 0.2 %.
-        for (memory, samples) in [(0.0, 400), (0.9, 3000)] {
-            let (mut alarms, mut latest) = (0, 0);
-            for seed in 0..100 {
-                let mut rng = ChaCha8Rng::seed_from_u64(seed);
-                let training = readings(samples, memory, &mut rng);
-                let reference = DriftReference::of(training.view()).unwrap();
-                assert!(reference.is_valid());
-                let block = reference.readings_per_block();
-                let same = readings(20 * block, memory, &mut rng);
-                alarms += usize::from(alarm(&reference, &same).is_some());
-                // The standard deviation of a channel is √2.
-                let mut shifted = readings(20 * block, memory, &mut rng);
-                shifted
-                    .column_mut(2)
-                    .mapv_inplace(|reading| reading + 3.0 * 2f64.sqrt());
-                let found = alarm(&reference, &shifted).unwrap_or(usize::MAX);
-                latest = latest.max(found / block);
-            }
-            assert!(alarms <= 1, "memory {memory}: {alarms} false alarms");
-            assert!(latest <= 12, "memory {memory}: found after {latest} blocks");
-        }
-    }
-
-    #[test]
-    fn too_few_or_unusable_readings_have_no_reference() {
-        let mut rng = ChaCha8Rng::seed_from_u64(0);
-        assert!(DriftReference::of(readings(20, 0.0, &mut rng).view()).is_none());
-        assert!(DriftReference::of(readings(300, 0.9, &mut rng).view()).is_none());
-        let mut with_nan = readings(400, 0.0, &mut rng);
-        with_nan[[7, 1]] = f64::NAN;
-        assert!(DriftReference::of(with_nan.view()).is_none());
-    }
-
-    #[test]
-    fn a_constant_channel_is_ignored() {
-        let mut rng = ChaCha8Rng::seed_from_u64(1);
-        let mut training = readings(400, 0.0, &mut rng);
-        training.column_mut(0).fill(5.0);
-        let reference = DriftReference::of(training.view()).unwrap();
-        let mut later = readings(100, 0.0, &mut rng);
-        later.column_mut(0).fill(6.0);
-        assert_eq!(alarm(&reference, &later), None);
-    }
-}
+mod tests;

@@ -2,7 +2,8 @@
 //!
 //! A [`Source`] provides bytes, [`Lines`] splits them into lines, and [`LineParser`] parses the readings.
 //! [`FaultMonitor`] checks whether Eq. (2) explains them and identifies the faulty wire; [`LeftOutDecoder`] decodes
-//! without it. [`DriftMonitor`] reports readings that no longer look like those of the training. [`Simulated`] needs no hardware. [`ReZero`] estimates the unloaded state from recent frames, and
+//! without it. [`DriftMonitor`] reports readings that no longer look like those of the training. [`Simulated`] needs no
+//! hardware. [`ReZero`] estimates the unloaded state from recent frames, and
 //! [`Recorder`] saves frames for replay.
 
 mod drift;
@@ -14,7 +15,7 @@ mod re_zero;
 mod recording;
 mod source;
 
-pub use drift::{DriftMonitor, DriftReference};
+pub use drift::{Drift, DriftEvent, DriftMonitor, DriftReference, NoDriftMonitor};
 pub use faults::{Diagnosis, FaultCause, FaultEvent, FaultMonitor, FaultyWire};
 pub use left_out_decoder::LeftOutDecoder;
 pub use line_parser::{LineError, LineParser, ParsedLine};

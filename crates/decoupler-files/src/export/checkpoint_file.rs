@@ -92,6 +92,7 @@ impl CheckpointFile {
         sets.check_saved(self.recorded.as_ref())?;
         if let (Some(recordings), Some(saved)) = (&mut sets.recordings, self.recorded) {
             recordings.recorded.search = saved.search;
+            recordings.recorded.chosen_intervals = saved.chosen_intervals;
         }
         let run = sets.clone().resume(&setup, self.starts, is_cancelled)?;
         Ok(run.map(|run| (run.with_wall_time(self.wall_time), sets)))

@@ -6,7 +6,7 @@ use decoupler_core::{
         ErrorTable, Intervals, PastNetwork, Problem, Run, RunSettings, Scores, SimulatedSettings, StartRecord,
         TargetPosition, TestErrors,
     },
-    live::DriftReference,
+    live::{DriftReference, NoDriftMonitor},
     network::{DecouplingNetwork, Networks},
 };
 use glam::DVec3;
@@ -47,8 +47,8 @@ pub struct NetworkFile {
     pub scores: Scores,
     /// Prediction intervals of the answers, if they were calibrated.
     pub intervals: Option<Intervals>,
-    /// Training readings of a recording, by which a later drift is detected.
-    pub drift: Option<DriftReference>,
+    /// Training readings of a recording, by which a later drift is detected, or the reason why they are not monitored.
+    pub drift: Result<DriftReference, NoDriftMonitor>,
 }
 
 /// The part of the file that the checksum covers.
@@ -66,7 +66,38 @@ struct Document {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     intervals: Option<Intervals>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    drift: Option<DriftReference>,
+    drift: Option<SavedDrift>,
+}
+
+/// Description of the training readings as it is saved; older files have none if there were too few readings.
+#[derive(Serialize, Deserialize)]
+#[serde(untagged)]
+enum SavedDrift {
+    Monitored(DriftReference),
+    NotMonitored {
+        not_monitored: NoDriftMonitor,
+    },
+    /// Description for the monitor of an older version.
+    #[serde(skip_serializing)]
+    Older(serde::de::IgnoredAny),
+}
+
+impl SavedDrift {
+    fn of(drift: Result<DriftReference, NoDriftMonitor>) -> Option<Self> {
+        match drift {
+            Ok(reference) => Some(Self::Monitored(reference)),
+            Err(NoDriftMonitor::NotDescribed) => None,
+            Err(not_monitored) => Some(Self::NotMonitored { not_monitored }),
+        }
+    }
+
+    fn read(saved: Option<Self>) -> Result<DriftReference, NoDriftMonitor> {
+        match saved {
+            Some(Self::Monitored(reference)) => Ok(reference),
+            Some(Self::NotMonitored { not_monitored }) => Err(not_monitored),
+            Some(Self::Older(_)) | None => Err(NoDriftMonitor::NotDescribed),
+        }
+    }
 }
 
 impl NetworkFile {
@@ -87,7 +118,7 @@ impl NetworkFile {
             training: TrainingRecord::of(run),
             scores,
             intervals: run.intervals().cloned(),
-            drift: None,
+            drift: Err(NoDriftMonitor::NotDescribed),
         })
     }
 
@@ -227,7 +258,7 @@ impl NetworkFile {
             training,
             scores,
             intervals,
-            drift,
+            drift: SavedDrift::of(drift),
         };
         to_raw_value(&document).map_err(|error| unsound(error.to_string()))
     }
@@ -261,7 +292,7 @@ impl NetworkFile {
             training: document.training,
             scores: document.scores,
             intervals: document.intervals,
-            drift: document.drift,
+            drift: SavedDrift::read(document.drift),
         })
     }
 }
@@ -369,7 +400,7 @@ pub(super) fn defect(file: &NetworkFile) -> Option<String> {
         (intervals.as_ref())
             .and_then(|intervals| intervals.check(problem.targets.len()).err())
             .map(|defect| format!("intervals: {defect}")),
-        (drift.as_ref())
+        (drift.as_ref().ok())
             .filter(|drift| !drift.is_valid() || drift.channels() != problem.inputs.len())
             .map(|_| "drift: it does not match the inputs".to_owned()),
         unmeasured("scores.network", errors, problem),
@@ -529,4 +560,26 @@ fn unmeasured(place: &str, errors: &TestErrors, problem: &Problem) -> Option<Str
     }
     let name = errors.infinite_figure()?;
     Some(format!("{place}.{name}: it is not a finite number"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_drift_reference_of_an_older_version_is_dropped() {
+        let older =
+            r#"{"metric":{"means":[0.0],"inverse_deviations":[1.0],"factor":[1.005]},"block":5,"distances":[1.0]}"#;
+        for (saved, expected) in [
+            (older, NoDriftMonitor::NotDescribed),
+            (r#"{"not_monitored":"constant"}"#, NoDriftMonitor::Constant),
+            (
+                r#"{"not_monitored":{"too_few_readings":{"blocks":4,"block":5}}}"#,
+                NoDriftMonitor::TooFewReadings { blocks: 4, block: 5 },
+            ),
+        ] {
+            let found = SavedDrift::read(Some(serde_json::from_str(saved).unwrap()));
+            assert_eq!(found, Err(expected));
+        }
+    }
 }

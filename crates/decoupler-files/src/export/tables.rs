@@ -3,8 +3,8 @@ use std::io::{self, Write};
 use decoupler_core::{
     dataset::{Dataset, Seed, SplitBy, Stream},
     evaluation::{
-        Channel, Coverage, DecoderReport, ErrorBlock, ErrorMeasure, ErrorRow, ErrorTable, Errors, Problem, Scores,
-        TargetErrors, TargetPosition, TestErrors,
+        Channel, Coverage, DecoderReport, ErrorBlock, ErrorMeasure, ErrorRow, ErrorTable, Errors, HalfWidth, Intervals,
+        Problem, Scores, TargetErrors, TargetPosition, TestErrors,
         recorded::{
             ChannelRemark, Determinacy, Determination, Findings, FittedModel, TargetFindings, Undetermined,
             target_remarks,
@@ -233,6 +233,30 @@ pub fn describe_determinacy(targets: &[Channel], measured: &[Result<Determinatio
             .then(|| measured.sentence(&target.name, &[FittedModel::Network])),
     };
     targets.iter().zip(measured).filter_map(of).collect()
+}
+
+/// Describes the half-widths of the targets whose intervals vary with the answer; `None` if there are none.
+pub fn describe_half_widths(targets: &[Channel], intervals: &Intervals) -> Option<String> {
+    let describe = |(target, half_width): (&Channel, &Option<HalfWidth>)| {
+        let half_width = half_width.as_ref()?;
+        let widths = || half_width.by_answer.iter().map(|point| point[1]);
+        let (min, max) = (widths().reduce(f64::min)?, widths().reduce(f64::max)?);
+        Some(format!(
+            "{} {} to {} (one for all answers together: {})",
+            target.name,
+            format_number(min),
+            format_number(max),
+            format_number(half_width.constant)
+        ))
+    };
+    let described: Vec<String> = targets.iter().zip(&intervals.targets).filter_map(describe).collect();
+    (!described.is_empty()).then(|| {
+        format!(
+            "The half-width above is the mean over the test samples. It varies with the answer: {}. decode writes that of each \
+             answer, and exports contain the one for all answers.",
+            described.join(", ")
+        )
+    })
 }
 
 /// Warns of the targets whose intervals contain significantly fewer test samples than stated, with cause and remedy.

@@ -3,7 +3,7 @@ use std::path::Path;
 use decoupler_core::{
     dataset::{Memory, Seed, Stream},
     evaluation::{
-        Intervals, NoIntervals,
+        Intervals,
         auto::{AutoChoice, AutoFixed, AutoProgress, AutoSamples, SamplePast, choose_settings},
     },
     scene::RowModel,
@@ -21,21 +21,6 @@ pub struct ChosenSetup {
     /// The choice and its held-out answers; `None` if there were too few samples to choose, so that the settings are as
     /// given.
     pub choice: Option<AutoChoice>,
-}
-
-impl ChosenSetup {
-    /// Calibrates the intervals of the network that will be trained on the held-out answers of the choice; `None` if
-    /// nothing was chosen.
-    ///
-    /// The answers are those of committees with the chosen settings, each trained without the fold that it answers to.
-    /// Epochs and settings were chosen for these same answers, which makes their errors slightly too small; that they come
-    /// from fewer training samples, and for large recordings from every nth of them or smaller committees, makes them too
-    /// large, which has the greater effect.
-    pub fn intervals(&self) -> Option<Result<Intervals, NoIntervals>> {
-        let (choice, plan) = (self.choice.as_ref()?, self.setup.plan()?);
-        let training = &self.sets.sets.split.training;
-        Some(Intervals::calibrate(training, choice.answers.view(), plan.division.by).checked())
-    }
 }
 
 /// Progress of a choice of settings.
@@ -130,6 +115,12 @@ impl Setup {
         };
         if let (Some(recordings), Some(choice)) = (&mut sets.recordings, &choice) {
             recordings.recorded.search = Some(choice.record.clone());
+            // The answers are those of committees with the chosen settings, each trained without the fold that it answers to.
+            // Epochs and settings were chosen for these same answers, which makes their errors slightly too small; that they
+            // come from fewer training samples, and for large recordings from every nth of them or smaller committees, makes
+            // them too large, which has the greater effect.
+            let (training, by) = (&sets.sets.split.training, plan.division.by);
+            recordings.recorded.chosen_intervals = Some(Intervals::calibrate(training, choice.answers.view(), by));
         }
         Ok(Some(ChosenSetup {
             setup: Self::recording(settings, plan),

@@ -282,7 +282,7 @@ impl InputLines {
         })
     }
 
-    /// Replaces a time stamp by the seconds since the first.
+    /// Replaces a time stamp by the time since the first.
     fn read_stamp(&mut self) {
         let time = self.columns.as_ref().and_then(|columns| columns.time);
         let Some(time) = time.filter(|time| time.column < self.cells.len().min(self.fields.count())) else {
@@ -291,7 +291,8 @@ impl InputLines {
         if let Some(stamp) = TimeStamp::parse(self.fields.get(time.column)) {
             let start = *self.start.get_or_insert(stamp);
             if start.has_zone == stamp.has_zone {
-                self.cells[time.column] = stamp.seconds_since(start);
+                // Stamps are in seconds, whatever unit the header has.
+                self.cells[time.column] = stamp.seconds_since(start) / time.unit_s;
             }
         }
     }

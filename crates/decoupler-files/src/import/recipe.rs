@@ -9,7 +9,7 @@ use std::{
 
 use decoupler_core::{
     dataset::{Dataset, Memory},
-    evaluation::auto::AutoRecord,
+    evaluation::{Intervals, auto::AutoRecord},
 };
 use serde::{Deserialize, Serialize};
 
@@ -198,6 +198,9 @@ pub struct Recorded {
     /// What was tried to choose the settings and the memory, if they were chosen automatically.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub search: Option<AutoRecord>,
+    /// Intervals of the network with the chosen settings, from the held-out answers of the choice.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub chosen_intervals: Option<Intervals>,
 }
 
 /// Checksum of a file.
@@ -231,6 +234,7 @@ impl Recorded {
             files,
             samples_crc32: samples_crc32([&sets.recording.set, &sets.test]),
             search: None,
+            chosen_intervals: None,
             plan,
         })
     }
@@ -272,6 +276,7 @@ impl Recorded {
             plan: self.plan.with_paths(|path| of(path)),
             samples_crc32: self.samples_crc32.clone(),
             search: self.search.clone(),
+            chosen_intervals: self.chosen_intervals.clone(),
         }
     }
 }

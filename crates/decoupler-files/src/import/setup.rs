@@ -6,10 +6,10 @@ use thiserror::Error;
 use super::{ImportError, Plan, PlannedSets, Progress, Recorded, Recording, Watch};
 use decoupler_core::{
     evaluation::{
-        Run, RunError, RunSets, RunSettings, SimulatedSettings, Source,
+        Intervals, NoIntervals, Run, RunError, RunSets, RunSettings, SimulatedSettings, Source,
         experiments::{ExperimentRecording, RecordedSamples, TrialSamples},
     },
-    live::DriftReference,
+    live::{DriftReference, NoDriftMonitor},
     text::clean_name,
     training::TrainerState,
 };
@@ -277,17 +277,35 @@ impl SetupSets {
         Run::resume_unless(setup.settings, states, self.sets, is_cancelled)
     }
 
-    /// Describes the training readings of a recording, by which a later drift is detected; `None` for an array, whose
-    /// readings are checked against its model, if the row-wires are known, or if there are too few independent readings.
-    pub fn drift_reference(&self) -> Option<DriftReference> {
+    /// Describes the training readings of a recording, by which a later drift is detected.
+    ///
+    /// # Errors
+    /// If they cannot be monitored, as those of an array, which are checked against its model.
+    pub fn drift_reference(&self) -> Result<DriftReference, NoDriftMonitor> {
         let training = &self.sets.split.training;
-        if self.recordings.is_none() || training.row_wires_read().is_some() {
-            return None;
+        if self.recordings.is_none() {
+            return Err(NoDriftMonitor::NotDescribed);
+        }
+        if training.row_wires_read().is_some() {
+            return Err(NoDriftMonitor::RowWires);
         }
         // With a memory, the readings are followed by values from the past, which a monitor does not need.
         let channels = self.sets.problem.inputs.len();
         let readings = training.readings();
         DriftReference::of(readings.slice_axis(Axis(1), Slice::from(..channels)))
+    }
+
+    /// Intervals of the network that is trained with chosen settings, from the held-out answers of the choice; `None` if
+    /// nothing was chosen.
+    pub fn chosen_intervals(&self) -> Option<Result<Intervals, NoIntervals>> {
+        self.recorded()?.chosen_intervals.clone().map(Intervals::checked)
+    }
+
+    /// Forgets the intervals of the choice, because the training continues with other settings.
+    pub fn forget_choice(&mut self) {
+        if let Some(recordings) = &mut self.recordings {
+            recordings.recorded.chosen_intervals = None;
+        }
     }
 
     /// Checks that recorded samples are those `saved` with a run.

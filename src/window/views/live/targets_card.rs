@@ -9,7 +9,7 @@ use crate::window::{
     theme::{Theme, semibold, space, type_size},
     widgets::{card_ui, coloured_fact_ui, fact_ui, scrolled_ui, section_heading_ui},
 };
-use decoupler_core::text::counted;
+use decoupler_core::text::{capitalised, counted};
 use decoupler_files::{
     export::format_number,
     figure::{
@@ -166,21 +166,23 @@ fn outside_ui(ui: &mut Ui, targets: &LiveTargets) {
 }
 
 fn drift_ui(ui: &mut Ui, targets: &LiveTargets) {
+    const NAME: &str = "Drift of the readings";
     let palette = Theme::of(ui).palette;
-    let Some(is_drifted) = targets.is_drifted else {
-        let hint = "Drift is not monitored: the training readings have fewer than 30 independent blocks, or the network has \
-                    inputs by row-wire or was saved by an older version.";
-        coloured_fact_ui(ui, "Drift of the readings", hint, "not monitored", palette.dim);
-        return;
+    let drift = match &targets.drift {
+        Ok(drift) => drift,
+        Err(reason) => {
+            let hint = format!("Drift is not monitored: {reason}.");
+            coloured_fact_ui(ui, NAME, &hint, "not monitored", palette.dim);
+            return;
+        }
     };
-    let hint = "Readings that no longer look like those of the training: prediction intervals no longer hold. Re-zero the \
-                sensor, or train with recent samples. In readings like those of the training, a false alarm occurs on \
-                average at most once in 10 000 blocks of readings, each five times as long as neighbouring readings are \
-                correlated.";
-    let (value, colour) = if is_drifted {
-        ("recalibrate", palette.warning)
-    } else {
-        ("none", palette.text)
+    let hint = "Readings that do not look like those of the training: prediction intervals do not hold. Check the sensor and \
+                its connection, re-zero it, or train with recent samples. The warning ends when the readings are back to \
+                normal. In readings like those of the training, a false alarm occurs on average at most once in 10 000 \
+                blocks of readings, each at least five times as long as neighbouring readings are correlated.";
+    let (value, colour) = match drift {
+        Some(drift) => (capitalised(&drift.describe(&targets.problem.inputs)), palette.warning),
+        None => ("none".to_owned(), palette.text),
     };
-    coloured_fact_ui(ui, "Drift of the readings", hint, value, colour);
+    coloured_fact_ui(ui, NAME, hint, &value, colour);
 }

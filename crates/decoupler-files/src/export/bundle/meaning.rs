@@ -158,7 +158,10 @@ impl Meaning {
             })
             .collect();
         if !half_widths.is_empty() {
-            sentences.push(format!("90 % prediction intervals: {}.", half_widths.join(", ")));
+            sentences.push(format!(
+                "90 % prediction intervals, valid for all answers together: {}.",
+                half_widths.join(", ")
+            ));
         }
         sentences.iter().flat_map(|sentence| wrapped(sentence)).collect()
     }

@@ -10,7 +10,7 @@ use ndarray::Array2;
 use crate::window::test_view::Frame;
 use decoupler_core::{
     evaluation::{Problem, SimulatedSettings},
-    live::{Diagnosis, Motion, Source, ZeroGains},
+    live::{Diagnosis, Drift, Motion, NoDriftMonitor, Source, ZeroGains},
     scene::Fault,
     sensor::SensorModel,
     surface::SurfaceMap,
@@ -159,8 +159,8 @@ pub struct LiveTargets {
     pub problem: Arc<Problem>,
     /// The network, which may have prediction intervals.
     pub network: Arc<NetworkFile>,
-    /// True once the readings no longer look like those of the training; `None` if that is not checked.
-    pub is_drifted: Option<bool>,
+    /// Present drift of the readings, or the reason why they are not monitored.
+    pub drift: Result<Option<Drift>, NoDriftMonitor>,
     /// Surface through the targets, if they have positions.
     pub surface: Option<Arc<TargetSurface>>,
     /// Smallest and largest value of each target so far.

@@ -10,7 +10,7 @@ use std::{
 use decoupler_core::{
     decoupling::{CompiledNetworks, Decoder},
     evaluation::Problem,
-    live::{DriftMonitor, Recording, Source},
+    live::{DriftMonitor, NoDriftMonitor, Recording, Source},
 };
 use decoupler_files::{
     export::NetworkFile,
@@ -46,7 +46,7 @@ pub(super) struct TargetSession {
     history: VecDeque<(f64, Arc<[f64]>)>,
     ranges: Vec<(f64, f64)>,
     outside: (Option<usize>, usize),
-    drift: Option<DriftMonitor>,
+    drift: Result<DriftMonitor, NoDriftMonitor>,
     has_events: bool,
 }
 
@@ -85,8 +85,9 @@ impl TargetSession {
             self.tally.bad(format!("sample at {:.3} s: {reason}", arrived.time_s));
             return;
         }
-        if let Some(drift) = &mut self.drift {
-            drift.take(readings);
+        if let Ok(drift) = &mut self.drift {
+            // Live does not show when a drift began.
+            drift.take(0, readings);
         }
         let network = self.network.network.at(row_index);
         let inputs = network.inputs();
@@ -171,7 +172,11 @@ impl LiveSession for TargetSession {
             targets: latest.map(|_| LiveTargets {
                 problem: Arc::clone(&self.problem),
                 network: Arc::clone(&self.network),
-                is_drifted: self.drift.as_ref().map(DriftMonitor::is_drifted),
+                drift: self
+                    .drift
+                    .as_ref()
+                    .map(|monitor| monitor.drift().copied())
+                    .map_err(Clone::clone),
                 surface: self.surface.clone(),
                 ranges: self.ranges.clone(),
                 history: self.history.iter().cloned().collect(),

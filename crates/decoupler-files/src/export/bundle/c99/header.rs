@@ -125,7 +125,7 @@ impl Header<'_> {
             half_widths = portable.meaning.half_widths().map_or_else(String::new, |half_widths| {
                 let half_widths: Vec<String> = half_widths.iter().map(|value| format!("{value:?}")).collect();
                 format!(
-                    "/* Half-widths of the 90 % prediction intervals in the units of the targets, to initialise an array. */\n\
+                    "/* Half-widths of the 90 % prediction intervals for all answers together, in the units of the targets, to initialise an array. */\n\
                      #define {upper}_HALF_WIDTHS_90 {{{}}}\n\n",
                     half_widths.join(", ")
                 )

@@ -161,7 +161,7 @@ def decode_by(index, r):
         channels = portable.channels,
         noun = portable.decoder,
         half_widths = meaning.half_widths().map_or_else(String::new, |half_widths| {
-            format!("# Half-widths of the 90 % prediction intervals, in the units of the targets.\nHALF_WIDTHS_90 = np.array({half_widths:?})\n")
+            format!("# Half-widths of the 90 % prediction intervals for all answers together, in the units of the targets.\nHALF_WIDTHS_90 = np.array({half_widths:?})\n")
         }),
         centre = meaning.centre(),
         not_of_maps = format_args!("(\"{}\", \"{}\")", meaning.limits()[0], meaning.limits()[1]),
