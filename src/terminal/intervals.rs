@@ -4,7 +4,7 @@ use std::io::Write;
 
 use clap::ValueEnum;
 use decoupler_core::{
-    evaluation::{Intervals, NoIntervals, Run, RunError},
+    evaluation::{Intervals, NoIntervals, Run},
     live::DriftMonitor,
 };
 use decoupler_files::{
@@ -31,12 +31,12 @@ pub(super) fn calibrate(
     sets: &SetupSets,
     chosen: Option<Result<Intervals, NoIntervals>>,
     when: WhenCalibrated,
-) -> Result<(), RunError> {
+) {
     let Some(recordings) = &sets.recordings else {
-        return Ok(());
+        return;
     };
     if when == WhenCalibrated::Never || run.intervals().is_some() {
-        return Ok(());
+        return;
     }
     let by = recordings.recorded.plan.division.by;
     // A training that failed is not one of those that gave the held-out answers.
@@ -49,7 +49,7 @@ pub(super) fn calibrate(
                     "No prediction intervals: they take about {}; give --intervals always",
                     format_duration(time)
                 ));
-                return Ok(());
+                return;
             }
             if let Some(time) = time.filter(|time| time.as_secs_f64() > 2.0) {
                 note(&format!(
@@ -64,10 +64,9 @@ pub(super) fn calibrate(
     };
     match calibrated {
         Ok(intervals) => run.set_intervals(intervals, by),
-        Err(NoIntervals::Run(error)) => return Err(error),
+        // The training is complete without them.
         Err(reason) => note(&format!("No prediction intervals: {reason}")),
     }
-    Ok(())
 }
 
 fn note(message: &str) {

@@ -119,7 +119,7 @@ fn an_incomplete_table_does_not_replace_a_larger_one() {
         let message = text(&output.stderr);
         assert_eq!(output.status.code(), Some(1), "{message}");
         assert!(
-            message.contains("the table there has more trials and is left as it is"),
+            message.contains("the table there has more trials, or cannot be read, and is left as it is"),
             "{message}"
         );
         assert_eq!(fs::read(folder.join(table)).unwrap(), before, "{table}");

@@ -166,6 +166,9 @@ impl DecouplerWindow {
         if may_close && !is_requested {
             self.ctx.send_viewport_cmd(ViewportCommand::Close);
         }
+        if is_requested && may_close {
+            self.worker.forget();
+        }
         if is_requested && !may_close {
             self.ctx.send_viewport_cmd(ViewportCommand::CancelClose);
             // The question must be visible.

@@ -234,11 +234,16 @@ pub(super) struct Entry {
 }
 
 impl Batch {
+    /// Returns true if the oldest line has waited too long.
+    pub(super) fn is_old(&self, now: Instant) -> bool {
+        let oldest = self.lines.front();
+        oldest.is_some_and(|entry| now.saturating_duration_since(entry.read_at) > Lines::PATIENCE)
+    }
+
     /// Drops all but the newest `kept` lines if the oldest has waited too long; returns the number of dropped lines. The
     /// latest header is kept: without it the lines that follow would be misinterpreted.
     pub(super) fn drop_old(&mut self, now: Instant, kept: usize) -> u64 {
-        let is_old = |entry: &Entry| now.saturating_duration_since(entry.read_at) > Lines::PATIENCE;
-        if !self.lines.front().is_some_and(is_old) || self.lines.len() <= kept {
+        if !self.is_old(now) || self.lines.len() <= kept {
             return 0;
         }
         let mut dropped = self.lines.len() - kept;

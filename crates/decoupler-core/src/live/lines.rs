@@ -17,6 +17,7 @@ use crate::text::LONGEST_ROW;
 #[derive(Debug)]
 pub struct Lines {
     shared: Arc<Shared>,
+    keeping: Keeping,
     /// Lines taken from the reader, not yet returned.
     batch: Batch,
 }
@@ -115,6 +116,7 @@ impl Lines {
         })?;
         Ok(Self {
             shared,
+            keeping,
             batch: Batch::default(),
         })
     }
@@ -175,8 +177,9 @@ impl Lines {
 
     /// Drops lines that have waited too long, if there are newer ones.
     fn drop_old(&mut self, now: Instant) {
-        let mut state = self.shared.lock();
-        if state.keeping == Keeping::Latest {
+        // A lock per line would wait for the reader, which holds it most of the time when lines arrive fast.
+        if self.keeping == Keeping::Latest && self.batch.is_old(now) {
+            let mut state = self.shared.lock();
             let kept = state.kept.saturating_sub(state.waiting.lines.len()).max(1);
             state.dropped += self.batch.drop_old(now, kept);
         }
