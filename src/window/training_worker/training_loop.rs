@@ -507,7 +507,10 @@ impl<'a> TrainingLoop<'a> {
         if std::mem::replace(&mut self.is_kept, true) {
             return;
         }
-        self.keeping.clear();
+        // The end of the program is not that of the training, whose intervals are then missing.
+        if !self.report.is_cancelled() {
+            self.keeping.clear();
+        }
         let file = trained.network_file();
         let checked = file.and_then(|file| file.defect().map_or(Ok(Box::new(file)), Err));
         let finished = checked.map_err(|defect| format!("This training was not added to the run list: {defect}"));

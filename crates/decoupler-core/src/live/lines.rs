@@ -203,6 +203,7 @@ impl Shared {
     fn read(&self, mut source: impl Read, skips_first: bool) -> io::Result<()> {
         let mut chunk = vec![0; CHUNK];
         let mut splitter = Splitter::new(skips_first);
+        let mut arrived = Batch::default();
         loop {
             let count = match source.read(&mut chunk) {
                 Ok(count) => count,
@@ -220,6 +221,11 @@ impl Shared {
                 Err(error) => return Err(error),
             };
             let read_at = Instant::now();
+            // Without the lock, for which the receiver would wait.
+            match count {
+                0 => splitter.finish(read_at, &mut arrived),
+                _ => splitter.split(&chunk[..count], read_at, &mut arrived),
+            }
             let mut state = self.lock();
             while state.keeping == Keeping::All && !state.waiting.lines.is_empty() && !state.is_abandoned {
                 state = self.emptied.wait(state).unwrap_or_else(PoisonError::into_inner);
@@ -227,11 +233,10 @@ impl Shared {
             if state.is_abandoned {
                 return Ok(());
             }
+            state.waiting.append(&mut arrived);
             if count == 0 {
-                splitter.finish(read_at, &mut state.waiting);
                 return Ok(());
             }
-            splitter.split(&chunk[..count], read_at, &mut state.waiting);
             state.unended = match chunk[..count].iter().rposition(|&byte| byte == b'\n') {
                 Some(end) => count - end - 1,
                 None => state.unended + count,
@@ -302,6 +307,21 @@ mod tests {
     fn the_source_waits_for_a_slow_receiver() {
         let text = format!("{}\n", "y".repeat(999)).repeat(2000);
         assert_eq!(all(io::Cursor::new(text), false).len(), 2000);
+    }
+
+    #[test]
+    fn lines_that_were_taken_over_are_returned_without_the_lock() {
+        let mut lines = Lines::spawn(&b"1\n2\n3\n"[..], Keeping::All, false).unwrap();
+        let shared = Arc::clone(&lines.shared);
+        assert!(matches!(lines.next(Duration::from_secs(60)), NextLine::Line(_)));
+        // The reader holds it most of the time when lines arrive fast.
+        let _held = shared.lock();
+        for number in 2..=3 {
+            let NextLine::Line(line) = lines.next(Duration::from_secs(60)) else {
+                panic!("no line {number}")
+            };
+            assert_eq!(line.number, number);
+        }
     }
 
     #[test]
