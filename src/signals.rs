@@ -10,7 +10,9 @@ pub(crate) fn on_termination(react: impl Fn(u8) + Send + 'static) {
     };
 
     // Without the handlers, signals end the program at once.
-    let Ok(mut signals) = Signals::new([SIGTERM]) else { return };
+    let Ok(mut signals) = Signals::new([SIGTERM]) else {
+        return;
+    };
     if !is_ignored(SIGHUP) {
         let _ = signals.add_signal(SIGHUP);
     }

@@ -150,7 +150,8 @@ fn arguments_that_divide_frames_are_refused() {
     let folder = tempfile::tempdir().unwrap();
     record(folder.path());
     let path = folder.path();
-    let trained = format!("train --array {ARRAY} --samples 40 --test-samples 8 --epochs 1 --decoder mean --out net.json");
+    let trained =
+        format!("train --array {ARRAY} --samples 40 --test-samples 8 --epochs 1 --decoder mean --out net.json");
     assert!(decoupler(&trained, path).status.success());
     for argument in [
         "--folds 5",
@@ -167,7 +168,10 @@ fn arguments_that_divide_frames_are_refused() {
             let message = String::from_utf8_lossy(&output.stderr).into_owned();
             assert_eq!(output.status.code(), Some(2), "{command}: {message}");
             let name = argument.split(' ').next().unwrap();
-            assert!(message.contains(&format!("error: {name}: calibrate fits all frames")), "{message}");
+            assert!(
+                message.contains(&format!("error: {name}: calibrate fits all frames")),
+                "{message}"
+            );
         }
     }
     assert!(!path.join("tuned.json").exists());

@@ -426,7 +426,8 @@ fn a_training_on_few_rows_has_one_outcome() {
         let text: String = (0..rows).map(line).collect();
         fs::write(folder.path().join("few.csv"), format!("a,b,y\n{text}")).unwrap();
         for options in ["--split time", "--split random", "--split random --intervals always"] {
-            let arguments = format!("train --data few.csv --inputs a,b --targets y --hidden 2 --epochs 3 {options} --json");
+            let arguments =
+                format!("train --data few.csv --inputs a,b --targets y --hidden 2 --epochs 3 {options} --json");
             let output = decoupler(&arguments, folder.path());
             let (printed, message) = (output.stdout, String::from_utf8(output.stderr).unwrap());
             let has_result = serde_json::from_slice::<serde_json::Value>(&printed).is_ok();

@@ -137,7 +137,11 @@ fn a_hangup_that_is_ignored_stays_ignored() {
     command.args(arguments.split_whitespace()).current_dir(folder);
     let child = begun(command, folder);
     signal("HUP", &child);
-    let epochs = || CheckpointFile::load(&folder.join("run.checkpoint")).unwrap().starts[0].history().len();
+    let epochs = || {
+        CheckpointFile::load(&folder.join("run.checkpoint")).unwrap().starts[0]
+            .history()
+            .len()
+    };
     let before = epochs();
     wait_until("more epochs", || epochs() > before + 5);
     signal("TERM", &child);

@@ -256,7 +256,11 @@ fn a_finished_sweep_and_trade_off_are_not_discarded_without_asking() {
         "{:#?}",
         driver.texts()
     );
-    assert!(driver.has("2 trials finished, not exported as a table"), "{:#?}", driver.texts());
+    assert!(
+        driver.has("2 trials finished, not exported as a table"),
+        "{:#?}",
+        driver.texts()
+    );
     driver.click_button("Stay");
     // Asking for a path saves nothing.
     driver.export("Table, CSV");

@@ -58,7 +58,7 @@ fn intervals_are_calibrated_at_the_end_of_a_training() {
 #[test]
 fn pausing_after_the_last_epoch_keeps_the_intervals() {
     // Its calibration takes much longer than a frame.
-    let (mut driver, _, _folder) = opened_text(&noisy(30_000));
+    let (mut driver, _, _folder) = opened_text(&noisy(10_000));
     driver.limit_epochs("20");
     driver.click("▶ Train");
     driver.wait("the calibration", |driver| driver.state().phase == Phase::Calibrating);

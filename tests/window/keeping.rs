@@ -152,7 +152,7 @@ fn a_damaged_checkpoint_is_reported_and_can_be_discarded() {
 fn a_training_that_ended_without_its_intervals_gets_them_when_resumed() {
     let folder = tempfile::tempdir().unwrap();
     // Its calibration takes much longer than a frame.
-    let path = written(&folder, "press.csv", &noisy(30_000));
+    let path = written(&folder, "press.csv", &noisy(10_000));
     let kept = folder.path().join("data");
     let mut driver = Driver::open_keeping_trainings(&kept);
     driver.open_recordings(&[&path]);

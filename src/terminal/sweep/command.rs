@@ -182,7 +182,11 @@ impl Sweep {
         check_writable(out)?;
         let merged = MergedSweep::read(&self.merge)?;
         // A table that cannot be read may have more trials.
-        let has_fewer = || format.trials_in(out).is_some_and(|trials| trials <= merged.trials.len());
+        let has_fewer = || {
+            format
+                .trials_in(out)
+                .is_some_and(|trials| trials <= merged.trials.len())
+        };
         let is_kept = !merged.is_whole() && !has_fewer();
         if !is_kept {
             atomic_write(out, |writer| format.write(&merged, writer))?;

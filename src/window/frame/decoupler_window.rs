@@ -257,7 +257,9 @@ impl DecouplerWindow {
                     Matter::Training if shared.phase == Phase::Died => vec![notices::Reply::Restart],
                     Matter::Live if can_reconnect => vec![notices::Reply::Reconnect],
                     // From right to left.
-                    Matter::CutShort if !shared.phase.is_busy() => vec![notices::Reply::Discard, notices::Reply::Resume],
+                    Matter::CutShort if !shared.phase.is_busy() => {
+                        vec![notices::Reply::Discard, notices::Reply::Resume]
+                    }
                     Matter::CutShort => vec![notices::Reply::Discard],
                     _ => Vec::new(),
                 };

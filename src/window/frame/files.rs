@@ -401,6 +401,20 @@ mod tests {
     use super::*;
 
     #[test]
+    fn messages_of_the_window_system_name_no_source_file() {
+        for (message, expected) in [
+            (
+                "winit: os error at /build/winit/mod.rs:788: no server: 3",
+                "winit: no server: 3",
+            ),
+            (r"os error at C:\build\mod.rs:1: no server", "no server"),
+            ("no OpenGL: none found", "no OpenGL: none found"),
+        ] {
+            assert_eq!(without_source_line(message), expected);
+        }
+    }
+
+    #[test]
     fn every_file_is_reported_even_if_writing_it_panicked() {
         let (woke, wakes) = channel();
         let mut files = Files::new(Arc::new(move || woke.send(()).unwrap_or(())));

@@ -260,9 +260,10 @@ pub fn furthest_epoch(run: &Run) -> usize {
 /// Handle of the worker, used by the window.
 #[derive(Debug)]
 pub struct Worker {
+    // Dropped first: a thread that finds no one to send requests must know that it is cancelled.
+    job: Job<Event>,
     /// Shared with the thread that waits for signals.
     requests: Arc<Mutex<Sender<Request>>>,
-    job: Job<Event>,
     kept: Kept,
     /// Numbers of requested and finished preparations of trainings.
     requested: Cell<u64>,
@@ -331,7 +332,10 @@ impl Worker {
         move || {
             let (done, saved) = channel();
             // If the thread has died, there is nothing to save.
-            let _ = requests.lock().unwrap_or_else(PoisonError::into_inner).send(Request::Save(done));
+            let _ = requests
+                .lock()
+                .unwrap_or_else(PoisonError::into_inner)
+                .send(Request::Save(done));
             let _ = saved.recv_timeout(LONGEST_SAVE);
         }
     }
@@ -340,11 +344,7 @@ impl Worker {
     /// [`Self::next_event`] reports it.
     pub fn ask(&self, request: Request) {
         match request {
-            Request::Train(_)
-            | Request::Choose(_)
-            | Request::Open(_)
-            | Request::TakeUp(..)
-            | Request::ResumeLeft => {
+            Request::Train(_) | Request::Choose(_) | Request::Open(_) | Request::TakeUp(..) | Request::ResumeLeft => {
                 self.requested.set(self.requested.get() + 1);
             }
             Request::Stop => self.cancelled.store(self.requested.get(), Ordering::Relaxed),

@@ -33,7 +33,10 @@ use decoupler_core::{
     training::TrainingSettings,
 };
 use decoupler_files::{
-    export::{CheckpointFile, CheckpointPlace, NetworkFile, describe_coverage, describe_determinacy, describe_worse_than_ridge},
+    export::{
+        CheckpointFile, CheckpointPlace, NetworkFile, describe_coverage, describe_determinacy,
+        describe_worse_than_ridge,
+    },
     import::{ChoosingProgress, Plan, Progress, Setup, SetupSets},
 };
 

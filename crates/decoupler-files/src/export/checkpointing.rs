@@ -130,13 +130,19 @@ mod tests {
             assert!(left.is_empty());
             free
         });
-        assert_eq!([&first, &second, &third].map(name), ["training-1", "training-2", "training-3"]);
+        assert_eq!(
+            [&first, &second, &third].map(name),
+            ["training-1", "training-2", "training-3"]
+        );
         for place in [&first, &third] {
             fs::write(place.path(), "").unwrap();
         }
         drop((second, third));
         let (free, left) = CheckpointPlace::find(&folder).unwrap();
-        assert_eq!((name(&free), Vec::from_iter(left.iter().map(name))), ("training-2".into(), vec!["training-3".into()]));
+        assert_eq!(
+            (name(&free), Vec::from_iter(left.iter().map(name))),
+            ("training-2".into(), vec!["training-3".into()])
+        );
         // Another program offers none of these, and the one in use is not offered at all.
         let (other, none) = CheckpointPlace::find(&folder).unwrap();
         assert!(name(&other) == "training-4" && none.is_empty());

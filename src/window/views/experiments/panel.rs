@@ -387,7 +387,10 @@ pub(super) fn experiment_exports(view: &ExperimentsView, colours: SequentialMap)
         outcome.clone().map(|outcome| || outcome.table.table()),
     ));
     match outcome {
-        Ok(outcome) => exports.into_iter().map(|export| export.noting(&outcome.is_saved)).collect(),
+        Ok(outcome) => exports
+            .into_iter()
+            .map(|export| export.noting(&outcome.is_saved))
+            .collect(),
         Err(_) => exports,
     }
 }

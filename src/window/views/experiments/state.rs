@@ -356,7 +356,9 @@ impl ExperimentsView {
 
     /// Returns the finished experiments of which no table has been saved, with their numbers of trials.
     pub(super) fn unsaved(&self) -> impl Iterator<Item = (Topic, usize)> {
-        let outcomes = Topic::ALL.into_iter().filter_map(|topic| Some((topic, self.outcomes.get(&topic)?)));
+        let outcomes = Topic::ALL
+            .into_iter()
+            .filter_map(|topic| Some((topic, self.outcomes.get(&topic)?)));
         let unsaved = outcomes.filter(|(_, outcome)| {
             outcome.ending == Some(Ending::Complete) && !outcome.is_saved.load(Ordering::Relaxed)
         });

@@ -310,7 +310,10 @@ pub(super) fn trade_off_exports(view: &TradeOffView) -> Vec<Export<'_>> {
         level.map(|level| move || trade_off_summary(level)),
     ));
     match outcome {
-        Ok(outcome) => exports.into_iter().map(|export| export.noting(&outcome.is_saved)).collect(),
+        Ok(outcome) => exports
+            .into_iter()
+            .map(|export| export.noting(&outcome.is_saved))
+            .collect(),
         Err(_) => exports,
     }
 }
