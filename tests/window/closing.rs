@@ -274,6 +274,7 @@ fn a_finished_sweep_and_trade_off_are_not_discarded_without_asking() {
     driver.click("10×6");
     driver.click_button("Trade-off");
     trading::tiny(&mut driver);
+    driver.type_into("Noise levels", "0");
     trading::measure(&mut driver);
     ask(&mut driver);
     assert!(driver.has("Trade-off: Measurement") && driver.says("not exported as a table"));

@@ -260,7 +260,6 @@ impl DecouplerWindow {
                     Matter::CutShort if !shared.phase.is_busy() => {
                         vec![notices::Reply::Discard, notices::Reply::Resume]
                     }
-                    Matter::CutShort => vec![notices::Reply::Discard],
                     _ => Vec::new(),
                 };
                 replies.extend(notice_ui(ui, notice, remedies).map(|reply| (place, reply)));
