@@ -1,14 +1,14 @@
 //! Trainings that are cut short when the program ends, and resumed at the next start.
 
-use std::{fs, path::Path};
+use std::{fs, path::Path, time::Instant};
 
 use decoupler::window::{Effect, Phase};
 use decoupler_core::training::StopReason;
-use decoupler_files::export::CheckpointFile;
+use decoupler_files::export::{CheckpointFile, CheckpointPlace};
 
 use crate::{
     closing::close,
-    driver::Driver,
+    driver::{Driver, PATIENCE},
     folders::names,
     intervals::noisy,
     recordings::written,
@@ -29,6 +29,17 @@ fn training_in(folder: &Path) -> Driver {
     start_endless(&mut driver);
     driver.wait("a checkpoint", |_| !checkpoints(folder).is_empty());
     driver
+}
+
+/// Ends windows without closing them, as when the program is killed, and waits until this many checkpoints are left.
+fn kill<W>(windows: W, folder: &Path, left: usize) {
+    drop(windows);
+    // Their threads may outlive them for an epoch, unlike those of a program that is killed.
+    let latest = Instant::now() + PATIENCE;
+    while CheckpointPlace::find(folder).unwrap().1.len() < left {
+        assert!(Instant::now() < latest, "{:?}", names(folder));
+        std::thread::yield_now();
+    }
 }
 
 /// Opens the next window and waits for the offer.
@@ -52,8 +63,7 @@ fn nothing_is_offered_in(folder: &Path) -> bool {
 fn a_training_that_was_cut_short_is_offered_at_the_next_start_and_resumed() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
-    // Dropped without being closed, as when the program is killed.
-    drop(training_in(folder));
+    kill(training_in(folder), folder, 1);
     let saved = CheckpointFile::load(&folder.join("training-1.checkpoint")).unwrap();
     assert_eq!(saved.settings, endless().into());
     let epoch = saved.starts[0].history().last().unwrap().epoch;
@@ -67,7 +77,7 @@ fn a_training_that_was_cut_short_is_offered_at_the_next_start_and_resumed() {
     assert!(driver.state().phase == Phase::Training && !driver.says(OFFER));
     assert_eq!(driver.state().draft, endless());
     // Cut short again, it is offered again.
-    drop(driver);
+    kill(driver, folder, 1);
     let mut driver = offered_in(folder);
     driver.click("Resume");
     driver.wait_for_epochs(1);
@@ -86,14 +96,14 @@ fn a_training_that_was_cut_short_is_offered_at_the_next_start_and_resumed() {
 fn a_training_that_was_cut_short_is_discarded_or_asked_about_later() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
-    drop(training_in(folder));
+    kill(training_in(folder), folder, 1);
     let mut driver = offered_in(folder);
     driver.click("Dismiss");
     assert!(!driver.says(OFFER));
     // The training of this session has a place of its own.
     start_endless(&mut driver);
     driver.wait("another checkpoint", |_| checkpoints(folder).len() == 2);
-    drop(driver);
+    kill(driver, folder, 2);
     let mut driver = offered_in(folder);
     driver.click("Discard");
     driver.wait("the other", |driver| driver.says(OFFER));
@@ -114,7 +124,7 @@ fn two_windows_keep_their_trainings_apart() {
     assert!(!second.says(OFFER), "the other window is at work on it");
     second.window_mut().apply(Effect::Stop);
     second.wait("its end", |_| checkpoints(folder) == ["training-1.checkpoint"]);
-    drop((first, second));
+    kill((first, second), folder, 1);
     let driver = offered_in(folder);
     assert!(driver.says(OFFER));
 }
@@ -160,7 +170,7 @@ fn a_training_that_ended_without_its_intervals_gets_them_when_resumed() {
     driver.limit_epochs("20");
     driver.click("▶ Train");
     driver.wait("the calibration", |driver| driver.state().phase == Phase::Calibrating);
-    drop(driver);
+    kill(driver, &kept, 1);
     let mut driver = offered_in(&kept);
     driver.click("Resume");
     driver.wait_for_training();
