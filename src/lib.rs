@@ -7,6 +7,7 @@
 //!
 //! Numerics are in [`decoupler_core`], files in [`decoupler_files`].
 
+mod signals;
 pub mod terminal;
 pub mod window;
 

@@ -213,6 +213,11 @@ impl FrameArguments {
     /// nodes in the frame of `sensor`.
     pub(super) fn read(&self, sensor: &SensorModel, limits: PressLimits, is_json: bool) -> Result<Dataset, Failure> {
         let has_depths = !self.depths.is_empty();
+        self.import.refuse_division(|argument| {
+            format!(
+                "{argument}: calibrate fits all frames, and fine-tune holds out a fifth of them by itself; leave it out"
+            )
+        })?;
         let plan = if has_depths {
             self.import.plan_of(&self.inputs, &self.depths)?
         } else {

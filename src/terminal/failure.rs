@@ -71,16 +71,16 @@ pub(super) enum Failure {
     #[error("interrupted after {}", counted(*.done, "point"))]
     InterruptedTrade { done: usize },
     #[error("interrupted")]
-    InterruptedFollow { status: u8 },
+    InterruptedFollow,
     #[error(transparent)]
     Specification(#[from] SpecificationError),
     #[error("interrupted after {done} of {trials} trials; the same command trains the rest")]
-    InterruptedSweep { done: usize, trials: usize, status: u8 },
+    InterruptedSweep { done: usize, trials: usize },
     #[error("{failed} of {trials} trials failed, for the reasons above; the others are kept")]
     FailedTrials { failed: usize, trials: usize },
     #[error(transparent)]
     SweepFolder(#[from] SweepFolderError),
-    #[error("'{}' lacks trials: {missing} missing, {conflicting} conflicting, {unreadable} files unreadable; run the sweep again for missing ones, and delete the wrong file of those that conflict{}", .out.display(), if *.is_kept { "; the table there has more trials and is left as it is" } else { "" })]
+    #[error("'{}' lacks trials: {missing} missing, {conflicting} conflicting, {unreadable} files unreadable; run the sweep again for missing ones, and delete the wrong file of those that conflict{}", .out.display(), if *.is_kept { "; the table there has more trials, or cannot be read, and is left as it is" } else { "" })]
     IncompleteSweep {
         missing: usize,
         conflicting: usize,
@@ -135,7 +135,7 @@ pub(super) enum Failure {
     NoAnswer { path: PathBuf, line: u64 },
 }
 
-/// A training stopped by Ctrl-C.
+/// A training stopped by Ctrl-C, SIGTERM or SIGHUP.
 #[derive(Debug)]
 pub(super) struct Interruption {
     /// Last completed epoch.
@@ -203,7 +203,6 @@ impl Failure {
             Self::Arguments(_) | Self::Bundle(BundleError::Choice(_)) => 2,
             Self::Specification(SpecificationError::Read { .. }) => 1,
             Self::Specification(_) => 2,
-            Self::InterruptedSweep { status, .. } | Self::InterruptedFollow { status } => *status,
             Self::Import(
                 ImportError::Unknown { .. }
                 | ImportError::Ambiguous { .. }
@@ -219,7 +218,9 @@ impl Failure {
             Self::Interrupted(_)
             | Self::InterruptedComparison { .. }
             | Self::InterruptedTrials { .. }
-            | Self::InterruptedTrade { .. } => interruption::STATUS,
+            | Self::InterruptedTrade { .. }
+            | Self::InterruptedSweep { .. }
+            | Self::InterruptedFollow => interruption::status(),
             _ => 1,
         }
     }

@@ -29,7 +29,7 @@ use decoupler_files::{
 use super::{
     failure::Failure,
     follow_report::{Answers, Form, Report},
-    interruption::{Graceful, STATUS, TERMINATED},
+    interruption::Graceful,
     number,
     output::messages,
 };
@@ -76,7 +76,7 @@ impl Follow {
         }
     }
 
-    /// Passes every line of `source` to `take`, until the source ends or fails, or until Ctrl-C. For a device, `kept`
+    /// Passes every line of `source` to `take`, until the source ends or fails, or a request to stop. For a device, `kept`
     /// lines are kept initially. Reports at the requested interval, on SIGUSR1, and at the end.
     fn follow(
         &self,
@@ -88,9 +88,6 @@ impl Follow {
         // Without the signal there are still reports at intervals and at the end.
         #[cfg(unix)]
         let _ = signal_hook::flag::register(signal_hook::consts::SIGUSR1, Arc::clone(&asked));
-        let terminated = Arc::new(AtomicBool::new(false));
-        #[cfg(unix)]
-        let _ = signal_hook::flag::register(signal_hook::consts::SIGTERM, Arc::clone(&terminated));
         let opened = source.open().map_err(Failure::Source)?;
         let spawned = Lines::spawn(opened, source.keeping(), source.begins_anywhere());
         let mut lines = spawned.map_err(Failure::Reader)?;
@@ -103,10 +100,7 @@ impl Follow {
                 report.print(lines.dropped());
             }
             if graceful.is_end_requested() {
-                break Err(Failure::InterruptedFollow { status: STATUS });
-            }
-            if terminated.load(Ordering::SeqCst) {
-                break Err(Failure::InterruptedFollow { status: TERMINATED });
+                break Err(Failure::InterruptedFollow);
             }
             let line = match lines.next(WAIT) {
                 NextLine::Line(line) => line,

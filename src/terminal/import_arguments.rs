@@ -205,13 +205,10 @@ impl ImportArguments {
             (!self.unit.is_empty(), "--unit"),
             (self.positions.is_some(), "--positions"),
             (self.save_recipe.is_some(), "--save-recipe"),
-            (self.split.is_some(), "--split"),
-            (self.test_fraction.is_some(), "--test-fraction"),
-            (self.validation_fraction.is_some(), "--validation-fraction"),
-            (!self.test_data.is_empty(), "--test-data"),
-            (self.folds.is_some(), "--folds"),
         ];
-        refuse(&given, |argument| format!("{argument} needs --inputs and --targets"))?;
+        let message = |argument: &str| format!("{argument} needs --inputs and --targets");
+        refuse(&given, message)?;
+        self.refuse_division(message)?;
         if self.data.is_empty() {
             let message = "--data: name the file to inspect";
             return Err(Failure::Arguments(message.to_owned()));
@@ -226,15 +223,22 @@ impl ImportArguments {
 
     /// Refuses arguments that need a recording.
     pub(super) fn check_unused(&self) -> Result<(), Failure> {
+        let message = |argument: &str| format!("{argument} needs --data or --recipe");
+        self.refuse_division(message)?;
+        let given = [(self.dialect.choice() != DialectChoice::default(), "the layout of files")];
+        refuse(&given, message)
+    }
+
+    /// Refuses arguments by which samples are divided.
+    pub(super) fn refuse_division(&self, message: impl Fn(&str) -> String) -> Result<(), Failure> {
         let given = [
             (self.split.is_some(), "--split"),
             (self.test_fraction.is_some(), "--test-fraction"),
             (self.validation_fraction.is_some(), "--validation-fraction"),
             (!self.test_data.is_empty(), "--test-data"),
             (self.folds.is_some(), "--folds"),
-            (self.dialect.choice() != DialectChoice::default(), "the layout of files"),
         ];
-        refuse(&given, |argument| format!("{argument} needs --data or --recipe"))
+        refuse(&given, message)
     }
 
     /// Refuses arguments that differ from the `saved` plan of a training that is resumed. File names are not compared:

@@ -2,47 +2,65 @@ use std::{
     fmt,
     io::Write,
     path::PathBuf,
-    sync::atomic::{AtomicBool, Ordering},
-    time::{Duration, Instant},
+    sync::atomic::{AtomicBool, AtomicU8, Ordering},
+    time::Duration,
 };
 
 use clap::Args;
 use decoupler_core::evaluation::Run;
 pub use decoupler_files::export::exit_leaving_nothing;
-use decoupler_files::{
-    export::{CheckpointFile, DocumentError},
-    import::Recorded,
-};
+use decoupler_files::{export::Checkpointing, import::Recorded};
 
 use super::{failure::Failure, output::messages};
+use crate::signals::on_termination;
 
 /// Exit status of a command ended by Ctrl-C: 128 plus the number of the signal, as in shells.
-pub(super) const STATUS: u8 = 130;
-
-/// Exit status after SIGTERM: 128 plus the number of the signal, as in shells.
-pub(super) const TERMINATED: u8 = 143;
+const CTRL_C: u8 = 130;
 
 /// True while the running command checks [`REQUESTED`] itself.
 static GRACEFUL: AtomicBool = AtomicBool::new(false);
-/// True once Ctrl-C was pressed while [`GRACEFUL`] was set.
-static REQUESTED: AtomicBool = AtomicBool::new(false);
+/// Exit status for the first signal that came while [`GRACEFUL`] was set; 0 before.
+static REQUESTED: AtomicU8 = AtomicU8::new(0);
 
-/// Installs the Ctrl-C handler: it ends the program without leaving temporary files, at once unless a [`Graceful`] part
-/// is running.
+/// Handles Ctrl-C, SIGTERM and SIGHUP: they end the program without leaving temporary files, at once unless a [`Graceful`]
+/// part is running.
 pub(super) fn install() {
     // If interruptions are ignored, for example in a background job of a script, they remain ignored.
     let _ = ctrlc::try_set_handler(|| {
         // There is no one to report to if writing fails.
-        if GRACEFUL.load(Ordering::SeqCst) && !REQUESTED.swap(true, Ordering::SeqCst) {
+        if GRACEFUL.load(Ordering::SeqCst) && request(CTRL_C) {
             let _ = writeln!(messages(), "stopping; press Ctrl-C again to end at once");
             return;
         }
         let _ = writeln!(messages(), "interrupted");
-        exit_leaving_nothing(i32::from(STATUS));
+        exit_leaving_nothing(i32::from(CTRL_C));
+    });
+    on_termination(|status| {
+        // At log-out both signals are sent, or one of them twice.
+        if GRACEFUL.load(Ordering::SeqCst) {
+            request(status);
+        } else if REQUESTED.load(Ordering::SeqCst) == 0 {
+            exit_leaving_nothing(i32::from(status));
+        }
     });
 }
 
-/// Guard: while it exists, the first Ctrl-C only requests the end; the second ends the program at once.
+/// Requests the end with this exit status; returns false if it was requested before.
+fn request(status: u8) -> bool {
+    let requested = REQUESTED.compare_exchange(0, status, Ordering::SeqCst, Ordering::SeqCst);
+    requested.is_ok()
+}
+
+/// Exit status of a command that was interrupted.
+pub(super) fn status() -> u8 {
+    match REQUESTED.load(Ordering::SeqCst) {
+        0 => CTRL_C,
+        status => status,
+    }
+}
+
+/// Guard: while it exists, the first Ctrl-C, SIGTERM or SIGHUP only requests the end; a second Ctrl-C ends the program at
+/// once.
 pub(super) struct Graceful(());
 
 impl Graceful {
@@ -52,7 +70,7 @@ impl Graceful {
     }
 
     pub(super) fn is_end_requested(&self) -> bool {
-        REQUESTED.load(Ordering::SeqCst)
+        REQUESTED.load(Ordering::SeqCst) != 0
     }
 }
 
@@ -61,9 +79,6 @@ impl Drop for Graceful {
         GRACEFUL.store(false, Ordering::SeqCst);
     }
 }
-
-/// Reciprocal of the largest share of the time spent on saving.
-const LARGEST_SHARE: u32 = 20;
 
 #[derive(Args)]
 pub(super) struct CheckpointArguments {
@@ -105,26 +120,11 @@ fn seconds(text: &str) -> Result<f64, String> {
     seconds.ok_or_else(|| format!("give a number of seconds from 0 to {LONGEST}"))
 }
 
-/// File in which a training is saved, and time of the next save.
-pub(super) struct Checkpointing {
-    path: PathBuf,
-    interval: Duration,
-    next: Instant,
-    has_warned: bool,
-    /// Origin of recorded samples.
-    recorded: Option<Recorded>,
-}
-
 impl CheckpointArguments {
     /// The requested checkpoints; `recorded` is the origin of recorded samples.
     pub(super) fn checkpointing(&self, recorded: Option<&Recorded>) -> Option<Checkpointing> {
-        Some(Checkpointing {
-            path: self.checkpoint.clone()?,
-            interval: Duration::from_secs_f64(self.checkpoint_interval),
-            next: Instant::now(),
-            has_warned: false,
-            recorded: recorded.cloned(),
-        })
+        let interval = Duration::from_secs_f64(self.checkpoint_interval);
+        Some(Checkpointing::from_now(interval, self.checkpoint.clone()?, recorded))
     }
 
     /// Refuses to overwrite an existing file unless its training is resumed.
@@ -140,35 +140,10 @@ impl CheckpointArguments {
     }
 }
 
-impl Checkpointing {
-    /// Saves to `path` every `interval`, first after one interval; `recorded` is the origin of recorded samples.
-    pub(super) fn every(interval: Duration, path: PathBuf, recorded: Option<&Recorded>) -> Self {
-        Self {
-            path,
-            interval,
-            next: Instant::now() + interval,
-            has_warned: false,
-            recorded: recorded.cloned(),
-        }
-    }
-
-    /// Saves `run` if due. A failure is only reported, and training continues until the next attempt.
-    pub(super) fn save_if_due(&mut self, run: &Run) {
-        let begun = Instant::now();
-        if begun < self.next {
-            return;
-        }
-        if let Err(error) = self.save(run)
-            && !self.has_warned
-        {
-            self.has_warned = true;
-            // There is no one to report to if this fails.
-            let _ = writeln!(messages(), "warning: {error}; training continues");
-        }
-        self.next = Instant::now() + self.interval.max(LARGEST_SHARE * begun.elapsed());
-    }
-
-    pub(super) fn save(&self, run: &Run) -> Result<(), DocumentError> {
-        CheckpointFile::from_run(run, self.recorded.as_ref())?.save(&self.path)
+/// Saves `run` if due. A failure is only reported, and training continues until the next attempt.
+pub(super) fn save_if_due(checkpointing: &mut Checkpointing, run: &Run) {
+    if let Some(error) = checkpointing.save_if_due(run) {
+        // There is no one to report to if this fails.
+        let _ = writeln!(messages(), "warning: {error}; training continues");
     }
 }

@@ -4,7 +4,7 @@ use std::io::Write;
 
 use clap::ValueEnum;
 use decoupler_core::{
-    evaluation::{Channel, Intervals, NoIntervals, Run, RunError},
+    evaluation::{Channel, Intervals, Run},
     live::{Drift, DriftEvent, DriftMonitor},
 };
 use decoupler_files::{
@@ -26,12 +26,12 @@ pub(super) enum WhenCalibrated {
 
 /// Sets the intervals of a finished `run` on a recording: those that its choice of settings has already given, or
 /// otherwise by cross-validation of its training samples. Ctrl-C leaves them out.
-pub(super) fn calibrate(run: &mut Run, sets: &SetupSets, when: WhenCalibrated) -> Result<(), RunError> {
+pub(super) fn calibrate(run: &mut Run, sets: &SetupSets, when: WhenCalibrated) {
     let Some(recordings) = &sets.recordings else {
-        return Ok(());
+        return;
     };
     if when == WhenCalibrated::Never || run.intervals().is_some() {
-        return Ok(());
+        return;
     }
     let by = recordings.recorded.plan.division.by;
     // A training that failed is not one of those that gave the held-out answers.
@@ -44,7 +44,7 @@ pub(super) fn calibrate(run: &mut Run, sets: &SetupSets, when: WhenCalibrated) -
                     "No prediction intervals: they take about {}; give --intervals always",
                     format_duration(time)
                 ));
-                return Ok(());
+                return;
             }
             if let Some(time) = time.filter(|time| time.as_secs_f64() > 2.0) {
                 note(&format!(
@@ -59,10 +59,9 @@ pub(super) fn calibrate(run: &mut Run, sets: &SetupSets, when: WhenCalibrated) -
     };
     match calibrated {
         Ok(intervals) => run.set_intervals(intervals, by),
-        Err(NoIntervals::Run(error)) => return Err(error),
+        // The training is complete without them.
         Err(reason) => note(&format!("No prediction intervals: {reason}")),
     }
-    Ok(())
 }
 
 fn note(message: &str) {

@@ -2,7 +2,7 @@
 //! `reproduce`, `trade` and `sweep`.
 //!
 //! A command ends with status 0 on success, 1 on failure, and 2 for invalid arguments; the last two with one line on
-//! standard error. Ctrl-C ends it with status 130; `train` first saves its results.
+//! standard error. Ctrl-C, SIGTERM and SIGHUP end it with status 130, 143 and 129; `train` first saves its results.
 //!
 //! Parsers of values used by several commands.
 
@@ -103,7 +103,7 @@ pub fn run_for_status<A: Into<OsString> + Clone>(arguments: impl IntoIterator<It
                 | Failure::InterruptedTrials { .. }
                 | Failure::InterruptedTrade { .. }
                 | Failure::InterruptedSweep { .. }
-                | Failure::InterruptedFollow { .. } => {
+                | Failure::InterruptedFollow => {
                     writeln!(messages(), "{failure}")
                 }
                 _ => writeln!(messages(), "error: {}", without_long_words(&failure.to_string())),

@@ -9,7 +9,7 @@ use indicatif::ProgressBar;
 use super::{
     failure::{Failure, Interruption},
     import_arguments::ImportArguments,
-    interruption::{CheckpointArguments, Checkpointing, Graceful},
+    interruption::{CheckpointArguments, Graceful, save_if_due},
     intervals::{WhenCalibrated, calibrate, note_unmonitored},
     output::{messages, progress_bar},
     samples::{announce, announce_recording, following, sets, working_folder},
@@ -24,7 +24,7 @@ use decoupler_core::{
 };
 use decoupler_files::{
     export::{
-        CheckpointFile, NetworkFile, SensorFile, check_writable, format_number, is_same,
+        CheckpointFile, Checkpointing, NetworkFile, SensorFile, check_writable, format_number, is_same,
         report::{RunReport, quoted},
     },
     import::{ChoosingProgress, ChosenSetup, ImportError, Setup, SetupError, SetupSets},
@@ -37,7 +37,8 @@ use decoupler_files::{
 /// with the published figures, if any. With --data it trains on the samples of a recording, and compares the network with
 /// the mean, with ridge regression and with other decoders, target by target; unless settings of the training are given,
 /// they are first chosen by cross-validation on the training samples (--hidden auto). Ctrl-C stops after the epoch, keeps the
-/// best network so far, and ends with status 130; a second Ctrl-C ends at once.
+/// best network so far, and ends with status 130; a second Ctrl-C ends at once. SIGTERM (status 143) and SIGHUP (129) do the
+/// same.
 #[derive(Args)]
 #[command(allow_negative_numbers = true)]
 pub(super) struct Train {
@@ -102,10 +103,8 @@ impl Train {
             }
         };
         let mut end = self.train(&mut run, self.checkpoint.checkpointing(sets.recorded()));
-        if end.is_ok()
-            && let Err(error) = calibrate(&mut run, &sets, self.intervals)
-        {
-            end = Err(error.into());
+        if end.is_ok() {
+            calibrate(&mut run, &sets, self.intervals);
         }
         let mut file = NetworkFile::from_run(&run, sets.recorded())?;
         file.drift = sets.drift_reference();
@@ -284,7 +283,7 @@ impl Train {
         Ok(())
     }
 
-    /// Trains to the end, or to the first epoch after Ctrl-C. The progress bar is shown only if standard error is a
+    /// Trains to the end, or to the first epoch after a request to stop. The progress bar is shown only if standard error is a
     /// terminal.
     fn train(&self, run: &mut Run, checkpointing: Option<Checkpointing>) -> Result<(), Failure> {
         let bar = progress_bar(
@@ -299,7 +298,7 @@ impl Train {
         let mut checkpointing = checkpointing;
         while run.stop_reason().is_none() && !graceful.is_end_requested() {
             if let Some(checkpointing) = &mut checkpointing {
-                checkpointing.save_if_due(run);
+                save_if_due(checkpointing, run);
             }
             run.step();
             if !bar.is_hidden() {

@@ -145,6 +145,38 @@ fn frames_that_do_not_fit_the_array_are_refused() {
     );
 }
 
+#[test]
+fn arguments_that_divide_frames_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    record(folder.path());
+    let path = folder.path();
+    let trained =
+        format!("train --array {ARRAY} --samples 40 --test-samples 8 --epochs 1 --decoder mean --out net.json");
+    assert!(decoupler(&trained, path).status.success());
+    for argument in [
+        "--folds 5",
+        "--test-fraction 0.5",
+        "--validation-fraction 0.5",
+        "--split time",
+        "--test-data none.csv",
+    ] {
+        for command in [
+            format!("calibrate --array {ARRAY} {FRAMES} {argument}"),
+            format!("fine-tune --network net.json {FRAMES} --epochs 1 --out tuned.json {argument}"),
+        ] {
+            let output = decoupler(&command, path);
+            let message = String::from_utf8_lossy(&output.stderr).into_owned();
+            assert_eq!(output.status.code(), Some(2), "{command}: {message}");
+            let name = argument.split(' ').next().unwrap();
+            assert!(
+                message.contains(&format!("error: {name}: calibrate fits all frames")),
+                "{message}"
+            );
+        }
+    }
+    assert!(!path.join("tuned.json").exists());
+}
+
 /// Line 6 of the file has an impossible value; both commands apply the same checks.
 #[test]
 fn impossible_readings_and_depths_are_refused_with_their_line() {

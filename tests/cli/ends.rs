@@ -119,13 +119,43 @@ fn an_incomplete_table_does_not_replace_a_larger_one() {
         let message = text(&output.stderr);
         assert_eq!(output.status.code(), Some(1), "{message}");
         assert!(
-            message.contains("the table there has more trials and is left as it is"),
+            message.contains("the table there has more trials, or cannot be read, and is left as it is"),
             "{message}"
         );
         assert_eq!(fs::read(folder.join(table)).unwrap(), before, "{table}");
     }
     let output = decoupler("sweep --merge runs --out new.csv", folder);
     assert!(output.status.code() == Some(1) && lines(folder, "new.csv").len() == 4);
+}
+
+#[test]
+fn an_incomplete_table_does_not_replace_one_that_cannot_be_read() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let specification = r#"{"train": {"array": "10x6_3x18", "samples": 100, "epochs": 2, "decoder": ["ridge"]}, "axes": {"seed": [0, 1]}}"#;
+    fs::write(folder.join("sweep.json"), specification).unwrap();
+    succeed("sweep --spec sweep.json --out runs", folder);
+    for table in ["table.csv", "table.json"] {
+        succeed(&format!("sweep --merge runs --out {table}"), folder);
+    }
+    let runs = folder.join("runs");
+    let mut trials = names(&runs).into_iter().filter(|name| !name.starts_with("sweep-"));
+    fs::remove_file(runs.join(trials.next().unwrap())).unwrap();
+    // A number of cells that changes, and a text that is cut off.
+    for (table, damage) in [("table.csv", "1,2\n"), ("table.json", "")] {
+        let path = folder.join(table);
+        let whole = fs::read_to_string(&path).unwrap();
+        let damaged = match damage {
+            "" => whole[..whole.len() - 10].to_owned(),
+            line => whole.lines().next().unwrap().to_owned() + "\n" + line,
+        };
+        fs::write(&path, &damaged).unwrap();
+        let output = decoupler(&format!("sweep --merge runs --out {table}"), folder);
+        let message = text(&output.stderr);
+        assert_eq!(output.status.code(), Some(1), "{message}");
+        assert!(message.contains("cannot be read, and is left as it is"), "{message}");
+        assert_eq!(fs::read_to_string(&path).unwrap(), damaged, "{table}");
+    }
 }
 
 fn export(folder: &Path, variable: (&str, &Path)) -> Output {
@@ -160,6 +190,12 @@ fn a_missing_folder_for_temporary_files_is_named() {
 
 #[test]
 fn an_interrupted_export_leaves_nothing() {
+    for (signal, status) in [("INT", 130), ("TERM", 143), ("HUP", 129)] {
+        interrupt_an_export(signal, status);
+    }
+}
+
+fn interrupt_an_export(signal: &str, code: i32) {
     let folder = trained();
     let tools = tempfile::tempdir().unwrap();
     let (compiler, temporary) = (tools.path().join("cc"), tools.path().join("tmp"));
@@ -173,7 +209,8 @@ fn an_interrupted_export_leaves_nothing() {
     .unwrap();
     fs::set_permissions(&compiler, Permissions::from_mode(0o755)).unwrap();
     let path = format!("{}:{}", tools.path().display(), std::env::var("PATH").unwrap());
-    let mut command = Command::new(env!("CARGO_BIN_EXE_decoupler"));
+    let mut command = Command::new("env");
+    command.args(["--default-signal", env!("CARGO_BIN_EXE_decoupler")]);
     command.args("export --network n.json --format c99 --out bundle".split(' '));
     command
         .env("PATH", path)
@@ -181,9 +218,9 @@ fn an_interrupted_export_leaves_nothing() {
         .current_dir(folder.path());
     let mut child = command.stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
     wait_until("the compiler runs", || ready.exists());
-    let status = Command::new("kill").args(["-INT", &child.id().to_string()]).status();
-    assert!(status.unwrap().success());
-    assert_eq!(child.wait().unwrap().code(), Some(130));
+    let kill = [format!("-{signal}"), child.id().to_string()];
+    assert!(Command::new("kill").args(kill).status().unwrap().success());
+    assert_eq!(child.wait().unwrap().code(), Some(code), "{signal}");
     assert_eq!(names(folder.path()), ["n.json", "readings.csv"]);
     assert_eq!(names(&temporary), [""; 0]);
 }

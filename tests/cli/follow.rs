@@ -51,7 +51,9 @@ fn assert_same<'a>(found: impl IntoIterator<Item = &'a str>, expected: impl Into
 }
 
 fn spawn(arguments: &str, folder: &Path) -> Child {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_decoupler"));
+    let mut command = Command::new("env");
+    // A hangup is ignored if the tests run in the background.
+    command.args(["--default-signal", env!("CARGO_BIN_EXE_decoupler")]);
     command.args(arguments.split_whitespace()).current_dir(folder);
     let command = command
         .stdin(Stdio::piped())
@@ -272,6 +274,14 @@ fn a_terminated_program_prints_its_report() {
     assert_eq!(running.child.wait().unwrap().code(), Some(143));
     let report = running.stderr();
     assert!(report.contains("1 line decoded"), "{report}");
+    // As when the terminal is closed.
+    let mut running = Running::new("decode --network n.json --follow", &folder);
+    running.input.write_all(lines[0].as_bytes()).unwrap();
+    running.line();
+    running.line();
+    running.signal("-HUP");
+    assert_eq!(running.child.wait().unwrap().code(), Some(129));
+    assert!(running.stderr().contains("1 line decoded"));
 }
 
 #[test]
@@ -420,7 +430,11 @@ fn sources_that_cannot_be_opened_are_explained_in_one_line() {
         ("/dev/no-such-tty:9600", 1, "there is no device '/dev/no-such-tty'"),
         ("/dev/ttyUSB77", 2, "needs its baud rate: give /dev/ttyUSB77:115200"),
         ("tcp:localhost", 2, "give tcp:HOST:PORT"),
-        ("tcp:127.0.0.1:1", 1, "cannot connect to 'tcp:127.0.0.1:1'"),
+        (
+            "tcp:127.0.0.1:1",
+            1,
+            "cannot connect to 'tcp:127.0.0.1:1': Connection refused; check that the sender listens there",
+        ),
         ("no-such-file.csv", 1, "cannot open 'no-such-file.csv'"),
         ("COMPARISON.csv", 1, "cannot open 'COMPARISON.csv'"),
         ("missing.csv:1", 1, "cannot open 'missing.csv:1'"),

@@ -619,3 +619,26 @@ fn a_reading_that_equals_the_target_is_named_as_a_possible_leak() {
     let warnings = json(honest, folder.path())["warnings"].to_string();
     assert!(!warnings.contains("up to scale and offset"), "{warnings}");
 }
+
+#[test]
+fn a_training_on_few_rows_has_one_outcome() {
+    let folder = tempfile::tempdir().unwrap();
+    for rows in [1, 2, 3, 4, 5, 8] {
+        let line = |row: u32| format!("{},{},{}\n", row, row * row % 5, 3 * row + 1);
+        let text: String = (0..rows).map(line).collect();
+        fs::write(folder.path().join("few.csv"), format!("a,b,y\n{text}")).unwrap();
+        for options in ["--split time", "--split random", "--split random --intervals always"] {
+            let arguments =
+                format!("train --data few.csv --inputs a,b --targets y --hidden 2 --epochs 3 {options} --json");
+            let output = decoupler(&arguments, folder.path());
+            let (printed, message) = (output.stdout, String::from_utf8(output.stderr).unwrap());
+            let has_result = serde_json::from_slice::<serde_json::Value>(&printed).is_ok();
+            let has_failed = message.lines().any(|line| line.starts_with("error: "));
+            let outcome = (output.status.success(), has_result, printed.is_empty(), has_failed);
+            assert!(
+                outcome == (true, true, false, false) || outcome == (false, false, true, true),
+                "{rows} rows, {options}: {outcome:?}, {message}"
+            );
+        }
+    }
+}

@@ -28,11 +28,11 @@ fn command(arguments: &str, folder: &Path) -> Command {
     command
 }
 
-/// Like `command`, with Ctrl-C enabled even if the tests run in the background, where it is ignored by default.
+/// Like `command`, with the signals enabled that are ignored if the tests run in the background.
 #[cfg(target_os = "linux")]
 fn interruptible(arguments: &str, folder: &Path) -> Command {
     let mut command = Command::new("env");
-    command.args(["--default-signal=INT", env!("CARGO_BIN_EXE_decoupler")]);
+    command.args(["--default-signal", env!("CARGO_BIN_EXE_decoupler")]);
     command.args(arguments.split_whitespace()).current_dir(folder);
     command
 }
@@ -109,22 +109,56 @@ fn a_killed_training_is_resumed_bit_for_bit() {
 
 #[cfg(target_os = "linux")]
 fn interrupt(child: &Child) {
-    let kill = format!("kill -INT {}", child.id());
+    signal("INT", child);
+}
+
+#[cfg(target_os = "linux")]
+fn signal(name: &str, child: &Child) {
+    let kill = format!("kill -{name} {}", child.id());
     assert!(Command::new("sh").args(["-c", &kill]).status().unwrap().success());
 }
 
 #[cfg(target_os = "linux")]
 #[test]
 fn an_interrupted_training_saves_its_results_and_prints_how_to_resume() {
+    for (name, status) in [("INT", 130), ("TERM", 143), ("HUP", 129)] {
+        interrupted_training_is_resumed(name, status);
+    }
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_hangup_that_is_ignored_stays_ignored() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let mut command = Command::new("env");
+    command.args(["--ignore-signal=HUP", env!("CARGO_BIN_EXE_decoupler")]);
+    let arguments = format!("train {LONG} 1000000 --checkpoint run.checkpoint --checkpoint-interval 0");
+    command.args(arguments.split_whitespace()).current_dir(folder);
+    let child = begun(command, folder);
+    signal("HUP", &child);
+    let epochs = || {
+        CheckpointFile::load(&folder.join("run.checkpoint")).unwrap().starts[0]
+            .history()
+            .len()
+    };
+    let before = epochs();
+    wait_until("more epochs", || epochs() > before + 5);
+    signal("TERM", &child);
+    assert_eq!(child.wait_with_output().unwrap().status.code(), Some(143));
+}
+
+#[cfg(target_os = "linux")]
+fn interrupted_training_is_resumed(name: &str, code: i32) {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
     let arguments =
         format!("train {LONG} 1000000 --checkpoint run.checkpoint --checkpoint-interval 0.1 --out part.json --json");
     let child = begun(interruptible(&arguments, folder), folder);
-    interrupt(&child);
+    signal(name, &child);
     let output = child.wait_with_output().unwrap();
     let message = String::from_utf8(output.stderr).unwrap();
-    assert_eq!(output.status.code(), Some(130), "{message}");
+    assert_eq!(output.status.code(), Some(code), "{message}");
     let last = message.lines().last().unwrap();
     let (epoch, resume) = last
         .strip_prefix("interrupted after epoch ")

@@ -10,12 +10,14 @@ use eframe::egui::{Key, ViewportCommand, ViewportEvent, ViewportId};
 use crate::{
     configuring::choose_method,
     driver::{Driver, PATIENCE},
+    experiments::{run_to_the_end, tiny},
     recordings::opened,
+    trading,
     training::{endless, start_endless},
 };
 
 const SAVE: &str = "Save checkpoints and close…";
-const QUESTION: &str = "Close while work is in progress?";
+const QUESTION: &str = "Close with unsaved work?";
 const DISCARD: &str = "Discard and close";
 
 /// Returns true if the window sent this command in the last frame.
@@ -239,6 +241,46 @@ fn an_experiment_and_a_trade_off_are_not_ended_without_asking() {
         driver.click("■ Cancel");
         assert!(close(&mut driver), "nothing is running any more");
     }
+}
+
+#[test]
+fn a_finished_sweep_and_trade_off_are_not_discarded_without_asking() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut driver = Driver::open();
+    driver.click_button("Experiments");
+    tiny(&mut driver);
+    run_to_the_end(&mut driver);
+    ask(&mut driver);
+    assert!(
+        driver.has("Experiments: Table 1") && driver.has("will be discarded"),
+        "{:#?}",
+        driver.texts()
+    );
+    assert!(
+        driver.has("2 trials finished, not exported as a table"),
+        "{:#?}",
+        driver.texts()
+    );
+    driver.click_button("Stay");
+    // Asking for a path saves nothing.
+    driver.export("Table, CSV");
+    driver.click_button("Cancel");
+    ask(&mut driver);
+    driver.click_button("Stay");
+    driver.save("Table, CSV", &folder.path().join("table.csv"));
+    assert!(close(&mut driver));
+
+    let mut driver = Driver::open();
+    driver.click("10×6");
+    driver.click_button("Trade-off");
+    trading::tiny(&mut driver);
+    driver.type_into("Noise levels", "0");
+    trading::measure(&mut driver);
+    ask(&mut driver);
+    assert!(driver.has("Trade-off: Measurement") && driver.says("not exported as a table"));
+    driver.click_button("Stay");
+    driver.save("All points, CSV", &folder.path().join("points.csv"));
+    assert!(close(&mut driver));
 }
 
 #[test]

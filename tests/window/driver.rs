@@ -80,6 +80,13 @@ impl Driver {
         Self::open_as(vec2(1440.0, 900.0), None, |window| window.keeping_runs(path)).on_the_papers_scene()
     }
 
+    /// Opens the window on the paper's scene, with running trainings saved in `folder` as often as possible.
+    pub(crate) fn open_keeping_trainings(folder: &Path) -> Self {
+        let folder = folder.to_owned();
+        let keeping = |window: DecouplerWindow| window.keeping_trainings(folder, Duration::ZERO);
+        Self::open_as(vec2(1440.0, 900.0), None, keeping).on_the_papers_scene()
+    }
+
     /// Opens the window with its state remembered in a file; the tour has ended.
     pub(crate) fn open_remembering(path: &Path) -> Self {
         let mut driver = Self::open_on_tour(path);

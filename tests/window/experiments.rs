@@ -25,7 +25,7 @@ fn open() -> Driver {
 }
 
 /// Table 1 with two sizes, one seed and few epochs, typed in.
-fn tiny(driver: &mut Driver) -> Experiment {
+pub(crate) fn tiny(driver: &mut Driver) -> Experiment {
     driver.type_into("Hidden nodes", "2, 4");
     driver.enter("Seeds", "1");
     driver.enter("Epochs", "3");
@@ -39,7 +39,7 @@ fn tiny(driver: &mut Driver) -> Experiment {
     wanted
 }
 
-fn run_to_the_end(driver: &mut Driver) {
+pub(crate) fn run_to_the_end(driver: &mut Driver) {
     driver.click("▶ Run");
     driver.wait("the end of the experiment", |driver| {
         driver.views().experiments.running.is_none()

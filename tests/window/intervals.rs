@@ -2,7 +2,7 @@
 
 use std::{fmt::Write as _, path::Path};
 
-use decoupler::window::Phase;
+use decoupler::window::{Effect, Phase};
 use decoupler_core::{
     dataset::SplitBy,
     evaluation::{Coverage, Intervals},
@@ -14,7 +14,7 @@ use rand::{RngExt as _, SeedableRng as _, rngs::ChaCha8Rng};
 use crate::recordings::opened_text;
 
 /// Readings of two channels and a target that they determine but for noise.
-fn noisy(rows: usize) -> String {
+pub(crate) fn noisy(rows: usize) -> String {
     let mut rng = ChaCha8Rng::seed_from_u64(8);
     let mut text = "u1 (V),u2 (V),x (mm)\n".to_owned();
     for _ in 0..rows {
@@ -53,6 +53,21 @@ fn intervals_are_calibrated_at_the_end_of_a_training() {
     });
     let again = driver.state().result().unwrap().coverage[0].unwrap();
     assert_ne!(again, coverage);
+}
+
+#[test]
+fn pausing_after_the_last_epoch_keeps_the_intervals() {
+    // Its calibration takes much longer than a frame.
+    let (mut driver, _, _folder) = opened_text(&noisy(10_000));
+    driver.limit_epochs("20");
+    driver.click("▶ Train");
+    driver.wait("the calibration", |driver| driver.state().phase == Phase::Calibrating);
+    // As if clicked before the window knew.
+    driver.window_mut().apply(Effect::Pause);
+    driver.wait_for_training();
+    driver.wait_for_kept_run();
+    assert!(!driver.says("No 90 % intervals"), "{:#?}", driver.texts());
+    assert!(driver.kept(0).intervals.is_some());
 }
 
 #[test]

@@ -19,6 +19,7 @@ mod identifying;
 mod import_choices;
 mod importing;
 mod intervals;
+mod keeping;
 mod live;
 mod looking;
 mod newcomer;

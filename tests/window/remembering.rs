@@ -57,6 +57,23 @@ fn a_file_of_another_program_opens_the_default_window() {
 }
 
 #[test]
+fn a_damaged_file_is_kept_and_reported() {
+    let (_folder, path) = file();
+    fs::create_dir_all(path.parent().unwrap()).unwrap();
+    let damaged = path.with_file_name("window.json.damaged");
+    for text in [r#"{"is_dark": false, "view": "Comp"#, "", "\u{0}"] {
+        fs::write(&path, text).unwrap();
+        let mut driver = Driver::open_remembering(&path);
+        let notice = format!("'{}' is damaged; it is kept as '{}'", path.display(), damaged.display());
+        assert!(driver.says(&notice), "{:#?}", driver.texts());
+        assert_eq!(fs::read_to_string(&damaged).unwrap(), text);
+        driver.wait("another file", |_| path.exists());
+        drop(driver);
+        assert!(Driver::open_remembering(&path).notice().is_none());
+    }
+}
+
+#[test]
 fn an_unwritable_location_is_reported_once() {
     let (folder, path) = file();
     // A file where the folder should be.

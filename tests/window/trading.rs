@@ -20,7 +20,7 @@ fn open() -> Driver {
 }
 
 /// Ridge, Newton and small networks of both presets at two levels of noise.
-fn tiny(driver: &mut Driver) -> TradeOffPlan {
+pub(crate) fn tiny(driver: &mut Driver) -> TradeOffPlan {
     driver.type_into("Noise levels", "0, 1e-3");
     driver.type_into("Hidden nodes", "3");
     for decoder in ["Training mean", "Radial basis", "Fuzzy rules", "Network + Newton"] {
@@ -33,7 +33,7 @@ fn tiny(driver: &mut Driver) -> TradeOffPlan {
     driver.views().trade_off.plan(driver.state()).unwrap()
 }
 
-fn measure(driver: &mut Driver) {
+pub(crate) fn measure(driver: &mut Driver) {
     driver.click("▶ Measure");
     driver.wait("the end of the measurement", |driver| {
         driver.views().trade_off.running.is_none()

@@ -4,10 +4,7 @@ use std::{
     num::NonZero,
     path::{Path, PathBuf},
     str::FromStr,
-    sync::{
-        Arc,
-        atomic::{AtomicBool, Ordering},
-    },
+    sync::atomic::{AtomicBool, Ordering},
     time::Instant,
 };
 
@@ -27,7 +24,7 @@ use crate::terminal::{
     count,
     failure::Failure,
     import_arguments::ImportArguments,
-    interruption::{Graceful, STATUS, TERMINATED},
+    interruption::Graceful,
     output::{print, print_object, progress_bar},
     seed,
 };
@@ -45,7 +42,7 @@ use crate::terminal::{
 ///   decoupler sweep --data press.csv --inputs c1..c4 --targets fz --hidden 4,8,12 --method lm,br --seeds 3 --out results
 ///
 /// The output of train --json for each trial is saved as a file in the folder. Running the command again trains only
-/// missing trials, and any number of programs can fill one folder together. Ctrl-C and SIGTERM save the trainings in
+/// missing trials, and any number of programs can fill one folder together. Ctrl-C, SIGTERM and SIGHUP save the trainings in
 /// progress, which are resumed with bit-identical results. A trial gives bit-identical results on machines with the same
 /// vector instructions; on others the last digits may differ.
 #[derive(Args)]
@@ -161,11 +158,10 @@ impl Sweep {
                 )
             })?;
         }
-        match stop.signal_status() {
-            Some(status) if present + trained + failed < of_shard => Err(Failure::InterruptedSweep {
+        match stop.graceful.is_end_requested() {
+            true if present + trained + failed < of_shard => Err(Failure::InterruptedSweep {
                 done: present + trained,
                 trials: of_shard,
-                status,
             }),
             _ if failed > 0 => Err(Failure::FailedTrials {
                 failed,
@@ -186,7 +182,13 @@ impl Sweep {
         })?;
         check_writable(out)?;
         let merged = MergedSweep::read(&self.merge)?;
-        let is_kept = !merged.is_whole() && format.trials_in(out) > merged.trials.len();
+        // A table that cannot be read may have more trials.
+        let has_fewer = || {
+            format
+                .trials_in(out)
+                .is_some_and(|trials| trials <= merged.trials.len())
+        };
+        let is_kept = !merged.is_whole() && !has_fewer();
         if !is_kept {
             atomic_write(out, |writer| format.write(&merged, writer))?;
         }
@@ -219,24 +221,17 @@ impl Sweep {
     }
 }
 
-/// Requests to stop: Ctrl-C, SIGTERM (by which clusters announce that a job must end), or a failure of another thread.
+/// Requests to stop: a signal, such as the SIGTERM by which clusters announce that a job must end, or a failure of another
+/// thread.
 pub(super) struct Stop {
     graceful: Graceful,
-    terminated: Arc<AtomicBool>,
     failed: AtomicBool,
 }
 
 impl Stop {
     pub(super) fn begin() -> Self {
-        let terminated = Arc::new(AtomicBool::new(false));
-        #[cfg(unix)]
-        {
-            // Without it SIGTERM ends the program at once, which loses only the time since the last checkpoint.
-            let _ = signal_hook::flag::register(signal_hook::consts::SIGTERM, Arc::clone(&terminated));
-        }
         Self {
             graceful: Graceful::begin(),
-            terminated,
             failed: AtomicBool::new(false),
         }
     }
@@ -247,15 +242,7 @@ impl Stop {
     }
 
     pub(super) fn is_requested(&self) -> bool {
-        self.failed.load(Ordering::Relaxed) || self.signal_status().is_some()
-    }
-
-    /// Exit status for the received signal, if any.
-    pub(super) fn signal_status(&self) -> Option<u8> {
-        if self.terminated.load(Ordering::Relaxed) {
-            return Some(TERMINATED);
-        }
-        self.graceful.is_end_requested().then_some(STATUS)
+        self.failed.load(Ordering::Relaxed) || self.graceful.is_end_requested()
     }
 }
 

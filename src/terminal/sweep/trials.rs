@@ -14,8 +14,8 @@ use decoupler_core::{
 };
 use decoupler_files::{
     export::{
-        CheckpointFile, NetworkFile, PlanAxis, SweepPlan, Trial, TrialId, TrialOptions, WriteError, decoders_in_order,
-        recording_options, report::quoted, train_options,
+        CheckpointFile, Checkpointing, NetworkFile, PlanAxis, SweepPlan, Trial, TrialId, TrialOptions, WriteError,
+        decoders_in_order, recording_options, report::quoted, train_options,
     },
     import::{FileChecksum, ImportError, Plan, Setup, SetupSets, file_crc32, stored},
 };
@@ -27,7 +27,7 @@ use super::{
 };
 use crate::terminal::{
     failure::{Failure, SpecificationError},
-    interruption::Checkpointing,
+    interruption::save_if_due,
     samples::sets,
     train::measure_decoders,
     train_report::Trained,
@@ -207,7 +207,7 @@ pub(super) fn train(
             checkpointing.save(&run)?;
             return Ok(None);
         }
-        checkpointing.save_if_due(&run);
+        save_if_due(&mut checkpointing, &run);
         run.step();
     }
     let file = NetworkFile::from_run(&run, sets.recorded())?;

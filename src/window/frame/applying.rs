@@ -13,7 +13,7 @@ use crate::window::{
     },
     test_view::HeightScale,
     theme,
-    training_worker::{Inspection, LOST, Request, Worker},
+    training_worker::{Inspection, LOST, Request},
     views::CHECKPOINT,
 };
 use decoupler_core::evaluation::{RunSettings, SimulatedSettings};
@@ -133,6 +133,19 @@ impl DecouplerWindow {
     fn open_training(&mut self, path: PathBuf) {
         self.opened = Some(path.clone());
         self.prepare(Request::Open(path));
+    }
+
+    /// Resumes the training that was cut short.
+    pub(super) fn resume_cut_short(&mut self) {
+        self.opened = None;
+        self.notices.settle(Matter::CutShort);
+        self.prepare(Request::ResumeLeft);
+    }
+
+    /// Discards the training that was cut short.
+    pub(super) fn discard_cut_short(&mut self) {
+        self.notices.settle(Matter::CutShort);
+        self.worker.ask(Request::DiscardLeft);
     }
 
     /// Shows the view in this place.
@@ -293,7 +306,8 @@ impl DecouplerWindow {
 
     /// Starts the worker again after it died.
     pub(super) fn restart_worker(&mut self) {
-        self.worker = Worker::start(Arc::clone(&self.wake));
+        self.worker.restart(Arc::clone(&self.wake));
+        self.keep_trainings();
         self.shared.phase = self.shared.phase_at_rest();
         self.notices.settle(Matter::Training);
     }

@@ -166,6 +166,9 @@ impl DecouplerWindow {
         if may_close && !is_requested {
             self.ctx.send_viewport_cmd(ViewportCommand::Close);
         }
+        if is_requested && may_close {
+            self.worker.forget();
+        }
         if is_requested && !may_close {
             self.ctx.send_viewport_cmd(ViewportCommand::CancelClose);
             // The question must be visible.
@@ -304,7 +307,7 @@ fn question_ui(ui: &Ui, question: &Question) -> Option<Answer> {
     const BUTTON: f32 = space(34);
     const SAVE: &str = "Save checkpoints and close…";
     const STAY: &str = "Stay";
-    card_ui(ui, "Close while work is in progress?", |ui| {
+    card_ui(ui, "Close with unsaved work?", |ui| {
         let height = LINE * question.height.min(MAX_LINES) as f32;
         let list = ScrollArea::vertical().max_height(height).min_scrolled_height(height);
         list.auto_shrink([false, false]).show(ui, |ui| {

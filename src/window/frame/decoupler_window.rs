@@ -1,5 +1,6 @@
 use std::{ops::RangeInclusive, path::PathBuf, sync::Arc, time::Duration};
 
+use decoupler_files::export::exit_leaving_nothing;
 use eframe::egui::{self, Context, Event, Frame as PanelFrame, Key, Margin, Modifiers, Panel, Ui};
 
 use super::{
@@ -13,12 +14,13 @@ use super::{
     top_bar::{Reach, edge_ui, export_menu_ui, top_bar_ui, widths_points},
     tour::{self, Tour, tour_ui},
 };
+use crate::signals::on_termination;
 use crate::window::{
     job::{Job, Wake},
     preview::PreviewEvent,
     shared::{Action, Effect, Matter, Notice, Offers, Phase, RunsWorker, Shared},
     theme::{self, Theme, space},
-    training_worker::Worker,
+    training_worker::{Request, Worker},
     views::Views,
 };
 
@@ -39,6 +41,8 @@ pub struct DecouplerWindow {
     /// The checkpoint that the training of the Train view was opened from.
     pub(super) opened: Option<PathBuf>,
     pub(super) worker: Worker,
+    /// Folder for the checkpoints of running trainings, and the interval at which they are saved.
+    pub(super) keeping: Option<(PathBuf, Duration)>,
     pub(super) previews: Job<PreviewEvent>,
     pub(super) runs: RunsWorker,
     pub(super) files: Files,
@@ -70,6 +74,7 @@ impl DecouplerWindow {
     /// As [`Self::new`]; `wake` is called whenever there is an event to handle.
     pub(super) fn woken_by(wake: Wake, ctx: &Context, desktop: Desktop, file: Option<WindowFile>) -> Self {
         let remembered = file.as_ref().map(|file| file.remembered.clone()).unwrap_or_default();
+        let damage = file.as_ref().and_then(|file| file.damage.clone());
         let is_dark = remembered
             .is_dark
             .unwrap_or(ctx.system_theme() != Some(egui::Theme::Light));
@@ -89,6 +94,7 @@ impl DecouplerWindow {
             path_checks: PathChecks::new(Arc::clone(&wake)),
             opened: None,
             worker: Worker::start(Arc::clone(&wake)),
+            keeping: None,
             previews: Job::new("preview", Arc::clone(&wake)),
             runs: RunsWorker::start(Arc::clone(&wake)),
             files: Files::new(Arc::clone(&wake)),
@@ -105,6 +111,9 @@ impl DecouplerWindow {
             wake,
             ctx: ctx.clone(),
         };
+        if let Some(damage) = damage {
+            window.notices.fail(Matter::Memory, damage);
+        }
         if let Some(scale) = window.remembered.scale.filter(|scale| SCALES.contains(scale)) {
             window.set_scale(scale);
         }
@@ -138,6 +147,31 @@ impl DecouplerWindow {
     pub fn keeping_runs(self, path: PathBuf) -> Self {
         self.runs.open(path);
         self
+    }
+
+    /// Keeps checkpoints of running trainings in `folder`, saved every `interval`, and offers those that were cut short when
+    /// the program ended.
+    #[must_use]
+    pub fn keeping_trainings(mut self, folder: PathBuf, interval: Duration) -> Self {
+        self.keeping = Some((folder, interval));
+        self.keep_trainings();
+        self
+    }
+
+    /// Keeps checkpoints of the worker's trainings, if they are to be kept.
+    pub(super) fn keep_trainings(&self) {
+        if let Some((folder, interval)) = &self.keeping {
+            self.worker.ask(Request::Keep(folder.clone(), *interval));
+        }
+    }
+
+    /// Saves the running training and ends the program on SIGTERM and SIGHUP, even if the window does not respond.
+    pub(super) fn save_on_termination(&self) {
+        let save = self.worker.saver();
+        on_termination(move |status| {
+            save();
+            exit_leaving_nothing(i32::from(status));
+        });
     }
 
     /// State that all views read.
@@ -219,12 +253,16 @@ impl DecouplerWindow {
         let replies = egui::CentralPanel::default().frame(background).show(ui, |ui| {
             let mut replies = Vec::new();
             for (place, (matter, notice)) in self.notices.iter().enumerate() {
-                let remedy = match matter {
-                    Matter::Training if shared.phase == Phase::Died => Some(notices::Reply::Restart),
-                    Matter::Live if can_reconnect => Some(notices::Reply::Reconnect),
-                    _ => None,
+                let remedies = match matter {
+                    Matter::Training if shared.phase == Phase::Died => vec![notices::Reply::Restart],
+                    Matter::Live if can_reconnect => vec![notices::Reply::Reconnect],
+                    // From right to left.
+                    Matter::CutShort if !shared.phase.is_busy() => {
+                        vec![notices::Reply::Discard, notices::Reply::Resume]
+                    }
+                    _ => Vec::new(),
                 };
-                replies.extend(notice_ui(ui, notice, remedy).map(|reply| (place, reply)));
+                replies.extend(notice_ui(ui, notice, remedies).map(|reply| (place, reply)));
             }
             view.body_ui(ui, shared, &mut effects);
             replies
@@ -256,6 +294,8 @@ impl DecouplerWindow {
                 notices::Reply::Dismiss => self.notices.dismiss(place),
                 notices::Reply::Restart => self.restart_worker(),
                 notices::Reply::Reconnect => self.views.live.retry(&self.shared, &mut effects),
+                notices::Reply::Resume => self.resume_cut_short(),
+                notices::Reply::Discard => self.discard_cut_short(),
             }
         }
         self.apply_all(effects);

@@ -7,7 +7,7 @@ use crate::window::{
     job::JobError,
     preview::PreviewEvent,
     shared::{Matter, Notice, Phase, Preview, RunView},
-    training_worker::Event,
+    training_worker::{Began, Event},
 };
 use decoupler_core::evaluation::RunSettings;
 
@@ -96,6 +96,20 @@ impl DecouplerWindow {
         }
     }
 
+    /// Shows a training restored from a checkpoint. If it has ended, its next event says so.
+    fn take_opened(&mut self, began: Began, phase: Phase) {
+        let setup = began.setup.clone();
+        self.shared.preview = None;
+        self.shared.run = Some(RunView {
+            // The checkpoint of one that was cut short is removed when the window closes.
+            is_saved: phase == Phase::Paused,
+            ..RunView::new(began)
+        });
+        self.take_setup(&setup);
+        self.typed = None;
+        self.shared.phase = phase;
+    }
+
     fn take_event(&mut self, event: Event) {
         let shared = &mut self.shared;
         if !matches!(event, Event::Reading(_)) {
@@ -111,18 +125,18 @@ impl DecouplerWindow {
                 shared.phase = Phase::Training;
             }
             Event::Began(Err(error)) => self.refuse(Matter::Settings, error.to_string()),
-            Event::Opened(Ok(began)) => {
-                let setup = began.setup.clone();
-                shared.preview = None;
-                shared.run = Some(RunView {
-                    is_saved: true,
-                    ..RunView::new(*began)
-                });
-                self.take_setup(&setup);
-                let shared = &mut self.shared;
-                self.typed = None;
-                // If it has ended, its next event says so.
-                shared.phase = Phase::Paused;
+            Event::Opened(Ok(began)) => self.take_opened(*began, Phase::Paused),
+            Event::Resumed(Ok(began)) => self.take_opened(*began, Phase::Training),
+            Event::Resumed(Err(reason)) => self.refuse(Matter::Training, reason),
+            Event::Left(question) => {
+                self.notices.settle(Matter::CutShort);
+                if let Some(question) = question {
+                    self.notices.fail(Matter::CutShort, question);
+                }
+            }
+            Event::Unkept(reason) => {
+                let text = format!("A running training will be lost if the program ends: {reason}");
+                self.notices.fail(Matter::Memory, text);
             }
             Event::Opened(Err(reason)) => {
                 self.refuse(Matter::Training, reason);

@@ -209,6 +209,9 @@ pub enum OpenError {
 const PACKAGES: &str = "on a bare Debian, install libxcursor1 libxi6 libxkbcommon-x11-0 libgl1-mesa-dri, or work in a \
                         terminal: `decoupler train --help`";
 
+/// Time between two checkpoints of a running training.
+const CHECKPOINT_INTERVAL: Duration = Duration::from_secs(10);
+
 /// Opens the window and returns when it is closed.
 ///
 /// # Errors
@@ -245,18 +248,28 @@ pub fn open() -> Result<(), OpenError> {
     let create = |creation: &eframe::CreationContext<'_>| {
         let window = DecouplerWindow::new(&creation.egui_ctx, Desktop::Native, file);
         let window = match &folders {
-            Some(folders) => window.keeping_runs(folders.data_dir().join("runs")),
+            Some(folders) => window
+                .keeping_runs(folders.data_dir().join("runs"))
+                .keeping_trainings(folders.data_dir().to_owned(), CHECKPOINT_INTERVAL),
             None => window,
         };
+        window.save_on_termination();
         Ok::<Box<dyn eframe::App>, Box<dyn std::error::Error + Send + Sync>>(Box::new(window))
     };
     // A missing library makes the window system panic with the name of the library.
     let run = || eframe::run_native("Decoupler", options, Box::new(create));
     match std::panic::catch_unwind(std::panic::AssertUnwindSafe(run)) {
         Ok(Ok(())) => Ok(()),
-        Ok(Err(error)) => Err(OpenError::NoWindow(error.to_string())),
+        Ok(Err(error)) => Err(OpenError::NoWindow(without_source_line(&error.to_string()))),
         Err(_) => Err(OpenError::Failed),
     }
+}
+
+/// Returns a message of the window system without the source line that it names: "os error at FILE:LINE: cause".
+fn without_source_line(message: &str) -> String {
+    let parts = message.split_once("os error at ");
+    let cause = parts.and_then(|(before, after)| Some((before, after.split_once(": ")?.1)));
+    cause.map_or(message.to_owned(), |(before, cause)| format!("{before}{cause}"))
 }
 
 /// Result of checking a path to which a file is to be written.
@@ -386,6 +399,20 @@ mod tests {
     use decoupler_files::export::WriteError;
 
     use super::*;
+
+    #[test]
+    fn messages_of_the_window_system_name_no_source_file() {
+        for (message, expected) in [
+            (
+                "winit: os error at /build/winit/mod.rs:788: no server: 3",
+                "winit: no server: 3",
+            ),
+            (r"os error at C:\build\mod.rs:1: no server", "no server"),
+            ("no OpenGL: none found", "no OpenGL: none found"),
+        ] {
+            assert_eq!(without_source_line(message), expected);
+        }
+    }
 
     #[test]
     fn every_file_is_reported_even_if_writing_it_panicked() {

@@ -94,6 +94,10 @@ pub enum Reply {
     Restart,
     /// Connect again to the stream that has ended.
     Reconnect,
+    /// Resume the training that was cut short.
+    Resume,
+    /// Discard the training that was cut short.
+    Discard,
 }
 
 impl Reply {
@@ -102,12 +106,14 @@ impl Reply {
             Self::Dismiss => "Dismiss",
             Self::Restart => "Start again",
             Self::Reconnect => "Try again",
+            Self::Resume => "Resume",
+            Self::Discard => "Discard",
         }
     }
 }
 
-/// Shows a notice in a strip above the view, a failure or a success, and a button for the `remedy`, if there is one.
-pub fn notice_ui(ui: &mut Ui, notice: &Notice, remedy: Option<Reply>) -> Option<Reply> {
+/// Shows a notice in a strip above the view, a failure or a success, and a button for each of the `remedies`.
+pub fn notice_ui(ui: &mut Ui, notice: &Notice, remedies: Vec<Reply>) -> Option<Reply> {
     let mut reply = None;
     let palette = Theme::of(ui).palette;
     let (text, colour) = match notice {
@@ -125,10 +131,10 @@ pub fn notice_ui(ui: &mut Ui, notice: &Notice, remedy: Option<Reply>) -> Option<
                 if ui.button(Reply::Dismiss.name()).clicked() {
                     reply = Some(Reply::Dismiss);
                 }
-                if let Some(remedy) = remedy
-                    && ui.button(remedy.name()).clicked()
-                {
-                    reply = Some(remedy);
+                for remedy in remedies {
+                    if ui.button(remedy.name()).clicked() {
+                        reply = Some(remedy);
+                    }
                 }
                 ui.with_layout(Layout::left_to_right(Align::Center), |ui| {
                     ui.add(eframe::egui::Label::new(RichText::new(text).color(colour)).wrap());

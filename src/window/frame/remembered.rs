@@ -4,7 +4,10 @@ use std::{
     time::Duration,
 };
 
-use decoupler_core::evaluation::{RunSettings, SimulatedSettings, Workload};
+use decoupler_core::{
+    evaluation::{RunSettings, SimulatedSettings, Workload},
+    text::system_cause,
+};
 use decoupler_files::{
     export::{WriteError, atomic_write},
     figure::SequentialMap,
@@ -76,26 +79,44 @@ pub(super) struct Remembered {
 pub struct WindowFile {
     pub(super) path: PathBuf,
     pub(super) remembered: Remembered,
+    /// Message on a file that cannot be read.
+    pub(super) damage: Option<String>,
 }
 
 impl WindowFile {
-    /// Reads the file at `path`; a missing or invalid file counts as empty.
+    /// Reads the file at `path`; a missing file counts as empty. One that cannot be read is kept under another name.
     pub fn read(path: PathBuf) -> Self {
         let remembered = Remembered::read(&path);
-        Self { path, remembered }
+        let damage = remembered.is_none().then(|| {
+            let kept = path.with_extension("json.damaged");
+            let kept_as = match fs::rename(&path, &kept) {
+                Ok(()) => format!("it is kept as '{}'", kept.display()),
+                Err(error) => format!("it cannot be kept as '{}': {}", kept.display(), system_cause(&error)),
+            };
+            let path = path.display();
+            format!("View, theme and settings of the last start are not restored: '{path}' is damaged; {kept_as}")
+        });
+        Self {
+            path,
+            remembered: remembered.unwrap_or_default(),
+            damage,
+        }
     }
 }
 
 impl Remembered {
-    fn read(path: &Path) -> Self {
+    /// Reads the file at `path`; a missing file counts as empty. Returns `None` if the file is damaged.
+    fn read(path: &Path) -> Option<Self> {
         /// Much more than the program writes.
         const LARGEST_BYTES: u64 = 1 << 20;
         // Opening a pipe would wait for a program that writes to it.
-        let is_ours = fs::metadata(path).is_ok_and(|found| found.is_file() && found.len() <= LARGEST_BYTES);
-        let text = is_ours.then(|| fs::read_to_string(path).ok()).flatten();
-        let mut read: Self = serde_json::from_str(&text.unwrap_or_default()).unwrap_or_default();
+        let Some(found) = fs::metadata(path).ok().filter(fs::Metadata::is_file) else {
+            return Some(Self::default());
+        };
+        let text = (found.len() <= LARGEST_BYTES).then(|| fs::read(path).ok()).flatten()?;
+        let mut read: Self = serde_json::from_slice(&text).ok()?;
         read.draft = read.draft.filter(is_within_limits);
-        read
+        Some(read)
     }
 
     /// Writes the file at `path`, and creates its folder if it is missing.
@@ -156,7 +177,7 @@ pub(super) struct Memory {
 
 impl Memory {
     pub(super) fn new(file: WindowFile, wake: Wake) -> Self {
-        let WindowFile { path, remembered } = file;
+        let WindowFile { path, remembered, .. } = file;
         Self {
             path,
             written: remembered.clone(),
@@ -247,7 +268,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("window.json");
         fs::write(&path, text).unwrap();
-        Remembered::read(&path)
+        Remembered::read(&path).unwrap_or_default()
     }
 
     #[test]
@@ -264,7 +285,7 @@ mod tests {
         };
         written.take_size_points([1203.4, 800.0]);
         written.write(&path).unwrap();
-        assert_eq!(Remembered::read(&path), written);
+        assert_eq!(Remembered::read(&path), Some(written.clone()));
         assert_eq!(written.opening_size_points(), [1203.0, 800.0]);
     }
 

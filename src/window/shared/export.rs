@@ -2,7 +2,11 @@ use std::{
     borrow::Cow,
     fmt,
     path::{Path, PathBuf},
-    sync::{Arc, mpsc::Sender},
+    sync::{
+        Arc,
+        atomic::{AtomicBool, Ordering},
+        mpsc::Sender,
+    },
 };
 
 use decoupler_core::training::EpochRecord;
@@ -75,6 +79,32 @@ impl ExportGroup {
 
 /// Form of a picture on the clipboard.
 const COPY: &str = "Copy";
+
+impl<'a> Export<'a> {
+    /// Sets `is_saved` once the user has saved the file, if it is a table.
+    #[must_use]
+    pub fn noting(self, is_saved: &Arc<AtomicBool>) -> Self {
+        if self.group != ExportGroup::Tables {
+            return self;
+        }
+        let is_saved = Arc::clone(is_saved);
+        let ask = self.ask.map(|ask| -> Ask<'a> {
+            Box::new(move || match ask() {
+                Effect::ChooseFile(FileTask {
+                    words,
+                    suggestion,
+                    purpose: Purpose::Save(contents),
+                }) => Effect::ChooseFile(FileTask {
+                    words,
+                    suggestion,
+                    purpose: Purpose::Save(contents.noting(is_saved)),
+                }),
+                effect => effect,
+            })
+        });
+        Self { ask, ..self }
+    }
+}
 
 impl Export<'_> {
     /// Returns the name of the action: "Export chart, SVG", "Copy error table as LaTeX".
@@ -318,6 +348,15 @@ impl Contents {
     /// The contents that `write` writes; it returns the message for the user.
     pub fn with_message(write: impl Fn(&Path) -> Result<String, String> + Send + Sync + 'static) -> Self {
         Self(Arc::new(write))
+    }
+
+    /// Sets `is_saved` once the file is written.
+    fn noting(self, is_saved: Arc<AtomicBool>) -> Self {
+        Self::with_message(move |path| {
+            let message = self.write(path)?;
+            is_saved.store(true, Ordering::Relaxed);
+            Ok(message)
+        })
     }
 
     /// Writes the file.

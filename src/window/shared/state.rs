@@ -265,7 +265,7 @@ pub fn opening_settings() -> SimulatedSettings {
     }
 }
 
-/// Work that closing the window would cut short.
+/// Work that closing the window would cut short, or whose result it would discard.
 #[derive(Debug)]
 pub struct Unfinished {
     /// Name that distinguishes the work from other work of the same view: "Training".

@@ -203,6 +203,8 @@ pub enum Notice {
 pub enum Matter {
     /// The current training, or one that was to be shown.
     Training,
+    /// A training that was cut short when the program ended.
+    CutShort,
     /// Settings with which no training can begin.
     Settings,
     /// The test set of the settings.

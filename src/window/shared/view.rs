@@ -45,7 +45,7 @@ pub trait View: Debug {
         false
     }
 
-    /// Returns the work that closing the window would cut short, including work being prepared.
+    /// Returns the work that closing the window would cut short or discard, including work being prepared.
     fn unfinished(&self, _shared: &Shared) -> Vec<Unfinished> {
         Vec::new()
     }

@@ -3,7 +3,7 @@ use std::{
     fmt,
     path::PathBuf,
     sync::{
-        Arc,
+        Arc, Mutex, MutexGuard, PoisonError,
         atomic::{AtomicU64, AtomicUsize, Ordering},
         mpsc::{Sender, channel},
     },
@@ -25,7 +25,7 @@ use decoupler_files::{
 };
 use ndarray::Array2;
 
-use super::{calibration::Calibration, training_loop::TrainingLoop};
+use super::{calibration::Calibration, keeping::Kept, training_loop::TrainingLoop};
 use crate::window::{
     job::{Job, JobError, Wake},
     test_view::{Frame, TargetCharts, TestSet, TestViewError},
@@ -52,6 +52,14 @@ pub enum Request {
     Stop,
     /// Inspect this training, unless another one has replaced it.
     Inspect(RunId, Inspection),
+    /// Keep checkpoints of running trainings in this folder from now on, saved at this interval.
+    Keep(PathBuf, Duration),
+    /// Resume the training that was offered.
+    ResumeLeft,
+    /// Remove the checkpoint that was offered.
+    DiscardLeft,
+    /// Save the checkpoint of the running training now, and answer.
+    Save(Sender<()>),
 }
 
 /// Message from the worker to the window.
@@ -61,6 +69,12 @@ pub enum Event {
     Began(Result<Box<Began>, TestViewError>),
     /// A saved training has been restored, or an error.
     Opened(Result<Box<Began>, String>),
+    /// A training that was cut short continues, or an error.
+    Resumed(Result<Box<Began>, String>),
+    /// Question about a training that was cut short, if there is one.
+    Left(Option<String>),
+    /// The running training cannot be kept, with the reason.
+    Unkept(String),
     /// A training was cancelled during its preparation.
     Abandoned,
     /// The training continues with these settings, or an error.
@@ -248,8 +262,11 @@ pub fn furthest_epoch(run: &Run) -> usize {
 /// Handle of the worker, used by the window.
 #[derive(Debug)]
 pub struct Worker {
-    requests: Sender<Request>,
+    // Dropped first: a thread that finds no one to send requests must know that it is cancelled.
     job: Job<Event>,
+    /// Shared with the thread that waits for signals.
+    requests: Arc<Mutex<Sender<Request>>>,
+    kept: Kept,
     /// Numbers of requested and finished preparations of trainings.
     requested: Cell<u64>,
     finished: Cell<u64>,
@@ -266,14 +283,16 @@ impl Worker {
         let cancelled = Arc::<AtomicU64>::default();
         let mut job = Job::new("training", wake);
         let snapshot = Arc::<AtomicUsize>::default();
-        let (in_thread, shown) = (Arc::clone(&cancelled), Arc::clone(&snapshot));
+        let kept = Kept::default();
+        let (in_thread, shown, keeps) = (Arc::clone(&cancelled), Arc::clone(&snapshot), kept.clone());
         job.start(
-            move |report| TrainingLoop::new(report, &in_thread, &shown).run(&incoming),
+            move |report| TrainingLoop::new(report, &in_thread, &shown, keeps).run(&incoming),
             |ended| Event::Died(ended.err()),
         );
         Self {
-            requests,
+            requests: Arc::new(Mutex::new(requests)),
             job,
+            kept,
             requested: Cell::default(),
             finished: Cell::default(),
             cancelled,
@@ -285,23 +304,56 @@ impl Worker {
     #[cfg(test)]
     pub fn dying(wake: Wake) -> Self {
         let mut dead = Self::start(wake);
-        dead.requests = channel().0;
+        *dead.requests() = channel().0;
         dead.job.start(|_| panic!("a test"), |ended| Event::Died(ended.err()));
         dead
+    }
+
+    /// Starts another thread after this one has died.
+    pub fn restart(&mut self, wake: Wake) {
+        let new = Self::start(wake);
+        let requests = Arc::clone(&self.requests);
+        *self.requests() = new.requests().clone();
+        *self = Self { requests, ..new };
+    }
+
+    fn requests(&self) -> MutexGuard<'_, Sender<Request>> {
+        self.requests.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Removes the checkpoint of the running training, which the user leaves unfinished, and keeps none from now on.
+    pub fn forget(&self) {
+        self.kept.forget();
+    }
+
+    /// Returns a function that saves the running training and waits until it is saved.
+    pub fn saver(&self) -> impl Fn() + Send + use<> {
+        /// An epoch may take longer; its training is then as old as the last checkpoint.
+        const LONGEST_SAVE: Duration = Duration::from_secs(5);
+        let requests = Arc::clone(&self.requests);
+        move || {
+            let (done, saved) = channel();
+            // If the thread has died, there is nothing to save.
+            let _ = requests
+                .lock()
+                .unwrap_or_else(PoisonError::into_inner)
+                .send(Request::Save(done));
+            let _ = saved.recv_timeout(LONGEST_SAVE);
+        }
     }
 
     /// Sends a request. Stopping also cancels a training that is being prepared. If the worker has died,
     /// [`Self::next_event`] reports it.
     pub fn ask(&self, request: Request) {
         match request {
-            Request::Train(_) | Request::Choose(_) | Request::Open(_) | Request::TakeUp(..) => {
+            Request::Train(_) | Request::Choose(_) | Request::Open(_) | Request::TakeUp(..) | Request::ResumeLeft => {
                 self.requested.set(self.requested.get() + 1);
             }
             Request::Stop => self.cancelled.store(self.requested.get(), Ordering::Relaxed),
             _ => {}
         }
         // The receiver is dropped only if the worker died.
-        let _ = self.requests.send(request);
+        let _ = self.requests().send(request);
     }
 
     /// Selects the snapshot whose surface is part of later results.
@@ -318,14 +370,14 @@ impl Worker {
     pub fn next_event(&self) -> Option<Event> {
         loop {
             let event = self.job.next_event()?;
-            if let Event::Began(_) | Event::Opened(_) | Event::Abandoned = event {
+            if let Event::Began(_) | Event::Opened(_) | Event::Resumed(_) | Event::Abandoned = event {
                 self.finished.set(self.finished.get() + 1);
             }
             let is_cancelled = self.finished.get() <= self.cancelled.load(Ordering::Relaxed);
             match event {
                 Event::Abandoned => {}
                 // Errors of a cancelled preparation are ignored.
-                Event::Began(Err(_)) | Event::Opened(Err(_)) if is_cancelled => {}
+                Event::Began(Err(_)) | Event::Opened(Err(_)) | Event::Resumed(Err(_)) if is_cancelled => {}
                 event => return Some(event),
             }
         }

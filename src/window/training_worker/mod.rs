@@ -2,6 +2,7 @@
 //! each event wakes the window.
 
 mod calibration;
+mod keeping;
 mod message;
 mod training_loop;
 

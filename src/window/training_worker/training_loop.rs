@@ -4,7 +4,7 @@ use std::{
     sync::{
         Arc,
         atomic::{AtomicU64, AtomicUsize, Ordering},
-        mpsc::{Receiver, TryRecvError},
+        mpsc::{Receiver, Sender, TryRecvError},
     },
     time::{Duration, Instant},
 };
@@ -14,6 +14,7 @@ use ndarray::Array2;
 use super::{
     Began, Event, Inspection, Progress as Advance, Request, RunId, RunResult, TrainedRun,
     calibration::Calibration,
+    keeping::{Keeping, Kept},
     message::{continue_run, furthest_epoch},
 };
 use crate::window::{
@@ -28,11 +29,12 @@ use decoupler_core::{
         network_frame_time,
         recorded::Determination,
     },
+    text::system_cause,
     training::TrainingSettings,
 };
 use decoupler_files::{
     export::{
-        CheckpointFile, NetworkFile, describe_coverage, describe_determinacy, describe_samples,
+        CheckpointFile, CheckpointPlace, NetworkFile, describe_coverage, describe_determinacy, describe_samples,
         describe_worse_than_ridge,
     },
     import::{ChoosingProgress, Plan, Progress, Setup, SetupSets},
@@ -67,6 +69,7 @@ pub(super) struct TrainingLoop<'a> {
     no_intervals: Option<String>,
     /// True if the result of a finished run has been sent to the window.
     is_kept: bool,
+    keeping: Keeping,
     /// Start of the last report, and its number of reported epochs.
     reported: (usize, usize),
     next_report: Instant,
@@ -74,7 +77,12 @@ pub(super) struct TrainingLoop<'a> {
 }
 
 impl<'a> TrainingLoop<'a> {
-    pub(super) fn new(report: &'a Report<Event>, cancelled: &'a AtomicU64, snapshot: &'a AtomicUsize) -> Self {
+    pub(super) fn new(
+        report: &'a Report<Event>,
+        cancelled: &'a AtomicU64,
+        snapshot: &'a AtomicUsize,
+        kept: Kept,
+    ) -> Self {
         Self {
             report,
             cancelled,
@@ -88,6 +96,7 @@ impl<'a> TrainingLoop<'a> {
             is_calibrating: false,
             no_intervals: None,
             is_kept: false,
+            keeping: Keeping::new(kept),
             reported: (0, 0),
             next_report: Instant::now(),
             next_starts: Instant::now(),
@@ -111,18 +120,20 @@ impl<'a> TrainingLoop<'a> {
     }
 
     fn is_training(&self) -> bool {
-        let unfinished = self
-            .run
-            .as_ref()
-            .is_some_and(|trained| trained.run.stop_reason().is_none());
-        unfinished && !self.is_paused
+        self.unfinished().is_some() && !self.is_paused
+    }
+
+    /// The training that has not ended, or whose result has not been sent to the window.
+    fn unfinished(&self) -> Option<&TrainedRun> {
+        let unfinished = self.run.as_ref();
+        unfinished.filter(|trained| trained.run.stop_reason().is_none() || !self.is_kept)
     }
 
     fn answer(&mut self, request: Request) {
         match request {
             Request::Train(setup) => {
                 let prepared = self.prepare_setup(&setup, |sets, is_cancelled| sets.run(&setup, is_cancelled));
-                self.begin(prepared, false, Event::Began);
+                self.begin(prepared, None, Event::Began);
             }
             Request::Choose(setup) => {
                 let prepared = self.choose(&setup).map(|prepared| {
@@ -131,24 +142,17 @@ impl<'a> TrainingLoop<'a> {
                         (trained, Box::new(Began { asked, ..*began }))
                     })
                 });
-                self.begin(prepared, false, Event::Began);
+                self.begin(prepared, None, Event::Began);
             }
             Request::Open(path) => {
-                let prepared = CheckpointFile::load(&path).map_err(|error| error.to_string());
-                let prepared = prepared.and_then(|file| {
-                    let prepared = self.prepare(|is_cancelled, on_progress| {
-                        let resumed = file.resume_unless(is_cancelled, on_progress)?;
-                        Ok(resumed.map(|(run, sets)| TrainedRun::new(run, &sets)))
-                    });
-                    prepared.map_err(|error| format!("'{}': {error}", path.display()))
-                });
-                self.begin(prepared, true, Event::Opened);
+                let prepared = self.open(&path);
+                self.begin(prepared, None, Event::Opened);
             }
             Request::TakeUp(setup, states) => {
                 let resume =
                     |sets: SetupSets, is_cancelled: &dyn Fn() -> bool| sets.resume(&setup, states, is_cancelled);
                 let prepared = self.prepare_setup(&setup, resume);
-                self.begin(prepared.map_err(|error| error.to_string()), true, Event::Opened);
+                self.begin(prepared.map_err(|error| error.to_string()), None, Event::Opened);
             }
             Request::Continue(training) => self.continue_training(training),
             Request::Pause => {
@@ -164,7 +168,51 @@ impl<'a> TrainingLoop<'a> {
                 }
             }
             Request::Inspect(id, inspection) => self.inspect(id, inspection),
+            Request::Keep(folder, interval) => match self.keeping.open(&folder, interval) {
+                Ok(()) => self.offer_left(),
+                Err(error) => self.unkept(format!("'{}': {}", folder.display(), system_cause(&error))),
+            },
+            Request::ResumeLeft => {
+                let left = self.keeping.take_left();
+                let prepared = left.as_ref().map_or(Ok(None), |left| self.open(left.path()));
+                self.begin(prepared, left, Event::Resumed);
+                self.offer_left();
+            }
+            Request::DiscardLeft => {
+                if let Some(left) = self.keeping.take_left() {
+                    left.clear();
+                }
+                self.offer_left();
+            }
+            Request::Save(done) => self.save(&done),
         }
+    }
+
+    /// Saves the running training and answers.
+    fn save(&self, done: &Sender<()>) {
+        if let Some(trained) = self.unfinished() {
+            self.keeping.save(&trained.run);
+        }
+        // The program ends meanwhile.
+        let _ = done.send(());
+    }
+
+    fn offer_left(&self) {
+        self.report.send(Event::Left(self.keeping.offer()));
+    }
+
+    fn unkept(&self, reason: String) {
+        self.report.send(Event::Unkept(reason));
+    }
+
+    /// Restores the training saved in the checkpoint at `path`; returns `None` if cancelled.
+    fn open(&self, path: &Path) -> Result<Option<(TrainedRun, Box<Began>)>, String> {
+        let file = CheckpointFile::load(path).map_err(|error| error.to_string())?;
+        let prepared = self.prepare(|is_cancelled, on_progress| {
+            let resumed = file.resume_unless(is_cancelled, on_progress)?;
+            Ok(resumed.map(|(run, sets)| TrainedRun::new(run, &sets)))
+        });
+        prepared.map_err(|error| format!("'{}': {error}", path.display()))
     }
 
     fn inspect(&self, id: RunId, inspection: Inspection) {
@@ -231,29 +279,39 @@ impl<'a> TrainingLoop<'a> {
         Ok(trained.map(begun).transpose()?.filter(|_| !is_cancelled()))
     }
 
-    /// Replaces the current run by a new one; the current run and its files stay if the new one is invalid.
+    /// Replaces the current run by a new one; the current run and its files stay if the new one is invalid. A run resumed from
+    /// the checkpoint `left` is kept there.
     fn begin<X>(
         &mut self,
         prepared: Result<Option<(TrainedRun, Box<Began>)>, X>,
-        is_paused: bool,
+        left: Option<CheckpointPlace>,
         event: fn(Result<Box<Began>, X>) -> Event,
     ) {
         self.preparations += 1;
         let (trained, began) = match prepared {
             Ok(Some(prepared)) => prepared,
-            Ok(None) => return self.report.send(Event::Abandoned),
-            Err(error) => return self.report.send(event(Err(error))),
+            failed => {
+                if let Some(left) = left {
+                    self.keeping.put_back(left);
+                }
+                let failed = failed.err().map_or(Event::Abandoned, |error| event(Err(error)));
+                return self.report.send(failed);
+            }
         };
-        // A run that had ended before it was saved was kept when it ended.
-        self.is_kept = trained.run.stop_reason().is_some();
+        let has_ended = trained.run.stop_reason().is_some();
+        // A run that had ended before it was saved was kept when it ended, unless its intervals were being calibrated.
+        self.is_kept = has_ended && left.is_none();
+        self.is_calibrating = has_ended && left.is_some();
+        self.keeping.begin(left, trained.recorded.as_ref());
         self.past = PastNetworks::default();
         self.past.record(&trained.run);
         (self.run, self.id, self.test) = (Some(trained), Some(began.id), Some(began.test.clone()));
-        self.is_paused = is_paused;
         self.no_intervals = None;
         self.reported = (0, 0);
         self.next_starts = Instant::now();
-        self.report.send(event(Ok(began)));
+        let event = event(Ok(began));
+        self.is_paused = matches!(event, Event::Opened(_));
+        self.report.send(event);
         self.report_progress();
     }
 
@@ -289,18 +347,24 @@ impl<'a> TrainingLoop<'a> {
         };
         let ended = run.step().is_some();
         self.past.record(run);
+        let unkept = self.keeping.save_if_due(run);
         if ended {
             self.calibrate(requests);
         } else if Instant::now() >= self.next_report {
             self.report_progress();
         }
+        if let Some(reason) = unkept {
+            self.unkept(reason);
+        }
     }
 
-    /// Calibrates the intervals of the training that has ended, and reports its end. Any request but an inspection ends
-    /// the calibration and is answered.
+    /// Calibrates the intervals of the training that has ended, and reports its end. A request for something else ends the
+    /// calibration and is answered.
     fn calibrate(&mut self, requests: &Receiver<Request>) {
-        self.is_calibrating = self.run.as_ref().is_some_and(|trained| trained.calibration.is_some());
-        if self.is_calibrating {
+        let calibrated = self.run.as_ref().filter(|trained| trained.calibration.is_some());
+        self.is_calibrating = calibrated.is_some();
+        if let Some(trained) = calibrated {
+            self.keeping.save(&trained.run);
             self.report_progress();
         }
         let pending = RefCell::new(None);
@@ -308,6 +372,9 @@ impl<'a> TrainingLoop<'a> {
             while pending.borrow().is_none() {
                 match requests.try_recv() {
                     Ok(Request::Inspect(id, inspection)) => worker.inspect(id, inspection),
+                    Ok(Request::Save(done)) => worker.save(&done),
+                    // Sent before the window knew that no epoch is left.
+                    Ok(Request::Pause | Request::Resume) => {}
                     Ok(request) => *pending.borrow_mut() = Some(request),
                     Err(TryRecvError::Empty) => return worker.report.is_cancelled(),
                     Err(TryRecvError::Disconnected) => return true,
@@ -448,6 +515,10 @@ impl<'a> TrainingLoop<'a> {
         };
         if std::mem::replace(&mut self.is_kept, true) {
             return;
+        }
+        // The end of the program is not that of the training, whose intervals are then missing.
+        if !self.report.is_cancelled() {
+            self.keeping.clear();
         }
         let file = trained.network_file();
         let checked = file.and_then(|file| file.defect().map_or(Ok(Box::new(file)), Err));

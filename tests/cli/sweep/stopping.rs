@@ -112,7 +112,7 @@ fn stopped_by(signal: &str, epochs: usize) -> (TempDir, i32, String) {
         "axes": {"seed": [3]},
     }));
     let mut command = Command::new("env");
-    command.args(["--default-signal=INT", env!("CARGO_BIN_EXE_decoupler")]);
+    command.args(["--default-signal", env!("CARGO_BIN_EXE_decoupler")]);
     command
         .args("sweep --spec sweep.json --out runs".split(' '))
         .current_dir(folder.path());
@@ -130,7 +130,7 @@ fn stopped_by(signal: &str, epochs: usize) -> (TempDir, i32, String) {
 #[cfg(target_os = "linux")]
 #[test]
 fn an_interrupted_trial_is_resumed_bit_for_bit() {
-    for (signal, status) in [("INT", 130), ("TERM", 143)] {
+    for (signal, status) in [("INT", 130), ("TERM", 143), ("HUP", 129)] {
         // A busy machine may deliver the signal late.
         let attempts = [1000, 10_000, 100_000].into_iter();
         let mut attempts = attempts.map(|epochs| (epochs, stopped_by(signal, epochs)));

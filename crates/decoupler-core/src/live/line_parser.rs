@@ -242,11 +242,26 @@ pub(super) struct Entry {
 }
 
 impl Batch {
+    /// Returns true if the oldest line has waited too long.
+    pub(super) fn is_old(&self, now: Instant) -> bool {
+        let oldest = self.lines.front();
+        oldest.is_some_and(|entry| now.saturating_duration_since(entry.read_at) > Lines::PATIENCE)
+    }
+
+    /// Moves the lines of `newer` to the end.
+    pub(super) fn append(&mut self, newer: &mut Self) {
+        let shift = self.bytes.len();
+        self.bytes.append(&mut newer.bytes);
+        self.lines.extend(newer.lines.drain(..).map(|mut entry| {
+            entry.place = entry.place.map(|(start, end)| (start + shift, end + shift));
+            entry
+        }));
+    }
+
     /// Drops all but the newest `kept` lines if the oldest has waited too long; returns the number of dropped lines. The
     /// latest header is kept: without it the lines that follow would be misinterpreted.
     pub(super) fn drop_old(&mut self, now: Instant, kept: usize) -> u64 {
-        let is_old = |entry: &Entry| now.saturating_duration_since(entry.read_at) > Lines::PATIENCE;
-        if !self.lines.front().is_some_and(is_old) || self.lines.len() <= kept {
+        if !self.is_old(now) || self.lines.len() <= kept {
             return 0;
         }
         let mut dropped = self.lines.len() - kept;
@@ -351,6 +366,24 @@ mod tests {
             row_index,
             readings_ohm,
         }
+    }
+
+    #[test]
+    fn lines_that_arrive_later_follow_those_that_wait() {
+        let (now, mut splitter) = (Instant::now(), Splitter::new(false));
+        let (mut waiting, mut arrived) = (Batch::default(), Batch::default());
+        for chunk in ["1,a\n22", ",b\n\n", "3"] {
+            splitter.split(chunk.as_bytes(), now, &mut arrived);
+            waiting.append(&mut arrived);
+            assert!(arrived.lines.is_empty() && arrived.bytes.is_empty());
+        }
+        splitter.finish(now, &mut arrived);
+        waiting.append(&mut arrived);
+        let texts = waiting.lines.iter().map(|entry| {
+            let (start, end) = entry.place.unwrap();
+            (entry.number, std::str::from_utf8(&waiting.bytes[start..end]).unwrap())
+        });
+        assert_eq!(Vec::from_iter(texts), [(1, "1,a"), (2, "22,b"), (3, ""), (4, "3")]);
     }
 
     #[test]

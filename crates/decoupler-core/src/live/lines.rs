@@ -17,6 +17,7 @@ use crate::text::LONGEST_ROW;
 #[derive(Debug)]
 pub struct Lines {
     shared: Arc<Shared>,
+    keeping: Keeping,
     /// Lines taken from the reader, not yet returned.
     batch: Batch,
 }
@@ -115,6 +116,7 @@ impl Lines {
         })?;
         Ok(Self {
             shared,
+            keeping,
             batch: Batch::default(),
         })
     }
@@ -175,8 +177,9 @@ impl Lines {
 
     /// Drops lines that have waited too long, if there are newer ones.
     fn drop_old(&mut self, now: Instant) {
-        let mut state = self.shared.lock();
-        if state.keeping == Keeping::Latest {
+        // A lock per line would wait for the reader, which holds it most of the time when lines arrive fast.
+        if self.keeping == Keeping::Latest && self.batch.is_old(now) {
+            let mut state = self.shared.lock();
             let kept = state.kept.saturating_sub(state.waiting.lines.len()).max(1);
             state.dropped += self.batch.drop_old(now, kept);
         }
@@ -200,6 +203,7 @@ impl Shared {
     fn read(&self, mut source: impl Read, skips_first: bool) -> io::Result<()> {
         let mut chunk = vec![0; CHUNK];
         let mut splitter = Splitter::new(skips_first);
+        let mut arrived = Batch::default();
         loop {
             let count = match source.read(&mut chunk) {
                 Ok(count) => count,
@@ -217,6 +221,11 @@ impl Shared {
                 Err(error) => return Err(error),
             };
             let read_at = Instant::now();
+            // Without the lock, for which the receiver would wait.
+            match count {
+                0 => splitter.finish(read_at, &mut arrived),
+                _ => splitter.split(&chunk[..count], read_at, &mut arrived),
+            }
             let mut state = self.lock();
             while state.keeping == Keeping::All && !state.waiting.lines.is_empty() && !state.is_abandoned {
                 state = self.emptied.wait(state).unwrap_or_else(PoisonError::into_inner);
@@ -224,11 +233,10 @@ impl Shared {
             if state.is_abandoned {
                 return Ok(());
             }
+            state.waiting.append(&mut arrived);
             if count == 0 {
-                splitter.finish(read_at, &mut state.waiting);
                 return Ok(());
             }
-            splitter.split(&chunk[..count], read_at, &mut state.waiting);
             state.unended = match chunk[..count].iter().rposition(|&byte| byte == b'\n') {
                 Some(end) => count - end - 1,
                 None => state.unended + count,
@@ -299,6 +307,21 @@ mod tests {
     fn the_source_waits_for_a_slow_receiver() {
         let text = format!("{}\n", "y".repeat(999)).repeat(2000);
         assert_eq!(all(io::Cursor::new(text), false).len(), 2000);
+    }
+
+    #[test]
+    fn lines_that_were_taken_over_are_returned_without_the_lock() {
+        let mut lines = Lines::spawn(&b"1\n2\n3\n"[..], Keeping::All, false).unwrap();
+        let shared = Arc::clone(&lines.shared);
+        assert!(matches!(lines.next(Duration::from_secs(60)), NextLine::Line(_)));
+        // The reader holds it most of the time when lines arrive fast.
+        let _held = shared.lock();
+        for number in 2..=3 {
+            let NextLine::Line(line) = lines.next(Duration::from_secs(60)) else {
+                panic!("no line {number}")
+            };
+            assert_eq!(line.number, number);
+        }
     }
 
     #[test]

@@ -18,7 +18,7 @@ use crate::{
     dataset::{Seed, Stream},
     scene::{Deformation, Fault, FaultError, FaultySensor, Indenter, Loading, NoiseSource, Scene, SceneError},
     sensor::{SensorError, SensorModel},
-    text::system_cause,
+    text::{system_cause, system_words},
 };
 
 /// Source of frames.
@@ -72,7 +72,7 @@ pub enum SourceError {
         cause: String,
     },
     /// The connection failed.
-    #[error("cannot connect to 'tcp:{address}': {}; check that the sender listens there", system_cause(.source))]
+    #[error("cannot connect to 'tcp:{address}': {}; check that the sender listens there", system_words(.source))]
     Connect {
         /// Given address.
         address: String,
@@ -151,6 +151,7 @@ impl Source {
             (Self::Serial { .. }, io::ErrorKind::BrokenPipe | io::ErrorKind::NotFound) => {
                 "the device was unplugged or switched off".to_owned()
             }
+            (Self::Tcp(_), _) => system_words(error),
             _ => system_cause(error),
         };
         format!("{self} is lost: {cause}; connect it again")

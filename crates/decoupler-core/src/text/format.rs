@@ -225,14 +225,19 @@ pub fn system_cause(error: &io::Error) -> String {
     words.to_owned()
 }
 
-/// Returns the system's own message without its number, for rare errors.
-fn with_remedy(error: &io::Error) -> String {
+/// Returns the system's own message without its number.
+pub(crate) fn system_words(error: &io::Error) -> String {
     let text = error.to_string();
-    let words = text.split(" (os error").next().unwrap_or(&text);
+    text.split(" (os error").next().unwrap_or(&text).to_owned()
+}
+
+/// Returns the system's own message, for rare errors.
+fn with_remedy(error: &io::Error) -> String {
+    let words = system_words(error);
     if error.raw_os_error().is_some() {
         format!("the system reports: {words}; check the disk or device, or give another place")
     } else {
-        words.to_owned()
+        words
     }
 }
 

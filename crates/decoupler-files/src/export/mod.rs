@@ -30,6 +30,7 @@
 mod atomic;
 pub mod bundle;
 mod checkpoint_file;
+mod checkpointing;
 mod document;
 mod experiment_tables;
 pub mod figures;
@@ -50,6 +51,7 @@ mod unfinished;
 
 pub use atomic::{AtomicFile, WriteError, atomic_write, check_writable, is_same};
 pub use checkpoint_file::CheckpointFile;
+pub use checkpointing::{CheckpointPlace, Checkpointing};
 pub use decoupler_core::text::{format_below_one, format_duration, format_number, format_percent, format_r2};
 pub use document::{DocumentError, DocumentKind};
 pub use experiment_tables::{

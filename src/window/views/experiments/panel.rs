@@ -382,6 +382,15 @@ pub(super) fn experiment_exports(view: &ExperimentsView, colours: SequentialMap)
             })
         }),
     });
-    exports.extend(copy_exports("Table", outcome.map(|outcome| || outcome.table.table())));
-    exports
+    exports.extend(copy_exports(
+        "Table",
+        outcome.clone().map(|outcome| || outcome.table.table()),
+    ));
+    match outcome {
+        Ok(outcome) => exports
+            .into_iter()
+            .map(|export| export.noting(&outcome.is_saved))
+            .collect(),
+        Err(_) => exports,
+    }
 }

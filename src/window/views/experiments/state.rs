@@ -3,7 +3,10 @@
 use std::{
     collections::HashMap,
     path::Path,
-    sync::Arc,
+    sync::{
+        Arc,
+        atomic::{AtomicBool, Ordering},
+    },
     time::{Duration, Instant},
 };
 
@@ -153,6 +156,8 @@ pub struct Outcome {
     pub ending: Option<Ending>,
     /// Time it took, once it has ended.
     pub took: Option<Duration>,
+    /// True once a table of it has been saved.
+    pub is_saved: Arc<AtomicBool>,
     kept_bytes: usize,
 }
 
@@ -168,6 +173,7 @@ impl Outcome {
             plan,
             ending: None,
             took: None,
+            is_saved: Arc::default(),
             kept_bytes: 0,
         }
     }
@@ -346,6 +352,17 @@ impl ExperimentsView {
     /// Returns the open sweep folder, if it is shown instead of an experiment.
     pub(super) fn shown_folder(&self) -> Option<&OpenFolder> {
         self.folder.shown().filter(|_| self.topic == Topic::Sweep)
+    }
+
+    /// Returns the finished experiments of which no table has been saved, with their numbers of trials.
+    pub(super) fn unsaved(&self) -> impl Iterator<Item = (Topic, usize)> {
+        let outcomes = Topic::ALL
+            .into_iter()
+            .filter_map(|topic| Some((topic, self.outcomes.get(&topic)?)));
+        let unsaved = outcomes.filter(|(_, outcome)| {
+            outcome.ending == Some(Ending::Complete) && !outcome.is_saved.load(Ordering::Relaxed)
+        });
+        unsaved.map(|(topic, outcome)| (topic, outcome.trials().0))
     }
 
     /// Returns the results of the current experiment.

@@ -69,7 +69,11 @@ impl View for ExperimentsView {
             let progress = format!("{name}, {done} of {} finished", counted(running.trials, "trial"));
             Unfinished::discarded("Experiment", progress)
         });
-        unfinished.collect()
+        let unsaved = self.unsaved().map(|(topic, trials)| {
+            let progress = format!("{} finished, not exported as a table", counted(trials, "trial"));
+            Unfinished::discarded(topic.name(), progress)
+        });
+        unfinished.chain(unsaved).collect()
     }
 
     fn offer_actions(&mut self, offers: &mut Offers<'_>, _shared: &Shared, effects: &mut Vec<Effect>) {

@@ -4,7 +4,7 @@
 use std::{
     collections::BTreeMap,
     path::Path,
-    sync::Arc,
+    sync::{Arc, atomic::AtomicBool},
     time::{Duration, Instant},
 };
 
@@ -97,6 +97,8 @@ pub struct TradeOffOutcome {
     pub ending: Option<TradeOffEnding>,
     /// Time it took, once it has ended.
     pub took: Option<Duration>,
+    /// True once its table has been saved.
+    pub is_saved: Arc<AtomicBool>,
 }
 
 impl TradeOffOutcome {
@@ -198,6 +200,7 @@ impl TradeOffView {
             plan,
             ending: None,
             took: None,
+            is_saved: Arc::default(),
         });
     }
 

@@ -1,6 +1,6 @@
 //! The body, the form and the exports of the Trade-off view.
 
-use std::time::Instant;
+use std::{sync::atomic::Ordering, time::Instant};
 
 use decoupler_core::{
     dataset::LARGEST_SAMPLES,
@@ -70,10 +70,17 @@ impl View for TradeOffView {
     }
 
     fn unfinished(&self, _shared: &Shared) -> Vec<Unfinished> {
-        let outcome = self.outcome.iter().filter(|_| self.running.is_some());
-        let unfinished = outcome.map(|outcome| {
+        let unfinished = self.outcome.iter().filter_map(|outcome| {
             let (done, all) = outcome.points();
-            Unfinished::discarded("Measurement", format!("{done} of {} measured", counted(all, "point")))
+            let progress = format!("{done} of {} measured", counted(all, "point"));
+            let is_unsaved =
+                outcome.ending == Some(TradeOffEnding::Complete) && !outcome.is_saved.load(Ordering::Relaxed);
+            if self.running.is_some() {
+                Some(Unfinished::discarded("Measurement", progress))
+            } else {
+                let progress = format!("{progress}, not exported as a table");
+                is_unsaved.then(|| Unfinished::discarded("Measurement", progress))
+            }
         });
         unfinished.collect()
     }
@@ -296,13 +303,19 @@ pub(super) fn trade_off_exports(view: &TradeOffView) -> Vec<Export<'_>> {
         .clone()
         .map(|level| move || Figure::from(trade_off_figure(level, &view.look.limits)));
     let mut exports: Vec<Export<'_>> = picture_exports("Charts", stem(), charts).collect();
-    let points = outcome.map(|outcome| || trade_off_points(&outcome.levels));
+    let points = outcome.clone().map(|outcome| || trade_off_points(&outcome.levels));
     exports.push(csv_export("All points", POINTS, stem(), points));
     exports.extend(copy_exports(
         "Trade-off table",
         level.map(|level| move || trade_off_summary(level)),
     ));
-    exports
+    match outcome {
+        Ok(outcome) => exports
+            .into_iter()
+            .map(|export| export.noting(&outcome.is_saved))
+            .collect(),
+        Err(_) => exports,
+    }
 }
 
 /// Shows the form: lists, presets, decoders, Measure and Cancel.

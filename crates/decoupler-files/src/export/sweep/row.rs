@@ -248,14 +248,21 @@ impl SweepTableFormat {
         }
     }
 
-    /// Returns the number of trials in the table at `path`; 0 if there is no such table.
-    pub fn trials_in(self, path: &Path) -> usize {
+    /// Returns the number of trials in the table at `path`, 0 if there is no file, or `None` if the file cannot be read as a
+    /// table.
+    pub fn trials_in(self, path: &Path) -> Option<usize> {
+        // Reading a pipe or device would wait for its other end.
+        if !path.is_file() {
+            return Some(0);
+        }
         match self {
-            Self::Csv => csv::Reader::from_path(path).map_or(0, |table| table.into_byte_records().flatten().count()),
+            Self::Csv => {
+                let mut records = csv::Reader::from_path(path).ok()?.into_byte_records();
+                records.try_fold(0, |trials, record| record.ok().map(|_| trials + 1))
+            }
             Self::Json => {
-                let text = fs::read(path).unwrap_or_default();
-                let table: serde_json::Value = serde_json::from_slice(&text).unwrap_or_default();
-                table["trials"].as_array().map_or(0, Vec::len)
+                let table: serde_json::Value = serde_json::from_slice(&fs::read(path).ok()?).ok()?;
+                Some(table.get("trials")?.as_array()?.len())
             }
         }
     }

@@ -1,0 +1,180 @@
+//! Trainings that are cut short when the program ends, and resumed at the next start.
+
+use std::{fs, path::Path, time::Instant};
+
+use decoupler::window::{Effect, Phase};
+use decoupler_core::training::StopReason;
+use decoupler_files::export::{CheckpointFile, CheckpointPlace};
+
+use crate::{
+    closing::close,
+    driver::{Driver, PATIENCE},
+    folders::names,
+    intervals::noisy,
+    recordings::written,
+    training::{endless, start_endless},
+};
+
+const OFFER: &str = "Resume the training of ";
+
+/// The checkpoints in a folder.
+fn checkpoints(folder: &Path) -> Vec<String> {
+    let names = names(folder).into_iter();
+    names.filter(|name| name.ends_with(".checkpoint")).collect()
+}
+
+/// A window with an endless training that has a checkpoint.
+fn training_in(folder: &Path) -> Driver {
+    let mut driver = Driver::open_keeping_trainings(folder);
+    start_endless(&mut driver);
+    driver.wait("a checkpoint", |_| !checkpoints(folder).is_empty());
+    driver
+}
+
+/// Ends windows without closing them, as when the program is killed, and waits until this many checkpoints are left.
+fn kill<W>(windows: W, folder: &Path, left: usize) {
+    drop(windows);
+    // Their threads may outlive them for an epoch, unlike those of a program that is killed.
+    let latest = Instant::now() + PATIENCE;
+    while CheckpointPlace::find(folder).unwrap().1.len() < left {
+        assert!(Instant::now() < latest, "{:?}", names(folder));
+        std::thread::yield_now();
+    }
+}
+
+/// Opens the next window and waits for the offer.
+fn offered_in(folder: &Path) -> Driver {
+    let mut driver = Driver::open_keeping_trainings(folder);
+    driver.wait("the offer", |driver| driver.says(OFFER));
+    driver
+}
+
+/// Returns true if the next window offers nothing. Its worker answers one request after the other.
+fn nothing_is_offered_in(folder: &Path) -> bool {
+    let mut driver = Driver::open_keeping_trainings(folder);
+    driver.configure_small();
+    driver.train();
+    // The checkpoint is removed before the run is kept.
+    driver.wait_for_kept_run();
+    !driver.says(OFFER) && checkpoints(folder).is_empty()
+}
+
+#[test]
+fn a_training_that_was_cut_short_is_offered_at_the_next_start_and_resumed() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    kill(training_in(folder), folder, 1);
+    let saved = CheckpointFile::load(&folder.join("training-1.checkpoint")).unwrap();
+    assert_eq!(saved.settings, endless().into());
+    let epoch = saved.starts[0].history().last().unwrap().epoch;
+
+    let mut driver = offered_in(folder);
+    let offer = format!("{OFFER}10×6_3×18, which was cut short at epoch {epoch} of 1000000?");
+    assert!(driver.says(&offer), "{:#?}", driver.texts());
+    driver.click("Resume");
+    driver.wait("its epochs", |driver| driver.epochs() > epoch);
+    driver.wait_for_epochs(3);
+    assert!(driver.state().phase == Phase::Training && !driver.says(OFFER));
+    assert_eq!(driver.state().draft, endless());
+    // Cut short again, it is offered again.
+    kill(driver, folder, 1);
+    let mut driver = offered_in(folder);
+    driver.click("Resume");
+    driver.wait_for_epochs(1);
+    assert!(!close(&mut driver), "it is not saved elsewhere");
+    driver.harness().step();
+    driver.click_button("Stay");
+    driver.click("■ Stop");
+    driver.wait("the end", |driver| {
+        driver.state().phase == Phase::Ended(StopReason::Stopped) && checkpoints(folder).is_empty()
+    });
+    drop(driver);
+    assert!(nothing_is_offered_in(folder));
+}
+
+#[test]
+fn a_training_that_was_cut_short_is_discarded_or_asked_about_later() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    kill(training_in(folder), folder, 1);
+    let mut driver = offered_in(folder);
+    driver.click("Dismiss");
+    assert!(!driver.says(OFFER));
+    // The training of this session has a place of its own.
+    start_endless(&mut driver);
+    driver.wait("another checkpoint", |_| checkpoints(folder).len() == 2);
+    kill(driver, folder, 2);
+    let mut driver = offered_in(folder);
+    driver.click("Discard");
+    driver.wait("the other", |driver| driver.says(OFFER));
+    driver.click("Discard");
+    driver.wait("the removal", |_| checkpoints(folder).is_empty());
+    drop(driver);
+    assert!(nothing_is_offered_in(folder));
+}
+
+#[test]
+fn two_windows_keep_their_trainings_apart() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let first = training_in(folder);
+    let mut second = Driver::open_keeping_trainings(folder);
+    start_endless(&mut second);
+    second.wait("another checkpoint", |_| checkpoints(folder).len() == 2);
+    assert!(!second.says(OFFER), "the other window is at work on it");
+    second.window_mut().apply(Effect::Stop);
+    second.wait("its end", |_| checkpoints(folder) == ["training-1.checkpoint"]);
+    kill((first, second), folder, 1);
+    let driver = offered_in(folder);
+    assert!(driver.says(OFFER));
+}
+
+#[test]
+fn a_training_that_is_discarded_at_closing_is_not_offered() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let mut driver = training_in(folder);
+    assert!(!close(&mut driver));
+    driver.harness().step();
+    driver.click_button("Discard and close");
+    assert!(close(&mut driver));
+    drop(driver);
+    assert!(nothing_is_offered_in(folder));
+}
+
+#[test]
+fn a_damaged_checkpoint_is_reported_and_can_be_discarded() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    fs::write(folder.join("training-1.checkpoint"), "{").unwrap();
+    let mut driver = Driver::open_keeping_trainings(folder);
+    driver.wait("the report", |driver| {
+        driver.says("A training was cut short and cannot be resumed")
+    });
+    driver.click("Resume");
+    driver.wait("the same again", |driver| {
+        driver.state().phase == Phase::Idle && driver.says("cannot be resumed")
+    });
+    driver.click("Discard");
+    driver.wait("the removal", |_| checkpoints(folder).is_empty());
+}
+
+#[test]
+fn a_training_that_ended_without_its_intervals_gets_them_when_resumed() {
+    let folder = tempfile::tempdir().unwrap();
+    // Its calibration takes much longer than a frame.
+    let path = written(&folder, "press.csv", &noisy(10_000));
+    let kept = folder.path().join("data");
+    let mut driver = Driver::open_keeping_trainings(&kept);
+    driver.open_recordings(&[&path]);
+    driver.limit_epochs("20");
+    driver.click("▶ Train");
+    driver.wait("the calibration", |driver| driver.state().phase == Phase::Calibrating);
+    kill(driver, &kept, 1);
+    let mut driver = offered_in(&kept);
+    driver.click("Resume");
+    driver.wait_for_training();
+    driver.wait_for_kept_run();
+    assert!(driver.kept(0).intervals.is_some());
+    assert_eq!(checkpoints(&kept), [""; 0]);
+}
