@@ -358,7 +358,8 @@ fn a_file_with_rows_out_of_order_is_decoded_in_order_of_time() {
     let warnings = String::from_utf8_lossy(&warnings);
     assert!(warnings.contains("the rows are taken in order of time"), "{warnings}");
     let of_shuffled = answers(&fs::read_to_string(folder.path().join("d.csv")).unwrap());
-    assert!(decode("readings.csv").stderr.is_empty());
+    let warnings = decode("readings.csv").stderr;
+    assert!(!String::from_utf8_lossy(&warnings).contains("backwards"));
     let of_sorted = answers(&fs::read_to_string(folder.path().join("d.csv")).unwrap());
     for (row, found) in of_shuffled.iter().enumerate() {
         let expected = of_sorted[row * 181 % lines.len()];

@@ -46,6 +46,24 @@ fn theme_view_and_settings_are_restored_and_nothing_is_trained() {
 }
 
 #[test]
+fn the_file_of_version_0_1_0_is_read() {
+    let (_folder, path) = file();
+    fs::create_dir_all(path.parent().unwrap()).unwrap();
+    let earlier = concat!(
+        env!("CARGO_MANIFEST_DIR"),
+        "/tests/fixtures/version_0.1.0/data/window.json"
+    );
+    fs::copy(earlier, &path).unwrap();
+    let driver = Driver::open_remembering(&path);
+    assert_eq!(driver.state().draft.training.stopping.epochs, 1_000_000);
+    assert!(is_a_print(&SimulatedSettings {
+        training: SimulatedSettings::default().training,
+        ..driver.state().draft
+    }));
+    assert_eq!(driver.notice(), None);
+}
+
+#[test]
 fn a_file_of_another_program_opens_the_default_window() {
     let (_folder, path) = file();
     fs::create_dir_all(path.parent().unwrap()).unwrap();

@@ -116,8 +116,11 @@ impl Reply {
 pub fn notice_ui(ui: &mut Ui, notice: &Notice, remedies: Vec<Reply>) -> Option<Reply> {
     let mut reply = None;
     let palette = Theme::of(ui).palette;
+    // The end of the program before is no failure of this one.
+    let is_offer = remedies.iter().any(|reply| matches!(reply, Reply::Resume));
     let (text, colour) = match notice {
         Notice::Done(text) => (text, palette.good),
+        Notice::Failed(text) if is_offer => (text, palette.text),
         Notice::Failed(text) => (text, palette.bad),
     };
     let frame = Frame::new()

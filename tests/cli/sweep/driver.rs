@@ -25,7 +25,12 @@ pub(crate) fn run(arguments: &str, folder: &Path) -> Output {
 pub(crate) fn success(arguments: &str, folder: &Path) -> String {
     let output = run(arguments, folder);
     let errors = String::from_utf8_lossy(&output.stderr);
-    assert!(output.status.success() && errors.is_empty(), "{arguments}: {errors}");
+    // The recordings here are short.
+    let is_note = |line: &str| line.starts_with("Drift of the readings is not monitored");
+    assert!(
+        output.status.success() && errors.lines().all(is_note),
+        "{arguments}: {errors}"
+    );
     String::from_utf8(output.stdout).unwrap()
 }
 

@@ -39,11 +39,11 @@ struct Continued<S> {
 pub enum Place {
     /// First row of the series.
     First,
-    /// So many seconds after the row before; `None` is one usual interval.
+    /// Seconds after the row before; `None` is one usual interval.
     After(Option<f64>),
     /// First row after a pause, in seconds.
     AfterPause(f64),
-    /// First row after the time stepped back by so many seconds.
+    /// First row after the time stepped back, by how many seconds.
     AfterStepBack(f64),
 }
 

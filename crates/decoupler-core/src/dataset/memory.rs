@@ -340,7 +340,7 @@ impl MemoryState {
         })
     }
 
-    /// Checks that states for so many series fit into memory.
+    /// Checks that the states of this number of series fit into memory.
     ///
     /// # Errors
     /// If they do not.

@@ -93,7 +93,7 @@ enum Statistic {
 }
 
 impl Statistic {
-    /// Number of statistics of so many inputs.
+    /// Number of statistics of this number of inputs.
     fn count(channels: usize) -> usize {
         3 * channels + 2
     }
@@ -585,7 +585,7 @@ impl DriftMonitor {
         }
     }
 
-    /// The present drift; `None` as long as the readings look like the training readings.
+    /// Current drift; `None` as long as the readings look like the training readings.
     pub fn drift(&self) -> Option<&Drift> {
         self.drift.as_ref()
     }

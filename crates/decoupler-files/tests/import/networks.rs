@@ -448,7 +448,7 @@ fn a_recipe_of_an_array_has_only_differences_from_the_papers_array() {
     assert!(matches!(error, DocumentError::SimulatedRecipe(_)), "{error}");
 }
 
-/// Makes a pipe that nobody writes to.
+/// Makes a pipe without a writer.
 #[cfg(unix)]
 fn pipe(path: &Path) {
     assert!(

@@ -44,7 +44,7 @@ pub enum ChannelRemark {
         /// Target that it repeats.
         target: usize,
     },
-    /// A target is constant but for a single stretch of samples.
+    /// A target is constant except for a single stretch of samples.
     SingleChange {
         /// Target.
         target: usize,

@@ -70,7 +70,7 @@ impl HysteresisLoop {
     const MIN_LEVELS: usize = 5;
     /// Minimum number of samples of an excursion, off rest.
     const MIN_PASSAGE: usize = 5;
-    /// Minimum hysteresis in percent of the range, to tell it from rounding.
+    /// Minimum hysteresis in percent of the range, above which it is more than rounding.
     const MIN_PERCENT: f64 = 0.05;
 
     /// Measures `answers` against `targets` (both samples × outputs), target by target. Samples are in order of time

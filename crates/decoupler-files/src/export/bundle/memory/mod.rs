@@ -175,7 +175,7 @@ impl ExportedMemory {
         )
     }
 
-    /// Tells the caller where the state has to restart, which the program does by itself.
+    /// Sentence on where the caller has to restart the state, as this program does by itself.
     fn restarts(&self) -> String {
         format!(
             "Keep one state for each group and row-wire, and restart it where the time steps back and after a pause of more\n\

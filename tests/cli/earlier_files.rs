@@ -1,0 +1,182 @@
+//! Files written by version 0.1.0 before the core was rebuilt: each gives the same answers, or is refused in one line that
+//! names what is not supported.
+
+use std::{fs, path::Path};
+
+use decoupler_files::export::RunFolder;
+use serde_json::Value;
+use tempfile::TempDir;
+
+use crate::{
+    printed::{json, success},
+    terminal::decoupler,
+};
+
+/// A copy of the files.
+fn files() -> TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    copy(
+        &Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures/version_0.1.0"),
+        folder.path(),
+    );
+    folder
+}
+
+fn copy(from: &Path, to: &Path) {
+    fs::create_dir_all(to).unwrap();
+    for entry in fs::read_dir(from).unwrap() {
+        let entry = entry.unwrap();
+        let copied = to.join(entry.file_name());
+        if entry.path().is_dir() {
+            copy(&entry.path(), &copied);
+        } else {
+            fs::copy(entry.path(), copied).unwrap();
+        }
+    }
+}
+
+fn text(folder: &TempDir, name: &str) -> String {
+    fs::read_to_string(folder.path().join(name)).unwrap()
+}
+
+/// Numbers that agree to this tolerance, relative to 1 or to their size; texts that are equal.
+fn assert_same(found: &str, expected: &str, tolerance: f64) {
+    assert_eq!(found.lines().count(), expected.lines().count());
+    for (found, expected) in found.lines().zip(expected.lines()) {
+        assert_eq!(found.split(',').count(), expected.split(',').count());
+        for (one, other) in found.split(',').zip(expected.split(',')) {
+            match (one.parse::<f64>(), other.parse::<f64>()) {
+                (Ok(one), Ok(other)) => {
+                    assert!(
+                        (one - other).abs() <= tolerance * other.abs().max(1.0),
+                        "{found}\n{expected}"
+                    );
+                }
+                _ => assert_eq!(one, other),
+            }
+        }
+    }
+}
+
+#[test]
+fn networks_give_the_same_answers() {
+    for (network, input, expected) in [
+        ("array.json", "array.csv", "array.decoded.csv"),
+        ("recording.json", "press.csv", "recording.decoded.csv"),
+    ] {
+        let folder = files();
+        success(
+            &format!("decode --network {network} --input {input} --output found.csv"),
+            folder.path(),
+        );
+        assert_same(&text(&folder, "found.csv"), &text(&folder, expected), 1e-12);
+        success(
+            &format!("export --network {network} --format numpy --out bundle"),
+            folder.path(),
+        );
+    }
+}
+
+/// Answers of the network at the end of the training, which the vector instructions of the machine may change slightly.
+#[test]
+fn a_checkpoint_continues_with_the_same_epochs() {
+    let folder = files();
+    success(
+        "train --checkpoint training.checkpoint --resume --epochs 8 --out found.json --json",
+        folder.path(),
+    );
+    let decoded = |network: &str| {
+        success(
+            &format!("decode --network {network} --input press.csv --output decoded.csv"),
+            folder.path(),
+        );
+        text(&folder, "decoded.csv")
+    };
+    assert_same(&decoded("found.json"), &decoded("resumed.json"), 1e-6);
+}
+
+#[test]
+fn recipes_and_sensors_are_trained_on() {
+    let folder = files();
+    let short = "--hidden 2 --epochs 2 --json";
+    let of_recording = json(&format!("train --recipe recording.recipe.json {short}"), folder.path());
+    assert_eq!(of_recording["targets"][0]["name"], "force");
+    let of_array = json(&format!("train --recipe array.recipe.json {short}"), folder.path());
+    let of_sensor = json(
+        &format!("train --sensor sensor.json --samples 60 {short}"),
+        folder.path(),
+    );
+    for report in [of_array, of_sensor] {
+        assert_eq!(report["array"], "2×2_2×6");
+    }
+}
+
+#[test]
+fn trials_of_a_sweep_are_merged() {
+    let folder = files();
+    success("sweep --merge sweep --out found.csv", folder.path());
+    let found = text(&folder, "found.csv");
+    let hidden: Vec<&str> = {
+        let mut lines = found.lines();
+        let column = lines.next().unwrap().split(',').position(|name| name == "hidden");
+        lines
+            .map(|line| line.split(',').nth(column.unwrap()).unwrap())
+            .collect()
+    };
+    assert_eq!(hidden.len(), 2, "{found}");
+    assert!(hidden.contains(&"2") && hidden.contains(&"3"), "{found}");
+}
+
+#[test]
+fn kept_runs_are_listed_and_one_that_cannot_be_opened_is_named() {
+    let folder = files();
+    let runs = folder.path().join("runs");
+    fs::create_dir(&runs).unwrap();
+    let network = text(&folder, "array.json");
+    fs::write(runs.join("run-1.json"), &network).unwrap();
+    fs::write(
+        runs.join("run-2.json"),
+        network.replace("\"version\":", "\"version\":9"),
+    )
+    .unwrap();
+    let (list, problems) = RunFolder::open(&runs).unwrap();
+    assert_eq!(list.runs().runs.len(), 1);
+    assert!(
+        problems.len() == 1 && problems[0].contains("run-2.json"),
+        "{problems:?}"
+    );
+}
+
+/// A file of a later version is refused in one line that names it.
+#[test]
+fn files_of_a_later_version_are_refused() {
+    let folder = files();
+    for (name, arguments) in [
+        (
+            "array.json",
+            "decode --network array.json --input array.csv --output d.csv",
+        ),
+        (
+            "training.checkpoint",
+            "train --checkpoint training.checkpoint --resume --epochs 8",
+        ),
+        (
+            "sensor.json",
+            "train --sensor sensor.json --samples 60 --hidden 2 --epochs 2",
+        ),
+        (
+            "recording.recipe.json",
+            "train --recipe recording.recipe.json --hidden 2 --epochs 2",
+        ),
+    ] {
+        let path = folder.path().join(name);
+        let mut document: Value = serde_json::from_str(&fs::read_to_string(&path).unwrap()).unwrap();
+        document["version"] = 99.into();
+        fs::write(&path, document.to_string()).unwrap();
+        let output = decoupler(arguments, folder.path());
+        let message = String::from_utf8(output.stderr).unwrap();
+        assert!(!output.status.success(), "{name}");
+        let errors = Vec::from_iter(message.lines().filter(|line| line.starts_with("error: ")));
+        assert!(errors.len() == 1 && errors[0].contains("99"), "{name}: {message}");
+    }
+}
