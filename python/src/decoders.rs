@@ -7,6 +7,7 @@ use decoupler_core::{
     decoupling::{AffineMap, Decoder, RadialBasisNetwork, TakagiSugeno},
     network::{InputChoice, ScalingChoice, ScalingError},
     scene::{NoiseSource, RowModel},
+    text::counted,
 };
 use numpy::{IntoPyArray, PyArray2};
 use pyo3::{
@@ -156,7 +157,8 @@ impl FittedDecoder {
             let expected = decoder.channels();
             if found != expected {
                 return Err(format!(
-                    "X has {found} readings per sample, the decoder reads {expected}"
+                    "X has {} per sample, the decoder reads {expected}",
+                    counted(found, "reading")
                 ));
             }
             decode(decoder, view, indices.as_deref()).map_err(|error| error.to_string())

@@ -10,6 +10,7 @@ use decoupler_core::{
     decoupling::CompiledNetworks,
     evaluation::{Channel, Intervals, Problem, RunSettings},
     network::Networks,
+    text::counted,
 };
 use decoupler_files::export::{
     NetworkFile,
@@ -155,7 +156,8 @@ impl Network {
         let ((samples, found), expected) = (view.dim(), self.record.problem.inputs.len());
         if found != expected {
             return Err(PyValueError::new_err(format!(
-                "X has {found} readings per sample, the network reads {expected}"
+                "X has {} per sample, the network reads {expected}",
+                counted(found, "reading")
             )));
         }
         let features = self.features(view, &past)?;

@@ -13,7 +13,7 @@ use decoupler_core::{
     evaluation::{Channel, Errors, Problem, TestErrors, fine_tune, press_limits, pressed_rows},
     network::{DecouplingNetwork, Networks},
     sensor::SensorModel,
-    text::inert,
+    text::{counted, inert},
     training::StoppingRules,
 };
 use decoupler_files::export::{
@@ -241,7 +241,8 @@ impl FrameArguments {
         ];
         if let Some((argument, found, expected)) = counts.into_iter().find(|(_, found, expected)| found != expected) {
             return Err(Failure::Arguments(format!(
-                "{argument}: {found} columns, where a row-wire of the array {scale} needs {expected}"
+                "{argument}: {}, where a row-wire of the array {scale} needs {expected}",
+                counted(found, "column")
             )));
         }
         let row_wires: Option<Vec<usize>> = (0..set.samples()).map(|sample| set.row_wire(sample)).collect();

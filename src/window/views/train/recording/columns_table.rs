@@ -4,6 +4,7 @@
 
 use std::{cell::Cell, rc::Rc};
 
+use decoupler_core::text::counted;
 use decoupler_files::{
     export::format_number,
     figure::tick_text,
@@ -178,7 +179,7 @@ fn file_row<'a>(draft: &'a Draft, file: usize, palette: &Palette, request: &'a d
             .response
             .widget_info(|| WidgetInfo::labeled(Role::ComboBox, true, &label));
     };
-    let rows = format!("{} rows", inspected.inspection.rows);
+    let rows = counted(inspected.inspection.rows, "row");
     let mut cells = vec![TableCell::new(name).strong(true), TableCell::controls(of_all)];
     cells.extend((0..4).map(|_| TableCell::default()));
     cells.push(TableCell::new(rows).colour(palette.dim));
