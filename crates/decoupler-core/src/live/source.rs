@@ -436,7 +436,9 @@ mod tests {
             "'/dev/ttyUSB0:9600' is lost: the device was unplugged or switched off; connect it again"
         );
         let socket = Source::Tcp("host:1".to_owned()).lost(&broken);
-        assert!(socket.contains("the program that reads it has ended"), "{socket}");
+        assert_eq!(socket, "'tcp:host:1' is lost: broken pipe; connect it again");
+        let pipe = Source::StandardInput.lost(&broken);
+        assert!(pipe.contains("the program that reads it has ended"), "{pipe}");
     }
 
     #[test]
