@@ -6,6 +6,7 @@
 //!
 //! | module | contents |
 //! |---|---|
+//! | `numerics` | quantiles of distributions and of samples |
 //! | [`text`] | numbers, names and CSV as text |
 //! | [`sensor`] | array scale, geometry, the resistance model and its Jacobian |
 //! | [`calibration`] | geometry and resistivity fitted to the readings of known deformations |
@@ -127,6 +128,7 @@ pub mod identifiability;
 pub mod live;
 pub mod machine;
 pub mod network;
+mod numerics;
 pub mod scene;
 pub mod sensor;
 pub mod surface;

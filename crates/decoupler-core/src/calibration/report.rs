@@ -5,7 +5,10 @@ use super::{
     equations::{COUNT, Slopes},
     fit::{CalibratedFit, Decomposition, LinearisedFit, fit, fit_with_prior, residuals, variances},
 };
-use crate::sensor::{SensorModel, short};
+use crate::{
+    numerics::two_sided_normal_quantile,
+    sensor::{SensorModel, short},
+};
 
 /// A sensor model fitted to readings of known deformations.
 #[derive(Clone, Debug, PartialEq)]
@@ -105,7 +108,7 @@ impl Calibration {
             let decomposition = Decomposition::of(&here.gram, &free)?;
             let noise_variance = here.squares / (readings - free.len()) as f64;
             let fit_variances = variances(&model, &free, &references, samples, (&decomposition, noise_variance));
-            let factor = two_sided_quantile(0.05 / free.len().max(1) as f64);
+            let factor = two_sided_normal_quantile(0.05 / free.len().max(1) as f64);
             let least_certain = fit_variances
                 .iter()
                 .enumerate()
@@ -172,20 +175,6 @@ fn held_variances(here: &LinearisedFit, free: &[usize], decomposition: &Decompos
         }
     }
     sums
-}
-
-/// Two-sided quantile of the standard normal distribution: the z with P(|Z| > z) = `probability`.
-fn two_sided_quantile(probability: f64) -> f64 {
-    let (mut low, mut high) = (0.0, 40.0);
-    for _ in 0..80 {
-        let middle: f64 = 0.5 * (low + high);
-        if libm::erfc(middle * std::f64::consts::FRAC_1_SQRT_2) > probability {
-            low = middle;
-        } else {
-            high = middle;
-        }
-    }
-    high
 }
 
 impl fmt::Display for CalibratedParameter {

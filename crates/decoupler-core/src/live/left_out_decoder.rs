@@ -4,6 +4,7 @@ use super::faults::{Diagnosis, FaultCause, FaultyWire, FitPrior, RowFit, RowRead
 use crate::{
     dataset::{Seed, Stream},
     decoupling::{DecodeError, Decoder},
+    numerics::median,
     scene::{Loading, Scene},
     sensor::{SensorError, SensorModel},
 };
@@ -242,17 +243,6 @@ impl Polished {
             }
         }
         found
-    }
-}
-
-/// Median of values, which must not be empty.
-pub(super) fn median(mut values: Vec<f64>) -> f64 {
-    values.sort_by(f64::total_cmp);
-    let middle = values.len() / 2;
-    if values.len().is_multiple_of(2) {
-        0.5 * (values[middle - 1] + values[middle])
-    } else {
-        values[middle]
     }
 }
 

@@ -1,8 +1,8 @@
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-use super::left_out_decoder::{Polished, median};
-use crate::scene::NoiseSource;
+use super::left_out_decoder::Polished;
+use crate::{numerics::median, scene::NoiseSource};
 
 /// Estimates the unloaded state from recent frames, without erasing a sustained contact.
 ///

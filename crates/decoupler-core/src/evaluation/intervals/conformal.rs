@@ -1,5 +1,5 @@
 use super::Intervals;
-use crate::evaluation::recorded::Evidence;
+use crate::{evaluation::recorded::Evidence, numerics::quantile};
 
 /// Returns the conformal quantile of `scores` and the effective number of samples m; `None` if there are too few.
 ///
@@ -17,17 +17,6 @@ pub(super) fn conformal_quantile(scores: &[f64], evidence: &Evidence) -> Option<
         .collect();
     let effective = evidence.effective_samples(&is_large);
     (effective >= Intervals::FEWEST_SAMPLES).then(|| (quantile(scores, P + (P - 0.5) / effective), effective))
-}
-
-/// Returns the quantile of `scores` at `level`: the kth smallest of n scores has the level (k − ½)/n, and scores in between
-/// are interpolated linearly (Hazen 1914; definition 5 of Hyndman and Fan 1996, doi:10.2307/2684934).
-pub(super) fn quantile(scores: &[f64], level: f64) -> f64 {
-    let mut sorted = scores.to_vec();
-    sorted.sort_unstable_by(f64::total_cmp);
-    let place = (level * sorted.len() as f64 - 0.5).clamp(0.0, (sorted.len() - 1) as f64);
-    let (below, share) = (place as usize, place.fract());
-    let above = (below + 1).min(sorted.len() - 1);
-    sorted[below] + share * (sorted[above] - sorted[below])
 }
 
 /// Returns the lowest and the highest share of `test` effective samples within intervals that were calibrated on

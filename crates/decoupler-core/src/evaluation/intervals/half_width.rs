@@ -2,9 +2,9 @@ use serde::{Deserialize, Serialize};
 
 use super::{
     Coverage, Intervals,
-    conformal::{conformal_quantile, expected_shares, quantile},
+    conformal::{conformal_quantile, expected_shares},
 };
-use crate::{dataset::Folds, evaluation::recorded::Evidence};
+use crate::{dataset::Folds, evaluation::recorded::Evidence, numerics::quantile};
 
 /// Half-width of the interval of one target.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

@@ -5,7 +5,6 @@ use super::{
     FittedModel, Interval,
     channel_remark::rmse_ratio,
     evidence::{Evidence, SumVariance},
-    split_comparison::student_quantile,
 };
 use crate::{
     dataset::{Dataset, SplitBy},
@@ -13,6 +12,7 @@ use crate::{
         CrossValidated,
         errors::{mean, varies},
     },
+    numerics::student_quantile,
     text::format_below_one,
 };
 

@@ -1,10 +1,10 @@
 use ndarray::ArrayView2;
 use serde::Serialize;
 
-use super::split_comparison::student_quantile;
 use crate::{
     dataset::{Dataset, SplitBy},
     evaluation::TargetErrors,
+    numerics::student_quantile,
 };
 
 /// Errors of decoded values while a target rises (loading) and while it falls (unloading), and the hysteresis that is

@@ -1,8 +1,9 @@
 use glam::DVec3;
 use rand::Rng;
 
-use super::monitor::{Diagnosis, FaultCause, FaultMonitor, FaultyWire, quantile};
+use super::monitor::{Diagnosis, FaultCause, FaultMonitor, FaultyWire};
 use crate::{
+    numerics::chi_squared_quantile,
     scene::{Loading, NoiseSource, Scene},
     sensor::{SensorError, SensorModel},
 };
@@ -225,7 +226,7 @@ impl Shorts {
         }
         let length = readings.len() as f64;
         Comparison {
-            is_equal: count > 0 && q <= quantile(count, DEVIATE),
+            is_equal: count > 0 && q <= chi_squared_quantile(count, DEVIATE),
             // The mean square difference has twice the variance, with a relative spread of √(2/n).
             noise: (2.0 * variance / length * (1.0 + 4.0 * (2.0 / length).sqrt())).sqrt(),
         }

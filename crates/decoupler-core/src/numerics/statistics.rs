@@ -1,0 +1,39 @@
+//! Figures of samples.
+
+/// Median of values, which must not be empty.
+pub(crate) fn median(mut values: Vec<f64>) -> f64 {
+    values.sort_by(f64::total_cmp);
+    let middle = values.len() / 2;
+    if values.len().is_multiple_of(2) {
+        0.5 * (values[middle - 1] + values[middle])
+    } else {
+        values[middle]
+    }
+}
+
+/// Returns the quantile of `values` at `level`: the kth smallest of n values has the level (k − ½)/n, and values in between
+/// are interpolated linearly (Hazen 1914; definition 5 of Hyndman and Fan 1996, doi:10.2307/2684934).
+pub(crate) fn quantile(values: &[f64], level: f64) -> f64 {
+    let mut sorted = values.to_vec();
+    sorted.sort_unstable_by(f64::total_cmp);
+    let place = (level * sorted.len() as f64 - 0.5).clamp(0.0, (sorted.len() - 1) as f64);
+    let (below, share) = (place as usize, place.fract());
+    let above = (below + 1).min(sorted.len() - 1);
+    sorted[below] + share * (sorted[above] - sorted[below])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn medians_and_quantiles_of_few_values() {
+        assert_eq!(median(vec![3.0, 1.0, 2.0]), 2.0);
+        assert_eq!(median(vec![4.0, 1.0]), 2.5);
+        // R: quantile(c(1, 2, 4, 8), c(0, 0.25, 0.5, 0.9, 1), type = 5)
+        for (level, expected) in [(0.0, 1.0), (0.25, 1.5), (0.5, 3.0), (0.9, 8.0), (1.0, 8.0)] {
+            assert_eq!(quantile(&[8.0, 1.0, 4.0, 2.0], level), expected, "{level}");
+        }
+        assert_eq!(quantile(&[7.0], 0.3), 7.0);
+    }
+}
