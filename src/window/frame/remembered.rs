@@ -4,14 +4,12 @@ use std::{
     time::Duration,
 };
 
-use decoupler_core::{
-    evaluation::{RunSettings, SimulatedSettings, Workload},
-    text::system_cause,
-};
+use decoupler_core::evaluation::{RunSettings, SimulatedSettings, Workload};
 use decoupler_files::{
     export::{WriteError, atomic_write},
     figure::SequentialMap,
     import::Plan,
+    machine::system_cause,
 };
 use serde::{Deserialize, Deserializer, Serialize, de::DeserializeOwned};
 

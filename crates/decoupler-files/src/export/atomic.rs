@@ -6,7 +6,8 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use decoupler_core::{machine::ReadingBudget, text::system_cause};
+use crate::machine::system_cause;
+use decoupler_core::machine::ReadingBudget;
 use thiserror::Error;
 
 use super::{

@@ -11,10 +11,10 @@ use super::{
     atomic::read_limited,
     tables::{Heading, NoHeading},
 };
-use crate::import::Recorded;
+use crate::{import::Recorded, machine::system_cause};
 use decoupler_core::{
     evaluation::{Run, Source},
-    text::{in_one_line, system_cause},
+    text::in_one_line,
 };
 
 pub(super) const PROGRAM: &str = concat!("decoupler ", env!("CARGO_PKG_VERSION"));

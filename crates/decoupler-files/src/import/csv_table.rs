@@ -9,7 +9,7 @@ use super::{
     detection::{BEGINNING, detect},
     dialect::utf8_of_utf16,
     format::{Cell, parse},
-    input_lines::table_error,
+    progress::table_error,
     rows::Rows,
     table::{Excess, Labels, Lines, column_called, name_and_unit, stem},
     time_stamp::TimeStamp,

@@ -3,10 +3,11 @@ use std::{
     path::{Path, PathBuf},
 };
 
+use crate::machine::system_cause;
 use decoupler_core::{
     dataset::{DatasetError, DivisionError, MemoryError},
     machine::OverBudget,
-    text::{in_one_line, system_cause},
+    text::in_one_line,
 };
 use thiserror::Error;
 

@@ -9,7 +9,7 @@ use std::{
 
 use decoupler_core::machine::ReadingBudget;
 
-use super::{Decimal, Dialect, TableError, Watch, input_lines::Watched, matlab, numpy};
+use super::{Decimal, Dialect, TableError, Watch, matlab, numpy, progress::Watched};
 
 /// File format.
 #[derive(Clone, Debug, PartialEq, Eq)]

@@ -10,7 +10,7 @@ use flate2::read::ZlibDecoder;
 use super::{
     TableError,
     format::{Array, Element, Endian, written},
-    input_lines::table_error,
+    progress::table_error,
 };
 
 /// Number of bytes read at once, so that a corrupt length allocates little memory.

@@ -10,8 +10,8 @@ use zip::{ZipArchive, result::ZipError};
 use super::{
     TableError, Watch,
     format::{Array, Element, Endian, written},
-    input_lines::{Watched, table_error},
     numpy,
+    progress::{Watched, table_error},
 };
 
 /// Maximum length of a header in bytes.

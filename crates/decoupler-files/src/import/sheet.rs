@@ -15,8 +15,8 @@ use zip::ZipArchive;
 use super::{
     Decimal, DialectChoice, Encoding, Format, Progress, Separator, Table, TableError, Watch,
     csv_table::{self, Reading},
-    input_lines::Watched,
     numpy::check_names,
+    progress::Watched,
     sheet_claims::{self, LARGEST, OF_CELL, Rectangle, outside},
     xls_claims,
 };

@@ -11,7 +11,7 @@ use quick_xml::{
 };
 use zip::ZipArchive;
 
-use super::{TableError, Watch, input_lines::Watched, numpy::damage};
+use super::{TableError, Watch, numpy::damage, progress::Watched};
 
 /// Memory of a byte of XML: strings of one letter, in a vector that has just doubled.
 const OF_BYTE: u64 = 4;
