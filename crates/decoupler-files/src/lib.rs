@@ -2,7 +2,7 @@
 //!
 //! | module | contents |
 //! |---|---|
-//! | [`machine`] | the operating system, in plain words |
+//! | [`machine`] | memory of the machine, errors of its operating system |
 //! | [`import`] | recordings out of files: tables, joins by time, meanings of columns, recipes |
 //! | [`live`] | live frames: serial ports, sockets and files, simulated frames, recordings of frames |
 //! | [`figure`] | what a picture shows, for the window and for print |

@@ -9,7 +9,7 @@ use decoupler_files::{
     export::{WriteError, atomic_write},
     figure::SequentialMap,
     import::Plan,
-    machine::system_cause,
+    machine::{memory_budget, system_cause},
 };
 use serde::{Deserialize, Deserializer, Serialize, de::DeserializeOwned};
 
@@ -154,7 +154,7 @@ pub(super) fn is_within_limits(settings: &SimulatedSettings) -> bool {
         && settings.training.check().is_ok()
         && settings.source.sensor.check().is_ok()
         && settings.source.scene.check().is_ok()
-        && Workload::of(settings).is_ok_and(|workload| workload.check_memory().is_ok())
+        && Workload::of(settings).is_ok_and(|workload| workload.check_memory(memory_budget()).is_ok())
 }
 
 /// Longest time that closing waits for the file.

@@ -6,14 +6,13 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use crate::machine::system_cause;
-use decoupler_core::machine::ReadingBudget;
 use thiserror::Error;
 
 use super::{
     tables::{Heading, NoHeading},
     unfinished::{Unfinished, folder_of},
 };
+use crate::machine::{ReadingBudget, system_cause};
 
 /// Errors of writing a file.
 #[derive(Debug, Error)]

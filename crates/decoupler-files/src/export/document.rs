@@ -4,6 +4,10 @@ use std::{
     path::{Path, PathBuf},
 };
 
+use decoupler_core::{
+    evaluation::{Run, Source},
+    text::in_one_line,
+};
 use thiserror::Error;
 
 use super::{
@@ -12,10 +16,6 @@ use super::{
     tables::{Heading, NoHeading},
 };
 use crate::{import::Recorded, machine::system_cause};
-use decoupler_core::{
-    evaluation::{Run, Source},
-    text::in_one_line,
-};
 
 pub(super) const PROGRAM: &str = concat!("decoupler ", env!("CARGO_PKG_VERSION"));
 

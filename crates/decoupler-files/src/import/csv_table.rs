@@ -4,6 +4,8 @@ use std::{
     path::Path,
 };
 
+use decoupler_core::text::{clean_name, original_name};
+
 use super::{
     Cells, Column, Dialect, DialectChoice, Encoding, Fault, Format, Missing, Table, TableError,
     detection::{BEGINNING, detect},
@@ -14,10 +16,7 @@ use super::{
     table::{Excess, Labels, Lines, column_called, name_and_unit, stem},
     time_stamp::TimeStamp,
 };
-use decoupler_core::{
-    machine::ReadingBudget,
-    text::{clean_name, original_name},
-};
+use crate::machine::ReadingBudget;
 
 /// Maximum number of rows; ten hours at 1 kHz are fewer.
 const LARGEST_ROWS: usize = 50_000_000;

@@ -3,15 +3,14 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use crate::machine::system_cause;
 use decoupler_core::{
     dataset::{DatasetError, DivisionError, MemoryError},
-    machine::OverBudget,
     text::in_one_line,
 };
 use thiserror::Error;
 
 use super::{Format, InputError, PositionsError};
+use crate::machine::{OverBudget, system_cause};
 
 /// Error of an import. Lines and columns are counted from 1.
 #[derive(Debug, Error)]

@@ -8,7 +8,6 @@ use std::{
 use decoupler_core::{
     dataset::{Dataset, History, Memory, MemoryError},
     evaluation::{Channel, Problem, TargetPosition},
-    machine::ReadingBudget,
     text::{counted, in_one_line},
 };
 use serde::Serialize;
@@ -31,6 +30,7 @@ use super::{
     suggestion::Meanings,
     table::{column_called, stem},
 };
+use crate::machine::ReadingBudget;
 
 impl Recipe {
     /// Imports the samples of the files, whose paths are relative to `folder`.

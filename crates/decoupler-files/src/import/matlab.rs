@@ -4,7 +4,6 @@
 
 use std::io::Read;
 
-use decoupler_core::machine::ReadingBudget;
 use flate2::read::ZlibDecoder;
 
 use super::{
@@ -12,6 +11,7 @@ use super::{
     format::{Array, Element, Endian, written},
     progress::table_error,
 };
+use crate::machine::ReadingBudget;
 
 /// Number of bytes read at once, so that a corrupt length allocates little memory.
 const BLOCK: usize = 1 << 20;

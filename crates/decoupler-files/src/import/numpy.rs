@@ -4,7 +4,6 @@
 
 use std::io::{self, Read, Seek, SeekFrom};
 
-use decoupler_core::machine::ReadingBudget;
 use zip::{ZipArchive, result::ZipError};
 
 use super::{
@@ -13,6 +12,7 @@ use super::{
     numpy,
     progress::{Watched, table_error},
 };
+use crate::machine::ReadingBudget;
 
 /// Maximum length of a header in bytes.
 const LONGEST_HEADER: usize = 1 << 16;

@@ -9,7 +9,7 @@ use std::{
 };
 
 use calamine::{Cell, Data, DataRef, Ods, Range, Reader, Xls, Xlsx, XlsxError, open_workbook_from_rs};
-use decoupler_core::{machine::ReadingBudget, text::clean_name};
+use decoupler_core::text::clean_name;
 use zip::ZipArchive;
 
 use super::{
@@ -20,6 +20,7 @@ use super::{
     sheet_claims::{self, LARGEST, OF_CELL, Rectangle, outside},
     xls_claims,
 };
+use crate::machine::ReadingBudget;
 
 /// Kind of spreadsheet.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -4,7 +4,6 @@
 
 use std::io::{self, BufRead, BufReader, Read, Seek};
 
-use decoupler_core::machine::ReadingBudget;
 use quick_xml::{
     Reader,
     events::{BytesStart, Event},
@@ -12,6 +11,7 @@ use quick_xml::{
 use zip::ZipArchive;
 
 use super::{TableError, Watch, numpy::damage, progress::Watched};
+use crate::machine::ReadingBudget;
 
 /// Memory of a byte of XML: strings of one letter, in a vector that has just doubled.
 const OF_BYTE: u64 = 4;

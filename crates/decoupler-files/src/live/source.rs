@@ -8,10 +8,10 @@ use std::{
     time::Duration,
 };
 
-use crate::machine::{system_cause, system_words};
 use thiserror::Error;
 
 use super::lines::Keeping;
+use crate::machine::{system_cause, system_words};
 
 /// Source of frames.
 #[derive(Clone, Debug, PartialEq, Eq)]

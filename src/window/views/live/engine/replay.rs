@@ -6,11 +6,11 @@ use std::{
     time::{Duration, Instant},
 };
 
-use decoupler_core::{machine::ReadingBudget, scene::Rows, sensor::ArrayScale};
+use decoupler_core::{scene::Rows, sensor::ArrayScale};
 use decoupler_files::{
     import::{LineParser, ParsedLine},
     live::{Lines, Recording},
-    machine::system_cause,
+    machine::{ReadingBudget, system_cause},
 };
 use ndarray::Array3;
 
