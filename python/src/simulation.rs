@@ -5,6 +5,7 @@ use decoupler_core::{
     evaluation::{Preset, SimulatedSettings, Workload},
     scene::{Loading, Movement, Noise, NoisySets, Rows},
 };
+use decoupler_files::machine::memory_budget;
 use numpy::ToPyArray;
 use pyo3::{prelude::*, types::PyDict};
 
@@ -95,7 +96,7 @@ pub fn simulate<'py>(
     let settings = settings.extract::<Settings>()?.simulated(sensor)?;
     settings.check_counts().map_err(value_error)?;
     Workload::of(&settings)
-        .and_then(|workload| workload.check_memory())
+        .and_then(|workload| workload.check_memory(memory_budget()))
         .map_err(value_error)?;
     let sets = detached(py, || settings.draw_sets())?;
     let validation = sets.split.validation.as_ref();

@@ -12,6 +12,7 @@ use decoupler_core::{
     scene::RowModel,
     training::{EpochRecord, Method, StoppingRules},
 };
+use decoupler_files::machine::memory_budget;
 use numpy::{IntoPyArray, PyArray1};
 use pyo3::{exceptions::PyValueError, prelude::*, types::PyDict};
 
@@ -248,7 +249,7 @@ pub fn train(
     let calibration = calibrates.then(|| split.training.clone());
     let size = RecordedSize::of(&run_settings, &split.training);
     Workload::of_recording(&run_settings, size)
-        .check_memory()
+        .check_memory(memory_budget())
         .map_err(value_error)?;
     let mut run = detached(py, move || Run::on_split(run_settings, split))?;
     let mut interruption = step_to_the_end(py, &mut run, callback.as_ref());

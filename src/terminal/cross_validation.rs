@@ -16,13 +16,15 @@ use super::{
 use decoupler_core::{
     dataset::{Division, Folds, SplitBy, Stream},
     evaluation::{
-        Channel, CrossValidated, ErrorTable, Problem, Run, RunError, RunSettings, Scores, TestErrors,
+        Channel, CrossValidated, ErrorTable, Problem, RecordedSize, Run, RunError, RunSettings, Scores, TestErrors,
+        Workload,
         recorded::{Determination, NonlinearGain, SplitComparison, channel_remarks},
     },
 };
 use decoupler_files::{
     export::{describe_channels, describe_determinacy, error_table},
     import::{Dropped, Plan, Recording, Setup, SetupSets},
+    machine::memory_budget,
 };
 
 /// The object printed by `train --folds --json`.
@@ -68,6 +70,7 @@ impl Train {
         self.import.save_recipe(setup)?;
         let set = &recording.set;
         let by = plan.division.by;
+        Workload::of_recording(settings, RecordedSize::of(settings, set)).check_memory(memory_budget())?;
         let assigned = Folds::by(set, folds, by, &mut settings.seed.rng(Stream::Split));
         let assigned = assigned.map_err(|error| Failure::Arguments(error.to_string()))?;
         let validated = CrossValidated::on_folds(settings, set, assigned, || false)?.expect("nothing cancels it");

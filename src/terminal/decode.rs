@@ -16,8 +16,12 @@ use decoupler_core::{
     text::{counted, inert},
     training::StoppingRules,
 };
-use decoupler_files::export::{
-    AtomicFile, NetworkFile, WriteError, check_writable, format_number, is_same, write_decoded, write_decoded_header,
+use decoupler_files::{
+    export::{
+        AtomicFile, NetworkFile, WriteError, check_writable, format_number, is_same, write_decoded,
+        write_decoded_header,
+    },
+    machine::memory_budget,
 };
 use glam::DVec3;
 use ndarray::{Array2, ArrayView1, Axis, Slice};
@@ -497,7 +501,7 @@ impl FineTune {
         let mut training = settings.training;
         training.stopping.epochs = self.epochs.unwrap_or(training.stopping.epochs);
         let bar = progress_bar(self.json, 1, "fine-tuning {spinner}");
-        let tuned = fine_tune(&file.network, &split, training, &|| false);
+        let tuned = fine_tune(&file.network, &split, training, memory_budget(), &|| false);
         bar.finish_and_clear();
         let tuned = tuned?.expect("nothing cancels it");
         let stroke_mm = settings.source.stroke_mm();

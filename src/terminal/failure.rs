@@ -9,15 +9,16 @@ use decoupler_core::{
     calibration::CalibrationError,
     dataset::{SimulationError, SplitBy},
     evaluation::{RunError, experiments::ExperimentError},
-    live::{LineError, Source, SourceError},
     scene::Rows,
     sensor::SensorError,
-    text::{ReadError, counted, system_cause},
+    text::counted,
     training::SettingError,
 };
 use decoupler_files::{
     export::{DocumentError, SweepFolderError, WriteError, bundle::BundleError, figures::PictureError},
-    import::{Cure, ImportError, InputLineError, SetupError},
+    import::{Cure, ImportError, InputLineError, LineError, ReadError, SetupError},
+    live::{Source, SourceError},
+    machine::system_cause,
 };
 use thiserror::Error;
 

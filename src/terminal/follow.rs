@@ -15,15 +15,13 @@ use clap::Args;
 use decoupler_core::{
     dataset::{Place, SimulationError},
     evaluation::Simulation,
-    live::{
-        FaultEvent, FaultMonitor, Keeping, LeftOutDecoder, Line, LineError, LineParser, Lines, NextLine, ParsedLine,
-        Source,
-    },
+    live::{FaultEvent, FaultMonitor, LeftOutDecoder},
     scene::Noise,
 };
 use decoupler_files::{
     export::NetworkFile,
-    import::{InputLine, InputLineError, InputLines, KeptCell},
+    import::{InputLine, InputLineError, InputLines, KeptCell, LineError, LineParser, ParsedLine},
+    live::{Keeping, Line, Lines, NextLine, Source},
 };
 
 use super::{

@@ -7,12 +7,13 @@ use std::{
 use clap::ValueEnum;
 use decoupler_core::{
     decoupling::{CompiledNetworks, Decoder},
-    live::{Latencies, LeftOutDecoder, ParsedLine, Source},
+    live::LeftOutDecoder,
     text::counted,
 };
 use decoupler_files::{
     export::{NetworkFile, write_decoded},
-    import::KeptCell,
+    import::{KeptCell, ParsedLine},
+    live::{Latencies, Source},
 };
 use ndarray::ArrayView1;
 use serde_json::{Map, Value, json};

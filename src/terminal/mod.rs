@@ -38,7 +38,7 @@ use std::{error::Error, ffi::OsString, io::Write, ops::RangeInclusive, process::
 use calibrate::Calibrate;
 use clap::{Parser, Subcommand, error::ErrorKind};
 use decode::{Decode, FineTune};
-use decoupler_core::machine::MachineMemory;
+use decoupler_files::machine::limit_memory;
 use export::Export;
 use failure::Failure;
 use inspect::Inspect;
@@ -120,7 +120,7 @@ impl Arguments {
             interruption::install();
         }
         if let Some(gigabytes) = self.memory_limit {
-            MachineMemory::limit(gigabytes);
+            limit_memory(gigabytes);
         }
         match self.command {
             Some(Command::Train(train)) => train.run(),

@@ -11,11 +11,11 @@ use decoupler_core::{
     dataset::SimulationError,
     evaluation::Simulation,
     scene::RowModel,
-    text::{ReadError, Reading, ResistanceReader, is_unprintable, printable},
+    text::{is_unprintable, printable},
 };
 use decoupler_files::{
     export::NetworkFile,
-    import::{InputTable, KeptColumn, Recipe},
+    import::{InputTable, KeptColumn, ReadError, Reading, Recipe, ResistanceReader},
 };
 use indicatif::{ProgressBar, ProgressStyle};
 use ndarray::Array2;

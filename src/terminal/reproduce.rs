@@ -28,6 +28,7 @@ use decoupler_files::{
         format_duration, trials_table, write_experiment_markdown,
     },
     figure::experiment_figure,
+    machine::memory_budget,
 };
 use serde::Serialize;
 
@@ -133,7 +134,7 @@ impl Reproduce {
         let mut done = 0;
         run_experiments(
             &experiments,
-            &TrialSamples::Drawn,
+            &TrialSamples::Drawn(memory_budget()),
             worker_threads(false),
             || graceful.is_end_requested(),
             |finished| {

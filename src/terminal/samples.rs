@@ -21,6 +21,7 @@ use decoupler_files::{
         AtomicFile, WriteError, describe_recorded_workload, describe_workload, write_samples, write_samples_header,
     },
     import::{Progress, Setup, SetupError, SetupSets},
+    machine::memory_budget,
 };
 
 use super::{
@@ -99,7 +100,7 @@ pub(super) fn announce_recording(setup: &Setup, sets: &SetupSets) {
 /// # Errors
 /// If the machine has too little memory.
 pub(super) fn announce_workload(workload: &Workload) -> Result<(), RunError> {
-    workload.check_memory()?;
+    workload.check_memory(memory_budget())?;
     if workload.is_large() {
         // There is no one to report to if this fails.
         let _ = writeln!(messages(), "{}", describe_workload(workload));

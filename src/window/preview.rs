@@ -8,6 +8,7 @@ use decoupler_core::{
     evaluation::{Baselines, Run, SimulatedSettings},
     training::{GradientDescentSettings, Method, TrainingSettings},
 };
+use decoupler_files::machine::memory_budget;
 
 /// Message from the thread to the window.
 #[derive(Debug)]
@@ -58,5 +59,8 @@ fn baselines(settings: &SimulatedSettings, is_cancelled: &dyn Fn() -> bool) -> O
         training,
         ..*settings
     };
-    Run::prepare_unless(cheapest, is_cancelled).ok()??.baselines().cloned()
+    Run::prepare_unless(cheapest, memory_budget(), is_cancelled)
+        .ok()??
+        .baselines()
+        .cloned()
 }

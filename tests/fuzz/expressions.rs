@@ -6,7 +6,6 @@ use std::{fmt::Display, str::FromStr};
 use decoupler_core::{
     dataset::{Span, SplitBy},
     evaluation::{Combination, Initialization},
-    live::Source,
     scene::Fault,
 };
 use decoupler_files::{
@@ -15,6 +14,7 @@ use decoupler_files::{
         bundle::{BundleDecoder, BundleFormat, BundlePrecision},
     },
     import::{Condition, Decimal, Derived, Encoding, Missing, Separator},
+    live::Source,
 };
 
 use crate::{

@@ -1,6 +1,6 @@
 //! Recordings of frames that the Live view replays.
 
-use decoupler_core::live::{Recorder, Recording};
+use decoupler_files::live::{Recorder, Recording};
 
 use crate::{
     corpus::replay,

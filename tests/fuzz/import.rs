@@ -1,8 +1,9 @@
 use std::{collections::BTreeSet, fmt::Write, fs, ops::ControlFlow, path::Path};
 
-use decoupler_core::{evaluation::TargetPosition, machine::MachineMemory};
-use decoupler_files::import::{
-    Cells, DialectChoice, Inspection, Recipe, Separator, Table, holds_positions, read_table, suggested_plan,
+use decoupler_core::evaluation::TargetPosition;
+use decoupler_files::{
+    import::{Cells, DialectChoice, Inspection, Recipe, Separator, Table, holds_positions, read_table, suggested_plan},
+    machine::limit_memory,
 };
 
 use crate::{
@@ -16,7 +17,7 @@ const MEMORY_GB: f64 = 0.25;
 /// Reads `bytes` as a file with the extension of `path`, checks its columns, and makes samples of the first two, and of those
 /// of the suggested plan.
 pub(crate) fn check(bytes: &[u8], path: &Path) {
-    MachineMemory::limit(MEMORY_GB);
+    limit_memory(MEMORY_GB);
     fs::write(path, bytes).unwrap();
     let mut watch = |_| ControlFlow::Continue(());
     let table = match read_table(path, DialectChoice::default(), &mut watch) {

@@ -6,9 +6,11 @@ use std::{fs, ops::ControlFlow, path::Path};
 use decoupler_core::{
     dataset::{Memory, MemoryStream, Span},
     evaluation::{Channel, Problem},
-    machine::MachineMemory,
 };
-use decoupler_files::import::{DialectChoice, Encoding, InputLine, InputLines, Recipe, Separator};
+use decoupler_files::{
+    import::{DialectChoice, Encoding, InputLine, InputLines, Recipe, Separator},
+    machine::limit_memory,
+};
 
 use crate::{
     corpus::replay,
@@ -46,7 +48,7 @@ const ROW_WIRES: [usize; 2] = [0, 2];
 
 /// Reads the lines, and then the file; returns the number of readings.
 fn check(bytes: &[u8], recipe: &Recipe, problem: &Problem, has_rows: bool, path: &Path) -> usize {
-    MachineMemory::limit(0.25);
+    limit_memory(0.25);
     let networks = if has_rows { ROW_WIRES.len() } else { 1 };
     let memory = problem.memory.as_ref();
     let memory = memory.map(|memory| MemoryStream::new(memory, problem.inputs.len()).unwrap());

@@ -5,9 +5,10 @@ use std::{
     time::Duration,
 };
 
-use decoupler_core::{
-    live::{Keeping, LineParser, Lines, NextLine, ParsedLine},
-    scene::Rows,
+use decoupler_core::scene::Rows;
+use decoupler_files::{
+    import::{LineParser, ParsedLine},
+    live::{Keeping, Lines, NextLine},
 };
 use rand::{Rng, RngExt, SeedableRng, rngs::ChaCha8Rng};
 

@@ -1,4 +1,4 @@
-use decoupler_core::text::ResistanceReader;
+use decoupler_files::import::ResistanceReader;
 use rand::RngExt;
 
 use crate::{

@@ -1,7 +1,10 @@
 use std::{fs, ops::ControlFlow, path::Path};
 
-use decoupler_core::{dataset::Seed, machine::MachineMemory};
-use decoupler_files::export::{RecipeFile, RecipeSource};
+use decoupler_core::dataset::Seed;
+use decoupler_files::{
+    export::{RecipeFile, RecipeSource},
+    machine::limit_memory,
+};
 
 use crate::{
     corpus::replay,
@@ -34,7 +37,7 @@ fn folder_with_recordings() -> tempfile::TempDir {
 /// Returns true if the recipe is accepted and gives samples. It is unchanged after saving and loading, and its samples are
 /// finite.
 fn check(path: &Path, bytes: &[u8]) -> bool {
-    MachineMemory::limit(0.25);
+    limit_memory(0.25);
     fs::write(path, bytes).unwrap();
     let source = match RecipeFile::load(path) {
         Ok(source) => source,

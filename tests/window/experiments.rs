@@ -3,9 +3,12 @@
 use std::{fs, num::NonZero};
 
 use decoupler::window::Phase;
-use decoupler_core::evaluation::{
-    RunSettings,
-    experiments::{Axis, Experiment, ExperimentResults, PaperTable, TrialSamples, run_experiments, verdicts},
+use decoupler_core::{
+    evaluation::{
+        RunSettings,
+        experiments::{Axis, Experiment, ExperimentResults, PaperTable, TrialSamples, run_experiments, verdicts},
+    },
+    machine::MemoryBudget,
 };
 use decoupler_files::export::ExperimentTable;
 
@@ -54,7 +57,7 @@ fn by_library(experiment: &Experiment) -> ExperimentResults {
     };
     run_experiments(
         std::slice::from_ref(experiment),
-        &TrialSamples::Drawn,
+        &TrialSamples::Drawn(MemoryBudget::UNLIMITED),
         NonZero::<usize>::MIN,
         || false,
         record,

@@ -13,10 +13,13 @@ use decoupler::window::Phase;
 use decoupler_core::{
     dataset::Seed,
     decoupling::{CompiledNetworks, Decoder},
-    live::{Recording, Simulated, ZeroGains},
+    live::ZeroGains,
     scene::{Noise, Scene},
 };
-use decoupler_files::export::NetworkFile;
+use decoupler_files::{
+    export::NetworkFile,
+    live::{Recording, Simulated},
+};
 use eframe::egui::{Key, Modifiers, accesskit::Role, vec2};
 use egui_kittest::kittest::{By, Queryable as _};
 use glam::DVec3;

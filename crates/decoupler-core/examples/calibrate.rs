@@ -8,6 +8,7 @@ use decoupler_core::{
     calibration::{Calibration, ParameterStatus, SensorParameter},
     dataset::{Dataset, Division, Seed, Stream},
     evaluation::{Errors, Preset, Run, SimulatedSettings, fine_tune, pressed_rows, rebased},
+    machine::MemoryBudget,
     network::Networks,
     scene::{Loading, Noise},
     sensor::SensorModel,
@@ -50,9 +51,13 @@ fn main() -> Result<(), Box<dyn Error>> {
         ..Division::default()
     };
     let parts = division.divide_for_training(&frames, &mut Seed(0).rng(Stream::Split))?;
-    let tuned = fine_tune(&calibrated, &parts.split(&moved(&frames)?), settings.training, &|| {
-        false
-    })?;
+    let tuned = fine_tune(
+        &calibrated,
+        &parts.split(&moved(&frames)?),
+        settings.training,
+        MemoryBudget::UNLIMITED,
+        &|| false,
+    )?;
     let (stroke_mm, after) = (settings.source.stroke_mm(), moved(&test)?);
     let z_mm = |set: &Dataset, networks: &Networks| Errors::measure(set, &networks.decouple(set), stroke_mm).z_mm;
     println!("Z error, nominal geometry:  {:.4} mm", z_mm(&test, &before));

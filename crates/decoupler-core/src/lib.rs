@@ -7,22 +7,23 @@
 //! | module | contents |
 //! |---|---|
 //! | `numerics` | quantiles of distributions and of samples |
-//! | [`text`] | numbers, names and CSV as text |
+//! | [`text`] | numbers, counts and names as text |
 //! | [`sensor`] | array scale, geometry, the resistance model and its Jacobian |
 //! | [`calibration`] | geometry and resistivity fitted to the readings of known deformations |
 //! | [`identifiability`] | deformation patterns that the readings determine, and how well |
-//! | [`machine`] | memory and speed of the machine |
+//! | [`machine`] | budget of memory, speed of the machine |
 //! | [`scene`] | what happens to the sensor: rows, movement, loading, noise |
 //! | [`dataset`] | samples with their row-wire and snapshot, simulated or recorded; frames, folds, splits |
 //! | [`network`] | the three-layer network, its initialisation and scaling |
 //! | [`training`] | methods, the stepped [`training::Trainer`], stop reasons |
 //! | [`decoupling`] | readings to deformation by every decoder, behind one trait |
-//! | [`evaluation`] | errors, a whole run from settings to report, cross-validation, experiments |
 //! | [`surface`] | smooth surfaces through the nodes |
-//! | [`live`] | frames as they arrive: sources, re-zero, recorder, faults named from the residual |
+//! | [`evaluation`] | errors, a whole run from settings to report, cross-validation, experiments |
+//! | [`live`] | arithmetic on frames as they arrive: re-zero, drift, faults named from the residual |
 //!
-//! The crate reads and writes no files and opens no window: `decoupler-files` has recordings, figures and exports, and the
-//! program `decoupler` the window and the commands.
+//! The crate has numbers only: no files, ports, sockets or environment variables, and no window. `decoupler-files` has live
+//! sources, recordings, figures and exports, and the program `decoupler` the window and the commands. How much memory a run
+//! may use is passed in as a [`machine::MemoryBudget`].
 //!
 //! # Glossary
 //!

@@ -1,24 +1,16 @@
-//! The machine that the program runs on: its memory and speed, from which the memory and time of a run are estimated
-//! before it starts.
+//! Memory and speed of the machine. A program passes the memory in as a [`MemoryBudget`]; the speed is measured, to estimate the
+//! time of a run before it starts.
 
-mod budget;
-
-use std::{env, fmt, fs, hint::black_box, sync::OnceLock, time::Instant};
-
-pub use budget::{OverBudget, ReadingBudget};
+use std::{fmt, hint::black_box, sync::OnceLock, time::Instant};
 
 use faer::{Accum, Mat, Par, linalg::matmul::matmul};
 use glam::DVec3;
 
 use crate::sensor::{ArrayScale, SensorModel};
 
-/// Memory available to trainings: that of the machine, or the limit of its container, or the limit given by the user.
-/// [`Self::ASSUMED_BYTES`] if none is known.
-///
-/// Only Linux reports its memory in a file. Other systems would need `unsafe` calls, or a crate of thousands of lines
-/// for one number; use the variable there, or to use less than the memory of the machine.
+/// Memory that trainings may use, with its source for messages.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct MachineMemory {
+pub struct MemoryBudget {
     /// Size in bytes.
     pub bytes: u64,
     /// Source of the size.
@@ -30,61 +22,25 @@ pub struct MachineMemory {
 pub enum MemorySource {
     /// The system.
     System,
-    /// The user, by [`MachineMemory::limit`] or [`MachineMemory::VARIABLE`].
+    /// The user, by the option `--memory-limit` or [`MemoryBudget::VARIABLE`].
     User,
     /// Assumed, since neither is known.
     Assumed,
 }
 
-static MEMORY: OnceLock<MachineMemory> = OnceLock::new();
-
-impl MachineMemory {
+impl MemoryBudget {
     /// Memory that is assumed if the system does not report it: that of an ordinary machine.
     pub const ASSUMED_BYTES: u64 = 8_000_000_000;
+    /// No limit, for work that is known to be small.
+    pub const UNLIMITED: Self = Self {
+        bytes: u64::MAX,
+        source: MemorySource::Assumed,
+    };
     /// Environment variable with the memory that the program may use, in GB (10⁹ bytes).
     pub const VARIABLE: &str = "DECOUPLER_MEMORY_GB";
-
-    /// Limits the memory that the program may use, instead of [`Self::VARIABLE`]. Without effect after the first call of
-    /// [`Self::of_this_machine`].
-    pub fn limit(gigabytes: f64) {
-        MEMORY.get_or_init(|| Self::from_texts(Some(&gigabytes.to_string()), None, None));
-    }
-
-    /// Returns the memory of this machine, which is read on the first call.
-    pub fn of_this_machine() -> Self {
-        *MEMORY.get_or_init(|| {
-            let given = env::var(Self::VARIABLE).ok();
-            let meminfo = fs::read_to_string("/proc/meminfo").ok();
-            let limit = fs::read_to_string("/sys/fs/cgroup/memory.max").ok();
-            Self::from_texts(given.as_deref(), meminfo.as_deref(), limit.as_deref())
-        })
-    }
-
-    /// Evaluates the texts of the variable, of `/proc/meminfo` and of the container's limit. A variable that is not a
-    /// number above 0 is ignored; the error message of a run that needs too much memory names the variable again.
-    fn from_texts(given: Option<&str>, meminfo: Option<&str>, limit: Option<&str>) -> Self {
-        let gigabytes = given.and_then(|text| text.trim().parse().ok());
-        if let Some(gigabytes) = gigabytes.filter(|gigabytes: &f64| *gigabytes > 0.0) {
-            return Self {
-                // Saturates, also at infinity.
-                bytes: (gigabytes * 1e9) as u64,
-                source: MemorySource::User,
-            };
-        }
-        let limit = limit.and_then(|text| text.trim().parse().ok());
-        let least = [meminfo.and_then(total_bytes), limit].into_iter().flatten().min();
-        let of_system = least.map(|bytes| Self {
-            bytes,
-            source: MemorySource::System,
-        });
-        of_system.unwrap_or(Self {
-            bytes: Self::ASSUMED_BYTES,
-            source: MemorySource::Assumed,
-        })
-    }
 }
 
-impl fmt::Display for MachineMemory {
+impl fmt::Display for MemoryBudget {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let (gigabytes, variable) = (self.bytes as f64 * 1e-9, Self::VARIABLE);
         match self.source {
@@ -97,12 +53,6 @@ impl fmt::Display for MachineMemory {
             ),
         }
     }
-}
-
-fn total_bytes(meminfo: &str) -> Option<u64> {
-    let total = meminfo.lines().find_map(|line| line.strip_prefix("MemTotal:"))?;
-    let kibibytes: u64 = total.trim().strip_suffix("kB")?.trim().parse().ok()?;
-    Some(kibibytes * 1024)
 }
 
 /// Work per second on one thread.
@@ -165,50 +115,4 @@ fn node_pairs_per_second() -> f64 {
 pub(crate) fn node_pairs_per_row(sensor: &SensorModel) -> f64 {
     let scale = sensor.scale;
     scale.nodes_per_row() as f64 * scale.nodes_per_column() as f64 * scale.columns() as f64
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    const MEMINFO: &str = "MemTotal:       24683956 kB\nMemFree:        24097000 kB\n";
-
-    #[test]
-    fn the_memory_is_the_smaller_of_machine_and_container() {
-        let memory = |meminfo, limit| MachineMemory::from_texts(None, meminfo, limit);
-        let known = |bytes| MachineMemory {
-            bytes,
-            source: MemorySource::System,
-        };
-        assert_eq!(memory(Some(MEMINFO), None), known(24_683_956 * 1024));
-        assert_eq!(memory(Some(MEMINFO), Some("max\n")), known(24_683_956 * 1024));
-        assert_eq!(memory(Some(MEMINFO), Some("1000000\n")), known(1_000_000));
-        assert_eq!(memory(Some(MEMINFO), None).to_string(), "the machine has 25.3 GB");
-    }
-
-    #[test]
-    fn without_a_reported_size_the_message_names_the_assumption_and_the_variable() {
-        let memory = MachineMemory::from_texts(None, Some("MemFree: 5 kB\n"), None);
-        let assumed = (MachineMemory::ASSUMED_BYTES, MemorySource::Assumed);
-        assert_eq!((memory.bytes, memory.source), assumed);
-        let text = memory.to_string();
-        assert!(
-            text.contains("8.0 GB are assumed") && text.contains("DECOUPLER_MEMORY_GB"),
-            "{text}"
-        );
-    }
-
-    #[test]
-    fn the_variable_overrides_the_memory() {
-        let memory = |given| MachineMemory::from_texts(Some(given), Some(MEMINFO), Some("1000000"));
-        assert_eq!(memory("64").bytes, 64_000_000_000);
-        assert_eq!(
-            memory(" 0.5\n").to_string(),
-            "--memory-limit or DECOUPLER_MEMORY_GB allows 0.5 GB"
-        );
-        assert_eq!(memory("inf").bytes, u64::MAX);
-        for refused in ["", "much", "0", "-3", "NaN"] {
-            assert_eq!(memory(refused).bytes, 1_000_000, "{refused}");
-        }
-    }
 }

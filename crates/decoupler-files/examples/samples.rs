@@ -7,10 +7,12 @@ use std::{error::Error, fmt::Write as _, fs, path::PathBuf};
 use decoupler_core::{
     dataset::Seed,
     evaluation::{Run, Simulation, ready_settings},
-    live::{Recorder, Simulated},
     scene::Noise,
 };
-use decoupler_files::export::NetworkFile;
+use decoupler_files::{
+    export::NetworkFile,
+    live::{Recorder, Simulated},
+};
 
 /// Enough for smooth motion, and keeps the file small.
 const FRAMES_PER_SECOND: f64 = 15.0;

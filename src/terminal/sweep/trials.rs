@@ -18,6 +18,7 @@ use decoupler_files::{
         decoders_in_order, recording_options, report::quoted, train_options,
     },
     import::{FileChecksum, ImportError, Plan, Setup, SetupSets, file_crc32, stored},
+    machine::memory_budget,
 };
 use serde_json::Value;
 
@@ -182,7 +183,7 @@ pub(super) fn train(
     if let Some(settings) = trial.setup.simulated() {
         let mut workload = Workload::of(&settings)?;
         workload.bytes = workload.bytes.saturating_mul(parallel as u64);
-        workload.check_memory()?;
+        workload.check_memory(memory_budget())?;
     }
     let (mut run, sets, before) = match resumed(trial, claim) {
         Some(resumed) => resumed,

@@ -4,14 +4,12 @@ use std::{
     time::Duration,
 };
 
-use decoupler_core::{
-    evaluation::{RunSettings, SimulatedSettings, Workload},
-    text::system_cause,
-};
+use decoupler_core::evaluation::{RunSettings, SimulatedSettings, Workload};
 use decoupler_files::{
     export::{WriteError, atomic_write},
     figure::SequentialMap,
     import::Plan,
+    machine::{memory_budget, system_cause},
 };
 use serde::{Deserialize, Deserializer, Serialize, de::DeserializeOwned};
 
@@ -156,7 +154,7 @@ pub(super) fn is_within_limits(settings: &SimulatedSettings) -> bool {
         && settings.training.check().is_ok()
         && settings.source.sensor.check().is_ok()
         && settings.source.scene.check().is_ok()
-        && Workload::of(settings).is_ok_and(|workload| workload.check_memory().is_ok())
+        && Workload::of(settings).is_ok_and(|workload| workload.check_memory(memory_budget()).is_ok())
 }
 
 /// Longest time that closing waits for the file.

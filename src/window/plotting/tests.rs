@@ -16,6 +16,7 @@ use decoupler_core::{
         measure_trade_off,
     },
     identifiability::Identifiability,
+    machine::MemoryBudget,
     sensor::Axes,
     training::EpochRecord,
 };
@@ -134,7 +135,7 @@ fn results(mut experiment: Experiment) -> ExperimentResults {
         |finished: decoupler_core::evaluation::experiments::Finished| results.record(finished.cell, finished.outcome);
     run_experiments(
         std::slice::from_ref(&experiment),
-        &TrialSamples::Drawn,
+        &TrialSamples::Drawn(MemoryBudget::UNLIMITED),
         threads,
         || false,
         record,

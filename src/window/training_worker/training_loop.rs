@@ -29,7 +29,6 @@ use decoupler_core::{
         network_frame_time,
         recorded::Determination,
     },
-    text::system_cause,
     training::TrainingSettings,
 };
 use decoupler_files::{
@@ -38,6 +37,7 @@ use decoupler_files::{
         describe_worse_than_ridge,
     },
     import::{ChoosingProgress, Plan, Progress, Setup, SetupSets},
+    machine::system_cause,
 };
 
 /// Minimum time between two progress reports. Each makes the window draw a frame; the time in between keeps the window

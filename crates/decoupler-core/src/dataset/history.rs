@@ -260,7 +260,7 @@ impl MemoryStream {
     /// Returns the stream with room for the states of `series` series at a time.
     ///
     /// # Errors
-    /// If they do not fit into memory.
+    /// If they are too large.
     fn with_room_for(self, series: usize) -> Result<Self, MemoryError> {
         self.start.check_states(series)?;
         Ok(Self {

@@ -11,26 +11,29 @@ use super::{
 use crate::{
     dataset::{Dataset, PerRow, Split, Stream},
     decoupling::decode_set,
+    machine::MemoryBudget,
     network::{Inputs, MinMax, Mlp, Shape, nguyen_widrow},
     scene::{NoiseSource, NoisySets, RowModel},
     training::{Examples, Problem, ResumeError, Trainer, TrainerState, check_width},
 };
 
 impl Run {
-    /// Draws and scales the sets, initialises the networks and measures the baselines.
+    /// Draws and scales the sets, initialises the networks and measures the baselines, without a limit of memory.
     ///
     /// # Errors
     /// If the settings are invalid.
     pub fn prepare(settings: SimulatedSettings) -> Result<Self, RunError> {
-        whole(Self::prepare_unless(settings, &|| false))
+        whole(Self::prepare_unless(settings, MemoryBudget::UNLIMITED, &|| false))
     }
 
-    /// As [`Self::prepare`]; returns `None` once `is_cancelled`, which is called between the parts of the work.
+    /// As [`Self::prepare`], if the run fits into `memory`; returns `None` once `is_cancelled`, which is called between the
+    /// parts of the work.
     pub fn prepare_unless(
         settings: SimulatedSettings,
+        memory: MemoryBudget,
         is_cancelled: &dyn Fn() -> bool,
     ) -> Result<Option<Self>, RunError> {
-        match settings.checked_sets_unless(is_cancelled)? {
+        match settings.checked_sets_unless(memory, is_cancelled)? {
             Some(sets) => Self::on_unless(settings.into(), sets, is_cancelled),
             None => Ok(None),
         }
@@ -166,7 +169,12 @@ impl Run {
     /// As [`Self::with_baselines`], without baselines and reference, for settings and sets that were checked.
     fn of_networks(
         settings: RunSettings,
-        RunSets { split, test, problem }: RunSets,
+        RunSets {
+            split,
+            test,
+            problem,
+            memory,
+        }: RunSets,
         is_cancelled: &dyn Fn() -> bool,
         begin: impl FnOnce(&[Task]) -> Result<Vec<StartTrainer>, RunError>,
     ) -> Result<Option<Self>, RunError> {
@@ -176,7 +184,7 @@ impl Run {
         let first = tasks.at(0);
         let samples = first.problem.training.samples();
         let trainings = settings.starts * tasks.values().len();
-        check_width(&settings.training.method, first.shape, samples, trainings)?;
+        check_width(&settings.training.method, first.shape, samples, trainings, memory)?;
         if is_cancelled() {
             return Ok(None);
         }
@@ -188,6 +196,7 @@ impl Run {
             settings,
             test,
             problem,
+            memory,
             scalings: tasks.map(|task| task.scaling.clone()),
             starts,
             baselines: None,
@@ -416,7 +425,9 @@ mod tests {
         (settings.hidden, settings.source.samples, settings.source.test_samples) = (3, 40, 8);
         let whole = Run::prepare(settings).unwrap();
         let (states, answers_mm) = (whole.states(), whole.decouple_test());
-        let begun = |is_cancelled: &dyn Fn() -> bool| Run::prepare_unless(settings, is_cancelled).unwrap();
+        let begun = |is_cancelled: &dyn Fn() -> bool| {
+            Run::prepare_unless(settings, MemoryBudget::UNLIMITED, is_cancelled).unwrap()
+        };
         let resumed = |is_cancelled: &dyn Fn() -> bool| {
             let sets = settings.sets_unless(is_cancelled).unwrap()?;
             Run::resume_unless(settings.into(), states.clone(), sets, is_cancelled).unwrap()

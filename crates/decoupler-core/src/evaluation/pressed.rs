@@ -11,11 +11,11 @@ use crate::{
     calibration::{PressLimits, PressedRow},
     dataset::{Dataset, PerRow, Split},
     decoupling::{DecodeError, Decoder},
-    machine::node_pairs_per_row,
+    machine::{MemoryBudget, node_pairs_per_row},
     network::{DecouplingNetwork, Networks},
     scene::Touch,
     sensor::{SensorError, SensorModel},
-    training::{Examples, Problem, Trainer, TrainingSettings},
+    training::{Examples, Problem, Trainer, TrainingSettings, check_width},
 };
 
 /// Sensor deformed by a [`Touch`]: positions of its nodes and readings of its wires, without noise.
@@ -239,11 +239,13 @@ pub fn press_limits(simulation: &Simulation) -> PressLimits {
 /// are returned, possibly the initial ones: with a validation set, fine-tuning cannot increase the validation error.
 ///
 /// # Errors
-/// If the samples do not have the channels, targets or rows of the networks, or a setting is out of range.
+/// If the samples do not have the channels, targets or rows of the networks, a setting is out of range, or the
+/// networks are too wide for `memory`.
 pub fn fine_tune(
     networks: &Networks,
     split: &Split,
     training: TrainingSettings,
+    memory: MemoryBudget,
     is_cancelled: &dyn Fn() -> bool,
 ) -> Result<Option<Networks>, RunError> {
     check_networks(networks, split)?;
@@ -263,6 +265,8 @@ pub fn fine_tune(
             validation: split.validation.as_ref().map(examples),
             test: None,
         };
+        let (shape, samples) = (network.mlp().shape(), problem.training.samples());
+        check_width(&training.method, shape, samples, 1, memory)?;
         let mut trainer = Trainer::new(network.mlp().clone(), problem, training)?;
         while trainer.step().is_none() {
             if is_cancelled() {

@@ -15,7 +15,7 @@ use super::{
 use crate::{
     dataset::{Dataset, DivisionError, FoldsError, PerRow, SimulationError, SplitBy},
     decoupling::{DecodeError, FitError},
-    machine::MachineMemory,
+    machine::MemoryBudget,
     network::{DecouplingNetwork, Inputs, MinMax, Mlp, Networks, ScalingError},
     scene::SceneError,
     sensor::SensorError,
@@ -35,6 +35,8 @@ pub struct Run {
     pub(super) settings: RunSettings,
     pub(super) test: Arc<Dataset>,
     pub(super) problem: Arc<Problem>,
+    /// Memory that the trainings may use.
+    pub(super) memory: MemoryBudget,
     pub(super) scalings: PerRow<(Inputs, MinMax)>,
     pub(super) starts: Vec<StartTrainer>,
     /// See [`Self::wall_time`].
@@ -115,7 +117,7 @@ impl Run {
         let rows = self.leader().rows();
         let trainings = rows.len() * self.starts.len();
         let samples = rows[0].samples();
-        check_width(&method, rows[0].present().shape(), samples, trainings)?;
+        check_width(&method, rows[0].present().shape(), samples, trainings, self.memory)?;
         // Starts have the same shapes, so either the first is rejected or none.
         for start in &mut self.starts {
             start.continue_with(method)?;
@@ -392,7 +394,7 @@ pub enum RunError {
     /// A training cannot begin.
     #[error(transparent)]
     Training(#[from] TrainingError),
-    /// The run would take more memory than the machine has.
+    /// The run would take more memory than it may use.
     #[error(
         "this would take about {:.1} GB of memory, and {memory}: use fewer samples, hidden nodes or starts, or the scaled \
          conjugate gradient (scg)",
@@ -401,8 +403,8 @@ pub enum RunError {
     Memory {
         /// Memory needed, in bytes.
         bytes: u64,
-        /// Memory of the machine.
-        memory: MachineMemory,
+        /// Memory that it may use.
+        memory: MemoryBudget,
     },
     /// A saved training cannot be resumed.
     #[error("start {}: {source}", .start + 1)]

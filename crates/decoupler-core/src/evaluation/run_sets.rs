@@ -3,6 +3,7 @@ use std::sync::Arc;
 use super::{Problem, RunError, RunSettings, SimulatedSettings, Simulation, Source, Workload};
 use crate::{
     dataset::{Dataset, LARGEST_SAMPLES, Split, Stream, hold_out},
+    machine::MemoryBudget,
     network::Networks,
     scene::RowModel,
     training::TrainingError,
@@ -17,16 +18,25 @@ pub struct RunSets {
     pub test: Arc<Dataset>,
     /// Description of the readings and targets.
     pub problem: Arc<Problem>,
+    /// Memory that trainings on these sets may use.
+    pub memory: MemoryBudget,
 }
 
 impl RunSets {
-    /// Returns the sets of a run whose samples are all in memory.
+    /// Returns the sets of a run whose samples are all in memory, without a limit of memory for its trainings.
     pub fn new(split: Split, test: Dataset) -> Self {
         Self {
             problem: Arc::new(Problem::unnamed(test.channels(), test.outputs())),
             split,
             test: Arc::new(test),
+            memory: MemoryBudget::UNLIMITED,
         }
+    }
+
+    /// Returns the sets with this limit of memory for trainings on them.
+    #[must_use]
+    pub fn limited_to(self, memory: MemoryBudget) -> Self {
+        Self { memory, ..self }
     }
 
     /// Returns the sets with this description of their channels.
@@ -40,22 +50,26 @@ impl RunSets {
 }
 
 impl SimulatedSettings {
-    /// Draws the sets of these settings, if they fit into memory.
+    /// Draws the sets of these settings, without a limit of memory.
     ///
     /// # Errors
-    /// If the settings are invalid, or the samples do not fit into memory.
+    /// If the settings are invalid.
     pub fn draw_sets(&self) -> Result<RunSets, RunError> {
-        Ok(self.checked_sets_unless(&|| false)?.expect("nothing cancels it"))
+        Ok(self.sets_unless(&|| false)?.expect("nothing cancels it"))
     }
 
-    /// Draws the sets of these settings, after a check that they fit into memory; returns `None` once `is_cancelled`,
-    /// which is called between the parts of the work.
+    /// Draws the sets of these settings, after a check that samples and trainings fit into `memory`; returns `None` once
+    /// `is_cancelled`, which is called between the parts of the work.
     ///
     /// # Errors
-    /// If the settings are invalid, or the samples do not fit into memory.
-    pub fn checked_sets_unless(&self, is_cancelled: &dyn Fn() -> bool) -> Result<Option<RunSets>, RunError> {
-        Workload::of(self)?.check_memory()?;
-        self.sets_unless(is_cancelled)
+    /// If the settings are invalid, or the run does not fit into memory.
+    pub fn checked_sets_unless(
+        &self,
+        memory: MemoryBudget,
+        is_cancelled: &dyn Fn() -> bool,
+    ) -> Result<Option<RunSets>, RunError> {
+        Workload::of(self)?.check_memory(memory)?;
+        Ok(self.sets_unless(is_cancelled)?.map(|sets| sets.limited_to(memory)))
     }
 
     /// Draws the sets of these settings; returns `None` once `is_cancelled`, which is called between the parts of the

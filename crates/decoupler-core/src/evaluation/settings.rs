@@ -7,7 +7,7 @@ use super::{Measured, PublishedErrors, RunError, Simulation, Source};
 use crate::{
     dataset::{Dataset, LARGEST_SAMPLES, Seed},
     decoupling::{DecoderKind, Posterior},
-    machine::{MachineMemory, Speed, node_pairs_per_row},
+    machine::{MemoryBudget, Speed, node_pairs_per_row},
     network::{InputChoice, LARGEST_HIDDEN, ScalingChoice, Shape},
     scene::{Movement, RowModel, Rows, Scene},
     training::{Method, ScaledConjugateGradientSettings, StoppingRules, TrainingSettings},
@@ -500,12 +500,11 @@ impl Workload {
         }
     }
 
-    /// Checks that the machine has enough memory.
+    /// Checks that the work fits into `memory`.
     ///
     /// # Errors
     /// [`RunError::Memory`] if it does not.
-    pub fn check_memory(&self) -> Result<(), RunError> {
-        let memory = MachineMemory::of_this_machine();
+    pub fn check_memory(&self, memory: MemoryBudget) -> Result<(), RunError> {
         if self.bytes > memory.bytes {
             return Err(RunError::Memory {
                 bytes: self.bytes,
@@ -540,7 +539,7 @@ fn float_bytes(rows: usize, columns: usize) -> u64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::training::Method;
+    use crate::{machine::MemorySource, training::Method};
 
     fn settings(array: &str, method: &str, hidden: usize) -> SimulatedSettings {
         let mut settings = SimulatedSettings {
@@ -605,11 +604,16 @@ mod tests {
         settings.starts = 100;
         let workload = Workload::of(&settings).unwrap();
         assert!(workload.bytes > 500_000_000_000, "{workload:?}");
-        let memory = MachineMemory::of_this_machine();
-        if memory.bytes < workload.bytes {
-            let message = workload.check_memory().unwrap_err().to_string();
-            assert!(message.contains(&format!("GB of memory, and {memory}")), "{message}");
-        }
+        let memory = MemoryBudget {
+            bytes: 500_000_000_000,
+            source: MemorySource::System,
+        };
+        let message = workload.check_memory(memory).unwrap_err().to_string();
+        assert!(
+            message.contains("GB of memory, and the machine has 500.0 GB"),
+            "{message}"
+        );
+        assert!(workload.check_memory(MemoryBudget::UNLIMITED).is_ok());
     }
 
     #[test]

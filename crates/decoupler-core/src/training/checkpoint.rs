@@ -7,9 +7,7 @@ use thiserror::Error;
 
 use super::{
     EpochRecord, History, Method, MethodState, Problem, SettingError, Stage, StopReason, StoppingRules, Trainer,
-    TrainingError, TrainingSettings,
-    activations::Activations,
-    trainer::{Best, check_width},
+    TrainingError, TrainingSettings, activations::Activations, trainer::Best,
 };
 use crate::network::{Mlp, Shape};
 
@@ -196,7 +194,7 @@ impl Trainer {
     /// restarts from 0, but the best validation error so far remains the one to beat.
     ///
     /// # Errors
-    /// If a setting is out of range, or the network is too wide for the method; nothing is then changed.
+    /// If a setting is out of range; nothing is then changed.
     pub fn continue_with(&mut self, method: Method) -> Result<(), TrainingError> {
         self.check_method(&method)?;
         let begun = Instant::now();
@@ -218,7 +216,7 @@ impl Trainer {
     /// As [`Self::continue_with`].
     pub fn check_method(&self, method: &Method) -> Result<(), TrainingError> {
         method.check()?;
-        check_width(method, self.mlp.shape(), self.problem.training.samples(), 1)
+        Ok(())
     }
 
     /// Replaces the stopping rules. The training continues if the new rules do not end it at its current epoch, for

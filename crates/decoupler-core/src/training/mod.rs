@@ -33,5 +33,4 @@ use normal_equations::{FactoredEquations, NormalEquations};
 pub use scaled_conjugate_gradient::ScaledConjugateGradientSettings;
 pub use setting::{Setting, SettingError, StopReason, StoppingRules, TrainingDefect};
 use trainer::Evaluation;
-pub(crate) use trainer::check_width;
-pub use trainer::{EpochRecord, Problem, Stage, Trainer, TrainingError, TrainingSettings};
+pub use trainer::{EpochRecord, Problem, Stage, Trainer, TrainingError, TrainingSettings, check_width};

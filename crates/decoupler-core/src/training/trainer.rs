@@ -11,7 +11,7 @@ use super::{
     method::Running,
 };
 use crate::{
-    machine::MachineMemory,
+    machine::MemoryBudget,
     network::{Mlp, Shape},
 };
 
@@ -74,7 +74,7 @@ pub enum TrainingError {
         /// Memory that they would take, in bytes.
         bytes: u64,
         /// Memory of the machine.
-        memory: MachineMemory,
+        memory: MemoryBudget,
     },
 }
 
@@ -86,14 +86,17 @@ fn counted(count: usize) -> String {
     }
 }
 
-/// Checks that the equations of the method fit into memory, with this many simultaneous trainings of this shape.
-pub(crate) fn check_width(
+/// Checks that the equations of the method fit into `memory`, with this many simultaneous trainings of this shape.
+///
+/// # Errors
+/// [`TrainingError::TooWide`] if they do not.
+pub fn check_width(
     method: &Method,
     shape: Shape,
     samples: usize,
     trainings: usize,
+    memory: MemoryBudget,
 ) -> Result<(), TrainingError> {
-    let memory = MachineMemory::of_this_machine();
     let bytes = (method.equations_bytes(shape, samples) as u64).saturating_mul(trainings as u64);
     if bytes > memory.bytes {
         return Err(TrainingError::TooWide {
@@ -131,7 +134,8 @@ pub(super) struct Best {
 }
 
 impl Trainer {
-    /// Prepares a training from the weights of `start` and records them as epoch 0.
+    /// Prepares a training from the weights of `start` and records them as epoch 0. Whether its equations fit into memory is
+    /// for the caller to check with [`check_width`].
     ///
     /// # Errors
     /// If a setting is out of range, or there is nothing to train.
@@ -143,7 +147,6 @@ impl Trainer {
         if start.shape().hidden == 0 {
             return Err(TrainingError::NoHiddenNodes);
         }
-        check_width(&settings.method, start.shape(), problem.training.samples(), 1)?;
         let begun = Instant::now();
         let (algorithm, evaluation) = settings.method.start(&start, &problem.training);
         let mut trainer = Self {
@@ -410,7 +413,7 @@ mod tests {
     use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
 
     use super::*;
-    use crate::network::Shape;
+    use crate::{machine::MemorySource, network::Shape};
 
     #[test]
     fn simultaneous_trainings_share_the_memory() {
@@ -419,7 +422,11 @@ mod tests {
             hidden: 12,
             outputs: 30,
         };
-        let check = |trainings| check_width(&Method::default(), shape, 1000, trainings);
+        let memory = MemoryBudget {
+            bytes: 1_000_000_000,
+            source: MemorySource::User,
+        };
+        let check = |trainings| check_width(&Method::default(), shape, 1000, trainings, memory);
         assert_eq!(check(1), Ok(()));
         let refused = check(1_000_000_000).unwrap_err().to_string();
         assert!(

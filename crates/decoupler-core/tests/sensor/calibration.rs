@@ -4,6 +4,7 @@ use decoupler_core::{
     calibration::Calibration,
     dataset::{Dataset, Division, Seed, Stream},
     evaluation::{Errors, Preset, Run, SimulatedSettings, fine_tune, pressed_rows, rebased},
+    machine::MemoryBudget,
     network::Networks,
     scene::{Loading, Noise},
     sensor::SensorModel,
@@ -74,19 +75,19 @@ fn calibration_and_fine_tuning_adapt_a_network_to_the_real_sensor() {
         .divide_for_training(&frames, &mut Seed(0).rng(Stream::Split))
         .unwrap();
     let split = parts.split(&frames);
-    let tuned = fine_tune(&networks, &split, settings.training, &|| false)
+    let tuned = fine_tune(&networks, &split, settings.training, MemoryBudget::UNLIMITED, &|| false)
         .unwrap()
         .unwrap();
     assert!(z_mm(&moved, &tuned) < 1.2 * calibrated);
     // A network of another sensor improves greatly with the frames.
     settings.source.sensor = nominal;
     let untold = trained(settings);
-    let tuned = fine_tune(&untold, &split, settings.training, &|| false)
+    let tuned = fine_tune(&untold, &split, settings.training, MemoryBudget::UNLIMITED, &|| false)
         .unwrap()
         .unwrap();
     assert!(z_mm(&moved, &tuned) < 0.5 * z_mm(&moved, &untold));
     assert!(
-        fine_tune(&untold, &split, settings.training, &|| true)
+        fine_tune(&untold, &split, settings.training, MemoryBudget::UNLIMITED, &|| true)
             .unwrap()
             .is_none()
     );
@@ -99,9 +100,15 @@ fn samples_of_another_sensor_are_refused() {
     let split = split.unwrap().split(&recorded(&settings, 10, 1));
     settings.source.sensor.scale = "4x5_3x15".parse().unwrap();
     settings.training.stopping.epochs = 1;
-    let message = fine_tune(&trained(settings), &split, settings.training, &|| false)
-        .unwrap_err()
-        .to_string();
+    let message = fine_tune(
+        &trained(settings),
+        &split,
+        settings.training,
+        MemoryBudget::UNLIMITED,
+        &|| false,
+    )
+    .unwrap_err()
+    .to_string();
     assert!(message.contains("12 channels, the networks have 15"), "{message}");
 }
 

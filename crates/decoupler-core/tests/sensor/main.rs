@@ -1,9 +1,8 @@
-//! The sensor: its model, its faults, its calibration, and the information in its readings.
+//! The sensor: its model, its calibration, and the information in its readings.
 
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 mod calibration;
-mod faults;
 mod model;
 mod posterior_rows;
 mod recorded;

@@ -1,9 +1,11 @@
 //! Networks too wide for their equations to be factorised.
 
 use decoupler_core::{
-    machine::MachineMemory,
+    machine::{MemoryBudget, MemorySource},
     network::{Mlp, Shape},
-    training::{Examples, Method, Problem, StoppingRules, Trainer, TrainerState, TrainingError, TrainingSettings},
+    training::{
+        Examples, Method, Problem, StoppingRules, Trainer, TrainerState, TrainingError, TrainingSettings, check_width,
+    },
 };
 use ndarray::Array2;
 
@@ -87,23 +89,23 @@ fn only_methods_that_factorise_refuse_a_very_wide_network() {
         hidden: 1000,
         outputs: 3,
     };
-    let refused = begin("br", shape, 8).err().unwrap();
+    let memory = MemoryBudget {
+        bytes: 16_000_000_000,
+        source: MemorySource::System,
+    };
+    let refused = check_width(&named("br"), shape, 8, 1, memory).unwrap_err();
     assert!(
-        matches!(refused, TrainingError::TooWide { trainings: 1, memory, .. } if memory == MachineMemory::of_this_machine()),
+        matches!(refused, TrainingError::TooWide { trainings: 1, memory: of, .. } if of == memory),
         "{refused:?}"
     );
-    assert!(
-        refused
-            .to_string()
-            .contains(&MachineMemory::of_this_machine().to_string()),
-        "{refused}"
-    );
+    assert!(refused.to_string().contains("the machine has 16.0 GB"), "{refused}");
     // 23 205 rows would take 4 GB.
     let shape = Shape {
         inputs: 220,
         hidden: 105,
         outputs: 3,
     };
+    check_width(&named("lm"), shape, 8, 1, memory).unwrap();
     let mut trainer = begin("lm", shape, 8).unwrap();
     let start = trainer.latest().training_mse;
     trainer.step();

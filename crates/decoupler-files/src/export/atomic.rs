@@ -6,13 +6,13 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use decoupler_core::{machine::ReadingBudget, text::system_cause};
 use thiserror::Error;
 
 use super::{
     tables::{Heading, NoHeading},
     unfinished::{Unfinished, folder_of},
 };
+use crate::machine::{ReadingBudget, system_cause};
 
 /// Errors of writing a file.
 #[derive(Debug, Error)]

@@ -4,6 +4,10 @@ use std::{
     path::{Path, PathBuf},
 };
 
+use decoupler_core::{
+    evaluation::{Run, Source},
+    text::in_one_line,
+};
 use thiserror::Error;
 
 use super::{
@@ -11,11 +15,7 @@ use super::{
     atomic::read_limited,
     tables::{Heading, NoHeading},
 };
-use crate::import::Recorded;
-use decoupler_core::{
-    evaluation::{Run, Source},
-    text::{in_one_line, system_cause},
-};
+use crate::{import::Recorded, machine::system_cause};
 
 pub(super) const PROGRAM: &str = concat!("decoupler ", env!("CARGO_PKG_VERSION"));
 

@@ -9,14 +9,14 @@ use std::{
     time::{SystemTime, UNIX_EPOCH},
 };
 
-use decoupler_core::text::{clean_name, system_cause};
+use decoupler_core::text::clean_name;
 use serde::{Serialize, de::DeserializeOwned};
 use serde_json::value::to_raw_value;
 
 use super::{
     AtomicFile, DocumentError, DocumentKind, NetworkFile, WriteError, document::PROGRAM, network_file::Sealed,
 };
-use crate::import::Setup;
+use crate::{import::Setup, machine::system_cause};
 
 /// The finished trainings, and the two that are compared.
 #[derive(Clone, Debug, Default, PartialEq)]

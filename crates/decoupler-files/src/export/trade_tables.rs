@@ -3,12 +3,12 @@ use std::time::Duration;
 use decoupler_core::{
     decoupling::Precision,
     evaluation::{RecordedSize, RunSettings, TradeOffCost, TradeOffLevel, TradeOffPoint, Workload, WorkloadTime},
-    machine::{MachineMemory, MemorySource},
+    machine::MemorySource,
     text::counted,
 };
 
 use super::{Cell, Table, TableColumn, format_duration};
-use crate::figure::point_name;
+use crate::{figure::point_name, machine::memory_budget};
 
 /// Returns the table of all points of all levels with all their figures, for programs.
 pub fn trade_off_points(levels: &[TradeOffLevel]) -> Table {
@@ -128,7 +128,7 @@ pub fn trade_off_summary(level: &TradeOffLevel) -> Table {
 /// about 20 ms.
 pub fn describe_workload(workload: &Workload) -> String {
     let gigabytes = |bytes: u64| format!("{:.1} GB", bytes as f64 * 1e-9);
-    let memory = MachineMemory::of_this_machine();
+    let memory = memory_budget();
     let machine = match memory.source {
         MemorySource::System | MemorySource::User => format!(" of {}", gigabytes(memory.bytes)),
         MemorySource::Assumed => String::new(),

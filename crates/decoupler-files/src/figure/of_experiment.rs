@@ -314,6 +314,7 @@ mod tests {
             CrossValidation,
             experiments::{Finished, PaperTable, TrialSamples, run_experiments},
         },
+        machine::MemoryBudget,
     };
 
     #[test]
@@ -334,7 +335,7 @@ mod tests {
         let one = NonZero::<usize>::MIN;
         run_experiments(
             std::slice::from_ref(&experiment),
-            &TrialSamples::Drawn,
+            &TrialSamples::Drawn(MemoryBudget::UNLIMITED),
             one,
             || false,
             keep,

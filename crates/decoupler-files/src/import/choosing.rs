@@ -10,6 +10,7 @@ use decoupler_core::{
 };
 
 use super::{ImportError, Plan, PlannedSets, Progress, Recording, Setup, SetupError, SetupSets, setup::watch};
+use crate::machine::memory_budget;
 
 /// Setup whose settings were chosen from its training samples.
 #[derive(Clone, Debug)]
@@ -94,6 +95,7 @@ impl Setup {
                 &fixed,
                 &samples,
                 budget_s,
+                memory_budget(),
                 is_cancelled,
                 &mut on_trying,
             )?;

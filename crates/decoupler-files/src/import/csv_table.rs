@@ -4,20 +4,19 @@ use std::{
     path::Path,
 };
 
+use decoupler_core::text::{clean_name, original_name};
+
 use super::{
     Cells, Column, Dialect, DialectChoice, Encoding, Fault, Format, Missing, Table, TableError,
     detection::{BEGINNING, detect},
     dialect::utf8_of_utf16,
     format::{Cell, parse},
-    input_lines::table_error,
+    progress::table_error,
     rows::Rows,
     table::{Excess, Labels, Lines, column_called, name_and_unit, stem},
     time_stamp::TimeStamp,
 };
-use decoupler_core::{
-    machine::ReadingBudget,
-    text::{clean_name, original_name},
-};
+use crate::machine::ReadingBudget;
 
 /// Maximum number of rows; ten hours at 1 kHz are fewer.
 const LARGEST_ROWS: usize = 50_000_000;

@@ -5,12 +5,12 @@ use std::{
 
 use decoupler_core::{
     dataset::{DatasetError, DivisionError, MemoryError},
-    machine::OverBudget,
-    text::{in_one_line, system_cause},
+    text::in_one_line,
 };
 use thiserror::Error;
 
 use super::{Format, InputError, PositionsError};
+use crate::machine::{OverBudget, system_cause};
 
 /// Error of an import. Lines and columns are counted from 1.
 #[derive(Debug, Error)]

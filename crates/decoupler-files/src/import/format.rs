@@ -7,9 +7,8 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use decoupler_core::machine::ReadingBudget;
-
-use super::{Decimal, Dialect, TableError, Watch, input_lines::Watched, matlab, numpy};
+use super::{Decimal, Dialect, TableError, Watch, matlab, numpy, progress::Watched};
+use crate::machine::ReadingBudget;
 
 /// File format.
 #[derive(Clone, Debug, PartialEq, Eq)]

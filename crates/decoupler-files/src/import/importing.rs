@@ -8,7 +8,6 @@ use std::{
 use decoupler_core::{
     dataset::{Dataset, History, Memory, MemoryError},
     evaluation::{Channel, Problem, TargetPosition},
-    machine::ReadingBudget,
     text::{counted, in_one_line},
 };
 use serde::Serialize;
@@ -19,18 +18,19 @@ use super::{
     csv_table::{self, Reading},
     derived::TimeColumn,
     format::Contents,
-    input_lines::Watched,
     inputs::{ColumnId, Names},
     join::{Partners, Source, gather, median_interval, nearest},
     numpy,
     part::Part,
     positions::read_positions,
+    progress::Watched,
     selection::{Rows, not_a_number},
     sentinel::{Sentinel, is_rounding, rounding_warning},
     sheet::Spreadsheet,
     suggestion::Meanings,
     table::{column_called, stem},
 };
+use crate::machine::ReadingBudget;
 
 impl Recipe {
     /// Imports the samples of the files, whose paths are relative to `folder`.

@@ -4,14 +4,14 @@
 
 use std::io::Read;
 
-use decoupler_core::machine::ReadingBudget;
 use flate2::read::ZlibDecoder;
 
 use super::{
     TableError,
     format::{Array, Element, Endian, written},
-    input_lines::table_error,
+    progress::table_error,
 };
+use crate::machine::ReadingBudget;
 
 /// Number of bytes read at once, so that a corrupt length allocates little memory.
 const BLOCK: usize = 1 << 20;

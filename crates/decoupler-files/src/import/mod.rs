@@ -18,16 +18,17 @@ mod dialect;
 mod error;
 mod format;
 mod importing;
-mod input_lines;
 mod inputs;
 mod inspection;
 mod join;
+mod lines;
 mod matlab;
 mod missing;
 mod numpy;
 mod part;
 mod plan;
 mod positions;
+mod progress;
 mod recipe;
 mod rows;
 mod selection;
@@ -46,12 +47,16 @@ pub use dialect::{Decimal, Dialect, DialectChoice, DialectError, Encoding, Separ
 pub use error::{Cure, ImportError, TableError};
 pub use format::Format;
 pub use importing::{Dropped, FileReport, JoinReport, Recording, read_table};
-pub use input_lines::{InputLine, InputLineError, InputLines, KeptCell, Progress, Watch};
 pub use inputs::{InputColumns, InputError, InputTable, InputTime, KeptColumn, OtherColumns};
 pub use inspection::{ColumnKind, ColumnSummary, InspectedFile, Inspection, TimeSummary};
+pub use lines::{
+    CsvFields, InputLine, InputLineError, InputLines, KeptCell, LONGEST_ROW, LineError, LineParser, ParsedLine,
+    ReadError, Reading, ResistanceColumns, ResistanceReader,
+};
 pub use missing::{Condition, Missing};
 pub use plan::{Plan, PlannedSets, TestFiles};
 pub use positions::{PositionsError, holds_positions};
+pub use progress::{Progress, Watch};
 pub use recipe::{FileChecksum, FileSet, Joined, Recipe, Recorded, file_crc32, stored};
 pub use sentinel::Sentinel;
 pub use setup::{Recordings, Setup, SetupError, SetupSets};

@@ -4,15 +4,15 @@
 
 use std::io::{self, Read, Seek, SeekFrom};
 
-use decoupler_core::machine::ReadingBudget;
 use zip::{ZipArchive, result::ZipError};
 
 use super::{
     TableError, Watch,
     format::{Array, Element, Endian, written},
-    input_lines::{Watched, table_error},
     numpy,
+    progress::{Watched, table_error},
 };
+use crate::machine::ReadingBudget;
 
 /// Maximum length of a header in bytes.
 const LONGEST_HEADER: usize = 1 << 16;

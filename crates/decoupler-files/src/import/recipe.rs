@@ -15,7 +15,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{
     Condition, Derived, DialectChoice, ImportError, Missing, Plan, PlannedSets, TableError, Watch,
-    input_lines::{Watched, table_error},
+    progress::{Watched, table_error},
     table::name_and_unit,
 };
 

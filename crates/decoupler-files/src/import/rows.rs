@@ -5,7 +5,7 @@ use std::{
 
 use csv_core::ReadRecordResult;
 
-use super::{Separator, TableError, input_lines::table_error};
+use super::{Separator, TableError, progress::table_error};
 
 /// Maximum length of a row in bytes: 16 MiB, enough for more than ten thousand columns.
 pub(super) const LONGEST_ROW: usize = 1 << 24;

@@ -1,9 +1,5 @@
 use std::{ops::ControlFlow, path::Path, sync::Arc};
 
-use ndarray::{Axis, Slice};
-use thiserror::Error;
-
-use super::{ImportError, Plan, PlannedSets, Progress, Recorded, Recording, Watch};
 use decoupler_core::{
     evaluation::{
         Intervals, NoIntervals, Run, RunError, RunSets, RunSettings, SimulatedSettings, Source,
@@ -13,6 +9,11 @@ use decoupler_core::{
     text::clean_name,
     training::TrainerState,
 };
+use ndarray::{Axis, Slice};
+use thiserror::Error;
+
+use super::{ImportError, Plan, PlannedSets, Progress, Recorded, Recording, Watch};
+use crate::machine::memory_budget;
 
 /// Everything needed to repeat a run: its settings and, for a recording, the plan that reads it.
 #[derive(Clone, Debug)]
@@ -163,7 +164,7 @@ impl Setup {
     ) -> Result<Option<SetupSets>, SetupError> {
         let Some(plan) = &self.plan else {
             let settings = self.settings.simulated().expect("a setup without a plan is simulated");
-            let sets = settings.checked_sets_unless(is_cancelled)?;
+            let sets = settings.checked_sets_unless(memory_budget(), is_cancelled)?;
             return Ok(sets.map(|sets| SetupSets { sets, recordings: None }));
         };
         self.check_files()?;
@@ -200,7 +201,7 @@ impl Setup {
         on_progress: &mut dyn FnMut(Progress),
     ) -> Result<Option<TrialSamples>, SetupError> {
         let Some(plan) = &self.plan else {
-            return Ok(Some(TrialSamples::Drawn));
+            return Ok(Some(TrialSamples::Drawn(memory_budget())));
         };
         self.check_files()?;
         let (recording, test) = match plan.recordings(folder, &mut watch(is_cancelled, on_progress)) {
@@ -211,6 +212,7 @@ impl Setup {
             problem: Arc::new(recording.problem()),
             set: Arc::new(recording.set),
             test: test.map(|test| Arc::new(test.set)),
+            memory: memory_budget(),
         })))
     }
 }
@@ -245,7 +247,9 @@ impl SetupSets {
             split,
             test,
         } = planned;
-        let sets = RunSets::new(split, test).described(recording.problem());
+        let sets = RunSets::new(split, test)
+            .described(recording.problem())
+            .limited_to(memory_budget());
         Ok(Self {
             sets,
             recordings: Some(Recordings {

@@ -9,17 +9,18 @@ use std::{
 };
 
 use calamine::{Cell, Data, DataRef, Ods, Range, Reader, Xls, Xlsx, XlsxError, open_workbook_from_rs};
-use decoupler_core::{machine::ReadingBudget, text::clean_name};
+use decoupler_core::text::clean_name;
 use zip::ZipArchive;
 
 use super::{
     Decimal, DialectChoice, Encoding, Format, Progress, Separator, Table, TableError, Watch,
     csv_table::{self, Reading},
-    input_lines::Watched,
     numpy::check_names,
+    progress::Watched,
     sheet_claims::{self, LARGEST, OF_CELL, Rectangle, outside},
     xls_claims,
 };
+use crate::machine::ReadingBudget;
 
 /// Kind of spreadsheet.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -4,14 +4,14 @@
 
 use std::io::{self, BufRead, BufReader, Read, Seek};
 
-use decoupler_core::machine::ReadingBudget;
 use quick_xml::{
     Reader,
     events::{BytesStart, Event},
 };
 use zip::ZipArchive;
 
-use super::{TableError, Watch, input_lines::Watched, numpy::damage};
+use super::{TableError, Watch, numpy::damage, progress::Watched};
+use crate::machine::ReadingBudget;
 
 /// Memory of a byte of XML: strings of one letter, in a vector that has just doubled.
 const OF_BYTE: u64 = 4;

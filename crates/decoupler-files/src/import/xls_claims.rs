@@ -9,9 +9,9 @@ use std::{
 };
 
 use cfb::CompoundFile;
-use decoupler_core::machine::ReadingBudget;
 
 use super::{TableError, sheet_claims::Rectangle};
+use crate::machine::ReadingBudget;
 
 /// Memory of a byte of the stream: short texts, in a vector that has just doubled.
 const OF_BYTE: u64 = 16;

@@ -20,6 +20,7 @@ use decoupler_core::{
             run_experiments, verdicts,
         },
     },
+    machine::MemoryBudget,
     scene::RowModel,
     sensor::{ArrayScale, SensorModel},
     training::Method,
@@ -81,7 +82,7 @@ fn run(experiments: &[Experiment], thread_count: usize) -> Vec<ExperimentResults
     let mut results: Vec<_> = experiments.iter().cloned().map(ExperimentResults::new).collect();
     run_experiments(
         experiments,
-        &TrialSamples::Drawn,
+        &TrialSamples::Drawn(MemoryBudget::UNLIMITED),
         threads(thread_count),
         || false,
         |finished| {
@@ -186,7 +187,7 @@ fn cancelling_keeps_finished_trials() {
         let mut finished = 0;
         run_experiments(
             std::slice::from_ref(&experiment),
-            &TrialSamples::Drawn,
+            &TrialSamples::Drawn(MemoryBudget::UNLIMITED),
             threads(1),
             || asked.fetch_add(1, Ordering::Relaxed) >= asked_at_most,
             |one| {
@@ -229,9 +230,13 @@ fn cancelling_does_not_wait_for_a_training_to_end() {
     ] {
         let asked = AtomicUsize::new(0);
         let is_cancelled = || asked.fetch_add(1, Ordering::Relaxed) >= 50;
-        run_experiments(&[experiment], &TrialSamples::Drawn, threads(2), is_cancelled, |one| {
-            panic!("{one:?}")
-        })
+        run_experiments(
+            &[experiment],
+            &TrialSamples::Drawn(MemoryBudget::UNLIMITED),
+            threads(2),
+            is_cancelled,
+            |one| panic!("{one:?}"),
+        )
         .unwrap();
         assert!((51..=60).contains(&asked.into_inner()));
     }
@@ -497,7 +502,10 @@ fn axes_belong_to_their_source() {
     assert!(message(&on_recording(&setup, split, None)).contains("no column of groups"));
     let hidden = Axis::Hidden(vec![2]);
     for (experiment, samples) in [
-        (on_recording(&setup, hidden.clone(), None), TrialSamples::Drawn),
+        (
+            on_recording(&setup, hidden.clone(), None),
+            TrialSamples::Drawn(MemoryBudget::UNLIMITED),
+        ),
         (small(hidden), samples_of(&setup)),
     ] {
         let refused = run_experiments(&[experiment], &samples, threads(1), || false, |one| panic!("{one:?}"));

@@ -7,6 +7,7 @@ use decoupler_core::{
         experiments::{Axis, Experiment, ExperimentError, ExperimentResults, TrialSamples, run_experiments},
         reference_errors,
     },
+    machine::MemoryBudget,
     scene::{Noise, NoisySets, Rows, Scene},
     sensor::SensorModel,
 };
@@ -53,7 +54,7 @@ fn finished(experiment: Experiment) -> ExperimentResults {
     let mut results = ExperimentResults::new(experiment.clone());
     run_experiments(
         &[experiment],
-        &TrialSamples::Drawn,
+        &TrialSamples::Drawn(MemoryBudget::UNLIMITED),
         1.try_into().unwrap(),
         || false,
         |finished| {

@@ -3,7 +3,7 @@
 use decoupler_core::{
     dataset::Seed,
     evaluation::{MAX_STARTS, Run, RunError, SimulatedSettings, Simulation, StartTrainer, Workload, best_start},
-    machine::MachineMemory,
+    machine::{MemoryBudget, MemorySource},
     sensor::SensorModel,
     training::{Method, StopReason, StoppingRules, Trainer},
 };
@@ -189,10 +189,12 @@ fn too_many_starts_are_refused() {
         starts: 100,
         ..settings(1)
     };
-    if Workload::of(&wide).unwrap().bytes > MachineMemory::of_this_machine().bytes {
-        let error = Run::prepare(wide).err().unwrap();
-        assert!(matches!(error, RunError::Memory { .. }), "{error}");
-    }
+    let memory = MemoryBudget {
+        bytes: Workload::of(&wide).unwrap().bytes - 1,
+        source: MemorySource::User,
+    };
+    let error = Run::prepare_unless(wide, memory, &|| false).err().unwrap();
+    assert!(matches!(error, RunError::Memory { .. }), "{error}");
     let states = Run::prepare(settings(2)).unwrap().states();
     assert!(matches!(
         Run::resume(settings(3), states),

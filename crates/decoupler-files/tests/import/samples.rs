@@ -6,9 +6,11 @@ use decoupler_core::{
     dataset::Seed,
     decoupling::{CompiledNetworks, Decoder},
     glam::DVec3,
+};
+use decoupler_files::{
+    export::NetworkFile,
     live::{Recording, Simulated},
 };
-use decoupler_files::export::NetworkFile;
 
 fn sample(name: &str) -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR"))

@@ -6,10 +6,12 @@ use decoupler_core::{
     dataset::Dataset,
     evaluation::{Run, SimulatedSettings},
     network::{DecouplingNetwork, Mlp},
-    text::ResistanceReader,
     training::Method,
 };
-use decoupler_files::export::{CheckpointFile, NetworkFile, RunFolder, write_samples, write_samples_header};
+use decoupler_files::{
+    export::{CheckpointFile, NetworkFile, RunFolder, write_samples, write_samples_header},
+    import::ResistanceReader,
+};
 use ndarray::Array2;
 use proptest::prelude::*;
 

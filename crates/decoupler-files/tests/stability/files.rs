@@ -5,9 +5,11 @@ use std::{fmt::Display, fs, path::Path};
 use decoupler_core::{
     evaluation::{Run, SimulatedSettings},
     sensor::SensorModel,
-    text::ResistanceReader,
 };
-use decoupler_files::export::{CheckpointFile, NetworkFile};
+use decoupler_files::{
+    export::{CheckpointFile, NetworkFile},
+    import::ResistanceReader,
+};
 
 use crate::{
     judge::{Job, Verdict, refused, wrong},
@@ -131,7 +133,7 @@ fn judge_table(text: &str, expected: Option<&[[f64; 3]]>) -> Verdict {
         while let Some(reading) = reader.read(2)? {
             values.extend(reading.resistances_ohm);
         }
-        Ok::<_, decoupler_core::text::ReadError>(values)
+        Ok::<_, decoupler_files::import::ReadError>(values)
     };
     match (read(), expected) {
         (Err(error), None) => refused(&error),

@@ -8,10 +8,12 @@ use std::{
 
 use decoupler_core::{
     evaluation::SimulatedSettings,
-    live::{Motion, Source},
     scene::{Fault, Rows},
 };
-use decoupler_files::export::{NetworkFile, format_percent};
+use decoupler_files::{
+    export::{NetworkFile, format_percent},
+    live::{Motion, Source},
+};
 use eframe::egui::{ComboBox, TextEdit, Ui, vec2};
 
 use super::{

@@ -20,6 +20,7 @@ use decoupler_files::{
     export::NetworkFile,
     figure::point_name,
     import::{Recorded, Setup, SetupSets},
+    machine::memory_budget,
 };
 
 use super::TradeOffForm;
@@ -327,7 +328,7 @@ fn measure_all(plan: &TradeOffPlan, report: &Report<TradeOffEvent>) -> Result<()
         for run in &planned.runs {
             if let Some(settings) = run.setup.simulated() {
                 let workload = Workload::of_trade_off(&settings, &plan.hidden, &run.decoders);
-                let checked = workload.and_then(|workload| workload.check_memory());
+                let checked = workload.and_then(|workload| workload.check_memory(memory_budget()));
                 checked.map_err(|error| error.to_string())?;
             }
             let sets = match last.take() {

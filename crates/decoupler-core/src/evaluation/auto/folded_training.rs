@@ -12,9 +12,10 @@ use super::{
 };
 use crate::{
     dataset::{Dataset, Folds},
+    machine::MemoryBudget,
     network::{Inputs, MinMax, Shape, nguyen_widrow},
     scene::NoiseSource,
-    training::{Examples, Problem, StoppingRules, Trainer, TrainingError, TrainingSettings},
+    training::{Examples, Problem, StoppingRules, Trainer, TrainingError, TrainingSettings, check_width},
 };
 
 /// Committees trained on all folds but one, for each fold, which advance together epoch by epoch: the epoch at which to
@@ -65,10 +66,17 @@ impl<'a> FoldedTraining<'a> {
         set: &Dataset,
         folds: &'a Folds,
         stride: usize,
+        memory: MemoryBudget,
     ) -> Result<Self, RunError> {
         let parts = (0..folds.count()).into_par_iter().map(|fold| {
             let thinned: Vec<usize> = folds.without(&[fold]).into_iter().step_by(stride).collect();
-            Part::new(settings, &set.select(&thinned), &set.select(folds.test(fold)), fold)
+            Part::new(
+                settings,
+                &set.select(&thinned),
+                &set.select(folds.test(fold)),
+                fold,
+                memory,
+            )
         });
         let parts: Vec<Part> = parts.collect::<Result<_, _>>()?;
         if parts.iter().all(|part| part.trainers.is_empty()) {
@@ -141,7 +149,13 @@ impl<'a> FoldedTraining<'a> {
 }
 
 impl Part {
-    fn new(settings: &RunSettings, training: &Dataset, test: &Dataset, fold: usize) -> Result<Self, RunError> {
+    fn new(
+        settings: &RunSettings,
+        training: &Dataset,
+        test: &Dataset,
+        fold: usize,
+        memory: MemoryBudget,
+    ) -> Result<Self, RunError> {
         let inputs = Inputs::fit(settings.inputs, training.readings(), NoiseSource::default())?;
         let outputs = MinMax::fit(training.targets())?;
         let scaled = |readings: ArrayView2<'_, f64>| inputs.of(readings);
@@ -157,6 +171,7 @@ impl Part {
             hidden: settings.hidden,
             outputs: examples.outputs(),
         };
+        check_width(&settings.training.method, shape, examples.samples(), 1, memory)?;
         let problem = Problem {
             training: examples,
             validation: None,

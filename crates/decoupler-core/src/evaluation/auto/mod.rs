@@ -27,6 +27,7 @@ use serde::{Deserialize, Serialize};
 use super::{Initialization, RunError, RunSettings};
 use crate::{
     dataset::{Dataset, Folds, History, Memory, Span, SplitBy},
+    machine::MemoryBudget,
     network::{InputChoice, Quantity, ScalingChoice},
     text::format_percent,
     training::Method,
@@ -291,7 +292,7 @@ fn describe_network(hidden: usize, method: &Method, starts: usize) -> String {
 }
 
 /// Chooses settings for `samples` by cross-validation. `base` gives the source, the seed, and whatever is not searched;
-/// its inputs are raw readings. `is_cancelled` is polled throughout; the result is then `None`.
+/// its inputs are raw readings. Networks whose equations do not fit into `memory` are not tried. `is_cancelled` is polled throughout; the result is then `None`.
 ///
 /// # Errors
 /// If the samples cannot be divided into folds, or cannot be scaled.
@@ -300,8 +301,9 @@ pub fn choose_settings(
     fixed: &AutoFixed,
     samples: &AutoSamples<'_>,
     budget_s: f64,
+    memory: MemoryBudget,
     is_cancelled: &dyn Fn() -> bool,
     on_progress: &mut dyn FnMut(AutoProgress),
 ) -> Result<Option<AutoChoice>, RunError> {
-    search::Search::new(base, fixed, samples, budget_s, is_cancelled, on_progress)?.run()
+    search::Search::new(base, fixed, samples, budget_s, memory, is_cancelled, on_progress)?.run()
 }

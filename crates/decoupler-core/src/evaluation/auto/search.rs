@@ -7,6 +7,7 @@ use super::{
 };
 use crate::{
     dataset::{Dataset, Folds, Memory, Seed, SplitBy, Stream},
+    machine::MemoryBudget,
     network::{InputChoice, InputScaling, Inputs, LARGEST_HIDDEN, ScalingChoice, Shape},
     training::{Method, TrainingError},
 };
@@ -53,6 +54,7 @@ pub(super) struct Search<'a> {
     pub(super) samples: &'a AutoSamples<'a>,
     pub(super) folds: Folds,
     budget_s: f64,
+    memory: MemoryBudget,
     /// Multiplications used so far.
     pub(super) work: f64,
     tried: Vec<Tried>,
@@ -90,6 +92,7 @@ impl<'a> Search<'a> {
         fixed: &'a AutoFixed,
         samples: &'a AutoSamples<'a>,
         budget_s: f64,
+        memory: MemoryBudget,
         is_cancelled: &'a dyn Fn() -> bool,
         on_progress: &'a mut dyn FnMut(AutoProgress),
     ) -> Result<Self, RunError> {
@@ -103,6 +106,7 @@ impl<'a> Search<'a> {
             samples,
             folds,
             budget_s,
+            memory,
             work: 0.0,
             tried: Vec::new(),
             networks: Vec::new(),
@@ -168,7 +172,7 @@ impl<'a> Search<'a> {
             describe_network(candidate.hidden, &candidate.method, candidate.starts)
         );
         self.announce(name)?;
-        let mut training = match FoldedTraining::new(&settings, &set, &self.folds, stride) {
+        let mut training = match FoldedTraining::new(&settings, &set, &self.folds, stride, self.memory) {
             Ok(training) => training,
             Err(_) if !is_first => return Ok(None),
             Err(error) => return Err(error.into()),

@@ -5,6 +5,7 @@ use super::*;
 use crate::{
     dataset::{Seed, SplitBy, Stream},
     evaluation::{Combination, Measured, Run},
+    machine::MemoryBudget,
     scene::RowModel,
     training::Method,
 };
@@ -43,7 +44,16 @@ fn choose(by: SplitBy, groups: Vec<usize>, fixed: &AutoFixed, is_cancelled: &dyn
         by,
     };
     let base = RunSettings::from(Measured { rows: RowModel::Shared });
-    choose_settings(&base, fixed, &samples, BUDGET_S, is_cancelled, &mut |_| ()).unwrap()
+    choose_settings(
+        &base,
+        fixed,
+        &samples,
+        BUDGET_S,
+        MemoryBudget::UNLIMITED,
+        is_cancelled,
+        &mut |_| (),
+    )
+    .unwrap()
 }
 
 fn in_time() -> Option<AutoChoice> {
@@ -157,9 +167,17 @@ fn many_inputs_for_few_samples_get_weight_decay() {
         by: SplitBy::Random,
     };
     let base = RunSettings::from(Measured { rows: RowModel::Shared });
-    let choice = choose_settings(&base, &AutoFixed::default(), &samples, 4.0, &|| false, &mut |_| ())
-        .unwrap()
-        .unwrap();
+    let choice = choose_settings(
+        &base,
+        &AutoFixed::default(),
+        &samples,
+        4.0,
+        MemoryBudget::UNLIMITED,
+        &|| false,
+        &mut |_| (),
+    )
+    .unwrap()
+    .unwrap();
     let Method::ScaledConjugateGradient(settings) = choice.settings.training.method else {
         panic!("{:?}", choice.record);
     };

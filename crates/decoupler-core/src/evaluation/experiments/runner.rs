@@ -271,7 +271,7 @@ pub(super) fn work(experiment: &Experiment, cell: &Cell, samples: &TrialSamples)
         (None, TrialSamples::Recorded(recorded)) => {
             (recorded.set.channels(), recorded.set.outputs(), recorded.set.samples())
         }
-        (None, TrialSamples::Drawn) => (1, 1, 1),
+        (None, TrialSamples::Drawn(_)) => (1, 1, 1),
     };
     let (n1, h) = ((inputs + 1) as f64, settings.hidden as f64);
     let (outputs, samples) = (outputs as f64, samples as f64);

@@ -12,6 +12,7 @@ use crate::{
         Baselines, CrossValidated, CrossValidation, Effort, Problem, Run, RunError, RunSets, RunSettings,
         SimulatedSettings, TestErrors,
     },
+    machine::MemoryBudget,
     network::{MinMax, ScalingError},
     scene::RowModel,
     training::TrainerState,
@@ -159,8 +160,8 @@ fn bottleneck_answers(set: &Dataset, validated: &CrossValidated, hidden: usize) 
 /// Samples of the trials of an experiment.
 #[derive(Clone, Debug)]
 pub enum TrialSamples {
-    /// Samples drawn by each trial from the model of its settings.
-    Drawn,
+    /// Samples drawn by each trial from the model of its settings, within this memory.
+    Drawn(MemoryBudget),
     /// Recorded samples, divided by each trial.
     Recorded(RecordedSamples),
 }
@@ -174,6 +175,8 @@ pub struct RecordedSamples {
     pub test: Option<Arc<Dataset>>,
     /// Description of the readings and targets.
     pub problem: Arc<Problem>,
+    /// Memory that a trial may use.
+    pub memory: MemoryBudget,
 }
 
 impl RecordedSamples {
@@ -185,6 +188,7 @@ impl RecordedSamples {
         let (split, test) = division.sets(&self.set, self.test.as_deref(), seed)?;
         Ok(RunSets {
             problem: Arc::clone(&self.problem),
+            memory: self.memory,
             ..RunSets::new(split, test)
         })
     }
@@ -199,13 +203,13 @@ impl TrialSamples {
         is_cancelled: &dyn Fn() -> bool,
     ) -> Result<Option<RunSets>, RunError> {
         match self {
-            Self::Drawn => {
+            Self::Drawn(memory) => {
                 let mut settings = cell
                     .settings
                     .simulated()
                     .expect("the source of drawn samples is simulated");
                 settings.seed = seed;
-                settings.checked_sets_unless(is_cancelled)
+                settings.checked_sets_unless(*memory, is_cancelled)
             }
             Self::Recorded(recorded) => {
                 let division = cell.division.expect("recorded samples have a division");

@@ -206,7 +206,7 @@ impl Indenter {
 impl Indenter {
     /// Returns the deformation of the array when the upright indenter of middle size presses `depth_mm` deep at (x, y); a
     /// cylinder or an edge is along y.
-    pub(crate) fn press(&self, model: &SensorModel, place_mm: DVec2, depth_mm: f64) -> Deformation {
+    pub fn press(&self, model: &SensorModel, place_mm: DVec2, depth_mm: f64) -> Deformation {
         let press = self.upright(place_mm, depth_mm);
         Deformation::from_fn(model.scale, |row, node| {
             let rest_mm = model.geometry.row_node_mm(model.scale, row, node);

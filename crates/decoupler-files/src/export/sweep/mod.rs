@@ -15,7 +15,7 @@ use serde::{Serialize, de::DeserializeOwned};
 use serde_json::value::to_raw_value;
 
 use super::{AtomicFile, DocumentError, DocumentKind, WriteError, network_file::Sealed};
-use decoupler_core::text::system_cause;
+use crate::machine::system_cause;
 
 pub use self::{
     plan_file::{PlanAxis, SweepPlan},

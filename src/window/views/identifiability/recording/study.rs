@@ -7,13 +7,14 @@ use std::{
 use decoupler_core::{
     dataset::{Folds, SplitBy, Stream},
     evaluation::{
-        Channel, CrossValidated, ErrorTable,
+        Channel, CrossValidated, ErrorTable, RecordedSize, Workload,
         recorded::{Determination, Findings, FittedModel, NonlinearGain, SplitComparison, StudyStep, channel_remarks},
     },
 };
 use decoupler_files::{
     export::describe_channels,
     import::{Plan, Progress, Recording, Setup},
+    machine::memory_budget,
 };
 
 use crate::window::{
@@ -262,6 +263,10 @@ fn validate(
 ) -> Result<(), String> {
     let (settings, set, by) = (setup.settings(), &recording.set, plan.division.by);
     let is_cancelled = || report.is_cancelled();
+    let workload = Workload::of_recording(settings, RecordedSize::of(settings, set));
+    workload
+        .check_memory(memory_budget())
+        .map_err(|error| error.to_string())?;
     let assigned =
         Folds::by(set, folds, by, &mut settings.seed.rng(Stream::Split)).map_err(|error| error.to_string())?;
     let validated =

@@ -270,9 +270,9 @@ mod tests {
         dataset::Seed,
         decoupling::resistance_residual,
         evaluation::{Run, SimulatedSettings},
-        live::Simulated,
         scene::{Fault, Noise},
     };
+    use decoupler_files::live::Simulated;
 
     fn network() -> Arc<NetworkFile> {
         let mut settings = SimulatedSettings::default();

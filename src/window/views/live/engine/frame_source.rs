@@ -8,9 +8,12 @@ use std::{
 use decoupler_core::{
     dataset::Seed,
     evaluation::SimulatedSettings,
-    live::{Keeping, LineParser, Lines, NextLine, ParsedLine, Simulated, Source},
     scene::{Deformation, Fault, Noise, Rows, Scene},
     sensor::{ArrayScale, SensorModel},
+};
+use decoupler_files::{
+    import::{LineParser, ParsedLine},
+    live::{Keeping, Lines, NextLine, Simulated, Source},
 };
 
 use super::{

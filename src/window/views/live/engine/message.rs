@@ -10,12 +10,16 @@ use ndarray::Array2;
 use crate::window::test_view::Frame;
 use decoupler_core::{
     evaluation::{Problem, SimulatedSettings},
-    live::{Diagnosis, Drift, Motion, NoDriftMonitor, Source, ZeroGains},
+    live::{Diagnosis, Drift, NoDriftMonitor, ZeroGains},
     scene::Fault,
     sensor::SensorModel,
     surface::SurfaceMap,
 };
-use decoupler_files::{export::NetworkFile, figure::TargetSurface};
+use decoupler_files::{
+    export::NetworkFile,
+    figure::TargetSurface,
+    live::{Motion, Source},
+};
 
 /// Frames to be decoded, and the network that decodes them.
 #[derive(Clone, Debug)]

@@ -5,7 +5,7 @@ use std::{
 };
 
 use super::message::Recorded;
-use decoupler_core::{live::Recorder, text::system_cause};
+use decoupler_files::{live::Recorder, machine::system_cause};
 
 /// A recording in progress: every frame is written to the file as soon as it arrives.
 #[derive(Debug)]
@@ -104,7 +104,7 @@ mod tests {
     use std::io::BufReader;
 
     use super::*;
-    use decoupler_core::live::Recording;
+    use decoupler_files::live::Recording;
 
     #[test]
     fn each_recording_has_its_own_file_that_is_complete_after_every_frame() {

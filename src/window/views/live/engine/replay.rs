@@ -6,12 +6,11 @@ use std::{
     time::{Duration, Instant},
 };
 
-use decoupler_core::{
-    live::{LineParser, Lines, ParsedLine, Recording},
-    machine::ReadingBudget,
-    scene::Rows,
-    sensor::ArrayScale,
-    text::system_cause,
+use decoupler_core::{scene::Rows, sensor::ArrayScale};
+use decoupler_files::{
+    import::{LineParser, ParsedLine},
+    live::{Lines, Recording},
+    machine::{ReadingBudget, system_cause},
 };
 use ndarray::Array3;
 
@@ -235,7 +234,7 @@ fn read_lines(
 mod tests {
     use std::time::Instant;
 
-    use decoupler_core::live::Recorder;
+    use decoupler_files::live::Recorder;
     use ndarray::Array3;
 
     use super::*;

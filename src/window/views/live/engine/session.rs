@@ -6,10 +6,11 @@ use std::{
 use decoupler_core::{
     decoupling::Decoder,
     evaluation::SimulatedSettings,
-    live::{FaultEvent, FaultMonitor, Latencies, LeftOutDecoder},
+    live::{FaultEvent, FaultMonitor, LeftOutDecoder},
     scene::Scene,
     sensor::{SensorError, SensorModel},
 };
+use decoupler_files::live::Latencies;
 
 use super::{
     decoding::Decoding,

@@ -10,12 +10,13 @@ use std::{
 use decoupler_core::{
     decoupling::{CompiledNetworks, Decoder},
     evaluation::Problem,
-    live::{DriftMonitor, NoDriftMonitor, Recording, Source},
+    live::{DriftMonitor, NoDriftMonitor},
 };
 use decoupler_files::{
     export::NetworkFile,
     figure::TargetSurface,
     import::{InputLine, InputLines},
+    live::{Recording, Source},
 };
 use ndarray::Array3;
 

@@ -5,7 +5,7 @@ use decoupler_core::{
     network::Networks,
     scene::{Contact, Print, Touch},
 };
-use decoupler_files::figure::surface::Ray;
+use decoupler_files::{figure::surface::Ray, machine::memory_budget};
 use eframe::egui::{Context, Key, Modifiers, Painter, PointerButton, Pos2, Response, Shape, Stroke, pos2};
 use glam::{DVec2, DVec3};
 
@@ -339,7 +339,7 @@ impl ReadyNetwork {
         self.job.start(
             move |report| {
                 let is_cancelled = || report.is_cancelled();
-                let Some(mut run) = Run::prepare_unless(settings, &is_cancelled)? else {
+                let Some(mut run) = Run::prepare_unless(settings, memory_budget(), &is_cancelled)? else {
                     return Ok(None);
                 };
                 while run.step().is_none() && !is_cancelled() {}

@@ -15,8 +15,6 @@ use std::{
     time::{Duration, Instant},
 };
 
-use decoupler_core::text::system_cause;
-
 use self::{fixed::readings, header::Header};
 use super::{
     choice::BundlePrecision,
@@ -28,7 +26,10 @@ use super::{
     vectors::{Deviation, Vector},
     weights::Weights,
 };
-use crate::export::{bundle::weights::Digits, unfinished::UnfinishedFolder};
+use crate::{
+    export::{bundle::weights::Digits, unfinished::UnfinishedFolder},
+    machine::system_cause,
+};
 use header::{SelfTest, WholeNumbers};
 
 /// Files of a bundle: names and contents.

@@ -9,11 +9,12 @@ use decoupler_core::{
     dataset::{Seed, Stream},
     decoupling::{CompiledNetworks, Decoder},
     evaluation::{Preset, Run, SimulatedSettings},
-    live::{FaultEvent, FaultMonitor, FaultyWire, LeftOutDecoder, Simulated},
+    live::{FaultEvent, FaultMonitor, FaultyWire, LeftOutDecoder},
     rand::{Rng, RngExt},
     scene::{ConverterEnd, Fault, Indenter, Loading, Noise},
     sensor::ArrayScale,
 };
+use decoupler_files::live::Simulated;
 
 const KINDS: [&str; 6] = [
     "open row",

@@ -8,14 +8,16 @@ use decoupler_core::{
         AffineMap, CompiledNetworks, Decoder, NewtonDecoder, NewtonRules, PolishedDecoder, RadialBasisNetwork,
         TakagiSugeno,
     },
-    live::{
-        Diagnosis, FaultCause, FaultMonitor, FaultyWire, Latencies, LeftOutDecoder, LineParser, ParsedLine, Simulated,
-    },
+    live::{Diagnosis, FaultCause, FaultMonitor, FaultyWire, LeftOutDecoder},
     network::{
         DecouplingNetwork, InputChoice, Inputs, MinMax, Quantity, ScalingChoice, ScalingError, Shape, nguyen_widrow,
     },
     scene::{Noise, NoiseSource, RowModel, Rows, Scene},
     sensor::{Axes, RowConductance, SensorModel},
+};
+use decoupler_files::{
+    import::{LineParser, ParsedLine},
+    live::{Latencies, Simulated},
 };
 use glam::DVec3;
 

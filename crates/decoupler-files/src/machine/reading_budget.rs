@@ -1,8 +1,9 @@
 use std::fs;
 
+use decoupler_core::machine::{MemoryBudget, MemorySource};
 use thiserror::Error;
 
-use super::{MachineMemory, MemorySource};
+use super::memory_budget;
 
 /// Memory that reading one file may take: half of the free memory or, if the user has set a limit, all of that.
 ///
@@ -23,7 +24,7 @@ pub struct ReadingBudget {
     size(*.needed),
     size(*.limit),
     if *.is_given { "" } else { ", half of the free memory" },
-    MachineMemory::VARIABLE
+    MemoryBudget::VARIABLE
 )]
 pub struct OverBudget {
     /// Bytes needed.
@@ -45,7 +46,7 @@ fn size(bytes: u64) -> String {
 impl ReadingBudget {
     /// Returns the budget for reading a file now.
     pub fn now() -> Self {
-        let machine = MachineMemory::of_this_machine();
+        let machine = memory_budget();
         if machine.source == MemorySource::User {
             return Self::of(machine.bytes, true);
         }

@@ -3,10 +3,11 @@
 use decoupler_core::{
     dataset::{Seed, Stream},
     decoupling::Decoder,
-    live::{Diagnosis, FaultCause, FaultEvent, FaultMonitor, FaultyWire, LeftOutDecoder, Simulated},
+    live::{Diagnosis, FaultCause, FaultEvent, FaultMonitor, FaultyWire, LeftOutDecoder},
     scene::{Deformation, Fault, FaultySensor, Indenter, Loading, Noise, Scene},
     sensor::SensorModel,
 };
+use decoupler_files::live::Simulated;
 use glam::DVec3;
 use rand::RngExt;
 

@@ -1,10 +1,11 @@
 use std::io::{self, BufRead, Read};
 
 use csv_core::{ReadRecordResult, Reader};
+use decoupler_core::text::counted;
 use ndarray::Array2;
 use thiserror::Error;
 
-use super::{counted, system_cause};
+use crate::machine::system_cause;
 
 /// Reads resistances from CSV block by block, so that large files need little memory.
 ///

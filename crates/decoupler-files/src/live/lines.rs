@@ -1,4 +1,5 @@
 use std::{
+    collections::VecDeque,
     io::{self, ErrorKind, Read},
     panic::{AssertUnwindSafe, catch_unwind},
     sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError},
@@ -6,8 +7,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use super::line_parser::{Batch, Entry, Splitter};
-use crate::text::LONGEST_ROW;
+use crate::import::LONGEST_ROW;
 
 /// Lines of a source, read on a separate thread as they arrive.
 ///
@@ -252,6 +252,133 @@ impl Shared {
     }
 }
 
+/// Lines stored consecutively in one buffer.
+#[derive(Debug, Default)]
+struct Batch {
+    bytes: Vec<u8>,
+    lines: VecDeque<Entry>,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Entry {
+    number: u64,
+    /// Start and end in the bytes; `None` for a line that is too long.
+    place: Option<(usize, usize)>,
+    /// True if it looks like a header.
+    has_names: bool,
+    read_at: Instant,
+}
+
+impl Batch {
+    /// Returns true if the oldest line has waited too long.
+    fn is_old(&self, now: Instant) -> bool {
+        let oldest = self.lines.front();
+        oldest.is_some_and(|entry| now.saturating_duration_since(entry.read_at) > Lines::PATIENCE)
+    }
+
+    /// Moves the lines of `newer` to the end.
+    fn append(&mut self, newer: &mut Self) {
+        let shift = self.bytes.len();
+        self.bytes.append(&mut newer.bytes);
+        self.lines.extend(newer.lines.drain(..).map(|mut entry| {
+            entry.place = entry.place.map(|(start, end)| (start + shift, end + shift));
+            entry
+        }));
+    }
+
+    /// Drops all but the newest `kept` lines if the oldest has waited too long; returns the number of dropped lines. The
+    /// latest header is kept: without it the lines that follow would be misinterpreted.
+    fn drop_old(&mut self, now: Instant, kept: usize) -> u64 {
+        if !self.is_old(now) || self.lines.len() <= kept {
+            return 0;
+        }
+        let mut dropped = self.lines.len() - kept;
+        let mut drained: Vec<Entry> = self.lines.drain(..dropped).collect();
+        if let Some(names) = drained.iter().rposition(|entry| entry.has_names) {
+            self.lines.push_front(drained.swap_remove(names));
+            dropped -= 1;
+        }
+        // The bytes of dropped lines are freed at once, so that the buffer never exceeds the waiting lines.
+        let mut bytes = Vec::with_capacity(self.bytes.len());
+        for (from, to) in self.lines.iter_mut().filter_map(|entry| entry.place.as_mut()) {
+            let start = bytes.len();
+            bytes.extend_from_slice(&self.bytes[*from..*to]);
+            (*from, *to) = (start, bytes.len());
+        }
+        self.bytes = bytes;
+        dropped as u64
+    }
+}
+
+/// Splits chunks of bytes into lines.
+#[derive(Debug, Default)]
+struct Splitter {
+    /// Beginning of an incomplete line.
+    partial: Vec<u8>,
+    is_too_long: bool,
+    number: u64,
+    skips_first: bool,
+}
+
+impl Splitter {
+    /// With `skips_first` the first line is skipped, unless it is empty or begins like a header.
+    fn new(skips_first: bool) -> Self {
+        Self {
+            skips_first,
+            ..Self::default()
+        }
+    }
+
+    fn split(&mut self, mut bytes: &[u8], read_at: Instant, batch: &mut Batch) {
+        while let Some(end) = bytes.iter().position(|&byte| byte == b'\n') {
+            self.extend(&bytes[..end]);
+            bytes = &bytes[end + 1..];
+            self.end_line(read_at, batch);
+        }
+        self.extend(bytes);
+    }
+
+    /// Adds the last line, if it has no line break.
+    fn finish(&mut self, read_at: Instant, batch: &mut Batch) {
+        if self.is_too_long || !self.partial.is_empty() {
+            self.end_line(read_at, batch);
+        }
+    }
+
+    fn extend(&mut self, bytes: &[u8]) {
+        if self.partial.len() + bytes.len() >= Lines::LONGEST {
+            self.is_too_long = true;
+        }
+        if self.is_too_long {
+            self.partial.clear();
+        } else {
+            self.partial.extend_from_slice(bytes);
+        }
+    }
+
+    fn end_line(&mut self, read_at: Instant, batch: &mut Batch) {
+        self.number += 1;
+        let begins_like_header = |text: &[u8]| {
+            text.first()
+                .is_none_or(|first| first.is_ascii_alphabetic() || *first == b'"')
+        };
+        let is_skipped = self.number == 1 && self.skips_first && !begins_like_header(self.partial.trim_ascii());
+        if !is_skipped {
+            let has_names = begins_like_header(self.partial.trim_ascii()) && self.partial.contains(&b',');
+            let start = batch.bytes.len();
+            batch.bytes.extend_from_slice(&self.partial);
+            batch.lines.push_back(Entry {
+                number: self.number,
+                place: (!self.is_too_long).then_some((start, batch.bytes.len())),
+                has_names: has_names && !self.is_too_long,
+                read_at,
+            });
+        }
+        self.partial.clear();
+        self.is_too_long = false;
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -350,5 +477,57 @@ mod tests {
         assert_eq!(all(&b"3,4\n1,2\n"[..], true), [(2, Some("1,2".to_owned()))]);
         assert_eq!(all(&b"r_1,r_2\n1,2\n"[..], true).len(), 2);
         assert_eq!(all(&b"\n1,2\n"[..], true).len(), 2);
+    }
+
+    #[test]
+    fn lines_that_arrive_later_follow_those_that_wait() {
+        let (now, mut splitter) = (Instant::now(), Splitter::new(false));
+        let (mut waiting, mut arrived) = (Batch::default(), Batch::default());
+        for chunk in ["1,a\n22", ",b\n\n", "3"] {
+            splitter.split(chunk.as_bytes(), now, &mut arrived);
+            waiting.append(&mut arrived);
+            assert!(arrived.lines.is_empty() && arrived.bytes.is_empty());
+        }
+        splitter.finish(now, &mut arrived);
+        waiting.append(&mut arrived);
+        let texts = waiting.lines.iter().map(|entry| {
+            let (start, end) = entry.place.unwrap();
+            (entry.number, std::str::from_utf8(&waiting.bytes[start..end]).unwrap())
+        });
+        assert_eq!(Vec::from_iter(texts), [(1, "1,a"), (2, "22,b"), (3, ""), (4, "3")]);
+    }
+
+    #[test]
+    fn headers_are_not_dropped() {
+        let start = Instant::now();
+        let mut batch = Batch::default();
+        let mut splitter = Splitter::default();
+        splitter.split(b"r_2,r_1\n1,2\n3,4\n5,6\n", start, &mut batch);
+        assert_eq!(batch.drop_old(start + Duration::from_millis(101), 1), 2);
+        let texts = batch.lines.iter().map(|entry| {
+            let (from, to) = entry.place.unwrap();
+            String::from_utf8_lossy(&batch.bytes[from..to]).into_owned()
+        });
+        assert!(texts.eq(["r_2,r_1", "5,6"]));
+    }
+
+    #[test]
+    fn old_lines_are_dropped_once_the_oldest_is_too_old() {
+        let start = Instant::now();
+        let after = |millis| start + Duration::from_millis(millis);
+        let mut batch = Batch::default();
+        let mut splitter = Splitter::default();
+        for k in 0..10 {
+            splitter.split(format!("line {k}\n").as_bytes(), after(k), &mut batch);
+        }
+        assert_eq!(batch.drop_old(after(100), 3), 0);
+        assert_eq!(batch.drop_old(after(101), 3), 7);
+        let texts = batch.lines.iter().map(|entry| {
+            let (from, to) = entry.place.unwrap();
+            String::from_utf8_lossy(&batch.bytes[from..to]).into_owned()
+        });
+        assert!(texts.eq(["line 7", "line 8", "line 9"]));
+        assert_eq!(batch.drop_old(after(500), 3), 0);
+        assert_eq!(batch.bytes.len(), 18);
     }
 }
