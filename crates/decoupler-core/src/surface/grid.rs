@@ -8,7 +8,7 @@ use std::ops::RangeInclusive;
 
 use ndarray::{Array2, ArrayView1, ArrayViewMut1, linalg::general_mat_vec_mul};
 
-use super::map::{Axis, SurfaceError};
+use super::error::{Axis, SurfaceError};
 
 /// A rectangular grid through the nodes of a lattice that extends half a pitch beyond them; for scattered nodes, a grid
 /// through the outermost of them.

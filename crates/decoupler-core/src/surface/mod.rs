@@ -6,9 +6,11 @@
 //! constants and planes, and none depends on the unit of length or the origin. [`Lattice`] detects a lattice among points
 //! in any order.
 
+mod error;
 mod grid;
 mod map;
 mod scattered;
 
+pub use error::{Axis, SurfaceError};
 pub use grid::{Grid, Lattice};
-pub use map::{Axis, Interpolation, SurfaceError, SurfaceMap};
+pub use map::{Interpolation, SurfaceMap};

@@ -28,8 +28,8 @@ use glam::DVec2;
 use ndarray::Array2;
 
 use super::{
+    error::{Axis, SurfaceError},
     grid::{CLOSEST_RELATIVE, Grid, GridAxis, Point, Weights, check_coordinates},
-    map::{Axis, SurfaceError},
 };
 
 /// Maximum distance of collinear points from their line, relative to their extent along it.

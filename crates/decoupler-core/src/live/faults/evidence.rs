@@ -1,7 +1,7 @@
 use std::f64::consts::TAU;
 
 use super::{
-    monitor::{Diagnosis, FaultCause, FaultyWire},
+    diagnosis::{Diagnosis, FaultCause, FaultyWire},
     row_fit::{FitPrior, RowFit, RowFitReport, RowReadings},
 };
 

@@ -1,7 +1,7 @@
 use glam::DVec3;
 use rand::Rng;
 
-use super::monitor::{Diagnosis, FaultCause, FaultMonitor, FaultyWire};
+use super::diagnosis::{Diagnosis, FaultCause, FaultyWire, PERSISTENCE, SURE};
 use crate::{
     numerics::chi_squared_quantile,
     scene::{Loading, NoiseSource, Scene},
@@ -193,7 +193,7 @@ impl Shorts {
     pub(super) fn held(&self) -> Option<Diagnosis> {
         let held = self.pairs.iter().filter(|pair| pair.is_held);
         let best = held.max_by(|a, b| a.evidence.total_cmp(&b.evidence))?;
-        let odds = (best.evidence - LIMIT).max(0.0).exp() * FaultMonitor::SURE / (1.0 - FaultMonitor::SURE);
+        let odds = (best.evidence - LIMIT).max(0.0).exp() * SURE / (1.0 - SURE);
         Some(Diagnosis {
             wire: best.wire,
             cause: FaultCause::Shorted,
@@ -264,7 +264,7 @@ impl Pair {
                 self.evidence = 0.0;
                 self.presses.truncate(signature.len());
             }
-            self.is_held &= self.apart < FaultMonitor::PERSISTENCE;
+            self.is_held &= self.apart < PERSISTENCE;
             return;
         }
         self.apart = 0;

@@ -1,5 +1,6 @@
 //! Loadings of the surface, and the drawing of deformations.
 
+mod bessel;
 mod indenter;
 mod press;
 mod sampler;

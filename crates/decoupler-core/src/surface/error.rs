@@ -1,0 +1,78 @@
+use std::fmt;
+
+/// Axis of the invalid coordinates.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Axis {
+    /// The x axis, in a lattice with one coordinate per row-wire.
+    X,
+    /// The y axis, in a lattice with one coordinate per node of a row.
+    Y,
+}
+
+impl fmt::Display for Axis {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter.write_str(match self {
+            Self::X => "x",
+            Self::Y => "y",
+        })
+    }
+}
+
+/// Error in the coordinates of the nodes.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum SurfaceError {
+    /// An axis has no coordinates.
+    #[error("a surface needs at least one {axis} coordinate, and none was given")]
+    NoNodes {
+        /// The empty axis.
+        axis: Axis,
+    },
+    /// A coordinate is NaN, infinite, or so large that distances would overflow.
+    #[error("{axis} coordinate {index} is {value_mm:?} mm; nodes need finite coordinates within ±1e300 mm")]
+    NotFinite {
+        /// Axis of the invalid coordinates.
+        axis: Axis,
+        /// Index in the given coordinates.
+        index: usize,
+        /// Value found, in millimetres.
+        value_mm: f64,
+    },
+    /// Two coordinates coincide, so that the surface would have two heights, or are too close to place points between
+    /// them.
+    #[error("{axis} coordinates {first} and {second} coincide at {value_mm:?} mm; nodes need distinct positions")]
+    Duplicate {
+        /// Axis of the invalid coordinates.
+        axis: Axis,
+        /// Index of the first in the given coordinates.
+        first: usize,
+        /// Index of the second.
+        second: usize,
+        /// Common coordinate in millimetres.
+        value_mm: f64,
+    },
+    /// Two scattered nodes coincide, so that the surface would have two heights.
+    #[error("nodes {first} and {second} coincide; nodes need distinct positions")]
+    SamePlace {
+        /// Index of the first in the given points.
+        first: usize,
+        /// Index of the second.
+        second: usize,
+    },
+    /// Scattered nodes are on one line.
+    #[error("all nodes are on one line, oblique to x and y; a surface needs nodes on both sides of it")]
+    OnOneLine,
+    /// There are too many scattered nodes for a spline.
+    #[error("{count} scattered nodes are too many; a surface can have at most {most}, or a lattice of any size")]
+    TooMany {
+        /// Number of nodes.
+        count: usize,
+        /// Maximum number.
+        most: usize,
+    },
+    /// Some scattered nodes are much closer to each other than to the rest.
+    #[error(
+        "a surface through the nodes would overshoot a thousandfold; leave out one of the nodes that nearly coincide"
+    )]
+    Uneven,
+}
