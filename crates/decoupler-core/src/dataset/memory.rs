@@ -343,7 +343,7 @@ impl MemoryState {
         })
     }
 
-    /// Checks that states for so many series are not too large together.
+    /// Checks that the states of this many series are not too large together.
     ///
     /// # Errors
     /// If they are.
