@@ -214,7 +214,7 @@ fn cancelling_does_not_wait_for_a_training_to_end() {
     let mut experiment = small(Axis::Hidden(vec![3]));
     experiment.base.training.stopping.epochs = 1_000_000;
     experiment.base.training.stopping.max_fail = 1_000_000;
-    experiment.base.training.method = Method::all()[8];
+    experiment.base.training.method = Method::all()[7];
     for experiment in [
         experiment.clone(),
         Experiment {
