@@ -32,8 +32,8 @@ class NetworkRegressor(Decoder):
     hidden_nodes : int, default=12
         Number of hidden nodes.
     method : str, default="lm"
-        Training method: "lm" (Levenberg-Marquardt), "br" (Bayesian regularisation), "varpro"
-        (variable projection), "scg" (scaled conjugate gradient), and other methods of the program.
+        Training method: "lm" (Levenberg-Marquardt), "br" (Bayesian regularisation), "scg"
+        (scaled conjugate gradient), and other methods of the program.
     method_settings : mapping of str to float, default=None
         Settings of the method that differ from their defaults, such as ``{"mu": 0.01}``.
     epochs : int, default=1000

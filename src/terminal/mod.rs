@@ -227,7 +227,7 @@ mod tests {
             ("train --hiden 3", "unexpected argument '--hiden' found"),
             ("train --hidden 0", "'0' for '--hidden"),
             ("train --array 10x6", "10x10_5x30"),
-            ("train --method sgd", "lm, br, varpro"),
+            ("train --method sgd", "lm, br, scg"),
             ("train extra", "unexpected argument 'extra'"),
             ("decode --network n", "--input <FILE> --output <FILE>"),
             ("trian", "unrecognized subcommand 'trian'"),

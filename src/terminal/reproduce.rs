@@ -12,8 +12,8 @@ use decoupler_core::{
     evaluation::{
         CrossValidation, MAX_STARTS,
         experiments::{
-            Axis, CellSummary, Experiment, ExperimentResults, Figure, PaperTable, SummaryErrors, TrialSamples, Verdict,
-            run_experiments, verdicts, worker_threads,
+            Axis, CellSummary, Experiment, ExperimentResults, Figure, PaperTable, SummaryErrors, TrialSamples,
+            run_experiments, worker_threads,
         },
     },
     network::LARGEST_HIDDEN,
@@ -43,8 +43,7 @@ use super::{
 /// Reproduce the paper's tables next to the published figures
 ///
 /// Runs every cell with several seeds on all cores and prints the published error next to the median, minimum and
-/// maximum of ours, the baselines, and which of the paper's claims hold in this run. Ctrl-C stops it and prints the
-/// finished tables.
+/// maximum of ours and the baselines. Ctrl-C stops it and prints the finished tables.
 #[derive(Args)]
 #[command(allow_negative_numbers = true)]
 pub(super) struct Reproduce {
@@ -148,15 +147,7 @@ impl Reproduce {
         )?;
         bar.finish_and_clear();
         drop(graceful);
-        let reproduced: Vec<Reproduced> = tables
-            .into_iter()
-            .zip(results)
-            .map(|(table, results)| Reproduced {
-                table,
-                verdicts: verdicts(&results),
-                results,
-            })
-            .collect();
+        let reproduced: Vec<Reproduced> = tables.into_iter().zip(results).collect();
         // The figures are printed even if something fails here.
         let folder = self.out.iter();
         let written = folder.flat_map(|folder| reproduced.iter().flat_map(|table| write_files(folder, table)));
@@ -235,17 +226,11 @@ fn prepare_folder(folder: &Path, tables: &[PaperTable]) -> Result<(), Failure> {
 }
 
 /// Writes every file of a table, even if others fail.
-fn write_files(folder: &Path, reproduced: &Reproduced) -> [Result<(), PictureError>; 5] {
-    let Reproduced {
-        table,
-        results,
-        verdicts,
-    } = reproduced;
+fn write_files(folder: &Path, (table, results): &Reproduced) -> [Result<(), PictureError>; 5] {
     let [cells, trials, markdown, svg, png] = files(folder, *table);
     let picture = experiment_figure(results).draw();
     let (title, conditions) = (table.heading(), describe_conditions(&results.experiment));
-    let write_markdown =
-        |writer: &mut dyn Write| write_experiment_markdown(&title, &conditions, results, verdicts, writer);
+    let write_markdown = |writer: &mut dyn Write| write_experiment_markdown(&title, &conditions, results, writer);
     [
         atomic_write(&cells, |writer| cells_table(results).write_csv(writer)).map_err(PictureError::from),
         atomic_write(&trials, |writer| trials_table(results).write_csv(writer)).map_err(PictureError::from),
@@ -255,23 +240,19 @@ fn write_files(folder: &Path, reproduced: &Reproduced) -> [Result<(), PictureErr
     ]
 }
 
-/// A reproduced table of the paper.
-pub(super) struct Reproduced {
-    pub(super) table: PaperTable,
-    pub(super) results: ExperimentResults,
-    pub(super) verdicts: Vec<Verdict>,
-}
+/// A table of the paper and its results.
+type Reproduced = (PaperTable, ExperimentResults);
 
 /// The object printed by `reproduce --json`.
 #[derive(Serialize)]
-struct Report<'a> {
+struct Report {
     seconds: f64,
     is_complete: bool,
-    tables: Vec<TableReport<'a>>,
+    tables: Vec<TableReport>,
 }
 
 #[derive(Serialize)]
-struct TableReport<'a> {
+struct TableReport {
     table: u8,
     title: &'static str,
     conditions: String,
@@ -282,7 +263,6 @@ struct TableReport<'a> {
     failures: Vec<String>,
     /// Cells with networks that are worse than the training mean.
     remarks: Vec<String>,
-    verdicts: &'a [Verdict],
 }
 
 /// Figures of a cell of an array.
@@ -303,7 +283,6 @@ struct CellReport {
     z_mm: Figure,
     mean_z_percent: Option<f64>,
     linear_z_percent: Option<f64>,
-    bound_z_percent: Option<f64>,
     epochs_run: Option<f64>,
     training_seconds: Option<f64>,
     epoch_ms: Option<f64>,
@@ -336,7 +315,6 @@ impl CellReport {
             z_mm,
             mean_z_percent: summary.mean_percent,
             linear_z_percent: summary.linear_percent,
-            bound_z_percent: summary.bound_percent,
             epochs_run: summary.epochs_run,
             training_seconds: summary.training_seconds,
             epoch_ms: summary.epoch_ms,
@@ -345,47 +323,34 @@ impl CellReport {
 }
 
 /// Prints one JSON object.
-pub(super) fn print_json(reproduced: &[Reproduced], took: Duration) -> Result<(), Failure> {
-    let table = |reproduced| {
-        let Reproduced {
-            table,
-            results,
-            verdicts,
-        }: &Reproduced = reproduced;
-        TableReport {
-            table: table.number(),
-            title: table.title(),
-            conditions: describe_conditions(&results.experiment),
-            seeds: results.experiment.seeds,
-            cross_validation: results.experiment.cross_validation,
-            is_complete: results.is_complete(),
-            cells: results.summaries().into_iter().filter_map(CellReport::of).collect(),
-            failures: describe_failures(results),
-            remarks: describe_worse_than_mean(results),
-            verdicts,
-        }
+fn print_json(reproduced: &[Reproduced], took: Duration) -> Result<(), Failure> {
+    let table = |(table, results): &Reproduced| TableReport {
+        table: table.number(),
+        title: table.title(),
+        conditions: describe_conditions(&results.experiment),
+        seeds: results.experiment.seeds,
+        cross_validation: results.experiment.cross_validation,
+        is_complete: results.is_complete(),
+        cells: results.summaries().into_iter().filter_map(CellReport::of).collect(),
+        failures: describe_failures(results),
+        remarks: describe_worse_than_mean(results),
     };
     let report = Report {
         seconds: took.as_secs_f64(),
-        is_complete: reproduced.iter().all(|table| table.results.is_complete()),
+        is_complete: reproduced.iter().all(|(_, results)| results.is_complete()),
         tables: reproduced.iter().map(table).collect(),
     };
     print_object(&report)
 }
 
-/// Prints each table with its conditions and verdicts.
-pub(super) fn print_text(reproduced: &[Reproduced], took: Duration) -> Result<(), Failure> {
+/// Prints each table with its conditions.
+fn print_text(reproduced: &[Reproduced], took: Duration) -> Result<(), Failure> {
     print(|output| write_text(reproduced, took, output))
 }
 
 fn write_text(reproduced: &[Reproduced], took: Duration, out: &mut impl Write) -> io::Result<()> {
     let mut notes = BTreeSet::new();
-    for Reproduced {
-        table,
-        results,
-        verdicts,
-    } in reproduced
-    {
+    for (table, results) in reproduced {
         writeln!(
             out,
             "{}\n{}\n",
@@ -400,14 +365,6 @@ fn write_text(reproduced: &[Reproduced], took: Duration, out: &mut impl Write) -
             .map(|row| row.iter().map(|text| Cell::from(text.as_str())).collect());
         writeln!(out, "{}", Table::of_headings(headings, rows).aligned())?;
         notes.insert(table.note);
-        for Verdict {
-            claim,
-            standing,
-            finding,
-        } in verdicts
-        {
-            writeln!(out, "{claim}: {standing}. {finding}")?;
-        }
         for failure in describe_failures(results) {
             writeln!(out, "{failure}")?;
         }

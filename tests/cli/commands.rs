@@ -86,7 +86,7 @@ fn invalid_arguments_end_with_status_2() {
         ("train --seed 18446744073709551616", "from 0"),
         ("train --array 10x6", "M1xM2_M3xM4"),
         ("train --array 10x6_3x0", "column-wires (M4)"),
-        ("train --method adam", "lm, br, varpro"),
+        ("train --method adam", "lm, br, scg"),
         ("train --set mu", "NAME=VALUE"),
         ("train --set mu=small", "not a number"),
         ("train --set mu=NaN", "mu is NaN"),

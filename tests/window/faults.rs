@@ -48,7 +48,7 @@ const EXPORTS: [(&str, &[(&str, &str)]); 5] = [
     (
         "Experiments",
         &[
-            ("Table and verdicts, Markdown", "table.md"),
+            ("Table with settings, Markdown", "table.md"),
             ("Every trial, CSV", "trials.csv"),
         ],
     ),

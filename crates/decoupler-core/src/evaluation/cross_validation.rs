@@ -49,8 +49,6 @@ pub struct CrossValidated {
     pub mean: Array2<f64>,
     /// Answers of the linear maps.
     pub linear: Array2<f64>,
-    /// `true` if the fold after the test fold is held out for validation.
-    holds_out: bool,
     /// Epochs and time of the trainings.
     pub effort: Effort,
 }
@@ -154,14 +152,8 @@ impl CrossValidated {
             network,
             mean,
             linear,
-            holds_out,
             effort,
         }))
-    }
-
-    /// Returns the training samples for test fold `fold` of `set`, the set that was cross-validated.
-    pub(super) fn training(&self, set: &Dataset, fold: usize) -> Dataset {
-        split(set, &self.folds, fold, self.holds_out).training
     }
 
     /// Returns the errors of each target over all samples of `set`, the set that was cross-validated.

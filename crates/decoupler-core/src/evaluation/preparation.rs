@@ -109,20 +109,12 @@ impl Run {
         is_cancelled: &dyn Fn() -> bool,
         begin: impl FnOnce(&[Task]) -> Result<Vec<StartTrainer>, RunError>,
     ) -> Result<Option<Self>, RunError> {
-        settings.check_network()?;
-        check_sets(&settings, &sets.split, &sets.test)?;
-        let test = &sets.test;
-        let (mut mean, mut linear) = fit_baselines(&sets.split.training, &settings)?;
+        let [mean, linear] = mean_and_linear(&settings, &sets)?;
         if is_cancelled() {
             return Ok(None);
         }
-        let errors = |answers| TestErrors::measure(&settings.source, test, &answers);
-        let (mean, linear) = (
-            errors(decode_set(&mut mean, test)?),
-            errors(decode_set(&mut linear, test)?),
-        );
         let reference = match settings.simulated() {
-            Some(simulated) => Some(reference(&simulated, test)?),
+            Some(simulated) => Some(reference(&simulated, &sets.test)?),
             None => None,
         };
         let (reference, no_reference) = match reference {
@@ -144,6 +136,21 @@ impl Run {
             baselines: Some(baselines),
             ..run
         }))
+    }
+
+    /// Prepares a run without the Bayesian reference, and measures the training mean and the linear baseline. Returns
+    /// `None` once `is_cancelled`.
+    pub(super) fn without_reference(
+        settings: RunSettings,
+        sets: RunSets,
+        is_cancelled: &dyn Fn() -> bool,
+    ) -> Result<Option<(Self, [TestErrors; 2])>, RunError> {
+        let measured = mean_and_linear(&settings, &sets)?;
+        if is_cancelled() {
+            return Ok(None);
+        }
+        let run = Self::of_networks(settings, sets, is_cancelled, |tasks| begin(settings, tasks))?;
+        Ok(run.map(|run| (run, measured)))
     }
 
     /// Prepares a run of networks only, without baselines and reference, such as the run of a fold.
@@ -203,6 +210,18 @@ impl Run {
             intervals: None,
         }))
     }
+}
+
+/// Checks settings and sets, and returns the errors of the training mean and of the linear baseline on the test set.
+fn mean_and_linear(settings: &RunSettings, RunSets { split, test, .. }: &RunSets) -> Result<[TestErrors; 2], RunError> {
+    settings.check_network()?;
+    check_sets(settings, split, test)?;
+    let (mut mean, mut linear) = fit_baselines(&split.training, settings)?;
+    let errors = |answers| TestErrors::measure(&settings.source, test, &answers);
+    Ok([
+        errors(decode_set(&mut mean, test)?),
+        errors(decode_set(&mut linear, test)?),
+    ])
 }
 
 /// Returns the run of a preparation that cannot be cancelled.

@@ -15,7 +15,7 @@ use super::{
     gradient_descent::{
         AdaptiveDescent, AdaptiveState, GradientDescent, Momentum, Resilient, ResilientState, StepMomentum,
     },
-    levenberg_marquardt::{DampedState, LevenbergMarquardt, ProjectionState, VariableProjection},
+    levenberg_marquardt::{DampedState, LevenbergMarquardt},
     scaled_conjugate_gradient::{ConjugateState, ScaledConjugateGradient},
     setting::Settings,
 };
@@ -162,9 +162,6 @@ methods! {
     /// Levenberg-Marquardt that keeps the weights as small as the data permit (`trainbr`). The normal equations are
     /// always factored, since the method needs the trace of their inverse.
     BayesianRegularization(RegularizationSettings) with state: BayesianState,
-    /// Exact solution for the output layer, Gauss-Newton steps on the hidden layer. The normal equations are always
-    /// factored, since the damping becomes so small that conjugate gradients would need thousands of iterations.
-    VariableProjection(Damping) with state: ProjectionState,
     /// Møller's scaled conjugate gradient (`trainscg`).
     ScaledConjugateGradient(ScaledConjugateGradientSettings) with state: ConjugateState,
     /// Resilient back-propagation (`trainrp`).
@@ -200,7 +197,7 @@ impl Method {
     /// does not fall in every one of them.
     pub fn follows_gradients(&self) -> bool {
         match self {
-            Self::LevenbergMarquardt(_) | Self::BayesianRegularization(_) | Self::VariableProjection(_) => false,
+            Self::LevenbergMarquardt(_) | Self::BayesianRegularization(_) => false,
             Self::ScaledConjugateGradient(_)
             | Self::Resilient(_)
             | Self::AdaptiveDescent(_)

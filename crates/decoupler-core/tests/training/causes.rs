@@ -41,7 +41,6 @@ fn invalid_settings_are_refused_with_a_remedy() {
             "mu is 1e12, above largest mu, which is 1e10: lower mu, or raise largest mu",
         ),
         ("br", vec![("largest mu", 1e-6)], "lower mu, or raise largest mu"),
-        ("varpro", vec![("mu", 1e300)], "mu is 1e300, above largest mu"),
         (
             "rp",
             vec![("first step length", 1e300)],

@@ -79,7 +79,7 @@ fn training_stops_at_the_first_epoch_with_max_failures() {
 
 #[test]
 fn another_method_starts_counting_from_zero() {
-    let rp = Method::all()[4];
+    let rp = Method::all()[3];
     let mut trainer = trainer(rp);
     while trainer.latest().validation_failures == 0 {
         trainer.step();

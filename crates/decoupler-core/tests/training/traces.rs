@@ -65,11 +65,10 @@ fn with_the_fixtures_settings(mut method: Method) -> Method {
     method
 }
 
-/// Maximum relative difference from the fixture's weights: rounding, amplified if the problem is stiff (most if the
-/// output layer follows the hidden layer exactly, `varpro`) or if two gradients 5e-5 apart are subtracted (`scg`).
+/// Maximum relative difference from the fixture's weights: rounding, amplified if the problem is stiff or if two gradients 5e-5 apart are subtracted (`scg`).
 fn tolerance(method: &str) -> f64 {
     match method {
-        "scg" | "varpro" => 1e-5,
+        "scg" => 1e-5,
         "lm" | "br" => 1e-7,
         _ => 1e-12,
     }

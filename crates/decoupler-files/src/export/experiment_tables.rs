@@ -11,7 +11,7 @@ use decoupler_core::{
         Channel, Combination, CrossValidation, Simulation, TargetErrors,
         experiments::{
             AxisKind, CellResults, CellSummary, Experiment, ExperimentRecording, ExperimentResults, Figure,
-            SummaryErrors, Trial, Verdict,
+            SummaryErrors, Trial,
         },
     },
     network::HiddenSuggestions,
@@ -67,23 +67,20 @@ impl ExperimentTable {
     /// The results so far.
     pub fn new(results: &ExperimentResults) -> Self {
         let summaries = results.summaries();
-        let layout = Layout {
-            has_published: results.cells.iter().any(|cell| cell.cell.published.is_some()),
-            has_bound: results.experiment.recording.is_none() || summaries.iter().any(has_bound),
-        };
+        let has_published = results.cells.iter().any(|cell| cell.cell.published.is_some());
         let axes = results.experiment.axes().map(|axis| ExperimentColumn {
             heading: axis.name(),
             kind: ExperimentColumnKind::Axis,
         });
-        let figures = summaries
+        let first = summaries
             .first()
-            .map(|summary| layout.figures(summary))
+            .map(|summary| figures(summary, has_published))
             .unwrap_or_default();
-        let columns = axes.chain(figures.into_iter().map(|(column, ..)| column)).collect();
+        let columns = axes.chain(first.into_iter().map(|(column, ..)| column)).collect();
         let row = |(cell, summary): (&CellResults, &CellSummary)| {
             let places = [cell.cell.column, cell.cell.row].map(|place| Some(place as f64));
             let labels = places.into_iter().zip(results.cell_labels(cell));
-            let figures = layout.figures(summary).into_iter();
+            let figures = figures(summary, has_published).into_iter();
             labels.chain(figures.map(|(_, value, text)| (value, text))).unzip()
         };
         let (values, rows) = results.cells.iter().zip(&summaries).map(row).unzip();
@@ -122,74 +119,57 @@ impl ExperimentTable {
 }
 
 const NODES_NOTE: &str = "Median, minimum and maximum over seeds (and repeats). mean: always answering the training mean; \
-     linear: best affine map on resistance; bound: least-squares optimum of any network with this number of hidden \
-     nodes; epochs: mean of the starts; training: one network, all its starts.";
+     linear: best affine map on resistance; epochs: mean of the starts; training: one network, all its starts.";
 
 const TARGETS_NOTE: &str = "Median, minimum and maximum over seeds. error: mean absolute error in percent of the range of \
      the target, averaged over the targets that vary, and R² likewise; mean: always answering the training mean; ridge: \
-     ridge regression; bound: error of the optimum of any network with this number of hidden nodes; epochs: mean of \
-     the starts; training: one network, all its starts.";
+     ridge regression; epochs: mean of the starts; training: one network, all its starts.";
 
-fn has_bound(summary: &CellSummary) -> bool {
-    summary.bound_percent.is_some_and(|percent| percent > 0.0)
-}
-
-/// Optional columns of a table.
-struct Layout {
-    has_published: bool,
-    has_bound: bool,
-}
-
-impl Layout {
-    /// Columns with the figures of a cell.
-    fn figures(&self, summary: &CellSummary) -> Vec<CellFigure> {
-        use ExperimentColumnKind::{Linear, Other, Published, Ranking, Time};
-        let number = |heading, kind, value: Option<f64>| {
-            let column = ExperimentColumn { heading, kind };
-            (column, value, format_number(value))
-        };
-        let published = |heading, figure: &Figure| {
-            let value = figure.published;
-            self.has_published.then(|| number(heading, Published, value))
-        };
-        let percent = &summary.percent;
-        let [publ, median, mean, linear, bound] = match summary.errors {
-            SummaryErrors::Nodes { .. } => ["Z % publ.", "Z % median", "mean Z %", "linear Z %", "bound Z %"],
-            SummaryErrors::Targets { .. } => ["error % publ.", "error % median", "mean %", "ridge %", "bound %"],
-        };
-        let mut figures = Vec::from_iter(published(publ, percent));
-        figures.extend([
-            number(median, Ranking, percent.median),
-            number("min", Other, percent.min),
-            number("max", Other, percent.max),
-        ]);
-        match &summary.errors {
-            SummaryErrors::Nodes {
-                x_percent, y_percent, ..
-            } => {
-                figures.extend(published("X % publ.", x_percent));
-                figures.push(number("X % median", Other, x_percent.median));
-                figures.extend(published("Y % publ.", y_percent));
-                figures.push(number("Y % median", Other, y_percent.median));
-            }
-            SummaryErrors::Targets { r2 } => figures.push(number("R² median", Other, r2.median)),
+/// Columns with the figures of a cell.
+fn figures(summary: &CellSummary, has_published: bool) -> Vec<CellFigure> {
+    use ExperimentColumnKind::{Linear, Other, Published, Ranking, Time};
+    let number = |heading, kind, value: Option<f64>| {
+        let column = ExperimentColumn { heading, kind };
+        (column, value, format_number(value))
+    };
+    let published = |heading, figure: &Figure| {
+        let value = figure.published;
+        has_published.then(|| number(heading, Published, value))
+    };
+    let percent = &summary.percent;
+    let [publ, median, mean, linear] = match summary.errors {
+        SummaryErrors::Nodes { .. } => ["Z % publ.", "Z % median", "mean Z %", "linear Z %"],
+        SummaryErrors::Targets { .. } => ["error % publ.", "error % median", "mean %", "ridge %"],
+    };
+    let mut figures = Vec::from_iter(published(publ, percent));
+    figures.extend([
+        number(median, Ranking, percent.median),
+        number("min", Other, percent.min),
+        number("max", Other, percent.max),
+    ]);
+    match &summary.errors {
+        SummaryErrors::Nodes {
+            x_percent, y_percent, ..
+        } => {
+            figures.extend(published("X % publ.", x_percent));
+            figures.push(number("X % median", Other, x_percent.median));
+            figures.extend(published("Y % publ.", y_percent));
+            figures.push(number("Y % median", Other, y_percent.median));
         }
-        figures.push(number(mean, Other, summary.mean_percent));
-        figures.push(number(linear, Linear, summary.linear_percent));
-        if self.has_bound {
-            figures.push(number(bound, Other, summary.bound_percent));
-        }
-        figures.push(number("epochs", Other, summary.epochs_run));
-        let seconds = summary.training_seconds;
-        let time = seconds.and_then(|seconds| Duration::try_from_secs_f64(seconds).ok());
-        let column = ExperimentColumn {
-            heading: "training",
-            kind: Time,
-        };
-        let time = time.map_or_else(|| format_number(None), format_duration);
-        figures.push((column, seconds, time));
-        figures
+        SummaryErrors::Targets { r2 } => figures.push(number("R² median", Other, r2.median)),
     }
+    figures.push(number(mean, Other, summary.mean_percent));
+    figures.push(number(linear, Linear, summary.linear_percent));
+    figures.push(number("epochs", Other, summary.epochs_run));
+    let seconds = summary.training_seconds;
+    let time = seconds.and_then(|seconds| Duration::try_from_secs_f64(seconds).ok());
+    let column = ExperimentColumn {
+        heading: "training",
+        kind: Time,
+    };
+    let time = time.map_or_else(|| format_number(None), format_duration);
+    figures.push((column, seconds, time));
+    figures
 }
 
 /// Returns the table of all cells, for programs.
@@ -222,12 +202,9 @@ pub fn cells_table(results: &ExperimentResults) -> Table {
                 "percent_of_range"
             }
         };
-        let baselines =
-            BASELINES
-                .into_iter()
-                .zip([summary.mean_percent, summary.linear_percent, summary.bound_percent]);
-        fields.extend(baselines.map(|(baseline, percent)| field(&format!("{baseline}_{name}"), percent.into())));
         fields.extend([
+            field(&format!("mean_{name}"), summary.mean_percent.into()),
+            field(&format!("linear_{name}"), summary.linear_percent.into()),
             field("epochs_run", summary.epochs_run.into()),
             field("training_seconds", summary.training_seconds.into()),
             field("epoch_ms", summary.epoch_ms.into()),
@@ -236,9 +213,6 @@ pub fn cells_table(results: &ExperimentResults) -> Table {
     });
     table_of(rows)
 }
-
-/// Names of the baselines in the fields of tables for programs.
-const BASELINES: [&str; 3] = ["mean", "linear", "bound"];
 
 /// Returns the table of all trials, for programs. Repeats are counted from 1.
 pub fn trials_table(results: &ExperimentResults) -> Table {
@@ -269,13 +243,9 @@ pub fn trials_table(results: &ExperimentResults) -> Table {
                 "percent_of_range"
             }
         };
-        let bound = trial.bottleneck.as_ref().and_then(|errors| errors.percent());
-        let baselines =
-            BASELINES
-                .into_iter()
-                .zip([trial.baselines.mean.percent(), trial.baselines.linear.percent(), bound]);
-        fields.extend(baselines.map(|(baseline, percent)| field(&format!("{baseline}_{name}"), percent.into())));
         fields.extend([
+            field(&format!("mean_{name}"), trial.mean.percent().into()),
+            field(&format!("linear_{name}"), trial.linear.percent().into()),
             field("epochs_run", trial.epochs.into()),
             field("seconds", trial.seconds.into()),
         ]);
@@ -353,7 +323,7 @@ fn table_of(rows: impl Iterator<Item = Vec<Field>>) -> Table {
     Table { columns, rows }
 }
 
-/// Writes table and verdicts as Markdown under `title`, with `conditions` between.
+/// Writes the table as Markdown under `title`, with `conditions` between.
 ///
 /// # Errors
 /// Any error of `writer`.
@@ -361,22 +331,12 @@ pub fn write_experiment_markdown(
     title: &str,
     conditions: &str,
     results: &ExperimentResults,
-    verdicts: &[Verdict],
     writer: &mut dyn Write,
 ) -> io::Result<()> {
     let table = ExperimentTable::new(results);
     let text = table.table().text(TableForm::Markdown);
     writeln!(writer, "## {title}\n\n{conditions}\n\n{text}")?;
-    writeln!(writer, "{}\n", table.note)?;
-    for Verdict {
-        claim,
-        standing,
-        finding,
-    } in verdicts
-    {
-        writeln!(writer, "* {claim}: **{standing}**. {finding}")?;
-    }
-    Ok(())
+    writeln!(writer, "{}", table.note)
 }
 
 /// Describes the conditions of an experiment in one or two sentences.
@@ -487,7 +447,7 @@ pub fn describe_worse_than_mean(results: &ExperimentResults) -> Vec<String> {
 }
 
 fn is_worse_than_mean(trial: &Trial) -> bool {
-    let mean = &trial.baselines.mean;
+    let mean = &trial.mean;
     match (trial.errors.nodes(), mean.nodes()) {
         (Some(errors), Some(mean)) => errors.z_mm > mean.z_mm,
         // An error that is not finite counts as worse.

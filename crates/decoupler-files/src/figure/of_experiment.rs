@@ -104,9 +104,9 @@ fn along_the_axis(results: &ExperimentResults, summaries: &[CellSummary]) -> Plo
     };
     // Categories are not joined by lines.
     let joined = |look: Look| if is_number { look.joined() } else { look };
-    let reference = |hue, marker| match is_number {
-        true => Look::line(hue, LineStyle::Dashed),
-        false => Look::marker(hue, marker),
+    let reference = match is_number {
+        true => Look::line(Hue::Grey, LineStyle::Dashed),
+        false => Look::marker(Hue::Grey, Marker::Ring),
     };
     let ours = cells.iter().filter_map(|(x, cell)| {
         let Measured { median, min, max, .. } = cell.percent;
@@ -115,11 +115,6 @@ fn along_the_axis(results: &ExperimentResults, summaries: &[CellSummary]) -> Plo
             ..PlotPoint::from([*x, median?])
         })
     });
-    let bound = if is_number {
-        points(|cell| cell.bound_percent)
-    } else {
-        Vec::new()
-    };
     let published = Look {
         line: is_number.then_some(LineStyle::Fine),
         ..Look::marker(Hue::Ink, Marker::Square)
@@ -130,10 +125,9 @@ fn along_the_axis(results: &ExperimentResults, summaries: &[CellSummary]) -> Plo
                 None => "linear map",
                 Some(_) => "ridge",
             },
-            reference(Hue::Grey, Marker::Ring),
+            reference,
             points(|cell| cell.linear_percent),
         ),
-        Series::new("bound of the hidden nodes", reference(Hue::Green, Marker::Ring), bound),
         Series::new("published", published, points(|cell| cell.percent.published)),
         Series {
             points: ours.collect(),

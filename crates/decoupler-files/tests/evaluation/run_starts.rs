@@ -155,7 +155,7 @@ fn a_run_continues_until_every_start_has_ended_or_all_are_stopped() {
 #[test]
 fn every_start_continues_with_another_method_and_keeps_counting() {
     let mut settings = settings(2);
-    settings.training.method = Method::all()[8];
+    settings.training.method = Method::all()[7];
     let mut run = Run::prepare(settings).unwrap();
     (0..5).for_each(|_| {
         run.step();

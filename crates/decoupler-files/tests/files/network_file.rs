@@ -138,6 +138,11 @@ fn invalid_contents_are_named() {
             "unknown field `nodes`",
         ),
         (
+            "a training method that no longer exists",
+            replaced("\"levenberg_marquardt\"", "\"variable_projection\""),
+            "unknown variant `variable_projection`, expected one of `levenberg_marquardt`",
+        ),
+        (
             "one weight missing",
             replaced(&format!("{first_weight},"), "\"hidden_layer\":["),
             "hidden layer has 94 weights, but 95",

@@ -6,7 +6,7 @@ use decoupler_core::{
     dataset::FoldUnit,
     evaluation::{
         MAX_STARTS,
-        experiments::{AxisKind, PaperTable, verdicts},
+        experiments::{AxisKind, PaperTable},
     },
     text::counted,
     training::StoppingRules,
@@ -342,12 +342,12 @@ const TRIALS: FileWords = FileWords {
 };
 
 const MARKDOWN: FileWords = FileWords {
-    kind: "table and verdicts",
-    description: "The table as shown, the settings behind it and the verdicts, as Markdown.",
+    kind: "table",
+    description: "The table as shown with the settings behind it, as Markdown.",
     extensions: &["md"],
 };
 
-/// Returns the exports of the current experiment: figure, tables and verdicts.
+/// Returns the exports of the current experiment: figure and tables.
 pub(super) fn experiment_exports(view: &ExperimentsView, colours: SequentialMap) -> Vec<Export<'_>> {
     let topic = view.topic;
     let stem = topic.name().to_lowercase().replace(' ', "_");
@@ -366,16 +366,16 @@ pub(super) fn experiment_exports(view: &ExperimentsView, colours: SequentialMap)
     exports.push(csv_export("Every trial", TRIALS, format!("{stem}_trials"), trials));
     exports.push(Export {
         group: ExportGroup::Tables,
-        name: "Table and verdicts".to_owned(),
+        name: "Table with settings".to_owned(),
         form: "Markdown".to_owned(),
         description: MARKDOWN.description,
         ask: outcome.clone().map(|outcome| -> Ask<'_> {
             Box::new(move || {
                 let results = Arc::clone(&outcome.results);
                 let contents = Contents::new(move |path| {
-                    let (conditions, verdicts) = (describe_conditions(&results.experiment), verdicts(&results));
+                    let conditions = describe_conditions(&results.experiment);
                     atomic_write(path, |writer| {
-                        write_experiment_markdown(&topic.heading(), &conditions, &results, &verdicts, writer)
+                        write_experiment_markdown(&topic.heading(), &conditions, &results, writer)
                     })
                 });
                 Effect::ChooseFile(FileTask::save(MARKDOWN, &stem, contents))

@@ -14,8 +14,8 @@ use decoupler_core::{
     evaluation::{
         Problem,
         experiments::{
-            CellSummary, Experiment, ExperimentResults, Finished, PaperTable, Trial, TrialSamples, Verdict,
-            run_experiments, verdicts, worker_threads,
+            CellSummary, Experiment, ExperimentResults, Finished, PaperTable, Trial, TrialSamples, run_experiments,
+            worker_threads,
         },
     },
     training::EpochRecord,
@@ -150,8 +150,6 @@ pub struct Outcome {
     pub figure: Figure,
     /// Results of each cell.
     pub summaries: Vec<CellSummary>,
-    /// Verdicts on the paper's claims.
-    pub verdicts: Vec<Verdict>,
     /// Ending of the experiment, once it has ended.
     pub ending: Option<Ending>,
     /// Time it took, once it has ended.
@@ -168,7 +166,6 @@ impl Outcome {
             table: ExperimentTable::new(&results),
             figure: experiment_figure(&results),
             summaries: results.summaries(),
-            verdicts: Vec::new(),
             results: Arc::new(results),
             plan,
             ending: None,
@@ -206,7 +203,6 @@ impl Outcome {
         self.table = ExperimentTable::new(&self.results);
         self.figure = experiment_figure(&self.results);
         self.summaries = self.results.summaries();
-        self.verdicts = verdicts(&self.results);
     }
 }
 

@@ -1,18 +1,16 @@
-//! The results of an experiment: table, figure and verdicts.
+//! The results of an experiment: table, figure and remarks.
 
 use std::time::Instant;
 
-use decoupler_core::{
-    evaluation::experiments::{Verdict, VerdictStatus},
-    text::counted,
-};
+use decoupler_core::text::counted;
 use decoupler_files::{
-    export::{ExperimentColumn, ExperimentColumnKind, ExperimentTable, describe_conditions},
+    export::{
+        ExperimentColumn, ExperimentColumnKind, ExperimentTable, describe_conditions, describe_failures,
+        describe_worse_than_mean,
+    },
     figure::{Figure, HeatMap},
 };
-use eframe::egui::{
-    Align, Color32, FontId, Frame, Key, Label, Layout, Margin, Modifiers, RichText, Sense, Ui, Vec2, vec2,
-};
+use eframe::egui::{Align, FontId, Key, Label, Layout, Modifiers, RichText, Sense, Ui, Vec2, vec2};
 
 use super::{
     ExperimentLook, ExperimentsView, Outcome, Topic,
@@ -23,7 +21,7 @@ use super::{
 use crate::window::{
     plotting::{CellPointed, Pointer, heat_map_ui, legend_ui, plots_ui},
     shared::{Effect, Export, Matter, Notice, Offers, Shared, Unfinished, View},
-    theme::{Palette, Theme, radius, semibold, space, type_size},
+    theme::{Theme, semibold, space, type_size},
     widgets::{
         ColumnWidth, TableCell, TableClick, TableColumn, TableRow, TableView, card_ui, ghost_button, invitation_ui,
         placeholder_ui, scrolled_ui, section_heading_ui,
@@ -98,7 +96,7 @@ impl View for ExperimentsView {
         panel::form_ui(ui, self, shared, effects);
     }
 
-    /// Shows the table above, figure and verdicts below.
+    /// Shows the table above, figure and remarks below.
     fn body_ui(&mut self, ui: &mut Ui, shared: &Shared, effects: &mut Vec<Effect>) {
         let whole = ui.available_rect_before_wrap();
         if self.shown_folder().is_some() {
@@ -120,22 +118,28 @@ impl View for ExperimentsView {
             results_card_ui(ui, self.topic, outcome, &mut look, shared, effects);
         });
         let lower = lower.with_min_y(lower.min.y + gap);
-        let (left, right) = lower.split_left_right_at_x(lower.left() + (0.6 * lower.width()).round());
+        let failures = describe_failures(&outcome.results);
+        let remarks = describe_worse_than_mean(&outcome.results);
+        let is_empty = outcome.trials().0 == 0;
+        let share = match is_empty || !failures.is_empty() || !remarks.is_empty() {
+            true => 0.6,
+            false => 1.0,
+        };
+        let (left, right) = lower.split_left_right_at_x(lower.left() + (share * lower.width()).round());
         card_ui(ui, left, |ui| {
             picture_ui(ui, self.topic, outcome, &mut look, shared, effects);
         });
         let mut is_wanted = false;
-        card_ui(ui, right.with_min_x(right.min.x + gap), |ui| {
-            if outcome.trials().0 == 0 {
-                match hint(self) {
-                    Some(hint) => placeholder_ui(ui, hint),
-                    None => is_wanted = invitation_ui(ui, INVITATION, "Run now", self.can_run()),
+        if share < 1.0 {
+            card_ui(ui, right.with_min_x(right.min.x + gap), |ui| match hint(self) {
+                Some(hint) if is_empty => placeholder_ui(ui, hint),
+                None if is_empty => is_wanted = invitation_ui(ui, INVITATION, "Run now", self.can_run()),
+                _ => {
+                    section_heading_ui(ui, "Remarks");
+                    scrolled_ui(ui, "remarks", |ui| remarks_ui(ui, &failures, &remarks));
                 }
-                return;
-            }
-            section_heading_ui(ui, "Verdicts");
-            scrolled_ui(ui, "verdicts", |ui| verdicts_ui(ui, outcome));
-        });
+            });
+        }
         ui.allocate_rect(whole, Sense::hover());
         self.look = look;
         if is_wanted {
@@ -202,51 +206,13 @@ pub fn sweep_ui(
     }
 }
 
-/// Shows the verdicts on the paper's claims with their numbers, then failed trials and other remarks.
-pub fn verdicts_ui(ui: &mut Ui, outcome: &Outcome) {
-    for verdict in &outcome.verdicts {
-        verdict_ui(ui, verdict);
-    }
+/// Shows failed trials and other remarks.
+fn remarks_ui(ui: &mut Ui, failures: &[String], remarks: &[String]) {
     let palette = Theme::of(ui).palette;
-    for failure in decoupler_files::export::describe_failures(&outcome.results) {
-        ui.label(RichText::new(failure).size(type_size().note).color(palette.bad));
-    }
-    for remark in decoupler_files::export::describe_worse_than_mean(&outcome.results) {
-        ui.label(RichText::new(remark).size(type_size().note).color(palette.warning));
-    }
-}
-
-fn verdict_ui(ui: &mut Ui, verdict: &Verdict) {
-    let palette = Theme::of(ui).palette;
-    let colour = colour_of(verdict.standing, &palette);
-    ui.horizontal_wrapped(|ui| {
-        Frame::new()
-            .fill(colour.gamma_multiply(0.16))
-            .corner_radius(radius())
-            .inner_margin(Margin::symmetric(6, 1))
-            .show(ui, |ui| {
-                ui.label(
-                    RichText::new(verdict.standing.to_string())
-                        .font(semibold(type_size().small))
-                        .color(colour),
-                );
-            });
-        ui.label(RichText::new(verdict.claim).font(semibold(type_size().note)));
-    });
-    ui.label(
-        RichText::new(&verdict.finding)
-            .size(type_size().note)
-            .color(palette.dim),
-    );
-    ui.add_space(space(2));
-}
-
-fn colour_of(standing: VerdictStatus, palette: &Palette) -> Color32 {
-    match standing {
-        VerdictStatus::Holds => palette.good,
-        VerdictStatus::HoldsInPart => palette.warning,
-        VerdictStatus::Fails => palette.bad,
-        VerdictStatus::Undecided => palette.dim,
+    for (texts, colour) in [(failures, palette.bad), (remarks, palette.warning)] {
+        for text in texts {
+            ui.label(RichText::new(text).size(type_size().note).color(colour));
+        }
     }
 }
 

@@ -2,21 +2,16 @@
 //!
 //! An [`Experiment`] is a grid of cells; each cell is run several times (seeds, repeats of a cross-validation) by
 //! independent jobs, each on its own [`TrialSamples`]. [`run_experiments`] runs them on all cores and passes on each
-//! [`Trial`] as it finishes; [`ExperimentResults`] collects them and can be evaluated at any time; [`verdicts`] judges
-//! which of the paper's claims they support.
+//! [`Trial`] as it finishes; [`ExperimentResults`] collects them and can be evaluated at any time.
 
 mod axis;
 mod experiment;
-mod growth;
 mod results;
 mod runner;
 mod trial;
-mod verdict;
 
 pub use axis::{Axis, AxisKind};
 pub use experiment::{Cell, Experiment, ExperimentError, ExperimentRecording, PaperTable};
-pub use growth::Growth;
 pub use results::{CellResults, CellSummary, ExperimentResults, Figure, SummaryErrors};
 pub use runner::{Finished, run_experiments, worker_threads};
-pub use trial::{Bottleneck, RecordedSamples, Trial, TrialFailure, TrialSamples};
-pub use verdict::{Verdict, VerdictStatus, verdicts};
+pub use trial::{RecordedSamples, Trial, TrialFailure, TrialSamples};

@@ -1,4 +1,4 @@
-use std::{cmp::Ordering, sync::Arc};
+use std::sync::Arc;
 
 use serde::Serialize;
 
@@ -7,7 +7,6 @@ use crate::{
     dataset::{Seed, SplitBy},
     evaluation::{Errors, Problem, PublishedErrors, Spread, TargetErrors},
     sensor::ArrayScale,
-    text::format_number,
 };
 
 /// Results of an experiment so far.
@@ -124,71 +123,6 @@ impl CellResults {
     }
 }
 
-#[cfg(test)]
-pub(super) mod tests {
-    use super::*;
-    use crate::{
-        dataset::Seed,
-        evaluation::{Baselines, Errors, NodeAddress, TestErrors, experiments::PaperTable},
-    };
-
-    fn errors(z_percent: f64) -> TestErrors {
-        TestErrors::Nodes(Errors {
-            z_percent: Some(z_percent),
-            x_percent: Some(0.1),
-            y_percent: Some(1e-12),
-            z_mm: z_percent / 20.0,
-            z_full_scale_percent: 5.0 * z_percent,
-            worst_mm: 0.5,
-            worst_node: NodeAddress::default(),
-        })
-    }
-
-    /// Returns a trial with these errors; the linear map has 1.6 %, and an epoch takes a second.
-    pub(in crate::evaluation::experiments) fn trial(seed: u64, z_percent: f64) -> Trial {
-        Trial {
-            seed: Seed(seed),
-            repeat: 0,
-            errors: errors(z_percent),
-            baselines: Baselines {
-                mean: errors(5.5),
-                linear: errors(1.6),
-                reference: None,
-                no_reference: None,
-            },
-            bottleneck: Some(errors(0.0)),
-            networks: 1,
-            epochs: 10,
-            seconds: 10.0,
-            min_epoch_seconds: 1.0,
-            states: Vec::new(),
-        }
-    }
-
-    #[test]
-    fn results_do_not_depend_on_the_order_in_which_trials_finish() {
-        let mut forwards = ExperimentResults::new(PaperTable::HiddenNodes.experiment());
-        let mut backwards = forwards.clone();
-        let trials = [trial(0, 3.0), trial(1, 1.0), trial(2, 2.0), trial(3, 9.0)];
-        for trial in &trials {
-            forwards.record(2, Ok(trial.clone()));
-        }
-        for trial in trials.iter().rev() {
-            backwards.record(2, Ok(trial.clone()));
-        }
-        assert_eq!(forwards.cells[2].trials, trials);
-        assert_eq!(backwards.cells[2].trials, trials);
-        assert_eq!(forwards.cells[2].median_trial().unwrap().seed, Seed(2));
-        assert!(!forwards.cells[2].is_complete());
-        let z = forwards.cells[2].summary().percent;
-        assert_eq!(
-            [z.published, z.min, z.median, z.max],
-            [Some(2.37), Some(1.0), Some(2.5), Some(9.0)]
-        );
-        assert_eq!(forwards.cells[1].median_trial(), None);
-    }
-}
-
 /// Figures of a cell for tables and files: medians unless stated otherwise, `None` if there is no such figure (yet).
 #[derive(Clone, Debug, PartialEq)]
 pub struct CellSummary {
@@ -221,8 +155,6 @@ pub struct CellSummary {
     pub mean_percent: Option<f64>,
     /// Error in percent of the linear baseline.
     pub linear_percent: Option<f64>,
-    /// Error in percent of the best possible answer with this number of hidden nodes.
-    pub bound_percent: Option<f64>,
     /// Mean number of epochs per start.
     pub epochs_run: Option<f64>,
     /// Training time of a network, over all its starts.
@@ -298,9 +230,8 @@ impl CellResults {
                     r2: self.figure(|_| None, |trial| TargetErrors::over_all(trial.errors.targets())?.r2),
                 },
             },
-            mean_percent: median(|trial| trial.baselines.mean.percent()),
-            linear_percent: median(|trial| trial.baselines.linear.percent()),
-            bound_percent: median(|trial| trial.bottleneck.as_ref()?.percent()).map(without_rounding),
+            mean_percent: median(|trial| trial.mean.percent()),
+            linear_percent: median(|trial| trial.linear.percent()),
             epochs_run: epochs_run.map(|spread| spread.median),
             training_seconds: median(|trial| Some(trial.seconds_per_network())),
             epoch_ms: self.min_epoch_seconds().map(|seconds| 1e3 * seconds),
@@ -330,92 +261,62 @@ impl CellResults {
     }
 }
 
-/// Replaces rounding errors by zero.
-fn without_rounding(percent: f64) -> f64 {
-    if percent < 1e-9 { 0.0 } else { percent }
-}
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{
+        dataset::Seed,
+        evaluation::{Errors, NodeAddress, TestErrors, experiments::PaperTable},
+    };
 
-/// Errors of the finished trials of a cell.
-#[derive(Clone, Debug)]
-pub(super) struct CellErrors {
-    pub(super) label: String,
-    pub(super) column: usize,
-    /// Errors of the network in percent.
-    pub(super) percent: Spread,
-    pub(super) published: Option<f64>,
-    pub(super) linear: Option<f64>,
-    pub(super) bound: Option<f64>,
-    /// Number of trials.
-    trials: usize,
-}
-
-impl CellErrors {
-    /// Minimum number of trials for a spread. By chance, the ranges of three and three trials are disjoint in a given
-    /// order once in 20.
-    pub(super) const MIN_TRIALS: usize = 3;
-
-    /// Returns the cells that have results.
-    pub(super) fn all(results: &ExperimentResults) -> Vec<Self> {
-        let errors = |cell: &CellResults| {
-            let place = cell.cell;
-            let median = |spread: Option<Spread>| spread.map(|spread| spread.median);
-            Some(Self {
-                label: results.cell_labels(cell).join("/"),
-                column: place.column,
-                percent: cell.percent()?,
-                published: place.published.map(|published| published.z_percent),
-                linear: median(cell.spread(|trial| trial.baselines.linear.percent())),
-                trials: cell
-                    .trials
-                    .iter()
-                    .filter(|trial| trial.errors.percent().is_some())
-                    .count(),
-                bound: median(cell.spread(|trial| trial.bottleneck.as_ref()?.percent())),
-            })
-        };
-        results.cells.iter().filter_map(errors).collect()
+    fn errors(z_percent: f64) -> TestErrors {
+        TestErrors::Nodes(Errors {
+            z_percent: Some(z_percent),
+            x_percent: Some(0.1),
+            y_percent: Some(1e-12),
+            z_mm: z_percent / 20.0,
+            z_full_scale_percent: 5.0 * z_percent,
+            worst_mm: 0.5,
+            worst_node: NodeAddress::default(),
+        })
     }
 
-    /// Compares the errors of all trials with a figure; `None` if it is within their range, or there are too few
-    /// trials.
-    pub(super) fn against(&self, figure: f64) -> Option<Ordering> {
-        self.apart([figure, figure])
-    }
-
-    /// Compares the errors of all trials with those of another cell; `None` if the ranges overlap, or there are too few
-    /// trials.
-    pub(super) fn compare(&self, other: &Self) -> Option<Ordering> {
-        let is_enough = other.trials >= Self::MIN_TRIALS;
-        self.apart([other.percent.smallest, other.percent.largest])
-            .filter(|_| is_enough)
-    }
-
-    fn apart(&self, [low, high]: [f64; 2]) -> Option<Ordering> {
-        match self.percent {
-            _ if self.trials < Self::MIN_TRIALS => None,
-            Spread { largest, .. } if largest < low => Some(Ordering::Less),
-            Spread { smallest, .. } if smallest > high => Some(Ordering::Greater),
-            _ => None,
+    /// Returns a trial with these errors; the linear map has 1.6 %, and an epoch takes a second.
+    fn trial(seed: u64, z_percent: f64) -> Trial {
+        Trial {
+            seed: Seed(seed),
+            repeat: 0,
+            errors: errors(z_percent),
+            mean: errors(5.5),
+            linear: errors(1.6),
+            networks: 1,
+            epochs: 10,
+            seconds: 10.0,
+            min_epoch_seconds: 1.0,
+            states: Vec::new(),
         }
     }
 
-    /// Returns the label and errors as text.
-    pub(super) fn figures(&self) -> String {
-        format!("{}: {}", self.label, spread(&self.percent))
+    #[test]
+    fn results_do_not_depend_on_the_order_in_which_trials_finish() {
+        let mut forwards = ExperimentResults::new(PaperTable::HiddenNodes.experiment());
+        let mut backwards = forwards.clone();
+        let trials = [trial(0, 3.0), trial(1, 1.0), trial(2, 2.0), trial(3, 9.0)];
+        for trial in &trials {
+            forwards.record(2, Ok(trial.clone()));
+        }
+        for trial in trials.iter().rev() {
+            backwards.record(2, Ok(trial.clone()));
+        }
+        assert_eq!(forwards.cells[2].trials, trials);
+        assert_eq!(backwards.cells[2].trials, trials);
+        assert_eq!(forwards.cells[2].median_trial().unwrap().seed, Seed(2));
+        assert!(!forwards.cells[2].is_complete());
+        let z = forwards.cells[2].summary().percent;
+        assert_eq!(
+            [z.published, z.min, z.median, z.max],
+            [Some(2.37), Some(1.0), Some(2.5), Some(9.0)]
+        );
+        assert_eq!(forwards.cells[1].median_trial(), None);
     }
-}
-
-/// Sorts cells by a key, ascending.
-pub(super) fn sorted_by<K: Ord>(mut cells: Vec<CellErrors>, key: impl FnMut(&CellErrors) -> K) -> Vec<CellErrors> {
-    cells.sort_by_key(key);
-    cells
-}
-
-/// Formats the median, followed by the range if the values differ.
-fn spread(spread: &Spread) -> String {
-    if spread.smallest == spread.largest {
-        return format!("{} %", format_number(spread.median));
-    }
-    let [median, smallest, largest] = [spread.median, spread.smallest, spread.largest].map(format_number);
-    format!("{median} % ({smallest} to {largest})")
 }

@@ -279,9 +279,7 @@ pub(super) fn work(experiment: &Experiment, cell: &Cell, samples: &TrialSamples)
     let passes = 4.0 * samples * h * (n1 + outputs);
     let second_order = samples * (h * n1).powi(2) / 4.0 + 0.5 * (h * n1).powi(3);
     let epoch = match settings.training.method {
-        Method::LevenbergMarquardt(_) | Method::BayesianRegularization(_) | Method::VariableProjection(_) => {
-            passes + second_order
-        }
+        Method::LevenbergMarquardt(_) | Method::BayesianRegularization(_) => passes + second_order,
         _ => passes,
     };
     let trainings = experiment.folds() * settings.starts * settings.training.stopping.epochs;

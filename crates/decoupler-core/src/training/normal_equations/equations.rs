@@ -4,10 +4,10 @@ use faer::{Mat, MatRef};
 
 use super::{
     Cost,
-    cholesky::{Elimination, output_weights, write_negative},
+    cholesky::{Elimination, output_weights},
     conjugate::{ConjugateGradient, HiddenSolver, System},
     factoring_is_cheaper,
-    products::{OutputLayer, Products, ridge},
+    products::Products,
     schur::{Decay, PerClass, SchurComplement, Traces},
 };
 use crate::{
@@ -20,7 +20,6 @@ pub(in crate::training) struct NormalEquations<S: HiddenSolver + ?Sized = dyn Hi
     activations: KeptActivations,
     products: Products,
     elimination: Elimination,
-    projection: OutputLayer,
     /// Right-hand side of the hidden layer, then its negative step, node by node.
     right: Vec<f64>,
     solver: Box<S>,
@@ -126,7 +125,6 @@ impl<S: HiddenSolver + ?Sized> NormalEquations<S> {
             activations: KeptActivations::new(shape, examples, gathering.max(solver.parts())),
             products: Products::new(&*solver, cost, gathering),
             elimination: Elimination::new(shape),
-            projection: OutputLayer::new(shape, gathering),
             right: vec![0.0; shape.hidden_weights()],
             solver,
         }
@@ -193,28 +191,6 @@ impl<S: HiddenSolver + ?Sized> NormalEquations<S> {
         step.iter().all(|value| value.is_finite()).then_some(())
     }
 
-    /// Solves for the step of the hidden layer alone, with the output layer as its least-squares solution.
-    pub(in crate::training) fn solve_hidden(
-        &mut self,
-        mlp: &Mlp,
-        examples: &Examples,
-        mu: f64,
-        step: &mut [f64],
-    ) -> Option<()> {
-        let sums = self.products.sums();
-        self.elimination.factor(sums, PerClass::all(ridge(&sums.g)))?;
-        let gradient = sums.gradient_w.col_iter().flat_map(|column| column.iter());
-        self.right
-            .iter_mut()
-            .zip(gradient)
-            .for_each(|(right, gradient)| *right = *gradient);
-        self.solve_for_hidden(mlp, examples, PerClass::all(mu))?;
-        let shape = mlp.shape();
-        let right = MatRef::from_column_major_slice(&self.right, shape.inputs + 1, shape.hidden);
-        write_negative(right, step);
-        step.iter().all(|value| value.is_finite()).then_some(())
-    }
-
     /// Replaces the right-hand side of the hidden layer by its solution.
     fn solve_for_hidden(&mut self, mlp: &Mlp, examples: &Examples, damping: PerClass) -> Option<()> {
         let system = System {
@@ -248,12 +224,6 @@ impl<S: HiddenSolver + ?Sized> NormalEquations<S> {
         w.hypot(length(sums.gradient_v.as_ref(), v, &|row, column, weight| {
             decay.pull_in_output((row, hidden), column, weight)
         }))
-    }
-
-    /// Sets the output layer of `mlp` to the least-squares solution for its hidden layer; `None` if the equations are
-    /// numerically singular.
-    pub(in crate::training) fn solve_outputs(&mut self, mlp: &mut Mlp, examples: &Examples) -> Option<()> {
-        self.projection.solve(mlp, examples, &mut self.activations)
     }
 }
 

@@ -1,14 +1,8 @@
-//! The products of which the equations consist, gathered from the samples block by block, and the least-squares output
-//! layer.
+//! The products of which the equations consist, gathered from the samples block by block.
 
 use faer::{Accum, Mat, MatMut, MatRef, Par, linalg::matmul::matmul};
 
-use super::{
-    CHUNK, Cost,
-    cholesky::{Cholesky, substitute},
-    conjugate::HiddenSolver,
-    equations::Sums,
-};
+use super::{CHUNK, Cost, conjugate::HiddenSolver, equations::Sums};
 use crate::{
     network::{Mlp, Shape},
     training::{
@@ -174,79 +168,6 @@ impl Sums {
             1.0,
         );
     }
-}
-
-/// Linear least-squares problem of the output layer: G V = H̃ᵀT, G = H̃ᵀH̃.
-///
-/// It is solved for a correction of the current V, G δV = −H̃ᵀE, so that the next solution corrects rounding errors
-/// instead of repeating them.
-pub(super) struct OutputLayer {
-    /// Sums for each part of the samples; once gathered, the first contains the total.
-    parts: Vec<OutputSums>,
-    cholesky: Cholesky,
-}
-
-struct OutputSums {
-    /// H̃ᵀH̃.
-    g: Mat<f64>,
-    /// H̃ᵀE.
-    right: Mat<f64>,
-}
-
-impl OutputLayer {
-    /// Allocates for samples in this many `parts`.
-    pub(super) fn new(shape: Shape, parts: usize) -> Self {
-        let h1 = shape.hidden + 1;
-        let sums = || OutputSums {
-            g: Mat::zeros(h1, h1),
-            right: Mat::zeros(h1, shape.outputs),
-        };
-        Self {
-            parts: (0..parts).map(|_| sums()).collect(),
-            cholesky: Cholesky::new(h1),
-        }
-    }
-
-    /// Replaces the output layer of `mlp`; `None` if the equations are numerically singular.
-    pub(super) fn solve(&mut self, mlp: &mut Mlp, examples: &Examples, kept: &mut KeptActivations) -> Option<()> {
-        kept.evaluate(mlp, examples);
-        for sums in &mut self.parts {
-            sums.g.fill(0.0);
-            sums.right.fill(0.0);
-        }
-        kept.for_each_block(mlp, examples, &mut self.parts, |sums, now| {
-            let (hidden, errors) = (now.hidden(), now.errors());
-            let (add, alone) = (Accum::Add, Par::Seq);
-            matmul(sums.g.as_mut(), add, hidden.transpose(), hidden, 1.0, alone);
-            matmul(sums.right.as_mut(), add, hidden.transpose(), errors, 1.0, alone);
-        });
-        let (first, others) = self.parts.split_at_mut(1);
-        let OutputSums { g, right } = &mut first[0];
-        for other in others {
-            *g += &other.g;
-            *right += &other.right;
-        }
-        let ridge = ridge(g);
-        for node in 0..g.nrows() {
-            g[(node, node)] += ridge;
-        }
-        self.cholesky.factor(g.as_mut())?;
-        substitute(g.as_ref(), right.as_mut());
-        let Shape { outputs, .. } = mlp.shape();
-        let hidden_weights = mlp.shape().hidden_weights();
-        let (_, v) = mlp.weights_mut().split_at_mut(hidden_weights);
-        for (index, weight) in v.iter_mut().enumerate() {
-            *weight -= right[(index / outputs, index % outputs)];
-        }
-        v.iter().all(|weight| weight.is_finite()).then_some(())
-    }
-}
-
-/// Ridge on the diagonal of G = H̃ᵀH̃ that keeps it positive definite: 1e-13 of its largest entry, which is the last
-/// one (the column of ones).
-pub(super) fn ridge(g: &Mat<f64>) -> f64 {
-    let last = g.nrows() - 1;
-    1e-13 * g[(last, last)]
 }
 
 #[cfg(test)]
