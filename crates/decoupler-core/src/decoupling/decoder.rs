@@ -195,7 +195,7 @@ pub fn resistance_residual(model: &SensorModel, readings_ohm: &[f64], coordinate
     problem.read(0, readings_ohm);
     let mut unknowns = vec![0.0; problem.unknowns()];
     problem.unknowns_of(coordinates_mm, &mut unknowns);
-    let residual = problem.evaluate(&unknowns);
+    let residual = problem.evaluate_residuals(&unknowns);
     if residual.is_finite() { residual } else { f64::INFINITY }
 }
 

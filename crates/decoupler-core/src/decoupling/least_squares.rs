@@ -137,7 +137,13 @@ impl Triangle {
         below[pivot] = diagonal;
     }
 
-    fn row(&self, row: usize) -> &[f64] {
+    /// Number of unknowns.
+    pub(super) fn unknowns(&self) -> usize {
+        self.width - 1
+    }
+
+    /// Row of [R, Qᵀb]; entries below the diagonal are scratch.
+    pub(super) fn row(&self, row: usize) -> &[f64] {
         &self.matrix[row * self.width..(row + 1) * self.width]
     }
 
@@ -157,10 +163,15 @@ impl Triangle {
 
     /// Returns the largest norm of a row of R⁻¹, which equals that of A⁺; infinite if the columns of A are linearly
     /// dependent.
-    pub(super) fn largest_inverse_row(&mut self) -> f64 {
+    pub(super) fn largest_inverse_row(&self) -> f64 {
+        self.inverse_rows().into_iter().fold(0.0, f64::max)
+    }
+
+    /// Returns the norm of each row of R⁻¹, which equals that of A⁺; infinite where NaN.
+    pub(super) fn inverse_rows(&self) -> Vec<f64> {
         let unknowns = self.width - 1;
         let mut squares = vec![0.0; unknowns];
-        let mut column = std::mem::take(&mut self.column);
+        let mut column = Vec::with_capacity(unknowns);
         for last in 0..unknowns {
             // R⁻¹ is upper triangular: its column `last` ends at the diagonal.
             column.clear();
@@ -176,15 +187,8 @@ impl Triangle {
                 *square += value * value;
             }
         }
-        self.column = column;
-        let largest = squares.into_iter().fold(0.0, |largest: f64, square| {
-            if square.is_nan() {
-                f64::INFINITY
-            } else {
-                largest.max(square)
-            }
-        });
-        largest.sqrt()
+        let norm = |square: f64| if square.is_nan() { f64::INFINITY } else { square.sqrt() };
+        squares.into_iter().map(norm).collect()
     }
 }
 

@@ -282,6 +282,40 @@ pub(crate) struct GaussianPrior {
     pub(crate) inverse_root: Mat<f64>,
 }
 
+/// Mean and scatter of draws, updated draw by draw (Welford 1962), so that memory does not grow with their number.
+#[derive(Clone, Debug)]
+struct Moments {
+    count: f64,
+    mean: Vec<f64>,
+    /// Sums of products of deviations from the mean; only the lower triangle is used.
+    products: Vec<f64>,
+}
+
+impl Moments {
+    fn new(unknowns: usize) -> Self {
+        Self {
+            count: 0.0,
+            mean: vec![0.0; unknowns],
+            products: vec![0.0; unknowns * unknowns],
+        }
+    }
+
+    fn add(&mut self, values: impl Iterator<Item = f64>) {
+        let n = self.mean.len();
+        self.count += 1.0;
+        let before: Vec<f64> = values.zip(&self.mean).map(|(value, mean)| value - mean).collect();
+        let share = (self.count - 1.0) / self.count;
+        for (i, (mean, apart)) in self.mean.iter_mut().zip(&before).enumerate() {
+            *mean += apart / self.count;
+            let products = &mut self.products[i * n..=i * n + i];
+            products
+                .iter_mut()
+                .zip(&before)
+                .for_each(|(sum, other)| *sum += share * apart * other);
+        }
+    }
+}
+
 /// Number of draws that estimate a scene's mean and covariance.
 const DRAWS: usize = 4000;
 
@@ -312,16 +346,19 @@ impl GaussianPrior {
         }
         let sampler = scene.sampler(model);
         let axes = scene.movement.axes().indices();
-        let mut draws: Vec<Vec<f64>> = rows.iter().map(|_| Vec::new()).collect();
+        let mut moments = vec![Moments::new(ranges.len()); rows.len()];
         for _ in 0..DRAWS {
             let deformation = sampler.draw(rng);
-            for (&row, values) in rows.iter().zip(&mut draws) {
+            for (&row, moments) in rows.iter().zip(&mut moments) {
                 let nodes = deformation.row_mm(row).iter();
-                values.extend(nodes.flat_map(|u| axes.iter().map(|&axis| u[axis])));
+                let values = nodes.flat_map(|u| axes.iter().map(|&axis| u[axis]));
+                moments.add(values.zip(&ranges).map(|(value, range)| value / range.width()));
             }
         }
-        let of_row = |values: &Vec<f64>| Self::of_draws(values, &ranges, smallest_spread);
-        draws.iter().map(of_row).collect()
+        moments
+            .into_iter()
+            .map(|moments| Self::of_moments(moments, smallest_spread))
+            .collect()
     }
 
     /// Approximate number of bytes that [`Self::of_rows`] needs.
@@ -330,31 +367,14 @@ impl GaussianPrior {
         if loading == Loading::RandomNodes {
             return 0;
         }
-        let entries = (rows * unknowns) as u64 * (DRAWS + unknowns) as u64;
+        let entries = 2 * rows as u64 * (unknowns * unknowns) as u64;
         entries.saturating_mul(size_of::<f64>() as u64)
     }
 
-    /// Estimates a prior from draws × unknowns in millimetres, row by row.
-    fn of_draws(values_mm: &[f64], ranges: &[Range], smallest_spread: f64) -> Self {
-        let n = ranges.len();
-        let draws = values_mm.chunks_exact(n);
-        let count = draws.len() as f64;
-        let mut mean = vec![0.0; n];
-        for draw in draws.clone() {
-            mean.iter_mut()
-                .zip(draw)
-                .zip(ranges)
-                .for_each(|((mean, value), range)| *mean += value / range.width() / count);
-        }
-        let mut covariance: Mat<f64> = Mat::zeros(n, n);
-        for draw in draws {
-            for i in 0..n {
-                for j in 0..n {
-                    let apart = |i: usize| draw[i] / ranges[i].width() - mean[i];
-                    covariance[(i, j)] += apart(i) * apart(j) / count;
-                }
-            }
-        }
+    fn of_moments(moments: Moments, smallest_spread: f64) -> Self {
+        let Moments { count, mean, products } = moments;
+        let n = mean.len();
+        let mut covariance = Mat::from_fn(n, n, |i, j| products[i * n + j] / count);
         for i in 0..n {
             covariance[(i, i)] += smallest_spread * smallest_spread;
         }
@@ -364,6 +384,12 @@ impl GaussianPrior {
         let mut inverse_root = Mat::identity(n, n);
         triangular_solve::solve_lower_triangular_in_place(factor.L(), inverse_root.as_mut(), Par::Seq);
         Self { mean, inverse_root }
+    }
+
+    /// ln det of the inverse covariance.
+    pub(crate) fn log_precision(&self) -> f64 {
+        let diagonal = (0..self.mean.len()).map(|place| self.inverse_root[(place, place)]);
+        2.0 * diagonal.map(f64::ln).sum::<f64>()
     }
 
     /// Appends the prior to equations `[A, b]` (row by row, `unknowns` + 1 columns) for

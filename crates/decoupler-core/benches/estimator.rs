@@ -1,0 +1,122 @@
+//! Accuracy of Newton's method with prior: `cargo bench -p decoupler-core --bench estimator`.
+//!
+//! Decodes 40 scenes: loading, noise, drift, and row-wires that are known or not, of a small array and the paper's.
+#![expect(clippy::print_stdout, reason = "a benchmark's result is what it prints")]
+#![allow(missing_docs, clippy::unwrap_used)]
+
+use std::time::Instant;
+
+use decoupler_core::{
+    dataset::{Dataset, Seed, Stream},
+    decoupling::{Decoder, DecoderKind, Estimator, FitProblem, Precision, decode_set},
+    evaluation::{Errors, reference_errors},
+    network::InputChoice,
+    scene::{Noise, NoiseSource, Rows, Scene},
+    sensor::SensorModel,
+};
+
+/// Number of snapshots of a scene; 10 are enough for errors to within a few percent.
+const SNAPSHOTS: usize = 15;
+const SMALL: &str = "6x6_3x18";
+const LARGE: &str = "10x10_5x30";
+const LOADINGS: [&str; 3] = ["random", "smooth:4", "indenter"];
+
+fn print_scene(array: &str, loading: &str, noise: Noise, rows: Rows) {
+    let model = SensorModel::new(array.parse().unwrap());
+    let scene = Scene {
+        loading: loading.parse().unwrap(),
+        noise,
+        rows,
+        ..Scene::default()
+    };
+    let samples = SNAPSHOTS * model.scale.rows();
+    let mut test = Dataset::simulate(&model, &scene, samples, &mut Seed(2).rng(Stream::Test)).unwrap();
+    test.disturb(&model, &noise, &mut Seed(2).rng(Stream::TestNoise))
+        .unwrap();
+    let errors = |kind: DecoderKind| {
+        let problem = FitProblem {
+            training: &test,
+            row_model: rows.model(),
+            inputs: InputChoice::BEST,
+            unseen: NoiseSource::default(),
+            sensor: Some((&model, &scene)),
+            networks: None,
+            precision: Precision::Double,
+            seed: Seed(0),
+        };
+        let mut decoder: Box<dyn Decoder> = kind.fit(&problem).unwrap().unwrap();
+        let begun = Instant::now();
+        let answers_mm = decode_set(decoder.as_mut(), &test).unwrap();
+        let micros = begun.elapsed().as_micros() as f64 / SNAPSHOTS as f64;
+        let errors = Errors::measure(&test, &answers_mm, scene.stroke_mm(&model.geometry));
+        (errors.z_mm, micros)
+    };
+    let (newton_mm, micros) = errors(DecoderKind::Newton);
+    let (mean_mm, _) = errors(DecoderKind::Mean);
+    let (estimator_mm, estimator_micros) = estimate(&model, &scene, &test);
+    let mut rng = Seed(2).rng(Stream::Expectation);
+    let reference = reference_errors(&model, &scene, &test, &mut rng).unwrap();
+    let reference = reference.map_or_else(|reason| format!("{reason:?}"), |errors| format!("{:.4}", errors.z_mm));
+    let known = if rows == Rows::Known { "known" } else { "unknown" };
+    println!(
+        "| {array} | {loading} | {:e} | {} | {known} | {mean_mm:.4} | {reference} | {newton_mm:.4} | {micros:.0} | \
+         {estimator_mm:.4} | {estimator_micros:.0} |",
+        noise.relative, noise.drift
+    );
+}
+
+/// Returns the z error in millimetres of the estimator, with the row-wire of the highest evidence if rows are not
+/// known, and microseconds per frame.
+fn estimate(model: &SensorModel, scene: &Scene, test: &Dataset) -> (f64, f64) {
+    let rows: Vec<usize> = (0..model.scale.rows()).collect();
+    let mut estimator = Estimator::new(model, scene, &rows).unwrap();
+    let mut answers_mm = test.targets().to_owned();
+    // The first row computes the priors.
+    let mut first_mm = vec![0.0; model.scale.coordinates_per_row()];
+    estimator
+        .solve(rows[0], test.sample_readings(0), &mut first_mm)
+        .unwrap();
+    let begun = Instant::now();
+    for (sample, mut answer_mm) in answers_mm.rows_mut().into_iter().enumerate() {
+        let readings_ohm = test.sample_readings(sample);
+        let own = test.row_wire(sample).unwrap();
+        let candidates = if scene.rows == Rows::Known {
+            vec![own]
+        } else {
+            rows.clone()
+        };
+        let mut lowest = f64::INFINITY;
+        for row in candidates {
+            let mut coordinates_mm = vec![0.0; answer_mm.len()];
+            let found = estimator.solve(row, readings_ohm, &mut coordinates_mm).unwrap();
+            if found.surprise < lowest {
+                lowest = found.surprise;
+                answer_mm.assign(&ndarray::Array1::from(coordinates_mm));
+            }
+        }
+    }
+    let micros = begun.elapsed().as_micros() as f64 / SNAPSHOTS as f64;
+    let errors = Errors::measure(test, &answers_mm, scene.stroke_mm(&model.geometry));
+    (errors.z_mm, micros)
+}
+
+fn main() {
+    println!(
+        "| array | loading | noise | drift | rows | mean | reference | newton | us per frame | estimator | us per frame |"
+    );
+    println!("|---|---|---|---|---|---|---|---|---|---|---|");
+    let of = |relative: f64, drift: f64| Noise {
+        drift,
+        ..Noise::relative(relative)
+    };
+    for loading in LOADINGS {
+        for relative in [1e-4, 1e-3, 1e-2] {
+            print_scene(SMALL, loading, of(relative, 0.0), Rows::Known);
+            print_scene(SMALL, loading, of(relative, 0.0), Rows::All);
+            print_scene(SMALL, loading, of(relative, 0.05), Rows::Known);
+            print_scene(LARGE, loading, of(relative, 0.0), Rows::Known);
+        }
+        print_scene(SMALL, loading, of(1e-3, 0.05), Rows::All);
+    }
+    print_scene(LARGE, "random", of(1e-3, 0.05), Rows::Known);
+}
