@@ -331,5 +331,8 @@ fn row_wires_in_readings_claim_only_the_memory_that_they_need() {
     )
     .unwrap();
     let message = refused(&decode, folder.path());
-    assert!(message.contains("in.csv") && message.contains(OVER_BUDGET), "{message}");
+    assert!(
+        message.contains("in.csv") && message.contains("10000 groups and row-wires at once"),
+        "{message}"
+    );
 }
