@@ -201,7 +201,7 @@ const BOMBS: [Bomb; 19] = [
                 r#"<row><c r="A1"><v>1</v></c><c r="A99999999999999999999"><v>1</v></c></row>"#,
                 "<sst/>",
                 0,
-            )
+            );
         },
         "cell A99999999999999999999 is outside of a sheet",
     ),
@@ -219,7 +219,7 @@ const BOMBS: [Bomb; 19] = [
                 r#"<row r="1"><c><v>1</v></c></row><row r="A99999999"><c><v>1</v></c></row>"#,
                 "<sst/>",
                 0,
-            )
+            );
         },
         "A99999999 is outside of a sheet",
     ),

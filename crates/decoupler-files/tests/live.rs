@@ -1,5 +1,7 @@
 //! Faults of wires and electronics: their effect on readings, and whether the right wire is named.
 
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
 use decoupler_core::{
     dataset::{Seed, Stream},
     decoupling::Decoder,
