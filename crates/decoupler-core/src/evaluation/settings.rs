@@ -569,7 +569,7 @@ mod tests {
     }
 
     #[test]
-    fn kept_products_and_draws_of_priors_are_counted() {
+    fn kept_products_and_covariances_of_priors_are_counted() {
         let mut known = settings("10x10_5x30", "lm", 12);
         known.source.scene.rows = Rows::Known;
         known.source.samples = 60_000;
@@ -585,7 +585,8 @@ mod tests {
         let mut smooth = settings("512x512_1x512", "gd", 1);
         smooth.source.scene.loading = "smooth:4".parse().unwrap();
         let bytes = Workload::of(&smooth).unwrap().bytes;
-        assert!(bytes > 8 * 512 * 512 * 4000, "{bytes}");
+        // The products and the factor of the covariance of each row.
+        assert!(bytes > 8 * 2 * 512 * 512 * 512, "{bytes}");
     }
 
     /// Bayesian regularisation holds the factor and the inverse of the equations of the hidden layer: (31·512)² each.

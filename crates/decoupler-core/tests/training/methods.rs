@@ -2,8 +2,9 @@
 //! return NaN.
 
 use decoupler_core::{
+    machine::{MemoryBudget, MemorySource},
     network::{Mlp, Shape},
-    training::{Examples, Method, Problem, StopReason, StoppingRules, Trainer, TrainingSettings},
+    training::{Examples, Method, Problem, StopReason, StoppingRules, Trainer, TrainingSettings, check_width},
 };
 use ndarray::Array2;
 
@@ -119,15 +120,11 @@ fn a_network_too_wide_for_the_normal_equations_is_refused_with_a_remedy() {
         hidden: 512,
         outputs: 1,
     };
-    let zeros = |columns| Array2::<f64>::zeros((5, columns));
-    let train = |name: &str| {
-        let examples = Examples::new(zeros(96).view(), zeros(1).view());
-        let settings = TrainingSettings {
-            method: named(name),
-            stopping: StoppingRules::default(),
-        };
-        Trainer::new(Mlp::zeros(shape), alone(examples), settings)
+    let memory = MemoryBudget {
+        bytes: 16_000_000_000,
+        source: MemorySource::System,
     };
+    let train = |name: &str| check_width(&named(name), shape, 5, 1, memory);
     let refusal = train("br").err().expect("20 GB are refused").to_string();
     assert!(refusal.contains("scg"), "{refusal}");
     assert!(train("scg").is_ok());

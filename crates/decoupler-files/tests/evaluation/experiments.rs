@@ -19,7 +19,7 @@ use decoupler_core::{
             Axis, Experiment, ExperimentError, ExperimentResults, SummaryErrors, Trial, TrialSamples, run_experiments,
         },
     },
-    machine::MemoryBudget,
+    machine::{MemoryBudget, MemorySource},
     scene::RowModel,
     sensor::{ArrayScale, SensorModel},
     training::Method,
@@ -79,9 +79,13 @@ fn threads(count: usize) -> NonZero<usize> {
 
 fn run(experiments: &[Experiment], thread_count: usize) -> Vec<ExperimentResults> {
     let mut results: Vec<_> = experiments.iter().cloned().map(ExperimentResults::new).collect();
+    let memory = MemoryBudget {
+        bytes: 8_000_000_000,
+        source: MemorySource::System,
+    };
     run_experiments(
         experiments,
-        &TrialSamples::Drawn(MemoryBudget::UNLIMITED),
+        &TrialSamples::Drawn(memory),
         threads(thread_count),
         || false,
         |finished| {
