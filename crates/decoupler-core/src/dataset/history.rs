@@ -14,6 +14,8 @@ pub struct History {
     /// Rows × channels, shared with the samples.
     readings: ArcArray2<f64>,
     series: Vec<Series>,
+    /// Above all groups: the first of an appended history.
+    next_group: u64,
     times_s: Option<Vec<f64>>,
     /// Row of each sample.
     samples: Vec<usize>,
@@ -48,8 +50,10 @@ impl History {
             group: groups.map_or(0, |groups| groups[row]),
             row_wire: row_wires.map_or(0, |row_wires| row_wires[row]),
         });
+        let last_group = groups.and_then(|groups| groups.iter().max()).copied().unwrap_or(0);
         let mut history = Self {
             series: series.collect(),
+            next_group: last_group.saturating_add(1),
             readings: readings.into_shared(),
             times_s,
             samples,
@@ -74,7 +78,7 @@ impl History {
         let appended = readings.append(Axis(0), other.readings.view());
         appended.expect("histories of the same channels");
         self.readings = readings.into_shared();
-        let next = self.series.iter().map(|series| series.group + 1).max().unwrap_or(0);
+        let next = self.next_group;
         let mut groups = HashMap::new();
         self.series.extend(other.series.iter().map(|series| {
             let known = groups.len() as u64;
@@ -83,6 +87,7 @@ impl History {
                 ..*series
             }
         }));
+        self.next_group += groups.len() as u64;
         self.samples.extend(other.samples.iter().map(|row| rows + row));
         self.times_s = self
             .times_s
