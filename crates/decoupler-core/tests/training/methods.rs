@@ -125,7 +125,7 @@ fn a_network_too_wide_for_the_normal_equations_is_refused_with_a_remedy() {
         source: MemorySource::System,
     };
     let train = |name: &str| check_width(&named(name), shape, 5, 1, memory);
-    let refusal = train("br").err().expect("20 GB are refused").to_string();
+    let refusal = train("br").expect_err("20 GB are refused").to_string();
     assert!(refusal.contains("scg"), "{refusal}");
     assert!(train("scg").is_ok());
     assert!(train("lm").is_ok());
