@@ -14,11 +14,12 @@ use std::{
 use decoupler_core::{
     dataset::{FoldUnit, Seed, SplitBy},
     evaluation::{
-        CrossValidation, Measured, Run, RunSettings, SimulatedSettings, Simulation, TestErrors,
+        Begin, CrossValidation, Measured, Run, RunSets, RunSettings, SimulatedSettings, Simulation, TestErrors,
         experiments::{
             Axis, Experiment, ExperimentError, ExperimentResults, SummaryErrors, Trial, TrialSamples, run_experiments,
         },
     },
+    job::Job,
     machine::{MemoryBudget, MemorySource},
     scene::RowModel,
     sensor::{ArrayScale, SensorModel},
@@ -144,7 +145,9 @@ fn a_trial_equals_the_run_with_its_settings() {
             assert_eq!(trial.errors, alone.scores().unwrap().network);
             let baselines = alone.baselines().unwrap();
             assert_eq!([&trial.mean, &trial.linear], [&baselines.mean, &baselines.linear]);
-            let taken_up = Run::resume(settings, trial.states.clone()).unwrap();
+            let sets = RunSets::draw(&settings, MemoryBudget::UNLIMITED, &Job::UNINTERRUPTED).unwrap();
+            let begin = Begin::Resume(trial.states.clone());
+            let taken_up = Run::new(settings.into(), sets, begin, &Job::UNINTERRUPTED).unwrap();
             assert_eq!(taken_up.network(), alone.network());
             assert_eq!(taken_up.stop_reason(), alone.stop_reason());
             z_percent.push(alone.errors().percent().unwrap());
@@ -326,8 +329,9 @@ fn on_recording(setup: &Setup, axis: Axis, second_axis: Option<Axis>) -> Experim
 }
 
 fn samples_of(setup: &Setup) -> TrialSamples {
-    let samples = setup.trial_samples(Path::new(""), &|| false, &mut |_| {}).unwrap();
-    samples.expect("nothing cancels it")
+    setup
+        .trial_samples(Path::new(""), &Job::UNINTERRUPTED, &mut |_| {})
+        .unwrap()
 }
 
 fn run_on(experiment: &Experiment, samples: &TrialSamples, thread_count: usize) -> ExperimentResults {
@@ -372,7 +376,13 @@ fn a_trial_on_a_recording_equals_the_run_with_its_settings_and_division() {
             let mut settings = *setup.settings();
             settings.seed = seed;
             settings.training.method = [Method::recorded_regularization(), method("lm")][place % 2];
-            let mut alone = Run::on_sets(settings, sets.split, sets.test).unwrap();
+            let mut alone = Run::with_baselines(
+                settings,
+                RunSets::new(sets.split, sets.test),
+                Begin::Initialize,
+                &Job::UNINTERRUPTED,
+            )
+            .unwrap();
             while alone.step().is_none() {}
             assert_eq!(trial.seed, seed);
             assert_eq!(trial.errors, alone.errors(), "cell {place}");
@@ -381,7 +391,13 @@ fn a_trial_on_a_recording_equals_the_run_with_its_settings_and_division() {
             let sets = plan
                 .sets(Path::new(""), seed, &mut |_| ControlFlow::Continue(()))
                 .unwrap();
-            let taken_up = Run::resume_on_sets(settings, trial.states.clone(), sets.split, sets.test).unwrap();
+            let taken_up = Run::with_baselines(
+                settings,
+                RunSets::new(sets.split, sets.test),
+                Begin::Resume(trial.states.clone()),
+                &Job::UNINTERRUPTED,
+            )
+            .unwrap();
             assert_eq!(taken_up.network(), alone.network());
         }
         let summary = cell.summary();

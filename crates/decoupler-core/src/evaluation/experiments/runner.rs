@@ -14,7 +14,8 @@ use rayon::{ThreadPool, ThreadPoolBuilder};
 use super::{Cell, Experiment, ExperimentError, Trial, TrialFailure, TrialSamples};
 use crate::{
     dataset::Seed,
-    evaluation::{CrossValidation, SimulatedSettings},
+    evaluation::{CrossValidation, RunError, SimulatedSettings},
+    job::{Cancelled, Job},
     training::Method,
 };
 
@@ -86,7 +87,7 @@ pub fn run_experiments(
             let work_off = move || {
                 while let Some(job) = jobs.get(next.fetch_add(1, Ordering::Relaxed)) {
                     let begun = Instant::now();
-                    let Some(outcome) = job.run(samples, is_cancelled) else {
+                    let Ok(outcome) = job.run(samples, &Job::new(is_cancelled)) else {
                         break;
                     };
                     // The receiver is dropped only if the calling thread panicked.
@@ -119,12 +120,12 @@ pub fn run_experiments(
 
 /// Queue of jobs in the order of execution.
 struct Queue {
-    jobs: Vec<Job>,
+    jobs: Vec<TrialJob>,
     time_left: TimeLeft,
 }
 
 /// A single trial.
-struct Job {
+struct TrialJob {
     experiment: usize,
     cell: usize,
     /// Index of the cell among the cells of all experiments.
@@ -143,7 +144,7 @@ impl Queue {
     /// Orders the jobs: first one trial of every cell, so that preliminary tables appear early, then the second trials,
     /// and so on; in each round the longest first, so that no core is idle for long at the end.
     fn new(experiments: &[Experiment], samples: &TrialSamples, threads: NonZero<usize>) -> Self {
-        let mut jobs: Vec<Job> = Vec::new();
+        let mut jobs: Vec<TrialJob> = Vec::new();
         let mut cells = Vec::new();
         for (number, experiment) in experiments.iter().enumerate() {
             for (cell_number, cell) in experiment.cells().iter().enumerate() {
@@ -151,7 +152,7 @@ impl Queue {
                 let seeds = experiment.seeds_of(&cell.settings);
                 let trials = seeds.flat_map(|seed| (0..experiment.repeats()).map(move |repeat| (seed, repeat)));
                 let before = jobs.len();
-                jobs.extend(trials.enumerate().map(|(round, (seed, repeat))| Job {
+                jobs.extend(trials.enumerate().map(|(round, (seed, repeat))| TrialJob {
                     experiment: number,
                     cell: cell_number,
                     time_cell: cells.len(),
@@ -171,14 +172,12 @@ impl Queue {
     }
 }
 
-impl Job {
-    /// Runs the trial; returns `None` if cancelled.
-    fn run(&self, samples: &TrialSamples, is_cancelled: impl Fn() -> bool) -> Option<Result<Trial, TrialFailure>> {
-        if is_cancelled() {
-            return None;
-        }
+impl TrialJob {
+    /// Runs the trial.
+    fn run(&self, samples: &TrialSamples, job: &Job<'_>) -> Result<Result<Trial, TrialFailure>, Cancelled> {
+        job.check()?;
         let trial = match self.cross_validation {
-            None => Trial::on_sets(&self.of_cell, self.seed, samples, is_cancelled),
+            None => Trial::on_sets(&self.of_cell, self.seed, samples, job),
             Some(validation) => {
                 let settings = self
                     .of_cell
@@ -189,16 +188,17 @@ impl Job {
                     seed: self.seed,
                     ..settings
                 };
-                Trial::by_cross_validation(settings, validation, self.repeat, is_cancelled)
+                Trial::by_cross_validation(settings, validation, self.repeat, job)
             }
         };
-        trial.transpose().map(|trial| {
-            trial.map_err(|reason| TrialFailure {
+        match trial {
+            Err(RunError::Cancelled(cancelled)) => Err(cancelled),
+            trial => Ok(trial.map_err(|reason| TrialFailure {
                 seed: self.seed,
                 repeat: self.repeat,
                 reason,
-            })
-        })
+            })),
+        }
     }
 }
 
