@@ -5,7 +5,7 @@
 use std::error::Error;
 
 use decoupler_core::{
-    dataset::{Dataset, FoldUnit, Seed, Stream, hold_out},
+    dataset::{Dataset, Seed, SplitBy, Stream},
     evaluation::{Begin, CrossValidation, Measured, Run, RunSets, RunSettings},
     job::Job,
     ndarray::Array2,
@@ -26,7 +26,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let folds = CrossValidation {
         folds: 5,
         repeats: 1,
-        unit: FoldUnit::Snapshot,
+        by: SplitBy::Group,
     };
     let validated = folds.run(&settings, &set, 0, &Job::UNINTERRUPTED)?;
     let scores = validated.scores(&set);
@@ -40,7 +40,9 @@ fn main() -> Result<(), Box<dyn Error>> {
         println!("{name:<14} RMSE {}", Vec::from_iter(errors).join("  "));
     }
     let test = set.select(&Vec::from_iter(500..600));
-    let split = hold_out(set.select(&Vec::from_iter(0..500)), 5, &mut Seed(0).rng(Stream::Split));
+    let training = set.select(&Vec::from_iter(0..500));
+    let parts = SplitBy::Group.hold_out(&training, 5, &mut Seed(0).rng(Stream::Split));
+    let split = parts.split(&training);
     let mut run = Run::with_baselines(
         settings,
         RunSets::new(split, test),

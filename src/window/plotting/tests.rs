@@ -8,7 +8,7 @@ use resvg::usvg::roxmltree::Document;
 use super::*;
 use crate::window::theme;
 use decoupler_core::{
-    dataset::FoldUnit,
+    dataset::SplitBy,
     decoupling::DecoderKind,
     evaluation::{
         CrossValidation, Preset, Run, RunSets, SimulatedSettings, TradeOffLevel, TradeOffLimits, TradeOffPoint,
@@ -186,7 +186,7 @@ fn figures_of_experiments_are_the_same_on_screen_and_in_print() {
     table_2.cross_validation = Some(CrossValidation {
         folds: 2,
         repeats: 2,
-        unit: FoldUnit::Sample,
+        by: SplitBy::Random,
     });
     // Two cells of four trials, each with an error of Z and of X; the error of Y may be exactly 0.
     assert!(same("Fig. 5", experiment_figure(&results(table_2))).circles >= 2 * 2 * 4 + 2);

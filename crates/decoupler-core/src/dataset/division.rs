@@ -54,6 +54,16 @@ pub enum DivisionError {
         /// Name of the unit of division: sample or group.
         unit: &'static str,
     },
+    /// The set cannot be divided into so many folds.
+    #[error("{folds} folds of {units} {unit}s: give from 2 folds to as many as there are {unit}s")]
+    Folds {
+        /// Number of folds requested.
+        folds: usize,
+        /// Number of units in the set.
+        units: usize,
+        /// Name of the unit of the folds: sample or group.
+        unit: &'static str,
+    },
     /// The test samples belong to other row-wires.
     #[error(transparent)]
     Rows(#[from] DatasetError),
@@ -224,35 +234,6 @@ pub struct Split {
     pub validation: Option<Dataset>,
 }
 
-/// Holds out `held_out` snapshots for validation, chosen by `rng`; at least one snapshot remains for training. Whole
-/// snapshots are held out, so that no validation sample was read at the same moment as a training sample.
-pub fn hold_out(set: Dataset, held_out: usize, rng: &mut impl Rng) -> Split {
-    let snapshots = set.snapshots();
-    let held_out = held_out.min(snapshots.len().saturating_sub(1));
-    if held_out == 0 {
-        return Split {
-            training: set,
-            validation: None,
-        };
-    }
-    let mut order: Vec<usize> = (0..snapshots.len()).collect();
-    order.shuffle(rng);
-    let (validation, training) = order.split_at(held_out);
-    let samples = |chosen: &[usize]| -> Vec<usize> {
-        let mut samples: Vec<usize> = chosen
-            .iter()
-            .flat_map(|&snapshot| &snapshots[snapshot])
-            .copied()
-            .collect();
-        samples.sort_unstable();
-        samples
-    };
-    Split {
-        training: set.select(&samples(training)),
-        validation: Some(set.select(&samples(validation))),
-    }
-}
-
 /// Rule by which the samples of a recording are divided into training, validation and test samples, or into folds.
 ///
 /// Neighbouring frames of a recording are nearly the same, so a test sample whose neighbours are in the training set
@@ -264,9 +245,12 @@ pub enum SplitBy {
     /// targets). Consecutive samples of one group stay together.
     #[default]
     Time,
-    /// Whole groups, drawn at random: no group is in two parts.
+    /// Whole groups, drawn at random: no group is in two parts. The groups of a simulated array are its snapshots.
+    #[serde(alias = "snapshot")]
     Group,
-    /// Single samples, drawn at random. Optimistic if neighbouring samples are alike.
+    /// Single samples, drawn at random, as in the cross-validation of the paper. Optimistic if neighbouring samples are
+    /// alike, or row-wires of one snapshot.
+    #[serde(alias = "sample")]
     Random,
 }
 
@@ -327,6 +311,22 @@ impl SplitBy {
         }
     }
 
+    /// Holds out `held_out` units of `set` for validation, drawn at random unless in order of time; at least one unit
+    /// remains for training.
+    pub fn hold_out(self, set: &Dataset, held_out: usize, rng: &mut impl Rng) -> DividedSamples {
+        let mut validation = self.units(set);
+        let held_out = held_out.min(validation.len().saturating_sub(1));
+        if held_out > 0 && self != Self::Time {
+            validation.shuffle(rng);
+        }
+        let training = validation.split_off(held_out);
+        DividedSamples {
+            training: ascending(training),
+            validation: ascending(validation),
+            test: Vec::new(),
+        }
+    }
+
     /// Returns [`Self::units`] in the order in which they are assigned to the parts.
     pub(super) fn ordered_units(self, set: &Dataset, rng: &mut impl Rng) -> Vec<Vec<usize>> {
         let mut units = self.units(set);
@@ -336,8 +336,20 @@ impl SplitBy {
         units
     }
 
+    /// Checks that `units` of a set of `samples` samples fill `folds` folds.
+    ///
+    /// # Errors
+    /// If there are fewer than two folds, or more folds than units.
+    pub(crate) fn check_folds(self, folds: usize, units: usize, samples: usize) -> Result<(), DivisionError> {
+        if (2..=units).contains(&folds) {
+            return Ok(());
+        }
+        let unit = self.unit_name(units, samples);
+        Err(DivisionError::Folds { folds, units, unit })
+    }
+
     /// Name of one of `units` of a set of `samples` samples.
-    pub(super) fn unit_name(self, units: usize, samples: usize) -> &'static str {
+    fn unit_name(self, units: usize, samples: usize) -> &'static str {
         match self {
             Self::Time | Self::Group if units < samples => "group",
             _ => "sample",
@@ -489,7 +501,8 @@ mod tests {
     fn split(samples: usize, held_out: usize) -> (Dataset, Split) {
         let model = SensorModel::new("10x6_3x18".parse().unwrap());
         let set = Dataset::simulate(&model, &Scene::default(), samples, &mut Seed(0).rng(Stream::Training)).unwrap();
-        (set.clone(), hold_out(set, held_out, &mut Seed(0).rng(Stream::Split)))
+        let parts = SplitBy::Group.hold_out(&set, held_out, &mut Seed(0).rng(Stream::Split));
+        (set.clone(), parts.split(&set))
     }
 
     #[test]

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{Baselines, Begin, Run, RunError, RunSets, RunSettings, Scores, TestErrors, baselines::fit_baselines};
 use crate::{
-    dataset::{Dataset, FoldUnit, Folds, Seed, Split, Stream},
+    dataset::{Dataset, Folds, Seed, SplitBy, Stream},
     decoupling::decode_set,
     job::{Cancelled, Job},
     training::TrainingError,
@@ -24,8 +24,9 @@ pub struct CrossValidation {
     pub folds: usize,
     /// Number of repeats, each with the samples reshuffled.
     pub repeats: usize,
-    /// Unit of the folds.
-    pub unit: FoldUnit,
+    /// Rule by which samples are assigned to the folds.
+    #[serde(alias = "unit")]
+    pub by: SplitBy,
 }
 
 impl Default for CrossValidation {
@@ -34,7 +35,7 @@ impl Default for CrossValidation {
         Self {
             folds: 10,
             repeats: 10,
-            unit: FoldUnit::Sample,
+            by: SplitBy::Random,
         }
     }
 }
@@ -91,7 +92,7 @@ impl CrossValidation {
         job: &Job<'_>,
     ) -> Result<CrossValidated, RunError> {
         let seed = nth_seed(settings.seed, repeat);
-        let folds = Folds::deal(set, self.folds, self.unit, &mut seed.rng(Stream::Split))?;
+        let folds = Folds::by(set, self.folds, self.by, &mut seed.rng(Stream::Split))?;
         CrossValidated::of_sets(&RunSettings { seed, ..*settings }, (set, tested), folds, job)
     }
 }
@@ -119,7 +120,7 @@ impl CrossValidated {
         let (mut network, mut mean, mut linear) = (empty(), empty(), empty());
         for fold in 0..folds.count() {
             let (samples, test) = (folds.test(fold), tested.select(folds.test(fold)));
-            let split = split(set, &folds, fold, holds_out);
+            let split = folds.divided(fold, holds_out).split(set);
             let (mut of_mean, mut of_linear) = fit_baselines(&split.training, settings)?;
             let answers_of_mean = decode_set(&mut of_mean, &test)?;
             scatter(&mut mean, samples, &answers_of_mean);
@@ -200,22 +201,6 @@ impl Effort {
         self.epochs += other.epochs;
         self.seconds += other.seconds;
         self.min_epoch_seconds = self.min_epoch_seconds.min(other.min_epoch_seconds);
-    }
-}
-
-/// Returns the training and validation sets for test fold `fold`: the fold after it is the validation set, if one is
-/// held out.
-fn split(set: &Dataset, folds: &Folds, fold: usize, holds_out: bool) -> Split {
-    let chooses = (fold + 1) % folds.count();
-    if folds.count() < 3 || !holds_out {
-        return Split {
-            training: set.select(&folds.without(&[fold])),
-            validation: None,
-        };
-    }
-    Split {
-        training: set.select(&folds.without(&[fold, chooses])),
-        validation: Some(set.select(folds.test(chooses))),
     }
 }
 

@@ -13,7 +13,7 @@ use super::{
     TestErrors, starts::lowest,
 };
 use crate::{
-    dataset::{Dataset, DivisionError, FoldsError, PerRow, SimulationError, SplitBy},
+    dataset::{Dataset, DivisionError, PerRow, SimulationError, SplitBy},
     decoupling::{DecodeError, FitError},
     job::{Cancelled, Job},
     machine::MemoryBudget,
@@ -359,9 +359,6 @@ pub enum RunError {
     /// A decoder cannot be fitted.
     #[error(transparent)]
     Fit(#[from] FitError),
-    /// Folds cannot be filled.
-    #[error(transparent)]
-    Folds(#[from] FoldsError),
     /// Samples cannot be divided.
     #[error(transparent)]
     Division(#[from] DivisionError),

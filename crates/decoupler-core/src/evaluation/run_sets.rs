@@ -2,7 +2,7 @@ use std::sync::Arc;
 
 use super::{Problem, RunError, RunSettings, SimulatedSettings, Simulation, Source, Workload};
 use crate::{
-    dataset::{Dataset, LARGEST_SAMPLES, Seed, Split, Stream, hold_out},
+    dataset::{Dataset, LARGEST_SAMPLES, Seed, Split, SplitBy, Stream},
     job::Job,
     machine::MemoryBudget,
     network::Networks,
@@ -49,7 +49,17 @@ impl RunSets {
         job.check()?;
         let drawn = source.draw_training(total, seed)?;
         job.check()?;
-        let split = hold_out(drawn, held_out, &mut seed.rng(Stream::Split));
+        // Whole snapshots, so that no validation sample was read at the same moment as a training sample.
+        let held_out = SplitBy::Group.hold_out(&drawn, held_out, &mut seed.rng(Stream::Split));
+        let split = if held_out.validation.is_empty() {
+            // Large sets need not be copied.
+            Split {
+                training: drawn,
+                validation: None,
+            }
+        } else {
+            held_out.split(&drawn)
+        };
         Ok(Self::new(split, test).described(source.problem()).limited_to(memory))
     }
 

@@ -12,7 +12,7 @@ use std::{
 };
 
 use decoupler_core::{
-    dataset::{FoldUnit, Seed, SplitBy},
+    dataset::{Seed, SplitBy},
     evaluation::{
         Begin, CrossValidation, Measured, Run, RunSets, RunSettings, SimulatedSettings, Simulation, TestErrors,
         experiments::{
@@ -59,12 +59,12 @@ fn small(axis: Axis) -> Experiment {
     }
 }
 
-fn cross_validated(unit: FoldUnit) -> Experiment {
+fn cross_validated(unit: SplitBy) -> Experiment {
     Experiment {
         cross_validation: Some(CrossValidation {
             folds: 4,
             repeats: 2,
-            unit,
+            by: unit,
         }),
         ..small(Axis::Samples(vec![40, 20]))
     }
@@ -119,8 +119,8 @@ fn results_are_the_same_on_any_number_of_threads() {
             second_axis: Some(Axis::Method(Method::all()[..4].to_vec())),
             ..small(Axis::Hidden(vec![2, 5]))
         },
-        cross_validated(FoldUnit::Sample),
-        cross_validated(FoldUnit::Snapshot),
+        cross_validated(SplitBy::Random),
+        cross_validated(SplitBy::Group),
     ];
     let alone = run(&experiments, 1);
     assert!(alone.iter().all(ExperimentResults::is_complete));
@@ -163,7 +163,7 @@ fn a_trial_equals_the_run_with_its_settings() {
 
 #[test]
 fn cross_validation_decouples_every_sample_with_a_network_that_was_not_trained_on_it() {
-    for unit in [FoldUnit::Sample, FoldUnit::Snapshot] {
+    for unit in [SplitBy::Random, SplitBy::Group] {
         let mut experiment = cross_validated(unit);
         experiment.base.hidden = 6;
         for cell in &run(&[experiment], 2)[0].cells {

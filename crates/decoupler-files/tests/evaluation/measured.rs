@@ -1,7 +1,7 @@
 //! Measured samples in the library: training, cross-validation and tables without any geometry.
 
 use decoupler_core::{
-    dataset::{Dataset, FoldUnit, PerRow, Split},
+    dataset::{Dataset, PerRow, Split, SplitBy},
     decoupling::{DecoderKind, Precision},
     evaluation::{
         Begin, CrossValidation, DecoderSet, ErrorTable, Measured, Run, RunError, RunSets, RunSettings,
@@ -126,14 +126,14 @@ fn every_fold_is_answered_by_networks_not_trained_on_it() {
         let validation = CrossValidation {
             folds: 5,
             repeats: 1,
-            unit,
+            by: unit,
         };
         let validated = validation
             .run(&settings(RowModel::Shared), &set, 0, &Job::UNINTERRUPTED)
             .unwrap();
         validated.scores(&set).network.targets()[0].r2.unwrap()
     };
-    let [by_sample, by_group] = [FoldUnit::Sample, FoldUnit::Snapshot].map(r2);
+    let [by_sample, by_group] = [SplitBy::Random, SplitBy::Group].map(r2);
     assert!(by_sample > 0.99, "samples of a test group are trained on: {by_sample}");
     assert!(by_group < 0.1, "an unseen group cannot be predicted: {by_group}");
 }
