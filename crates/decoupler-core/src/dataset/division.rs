@@ -61,12 +61,26 @@ pub enum DivisionError {
         folds: usize,
         /// Number of units in the set.
         units: usize,
-        /// Name of the unit of the folds: sample or group.
+        /// Name of the unit of the folds: sample, snapshot or group.
         unit: &'static str,
     },
     /// The test samples belong to other row-wires.
     #[error(transparent)]
     Rows(#[from] DatasetError),
+}
+
+impl DivisionError {
+    /// Checks that so many units, named `unit`, fill `folds` folds.
+    ///
+    /// # Errors
+    /// If there are fewer than two folds, or more folds than units.
+    pub(crate) fn check_folds(folds: usize, units: usize, unit: &'static str) -> Result<(), Self> {
+        if (2..=units).contains(&folds) {
+            Ok(())
+        } else {
+            Err(Self::Folds { folds, units, unit })
+        }
+    }
 }
 
 impl Default for Division {
@@ -336,20 +350,8 @@ impl SplitBy {
         units
     }
 
-    /// Checks that `units` of a set of `samples` samples fill `folds` folds.
-    ///
-    /// # Errors
-    /// If there are fewer than two folds, or more folds than units.
-    pub(crate) fn check_folds(self, folds: usize, units: usize, samples: usize) -> Result<(), DivisionError> {
-        if (2..=units).contains(&folds) {
-            return Ok(());
-        }
-        let unit = self.unit_name(units, samples);
-        Err(DivisionError::Folds { folds, units, unit })
-    }
-
     /// Name of one of `units` of a set of `samples` samples.
-    fn unit_name(self, units: usize, samples: usize) -> &'static str {
+    pub(super) fn unit_name(self, units: usize, samples: usize) -> &'static str {
         match self {
             Self::Time | Self::Group if units < samples => "group",
             _ => "sample",

@@ -17,7 +17,8 @@ impl Folds {
     /// If there are fewer than two folds, or more folds than samples (or groups).
     pub fn by(set: &Dataset, folds: usize, by: SplitBy, rng: &mut impl Rng) -> Result<Self, DivisionError> {
         let units = by.units(set);
-        by.check_folds(folds, units.len(), set.samples())?;
+        let unit = by.unit_name(units.len(), set.samples());
+        DivisionError::check_folds(folds, units.len(), unit)?;
         Ok(match by {
             SplitBy::Time => Self::blocks(&units, folds),
             SplitBy::Group | SplitBy::Random => Self::shuffled(&units, folds, rng),

@@ -231,11 +231,11 @@ impl Experiment {
         };
         let rows = settings.source.model_size()?.rows;
         let snapshots = settings.source.samples.div_ceil(rows);
-        let units = match by {
-            SplitBy::Random => snapshots * rows,
-            SplitBy::Time | SplitBy::Group => snapshots,
+        let (units, unit) = match by {
+            SplitBy::Random => (snapshots * rows, "sample"),
+            SplitBy::Time | SplitBy::Group => (snapshots, "snapshot"),
         };
-        Ok(by.check_folds(folds, units, snapshots * rows)?)
+        Ok(DivisionError::check_folds(folds, units, unit)?)
     }
 
     fn check_recorded_cell(&self, cell: &Cell) -> Result<(), ExperimentError> {
