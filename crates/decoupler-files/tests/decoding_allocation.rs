@@ -8,7 +8,7 @@ use decoupler_core::{
         AffineMap, CompiledNetworks, Decoder, NewtonDecoder, NewtonRules, PolishedDecoder, RadialBasisNetwork,
         TakagiSugeno,
     },
-    live::{Diagnosis, FaultCause, FaultMonitor, FaultyWire, LeftOutDecoder},
+    live::{Diagnosis, FaultCause, FaultyWire, LeftOutDecoder, WireCheck},
     network::{
         DecouplingNetwork, InputChoice, Inputs, MinMax, Quantity, ScalingChoice, ScalingError, Shape, nguyen_widrow,
     },
@@ -133,8 +133,9 @@ fn a_line_is_parsed_and_monitored_without_allocating() {
     let mut source = Simulated::new(&model, &scene, Seed(0), 10.0).unwrap();
     let mut frame_ohm = vec![0.0; source.readings()];
     let mut parser = LineParser::new(model.scale, scene.rows, true).unwrap();
-    let mut monitor = FaultMonitor::new(&model, &scene, source.rows()).unwrap();
-    let mut decoder = LeftOutDecoder::new(&model, &scene, source.rows()).unwrap();
+    let newton = || Box::new(NewtonDecoder::new(&model, &scene, source.rows(), NewtonRules::default()).unwrap());
+    let mut check = WireCheck::by(newton(), &model, &scene, source.rows()).unwrap();
+    let mut decoder = LeftOutDecoder::new(&model, &scene, source.rows(), newton()).unwrap();
     decoder.leave_out(Some(Diagnosis {
         wire: FaultyWire::Column(3),
         cause: FaultCause::Unknown,
@@ -149,7 +150,7 @@ fn a_line_is_parsed_and_monitored_without_allocating() {
             let ParsedLine::Snapshot(readings_ohm) = parser.parse(frame + 1, line.as_bytes()).unwrap() else {
                 panic!("a snapshot is parsed");
             };
-            assert_eq!(monitor.check(readings_ohm), None);
+            assert_eq!(check.check(readings_ohm), None);
             decoder
                 .decode_row(4, &readings_ohm[4 * 18..5 * 18], &mut answer_mm)
                 .unwrap();
