@@ -1,4 +1,4 @@
-use std::{f64::consts::TAU, fmt, iter::Sum};
+use std::{f64::consts::TAU, fmt, iter::Sum, mem::discriminant};
 
 use faer::{Mat, Side, linalg::solvers::Solve};
 use glam::DVec3;
@@ -86,7 +86,8 @@ pub struct WireCheck {
     /// Resistances at rest: rows × M4.
     at_rest_ohm: Vec<f64>,
     coordinates_mm: Vec<f64>,
-    state: State,
+    /// Last event; [`FaultEvent::Recovered`] at first.
+    state: FaultEvent,
     /// Consecutive suspicious frames, each rows × M4.
     suspicious_ohm: Vec<f64>,
     /// Number of consecutive suspicious frames since the last comparison.
@@ -95,13 +96,6 @@ pub struct WireCheck {
     next_comparison: usize,
     /// Number of consecutive frames without a fault.
     normal: usize,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq)]
-enum State {
-    Normal,
-    Named(Diagnosis),
-    Unexplained,
 }
 
 /// Fit of some readings.
@@ -121,8 +115,6 @@ struct PartialRow {
     fit: Fit,
     /// The missing readings.
     missing: [Predicted; 2],
-    /// The mean conductance of both missing columns, as ln R, without noise.
-    shared: Predicted,
 }
 
 /// A reading predicted from others.
@@ -219,7 +211,7 @@ impl WireCheck {
             suspicious_ohm: Vec::with_capacity(Self::PERSISTENCE * at_rest_ohm.len()),
             at_rest_ohm,
             coordinates_mm: vec![0.0; model.scale.coordinates_per_row()],
-            state: State::Normal,
+            state: FaultEvent::Recovered,
             suspicious: 0,
             next_comparison: Self::PERSISTENCE,
             normal: 0,
@@ -230,8 +222,8 @@ impl WireCheck {
     /// Returns the fault currently reported.
     pub fn named(&self) -> Option<Diagnosis> {
         match self.state {
-            State::Named(diagnosis) => Some(diagnosis),
-            State::Normal | State::Unexplained => None,
+            FaultEvent::Named(diagnosis) => Some(diagnosis),
+            FaultEvent::Unexplained | FaultEvent::Recovered => None,
         }
     }
 
@@ -245,10 +237,10 @@ impl WireCheck {
         if self.is_explained(frame_ohm, None) {
             self.suspicious = 0;
             self.normal += 1;
-            if self.normal == Self::PERSISTENCE && self.state != State::Normal {
-                self.state = State::Normal;
+            if self.normal == Self::PERSISTENCE && self.state != FaultEvent::Recovered {
+                self.state = FaultEvent::Recovered;
                 self.next_comparison = Self::PERSISTENCE;
-                return Some(FaultEvent::Recovered);
+                return Some(self.state);
             }
             return None;
         }
@@ -274,13 +266,15 @@ impl WireCheck {
             Some(_) => Self::PERSISTENCE,
             None => (2 * self.next_comparison).min(LONGEST_WAIT * Self::PERSISTENCE),
         };
-        let wire = |state: State| match state {
-            State::Named(diagnosis) => Some((diagnosis.wire, std::mem::discriminant(&diagnosis.cause))),
-            State::Normal | State::Unexplained => None,
+        let event = found.map_or(FaultEvent::Unexplained, FaultEvent::Named);
+        let last = std::mem::replace(&mut self.state, event);
+        let is_known = match (last, event) {
+            (FaultEvent::Named(last), FaultEvent::Named(named)) => {
+                last.wire == named.wire && discriminant(&last.cause) == discriminant(&named.cause)
+            }
+            _ => last == event,
         };
-        let last = std::mem::replace(&mut self.state, found.map_or(State::Unexplained, State::Named));
-        let is_known = wire(last) == wire(self.state) && last != State::Normal;
-        (!is_known).then(|| found.map_or(FaultEvent::Unexplained, FaultEvent::Named))
+        (!is_known).then_some(event)
     }
 
     /// Returns `true` if some deformation explains the readings, excluding those of `left_out`.
@@ -352,7 +346,6 @@ impl WireCheck {
             return PartialRow {
                 fit,
                 missing: [Predicted::default(); 2],
-                shared: Predicted::default(),
             };
         };
         // Slopes of ln R by the unknowns, in units of their prior standard deviations: the stroke, and that of the gain.
@@ -396,24 +389,9 @@ impl WireCheck {
                 }
             })
         });
-        let shared = if let [Some(one), Some(other)] = missing {
-            let conductances = [one, other].map(|column| 1.0 / partial.predicted_ohm[column]);
-            let total = conductances[0] + conductances[1];
-            let of_both = faer::Scale(conductances[0] / total) * slopes(one)
-                + faer::Scale(conductances[1] / total) * slopes(other);
-            Predicted {
-                log_reading: 0.5 * (predicted[0].log_reading + predicted[1].log_reading),
-                log_ohm: (2.0 / total).ln() + log_gain,
-                variance: variance(&of_both) + 0.25 * (predicted[0].noise + predicted[1].noise),
-                noise: 0.0,
-            }
-        } else {
-            Predicted::default()
-        };
         PartialRow {
             fit,
             missing: predicted,
-            shared,
         }
     }
 
@@ -547,8 +525,12 @@ impl WireCheck {
 fn of_short(column: usize, rows: &[PartialRow]) -> Hypothesis {
     let of_rows = rows.iter().flat_map(|row| {
         let [one, other] = row.missing;
-        let apart = normal(one.log_reading - other.log_reading, one.noise + other.noise);
-        let mean = normal(row.shared.log_reading - row.shared.log_ohm, row.shared.variance);
+        let noise = one.noise + other.noise;
+        let apart = normal(one.log_reading - other.log_reading, noise);
+        // The mean conductance is known at least as well as both on average.
+        let log_ohm = -(0.5 * ((-one.log_ohm).exp() + (-other.log_ohm).exp())).ln();
+        let misfit = 0.5 * (one.log_reading + other.log_reading) - log_ohm;
+        let mean = normal(misfit, 0.5 * (one.variance + other.variance) - 0.25 * noise);
         [row.fit, apart, mean]
     });
     Hypothesis {

@@ -15,7 +15,7 @@ use super::{Cell, Experiment, ExperimentError, Trial, TrialFailure, TrialSamples
 use crate::{
     dataset::Seed,
     evaluation::{CrossValidation, SimulatedSettings},
-    training::Method,
+    network::Shape,
 };
 
 /// A finished trial.
@@ -273,17 +273,13 @@ pub(super) fn work(experiment: &Experiment, cell: &Cell, samples: &TrialSamples)
         }
         (None, TrialSamples::Drawn(_)) => (1, 1, 1),
     };
-    let (n1, h) = ((inputs + 1) as f64, settings.hidden as f64);
-    let (outputs, samples) = (outputs as f64, samples as f64);
-    // Forward and backward passes, and the test and validation sets.
-    let passes = 4.0 * samples * h * (n1 + outputs);
-    let second_order = samples * (h * n1).powi(2) / 4.0 + 0.5 * (h * n1).powi(3);
-    let epoch = match settings.training.method {
-        Method::LevenbergMarquardt(_) | Method::BayesianRegularization(_) => passes + second_order,
-        _ => passes,
+    let shape = Shape {
+        inputs,
+        hidden: settings.hidden,
+        outputs,
     };
-    let trainings = experiment.folds() * settings.starts * settings.training.stopping.epochs;
-    epoch * trainings as f64
+    let epochs = experiment.folds() * settings.starts * settings.training.stopping.epochs;
+    settings.training.method.epoch_multiplications(shape, samples) * epochs as f64
 }
 
 #[cfg(test)]
