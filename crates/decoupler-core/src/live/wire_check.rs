@@ -1,7 +1,6 @@
 use std::{f64::consts::TAU, fmt, iter::Sum, mem::discriminant};
 
 use faer::{Mat, Side, linalg::solvers::Solve};
-use glam::DVec3;
 
 use super::partial_decoder::{Missing, PartialDecoder, equation_decoder};
 use crate::{
@@ -83,8 +82,6 @@ pub struct WireCheck {
     common: f64,
     /// Logarithm of the reading above which the converter clips.
     log_full_scale: f64,
-    /// Resistances at rest: rows × M4.
-    at_rest_ohm: Vec<f64>,
     coordinates_mm: Vec<f64>,
     /// Last event; [`FaultEvent::Recovered`] at first.
     state: FaultEvent,
@@ -196,11 +193,6 @@ impl WireCheck {
         let noise = scene.noise.in_test();
         let source = noise.source(model)?;
         let own = |&ohm: &f64| source.relative_to(ohm).own.max(SMALLEST_NOISE);
-        let at_rest = vec![DVec3::ZERO; model.scale.nodes_per_row()];
-        let mut at_rest_ohm = Vec::with_capacity(partial.half_way_ohm.len());
-        for &row in rows {
-            at_rest_ohm.extend(model.row_resistances(row, &at_rest)?);
-        }
         Ok(Self {
             axes: scene.movement.axes().indices(),
             stroke_mm: scene.stroke_mm(&model.geometry),
@@ -208,8 +200,7 @@ impl WireCheck {
             // Rows are decoded one by one but share this error: it must not be penalised more than once in total.
             common: noise.drift * (rows.len() as f64).sqrt(),
             log_full_scale: (noise.range_ohm(model)?.1 * (1.0 - 1e-9)).ln(),
-            suspicious_ohm: Vec::with_capacity(Self::PERSISTENCE * at_rest_ohm.len()),
-            at_rest_ohm,
+            suspicious_ohm: Vec::with_capacity(Self::PERSISTENCE * partial.half_way_ohm.len()),
             coordinates_mm: vec![0.0; model.scale.coordinates_per_row()],
             state: FaultEvent::Recovered,
             suspicious: 0,
@@ -233,7 +224,7 @@ impl WireCheck {
     /// # Panics
     /// If the frame has the wrong length.
     pub fn check(&mut self, frame_ohm: &[f64]) -> Option<FaultEvent> {
-        assert_eq!(frame_ohm.len(), self.at_rest_ohm.len());
+        assert_eq!(frame_ohm.len(), self.deviations.len());
         if self.is_explained(frame_ohm, None) {
             self.suspicious = 0;
             self.normal += 1;
@@ -439,14 +430,12 @@ impl WireCheck {
         let (rows, columns) = (self.partial.rows.len(), self.columns());
         let others = intact.iter().enumerate().filter(|(line, _)| line % rows != row_index);
         let lines = self.suspicious_ohm.chunks_exact(columns).skip(row_index).step_by(rows);
-        let at_rest_ohm = &self.at_rest_ohm[row_index * columns..][..columns];
-        let pairs = lines.clone().flat_map(|line| line.iter().zip(at_rest_ohm));
-        let is_open = pairs
-            .clone()
-            .all(|(ohm, at_rest)| ohm.ln() >= self.log_full_scale || ohm > at_rest);
-        let uncertain = pairs
-            .filter(|(ohm, _)| !(is_open && ohm.ln() >= self.log_full_scale))
-            .count();
+        let half_way_ohm = &self.partial.half_way_ohm[row_index * columns..][..columns];
+        let pairs = lines.flat_map(|line| line.iter().zip(half_way_ohm));
+        let is_clipped = |ohm: f64| ohm.ln() >= self.log_full_scale;
+        let is_open = pairs.clone().all(|(&ohm, half_way)| is_clipped(ohm) || ohm > *half_way);
+        // Clipped readings are certain without any current.
+        let uncertain = pairs.filter(|(ohm, _)| !(is_open && is_clipped(**ohm))).count();
         let of_row = Fit {
             score: 2.0 * WIDTH.ln() * uncertain as f64,
             ..Fit::default()
