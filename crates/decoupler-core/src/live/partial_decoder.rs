@@ -93,7 +93,8 @@ impl PartialDecoder {
                 Some(column) => self.predicted_ohm[column].ln() + log_gain - at[place],
                 None => 0.0,
             });
-            if !(misfit[0].abs().max(misfit[1].abs()) > TOLERANCE) {
+            let apart = misfit[0].abs().max(misfit[1].abs());
+            if apart <= TOLERANCE || apart.is_nan() {
                 break;
             }
             let next = match last.replace([at, misfit]) {
