@@ -253,7 +253,7 @@ fn grid(x: &SortedAxis, y: &SortedAxis, target: usize) -> Grid {
     )
 }
 
-/// A grid point of the lattice `x_mm × y_mm`; on a line of nodes, the point of the line beside it.
+/// A grid point of the lattice `x_mm × y_mm`; on a line of nodes, the nearest point on that line.
 fn point_of(grid: &Grid, (ix, iy): (usize, usize), (x_mm, y_mm): (&[f64], &[f64])) -> Point {
     let on_axis = |nodes_mm: &[f64], point_mm: f64| match nodes_mm {
         [only_mm] => *only_mm,
