@@ -349,7 +349,7 @@ fn other_presses_than_those_of_the_scene_raise_no_alarm() {
     };
     let mut check = WireCheck::new(&sensor, &scene, &[0, 1, 2, 3]).unwrap();
     frames(&sensor, &pressed, None, 300, |frame_ohm, _| {
-        assert_eq!(check.check(frame_ohm), None)
+        assert_eq!(check.check(frame_ohm), None);
     });
 }
 
