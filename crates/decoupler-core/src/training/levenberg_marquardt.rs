@@ -3,8 +3,9 @@
 use serde::{Deserialize, Serialize};
 
 use super::{
-    Evaluation, Examples, NormalEquations, SettingError, StopReason,
+    Evaluation, Examples, SettingError, StopReason,
     method::{Algorithm, Checked, Description, add_step},
+    normal_equations::{NormalEquations, Plan},
     setting::{check_limit, settings},
 };
 use crate::network::{Mlp, Shape};
@@ -49,16 +50,16 @@ impl Algorithm for LevenbergMarquardt {
     }
 
     fn equations_bytes(shape: Shape, samples: usize) -> usize {
-        NormalEquations::cheapest_bytes(shape, samples)
+        Plan::cheapest(shape, samples).bytes()
     }
 
     fn epoch_multiplications(shape: Shape, samples: usize) -> f64 {
-        NormalEquations::cheapest_multiplications(shape, samples)
+        Plan::cheapest(shape, samples).multiplications()
     }
 
     fn new(damping: Damping, mlp: &Mlp, examples: &Examples) -> (Self, Evaluation) {
-        let mut equations = NormalEquations::cheapest(mlp.shape(), examples);
-        let evaluation = equations.gather(mlp, examples);
+        let mut equations = NormalEquations::new(&Plan::cheapest(mlp.shape(), examples.samples()), examples);
+        let evaluation = equations.gather(mlp, &[], examples);
         let method = Self {
             damping,
             mu: damping.mu,
@@ -77,14 +78,14 @@ impl Algorithm for LevenbergMarquardt {
     fn step(&mut self, mlp: &mut Mlp, examples: &Examples) -> Result<Evaluation, StopReason> {
         let before = self.mse;
         self.mse = self.damping.search(&mut self.mu, |mu| {
-            self.equations.solve(mlp, examples, mu, &mut self.step)?;
+            self.equations.solve(mlp, examples, [mu; 4], &[], &mut self.step)?;
             add_step(&mut self.candidate, mlp, &self.step);
             let mse = self.equations.mse(&self.candidate, examples);
             // False for NaN.
             (mse < before).then_some(mse)
         })?;
         std::mem::swap(mlp, &mut self.candidate);
-        Ok(self.equations.gather(mlp, examples))
+        Ok(self.equations.gather(mlp, &[], examples))
     }
 
     fn parameter(&self) -> f64 {

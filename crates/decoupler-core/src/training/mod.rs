@@ -5,8 +5,6 @@
 
 mod activations;
 mod bayesian_regularization;
-#[cfg(test)]
-mod certified;
 mod checkpoint;
 mod epoch_columns;
 mod examples;
@@ -17,6 +15,8 @@ mod normal_equations;
 mod parallel;
 mod scaled_conjugate_gradient;
 mod setting;
+#[cfg(test)]
+mod tests;
 mod trainer;
 
 pub use bayesian_regularization::RegularizationSettings;
@@ -29,7 +29,6 @@ pub use gradient_descent::{
 pub use levenberg_marquardt::Damping;
 pub use method::Method;
 use method::MethodState;
-use normal_equations::{FactoredEquations, NormalEquations};
 pub use scaled_conjugate_gradient::ScaledConjugateGradientSettings;
 pub use setting::{Setting, SettingError, StopReason, StoppingRules, TrainingDefect};
 use trainer::Evaluation;

@@ -14,9 +14,9 @@ use state::{GroupState, TargetState};
 use weighting::{OutputParameters, scale_outputs, weighted_mse};
 
 use super::{
-    Damping, Evaluation, Examples, FactoredEquations, SettingError, StopReason,
+    Damping, Evaluation, Examples, SettingError, StopReason,
     method::{Algorithm, Description, add_step},
-    normal_equations::{Decay, PerClass, class_sizes},
+    normal_equations::{Classes, NormalEquations, Plan, class_sizes, decay_slopes},
     trainer::correlation_time,
 };
 use crate::network::{Mlp, Shape};
@@ -59,7 +59,7 @@ pub(super) struct BayesianRegularization {
     /// Epoch after which the correlation of errors is measured; 0 for never.
     correlation_epoch: usize,
     /// Group of each class of weights.
-    group_of: PerClass<usize>,
+    group_of: Classes<usize>,
     /// Means of the targets, if output biases are drawn towards them.
     means: Vec<f64>,
     state: BayesianState,
@@ -67,7 +67,7 @@ pub(super) struct BayesianRegularization {
     roots: Vec<f64>,
     /// γ of the output weights of each target, once measured; empty if all have the same noise level.
     of_outputs: Vec<OutputParameters>,
-    equations: FactoredEquations,
+    equations: NormalEquations,
     examples: Examples,
     /// Mean squared error.
     mse: f64,
@@ -101,17 +101,19 @@ impl Algorithm for BayesianRegularization {
     }
 
     fn equations_bytes(shape: Shape, samples: usize) -> usize {
-        FactoredEquations::factored_bytes(shape, samples).saturating_add(FactoredEquations::inverse_bytes(shape))
+        let plan = Plan::factored(shape, samples);
+        plan.bytes().saturating_add(plan.inverse_bytes())
     }
 
     fn epoch_multiplications(shape: Shape, samples: usize) -> f64 {
-        FactoredEquations::factored_multiplications(shape, samples) + FactoredEquations::trace_multiplications(shape)
+        let plan = Plan::factored(shape, samples);
+        plan.multiplications() + plan.trace_multiplications()
     }
 
     /// Starts with γ = N, as if the data determined all weights.
     fn new(settings: RegularizationSettings, mlp: &Mlp, examples: &Examples) -> (Self, Evaluation) {
-        let mut equations = FactoredEquations::factored(mlp.shape(), examples);
-        let evaluation = equations.gather(mlp, examples);
+        let mut equations = NormalEquations::new(&Plan::factored(mlp.shape(), examples.samples()), examples);
+        let evaluation = equations.gather(mlp, &[], examples);
         let weights = mlp.weights().len();
         let group_of = settings.group_of_classes();
         let mut method = Self {
@@ -154,8 +156,8 @@ impl Algorithm for BayesianRegularization {
             scaled_candidate: mlp.clone(),
         };
         method.state.further = {
-            let sizes = class_sizes(mlp.shape()).values();
-            let classes = group_of.values().into_iter().zip(sizes);
+            let sizes = class_sizes(mlp.shape());
+            let classes = group_of.into_iter().zip(sizes);
             let size = |group| {
                 classes
                     .clone()
@@ -198,12 +200,12 @@ impl Algorithm for BayesianRegularization {
         let (beta, prior) = (weighting.beta, (self.group_of, &means[..]));
         let alphas = weighting.decays(self.group_of);
         let objective = weighting.objective(self.weighted_mse, errors, &self.scaled, prior);
+        let decay = decay_slopes(&self.scaled, alphas.map(|alpha| alpha / beta), prior.1);
         let hidden_weights = mlp.shape().hidden_weights();
         self.damping.search(&mut self.state.mu, |mu| {
             let damping = alphas.map(|alpha| (mu + alpha) / beta);
-            let decay = Decay::new(alphas.map(|alpha| alpha / beta), prior.1);
             self.equations
-                .solve_with_decay(&self.scaled, examples, damping, decay, &mut self.step)?;
+                .solve(&self.scaled, examples, damping, &decay, &mut self.step)?;
             if !self.roots.is_empty() {
                 let outputs = self.step[hidden_weights..].iter_mut().zip(self.roots.iter().cycle());
                 outputs.for_each(|(step, root)| *step /= root);

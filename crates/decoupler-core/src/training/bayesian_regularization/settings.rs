@@ -2,7 +2,7 @@
 
 use crate::training::{
     Damping,
-    normal_equations::PerClass,
+    normal_equations::Classes,
     setting::{WHOLE, settings},
 };
 
@@ -47,18 +47,12 @@ impl RegularizationSettings {
     }
 
     /// Group of each class of weights, from 0.
-    pub(super) fn group_of_classes(&self) -> PerClass<usize> {
-        let [hidden_weights, hidden_biases, output_weights, output_biases] = match self.groups as usize {
+    pub(super) fn group_of_classes(&self) -> Classes<usize> {
+        match self.groups as usize {
             ..=1 => [0, 0, 0, 0],
             2 => [0, 0, 1, 1],
             3 => [0, 1, 2, 2],
             _ => [0, 1, 2, 3],
-        };
-        PerClass {
-            hidden_weights,
-            hidden_biases,
-            output_weights,
-            output_biases,
         }
     }
 

@@ -5,7 +5,9 @@ use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
 use super::*;
 use crate::{
     network::nguyen_widrow,
-    training::{Method, Problem, StoppingRules, Trainer, TrainingSettings, method::Running, normal_equations::dense},
+    training::{
+        Method, Problem, StoppingRules, Trainer, TrainingSettings, method::Running, normal_equations::tests::dense,
+    },
 };
 
 /// Returns the effective number of parameters after 60 epochs on a curve with autoregressive noise.
