@@ -4,10 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::{
     network::Mlp,
-    training::{
-        method::Checked,
-        normal_equations::{Classes, class_squares},
-    },
+    training::normal_equations::{Classes, class_squares},
 };
 
 /// State of Bayesian regularisation.
@@ -51,12 +48,6 @@ pub(super) struct TargetState {
 pub(super) struct GroupState {
     pub(super) alpha: f64,
     pub(super) effective_parameters: f64,
-}
-
-impl Checked for BayesianState {
-    fn vectors(&self) -> Vec<&[f64]> {
-        Vec::new()
-    }
 }
 
 impl BayesianState {

@@ -179,7 +179,7 @@ impl NormalEquations {
         &mut self,
         mlp: &Mlp,
         damping: Classes,
-        compute: impl FnOnce(&SchurComplement, &mut Elimination) -> T,
+        compute: impl FnOnce(&mut SchurComplement, &mut Elimination) -> T,
     ) -> Option<T> {
         let (sums, elimination) = (&self.parts[0], &mut self.elimination);
         let Solver::Factored(schur) = &mut self.solver else {

@@ -33,6 +33,8 @@ pub(super) struct SchurComplement {
     /// Unpacked n1 × n1 block of BᵀB for each hidden node.
     squares: Vec<f64>,
     cholesky: Cholesky,
+    /// L⁻¹ and L⁻¹ Rₜ, allocated on first use.
+    inverse: Option<(Mat<f64>, Mat<f64>)>,
 }
 
 impl SchurComplement {
@@ -43,6 +45,7 @@ impl SchurComplement {
             s: Mat::zeros(order, order),
             squares: vec![0.0; order * (shape.inputs + 1)],
             cholesky: Cholesky::new(order),
+            inverse: None,
         }
     }
 
@@ -83,23 +86,23 @@ impl SchurComplement {
     /// Returns the trace of the inverse of the whole matrix last factored. From the blocks of the inverse it is `tr S⁻¹
     /// + m tr G⁻¹ + Σₜ tr S⁻¹ Rₜ Rₜᵀ` with Rₜ = diag(V̄ₜ ⊗ 1) C G⁻¹; with the factors S = L Lᵀ and G = Lg Lgᵀ this is
     /// `‖L⁻¹‖² + m ‖Lg⁻¹‖² + Σₜ ‖L⁻¹ Rₜ‖²` (Frobenius norms).
-    pub(super) fn trace_of_inverse(&self, elimination: &mut Elimination, mlp: &Mlp) -> f64 {
-        let squares = |matrix: MatRef<'_, f64>| -> f64 {
-            let columns = (0..matrix.ncols()).flat_map(|index| &column(matrix, index)[index..]);
+    pub(super) fn trace_of_inverse(&mut self, elimination: &mut Elimination, mlp: &Mlp) -> f64 {
+        let squares = |matrix: &Mat<f64>| -> f64 {
+            let columns = (0..matrix.ncols()).flat_map(|index| &column(matrix.as_ref(), index)[index..]);
             columns.map(|value| value * value).sum()
         };
-        let (s, g) = (inverse(self.s.as_ref()), inverse(elimination.g_factor.as_ref()));
-        let mut trace = squares(s.as_ref()) + self.shape.outputs as f64 * squares(g.as_ref());
+        let of_g = squares(&inverse(elimination.g_factor.as_ref()));
+        let mut trace = squares(self.inverse()) + self.shape.outputs as f64 * of_g;
         self.for_each_output(elimination, mlp, |r| trace += r.squared_norm_l2());
         trace
     }
 
     /// As [`Self::trace_of_inverse`], class by class: diagonal entry k is the squared norm of column k of L⁻¹, or of
     /// Lg⁻¹ and L⁻¹ Rₜ.
-    pub(super) fn traces_of_inverse(&self, elimination: &mut Elimination, mlp: &Mlp) -> Traces {
+    pub(super) fn traces_of_inverse(&mut self, elimination: &mut Elimination, mlp: &Mlp) -> Traces {
         let Shape { inputs, hidden, .. } = self.shape;
         let square = |values: &[f64]| values.iter().map(|value| value * value).sum::<f64>();
-        let (s, g) = (inverse(self.s.as_ref()), inverse(elimination.g_factor.as_ref()));
+        let (s, g) = (self.inverse(), inverse(elimination.g_factor.as_ref()));
         let mut traces = Traces::default();
         for index in 0..s.ncols() {
             let is_bias = index % (inputs + 1) == inputs;
@@ -121,12 +124,23 @@ impl SchurComplement {
         traces
     }
 
-    /// Calls `add` with L⁻¹ Rₜ for every output; turns F into C G⁻¹.
-    fn for_each_output(&self, elimination: &mut Elimination, mlp: &Mlp, mut add: impl FnMut(MatRef<'_, f64>)) {
+    /// Returns L⁻¹.
+    fn inverse(&mut self) -> &Mat<f64> {
+        let (order, h1) = (self.s.nrows(), self.shape.hidden + 1);
+        let allocate = || (Mat::zeros(order, order), Mat::zeros(order, h1));
+        let (inverse, _) = self.inverse.get_or_insert_with(allocate);
+        invert_lower_triangular(inverse.as_mut(), self.s.as_ref(), Par::Seq);
+        inverse
+    }
+
+    /// Calls `add` with L⁻¹ Rₜ for every output, after [`Self::inverse`]; turns F into C G⁻¹.
+    fn for_each_output(&mut self, elimination: &mut Elimination, mlp: &Mlp, mut add: impl FnMut(MatRef<'_, f64>)) {
         let (v, n1) = (output_weights(mlp), self.shape.inputs + 1);
         let Elimination { g_factor, f, .. } = elimination;
         solve_upper_triangular_in_place(g_factor.as_ref().transpose(), f.as_mut().transpose_mut(), Par::Seq);
-        let mut r = Mat::zeros(f.nrows(), f.ncols());
+        let Some((_, r)) = &mut self.inverse else {
+            return;
+        };
         for output in 0..self.shape.outputs {
             fill(r.as_mut(), |index, column| v[(index / n1, output)] * f[(index, column)]);
             solve_lower_triangular_in_place(self.s.as_ref(), r.as_mut(), Par::Seq);

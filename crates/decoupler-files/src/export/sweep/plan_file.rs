@@ -320,11 +320,10 @@ fn text(value: &dyn ToString) -> Value {
     Value::from(value.to_string())
 }
 
-fn method_settings(mut method: Method) -> Value {
-    let settings = method.settings();
-    let pairs = settings.iter().map(|setting| {
-        let value = Value::from(*setting.value + 0.0);
-        format!("{}={value}", setting.name.replace(' ', "-"))
+fn method_settings(method: Method) -> Value {
+    let pairs = method.settings().filter_map(|setting| {
+        let value = number(setting.number(&method)?);
+        Some(format!("{}={value}", setting.word("-")))
     });
     pairs.collect()
 }
