@@ -6,8 +6,10 @@ use std::{
     str::FromStr,
 };
 
+use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
+use super::Method;
 use crate::sensor::short;
 
 /// A setting of `S`: a row of a table.
@@ -62,6 +64,17 @@ pub trait AsText {
     fn read(&mut self, text: &str) -> Result<(), String>;
 }
 
+impl AsText for Method {
+    fn text(&self) -> String {
+        self.short_name().to_owned()
+    }
+
+    fn read(&mut self, text: &str) -> Result<(), String> {
+        *self = Self::named(text).map_err(|error| error.to_string())?;
+        Ok(())
+    }
+}
+
 impl<T: Display + FromStr<Err: Display>> AsText for T {
     fn text(&self) -> String {
         self.to_string()
@@ -74,12 +87,13 @@ impl<T: Display + FromStr<Err: Display>> AsText for T {
 }
 
 /// Value of a setting.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(untagged)]
 pub enum Value {
-    /// Number.
-    Number(f64),
     /// Integer.
     Integer(u64),
+    /// Number.
+    Number(f64),
     /// Name or text.
     Text(String),
 }
