@@ -19,7 +19,7 @@ mod simulation;
 mod span;
 
 pub use continuation::{Continuation, Place, RowOrder, Series};
-pub use division::{DividedSamples, Division, DivisionError, Split, SplitBy, SplitByError, hold_out};
+pub use division::{DividedSamples, Division, DivisionError, Split, SplitBy, hold_out};
 pub use folds::{FoldUnit, Folds, FoldsError};
 pub use frames::{Frames, FramesError, PerRow};
 pub use history::{History, MemoryStream};
