@@ -190,7 +190,7 @@ impl<S: Clone> Setting<S> {
             (Some(Field::Number(field)), Value::Number(value)) => *field = *value,
             (Some(Field::Number(field)), Value::Integer(value)) => *field = *value as f64,
             (Some(Field::Count(field)), Value::Integer(value)) => {
-                *field = usize::try_from(*value).unwrap_or(usize::MAX)
+                *field = usize::try_from(*value).unwrap_or(usize::MAX);
             }
             (Some(Field::Integer(field)), Value::Integer(value)) => *field = *value,
             (Some(Field::Text(field)), Value::Text(text)) => {

@@ -34,7 +34,8 @@ fn by_class<'a>(mlp: &'a Mlp, biases: &'a [f64]) -> Classes<impl Iterator<Item =
     class_sizes(mlp.shape()).map(|size| {
         let class: Range<usize> = first..first + size;
         first = class.end;
-        let towards = (first == mlp.weights().len()).then_some(biases).unwrap_or_default();
+        let is_last = first == mlp.weights().len();
+        let towards = if is_last { biases } else { &[] };
         let weights = mlp.weights()[class].iter().enumerate();
         weights.map(|(index, weight)| towards.get(index).map_or(*weight, |towards| weight - towards))
     })

@@ -53,7 +53,7 @@ pub(super) struct NormalEquations {
 
 /// Solver of S δ = r on W.
 enum Solver {
-    Factored(SchurComplement),
+    Factored(Box<SchurComplement>),
     Iterated(Box<ConjugateGradient>),
 }
 
@@ -63,7 +63,7 @@ impl NormalEquations {
         let (shape, blocks) = (plan.shape, examples.blocks().len());
         let gathering = plan.gathering_parts(blocks);
         let (solver, solving) = match plan.solution {
-            Solution::Factored => (Solver::Factored(SchurComplement::new(shape)), 1),
+            Solution::Factored => (Solver::Factored(Box::new(SchurComplement::new(shape))), 1),
             Solution::Iterated => {
                 let solver = ConjugateGradient::new(shape, blocks);
                 let parts = solver.parts();
