@@ -7,7 +7,7 @@ use rand::{Rng, seq::index};
 use serde::{Deserialize, Serialize};
 
 use super::{
-    DecodeError, Decoder,
+    DecodeError, Decoder, Description, NotDescribed,
     radial_basis::{distance2, thinned, with_noise},
     ridge::{Regression, Standard, folds},
 };
@@ -248,6 +248,10 @@ impl Decoder for TakagiSugeno {
             }
         }
         Ok(())
+    }
+
+    fn description(&self) -> Result<Description, NotDescribed> {
+        Err(NotDescribed::Rules)
     }
 }
 
