@@ -124,7 +124,9 @@ fn fit(kind: Kind, set: &Dataset, model: RowModel, choice: InputChoice, seed: Se
     let unseen = NoiseSource::default();
     let mut rng = seed.rng(Stream::Expectation);
     Ok(match kind {
-        Kind::Ridge => Fitted::Ridge(PerRow::fit(set, model, |set| AffineMap::ridge(set, choice, unseen))?),
+        Kind::Ridge => Fitted::Ridge(PerRow::fit(set, model, |set| {
+            AffineMap::ridge(set, choice.quantity, unseen)
+        })?),
         Kind::RadialBasis => Fitted::RadialBasis(PerRow::fit(set, model, |set| {
             RadialBasisNetwork::fit(set, choice, unseen, &mut rng)
         })?),

@@ -144,7 +144,7 @@ fn print_scale(scale: ArrayScale) {
             "ridge".into(),
             Box::new(
                 PerRow::fit(&training, RowModel::Each, |set| {
-                    AffineMap::ridge(set, InputChoice::BEST, NoiseSource::default())
+                    AffineMap::ridge(set, Quantity::Conductance, NoiseSource::default())
                 })
                 .unwrap(),
             ),

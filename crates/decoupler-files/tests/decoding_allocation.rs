@@ -89,7 +89,7 @@ fn a_frame_is_decoded_by_radial_basis_and_newton_without_allocating() {
     let mut rng = Seed(0).rng(Stream::Training);
     let set = Dataset::simulate(&model, &scene, 600, &mut rng).unwrap();
     let no_noise = NoiseSource::default();
-    let ridge = |set: &Dataset| AffineMap::ridge(set, InputChoice::BEST, no_noise);
+    let ridge = |set: &Dataset| AffineMap::ridge(set, Quantity::Conductance, no_noise);
     let first = Box::new(PerRow::fit(&set, RowModel::Each, ridge).unwrap());
     let rows: Vec<usize> = (0..10).collect();
     let mut polished = PolishedDecoder::new(first, &model, &scene, &rows, 1, &mut rng).unwrap();

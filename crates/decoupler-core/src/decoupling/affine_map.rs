@@ -1,15 +1,16 @@
 use faer::{Mat, Side, linalg::solvers::Solve};
 use glam::DVec3;
-use ndarray::{Array1, Array2, ArrayView2, Axis, Slice};
+use ndarray::{Array1, Array2, Axis};
 use serde::{Deserialize, Serialize};
 
 use super::{
-    AffineLayer, DecodeError, Decoder, Description, Layer, LayeredMap, NotDescribed, least_squares::fit_least_squares,
-    ridge::Ridge, row_problem::Range, units::Units,
+    AffineLayer, DecodeError, Decoder, Description, Layer, LayeredMap, NotDescribed,
+    ridge::{Regression, Standard, folds},
+    row_problem::Range,
 };
 use crate::{
     dataset::Dataset,
-    network::{InputChoice, InputScaling, Inputs, MinMax, Quantity, ScalingError, channel_noise},
+    network::{MinMax, Quantity, ScalingError, channel_noise},
     scene::NoiseSource,
     sensor::{Axes, RowConductance, SensorModel},
 };
@@ -33,55 +34,70 @@ pub struct AffineMap {
 }
 
 impl AffineMap {
-    /// Fits the map to `training` by least squares, on `quantity` of the readings.
+    /// Fits the map to `training` by least squares, on `quantity` of the readings. Of the maps that fit equally well it is
+    /// the one of minimum norm.
     ///
     /// # Errors
     /// If values cannot be scaled.
     pub fn least_squares(training: &Dataset, quantity: Quantity) -> Result<Self, ScalingError> {
-        let values = training.readings().mapv(|reading| quantity.of(reading));
-        let inputs = Inputs::new(quantity, InputScaling::MinMax(MinMax::fit(values.view())?));
-        let outputs = MinMax::fit(training.targets())?;
-        let coefficients = fit_least_squares(training, &inputs, &outputs)?;
-        Ok(Self::folded(&inputs, &coefficients, &outputs))
+        Self::fit(training, quantity, NoiseSource::default(), |regression| {
+            regression.least_squares()
+        })
     }
 
-    /// Fits the map to `training` by ridge regression, with the penalty of each target chosen by leave-one-out error;
-    /// `unseen` is as in [`Inputs::fit`].
+    /// Fits the map to `training` by ridge regression on the standardised `quantity` of the readings, with the penalty of
+    /// each target chosen by cross-validation on blocks of samples, or on whole groups; `unseen` is as in
+    /// [`Inputs::fit`](crate::network::Inputs::fit).
     ///
     /// # Errors
     /// If values cannot be scaled.
-    pub fn ridge(training: &Dataset, choice: InputChoice, unseen: NoiseSource) -> Result<Self, ScalingError> {
-        let inputs = Inputs::fit_all(choice, training.readings())?;
-        let outputs = MinMax::fit(training.targets())?;
-        let y = outputs.scale(training.targets());
-        let units = Units::of(training, inputs.of(training.readings()), y);
-        let changes = inputs.changes_of(&channel_noise(inputs.quantity(), training.readings(), unseen));
-        let fit = LinearFit::new(&inputs, units, changes.view())?;
-        Ok(Self::folded(&inputs, &fit.coefficients(), &outputs))
+    pub fn ridge(training: &Dataset, quantity: Quantity, unseen: NoiseSource) -> Result<Self, ScalingError> {
+        let folds = folds(training);
+        Self::fit(training, quantity, unseen, |regression| {
+            Ok(regression.ridge(folds.as_ref())?.map)
+        })
     }
 
-    /// Folds the scalings into `coefficients` (inputs + 1 × varying outputs, the constant last).
-    fn folded(inputs: &Inputs, coefficients: &Array2<f64>, outputs: &MinMax) -> Self {
-        let (centre, to_inputs) = inputs.affine();
-        let ranges = outputs.middles_and_half_widths();
-        let varying = outputs.varying();
+    fn fit(
+        training: &Dataset,
+        quantity: Quantity,
+        unseen: NoiseSource,
+        map: impl FnOnce(&Regression<'_>) -> Result<Array2<f64>, ScalingError>,
+    ) -> Result<Self, ScalingError> {
+        let readings = training.readings();
+        quantity.check(readings)?;
+        let standard = Standard::fit(readings, |reading| quantity.of(reading))?;
+        let outputs = MinMax::fit(training.targets())?;
+        let (ranges, varying) = (outputs.middles_and_half_widths(), outputs.varying());
+        let channels = training.channels();
+        let map = map(&Regression {
+            samples: training.samples(),
+            features: channels,
+            outputs: varying.len(),
+            write: &|sample, features, targets| {
+                let values = readings.row(sample).into_iter().map(|&reading| quantity.of(reading));
+                standard.write(values, features);
+                for (scaled, &target) in targets.iter_mut().zip(&varying) {
+                    *scaled = (training.sample_targets(sample)[target] - ranges[target].0) / ranges[target].1;
+                }
+            },
+            noise: channel_noise(quantity, readings, unseen).changes(&standard.scale),
+        })?;
         let mut base: Vec<f64> = ranges.iter().map(|range| range.0).collect();
-        let n = inputs.count();
-        let mut matrix = to_inputs.t().dot(&coefficients.slice_axis(Axis(0), Slice::from(..n)));
         for (output, &target) in varying.iter().enumerate() {
-            let half_width = ranges[target].1;
-            matrix.column_mut(output).mapv_inplace(|value| value * half_width);
-            base[target] += coefficients[[n, output]] * half_width;
+            base[target] += map[[channels, output]] * ranges[target].1;
         }
-        Self {
-            quantity: inputs.quantity(),
-            values: vec![0.0; centre.len()],
-            centre,
-            matrix: matrix.as_standard_layout().into_owned(),
+        Ok(Self {
+            quantity,
+            values: vec![0.0; channels],
+            matrix: Array2::from_shape_fn((channels, varying.len()), |(channel, output)| {
+                map[[channel, output]] * standard.scale[channel] * ranges[varying[output]].1
+            }),
+            centre: standard.centre,
             base,
             changes: vec![0.0; varying.len()],
             varying,
-        }
+        })
     }
 }
 
@@ -251,54 +267,6 @@ impl AffineStart {
     }
 }
 
-/// Ridge regression on scaled inputs, with the penalty of each output chosen by leave-one-out error.
-///
-/// The penalty acts on inputs in proportion to their standard deviations, whether they are whitened or not: it
-/// suppresses weak components first, in which noise is largest.
-pub(super) struct LinearFit {
-    ridge: Ridge,
-    /// Standard deviation of each input before whitening, relative to the largest.
-    sizes: Array1<f64>,
-    /// Number of samples.
-    samples: f64,
-}
-
-impl LinearFit {
-    /// Fits to `units` of the scaled inputs and outputs. `unseen` (sources × inputs) are the changes of the inputs by
-    /// one standard deviation of each noise source that the training samples lack.
-    pub fn new(inputs: &Inputs, units: Units, unseen: ArrayView2<'_, f64>) -> Result<Self, ScalingError> {
-        let sizes = Array1::from(inputs.deviations());
-        let largest = sizes.iter().copied().fold(0.0, f64::max);
-        let sizes = sizes / largest;
-        let Units { x, y, weights } = units;
-        let x = x * &sizes;
-        let ridge = Ridge::new(x.view(), y.view(), &weights, (&unseen * &sizes).view())?;
-        Ok(Self {
-            ridge,
-            sizes,
-            samples: weights.iter().sum(),
-        })
-    }
-
-    /// Coefficients of the scaled inputs: inputs + 1 × outputs, the constant last.
-    pub fn coefficients(&self) -> Array2<f64> {
-        let mut coefficients = self.ridge.coefficients(&self.ridge.best_penalties());
-        for (mut gains, &size) in coefficients.rows_mut().into_iter().zip(&self.sizes) {
-            gains *= size;
-        }
-        coefficients
-    }
-
-    /// Variances of the noise of the scaled inputs that has the same effect as the best penalty for all outputs together.
-    pub fn variances(&self) -> Vec<f64> {
-        /// Noise variance beyond which the inputs carry no information.
-        const LARGEST: f64 = 1e12;
-        let penalty = self.ridge.common_penalty();
-        let variance = |size: &f64| (penalty / self.samples / (size * size)).min(LARGEST);
-        self.sizes.iter().map(variance).collect()
-    }
-}
-
 /// Decoder that always answers the mean targets of the training set: the baseline.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TrainingMean {
@@ -352,12 +320,13 @@ impl Decoder for TrainingMean {
 
 #[cfg(test)]
 mod tests {
+    use rand::{SeedableRng, rngs::ChaCha8Rng};
+
     use super::*;
     use crate::{
         dataset::{Dataset, Seed, Stream},
         decoupling::decode_set,
-        network::ScalingChoice,
-        scene::Scene,
+        scene::{Scene, standard_normal},
         sensor::SensorModel,
     };
 
@@ -397,7 +366,7 @@ mod tests {
         let other = draw("10x6_3x18", 10);
         for set in [draw("1x6_3x18", 1), draw("1x6_3x18", 2), other.select(&[3; 50])] {
             let least_squares = AffineMap::least_squares(&set, Quantity::Resistance).unwrap();
-            let ridge = AffineMap::ridge(&set, InputChoice::BEST, NoiseSource::default()).unwrap();
+            let ridge = AffineMap::ridge(&set, Quantity::Conductance, NoiseSource::default()).unwrap();
             for mut map in [least_squares, ridge] {
                 let answer = decode_set(&mut map, &other).unwrap();
                 assert!(answer.iter().all(|value| value.is_finite()));
@@ -408,21 +377,23 @@ mod tests {
     #[test]
     fn ridge_recovers_targets_affine_in_the_quantity() {
         let set = with_target(&draw("1x4_2x12", 60), |ohm| 4.0 + 20.0 / ohm[3] - 7.0 / ohm[8]);
-        for scaling in [ScalingChoice::Whitening, ScalingChoice::MinMax] {
-            let choice = InputChoice {
-                scaling,
-                ..InputChoice::BEST
-            };
-            let answer = decode_set(
-                &mut AffineMap::ridge(&set, choice, NoiseSource::default()).unwrap(),
-                &set,
-            )
-            .unwrap();
-            for (answer, truth) in answer.rows().into_iter().zip(set.targets().rows()) {
-                assert_eq!(answer[0], truth[0], "constant targets keep their value");
-                assert!((answer[2] - truth[2]).abs() < 1e-6, "{} {}", answer[2], truth[2]);
-            }
+        let mut map = AffineMap::ridge(&set, Quantity::Conductance, NoiseSource::default()).unwrap();
+        let answer = decode_set(&mut map, &set).unwrap();
+        for (answer, truth) in answer.rows().into_iter().zip(set.targets().rows()) {
+            assert_eq!(answer[0], truth[0], "constant targets keep their value");
+            assert!((answer[2] - truth[2]).abs() < 1e-6, "{} {}", answer[2], truth[2]);
         }
+    }
+
+    #[test]
+    fn overflow_is_an_error() {
+        let readings = Array2::from_shape_fn((3, 1), |(s, _)| [f64::MAX, -f64::MAX, 3.0][s]);
+        let targets = Array2::from_shape_fn((3, 1), |(s, _)| s as f64);
+        let set = Dataset::new(readings, targets, None, vec![0, 1, 2]).unwrap();
+        assert_eq!(
+            AffineMap::least_squares(&set, Quantity::Raw),
+            Err(ScalingError::NotConverged)
+        );
     }
 
     #[test]
@@ -442,6 +413,52 @@ mod tests {
                 assert!(error.to_string().starts_with("row 1, reading 6: -1"), "{error}");
             }
         }
+    }
+
+    /// Two channels that are constant apart from a rare pulse (one also from rounding) and their decaying averages: in
+    /// training they carry no information, later they vary.
+    #[test]
+    fn averages_of_channels_that_were_constant_leave_ridge_better_than_the_mean() {
+        let draw = |samples: usize, is_training: bool, seed: u64| {
+            let mut rng = ChaCha8Rng::seed_from_u64(seed);
+            let mut averages = [[0.0; 4]; 2];
+            let mut readings = Array2::zeros((samples, 13));
+            let mut targets = Array2::zeros((samples, 1));
+            for sample in 0..samples {
+                for channel in 0..3 {
+                    readings[[sample, channel]] = standard_normal(&mut rng);
+                }
+                let is_pressed = !is_training && sample % 50 < 25;
+                let pulse = f64::from(u8::from(is_training && (500..503).contains(&sample)));
+                let values = [
+                    pulse + f64::from(u8::from(is_pressed)),
+                    5.3 * (1.0 + 1e-16 * standard_normal(&mut rng)) + f64::from(u8::from(is_pressed)),
+                ];
+                for (place, (value, averages)) in values.into_iter().zip(&mut averages).enumerate() {
+                    readings[[sample, 3 + 5 * place]] = value;
+                    for (k, (average, span)) in averages.iter_mut().zip([3.0, 10.0, 30.0, 100.0]).enumerate() {
+                        *average = if sample == 0 {
+                            value
+                        } else {
+                            *average + (value - *average) / span
+                        };
+                        readings[[sample, 4 + 5 * place + k]] = *average;
+                    }
+                }
+                targets[[sample, 0]] =
+                    readings[[sample, 0]] - 0.5 * readings[[sample, 1]] + 0.3 * standard_normal(&mut rng);
+            }
+            Dataset::new(readings, targets, None, (0..samples).collect()).unwrap()
+        };
+        let (training, test) = (draw(1000, true, 1), draw(500, false, 2));
+        let mut map = AffineMap::ridge(&training, Quantity::Raw, NoiseSource::default()).unwrap();
+        let rmse = |decoder: &mut dyn Decoder| {
+            let off = decode_set(decoder, &test).unwrap() - test.targets();
+            off.mapv(|error| error * error).mean().unwrap().sqrt()
+        };
+        // The noise of the targets is 0.3.
+        let (ours, mean) = (rmse(&mut map), rmse(&mut TrainingMean::fit(&training)));
+        assert!(ours < mean, "{ours} {mean}");
     }
 
     /// The mean distance of a uniform compression from the middle is a quarter of the stroke.

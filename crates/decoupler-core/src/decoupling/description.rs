@@ -36,13 +36,6 @@ pub enum Layer<T> {
         /// Inputs × Gaussians.
         centres: Array2<T>,
     },
-    /// Fuzzy rules: affine consequents, blended by normalised firing strengths.
-    Rules {
-        /// Logarithms of the memberships (up to a common term), one for each rule.
-        memberships: AffineLayer<T>,
-        /// Outputs of each rule, rule by rule.
-        consequents: AffineLayer<T>,
-    },
 }
 
 /// Weighted sums with a constant: values · weights + biases.
@@ -74,6 +67,9 @@ pub enum NotDescribed {
         /// Number of unknowns of a row.
         unknowns: usize,
     },
+    /// The decoder is a system of fuzzy rules.
+    #[error("fuzzy rules are only for comparison and cannot be exported: take another decoder, such as rbf or ridge")]
+    Rules,
     /// The decoder cannot be described.
     #[error("this decoder cannot be exported for other programs: take another decoder")]
     Unknown,
@@ -116,16 +112,12 @@ impl AffineLayer<f64> {
 }
 
 impl<T> Layer<T> {
-    /// Values of all tables: weights (row by row) before biases, memberships before consequents.
+    /// Values of all tables: weights (row by row) before biases.
     pub fn values(&self) -> Box<dyn Iterator<Item = &T> + '_> {
         match self {
             Self::Affine(affine) => Box::new(affine.values()),
             Self::Tanh => Box::new(std::iter::empty()),
             Self::Gaussians { centres } => Box::new(centres.iter()),
-            Self::Rules {
-                memberships,
-                consequents,
-            } => Box::new(memberships.values().chain(consequents.values())),
         }
     }
 
@@ -137,13 +129,6 @@ impl<T> Layer<T> {
             Self::Gaussians { centres } => Layer::Gaussians {
                 centres: array(centres.dim(), values)?,
             },
-            Self::Rules {
-                memberships,
-                consequents,
-            } => Layer::Rules {
-                memberships: memberships.with_values(values)?,
-                consequents: consequents.with_values(values)?,
-            },
         })
     }
 
@@ -153,10 +138,6 @@ impl<T> Layer<T> {
             Self::Affine(affine) => affine.outputs(),
             Self::Tanh => inputs,
             Self::Gaussians { centres } => centres.ncols(),
-            Self::Rules {
-                memberships,
-                consequents,
-            } => consequents.outputs() / memberships.outputs().max(1),
         }
     }
 }

@@ -4,7 +4,7 @@
 //! | decoder | how it decodes |
 //! |---|---|
 //! | [`TrainingMean`] | always answers the mean of the training set: the baseline |
-//! | [`AffineMap`] | an affine map, by least squares or ridge regression with leave-one-out cross-validation |
+//! | [`AffineMap`] | an affine map, by least squares or ridge regression |
 //! | [`RadialBasisNetwork`] | Gaussians around centres |
 //! | [`TakagiSugeno`] | fuzzy rules with affine consequents |
 //! | [`CompiledNetworks`] | trained networks, fast, in double or single precision |
@@ -18,14 +18,12 @@
 //! computes, as plain numbers, for programs that decode without this one.
 
 mod affine_map;
-mod clusters;
 mod compiled;
 mod decoder;
 mod description;
 mod equation_decoders;
 mod equations;
 mod gauss_newton;
-mod kernel_ridge;
 mod kind;
 mod least_squares;
 mod newton;
@@ -36,7 +34,6 @@ mod ridge;
 mod row_problem;
 mod side_by_side;
 mod takagi_sugeno;
-mod units;
 
 pub use affine_map::{AffineMap, TrainingMean};
 pub use compiled::{CompiledNetworks, Real};
@@ -49,6 +46,7 @@ pub use newton::{LARGEST_ERROR, Newton, NewtonReport, NewtonRules, NewtonStop, S
 pub(crate) use posterior::SampledPosterior;
 pub use posterior::{Posterior, PosteriorReport};
 pub use radial_basis::RadialBasisNetwork;
+pub(crate) use ridge::{Regression, ridge};
 pub(crate) use row_problem::{GaussianPrior, Range, ranges};
 pub use row_problem::{RowChoice, RowProblemDescription};
 pub use takagi_sugeno::TakagiSugeno;

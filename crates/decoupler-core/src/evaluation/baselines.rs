@@ -8,7 +8,7 @@ use crate::{
     dataset::{Dataset, PerRow, Stream},
     decoupling::{AffineMap, TrainingMean, decode_set},
     job::Job,
-    network::{InputChoice, Quantity},
+    network::Quantity,
     scene::{NoiseSource, Rows},
     sensor::ArrayScale,
 };
@@ -128,14 +128,14 @@ pub(super) fn fit_baselines(
 ) -> Result<(PerRow<TrainingMean>, PerRow<AffineMap>), RunError> {
     let mean = |set: &Dataset| Ok::<_, RunError>(TrainingMean::fit(set));
     let mean = PerRow::fit(training, settings.source.row_model(), mean)?;
-    let ridge = |inputs| {
-        let of_set = move |set: &Dataset| AffineMap::ridge(set, inputs, NoiseSource::default());
+    let ridge = |quantity| {
+        let of_set = move |set: &Dataset| AffineMap::ridge(set, quantity, NoiseSource::default());
         PerRow::fit(training, settings.source.row_model(), of_set)
     };
     let linear = match settings.source {
-        Source::Simulated(simulation) if simulation.scene.rows == Rows::Known => ridge(InputChoice::PAPER)?,
+        Source::Simulated(simulation) if simulation.scene.rows == Rows::Known => ridge(Quantity::Resistance)?,
         Source::Simulated(_) => PerRow::shared(AffineMap::least_squares(training, Quantity::Resistance)?),
-        Source::Measured(_) => ridge(settings.inputs)?,
+        Source::Measured(_) => ridge(settings.inputs.quantity)?,
     };
     Ok((mean, linear))
 }

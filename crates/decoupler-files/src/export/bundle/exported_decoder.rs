@@ -245,9 +245,6 @@ fn layers(portable: &Portable) -> Vec<String> {
             Layer::Affine(_) => format!("affine, {inputs} to {outputs}"),
             Layer::Tanh => "hyperbolic tangent".to_owned(),
             Layer::Gaussians { .. } => format!("{outputs} Gaussians of {inputs} values"),
-            Layer::Rules { memberships, .. } => {
-                format!("{} fuzzy rules, {inputs} to {outputs}", memberships.outputs())
-            }
         };
         inputs = outputs;
         text

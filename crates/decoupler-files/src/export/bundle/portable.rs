@@ -202,9 +202,6 @@ pub(super) struct FoldedMap {
     pub(super) layers: Vec<Layer<Twofold>>,
 }
 
-/// Difference of the logarithms of memberships between a rule and its copy that never fires.
-const NEVER: f64 = -1000.0;
-
 impl FoldedMap {
     /// Folds neighbouring affine layers into one, and the quantity into the first.
     pub(super) fn of(map: &LayeredMap) -> Self {
@@ -222,19 +219,6 @@ impl FoldedMap {
             match (layer, &pending) {
                 (Layer::Affine(next), Some(before)) => pending = Some(joined(before, &next)),
                 (Layer::Affine(next), None) => pending = Some(next),
-                (
-                    Layer::Rules {
-                        memberships,
-                        consequents,
-                    },
-                    Some(before),
-                ) => {
-                    layers.push(Layer::Rules {
-                        memberships: joined(before, &memberships),
-                        consequents: joined(before, &consequents),
-                    });
-                    pending = None;
-                }
                 (layer, _) => {
                     layers.extend(pending.take().map(Layer::Affine));
                     layers.push(layer);
@@ -306,13 +290,12 @@ fn joined(first: &AffineLayer<Twofold>, second: &AffineLayer<Twofold>) -> Affine
     AffineLayer { weights, biases }
 }
 
-/// Number of a layer's outputs, Gaussians or rules; 0 for a layer without tables.
+/// Number of a layer's outputs or Gaussians; 0 for a layer without tables.
 fn own_width(layer: &Layer<Twofold>) -> usize {
     match layer {
         Layer::Affine(affine) => affine.outputs(),
         Layer::Tanh => 0,
         Layer::Gaussians { centres } => centres.ncols(),
-        Layer::Rules { memberships, .. } => memberships.outputs(),
     }
 }
 
@@ -334,34 +317,5 @@ fn widened(layer: &Layer<Twofold>, inputs: usize, width: usize) -> Layer<Twofold
         Layer::Gaussians { centres } => Layer::Gaussians {
             centres: wide(centres, width),
         },
-        Layer::Rules {
-            memberships,
-            consequents,
-        } => {
-            let (rules, outputs) = (memberships.outputs(), consequents.outputs() / memberships.outputs());
-            // The padding consists of copies of the first rule with negligible memberships.
-            let source = |rule: usize| if rule < rules { rule } else { 0 };
-            let of_rule = |column: usize| source(column / outputs) * outputs + column % outputs;
-            let pick = |table: &Array2<Twofold>, columns: usize, of: &dyn Fn(usize) -> usize| {
-                let value = |(input, column)| table.get((input, of(column))).copied().unwrap_or(Twofold::ZERO);
-                Array2::from_shape_fn((inputs, columns), value)
-            };
-            let offset = |rule: usize| {
-                let never = if rule < rules { 0.0 } else { NEVER };
-                memberships.biases[source(rule)] + Twofold::from(never)
-            };
-            Layer::Rules {
-                memberships: AffineLayer {
-                    weights: pick(&memberships.weights, width, &source),
-                    biases: (0..width).map(offset).collect(),
-                },
-                consequents: AffineLayer {
-                    weights: pick(&consequents.weights, width * outputs, &of_rule),
-                    biases: (0..width * outputs)
-                        .map(|column| consequents.biases[of_rule(column)])
-                        .collect(),
-                },
-            }
-        }
     }
 }
