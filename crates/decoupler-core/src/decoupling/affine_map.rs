@@ -4,8 +4,8 @@ use ndarray::{Array1, Array2, ArrayView2, Axis, Slice};
 use serde::{Deserialize, Serialize};
 
 use super::{
-    AffineLayer, DecodeError, Decoder, Description, Layer, LayeredMap, NotDescribed, least_squares::fit_least_squares,
-    ridge::Ridge, row_problem::Range, units::Units,
+    AffineLayer, DecodeError, Decoder, Description, Layer, LayeredMap, NotDescribed, equations::Range,
+    least_squares::fit_least_squares, ridge::Ridge, units::Units,
 };
 use crate::{
     dataset::Dataset,

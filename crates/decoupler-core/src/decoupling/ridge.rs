@@ -1,7 +1,7 @@
 use faer::Mat;
 use ndarray::{Array2, ArrayView2, Axis};
 
-use super::gauss_newton::minima;
+use super::minima::minima;
 use crate::network::ScalingError;
 
 /// Ridge regressions of outputs on inputs for any penalty, from one singular value decomposition, with their

@@ -1,6 +1,6 @@
 use serde::{Deserialize, Serialize};
 
-use super::{Coverage, Errors, NoReference, RunError, RunSettings, Source, TestErrors};
+use super::{Coverage, Errors, RunError, RunSettings, Source, TestErrors};
 use crate::{
     dataset::{Dataset, PerRow},
     decoupling::{AffineMap, TrainingMean},
@@ -11,20 +11,18 @@ use crate::{
 
 /// Errors of the baselines, listed next to those of the network in every error table. `E` is [`Errors`] where the
 /// targets are known to be nodes.
+// Unknown fields are ignored: those of version 0.1.0 had another row.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
 pub struct Baselines<E = TestErrors> {
     /// Errors of always answering the mean of the training set.
     pub mean: E,
     /// Errors of the best affine map on the readings, one for each row-wire where rows are known; ridge regression for
     /// recordings.
     pub linear: E,
-    /// Errors of the Bayesian reference, the limit due to the noise and to the distribution of the loading:
-    /// [`reference_errors`](super::reference_errors). Recordings have none.
-    pub reference: Option<E>,
-    /// Reason why there is no reference, if one was attempted.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub no_reference: Option<NoReference>,
+    /// Errors of [`DecoderKind::Newton`](crate::decoupling::DecoderKind::Newton), which knows the equations, the noise, and
+    /// mean and covariance of the loading. Recordings have no sensor model, and files of version 0.1.0 not this row; for
+    /// test sets of many large rows it would take too long.
+    pub model_based: Option<E>,
 }
 
 /// Errors of the network and of the baselines on the same test set.
@@ -46,9 +44,18 @@ impl Baselines {
         Some(Baselines {
             mean: *self.mean.nodes()?,
             linear: *self.linear.nodes()?,
-            reference: self.reference.as_ref().and_then(TestErrors::nodes).copied(),
-            no_reference: self.no_reference,
+            model_based: self.model_based.as_ref().and_then(TestErrors::nodes).copied(),
         })
+    }
+
+    /// Returns the reason why the error table of a simulated array has no model-based row.
+    pub fn model_based_note(&self) -> Option<&'static str> {
+        let is_missing = self.mean.nodes().is_some() && self.model_based.is_none();
+        is_missing.then_some(
+            "There is no model-based row: solving the equations for a test set of so many rows of this size takes many \
+             minutes, or an earlier version wrote the file. Lower the number of test samples or the size of the array, and \
+             train again.",
+        )
     }
 
     /// Name of the linear baseline in tables.

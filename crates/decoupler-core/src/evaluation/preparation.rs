@@ -4,13 +4,12 @@ use rand::Rng;
 use rayon::prelude::*;
 
 use super::{
-    Baselines, Errors, Initialization, NoReference, Run, RunError, RunSets, RunSettings, SimulatedSettings, Simulation,
-    Source, StartTrainer, TestErrors, baselines::fit_baselines, linear_start::LinearStart, reference_errors,
-    run_sets::check_sets,
+    Baselines, Initialization, Run, RunError, RunSets, RunSettings, SimulatedSettings, Simulation, Source, StartTrainer,
+    TestErrors, baselines::fit_baselines, linear_start::LinearStart, run_sets::check_sets,
 };
 use crate::{
-    dataset::{Dataset, PerRow, Split, Stream},
-    decoupling::decode_set,
+    dataset::{Dataset, PerRow, Split},
+    decoupling::{NewtonDecoder, decode_set},
     machine::MemoryBudget,
     network::{Inputs, MinMax, Mlp, Shape, nguyen_widrow},
     scene::{NoiseSource, NoisySets, RowModel},
@@ -113,20 +112,10 @@ impl Run {
         if is_cancelled() {
             return Ok(None);
         }
-        let reference = match settings.simulated() {
-            Some(simulated) => Some(reference(&simulated, &sets.test)?),
-            None => None,
-        };
-        let (reference, no_reference) = match reference {
-            Some(Ok(errors)) => (Some(TestErrors::Nodes(errors)), None),
-            Some(Err(reason)) => (None, Some(reason)),
-            None => (None, None),
-        };
         let baselines = Baselines {
             mean,
             linear,
-            reference,
-            no_reference,
+            model_based: model_based(&settings.source, &sets.test)?,
         };
         if is_cancelled() {
             return Ok(None);
@@ -138,9 +127,9 @@ impl Run {
         }))
     }
 
-    /// Prepares a run without the Bayesian reference, and measures the training mean and the linear baseline. Returns
+    /// Prepares a run without the model-based decoder, and measures the training mean and the linear baseline. Returns
     /// `None` once `is_cancelled`.
-    pub(super) fn without_reference(
+    pub(super) fn without_model_based(
         settings: RunSettings,
         sets: RunSets,
         is_cancelled: &dyn Fn() -> bool,
@@ -153,7 +142,7 @@ impl Run {
         Ok(run.map(|run| (run, measured)))
     }
 
-    /// Prepares a run of networks only, without baselines and reference, such as the run of a fold.
+    /// Prepares a run of networks only, without baselines, such as the run of a fold.
     pub(super) fn of_networks_on_sets(settings: RunSettings, split: Split, test: Dataset) -> Result<Self, RunError> {
         settings.check_network()?;
         check_sets(&settings, &split, &test)?;
@@ -163,7 +152,7 @@ impl Run {
         }))
     }
 
-    /// Prepares a run without a test set, baselines and reference, for programs that need only its networks. Their
+    /// Prepares a run without a test set and baselines, for programs that need only its networks. Their
     /// training is bit-identical to that of [`Self::on_sets`].
     ///
     /// # Errors
@@ -173,7 +162,7 @@ impl Run {
         Self::of_networks_on_sets(settings, split, none)
     }
 
-    /// As [`Self::with_baselines`], without baselines and reference, for settings and sets that were checked.
+    /// As [`Self::with_baselines`], without baselines, for settings and sets that were checked.
     fn of_networks(
         settings: RunSettings,
         RunSets {
@@ -278,11 +267,28 @@ fn check_states(states: &[TrainerState], expected: usize) -> Result<(), RunError
     }
 }
 
-/// Returns the errors of the Bayesian reference on `test`, or the reason why there are none.
-pub(super) fn reference(settings: &SimulatedSettings, test: &Dataset) -> Result<Result<Errors, NoReference>, RunError> {
-    let SimulatedSettings { source, seed, .. } = settings;
-    let mut rng = seed.rng(Stream::Expectation);
-    Ok(reference_errors(&source.sensor, &source.scene, test, &mut rng)?)
+/// Returns the errors on `test` of Newton's method with the noise of the scene and mean and covariance of its loading;
+/// `None` without a sensor model, and if it would take many minutes.
+pub(super) fn model_based(source: &Source, test: &Dataset) -> Result<Option<TestErrors>, RunError> {
+    /// Multiplications of a few minutes on one core.
+    const MAX_MULTIPLICATIONS: f64 = 2e11;
+    /// Usual number of steps per row.
+    const STEPS: f64 = 8.0;
+    let Source::Simulated(Simulation { sensor, scene, .. }) = source else {
+        return Ok(None);
+    };
+    let rows = test.row_wires_read().expect("samples of a scene know their row-wire");
+    let is_each_tried = scene.rows.model() == RowModel::Shared && !scene.noise.in_test().is_none();
+    let tried = if is_each_tried { rows.len() } else { 1 };
+    let unknowns = (sensor.scale.nodes_per_row() * scene.movement.axes().count()) as f64;
+    // QR decomposition of the equations of readings and prior.
+    let of_step = 2.0 * unknowns * unknowns * (sensor.scale.columns() as f64 + unknowns);
+    if STEPS * of_step * (test.samples() * tried) as f64 > MAX_MULTIPLICATIONS {
+        return Ok(None);
+    }
+    let mut decoder = NewtonDecoder::new(sensor, scene, rows)?;
+    let answers = decode_set(&mut decoder, test)?;
+    Ok(Some(TestErrors::measure(source, test, &answers)))
 }
 
 /// Training problem of one network, for one row-wire or for all.

@@ -68,7 +68,7 @@ impl Trial {
         let Some(sets) = samples.sets(cell, seed, &is_cancelled)? else {
             return Ok(None);
         };
-        let Some((mut run, [mean, linear])) = Run::without_reference(settings, sets, &is_cancelled)? else {
+        let Some((mut run, [mean, linear])) = Run::without_model_based(settings, sets, &is_cancelled)? else {
             return Ok(None);
         };
         let Some(effort) = Effort::train(&mut run, &is_cancelled) else {
