@@ -4,6 +4,8 @@ mod bounded;
 mod description;
 mod estimate;
 mod estimator;
+#[cfg(test)]
+mod exact_tests;
 mod lanes;
 mod priors;
 mod reading_noise;

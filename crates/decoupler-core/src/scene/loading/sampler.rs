@@ -157,10 +157,7 @@ fn root(count: usize, step: f64) -> Mat<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{
-        dataset::{Seed, Stream},
-        scene::standard_normal,
-    };
+    use crate::dataset::{Seed, Stream};
 
     #[test]
     fn roots_square_to_the_covariance() {
