@@ -5,8 +5,7 @@
 use decoupler_core::{
     dataset::{Dataset, PerRow, Seed, Stream},
     decoupling::{
-        AffineMap, CompiledNetworks, Decoder, NewtonDecoder, PolishedDecoder, RadialBasisNetwork,
-        TakagiSugeno,
+        AffineMap, CompiledNetworks, Decoder, NewtonDecoder, PolishedDecoder, RadialBasisNetwork, TakagiSugeno,
     },
     live::{Diagnosis, FaultCause, FaultMonitor, FaultyWire, LeftOutDecoder},
     network::{

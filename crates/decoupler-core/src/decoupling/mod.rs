@@ -37,9 +37,7 @@ pub use compiled::{CompiledNetworks, Real};
 pub use decoder::{DecodeError, Decoder, SolvedRows, decode_set, resistance_residual};
 pub use description::{AffineLayer, Description, Layer, LayeredMap, NotDescribed};
 pub use equation_decoders::{NewtonDecoder, PolishedDecoder};
-pub use equations::{
-    Estimate, Estimator, LARGEST_ERROR, NewtonStop, RowChoice, RowProblemDescription, Solution,
-};
+pub use equations::{Estimate, Estimator, LARGEST_ERROR, NewtonStop, RowChoice, RowProblemDescription, Solution};
 pub(crate) use equations::{GaussianPrior, Range, ranges};
 pub use kind::{DecoderKind, DecoderKindError, Fit, FitError, FitProblem, Precision};
 pub use radial_basis::RadialBasisNetwork;

@@ -4,8 +4,8 @@ use rand::Rng;
 use rayon::prelude::*;
 
 use super::{
-    Baselines, Initialization, Run, RunError, RunSets, RunSettings, SimulatedSettings, Simulation, Source, StartTrainer,
-    TestErrors, baselines::fit_baselines, linear_start::LinearStart, run_sets::check_sets,
+    Baselines, Initialization, Run, RunError, RunSets, RunSettings, SimulatedSettings, Simulation, Source,
+    StartTrainer, TestErrors, baselines::fit_baselines, linear_start::LinearStart, run_sets::check_sets,
 };
 use crate::{
     dataset::{Dataset, PerRow, Split},

@@ -414,7 +414,11 @@ impl Workload {
         let unknowns = size.unknowns / size.rows;
         // Exact readings that determine the deformation need no prior.
         let has_priors = !source.scene.noise.in_test().is_none() || scale.columns() <= unknowns;
-        let priors = if has_priors { GaussianPrior::bytes(source.scene.loading, size.rows, unknowns) } else { 0 };
+        let priors = if has_priors {
+            GaussianPrior::bytes(source.scene.loading, size.rows, unknowns)
+        } else {
+            0
+        };
         let per_row = node_pairs_per_row(&source.sensor);
         let bytes = samples
             .saturating_add(training_bytes.saturating_mul(trainings as u64))

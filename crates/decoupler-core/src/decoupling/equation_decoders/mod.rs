@@ -41,7 +41,9 @@ fn solve_in_blocks<S: Clone + Send>(
         .par_chunks(BLOCK)
         .zip(readings.par_chunks(BLOCK * channels))
         .zip(targets.par_chunks_mut(BLOCK * outputs))
-        .map_with(solver.clone(), |solver, ((rows, readings), targets)| solve(solver, rows, readings, targets))
+        .map_with(solver.clone(), |solver, ((rows, readings), targets)| {
+            solve(solver, rows, readings, targets)
+        })
         .reduce(SolvedRows::default, |mut all, some| {
             all += some;
             all

@@ -4,10 +4,8 @@ use ndarray::Array2;
 use super::{check, solve_in_blocks};
 use crate::{
     decoupling::{
-        AffineLayer, DecodeError, Decoder, Description, Estimate, Estimator, Layer, LayeredMap,
-        NotDescribed, RowChoice, RowProblemDescription, Solution, SolvedRows,
-        affine_map::AffineStart,
-        ranges,
+        AffineLayer, DecodeError, Decoder, Description, Estimate, Estimator, Layer, LayeredMap, NotDescribed,
+        RowChoice, RowProblemDescription, Solution, SolvedRows, affine_map::AffineStart, ranges,
     },
     network::Quantity,
     scene::{RowModel, Scene},
@@ -159,7 +157,10 @@ impl Decoder for NewtonDecoder {
 
     fn decode_rows(&mut self, row_indices: &[usize], readings: &[f64], targets: &mut [f64]) -> Result<(), DecodeError> {
         let rows = row_indices.len();
-        assert_eq!((readings.len(), targets.len()), (rows * self.channels(), rows * self.outputs()));
+        assert_eq!(
+            (readings.len(), targets.len()),
+            (rows * self.channels(), rows * self.outputs())
+        );
         check(readings, self.channels())?;
         self.row_wires.clear();
         self.row_wires.extend(row_indices.iter().map(|&index| self.rows[index]));

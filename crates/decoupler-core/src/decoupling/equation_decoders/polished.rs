@@ -117,7 +117,11 @@ impl Decoder for PolishedDecoder {
         let of_scene = (&self.model, &self.scene);
         Ok(Description {
             maps: self.first.description()?.maps,
-            equations: Some(RowProblemDescription::new(of_scene, (&self.rows, row_choice), Some(self.steps))),
+            equations: Some(RowProblemDescription::new(
+                of_scene,
+                (&self.rows, row_choice),
+                Some(self.steps),
+            )),
         })
     }
 }

@@ -83,7 +83,11 @@ impl Estimator {
         let ranges = ranges(model, scene);
         let noise = ReadingNoise::new(scene.noise.in_test().source(model)?);
         let unknowns = ranges.len() + usize::from(noise.drift() > 0.0);
-        let lanes = if noise.is_none() { Lanes::new(model, scene, rows) } else { None };
+        let lanes = if noise.is_none() {
+            Lanes::new(model, scene, rows)
+        } else {
+            None
+        };
         Ok(Self {
             lanes,
             problem: RowProblem::new(model, scene.movement.axes()),
@@ -209,7 +213,12 @@ impl Estimator {
     }
 
     /// Estimates a row from its valid readings with bounds, damping and restarts.
-    pub(in crate::decoupling) fn search(&mut self, row: usize, readings_ohm: &[f64], coordinates_mm: &mut [f64]) -> Estimate {
+    pub(in crate::decoupling) fn search(
+        &mut self,
+        row: usize,
+        readings_ohm: &[f64],
+        coordinates_mm: &mut [f64],
+    ) -> Estimate {
         self.problem.read(row, readings_ohm);
         if self.is_exact() && self.problem.is_redundant() {
             self.has_prior = false;
@@ -292,7 +301,11 @@ impl Estimator {
         }
         let readings = self.problem.equations();
         let residual = misfits.residual(readings);
-        let spread = if self.has_prior { deviation } else { deviation * misfits.norm() / ROUNDING };
+        let spread = if self.has_prior {
+            deviation
+        } else {
+            deviation * misfits.norm() / ROUNDING
+        };
         let is_explained = match (self.is_exact(), self.has_prior) {
             (false, _) => (standardised / readings as f64).sqrt() <= MAX_NOISE_RATIO,
             (true, true) => residual < EXPLAINED,
@@ -301,9 +314,7 @@ impl Estimator {
         let is_only = || {
             let row = self.problem.row();
             !self.is_exact()
-                || spread <= LARGEST_ERROR
-                    && self.problem.is_redundant()
-                    && !self.symmetry.has_twin(row, &self.at[..n])
+                || spread <= LARGEST_ERROR && self.problem.is_redundant() && !self.symmetry.has_twin(row, &self.at[..n])
         };
         let surprise = if self.has_prior {
             objective + log_determinant - self.priors.of(self.problem.row()).log_precision()
@@ -331,7 +342,11 @@ impl Estimator {
         self.best.copy_from_slice(&self.at);
         let mut taken = 0;
         while taken < max_steps.min(UNDAMPED_STEPS) {
-            let share = if taken < FULL_STEPS || !self.has_prior { 1.0 } else { 0.5 };
+            let share = if taken < FULL_STEPS || !self.has_prior {
+                1.0
+            } else {
+                0.5
+            };
             let length = self.step(0.0, share, !self.has_prior);
             taken += 1;
             let is_last = length <= tolerance;

@@ -234,7 +234,11 @@ impl Lanes {
                     if self.lanes[lane].state == State::Arrived {
                         let found = self.judge(lane, inverse_row, (NewtonStop::Converged, step));
                         let is_determined = found.spread <= LARGEST_ERROR;
-                        self.lanes[lane].state = if is_determined { State::Judged(found) } else { State::GivenUp };
+                        self.lanes[lane].state = if is_determined {
+                            State::Judged(found)
+                        } else {
+                            State::GivenUp
+                        };
                     }
                 }
             }
