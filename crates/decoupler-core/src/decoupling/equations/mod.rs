@@ -4,8 +4,6 @@ mod bounded;
 mod description;
 mod estimate;
 mod estimator;
-#[cfg(test)]
-mod exact_tests;
 mod lanes;
 mod priors;
 mod reading_noise;

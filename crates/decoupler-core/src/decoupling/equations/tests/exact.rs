@@ -1,9 +1,8 @@
 //! Rows with exact readings.
 
-use super::*;
 use crate::{
     dataset::{Dataset, Seed, Stream},
-    decoupling::resistance_residual,
+    decoupling::{Estimator, LARGEST_ERROR, NewtonStop, Solution, resistance_residual},
     scene::{Movement, Rows, Scene},
     sensor::{ArrayScale, SensorModel},
 };
