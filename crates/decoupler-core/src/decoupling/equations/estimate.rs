@@ -80,7 +80,9 @@ impl Misfits {
         let rounding = ROUNDING + f64::EPSILON * slopes.map(f64::abs).sum::<f64>();
         self.squares += residual * residual;
         self.rounding_squares += rounding * rounding;
-        self.exceed_rounding |= !(residual.abs() <= rounding);
+        // Written so that NaN exceeds it.
+        let is_within = residual.abs() <= rounding;
+        self.exceed_rounding |= !is_within;
     }
 
     /// Norm of the errors of the readings that explain the misfits, at least their rounding. To first order, they cause

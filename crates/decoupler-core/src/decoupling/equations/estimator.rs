@@ -47,6 +47,8 @@ pub struct Estimator {
     best: Vec<f64>,
     /// Equations linearised at the current point, in units of the ranges: [A, b], row by row.
     system: Vec<f64>,
+    /// Twice the negative logarithm of the probability where the equations were linearised, up to a constant.
+    objective: f64,
     bounds: Vec<(f64, f64)>,
     bounded: BoundedLeastSquares,
 }
@@ -83,14 +85,11 @@ impl Estimator {
         let ranges = ranges(model, scene);
         let noise = ReadingNoise::new(scene.noise.in_test().source(model)?);
         let unknowns = ranges.len() + usize::from(noise.drift() > 0.0);
-        let lanes = if noise.is_none() {
-            Lanes::new(model, scene, rows)
-        } else {
-            None
-        };
+        let lanes = noise.is_none().then(|| Lanes::new(model, scene, rows)).flatten();
+        let refined = RowProblem::refined(model, scene).filter(|_| !noise.is_none());
         Ok(Self {
             lanes,
-            problem: RowProblem::new(model, scene.movement.axes()),
+            problem: refined.unwrap_or_else(|| RowProblem::new(model, scene.movement.axes())),
             ranges,
             wide: wide_ranges(model, scene),
             noise,
@@ -100,6 +99,7 @@ impl Estimator {
             at: vec![0.0; unknowns],
             best: vec![0.0; unknowns],
             system: Vec::new(),
+            objective: 0.0,
             bounds: Vec::with_capacity(unknowns),
             bounded: BoundedLeastSquares::default(),
         })
@@ -286,8 +286,8 @@ impl Estimator {
         self.at[n..].fill(0.0);
         self.clamp();
         let (stop, steps) = self.climb(max_steps);
-        let objective = self.linearise();
-        self.bounded.factor(&self.system, self.at.len() + 1, 0.0);
+        self.problem.evaluate_residuals(&self.at[..n]);
+        let objective = self.objective;
         let (deviation, log_determinant) = self.bounded.spread(n);
         let mut misfits = Misfits::default();
         let mut standardised = 0.0;
@@ -333,7 +333,8 @@ impl Estimator {
         (estimate, objective)
     }
 
-    /// Moves [`Self::at`] to the maximum of the probability. Steps without damping converge from anywhere nearby, though the
+    /// Moves [`Self::at`] to the maximum of the probability; the last equations factored are those there, or before a last
+    /// step within the tolerance. Steps without damping converge from anywhere nearby, though the
     /// misfit may rise on the way. Without prior they may also leave the ranges: damped steps alone would solve only half
     /// as many rows whose nodes move sideways.
     fn climb(&mut self, max_steps: usize) -> (NewtonStop, usize) {
@@ -358,6 +359,10 @@ impl Estimator {
                 break;
             }
             let objective = self.linearise();
+            if self.is_local_minimum(length) && self.is_within(0.0) {
+                self.factor();
+                return (NewtonStop::Converged, taken);
+            }
             if objective < lowest && self.is_within(0.0) {
                 lowest = objective;
                 self.best.copy_from_slice(&self.at);
@@ -376,23 +381,42 @@ impl Estimator {
                 self.linearise();
             }
             let length = self.step(damping, 1.0, false);
-            if length <= tolerance {
+            if length > tolerance {
+                objective = self.linearise();
+            }
+            if length <= tolerance || self.is_local_minimum(length) {
+                self.factor();
                 return (NewtonStop::Converged, step);
             }
-            objective = self.linearise();
             if objective < lowest {
                 lowest = objective;
                 self.best.copy_from_slice(&self.at);
                 damping *= 0.1;
             } else if damping > DAMPINGS[1] {
-                self.at.copy_from_slice(&self.best);
+                self.return_to_best();
                 return (NewtonStop::NoStepHelps, step);
             } else {
                 damping = (10.0 * damping).max(DAMPINGS[0]);
             }
         }
-        self.at.copy_from_slice(&self.best);
+        self.return_to_best();
         (NewtonStop::StepsTaken, max_steps)
+    }
+
+    /// True after a short step to a misfit that exact readings do not have at a solution, where steps get shorter slowly.
+    fn is_local_minimum(&self, length: f64) -> bool {
+        let explained = (EXPLAINED / ROUNDING).powi(2) * self.problem.equations() as f64;
+        self.is_exact() && length <= NOISY_TOLERANCE && self.objective > explained
+    }
+
+    fn return_to_best(&mut self) {
+        self.at.copy_from_slice(&self.best);
+        self.linearise();
+        self.factor();
+    }
+
+    fn factor(&mut self) {
+        self.bounded.factor(&self.system, self.at.len() + 1, 0.0);
     }
 
     /// Returns `true` if all displacements are at most `tolerance` times their ranges outside of these.
@@ -486,6 +510,7 @@ impl Estimator {
             let apart = self.system[own..].chunks_exact(unknowns + 1);
             objective += apart.map(|row| row[unknowns] * row[unknowns]).sum::<f64>();
         }
+        self.objective = objective;
         objective
     }
 }

@@ -4,7 +4,7 @@ use super::{
     Estimate, LARGEST_ERROR, NewtonStop, Solution,
     estimate::Misfits,
     estimator::TOLERANCE,
-    row_problem::{Range, RowProblem, ranges, wide_ranges},
+    row_problem::{Range, RowProblem, ranges, smallest_gap_mm, wide_ranges},
     side_by_side::{LANES, SideBySide, write_normal_equations},
     symmetry::Symmetry,
 };
@@ -75,13 +75,7 @@ impl Lanes {
         let (axes, ranges, wide) = (scene.movement.axes(), ranges(model, scene), wide_ranges(model, scene));
         let (unknowns, readings) = (ranges.len(), model.scale.columns());
         let length = padded(readings);
-        let deepest_mm = wide.iter().skip(axes.count() - 1).step_by(axes.count());
-        let deepest_mm = deepest_mm.map(|range| range.highest).fold(0.0, f64::max);
-        let gap_mm = model.geometry.height_mm - deepest_mm;
-        let largest_mm = wide
-            .iter()
-            .fold(0.0, |most: f64, range| most.max(-range.lowest).max(range.highest));
-        let problem = RowProblem::refined(model, axes, (gap_mm, largest_mm))?;
+        let problem = RowProblem::refined(model, scene)?;
         let lane = Lane {
             row: 0,
             readings_ohm: vec![0.0; readings],
@@ -97,7 +91,7 @@ impl Lanes {
         problem.is_redundant().then(|| Self {
             model: *model,
             problem,
-            last_length_mm: gap_mm * f64::EPSILON.sqrt() / (axes.count() as f64).sqrt(),
+            last_length_mm: smallest_gap_mm(model, scene) * f64::EPSILON.sqrt() / (axes.count() as f64).sqrt(),
             ranges,
             wide,
             symmetry: Symmetry::new(model, scene, rows),

@@ -83,6 +83,14 @@ pub(crate) fn wide_ranges(model: &SensorModel, scene: &Scene) -> Vec<Range> {
     ranges(model, scene).into_iter().enumerate().map(widened).collect()
 }
 
+/// Smallest height of a node above the column-wires in the wide ranges.
+pub(super) fn smallest_gap_mm(model: &SensorModel, scene: &Scene) -> f64 {
+    let wide = wide_ranges(model, scene);
+    let axes = scene.movement.axes().count();
+    let heights = wide.iter().skip(axes - 1).step_by(axes);
+    model.geometry.height_mm - heights.map(|range| range.highest).fold(0.0, f64::max)
+}
+
 impl RowProblem {
     pub(crate) fn new(model: &SensorModel, axes: Axes) -> Self {
         Self {
@@ -97,12 +105,16 @@ impl RowProblem {
         }
     }
 
-    /// As [`Self::new`], evaluated in half the time, for nodes displaced by up to the second length and at least the first
-    /// one away from the column-wires; `None` if that is not within reach of the method.
-    pub(super) fn refined(model: &SensorModel, axes: Axes, (nearest_mm, largest_mm): (f64, f64)) -> Option<Self> {
-        RowConductance::is_within_reach(model, nearest_mm, largest_mm).then(|| Self {
+    /// As [`Self::new`], evaluated in half the time; `None` if the wide ranges of `scene` are not within reach of the
+    /// method.
+    pub(super) fn refined(model: &SensorModel, scene: &Scene) -> Option<Self> {
+        let wide = wide_ranges(model, scene);
+        let largest_mm = wide
+            .iter()
+            .fold(0.0, |most: f64, range| most.max(-range.lowest).max(range.highest));
+        RowConductance::is_within_reach(model, smallest_gap_mm(model, scene), largest_mm).then(|| Self {
             is_refined: true,
-            ..Self::new(model, axes)
+            ..Self::new(model, scene.movement.axes())
         })
     }
 

@@ -1,5 +1,6 @@
-/// QR decomposition of a small least-squares problem by Householder reflections (Golub and Van Loan, Matrix
-/// Computations, section 5.2). Row by row, so that all columns are reflected at once in vector registers.
+/// QR decomposition of a small least-squares problem: by the normal equations if they are well conditioned, otherwise by
+/// Householder reflections, which take four times as long (Golub and Van Loan, Matrix Computations, sections 5.2 and 5.3).
+/// Row by row, so that all columns are transformed at once in vector registers.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Triangle {
     /// [R, Qᵀb] above the diagonal; the entries below it are scratch. Rows × width.
@@ -15,6 +16,9 @@ impl Triangle {
     /// is 0 and A has at least as many rows as unknowns.
     pub(super) fn factor(&mut self, system: &[f64], width: usize, root: f64) {
         let unknowns = width - 1;
+        if self.factor_normal_equations(system, width, root) {
+            return;
+        }
         let equations = system.len() / width;
         let below = if root > 0.0 || equations < unknowns {
             unknowns
@@ -31,6 +35,48 @@ impl Triangle {
         for pivot in 0..unknowns {
             self.reflect(pivot);
         }
+    }
+
+    /// As [`Self::factor`], by Cholesky factorisation of AᵀA; `false` if rounding would affect the solution.
+    fn factor_normal_equations(&mut self, system: &[f64], width: usize, root: f64) -> bool {
+        /// Fraction of a diagonal entry that must remain after eliminating the columns before it.
+        const MIN_LEFT: f64 = 1e-8;
+        let unknowns = width - 1;
+        self.width = width;
+        self.matrix.clear();
+        self.matrix.resize(unknowns * width, 0.0);
+        for row in system.chunks_exact(width) {
+            for (place, products) in self.matrix.chunks_exact_mut(width).enumerate() {
+                let value = row[place];
+                for (product, entry) in products[place..].iter_mut().zip(&row[place..]) {
+                    *product += value * entry;
+                }
+            }
+        }
+        self.column.clear();
+        for place in 0..unknowns {
+            let diagonal = &mut self.matrix[place * width + place];
+            *diagonal += root * root;
+            self.column.push(*diagonal);
+        }
+        for pivot in 0..unknowns {
+            let (done, below) = self.matrix.split_at_mut((pivot + 1) * width);
+            let row = &mut done[pivot * width..];
+            // Written so that NaN and overflow are refused.
+            let is_well_conditioned = row[pivot] > MIN_LEFT * self.column[pivot];
+            if !is_well_conditioned {
+                return false;
+            }
+            let reciprocal = 1.0 / row[pivot].sqrt();
+            row[pivot..].iter_mut().for_each(|entry| *entry *= reciprocal);
+            for (place, products) in (pivot + 1..).zip(below.chunks_exact_mut(width)) {
+                let share = row[place];
+                for (product, entry) in products[place..].iter_mut().zip(&row[place..]) {
+                    *product -= share * entry;
+                }
+            }
+        }
+        true
     }
 
     /// Zeroes the entries of column `pivot` below the diagonal.
