@@ -334,9 +334,9 @@ impl Estimator {
     }
 
     /// Moves [`Self::at`] to the maximum of the probability; the last equations factored are those there, or before a last
-    /// step within the tolerance. Steps without damping converge from anywhere nearby, though the
-    /// misfit may rise on the way. Without prior they may also leave the ranges: damped steps alone would solve only half
-    /// as many rows whose nodes move sideways.
+    /// step within the tolerance. Steps without damping converge from anywhere nearby, though the misfit may rise on the
+    /// way. Without prior they may also leave the ranges: damped steps alone would solve only half as many rows whose nodes
+    /// move sideways.
     fn climb(&mut self, max_steps: usize) -> (NewtonStop, usize) {
         let tolerance = if self.is_exact() { TOLERANCE } else { NOISY_TOLERANCE };
         let mut lowest = self.linearise();
@@ -359,7 +359,7 @@ impl Estimator {
                 break;
             }
             let objective = self.linearise();
-            if self.is_local_minimum(length) && self.is_within(0.0) {
+            if self.is_local_minimum(length, lowest) && self.is_within(0.0) {
                 self.factor();
                 return (NewtonStop::Converged, taken);
             }
@@ -384,7 +384,7 @@ impl Estimator {
             if length > tolerance {
                 objective = self.linearise();
             }
-            if length <= tolerance || self.is_local_minimum(length) {
+            if length <= tolerance || self.is_local_minimum(length, lowest) {
                 self.factor();
                 return (NewtonStop::Converged, step);
             }
@@ -403,10 +403,12 @@ impl Estimator {
         (NewtonStop::StepsTaken, max_steps)
     }
 
-    /// True after a short step to a misfit that exact readings do not have at a solution, where steps get shorter slowly.
-    fn is_local_minimum(&self, length: f64) -> bool {
+    /// True after a short step to the `lowest` misfit, if exact readings have no such misfit at a solution: the next steps
+    /// get shorter slowly.
+    fn is_local_minimum(&self, length: f64, lowest: f64) -> bool {
         let explained = (EXPLAINED / ROUNDING).powi(2) * self.problem.equations() as f64;
-        self.is_exact() && length <= NOISY_TOLERANCE && self.objective > explained
+        let is_lowest = self.objective <= lowest * (1.0 + 1e-9);
+        self.is_exact() && length <= NOISY_TOLERANCE && is_lowest && self.objective > explained
     }
 
     fn return_to_best(&mut self) {
