@@ -111,6 +111,12 @@ impl Solver {
         let mut order: Vec<(f64, usize)> = self.searched.iter().map(|(row, rest)| (unlike(rest), *row)).collect();
         order.sort_by(|a, b| a.0.total_cmp(&b.0));
         let is_exact = self.estimator.is_exact();
+        for &(_, row) in &order {
+            let found = self.estimator.try_plainly(row, readings_ohm, coordinates_mm);
+            if let Some(found) = found.filter(|found| found.solution != Solution::None) {
+                return found;
+            }
+        }
         let mut chosen: Option<(f64, usize, Estimate)> = None;
         for (_, row) in order {
             let found = self.estimator.try_row(row, readings_ohm, &mut self.trial_mm);

@@ -59,14 +59,16 @@ const STEPS: usize = 60;
 const STARTS: usize = 6;
 /// Number of steps without damping.
 const UNDAMPED_STEPS: usize = 12;
-/// Number of full steps; later ones without damping are halved to prevent cycles.
+/// Number of full steps; later ones without damping are halved, unless steps contract, to prevent cycles.
 const FULL_STEPS: usize = 5;
 /// Step, relative to the range of the unknown, below which the method has converged for exact readings: a tenth of a
 /// picometre for a stroke of a millimetre, where rounding of the readings begins to show in the worst-determined pattern
 /// of the paper's largest array (singular value 1e-5 per mm).
 pub(super) const TOLERANCE: f64 = 1e-10;
 /// As [`TOLERANCE`], for readings with noise.
-const NOISY_TOLERANCE: f64 = 1e-6;
+const NOISY_TOLERANCE: f64 = 1e-5;
+/// Step, relative to the range of the unknown, after which the misfit of exact readings is rounding at a solution.
+const SHORT_STEP: f64 = 1e-6;
 /// Damping of the first retry, relative to the largest diagonal entry of AᵀA, and the largest.
 const DAMPINGS: [f64; 2] = [1e-12, 1e6];
 /// Root mean square of the misfits, in standard deviations, that noise explains.
@@ -183,6 +185,16 @@ impl Estimator {
         solved
     }
 
+    /// Estimates a row from its valid readings as if they were those of row-wire `row`, if plain steps solve it.
+    pub(in crate::decoupling) fn try_plainly(
+        &mut self,
+        row: usize,
+        readings_ohm: &[f64],
+        coordinates_mm: &mut [f64],
+    ) -> Option<Estimate> {
+        self.in_lanes(&[row], readings_ohm, coordinates_mm, None)[0]
+    }
+
     /// Estimates a row from its valid readings as if they were those of row-wire `row`, from one start.
     pub(in crate::decoupling) fn try_row(
         &mut self,
@@ -190,9 +202,6 @@ impl Estimator {
         readings_ohm: &[f64],
         coordinates_mm: &mut [f64],
     ) -> Estimate {
-        if let Some(found) = self.in_lanes(&[row], readings_ohm, coordinates_mm, None)[0] {
-            return found;
-        }
         self.problem.read(row, readings_ohm);
         self.has_prior = !(self.is_exact() && self.problem.is_redundant());
         self.start_from(coordinates_mm, 1)
@@ -342,13 +351,12 @@ impl Estimator {
         let mut lowest = self.linearise();
         self.best.copy_from_slice(&self.at);
         let mut taken = 0;
+        let mut lengths = [f64::INFINITY; 2];
         while taken < max_steps.min(UNDAMPED_STEPS) {
-            let share = if taken < FULL_STEPS || !self.has_prior {
-                1.0
-            } else {
-                0.5
-            };
-            let length = self.step(0.0, share, !self.has_prior);
+            let contracts = lengths[1] <= 0.5 * lengths[0];
+            let is_full = taken < FULL_STEPS || contracts || !self.has_prior;
+            let length = self.step(0.0, if is_full { 1.0 } else { 0.5 }, !self.has_prior);
+            lengths = [lengths[1], length];
             taken += 1;
             let is_last = length <= tolerance;
             if is_last && self.is_within(tolerance) {
@@ -408,7 +416,7 @@ impl Estimator {
     fn is_local_minimum(&self, length: f64, lowest: f64) -> bool {
         let explained = (EXPLAINED / ROUNDING).powi(2) * self.problem.equations() as f64;
         let is_lowest = self.objective <= lowest * (1.0 + 1e-9);
-        self.is_exact() && length <= NOISY_TOLERANCE && is_lowest && self.objective > explained
+        self.is_exact() && length <= SHORT_STEP && is_lowest && self.objective > explained
     }
 
     fn return_to_best(&mut self) {
