@@ -302,7 +302,8 @@ impl Estimator {
         let mut standardised = 0.0;
         for (reading, &misfit) in self.problem.residuals().iter().enumerate() {
             let misfit = self.without_gain(misfit);
-            let slopes = self.ranges.iter().enumerate();
+            // Only exact readings are compared with their rounding.
+            let slopes = self.ranges.iter().enumerate().filter(|_| self.is_exact());
             let slopes = slopes.map(|(unknown, range)| self.problem.derivative(reading, unknown) * range.width());
             misfits.add(misfit, slopes);
             let expansion = self.noise.expand(self.problem.reading_ohm(reading), misfit);

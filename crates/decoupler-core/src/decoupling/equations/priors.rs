@@ -176,22 +176,12 @@ impl GaussianPrior {
     /// Appends the prior to equations `[A, b]` (row by row, `unknowns` + 1 columns) for
     /// x = (displacement − `at_mm`) / width.
     pub(crate) fn append_to(&self, equations: &mut Vec<f64>, unknowns: usize, at_mm: &[f64], ranges: &[Range]) {
-        let n = at_mm.len();
-        for row in 0..n {
-            let value = |column| {
-                if column < n {
-                    self.inverse_root[(row, column)]
-                } else {
-                    0.0
-                }
-            };
-            equations.extend((0..unknowns).map(value));
+        for row in 0..at_mm.len() {
+            let entry = |column: usize| self.inverse_root[(row, column)];
+            equations.extend((0..=row).map(entry));
+            equations.resize(equations.len() + unknowns - row - 1, 0.0);
             let apart = |column: usize| self.mean[column] - at_mm[column] / ranges[column].width();
-            equations.push(
-                (0..=row)
-                    .map(|column| self.inverse_root[(row, column)] * apart(column))
-                    .sum(),
-            );
+            equations.push((0..=row).map(|column| entry(column) * apart(column)).sum());
         }
     }
 }

@@ -48,6 +48,10 @@ impl Triangle {
         for row in system.chunks_exact(width) {
             for (place, products) in self.matrix.chunks_exact_mut(width).enumerate() {
                 let value = row[place];
+                // Half the entries of a prior, or nearly all.
+                if value == 0.0 {
+                    continue;
+                }
                 for (product, entry) in products[place..].iter_mut().zip(&row[place..]) {
                     *product += value * entry;
                 }
