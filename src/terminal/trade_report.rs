@@ -128,9 +128,9 @@ enum PointSource {
         preset: Option<String>,
         /// Root mean square of m/R − 1; none if the decoded deformation has no valid resistance.
         residual: Option<f64>,
-        reference_z_percent: Option<f64>,
-        reference_z_mm: Option<f64>,
-        to_reference: Option<f64>,
+        model_based_z_percent: Option<f64>,
+        model_based_z_mm: Option<f64>,
+        to_model_based: Option<f64>,
     },
     Recording {
         method: Option<&'static str>,
@@ -224,9 +224,9 @@ impl MeasuredLevel {
                 TradeSource::Array(_) => PointSource::Array {
                     preset: point.preset.map(|preset| preset.to_string()),
                     residual: point.report.residual.filter(|residual| residual.is_finite()),
-                    reference_z_percent: point.reference.and_then(|errors| errors.z_percent),
-                    reference_z_mm: point.reference.map(|errors| errors.z_mm),
-                    to_reference: point.to_reference(),
+                    model_based_z_percent: point.model_based.and_then(|errors| errors.z_percent),
+                    model_based_z_mm: point.model_based.map(|errors| errors.z_mm),
+                    to_model_based: point.to_model_based(),
                 },
                 TradeSource::Recording(_) => PointSource::Recording {
                     method: point.method().map(|method| method.short_name()),
@@ -277,10 +277,10 @@ impl MeasuredLevel {
     fn write(&self, limits: Limits, out: &mut dyn Write) -> io::Result<()> {
         if let Some(noise) = self.level.noise {
             write!(out, "\nNoise {noise}")?;
-            if let Some(reference) = self.level.points.first().and_then(|point| point.reference) {
-                let (percent, mm) = (format_number(reference.z_percent), format_number(reference.z_mm));
-                write!(out, ", reference {percent} % ({mm} mm)")?;
-                if reference.is_rounding() {
+            if let Some(model_based) = self.level.points.first().and_then(|point| point.model_based) {
+                let (percent, mm) = (format_number(model_based.z_percent), format_number(model_based.z_mm));
+                write!(out, ", model-based {percent} % ({mm} mm)")?;
+                if model_based.is_rounding() {
                     write!(out, ", nothing but rounding")?;
                 }
             }

@@ -34,7 +34,7 @@ use decoupler_files::{
 /// Train a network and print its errors
 ///
 /// Draws samples of the array, trains, and compares the network on its test samples with the mean of the training set,
-/// with the best linear map, with other decoders, with the minimum error achievable in the scene (the reference), and
+/// with the best linear map, with other decoders, with the decoder that knows the sensor model (model-based), and
 /// with the published figures, if any. With --data it trains on the samples of a recording, and compares the network with
 /// the mean, with ridge regression and with other decoders, target by target; unless settings of the training are given,
 /// they are first chosen by cross-validation on the training samples (--hidden auto). Ctrl-C stops after the epoch, keeps the
@@ -65,7 +65,7 @@ pub(super) struct Train {
     /// When to calibrate the 90 % prediction intervals of a recording's targets. After a choice of settings (--hidden
     /// auto), this takes no time; otherwise the training samples are cross-validated, which takes four times as long as the
     /// training: auto if that is at most a minute. Simulated arrays have none: theirs would hold for the scene, not for a
-    /// sensor, and the errors of each node and the reference already describe the scene
+    /// sensor, and the errors of each node already describe the scene
     #[arg(long, value_name = "WHEN", default_value = "auto")]
     pub(super) intervals: WhenCalibrated,
     /// Print one JSON object instead of text and progress

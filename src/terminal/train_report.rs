@@ -14,8 +14,8 @@ use super::{
 };
 use decoupler_core::{
     evaluation::{
-        Baselines, Channel, Combination, DecoderReport, Errors, Outlook, Problem, ReferenceNote, Run, RunError,
-        SimulatedSettings, StartRecord, TestErrors,
+        Baselines, Channel, Combination, DecoderReport, Errors, Outlook, Problem, Run, RunError, SimulatedSettings,
+        StartRecord, TestErrors,
         auto::AutoRecord,
         best_start, error_remarks,
         recorded::{Determination, Extrapolation, HysteresisLoop, Undetermined},
@@ -96,7 +96,7 @@ struct ArrayReport<'a> {
     condition: Option<f64>,
     /// Remarks on the errors above, with cause and remedy.
     remarks: Vec<String>,
-    reference: Option<Reference>,
+    model_based: Option<ModelBased>,
 }
 
 #[derive(Serialize)]
@@ -134,7 +134,7 @@ struct Solved {
 }
 
 #[derive(Serialize)]
-struct Reference {
+struct ModelBased {
     z_percent: Option<f64>,
     z_mm: f64,
 }
@@ -198,7 +198,7 @@ impl<'a> ArrayReport<'a> {
             equations: size.equations,
             condition: condition(Outlook::of(source).ok().as_ref()),
             remarks,
-            reference: scores.baselines.reference.map(|errors| Reference {
+            model_based: scores.baselines.model_based.map(|errors| ModelBased {
                 z_percent: errors.z_percent,
                 z_mm: errors.z_mm,
             }),
@@ -316,9 +316,7 @@ impl<'a> Trained<'a> {
         };
         let remarks = error_remarks(&settings, &file.scores, file.training.stop_reason);
         let remarks = remarks.iter().map(|(row, remark)| format!("{row}: {remark}"));
-        remarks
-            .chain(ReferenceNote::of(baselines).map(|note| note.to_string()))
-            .collect()
+        remarks.chain(baselines.model_based_note().map(str::to_owned)).collect()
     }
 
     fn write(&self, out: &mut dyn Write) -> io::Result<()> {
@@ -394,14 +392,14 @@ impl<'a> Trained<'a> {
         Ok(())
     }
 
-    /// Writes the errors of each decoder and their ratio to the reference.
+    /// Writes the errors of each decoder and their ratio to the model-based one.
     fn write_decoders(&self, out: &mut dyn Write) -> io::Result<()> {
-        let reference = self.file.scores.baselines.reference.as_ref();
-        if reference.and_then(TestErrors::nodes).is_some_and(Errors::is_rounding) {
+        let model_based = self.file.scores.baselines.model_based.as_ref();
+        if model_based.and_then(TestErrors::nodes).is_some_and(Errors::is_rounding) {
             writeln!(
                 out,
-                "The reference is nothing but rounding: the readings determine the deformation, and no ratio to it is \
-                 given."
+                "The model-based error is nothing but rounding: the readings determine the deformation, and no ratio to \
+                 it is given."
             )?;
         }
         if self.decoders.is_empty() {
@@ -410,12 +408,7 @@ impl<'a> Trained<'a> {
         write!(
             out,
             "\n{}",
-            decoder_table(
-                &self.file.problem,
-                self.decoders,
-                self.file.scores.baselines.reference.as_ref()
-            )
-            .aligned()
+            decoder_table(&self.file.problem, self.decoders, model_based).aligned()
         )?;
         for report in self.decoders {
             let name = report.kind.name(report.precision);

@@ -102,9 +102,9 @@ terms! { ERROR_TERMS:
         "Best affine map from the resistances to the coordinates, one for each row-wire where the row is known to the network. A \
          network that is not better is not worth training.",
         "coordinates = A · R + b";
-    REFERENCE = "Reference",
-        "Bayesian reference: the error that remains given the noise and the loading of the scene. On average, no decoder of a \
-         row's own readings does better. Without noise, only the rounding of the readings is left.";
+    MODEL_BASED = "Model-based",
+        "Newton's method on Eq. (2), measured like any other decoder: it knows the equations, the noise, and mean and \
+         covariance of the loading.";
     PUBLISHED = "Published",
         "Error that the paper reports for this array and these numbers of hidden nodes and samples.";
     RESIDUAL = "Residual",

@@ -20,7 +20,7 @@ fn failure(arguments: &str, folder: &Path, status: i32) -> String {
 const SMALL: &str = "--array 3x4_2x12 --hidden 4 --epochs 20 --samples 300 --validation-samples 30 --test-samples 30";
 
 #[test]
-fn training_reports_decoders_reference_and_size_of_the_scene() {
+fn training_reports_decoders_model_based_errors_and_size_of_the_scene() {
     let folder = tempfile::tempdir().unwrap();
     let report = |arguments: &str| -> Value {
         serde_json::from_str(&success(&format!("train {SMALL} --json {arguments}"), folder.path())).unwrap()
@@ -32,7 +32,7 @@ fn training_reports_decoders_reference_and_size_of_the_scene() {
             assert!(value.is_some_and(|value| value > 0.0), "{name} {figure}: {value:?}");
         }
     }
-    assert!(known["reference"]["z_percent"].as_f64().unwrap() > 0.0);
+    assert!(known["model_based"]["z_percent"].as_f64().unwrap() > 0.0);
     assert_eq!((&known["unknowns"], &known["equations"]), (&12.into(), &36.into()));
     assert_eq!(known["networks"], 3);
     assert_eq!(known["published"], Value::Null);
@@ -48,12 +48,12 @@ fn training_reports_decoders_reference_and_size_of_the_scene() {
         (&log["networks"], &log["inputs"]["scaling"]),
         (&1.into(), &"whitening".into())
     );
-    assert!(log["reference"]["z_mm"].as_f64().unwrap() < 1e-10);
+    assert!(log["model_based"]["z_mm"].as_f64().unwrap() < 1e-10);
 }
 
 /// Twelve readings determine four nodes up to rounding, so that error ratios are meaningless; three readings do not.
 #[test]
-fn ratios_need_a_reference_above_rounding() {
+fn ratios_need_a_model_based_error_above_rounding() {
     let folder = tempfile::tempdir().unwrap();
     let ratio = |array: &str| {
         let call = format!("train {SMALL} --array {array} --preset best --epochs 1 --decoder newton");
@@ -65,13 +65,13 @@ fn ratios_need_a_reference_above_rounding() {
         );
         let line = text.lines().find(|line| line.starts_with("Newton ")).unwrap();
         let ratio = line.split_whitespace().nth(3).unwrap().parse::<f64>().unwrap();
-        let ratio = text.contains("times reference").then_some(ratio);
+        let ratio = text.contains("times model-based").then_some(ratio);
         assert_eq!(text.contains("nothing but rounding"), ratio.is_none(), "{text}");
         ratio
     };
     assert_eq!(ratio("3x4_2x12"), None);
     let open = ratio("3x4_2x3").unwrap();
-    assert!((0.9..1.2).contains(&open), "{open}");
+    assert_eq!(open, 1.0, "the model-based decoder is Newton's method");
 }
 
 #[test]

@@ -59,20 +59,20 @@ fn table_of(run: &Run) -> Vec<String> {
         .training,
         Some(run.network()),
     );
-    let limit = run
+    let model_based = run
         .baselines()
         .unwrap()
         .nodes()
         .unwrap()
-        .reference
-        .filter(|limit| !limit.is_rounding());
+        .model_based
+        .filter(|errors| !errors.is_rounding());
     let of_decoder = |(wanted, name): (DecoderResult, &str)| {
         let report = set.measure(wanted.kind, wanted.precision, run.test()).unwrap().unwrap();
         let errors = *report.errors.nodes().unwrap();
-        let ratio = limit.map(|limit| errors.z_mm / limit.z_mm);
+        let ratio = model_based.map(|model_based| errors.z_mm / model_based.z_mm);
         let figures = [
             Some(("Z %", errors.z_percent)),
-            ratio.map(|ratio| ("× limit", Some(ratio))),
+            ratio.map(|ratio| ("× model-based", Some(ratio))),
             Some(("residual", report.residual)),
         ];
         let cell = |(heading, value)| format!("{name}, {heading}: {}", format_number(value));

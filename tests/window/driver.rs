@@ -522,7 +522,7 @@ impl Driver {
     }
 }
 
-const ROWS: [&str; 5] = ["training mean", "linear map", "network", "reference", "published"];
+const ROWS: [&str; 5] = ["training mean", "linear map", "network", "model-based", "published"];
 
 /// Returns the settings of [`Driver::configure_small`].
 pub(crate) fn small() -> SimulatedSettings {

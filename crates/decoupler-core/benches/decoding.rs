@@ -16,8 +16,8 @@ use std::{hint::black_box, time::Instant};
 use decoupler_core::{
     dataset::{Dataset, PerRow, Seed, Stream},
     decoupling::{
-        AffineMap, CompiledNetworks, Decoder, NewtonDecoder, NewtonRules, PolishedDecoder, Posterior, PosteriorDecoder,
-        RadialBasisNetwork, TakagiSugeno, TrainingMean,
+        AffineMap, CompiledNetworks, Decoder, Estimator, NewtonDecoder, PolishedDecoder, RadialBasisNetwork,
+        TakagiSugeno, TrainingMean,
     },
     network::{InputChoice, Quantity, ScalingChoice, tanh_in_place, tanh_in_place_single},
     scene::{Noise, NoiseSource, RowModel, Rows, Scene},
@@ -108,14 +108,14 @@ impl RowArithmetic {
         }
     }
 
-    /// Arithmetic of `rounds` of expectation propagation over all nodes: for each node a quadrature of 97 points and
-    /// two products with the factor of the covariance.
-    fn of_propagation(scale: ArrayScale, rounds: usize) -> Self {
-        let nodes = scale.nodes_per_row();
+    /// Arithmetic of `steps` steps with a prior: each evaluates Eq. (2) and decomposes the equations of readings and prior.
+    fn of_estimator(scale: ArrayScale, steps: usize) -> Self {
+        let (readings, nodes) = (scale.columns(), scale.nodes_per_row());
+        let newton = Self::of_newton(scale, steps);
         Self {
-            roots: rounds * 2 * nodes,
-            divisions: rounds * 10 * nodes,
-            products: rounds * nodes * (97 * 5 + 2 * nodes * nodes),
+            products: newton.products + steps * 2 * nodes * nodes * nodes,
+            roots: newton.roots + steps * readings,
+            ..newton
         }
     }
 }
@@ -184,22 +184,22 @@ fn print_scale(scale: ArrayScale) {
     let first = CompiledNetworks::<f64>::new(&untrained_networks(&training, InputChoice::BEST, 12), scale.rows());
     decoders.push((
         "polish, 1 step".into(),
-        Box::new(PolishedDecoder::new(Box::new(first), &model, &scene, &rows, 1, &mut rng).unwrap()),
+        Box::new(PolishedDecoder::new(Box::new(first), &model, &scene, &rows, 1).unwrap()),
     ));
     decoders.push((
         "newton".into(),
-        Box::new(NewtonDecoder::new(&model, &scene, &rows, NewtonRules::default()).unwrap()),
+        Box::new(NewtonDecoder::new(&model, &scene, &rows).unwrap()),
     ));
-    let mut posterior = Posterior::new(&model, &noisy, &rows, &mut rng).unwrap();
+    let mut estimator = Estimator::new(&model, &noisy, &rows).unwrap();
     let mut answer = vec![0.0; scale.coordinates_per_row()];
-    let mut rounds_of = |row: usize| {
+    let mut steps_of = |row: usize| {
         let readings = &frame[row * scale.columns()..(row + 1) * scale.columns()];
-        posterior.solve(row, readings, &mut answer).unwrap().rounds
+        estimator.solve(row, readings, &mut answer).unwrap().steps
     };
-    let rounds = rows.iter().map(|&row| rounds_of(row)).sum::<usize>() / rows.len();
+    let steps = rows.iter().map(|&row| steps_of(row)).sum::<usize>() / rows.len();
     decoders.push((
         "newton with prior, noise 1e-3".into(),
-        Box::new(PosteriorDecoder::new(posterior, &model, &scene, &rows).unwrap()),
+        Box::new(NewtonDecoder::new(&model, &noisy, &rows).unwrap()),
     ));
     let coordinates = scale.rows() * scale.coordinates_per_row();
     let (m1, m2, m4) = (scale.rows(), scale.nodes_per_row(), scale.columns());
@@ -268,7 +268,7 @@ fn print_scale(scale: ArrayScale) {
         ("newton", newton(NEWTON_EVALUATIONS)),
         (
             "newton with prior, noise 1e-3",
-            RowArithmetic::of_propagation(scale, rounds),
+            RowArithmetic::of_estimator(scale, steps),
         ),
     ];
     for (name, arithmetic) in per_row {

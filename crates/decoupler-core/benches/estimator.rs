@@ -8,8 +8,8 @@ use std::time::Instant;
 
 use decoupler_core::{
     dataset::{Dataset, Seed, Stream},
-    decoupling::{Decoder, DecoderKind, Estimator, FitProblem, Precision, decode_set},
-    evaluation::{Errors, reference_errors},
+    decoupling::{Decoder, DecoderKind, FitProblem, Precision, decode_set},
+    evaluation::Errors,
     network::InputChoice,
     scene::{Noise, NoiseSource, Rows, Scene},
     sensor::SensorModel,
@@ -53,58 +53,16 @@ fn print_scene(array: &str, loading: &str, noise: Noise, rows: Rows) {
     };
     let (newton_mm, micros) = errors(DecoderKind::Newton);
     let (mean_mm, _) = errors(DecoderKind::Mean);
-    let (estimator_mm, estimator_micros) = estimate(&model, &scene, &test);
-    let mut rng = Seed(2).rng(Stream::Expectation);
-    let reference = reference_errors(&model, &scene, &test, &mut rng).unwrap();
-    let reference = reference.map_or_else(|reason| format!("{reason:?}"), |errors| format!("{:.4}", errors.z_mm));
     let known = if rows == Rows::Known { "known" } else { "unknown" };
     println!(
-        "| {array} | {loading} | {:e} | {} | {known} | {mean_mm:.4} | {reference} | {newton_mm:.4} | {micros:.0} | \
-         {estimator_mm:.4} | {estimator_micros:.0} |",
+        "| {array} | {loading} | {:e} | {} | {known} | {mean_mm:.4} | {newton_mm:.4} | {micros:.0} |",
         noise.relative, noise.drift
     );
 }
 
-/// Returns the z error in millimetres of the estimator, with the row-wire of the highest evidence if rows are not
-/// known, and microseconds per frame.
-fn estimate(model: &SensorModel, scene: &Scene, test: &Dataset) -> (f64, f64) {
-    let rows: Vec<usize> = (0..model.scale.rows()).collect();
-    let mut estimator = Estimator::new(model, scene, &rows).unwrap();
-    let mut answers_mm = test.targets().to_owned();
-    // The first row computes the priors.
-    let mut first_mm = vec![0.0; model.scale.coordinates_per_row()];
-    estimator
-        .solve(rows[0], test.sample_readings(0), &mut first_mm)
-        .unwrap();
-    let begun = Instant::now();
-    for (sample, mut answer_mm) in answers_mm.rows_mut().into_iter().enumerate() {
-        let readings_ohm = test.sample_readings(sample);
-        let own = test.row_wire(sample).unwrap();
-        let candidates = if scene.rows == Rows::Known {
-            vec![own]
-        } else {
-            rows.clone()
-        };
-        let mut lowest = f64::INFINITY;
-        for row in candidates {
-            let mut coordinates_mm = vec![0.0; answer_mm.len()];
-            let found = estimator.solve(row, readings_ohm, &mut coordinates_mm).unwrap();
-            if found.surprise < lowest {
-                lowest = found.surprise;
-                answer_mm.assign(&ndarray::Array1::from(coordinates_mm));
-            }
-        }
-    }
-    let micros = begun.elapsed().as_micros() as f64 / SNAPSHOTS as f64;
-    let errors = Errors::measure(test, &answers_mm, scene.stroke_mm(&model.geometry));
-    (errors.z_mm, micros)
-}
-
 fn main() {
-    println!(
-        "| array | loading | noise | drift | rows | mean | reference | newton | us per frame | estimator | us per frame |"
-    );
-    println!("|---|---|---|---|---|---|---|---|---|---|---|");
+    println!("| array | loading | noise | drift | rows | mean | newton | us per frame |");
+    println!("|---|---|---|---|---|---|---|---|");
     let of = |relative: f64, drift: f64| Noise {
         drift,
         ..Noise::relative(relative)

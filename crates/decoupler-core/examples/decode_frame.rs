@@ -5,7 +5,7 @@
 use std::error::Error;
 
 use decoupler_core::{
-    decoupling::{CompiledNetworks, Decoder, NewtonDecoder, NewtonRules},
+    decoupling::{CompiledNetworks, Decoder, NewtonDecoder},
     evaluation::{Preset, Run},
 };
 
@@ -21,7 +21,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     network.decode(frames.frame(0), &mut coordinates_mm)?;
     println!("network: node 1 of row-wire 1 is at z = {:.6} mm", coordinates_mm[2]);
     let (source, rows) = (settings.source, Vec::from_iter(0..frames.rows()));
-    let mut newton = NewtonDecoder::new(&source.sensor, &source.scene, &rows, NewtonRules::default())?;
+    let mut newton = NewtonDecoder::new(&source.sensor, &source.scene, &rows)?;
     newton.decode(frames.frame(0), &mut coordinates_mm)?;
     println!("Newton:  node 1 of row-wire 1 is at z = {:.6} mm", coordinates_mm[2]);
     Ok(())

@@ -104,7 +104,7 @@
 //!
 //! ```
 //! use decoupler_core::{
-//!     decoupling::{Decoder, NewtonDecoder, NewtonRules},
+//!     decoupling::{Decoder, NewtonDecoder},
 //!     evaluation::Preset,
 //! };
 //!
@@ -114,7 +114,7 @@
 //! let test = source.draw_test(settings.seed)?;
 //! let frames = test.frames()?;
 //! let rows = Vec::from_iter(0..frames.rows());
-//! let mut newton = NewtonDecoder::new(&source.sensor, &source.scene, &rows, NewtonRules::default())?;
+//! let mut newton = NewtonDecoder::new(&source.sensor, &source.scene, &rows)?;
 //! let mut coordinates_mm = vec![0.0; frames.rows() * newton.outputs()];
 //! newton.decode(frames.frame(0), &mut coordinates_mm)?;
 //! assert!((coordinates_mm[2] - test.targets()[[0, 2]]).abs() < 1e-9);

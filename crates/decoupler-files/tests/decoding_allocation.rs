@@ -5,8 +5,8 @@
 use decoupler_core::{
     dataset::{Dataset, PerRow, Seed, Stream},
     decoupling::{
-        AffineMap, CompiledNetworks, DecodeError, Decoder, NewtonDecoder, NewtonRules, PolishedDecoder,
-        RadialBasisNetwork, TakagiSugeno,
+        AffineMap, CompiledNetworks, DecodeError, Decoder, NewtonDecoder, PolishedDecoder, RadialBasisNetwork,
+        TakagiSugeno,
     },
     live::{Diagnosis, FaultCause, FaultyWire, LeftOutDecoder, WireCheck},
     network::{
@@ -92,8 +92,8 @@ fn a_frame_is_decoded_by_radial_basis_and_newton_without_allocating() {
     let ridge = |set: &Dataset| AffineMap::ridge(set, Quantity::Conductance, no_noise);
     let first = Box::new(PerRow::fit(&set, RowModel::Each, ridge).unwrap());
     let rows: Vec<usize> = (0..10).collect();
-    let mut polished = PolishedDecoder::new(first, &model, &scene, &rows, 1, &mut rng).unwrap();
-    let mut newton = NewtonDecoder::new(&model, &scene, &rows, NewtonRules::default()).unwrap();
+    let mut polished = PolishedDecoder::new(first, &model, &scene, &rows, 1).unwrap();
+    let mut newton = NewtonDecoder::new(&model, &scene, &rows).unwrap();
     let basis = |set: &Dataset| RadialBasisNetwork::fit(set, InputChoice::BEST, no_noise, &mut rng);
     let mut basis = PerRow::fit(&set, RowModel::Each, basis).unwrap();
     let mut coordinates_mm = vec![0.0; 180];

@@ -41,7 +41,7 @@ fn column(measure: ErrorMeasure) -> TableColumn<'static> {
     }
 }
 
-/// Lays out an error table: rows of baselines, network, reference and published figures, for recordings target by target;
+/// Lays out an error table: rows of baselines, network, model-based and published figures, for recordings target by target;
 /// below, the intervals of the network, if they were calibrated.
 pub fn error_table_ui(ui: &mut Ui, table: &ErrorTable) {
     let palette = Theme::of(ui).palette;
@@ -71,7 +71,7 @@ pub fn error_table_ui(ui: &mut Ui, table: &ErrorTable) {
                 .meaning(row_meaning(row.name))
                 .colour(match row.name {
                     NETWORK => palette.accent,
-                    "published" | "reference" => palette.dim,
+                    "published" | "model-based" => palette.dim,
                     _ => palette.text,
                 })
                 .strong(row.name == NETWORK)
@@ -123,7 +123,7 @@ fn row_meaning(name: &str) -> &'static str {
         NETWORK => {
             "The network with the lowest validation error so far; with the lowest training error if nothing is held out"
         }
-        "reference" => glossary::REFERENCE.hint,
+        "model-based" => glossary::MODEL_BASED.hint,
         "published" => glossary::PUBLISHED.hint,
         _ => "",
     }

@@ -4,7 +4,7 @@ use std::hint::black_box;
 
 use decoupler_core::{
     dataset::{Dataset, Seed, Stream},
-    decoupling::{CompiledNetworks, Decoder, Newton, NewtonDecoder, NewtonRules, Solution},
+    decoupling::{CompiledNetworks, Decoder, Estimator, NewtonDecoder, Solution},
     network::{InputChoice, Networks, Quantity, ScalingChoice},
     scene::{Rows, Scene},
     sensor::{ArrayScale, SensorModel},
@@ -97,12 +97,11 @@ impl Array {
     /// Measures the Gauss-Newton method on a frame.
     pub(crate) fn newton(&self) -> NewtonFrame {
         let rows = Vec::from_iter(0..self.scale.rows());
-        let rules = NewtonRules::default();
-        let mut newton = Newton::new(&self.model, &self.scene, rules);
+        let mut estimator = Estimator::new(&self.model, &self.scene, &rows).unwrap();
         let mut coordinates = vec![0.0; self.scale.coordinates_per_row()];
         let (mut steps, mut unsolved, mut error_mm) = (0, 0, 0.0_f64);
         for &row in &rows {
-            let report = newton
+            let report = estimator
                 .solve(row, self.set.sample_readings(row), &mut coordinates)
                 .unwrap();
             steps += report.steps;
@@ -114,7 +113,7 @@ impl Array {
                 .fold(error_mm, |most, (a, b)| most.max((a - b).abs()));
         }
         let steps_per_row = steps as f64 / rows.len() as f64;
-        let mut decoder = NewtonDecoder::new(&self.model, &self.scene, &rows, rules).unwrap();
+        let mut decoder = NewtonDecoder::new(&self.model, &self.scene, &rows).unwrap();
         let evaluations = steps_per_row.round() as usize;
         let mut arithmetic = RowArithmetic::of_newton(self.scale, evaluations).work(rows.len());
         let arithmetic_ms = median(&mut Vec::from_iter((0..TURNS).map(|_| time_ms(&mut arithmetic))));

@@ -5,8 +5,8 @@ use serde::{Deserialize, Serialize};
 
 use super::{
     AffineLayer, DecodeError, Decoder, Description, Layer, LayeredMap, NotDescribed,
+    equations::Range,
     ridge::{Regression, Standard, folds},
-    row_problem::Range,
 };
 use crate::{
     dataset::Dataset,

@@ -1,9 +1,9 @@
-use std::fmt;
+use std::{fmt, ops::AddAssign};
 
 use ndarray::{Array2, Axis};
 use thiserror::Error;
 
-use super::{Description, NotDescribed, newton::Solution, row_problem::RowProblem};
+use super::{Description, NotDescribed, Solution, equations::RowProblem};
 use crate::{
     dataset::{Dataset, PerRow},
     network::Quantity,
@@ -223,6 +223,14 @@ impl SolvedRows {
     /// Returns `true` if all answers are reliable.
     pub fn are_reliable(self) -> bool {
         self.unsolved == 0 && self.undetermined == 0
+    }
+}
+
+impl AddAssign for SolvedRows {
+    fn add_assign(&mut self, other: Self) {
+        self.rows += other.rows;
+        self.unsolved += other.unsolved;
+        self.undetermined += other.undetermined;
     }
 }
 

@@ -53,7 +53,7 @@ pub struct AffineLayer<T> {
 pub enum NotDescribed {
     /// The decoder uses the noise of the readings and the prior of the scene.
     #[error(
-        "the readings of the scene have noise, for which this decoder computes a posterior by expectation propagation, which bundles do not support: take another decoder, or settings without noise"
+        "the readings of the scene have noise, for which this decoder uses a prior of the deformation, which bundles do not support: take another decoder, or settings without noise"
     )]
     Posterior,
     /// There are no more equations than unknowns.

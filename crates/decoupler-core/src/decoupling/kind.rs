@@ -4,8 +4,8 @@ use rand::rngs::ChaCha8Rng;
 use thiserror::Error;
 
 use super::{
-    AffineMap, CompiledNetworks, Decoder, NewtonDecoder, PolishedDecoder, Posterior, PosteriorDecoder,
-    RadialBasisNetwork, TakagiSugeno, TrainingMean,
+    AffineMap, CompiledNetworks, Decoder, NewtonDecoder, PolishedDecoder, RadialBasisNetwork, TakagiSugeno,
+    TrainingMean,
 };
 use crate::{
     dataset::{Dataset, PerRow, Seed, Stream},
@@ -284,12 +284,7 @@ fn fit_newton(problem: &FitProblem<'_>) -> Fit {
     let Some(((sensor, scene), rows)) = problem.sensor.zip(problem.training.row_wires_read()) else {
         return Ok(None);
     };
-    let posterior = Posterior::new(sensor, scene, rows, &mut problem.rng())?;
-    Ok(Some(if scene.noise.in_test().is_none() {
-        Box::new(NewtonDecoder::with_posterior(posterior, sensor, scene, rows)?)
-    } else {
-        Box::new(PosteriorDecoder::new(posterior, sensor, scene, rows)?)
-    }))
+    Ok(Some(Box::new(NewtonDecoder::new(sensor, scene, rows)?)))
 }
 
 fn fit_polish(problem: &FitProblem<'_>) -> Fit {
@@ -302,7 +297,7 @@ fn fit_polish(problem: &FitProblem<'_>) -> Fit {
         return Ok(None);
     };
     let steps = DecoderKind::POLISH_STEPS;
-    let polished = PolishedDecoder::new(first, sensor, scene, rows, steps, &mut problem.rng())?;
+    let polished = PolishedDecoder::new(first, sensor, scene, rows, steps)?;
     Ok(Some(Box::new(polished)))
 }
 

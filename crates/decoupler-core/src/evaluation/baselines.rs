@@ -1,34 +1,29 @@
 use serde::{Deserialize, Serialize};
 
-use super::{
-    Coverage, Errors, NoReference, RunError, RunSets, RunSettings, SimulatedSettings, Source, TestErrors,
-    reference_errors, run_sets::check_sets,
-};
+use super::{Coverage, Errors, RunError, RunSets, RunSettings, Simulation, Source, TestErrors, run_sets::check_sets};
 use crate::{
-    dataset::{Dataset, PerRow, Stream},
-    decoupling::{AffineMap, TrainingMean, decode_set},
+    dataset::{Dataset, PerRow},
+    decoupling::{AffineMap, NewtonDecoder, TrainingMean, decode_set},
     job::Job,
     network::Quantity,
-    scene::{NoiseSource, Rows},
+    scene::{NoiseSource, RowModel, Rows},
     sensor::ArrayScale,
 };
 
 /// Errors of the baselines, listed next to those of the network in every error table. `E` is [`Errors`] where the
 /// targets are known to be nodes.
+// Unknown fields are ignored: those of version 0.1.0 had another row.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
 pub struct Baselines<E = TestErrors> {
     /// Errors of always answering the mean of the training set.
     pub mean: E,
     /// Errors of the best affine map on the readings, one for each row-wire where rows are known; ridge regression for
     /// recordings.
     pub linear: E,
-    /// Errors of the Bayesian reference, the limit due to the noise and to the distribution of the loading:
-    /// [`reference_errors`](super::reference_errors). Recordings have none.
-    pub reference: Option<E>,
-    /// Reason why there is no reference, if one was attempted.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub no_reference: Option<NoReference>,
+    /// Errors of [`DecoderKind::Newton`](crate::decoupling::DecoderKind::Newton), which knows the equations, the noise, and
+    /// mean and covariance of the loading. Recordings have no sensor model, and files of version 0.1.0 not this row; for
+    /// test sets of many large rows it would take too long.
+    pub model_based: Option<E>,
 }
 
 /// Errors of the network and of the baselines on the same test set.
@@ -52,25 +47,12 @@ impl Baselines {
     pub fn measure(settings: &RunSettings, sets: &RunSets, job: &Job<'_>) -> Result<Self, RunError> {
         let [mean, linear] = mean_and_linear(settings, sets)?;
         job.check()?;
-        let reference = match settings.simulated() {
-            Some(simulated) => {
-                let SimulatedSettings { source, seed, .. } = simulated;
-                let mut rng = seed.rng(Stream::Expectation);
-                Some(reference_errors(&source.sensor, &source.scene, &sets.test, &mut rng)?)
-            }
-            None => None,
-        };
+        let model_based = model_based(&settings.source, &sets.test)?;
         job.check()?;
-        let (reference, no_reference) = match reference {
-            Some(Ok(errors)) => (Some(TestErrors::Nodes(errors)), None),
-            Some(Err(reason)) => (None, Some(reason)),
-            None => (None, None),
-        };
         Ok(Self {
             mean,
             linear,
-            reference,
-            no_reference,
+            model_based,
         })
     }
 
@@ -79,9 +61,18 @@ impl Baselines {
         Some(Baselines {
             mean: *self.mean.nodes()?,
             linear: *self.linear.nodes()?,
-            reference: self.reference.as_ref().and_then(TestErrors::nodes).copied(),
-            no_reference: self.no_reference,
+            model_based: self.model_based.as_ref().and_then(TestErrors::nodes).copied(),
         })
+    }
+
+    /// Returns the reason why the error table of a simulated array has no model-based row.
+    pub fn model_based_note(&self) -> Option<&'static str> {
+        let is_missing = self.mean.nodes().is_some() && self.model_based.is_none();
+        is_missing.then_some(
+            "There is no model-based row: solving the equations for a test set of so many rows of this size takes many \
+             minutes, or an earlier version wrote the file. Lower the number of test samples or the size of the array, and \
+             train again.",
+        )
     }
 
     /// Name of the linear baseline in tables.
@@ -102,6 +93,30 @@ impl Scores {
             coverage: self.coverage.clone(),
         })
     }
+}
+
+/// Returns the errors on `test` of Newton's method with the noise of the scene and mean and covariance of its loading;
+/// `None` without a sensor model, and if it would take many minutes.
+pub(super) fn model_based(source: &Source, test: &Dataset) -> Result<Option<TestErrors>, RunError> {
+    /// Multiplications of a few minutes on one core.
+    const MAX_MULTIPLICATIONS: f64 = 2e11;
+    /// Usual number of steps per row.
+    const STEPS: f64 = 8.0;
+    let Source::Simulated(Simulation { sensor, scene, .. }) = source else {
+        return Ok(None);
+    };
+    let rows = test.row_wires_read().expect("samples of a scene know their row-wire");
+    let is_each_tried = scene.rows.model() == RowModel::Shared && !scene.noise.in_test().is_none();
+    let tried = if is_each_tried { rows.len() } else { 1 };
+    let unknowns = (sensor.scale.nodes_per_row() * scene.movement.axes().count()) as f64;
+    // QR decomposition of the equations of readings and prior.
+    let of_step = 2.0 * unknowns * unknowns * (sensor.scale.columns() as f64 + unknowns);
+    if STEPS * of_step * (test.samples() * tried) as f64 > MAX_MULTIPLICATIONS {
+        return Ok(None);
+    }
+    let mut decoder = NewtonDecoder::new(sensor, scene, rows)?;
+    let answers = decode_set(&mut decoder, test)?;
+    Ok(Some(TestErrors::measure(source, test, &answers)))
 }
 
 /// Returns the errors of the training mean and of the linear baseline on the test set.

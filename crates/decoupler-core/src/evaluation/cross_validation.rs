@@ -160,8 +160,7 @@ impl CrossValidated {
             baselines: Baselines {
                 mean: errors(&self.mean),
                 linear: errors(&self.linear),
-                reference: None,
-                no_reference: None,
+                model_based: None,
             },
             coverage: Vec::new(),
         }

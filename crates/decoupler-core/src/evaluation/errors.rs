@@ -83,14 +83,14 @@ impl Errors {
         }
     }
 
-    /// Returns the ratio of the mean |decoupled z − z| to that of the Bayesian `reference`; `None` if the reference is
+    /// Returns the ratio of the mean |decoupled z − z| to that of `other` answers; `None` if that is
     /// only [rounding](Self::is_rounding).
-    pub fn times(&self, reference: &Self) -> Option<f64> {
-        (!reference.is_rounding()).then(|| self.z_mm / reference.z_mm)
+    pub fn times(&self, other: &Self) -> Option<f64> {
+        (!other.is_rounding()).then(|| self.z_mm / other.z_mm)
     }
 
     /// Returns `true` if errors of z are at most 1e-9 of the stroke, a hundredth of an atom for a stroke of a
-    /// millimetre. A Bayesian reference that small means that the readings determine the deformation up to rounding;
+    /// millimetre. A model-based error that small means that the readings determine the deformation up to rounding;
     /// ratios to it are meaningless.
     pub fn is_rounding(&self) -> bool {
         self.z_full_scale_percent <= 1e-7
@@ -160,9 +160,9 @@ impl TestErrors {
         }
     }
 
-    /// Returns the ratio of the error to that of the Bayesian `reference`: [`Errors::times`].
-    pub fn times(&self, reference: &Self) -> Option<f64> {
-        self.nodes()?.times(reference.nodes()?)
+    /// Returns the ratio of the error to that of `other` answers: [`Errors::times`].
+    pub fn times(&self, other: &Self) -> Option<f64> {
+        self.nodes()?.times(other.nodes()?)
     }
 
     /// Returns the name of the first figure that is not a finite number.

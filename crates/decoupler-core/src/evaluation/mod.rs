@@ -1,5 +1,5 @@
-//! Evaluation of decoders: errors as the paper defines them and beyond, next to baselines, a Bayesian reference and the
-//! published figures.
+//! Evaluation of decoders: errors as the paper defines them and beyond, next to baselines, a decoder that knows the
+//! sensor model, and the published figures.
 //!
 //! A [`Run`] goes from [`RunSettings`] to trained networks and error tables; [`CrossValidation`] tests on every sample;
 //! [`auto`] chooses settings by cross-validation; [`measure_trade_off`] compares speed with accuracy; [`experiments`] repeats runs over a grid of settings;
@@ -17,7 +17,6 @@ mod past_networks;
 mod preparation;
 mod pressed;
 pub mod recorded;
-mod reference;
 mod remark;
 mod run;
 mod run_sets;
@@ -35,7 +34,6 @@ pub use intervals::{Coverage, HalfWidth, Intervals, IntervalsDefect, NoIntervals
 pub use past_networks::{PastNetwork, PastNetworks};
 pub use preparation::Begin;
 pub use pressed::{Pressed, PressedAnswer, fine_tune, press_limits, pressed_rows, rebased};
-pub use reference::{NoReference, ReferenceNote, reference_errors};
 pub use remark::{Cause, MissingFigures, Remark, error_remarks};
 pub use run::{Run, RunDefect, RunError};
 pub use run_sets::RunSets;

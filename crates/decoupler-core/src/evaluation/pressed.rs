@@ -293,7 +293,7 @@ mod tests {
     use super::*;
     use crate::{
         dataset::Dataset,
-        decoupling::{NewtonDecoder, NewtonRules, TrainingMean},
+        decoupling::{NewtonDecoder, TrainingMean},
         evaluation::{Errors, Run, SimulatedSettings},
         scene::{Indenter, Print, Scene},
     };
@@ -319,7 +319,7 @@ mod tests {
         let pressed = Pressed::new(&sensor, &rows, &touch(), 1.0).unwrap();
         let moved = pressed.nodes_mm().nth(8 * 6 + 1).unwrap();
         assert_eq!(moved, sensor.displaced_mm(8, 1, DVec3::Z * 0.35));
-        let mut newton = NewtonDecoder::new(&sensor, &Scene::default(), &rows, NewtonRules::default()).unwrap();
+        let mut newton = NewtonDecoder::new(&sensor, &Scene::default(), &rows).unwrap();
         let answer = pressed.answer(&mut newton, &|| false).unwrap().unwrap();
         assert!(
             answer.worst_mm < 1e-9 && answer.mean_mm <= answer.worst_mm,

@@ -6,7 +6,7 @@ use thiserror::Error;
 use super::{Measured, PublishedErrors, RunError, Simulation, Source};
 use crate::{
     dataset::{Dataset, LARGEST_SAMPLES, Seed},
-    decoupling::{DecoderKind, Posterior},
+    decoupling::{DecoderKind, GaussianPrior},
     machine::{MemoryBudget, Speed, node_pairs_per_row},
     network::{InputChoice, LARGEST_HIDDEN, ScalingChoice, Shape},
     scene::{Movement, RowModel, Rows, Scene},
@@ -411,7 +411,14 @@ impl Workload {
         let with_inputs = |inputs| method.equations_bytes(Shape { inputs, ..shape }, of_each);
         let equations_bytes = (fewest..=shape.inputs).map(with_inputs).max().unwrap_or(0);
         let training_bytes = (equations_bytes as u64).saturating_add(float_bytes(shape.weights(), Self::VECTORS));
-        let priors = Posterior::prior_bytes(&source.scene, size.rows, size.unknowns / size.rows);
+        let unknowns = size.unknowns / size.rows;
+        // Exact readings that determine the deformation need no prior.
+        let has_priors = !source.scene.noise.in_test().is_none() || scale.columns() <= unknowns;
+        let priors = if has_priors {
+            GaussianPrior::bytes(source.scene.loading, size.rows, unknowns)
+        } else {
+            0
+        };
         let per_row = node_pairs_per_row(&source.sensor);
         let bytes = samples
             .saturating_add(training_bytes.saturating_mul(trainings as u64))

@@ -24,7 +24,7 @@ pub struct ErrorTable {
 pub struct ErrorBlock {
     /// Target; `None` for the nodes of an array.
     pub target: Option<Channel>,
-    /// Rows: baselines, decoders, reference and published figures.
+    /// Rows: baselines, decoders, model-based and published figures.
     pub rows: Vec<ErrorRow>,
 }
 
@@ -71,6 +71,8 @@ pub enum ErrorMeasure {
 
 /// Name of the row of the network.
 const NETWORK: &str = "network";
+/// Name of the row of the decoder that knows the sensor model.
+const MODEL_BASED: &str = "model-based";
 
 /// Name of the block of all targets.
 const ALL_TARGETS: &str = "all targets";
@@ -216,7 +218,7 @@ impl ErrorMeasure {
 }
 
 impl ErrorTable {
-    /// Returns the table of the baselines, the network, the Bayesian reference as the limit of any decoder, and the
+    /// Returns the table of the baselines, the network, the model-based decoder, and the
     /// published errors, if there are any.
     pub fn of_scores(problem: &Problem, scores: &Scores, published: Option<&PublishedErrors>) -> Self {
         let baselines = &scores.baselines;
@@ -225,7 +227,7 @@ impl ErrorTable {
             (baselines.linear_name(), &baselines.linear),
             (NETWORK, &scores.network),
         ];
-        rows.extend(baselines.reference.as_ref().map(|errors| ("reference", errors)));
+        rows.extend(baselines.model_based.as_ref().map(|errors| (MODEL_BASED, errors)));
         let mut table = Self::new(problem, &rows);
         if !problem.has_nodes && scores.coverage.iter().any(Option::is_some) {
             table.add_coverage(&scores.coverage);

@@ -1,9 +1,8 @@
 use super::{
-    Begin, DecoderReport, DecoderSet, Errors, Preset, Run, RunError, RunSets, RunSettings, SimulatedSettings,
-    Simulation, reference_errors,
+    Begin, DecoderReport, DecoderSet, Errors, Preset, Run, RunError, RunSets, RunSettings, Simulation, TestErrors,
+    baselines::model_based,
 };
 use crate::{
-    dataset::Stream,
     decoupling::DecoderKind,
     identifiability::{Identifiability, IdentifiabilityError, IdentifiabilityWarning},
     job::Job,
@@ -22,8 +21,8 @@ pub struct TradeOffPoint {
     pub report: DecoderReport,
     /// Training or fitting time in seconds, summed over all rows and starts.
     pub training_seconds: f64,
-    /// Errors of the Bayesian reference in this scene; `None` for recordings and if a posterior did not converge.
-    pub reference: Option<Errors>,
+    /// Model-based errors in this scene: [`Baselines::model_based`](super::Baselines::model_based).
+    pub model_based: Option<Errors>,
 }
 
 impl TradeOffPoint {
@@ -43,9 +42,9 @@ impl TradeOffPoint {
         is_trained.then_some(self.settings.training.method)
     }
 
-    /// Returns the ratio of the error to that of the reference: [`Errors::times`]; `None` without a reference.
-    pub fn to_reference(&self) -> Option<f64> {
-        self.report.errors.nodes()?.times(self.reference.as_ref()?)
+    /// Returns the ratio of the error to the model-based one: [`Errors::times`]; `None` without that.
+    pub fn to_model_based(&self) -> Option<f64> {
+        self.report.errors.nodes()?.times(self.model_based.as_ref()?)
     }
 
     /// Returns the decoding time in microseconds and the error in percent.
@@ -77,13 +76,8 @@ pub fn measure_trade_off(
     mut on_point: impl FnMut(DecoderKind, Result<TradeOffPoint, RunError>, Option<&Run>),
 ) -> Result<(), RunError> {
     let mut set = DecoderSet::new(*settings, sets.split.training.clone(), None);
-    let reference = match settings.simulated() {
-        Some(SimulatedSettings { source, seed, .. }) => {
-            let mut rng = seed.rng(Stream::Expectation);
-            reference_errors(&source.sensor, &source.scene, &sets.test, &mut rng)?.ok()
-        }
-        None => None,
-    };
+    let model_based = model_based(&settings.source, &sets.test)?;
+    let model_based = model_based.as_ref().and_then(TestErrors::nodes).copied();
     let offered = decoders
         .iter()
         .filter(|kind| settings.source.simulation().is_some() || !kind.needs_sensor());
@@ -93,7 +87,7 @@ pub fn measure_trade_off(
         settings,
         report,
         training_seconds,
-        reference,
+        model_based,
     };
     for kind in without {
         for &precision in kind.precisions() {
@@ -314,7 +308,7 @@ mod tests {
             .any(|warning| matches!(warning, IdentifiabilityWarning::Hopeless { .. }))
     }
 
-    /// The Bayesian reference of this scene is far below the error of the mean, and rows differ by 20 times the noise.
+    /// The model-based error of this scene is far below the error of the mean, and rows differ by 20 times the noise.
     #[test]
     fn drift_is_not_treated_as_independent_noise() {
         let simulation = Simulation {

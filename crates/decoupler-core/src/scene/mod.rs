@@ -7,7 +7,6 @@ mod noise_source;
 mod rows;
 
 pub use fault::{ConverterEnd, Fault, FaultError, FaultySensor};
-pub(crate) use loading::LatentRow;
 pub use loading::{Contact, DeformationSampler, Indenter, IndenterShape, Loading, Span};
 pub(crate) use noise::standard_normal;
 pub use noise::{Noise, NoisySets, RelativeNoise};

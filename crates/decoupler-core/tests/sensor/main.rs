@@ -4,6 +4,6 @@
 
 mod calibration;
 mod model;
-mod posterior_rows;
+mod noisy_rows;
 mod recorded;
 mod rounding;

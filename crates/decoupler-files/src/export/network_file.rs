@@ -406,8 +406,7 @@ pub(super) fn defect(file: &NetworkFile) -> Option<String> {
         unmeasured("scores.network", errors, problem),
         unmeasured("scores.baselines.mean", &baselines.mean, problem),
         unmeasured("scores.baselines.linear", &baselines.linear, problem),
-        (baselines.reference.as_ref())
-            .and_then(|reference| unmeasured("scores.baselines.reference", reference, problem)),
+        (baselines.model_based.as_ref()).and_then(|errors| unmeasured("scores.baselines.model_based", errors, problem)),
     ];
     let is_placed = |position: &TargetPosition| position.target < problem.targets.len();
     let problem_defect = match simulated {

@@ -44,33 +44,33 @@ pub fn error_table(table: &ErrorTable) -> Table {
     }
 }
 
-/// Returns the table of measured decoders: for an array a row for each, and the Bayesian `reference` if it exceeds
+/// Returns the table of measured decoders: for an array a row for each, and the `model_based` errors if they exceed
 /// rounding errors; for a recording a row for each decoder and target.
-pub fn decoder_table(problem: &Problem, reports: &[DecoderReport], reference: Option<&TestErrors>) -> Table {
+pub fn decoder_table(problem: &Problem, reports: &[DecoderReport], model_based: Option<&TestErrors>) -> Table {
     if problem.has_nodes {
-        array_decoder_table(reports, reference.and_then(TestErrors::nodes))
+        array_decoder_table(reports, model_based.and_then(TestErrors::nodes))
     } else {
         recording_decoder_table(problem, reports)
     }
 }
 
-fn array_decoder_table(reports: &[DecoderReport], reference: Option<&Errors>) -> Table {
-    let reference = reference.filter(|reference| !reference.is_rounding());
+fn array_decoder_table(reports: &[DecoderReport], model_based: Option<&Errors>) -> Table {
+    let model_based = model_based.filter(|errors| !errors.is_rounding());
     let row = |report: &DecoderReport| {
         let nodes = report.errors.nodes();
         vec![
             report.kind.name(report.precision).into(),
             report.errors.percent().into(),
             nodes.map(|errors| errors.z_mm).into(),
-            reference.and_then(|reference| nodes?.times(reference)).into(),
+            model_based.and_then(|model_based| nodes?.times(model_based)).into(),
             report.residual.into(),
             report.cost.frame_us.into(),
         ]
     };
-    let of_reference = reference.map(|errors| {
+    let of_model_based = model_based.map(|errors| {
         let nothing = || Cell::Number(None);
         vec![
-            "reference".into(),
+            "model-based".into(),
             errors.z_percent.into(),
             errors.z_mm.into(),
             1.0.into(),
@@ -83,14 +83,14 @@ fn array_decoder_table(reports: &[DecoderReport], reference: Option<&Errors>) ->
             TableColumn::new("decoder", "Decoder", ""),
             TableColumn::new("z_percent", "Z", "%"),
             TableColumn::new("z_mm", "Z", "mm"),
-            TableColumn::new("times_reference", "times reference", ""),
+            TableColumn::new("times_model_based", "times model-based", ""),
             TableColumn::new("residual", "residual", ""),
             TableColumn::new("frame_us", "a frame", "µs"),
         ],
-        rows: reports.iter().map(row).chain(of_reference).collect(),
+        rows: reports.iter().map(row).chain(of_model_based).collect(),
     };
-    if reference.is_none() {
-        table.remove_column("times_reference");
+    if model_based.is_none() {
+        table.remove_column("times_model_based");
     }
     table
 }

@@ -26,8 +26,8 @@ pub fn trade_off_points(levels: &[TradeOffLevel]) -> Table {
         "frame_us",
         "training_s",
         "residual",
-        "reference_z_percent",
-        "reference_z_mm",
+        "model_based_z_percent",
+        "model_based_z_mm",
         "on_decoding_front",
         "on_training_front",
     ];
@@ -60,8 +60,8 @@ pub fn trade_off_points(levels: &[TradeOffLevel]) -> Table {
                 report.cost.frame_us.into(),
                 point.training_seconds.into(),
                 report.residual.into(),
-                point.reference.and_then(|errors| errors.z_percent).into(),
-                point.reference.map(|errors| errors.z_mm).into(),
+                point.model_based.and_then(|errors| errors.z_percent).into(),
+                point.model_based.map(|errors| errors.z_mm).into(),
                 on_decoding.to_string().into(),
                 on_training.to_string().into(),
             ]
@@ -74,7 +74,10 @@ pub fn trade_off_points(levels: &[TradeOffLevel]) -> Table {
     };
     if levels.iter().all(|level| level.noise.is_none()) {
         let of_arrays = ["noise", "preset", "samples", "z_mm", "residual"];
-        for field in of_arrays.into_iter().chain(["reference_z_percent", "reference_z_mm"]) {
+        for field in of_arrays
+            .into_iter()
+            .chain(["model_based_z_percent", "model_based_z_mm"])
+        {
             table.remove_column(field);
         }
         let percent = table.columns.iter_mut().find(|column| column.field == "z_percent");
@@ -92,7 +95,7 @@ pub fn trade_off_summary(level: &TradeOffLevel) -> Table {
             point_name(point).into(),
             point.report.errors.percent().into(),
             point.report.errors.nodes().map(|errors| errors.z_mm).into(),
-            point.to_reference().into(),
+            point.to_model_based().into(),
             point.report.cost.frame_us.into(),
             point.training_seconds.into(),
         ]
@@ -104,7 +107,7 @@ pub fn trade_off_summary(level: &TradeOffLevel) -> Table {
             TableColumn::new("decoder", "Decoder", ""),
             TableColumn::new("z_percent", "Z", "%"),
             TableColumn::new("z_mm", "Z", "mm"),
-            TableColumn::new("times_reference", "times reference", ""),
+            TableColumn::new("times_model_based", "times model-based", ""),
             TableColumn::new("frame_us", "a frame", "µs"),
             TableColumn::new("training_s", "training", "s"),
         ],
@@ -117,9 +120,9 @@ pub fn trade_off_summary(level: &TradeOffLevel) -> Table {
             .into_iter()
             .for_each(|column| *column = TableColumn::new("percent_of_range", "MAE", "% of range"));
     }
-    // Without noise there is no limit to compare with.
-    if level.points.iter().all(|point| point.to_reference().is_none()) {
-        table.remove_column("times_reference");
+    // Ratios to rounding are meaningless.
+    if level.points.iter().all(|point| point.to_model_based().is_none()) {
+        table.remove_column("times_model_based");
     }
     table
 }

@@ -19,7 +19,7 @@ const FRONT: Look = Look {
     line: Some(LineStyle::Solid),
     marker: None,
 };
-const REFERENCE: Look = Look {
+const MODEL_BASED: Look = Look {
     hue: Hue::Ink,
     line: Some(LineStyle::Dashed),
     marker: None,
@@ -36,7 +36,7 @@ const ANSWER: Look = Look {
 };
 
 /// The points at one level of noise, one plot for each cost: colours show the decoder, discs and diamonds the preset,
-/// and hollow marks 32 bits. Also shows the Pareto front with the names of its points, the Bayesian reference, and the
+/// and hollow marks 32 bits. Also shows the Pareto front with the names of its points, the model-based error, and the
 /// answers to the two questions with their limits.
 pub fn trade_off_figure(level: &TradeOffLevel, limits: &TradeOffLimits) -> PlotFigure {
     let plots: Vec<Plot> = TradeOffCost::ALL.map(|cost| plot(level, limits, cost)).into();
@@ -63,7 +63,7 @@ pub fn trade_off_figure(level: &TradeOffLevel, limits: &TradeOffLimits) -> PlotF
     };
     let marks = [
         ("Pareto front", FRONT),
-        ("Bayesian reference", REFERENCE),
+        ("model-based", MODEL_BASED),
         ("limits asked for", LIMIT),
     ];
     keys.extend(
@@ -148,11 +148,10 @@ fn plot(level: &TradeOffLevel, limits: &TradeOffLimits, cost: TradeOffCost) -> P
         }),
         series,
     );
-    let reference = level.points.first().and_then(|point| point.reference);
-    let reference = reference.filter(|reference| !reference.is_rounding());
-    if let Some(percent) = reference.and_then(|reference| reference.z_percent) {
-        plot.lines
-            .push(line("Bayesian reference", LineAt::Y(percent), REFERENCE));
+    let model_based = level.points.first().and_then(|point| point.model_based);
+    let model_based = model_based.filter(|errors| !errors.is_rounding());
+    if let Some(percent) = model_based.and_then(|errors| errors.z_percent) {
+        plot.lines.push(line("model-based", LineAt::Y(percent), MODEL_BASED));
     }
     // The limits apply to decoding and are shown if they are within the range of the points.
     let places: Vec<[f64; 2]> = level
@@ -249,8 +248,8 @@ pub fn point_facts(point: &TradeOffPoint) -> Vec<String> {
         Some(errors) => format!("Z error {percent}, {} mm", format_number(errors.z_mm)),
         None => format!("mean absolute error {percent} of the range"),
     }];
-    if let Some(ratio) = point.to_reference() {
-        facts.push(format!("{} times the Bayesian reference", format_number(ratio)));
+    if let Some(ratio) = point.to_model_based() {
+        facts.push(format!("{} times the model-based error", format_number(ratio)));
     }
     facts.push(format!("{} per frame", frame_time(point.report.cost.frame_us)));
     facts.push(format!("{} of training", training_time(point.training_seconds)));

@@ -83,7 +83,7 @@ fn a_network_learns_a_nonlinear_map_that_a_linear_map_cannot() {
     let targets = scores.network.targets();
     assert!(targets.iter().all(|target| target.r2.unwrap() > 0.999));
     assert_eq!(scores.nodes(), None, "there are no nodes");
-    assert_eq!(baselines.reference, None, "there is no model of the sensor");
+    assert_eq!(baselines.model_based, None, "there is no model of the sensor");
 }
 
 #[test]

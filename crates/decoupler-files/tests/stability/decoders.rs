@@ -1,12 +1,12 @@
-//! Decoders and the reference in every situation, compared with the ground truth of the simulation.
+//! Decoders in every situation, compared with the ground truth of the simulation.
 
 use decoupler_core::{
     dataset::Dataset,
     decoupling::{DecoderKind, Precision, decode_set},
-    evaluation::{DecoderReport, DecoderSet, Outlook, ReferenceNote, Run, RunDefect, RunSets, SimulatedSettings},
+    evaluation::{DecoderReport, DecoderSet, Outlook, Run, RunDefect, RunSets, SimulatedSettings},
     machine::MemoryBudget,
     ndarray::Array2,
-    scene::{Loading, Noise, Rows},
+    scene::{Loading, Rows},
 };
 
 use crate::{
@@ -130,75 +130,33 @@ fn judge_decoder(seen: &Measured, settings: &SimulatedSettings, kind: DecoderKin
     Verdict::Right
 }
 
-/// The reference is no worse than the mean, no decoder beats it, and its certainty is justified.
-fn judge_reference(seen: &Measured, settings: &SimulatedSettings) -> Verdict {
+/// The model-based row has the errors of Newton's method, and noise that hides everything leaves those of the prior.
+fn judge_model_based(seen: &Measured, settings: &SimulatedSettings) -> Verdict {
     let scene = settings.source.scene;
-    let reference = seen.run.baselines().and_then(|baselines| baselines.nodes()?.reference);
-    let unseen = seen
-        .outlook
-        .as_ref()
-        .is_some_and(|outlook| outlook.worst_row.condition().is_infinite());
-    let Some(reference) = reference else {
-        let note = seen.run.baselines().and_then(ReferenceNote::of);
-        return note.map_or_else(|| wrong("there is no reference, and no reason"), |note| flagged(&note));
-    };
-    let (limit_mm, nodes) = (
-        reference.z_mm,
-        seen.run.test().samples() * settings.source.sensor.scale.nodes_per_row(),
-    );
-    if !limit_mm.is_finite() {
-        return wrong(format!("the reference is {limit_mm}"));
-    }
-    if limit_mm > by_chance(nodes) * seen.mean_mm {
-        let note = seen.run.baselines().and_then(ReferenceNote::of);
-        let times = limit_mm / seen.mean_mm;
+    let baselines = seen.run.baselines().expect("they are measured");
+    let Some(found) = baselines.nodes().and_then(|baselines| baselines.model_based) else {
+        let note = baselines.model_based_note();
         return note.map_or_else(
-            || wrong(format!("the reference is {times:.2e} times the error of the mean")),
+            || wrong("there is no model-based row, and no reason"),
             |note| flagged(&note),
         );
-    }
-    let stroke_mm = settings.source.stroke_mm();
-    let is_independent = scene.loading == Loading::RandomNodes;
-    if unseen && is_independent && limit_mm < 1e-9 * stroke_mm {
-        return wrong("the reference claims certainty about deformations that no reading determines");
-    }
-    // A gain common to all readings can be estimated from them.
-    let beside_drift = Noise {
-        drift: 0.0,
-        ..scene.noise
     };
-    if !beside_drift.in_test().is_none() && limit_mm == 0.0 {
-        return wrong("the reference claims certainty despite noise");
+    let report = seen
+        .set
+        .measure(DecoderKind::Newton, Precision::Double, seen.run.test());
+    let newton = report.ok().flatten().and_then(|report| report.errors.nodes().copied());
+    if newton != Some(found) {
+        return wrong(format!("the model-based errors are {found:?}, not {newton:?}"));
     }
     // Every node's depth is uniform, so the mean absolute error without readings is a quarter of the stroke.
-    let noise = scene.noise;
+    let (noise, stroke_mm) = (scene.noise, settings.source.stroke_mm());
     let hides_all = noise.additive_ohm > 1e4 * situations::resistance_ohm(&settings.source.sensor);
-    if hides_all && noise.in_test() == noise && is_independent && !(0.2..0.3).contains(&(limit_mm / stroke_mm)) {
+    let is_independent = scene.loading == Loading::RandomNodes;
+    if hides_all && noise.in_test() == noise && is_independent && !(0.2..0.3).contains(&(found.z_mm / stroke_mm)) {
         return wrong(format!(
-            "noise hides everything, and the reference is {:.2e} of the stroke, not 0.25",
-            limit_mm / stroke_mm
+            "noise hides everything, and the model-based error is {:.2e} of the stroke, not 0.25",
+            found.z_mm / stroke_mm
         ));
-    }
-    Verdict::Right
-}
-
-/// No decoder that is given the row and the range of every node beats the reference.
-fn judge_limit(seen: &Measured, settings: &SimulatedSettings) -> Verdict {
-    let scene = settings.source.scene;
-    let nodes = seen.run.test().samples() * settings.source.sensor.scale.nodes_per_row();
-    let reference = seen.run.baselines().and_then(|baselines| baselines.nodes()?.reference);
-    let Some(reference) = reference.filter(|_| scene.loading == Loading::RandomNodes && nodes >= 300) else {
-        return Verdict::Right;
-    };
-    for kind in DecoderKind::ALL {
-        let Ok(Some(report)) = seen.set.measure(kind, Precision::Double, seen.run.test()) else {
-            continue;
-        };
-        let z_mm = report.errors.nodes().map_or(f64::NAN, |errors| errors.z_mm);
-        if z_mm < 0.85 * reference.z_mm {
-            let share = z_mm / reference.z_mm;
-            return wrong(format!("{kind} has {share:.2} times the reference, which is the limit"));
-        }
     }
     Verdict::Right
 }
@@ -215,8 +173,7 @@ fn judge(settings: &SimulatedSettings) -> Vec<(String, Verdict)> {
             cells.push((name, judge_decoder(&seen, settings, kind, precision)));
         }
     }
-    cells.push(("reference".to_owned(), judge_reference(&seen, settings)));
-    cells.push(("limit".to_owned(), judge_limit(&seen, settings)));
+    cells.push(("model-based".to_owned(), judge_model_based(&seen, settings)));
     cells
 }
 

@@ -113,20 +113,20 @@ pub fn noise_name(noise: f64) -> String {
 #[derive(Clone, Copy, PartialEq)]
 enum Figure {
     Error,
-    ToLimit,
+    ToModelBased,
     Frame,
     Training,
 }
 
 impl Figure {
-    const ALL: [Self; 4] = [Self::Error, Self::ToLimit, Self::Frame, Self::Training];
+    const ALL: [Self; 4] = [Self::Error, Self::ToModelBased, Self::Frame, Self::Training];
 
     /// Returns the heading; `has_nodes` is false for the targets of a recording.
     fn heading(self, has_nodes: bool) -> &'static str {
         match self {
             Self::Error if has_nodes => "Z %",
             Self::Error => "% of range",
-            Self::ToLimit => "× limit",
+            Self::ToModelBased => "× model-based",
             Self::Frame => "decoding",
             Self::Training => "training",
         }
@@ -135,7 +135,7 @@ impl Figure {
     fn text(self, point: &TradeOffPoint) -> String {
         match self {
             Self::Error => format_number(point.report.errors.percent()),
-            Self::ToLimit => format_number(point.to_reference()),
+            Self::ToModelBased => format_number(point.to_model_based()),
             Self::Frame => frame_time(point.report.cost.frame_us),
             Self::Training => training_time(point.training_seconds),
         }
@@ -144,7 +144,7 @@ impl Figure {
     /// Returns the index in [`TradeOffCost::ALL`] of the cost it shows.
     fn cost(self) -> Option<usize> {
         match self {
-            Self::Error | Self::ToLimit => None,
+            Self::Error | Self::ToModelBased => None,
             Self::Frame => Some(0),
             Self::Training => Some(1),
         }
@@ -158,11 +158,11 @@ const MEANING: &str = "Click to mark it in the charts. A blue time is on the Par
 pub fn table_ui(ui: &mut Ui, level: &TradeOffLevel, marked: &mut Option<usize>) {
     let palette = &Theme::of(ui).palette;
     let fronts = TradeOffCost::ALL.map(|cost| level.front(cost));
-    // Without noise there is no limit to compare with.
-    let has_limit = level.points.iter().any(|point| point.to_reference().is_some());
+    // Ratios to rounding are meaningless.
+    let has_model_based = level.points.iter().any(|point| point.to_model_based().is_some());
     let figures = Figure::ALL.into_iter();
     let figures: Vec<Figure> = figures
-        .filter(|figure| has_limit || *figure != Figure::ToLimit)
+        .filter(|figure| has_model_based || *figure != Figure::ToModelBased)
         .collect();
     let names = TableColumn::text("").width(ColumnWidth::Rest);
     let headings = figures

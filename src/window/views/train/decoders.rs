@@ -188,7 +188,7 @@ impl DecodersState {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Figure {
     ZPercent,
-    TimesLimit,
+    TimesModelBased,
     Residual,
     RangePercent,
     Rmse,
@@ -198,23 +198,22 @@ enum Figure {
 
 impl Figure {
     /// Returns the figures for this problem, from left to right.
-    fn of(problem: &Problem, has_limit: bool) -> Vec<Self> {
+    fn of(problem: &Problem, has_model_based: bool) -> Vec<Self> {
         if !problem.has_nodes {
             return vec![Self::RangePercent, Self::Rmse, Self::R2, Self::FrameTime];
         }
-        let figures = [Self::ZPercent, Self::TimesLimit, Self::Residual, Self::FrameTime].into_iter();
+        let figures = [Self::ZPercent, Self::TimesModelBased, Self::Residual, Self::FrameTime].into_iter();
         figures
-            .filter(|figure| has_limit || *figure != Self::TimesLimit)
+            .filter(|figure| has_model_based || *figure != Self::TimesModelBased)
             .collect()
     }
 
     fn column(self) -> TableColumn<'static> {
         let (heading, meaning) = match self {
             Self::ZPercent => ("Z %", glossary::Z_PERCENT.hint),
-            Self::TimesLimit => (
-                "× limit",
-                "Mean |error| of z divided by that of the Bayesian reference, the limit for decoders of a row's own \
-                 readings in this scene.",
+            Self::TimesModelBased => (
+                "× model-based",
+                "Mean |error| of z divided by that of the model-based decoder in this scene.",
             ),
             Self::Residual => ("residual", glossary::RESIDUAL.hint),
             Self::RangePercent => (
@@ -231,11 +230,11 @@ impl Figure {
         TableColumn::figure(heading).meaning(meaning)
     }
 
-    fn value(self, report: &DecoderReport, limit: Option<&Errors>, target: usize) -> Option<f64> {
+    fn value(self, report: &DecoderReport, model_based: Option<&Errors>, target: usize) -> Option<f64> {
         let of_target = report.errors.targets().get(target);
         match self {
             Self::ZPercent | Self::RangePercent => report.errors.percent(),
-            Self::TimesLimit => report.errors.nodes()?.times(limit?),
+            Self::TimesModelBased => report.errors.nodes()?.times(model_based?),
             Self::Residual => report.residual,
             Self::Rmse => Some(of_target?.rmse),
             Self::R2 => of_target?.r2,
@@ -243,24 +242,24 @@ impl Figure {
         }
     }
 
-    /// Returns the same figure of the limit.
-    fn of_limit(self, limit: &Errors) -> Option<f64> {
+    /// Returns the same figure of the model-based errors.
+    fn of_model_based(self, errors: &Errors) -> Option<f64> {
         match self {
-            Self::ZPercent => limit.z_percent,
-            Self::TimesLimit => Some(1.0),
+            Self::ZPercent => errors.z_percent,
+            Self::TimesModelBased => Some(1.0),
             _ => None,
         }
     }
 }
 
-/// The other decoders on the same test set, folded away until the user asks for them, next to the errors `limit` of the
-/// Bayesian reference. `target` is the target whose errors are shown for a recording. Each decoder can be exported with
+/// The other decoders on the same test set, folded away until the user asks for them, next to the `model_based`
+/// errors. `target` is the target whose errors are shown for a recording. Each decoder can be exported with
 /// `source`; returns the requested file.
 pub fn decoders_ui(
     ui: &mut Ui,
     decoders: &mut DecodersState,
     phase: Phase,
-    (problem, limit): (&Problem, Option<&Errors>),
+    (problem, model_based): (&Problem, Option<&Errors>),
     target: &mut usize,
     source: Option<&DecoderSource>,
 ) -> Option<FileTask> {
@@ -270,7 +269,7 @@ pub fn decoders_ui(
         .open(Some(decoders.is_open))
         .show(ui, |ui| {
             if let Some(measured) = &decoders.measured {
-                asked = measured_ui(ui, measured, (problem, limit), target, source);
+                asked = measured_ui(ui, measured, (problem, model_based), target, source);
             } else {
                 let text = match phase {
                     Phase::Died => "The network was lost with the training thread: train again.",
@@ -282,7 +281,7 @@ pub fn decoders_ui(
     focus_ring_ui(ui, &header.header_response);
     let hint = if problem.has_nodes {
         "Ridge regression, radial-basis network, Newton on Eq. (2) and others on the same test set: errors, times, and \
-         distance from the limit."
+         ratio to the model-based error."
     } else {
         "Ridge regression, radial-basis network and others on the same test set: errors and times."
     };
@@ -295,18 +294,18 @@ pub fn decoders_ui(
 fn measured_ui(
     ui: &mut Ui,
     measured: &[DecoderResult],
-    (problem, limit): (&Problem, Option<&Errors>),
+    (problem, model_based): (&Problem, Option<&Errors>),
     target: &mut usize,
     source: Option<&DecoderSource>,
 ) -> Option<FileTask> {
     let palette = Theme::of(ui).palette;
-    // Without noise the only limit is rounding, so there is nothing to compare with.
-    let limit = limit.filter(|limit| !limit.is_rounding());
+    // Ratios to rounding are meaningless.
+    let model_based = model_based.filter(|errors| !errors.is_rounding());
     if !problem.has_nodes {
         target_choice_ui(ui, "RMSE and R² of", "target of the decoders", &problem.targets, target);
     }
     let target = (*target).min(problem.targets.len().saturating_sub(1));
-    let mut figures = Figure::of(problem, limit.is_some());
+    let mut figures = Figure::of(problem, model_based.is_some());
     // In a narrow window the buttons at the end come first.
     if ui.available_width() < space(80) {
         figures.retain(|figure| *figure != Figure::R2);
@@ -320,8 +319,8 @@ fn measured_ui(
         let cells = figures.iter().map(|figure| match &result.report {
             None => "…".to_owned(),
             Some(Err(_)) => format_number(None),
-            Some(Ok(report)) if *figure == Figure::R2 => format_r2(figure.value(report, limit, target)),
-            Some(Ok(report)) => format_number(figure.value(report, limit, target)),
+            Some(Ok(report)) if *figure == Figure::R2 => format_r2(figure.value(report, model_based, target)),
+            Some(Ok(report)) => format_number(figure.value(report, model_based, target)),
         });
         let colour = if result.kind == DecoderKind::Network {
             palette.accent
@@ -344,13 +343,15 @@ fn measured_ui(
             }),
         }
     });
-    let of_limit = limit.map(|limit| {
-        let cells = figures.iter().map(|figure| format_number(figure.of_limit(limit)));
-        TableRow::figures("limit", cells)
-            .meaning(glossary::REFERENCE.hint)
+    let of_model_based = model_based.map(|errors| {
+        let cells = figures
+            .iter()
+            .map(|figure| format_number(figure.of_model_based(errors)));
+        TableRow::figures("model-based", cells)
+            .meaning(glossary::MODEL_BASED.hint)
             .colour(palette.dim)
     });
-    let rows = rows.chain(of_limit).collect();
+    let rows = rows.chain(of_model_based).collect();
     TableView::new("decoders", &columns).show_all(ui, rows);
     for result in measured {
         let name = result.kind.name(result.precision);

@@ -97,7 +97,7 @@ pub(super) fn train_exports<'a>(view: &'a TrainView, shared: &'a Shared) -> Vec<
         if reports.is_empty() {
             return Err("No decoder is measured yet: unfold “More decoders”.".to_owned());
         }
-        Ok(move || decoder_table(&run.problem, &reports, run.baselines.reference.as_ref()))
+        Ok(move || decoder_table(&run.problem, &reports, run.baselines.model_based.as_ref()))
     });
     exports.push(csv_export(
         "Decoder table",

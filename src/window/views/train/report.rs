@@ -7,8 +7,8 @@ use std::time::Duration;
 use decoupler_core::{
     dataset::SplitBy,
     evaluation::{
-        Baselines, Combination, ErrorTable, Errors, Initialization, NodeAddress, Outlook, Problem, ReferenceNote,
-        Scores, SimulatedSettings, Spread, StartRecord, TestErrors, auto::Tried, best_start, error_remarks,
+        Baselines, Combination, ErrorTable, Errors, Initialization, NodeAddress, Outlook, Problem, Scores,
+        SimulatedSettings, Spread, StartRecord, TestErrors, auto::Tried, best_start, error_remarks,
     },
     identifiability::Identifiability,
     text::counted,
@@ -57,14 +57,14 @@ pub fn report_ui(ui: &mut Ui, view: &mut TrainView, shared: &Shared, effects: &m
             if let Some(test) = run.test.array() {
                 conditioning_ui(ui, test);
             }
-            if let Some(note) = ReferenceNote::of(baselines) {
-                note_ui(ui, &note.to_string());
+            if let Some(note) = baselines.model_based_note() {
+                note_ui(ui, note);
             }
             if let (Some(worst), Some(test)) = (worst_node_ui(ui, result), run.test.array()) {
                 view.go_to(TestPlace::of_node(worst, test));
             }
-            let limit = baselines.reference.as_ref().and_then(TestErrors::nodes);
-            let measured = (&*run.problem, limit);
+            let model_based = baselines.model_based.as_ref().and_then(TestErrors::nodes);
+            let measured = (&*run.problem, model_based);
             let is_open = view.decoders.is_open;
             let run_source = || NetworkSource::Training(run.id, Box::new(run.setup.clone()));
             let source = is_open.then(|| DecoderSource::Run(run_source()));
@@ -237,11 +237,11 @@ fn verdict_on_nodes_ui(
         note_ui(ui, &sentence(&capitalised(&fault)));
     } else if errors.z_mm > 0.0 {
         let times = format_number(baselines.linear.z_mm / errors.z_mm);
-        let to_limit = baselines.reference.and_then(|limit| errors.times(&limit));
-        let text = match to_limit.map(format_number) {
+        let ratio = baselines.model_based.and_then(|model_based| errors.times(&model_based));
+        let text = match ratio.map(format_number) {
             None => format!("On z {times} times as accurate as the linear map."),
             Some(ratio) => {
-                format!("On z {times} times as accurate as the linear map; {ratio} times the limit that noise sets.")
+                format!("On z {times} times as accurate as the linear map; {ratio} times the model-based error.")
             }
         };
         dim_ui(ui, &text);

@@ -1,4 +1,4 @@
-use crate::decoupling::least_squares::Triangle;
+use super::triangle::Triangle;
 
 /// Least squares with bounds, `min ‖A x − b‖²` with lowest ≤ x ≤ highest, for A of full column rank: block principal
 /// pivoting on the triangular factor of A (Portugal, Júdice and Vicente 1994). Reuses its memory.
@@ -74,11 +74,12 @@ impl BoundedLeastSquares {
         self.whole.factor(system, width, root);
     }
 
-    /// Returns the standard deviations of the unknowns if b has errors of standard deviation 1 and no bounds are known,
-    /// and ln det AᵀA, of the last factor.
-    pub(super) fn spread(&self) -> (Vec<f64>, f64) {
+    /// Returns the largest standard deviation of the first `count` unknowns if b has errors of standard deviation 1 and no
+    /// bounds are known, and ln det AᵀA, of the last factor.
+    pub(super) fn spread(&mut self, count: usize) -> (f64, f64) {
         let log_determinant = (0..self.whole.unknowns()).map(|k| self.whole.row(k)[k].abs().ln());
-        (self.whole.inverse_rows(), 2.0 * log_determinant.sum::<f64>())
+        let log_determinant = 2.0 * log_determinant.sum::<f64>();
+        (self.whole.largest_inverse_row(count), log_determinant)
     }
 
     fn find_wrong(&mut self, bounds: &[(f64, f64)]) {

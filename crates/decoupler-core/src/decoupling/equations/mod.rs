@@ -1,10 +1,21 @@
-//! The estimator of a row of Eq. (2).
+//! Eq. (2) of a row-wire, and the estimator that solves it.
 
 mod bounded;
+mod description;
+mod estimate;
 mod estimator;
+mod lanes;
 mod priors;
 mod reading_noise;
+mod row_problem;
+mod side_by_side;
+mod symmetry;
 #[cfg(test)]
 mod tests;
+mod triangle;
 
-pub use estimator::{Estimate, Estimator};
+pub use description::{RowChoice, RowProblemDescription};
+pub use estimate::{Estimate, LARGEST_ERROR, NewtonStop, Solution};
+pub use estimator::Estimator;
+pub(crate) use priors::GaussianPrior;
+pub(crate) use row_problem::{Range, RowProblem, ranges};

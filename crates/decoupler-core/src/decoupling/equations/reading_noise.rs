@@ -1,4 +1,5 @@
-use crate::{decoupling::newton::ROUNDING, scene::NoiseSource};
+use super::estimate::ROUNDING;
+use crate::scene::NoiseSource;
 
 /// Distribution of the readings of a row-wire about the model's resistances.
 ///

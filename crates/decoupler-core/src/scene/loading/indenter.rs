@@ -150,28 +150,12 @@ impl Indenter {
 
     /// Draws one press: its position is uniform over the nodes, its depth uniform up to the stroke.
     pub(super) fn draw(&self, model: &SensorModel, stroke_mm: f64, rng: &mut impl Rng) -> Press {
-        self.press_of(model, stroke_mm, || rng.random::<f64>())
-    }
-
-    /// Number of uniform values used by [`Self::press_of`].
-    pub(super) fn uniforms(&self) -> usize {
-        match self.shape {
-            IndenterShape::Sphere { .. } | IndenterShape::Edge { .. } => 5,
-            IndenterShape::FlatPunch { .. } | IndenterShape::Cylinder { .. } => 6,
-        }
-    }
-
-    /// Index of the uniform value for the direction: 0 to 1 is a full turn.
-    pub(super) const DIRECTION: usize = 3;
-
-    /// Returns the press determined by values that are uniform in [0, 1).
-    pub(super) fn press_of(&self, model: &SensorModel, stroke_mm: f64, mut uniform: impl FnMut() -> f64) -> Press {
         let scale = model.scale;
         let first = model.geometry.row_node_mm(scale, 0, 0);
         let last = model
             .geometry
             .row_node_mm(scale, scale.rows() - 1, scale.nodes_per_row() - 1);
-        let mut between = |low: f64, high: f64| low + (high - low) * uniform();
+        let mut between = |low: f64, high: f64| low + (high - low) * rng.random::<f64>();
         let place = DVec2::new(between(first.x, last.x), between(first.y, last.y));
         let depth_mm = between(0.0, stroke_mm);
         let direction = DVec2::from_angle(between(0.0, std::f64::consts::TAU));

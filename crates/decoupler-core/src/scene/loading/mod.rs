@@ -7,7 +7,6 @@ mod sampler;
 pub use indenter::{Indenter, IndenterShape, Span};
 pub use press::Contact;
 pub use sampler::DeformationSampler;
-pub(crate) use sampler::LatentRow;
 
 use std::{fmt, str::FromStr};
 

@@ -3,7 +3,7 @@ use std::{path::Path, time::Duration};
 use decoupler_core::{
     dataset::Dataset,
     evaluation::{
-        DecoderReport, Outlook, ReferenceNote, RunDefect, SimulatedSettings, StartRecord, TestErrors, error_remarks,
+        DecoderReport, Outlook, RunDefect, SimulatedSettings, StartRecord, TestErrors, error_remarks,
         recorded::{Determination, HysteresisLoop},
     },
     sensor::Geometry,
@@ -76,8 +76,8 @@ impl RunReport<'_> {
             let text = match setup.plan() {
                 None => {
                     "Means of |error|, in percent of the coordinate as in the paper, in mm, or in percent of the stroke. \
-                     The reference is the error that remains given the noise and the loading of the scene; training mean \
-                     and linear map are what a network has to beat."
+                     The model-based decoder knows the equations, the noise, and mean and covariance of the loading; \
+                     training mean and linear map are what a network has to beat."
                 }
                 Some(_) => {
                     "RMSE, MAE and worst are in the unit of the target. R² is the share of the target's variance that the \
@@ -89,8 +89,8 @@ impl RunReport<'_> {
         });
         if !decoders.is_empty() {
             html.section("Decoders", |html| {
-                let reference = file.scores.baselines.reference.as_ref();
-                html.table(&decoder_table(&file.problem, decoders, reference), "Network");
+                let model_based = file.scores.baselines.model_based.as_ref();
+                html.table(&decoder_table(&file.problem, decoders, model_based), "Network");
                 let text = match setup.plan() {
                     None => {
                         "The residual is the rms relative difference between the readings and those of the decoded \
@@ -213,14 +213,10 @@ impl RunReport<'_> {
                 "a linear map of the resistances is better on z than this network: {remedy}"
             ));
         }
-        remarks.extend(ReferenceNote::of(&file.scores.baselines).map(|note| note.to_string()));
-        if scores
-            .baselines
-            .reference
-            .is_some_and(|reference| reference.is_rounding())
-        {
-            let text = "the reference is nothing but rounding: the readings determine the deformation, and no ratio to \
-                        it is given";
+        remarks.extend(file.scores.baselines.model_based_note().map(str::to_owned));
+        if scores.baselines.model_based.is_some_and(|errors| errors.is_rounding()) {
+            let text = "the model-based error is nothing but rounding: the readings determine the deformation, and no \
+                        ratio to it is given";
             remarks.push(text.to_owned());
         }
         remarks

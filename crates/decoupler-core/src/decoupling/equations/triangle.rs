@@ -1,5 +1,6 @@
-/// QR decomposition of a small least-squares problem by Householder reflections (Golub and Van Loan, Matrix
-/// Computations, section 5.2). Row by row, so that all columns are reflected at once in vector registers.
+/// QR decomposition of a small least-squares problem: by the normal equations if they are well conditioned, otherwise by
+/// Householder reflections, which take four times as long (Golub and Van Loan, Matrix Computations, sections 5.2 and 5.3).
+/// Row by row, so that all columns are transformed at once in vector registers.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Triangle {
     /// [R, Qᵀb] above the diagonal; the entries below it are scratch. Rows × width.
@@ -15,6 +16,9 @@ impl Triangle {
     /// is 0 and A has at least as many rows as unknowns.
     pub(super) fn factor(&mut self, system: &[f64], width: usize, root: f64) {
         let unknowns = width - 1;
+        if self.factor_normal_equations(system, width, root) {
+            return;
+        }
         let equations = system.len() / width;
         let below = if root > 0.0 || equations < unknowns {
             unknowns
@@ -31,6 +35,52 @@ impl Triangle {
         for pivot in 0..unknowns {
             self.reflect(pivot);
         }
+    }
+
+    /// As [`Self::factor`], by Cholesky factorisation of AᵀA; `false` if rounding would affect the solution.
+    fn factor_normal_equations(&mut self, system: &[f64], width: usize, root: f64) -> bool {
+        /// Fraction of a diagonal entry that must remain after eliminating the columns before it.
+        const MIN_LEFT: f64 = 1e-8;
+        let unknowns = width - 1;
+        self.width = width;
+        self.matrix.clear();
+        self.matrix.resize(unknowns * width, 0.0);
+        for row in system.chunks_exact(width) {
+            for (place, products) in self.matrix.chunks_exact_mut(width).enumerate() {
+                let value = row[place];
+                // Half the entries of a prior, or nearly all.
+                if value == 0.0 {
+                    continue;
+                }
+                for (product, entry) in products[place..].iter_mut().zip(&row[place..]) {
+                    *product += value * entry;
+                }
+            }
+        }
+        self.column.clear();
+        for place in 0..unknowns {
+            let diagonal = &mut self.matrix[place * width + place];
+            *diagonal += root * root;
+            self.column.push(*diagonal);
+        }
+        for pivot in 0..unknowns {
+            let (done, below) = self.matrix.split_at_mut((pivot + 1) * width);
+            let row = &mut done[pivot * width..];
+            // Written so that NaN and overflow are refused.
+            let is_well_conditioned = row[pivot] > MIN_LEFT * self.column[pivot];
+            if !is_well_conditioned {
+                return false;
+            }
+            let reciprocal = 1.0 / row[pivot].sqrt();
+            row[pivot..].iter_mut().for_each(|entry| *entry *= reciprocal);
+            for (place, products) in (pivot + 1..).zip(below.chunks_exact_mut(width)) {
+                let share = row[place];
+                for (product, entry) in products[place..].iter_mut().zip(&row[place..]) {
+                    *product -= share * entry;
+                }
+            }
+        }
+        true
     }
 
     /// Zeroes the entries of column `pivot` below the diagonal.
@@ -92,34 +142,35 @@ impl Triangle {
         }
     }
 
-    /// Returns the largest norm of a row of R⁻¹, which equals that of A⁺; infinite if the columns of A are linearly
-    /// dependent.
-    pub(super) fn largest_inverse_row(&self) -> f64 {
-        self.inverse_rows().into_iter().fold(0.0, f64::max)
-    }
-
-    /// Returns the norm of each row of R⁻¹, which equals that of A⁺; infinite where NaN.
-    pub(super) fn inverse_rows(&self) -> Vec<f64> {
-        let unknowns = self.width - 1;
-        let mut squares = vec![0.0; unknowns];
-        let mut column = Vec::with_capacity(unknowns);
-        for last in 0..unknowns {
+    /// Returns the largest norm of the first `count` rows of R⁻¹, which equals that of A⁺; infinite if the columns of A are
+    /// linearly dependent.
+    pub(super) fn largest_inverse_row(&mut self, count: usize) -> f64 {
+        let Self {
+            matrix,
+            width,
+            sums: squares,
+            column,
+        } = self;
+        let width = *width;
+        let row = |index: usize| &matrix[index * width..(index + 1) * width];
+        squares.clear();
+        squares.resize(count, 0.0);
+        for last in 0..width - 1 {
             // R⁻¹ is upper triangular: its column `last` ends at the diagonal.
             column.clear();
             column.resize(last + 1, 0.0);
-            column[last] = 1.0 / self.row(last)[last];
+            column[last] = 1.0 / row(last)[last];
             for unknown in (0..last).rev() {
-                let row = self.row(unknown);
-                let known = row[unknown + 1..=last].iter().zip(&column[unknown + 1..]);
+                let known = row(unknown)[unknown + 1..=last].iter().zip(&column[unknown + 1..]);
                 let known: f64 = known.map(|(entry, value)| entry * value).sum();
-                column[unknown] = -known / row[unknown];
+                column[unknown] = -known / row(unknown)[unknown];
             }
-            for (square, value) in squares.iter_mut().zip(&column) {
+            for (square, value) in squares.iter_mut().zip(&*column) {
                 *square += value * value;
             }
         }
-        let norm = |square: f64| if square.is_nan() { f64::INFINITY } else { square.sqrt() };
-        squares.into_iter().map(norm).collect()
+        let norm = |square: &f64| if square.is_nan() { f64::INFINITY } else { square.sqrt() };
+        squares.iter().map(norm).fold(0.0, f64::max)
     }
 }
 
@@ -141,7 +192,7 @@ mod tests {
             "{solution:?}"
         );
         // AᵀA = [[25, 11], [11, 9]] has the inverse [[9, −11], [−11, 25]] / 104, whose diagonal holds the squares.
-        assert!((triangle.largest_inverse_row() - (25.0_f64 / 104.0).sqrt()).abs() < 1e-14);
+        assert!((triangle.largest_inverse_row(2) - (25.0_f64 / 104.0).sqrt()).abs() < 1e-14);
         // With damping 2: (AᵀA + 4 I) x = Aᵀb = (39, 13); determinant 29·13 − 121 = 256.
         triangle.factor(&system, 3, 2.0);
         triangle.solve(&mut solution);
@@ -155,8 +206,8 @@ mod tests {
     fn dependent_columns_have_no_inverse() {
         let mut triangle = Triangle::default();
         triangle.factor(&[1.0, 0.0, 1.0, 2.0, 0.0, 1.0], 3, 0.0);
-        assert_eq!(triangle.largest_inverse_row(), f64::INFINITY);
+        assert_eq!(triangle.largest_inverse_row(2), f64::INFINITY);
         triangle.factor(&[1.0, 2.0, 1.0], 3, 0.0);
-        assert_eq!(triangle.largest_inverse_row(), f64::INFINITY);
+        assert_eq!(triangle.largest_inverse_row(2), f64::INFINITY);
     }
 }

@@ -1,15 +1,29 @@
-use super::*;
+//! Rows with exact readings.
+
 use crate::{
     dataset::{Dataset, Seed, Stream},
-    decoupling::{LARGEST_ERROR, resistance_residual},
-    scene::Movement,
-    sensor::ArrayScale,
+    decoupling::{Estimator, LARGEST_ERROR, NewtonStop, Solution, resistance_residual},
+    scene::{Movement, Rows, Scene},
+    sensor::{ArrayScale, SensorModel},
 };
 
-fn worst(scene: &Scene, model: &SensorModel, rules: NewtonRules, snapshots: usize) -> (f64, usize) {
+/// An estimator for known rows.
+fn estimator(model: &SensorModel, scene: &Scene) -> Estimator {
+    let rows = Vec::from_iter(0..model.scale.rows());
+    let scene = Scene {
+        rows: match scene.rows {
+            Rows::All => Rows::Known,
+            rows => rows,
+        },
+        ..*scene
+    };
+    Estimator::new(model, &scene, &rows).unwrap()
+}
+
+fn worst(scene: &Scene, model: &SensorModel, snapshots: usize) -> (f64, usize) {
     let rows = model.scale.rows();
     let set = Dataset::simulate(model, scene, snapshots * rows, &mut Seed(5).rng(Stream::Test)).unwrap();
-    let mut newton = Newton::new(model, scene, rules);
+    let mut newton = estimator(model, scene);
     let mut worst_mm = 0.0_f64;
     let mut max_steps = 0;
     for sample in 0..set.samples() {
@@ -33,7 +47,7 @@ fn worst(scene: &Scene, model: &SensorModel, rules: NewtonRules, snapshots: usiz
 fn random_deformations_are_recovered_on_all_presets() {
     for scale in ArrayScale::PRESETS {
         let model = SensorModel::new(scale);
-        let (worst_mm, steps) = worst(&Scene::default(), &model, NewtonRules::default(), 20);
+        let (worst_mm, steps) = worst(&Scene::default(), &model, 20);
         assert!(worst_mm < 1e-9, "{scale}: {worst_mm:e} mm");
         assert!(steps <= 5, "{scale}: {steps}");
     }
@@ -46,14 +60,14 @@ fn sideways_shifts_of_a_small_array_are_recovered() {
         movement: Movement::SIDEWAYS,
         ..Scene::default()
     };
-    let (worst_mm, _) = worst(&scene, &model, NewtonRules::default(), 10);
+    let (worst_mm, _) = worst(&scene, &model, 10);
     assert!(worst_mm < 1e-6, "{worst_mm:e} mm");
 }
 
 #[test]
 fn impossible_readings_are_refused_and_inconsistent_ones_stay_within_the_bounds() {
     let model = SensorModel::new("10x6_3x18".parse().unwrap());
-    let mut newton = Newton::new(&model, &Scene::default(), NewtonRules::default());
+    let mut newton = estimator(&model, &Scene::default());
     let mut coordinates = vec![0.0; 18];
     let mut readings = vec![20.0; 18];
     readings[3] = f64::NAN;
@@ -73,7 +87,7 @@ fn impossible_readings_are_refused_and_inconsistent_ones_stay_within_the_bounds(
 /// more than [`LARGEST_ERROR`] of its range.
 fn counts(scene: &Scene, model: &SensorModel, rows: usize) -> [usize; 3] {
     let set = Dataset::simulate(model, scene, rows, &mut Seed(7).rng(Stream::Test)).unwrap();
-    let mut newton = Newton::new(model, scene, NewtonRules::default());
+    let mut newton = estimator(model, scene);
     let mut counts = [0; 3];
     for sample in 0..set.samples() {
         let mut coordinates = vec![0.0; model.scale.coordinates_per_row()];
@@ -144,7 +158,7 @@ fn undetermined_rows_are_flagged() {
 fn a_row_over_the_middle_of_the_electrodes_is_ambiguous() {
     let scene = Scene {
         movement: Movement::SIDEWAYS,
-        rows: crate::scene::Rows::One(6),
+        rows: Rows::One(6),
         ..Scene::default()
     };
     // Electrodes at x = 11.5 and 16.5, the row at x = 14.
@@ -154,7 +168,7 @@ fn a_row_over_the_middle_of_the_electrodes_is_ambiguous() {
     assert_eq!(wrong, 0);
     assert!(flagged > 0);
     let off_centre = Scene {
-        rows: crate::scene::Rows::One(5),
+        rows: Rows::One(5),
         ..scene
     };
     assert_eq!(counts(&off_centre, &model, 40), [40, 0, 0]);
@@ -175,7 +189,7 @@ fn the_residual_is_the_relative_error_of_the_readings() {
 fn an_answer_is_polished_to_rounding_in_a_few_steps() {
     let model = SensorModel::new("10x10_5x30".parse().unwrap());
     let set = Dataset::simulate(&model, &Scene::default(), 20, &mut Seed(2).rng(Stream::Test)).unwrap();
-    let mut newton = Newton::new(&model, &Scene::default(), NewtonRules::default());
+    let mut newton = estimator(&model, &Scene::default());
     for sample in 0..20 {
         let truth = set.sample_targets(sample);
         let mut coordinates: Vec<f64> = truth.to_vec();
@@ -184,7 +198,7 @@ fn an_answer_is_polished_to_rounding_in_a_few_steps() {
         }
         let row = set.row_wire(sample).unwrap();
         let report = newton
-            .polish(row, set.sample_readings(sample), &mut coordinates)
+            .polish(row, set.sample_readings(sample), &mut coordinates, 9)
             .unwrap();
         assert!(report.solution == Solution::Unique && report.steps <= 5, "{report:?}");
         for (ours, truth) in coordinates.iter().zip(truth) {
@@ -199,11 +213,7 @@ fn the_residual_reported_is_that_of_the_answer() {
     let model = SensorModel::new("3x4_2x12".parse().unwrap());
     let set = Dataset::simulate(&model, &Scene::default(), 30, &mut Seed(2).rng(Stream::Test)).unwrap();
     for steps in [0, 1, 2, 50] {
-        let rules = NewtonRules {
-            steps,
-            ..NewtonRules::default()
-        };
-        let mut newton = Newton::new(&model, &Scene::default(), rules);
+        let mut newton = estimator(&model, &Scene::default());
         for sample in 0..30 {
             let mut readings = set.sample_readings(sample).to_vec();
             readings[5] *= 1.0 + 1e-9 * sample as f64;
@@ -212,7 +222,7 @@ fn the_residual_reported_is_that_of_the_answer() {
             let mut polished = Vec::from_iter(set.sample_targets(sample).iter().map(|mm| mm - 0.02));
             for (report, coordinates) in [
                 (newton.solve(row, &readings, &mut solved).unwrap(), &solved),
-                (newton.polish(row, &readings, &mut polished).unwrap(), &polished),
+                (newton.polish(row, &readings, &mut polished, steps).unwrap(), &polished),
             ] {
                 let residual = resistance_residual(&model, &readings, coordinates);
                 let apart = (report.residual - residual).abs();

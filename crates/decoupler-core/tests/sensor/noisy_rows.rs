@@ -2,22 +2,20 @@
 
 use decoupler_core::{
     dataset::{Dataset, PerRow, Seed, Stream},
-    decoupling::{Decoder, PolishedDecoder, Posterior, PosteriorDecoder, TrainingMean, decode_set},
-    scene::{Movement, Noise, Rows, Scene},
+    decoupling::{Decoder, NewtonDecoder, PolishedDecoder, TrainingMean, decode_set},
+    scene::{Noise, Rows, Scene},
     sensor::SensorModel,
 };
 
-fn posterior(model: &SensorModel, scene: &Scene) -> PosteriorDecoder {
+fn newton(model: &SensorModel, scene: &Scene) -> NewtonDecoder {
     let rows: Vec<usize> = (0..model.scale.rows()).collect();
-    let posterior = Posterior::new(model, scene, &rows, &mut Seed(1).rng(Stream::Expectation)).unwrap();
-    PosteriorDecoder::new(posterior, model, scene, &rows).unwrap()
+    NewtonDecoder::new(model, scene, &rows).unwrap()
 }
 
 fn polished(model: &SensorModel, scene: &Scene, set: &Dataset, steps: usize) -> PolishedDecoder {
     let first = Box::new(PerRow::shared(TrainingMean::fit(set)));
     let rows: Vec<usize> = (0..model.scale.rows()).collect();
-    let mut rng = Seed(1).rng(Stream::Expectation);
-    PolishedDecoder::new(first, model, scene, &rows, steps, &mut rng).unwrap()
+    PolishedDecoder::new(first, model, scene, &rows, steps).unwrap()
 }
 
 fn noisy_set(model: &SensorModel, scene: &Scene, snapshots: usize) -> Dataset {
@@ -32,58 +30,7 @@ fn bits(values: &[f64]) -> Vec<u64> {
     values.iter().map(|value| value.to_bits()).collect()
 }
 
-/// Medians of one frame recorded when rows were solved one by one, with vector registers along the columns of one
-/// matrix. Each moves by less than 1e-11 mm if readings change by a unit in the last place.
-#[derive(serde::Deserialize)]
-struct Past {
-    array: String,
-    relative: f64,
-    additive_ohm: f64,
-    drift: f64,
-    converter_bits: Option<u8>,
-    loading: String,
-    sideways: bool,
-    known: bool,
-    readings_ohm: Vec<f64>,
-    z_mm: Vec<f64>,
-}
-
-#[test]
-fn medians_match_rows_solved_one_by_one() {
-    let past: Vec<Past> = serde_json::from_str(include_str!("../fixtures/posterior_medians.json")).unwrap();
-    for case in past {
-        let model = SensorModel::new(case.array.parse().unwrap());
-        let scene = Scene {
-            rows: if case.known { Rows::Known } else { Rows::All },
-            movement: if case.sideways { Movement::SIDEWAYS } else { Movement::Z },
-            loading: case.loading.parse().unwrap(),
-            noise: Noise {
-                relative: case.relative,
-                additive_ohm: case.additive_ohm,
-                drift: case.drift,
-                converter_bits: case.converter_bits,
-                ..Noise::default()
-            },
-            ..Scene::default()
-        };
-        let mut answer_mm = vec![0.0; 3 * case.z_mm.len()];
-        posterior(&model, &scene)
-            .decode(&case.readings_ohm, &mut answer_mm)
-            .unwrap();
-        for (place, (ours, past)) in answer_mm.iter().skip(2).step_by(3).zip(&case.z_mm).enumerate() {
-            let apart = (ours - past).abs();
-            assert!(
-                apart < 1e-10,
-                "{}, {:?}, node {place}: {apart:e}",
-                case.array,
-                scene.noise
-            );
-        }
-    }
-}
-
-/// Also next to rows whose readings no deformation explains, which take ten times as many linearisations, and in a
-/// decoder that has recorded which rows are slow.
+/// Also next to rows whose readings no deformation explains, which take ten times as many linearisations.
 #[test]
 fn frames_are_bit_identical_to_rows_with_the_same_status() {
     let relative = Noise::relative(1e-3);
@@ -123,7 +70,7 @@ fn frames_are_bit_identical_to_rows_with_the_same_status() {
                 .iter()
                 .for_each(|row| readings[row * channels + channels - 1] *= 40.0);
             let decoders: [[Box<dyn Decoder>; 2]; 3] = [
-                [posterior(&model, &scene), posterior(&model, &scene)].map(|decoder| Box::new(decoder) as _),
+                [newton(&model, &scene), newton(&model, &scene)].map(|decoder| Box::new(decoder) as _),
                 [1, 1].map(|steps| Box::new(polished(&model, &scene, &set, steps)) as _),
                 [4, 4].map(|steps| Box::new(polished(&model, &scene, &set, steps)) as _),
             ];
@@ -145,18 +92,30 @@ fn frames_are_bit_identical_to_rows_with_the_same_status() {
     }
 }
 
+/// Sets are solved in parallel.
 #[test]
 fn sets_are_bit_identical_to_their_frames() {
     let model = SensorModel::new("3x2_2x6".parse().unwrap());
-    let scene = Scene {
-        rows: Rows::Known,
-        noise: Noise::relative(1e-2),
-        ..Scene::default()
-    };
-    let set = noisy_set(&model, &scene, 400);
-    let answers = decode_set(&mut posterior(&model, &scene), &set).unwrap();
+    for (rows, noise) in [
+        (Rows::Known, 1e-2),
+        (Rows::Known, 0.0),
+        (Rows::All, 1e-3),
+        (Rows::All, 0.0),
+    ] {
+        let scene = Scene {
+            rows,
+            noise: Noise::relative(noise),
+            ..Scene::default()
+        };
+        assert_set_equals_its_frames(&model, &scene);
+    }
+}
+
+fn assert_set_equals_its_frames(model: &SensorModel, scene: &Scene) {
+    let set = noisy_set(model, scene, 400);
+    let answers = decode_set(&mut newton(model, scene), &set).unwrap();
     let frames = set.frames().unwrap();
-    let mut decoder = posterior(&model, &scene);
+    let mut decoder = newton(model, scene);
     let mut frame_mm = vec![0.0; 3 * 6];
     for snapshot in 0..frames.count() {
         decoder.decode(frames.frame(snapshot), &mut frame_mm).unwrap();
@@ -180,7 +139,7 @@ fn invalid_readings_are_named() {
             let mut readings = set.frames().unwrap().frame(0).to_vec();
             readings[row * 6 + channel] = value;
             let decoders: [Box<dyn Decoder>; 2] = [
-                Box::new(posterior(&model, &scene)),
+                Box::new(newton(&model, &scene)),
                 Box::new(polished(&model, &scene, &set, 2)),
             ];
             for mut decoder in decoders {
@@ -195,7 +154,7 @@ fn invalid_readings_are_named() {
         let row_wires: Vec<usize> = (0..set.samples()).map(|sample| set.row_wire(sample).unwrap()).collect();
         let groups = set.groups().to_vec();
         let bad = Dataset::new(readings, set.targets().to_owned(), Some(&row_wires), groups).unwrap();
-        let error = decode_set(&mut posterior(&model, &scene), &bad).unwrap_err();
+        let error = decode_set(&mut newton(&model, &scene), &bad).unwrap_err();
         assert_eq!((error.row_index, error.channel, error.value), (1300, 2, -1.0));
     }
 }
