@@ -9,7 +9,7 @@ use clap::Args;
 use decoupler_core::{
     calibration::PressLimits,
     dataset::{Dataset, Division, SimulationError, SplitBy, Stream},
-    decoupling::{CompiledNetworks, Decoder},
+    decoupling::{Decoder, ProgramDecoder},
     evaluation::{Channel, Errors, Problem, TestErrors, fine_tune, press_limits, pressed_rows},
     network::{DecouplingNetwork, Networks},
     sensor::SensorModel,
@@ -106,13 +106,13 @@ fn decode_file(file: &NetworkFile, input: &Path, output: &Path) -> Result<(), Fa
     let mut drift = DriftWarnings::new(file, false);
     let mut values = Vec::new();
     let mut outside = OutsideTraining::new(&file.problem);
-    let mut compiled = CompiledNetworks::<f64>::new(&file.network, rows_read(file)?);
+    let mut decoder = file.network.decoder();
     read(file, input, &mut |readings| {
         if !std::mem::replace(&mut has_heading, true) {
             let kept = readings.kept.iter().map(|column| column.title.clone());
             write_heading(file, &kept.collect::<Vec<_>>(), 1, &mut written).map_err(refused)?;
         }
-        let answers = decoded(file, &mut compiled, &readings);
+        let answers = decoded(file, &mut decoder, &readings);
         let kept = &readings.kept;
         let lines = readings.lines.iter().zip(&readings.row_indices);
         let rows = readings.values.outer_iter().zip(answers.outer_iter());
@@ -168,7 +168,7 @@ pub(super) fn with_half_widths(file: &NetworkFile, answers: &[f64], values: &mut
 
 /// Decodes each line with the network of its row; a single network for all rows of an array uses one matrix product.
 /// Invalid answers are NaN.
-fn decoded(file: &NetworkFile, compiled: &mut CompiledNetworks<f64>, readings: &Readings) -> Array2<f64> {
+fn decoded(file: &NetworkFile, decoder: &mut ProgramDecoder, readings: &Readings) -> Array2<f64> {
     let Readings {
         values, row_indices, ..
     } = readings;
@@ -191,7 +191,7 @@ fn decoded(file: &NetworkFile, compiled: &mut CompiledNetworks<f64>, readings: &
         let readings = values.row(line);
         let (readings, targets) = (readings.to_slice(), answer.as_slice_mut());
         let (readings, targets) = readings.zip(targets).expect("rows of standard arrays are contiguous");
-        if compiled.decode_row(row_index, readings, targets).is_err() {
+        if decoder.decode_row(row_index, readings, targets).is_err() {
             targets.fill(f64::NAN);
         }
     }

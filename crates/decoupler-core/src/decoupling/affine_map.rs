@@ -1,11 +1,14 @@
 use faer::{Mat, Side, linalg::solvers::Solve};
 use glam::DVec3;
 use ndarray::{Array1, Array2, ArrayView2, Axis, Slice};
-use serde::{Deserialize, Serialize};
 
 use super::{
-    AffineLayer, DecodeError, Decoder, Description, Layer, LayeredMap, NotDescribed, least_squares::fit_least_squares,
-    ridge::Ridge, row_problem::Range, units::Units,
+    Precision,
+    least_squares::fit_least_squares,
+    program::{Builder, Program},
+    ridge::Ridge,
+    row_problem::Range,
+    units::Units,
 };
 use crate::{
     dataset::Dataset,
@@ -14,26 +17,30 @@ use crate::{
     sensor::{Axes, RowConductance, SensorModel},
 };
 
-/// An affine map from readings to targets, with the input and output scalings folded into its matrix.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct AffineMap {
-    quantity: Quantity,
-    /// Centre of each channel, subtracted from its values.
-    centre: Vec<f64>,
-    /// Matrix from centred channels to targets (channels × varying targets), in standard layout.
-    matrix: Array2<f64>,
-    /// Targets for readings at the channel centres.
-    base: Vec<f64>,
-    /// Indices of the varying targets.
-    varying: Vec<usize>,
-    /// Buffer for the centred channels of one row.
-    values: Vec<f64>,
-    /// Buffer for the offsets of the varying targets in one row.
-    changes: Vec<f64>,
-}
+impl Program {
+    /// The mean targets over all samples, whatever the readings are: the baseline.
+    ///
+    /// # Panics
+    /// If there are no samples.
+    pub fn mean(training: &Dataset) -> Self {
+        let targets = training.targets();
+        // As the mean of deviations, so that a large offset does not hide small changes.
+        let first = targets.row(0);
+        let off = (&targets - &first).mean_axis(Axis(0));
+        let mean = off.expect("a training set has samples") + first;
+        Self::constant(training.channels(), &mean.to_vec())
+    }
 
-impl AffineMap {
-    /// Fits the map to `training` by least squares, on `quantity` of the readings.
+    /// The same targets for all finite readings.
+    pub(super) fn constant(channels: usize, targets: &[f64]) -> Self {
+        let mut builder = Builder::new(channels);
+        let weights = Array2::zeros((channels, targets.len()));
+        let changes = builder.changes(Quantity::Raw, &vec![0.0; channels], Precision::Double);
+        let targets = builder.affine_of(&changes, weights, targets);
+        builder.finish(targets)
+    }
+
+    /// Fits an affine map to `training` by least squares, on `quantity` of the readings.
     ///
     /// # Errors
     /// If values cannot be scaled.
@@ -42,11 +49,11 @@ impl AffineMap {
         let inputs = Inputs::new(quantity, InputScaling::MinMax(MinMax::fit(values.view())?));
         let outputs = MinMax::fit(training.targets())?;
         let coefficients = fit_least_squares(training, &inputs, &outputs)?;
-        Ok(Self::folded(&inputs, &coefficients, &outputs))
+        Ok(Self::affine(&inputs, &coefficients, &outputs))
     }
 
-    /// Fits the map to `training` by ridge regression, with the penalty of each target chosen by leave-one-out error;
-    /// `unseen` is as in [`Inputs::fit`].
+    /// Fits an affine map to `training` by ridge regression, with the penalty of each target chosen by leave-one-out
+    /// error; `unseen` is as in [`Inputs::fit`].
     ///
     /// # Errors
     /// If values cannot be scaled.
@@ -57,88 +64,21 @@ impl AffineMap {
         let units = Units::of(training, inputs.of(training.readings()), y);
         let changes = inputs.changes_of(&channel_noise(inputs.quantity(), training.readings(), unseen));
         let fit = LinearFit::new(&inputs, units, changes.view())?;
-        Ok(Self::folded(&inputs, &fit.coefficients(), &outputs))
+        Ok(Self::affine(&inputs, &fit.coefficients(), &outputs))
     }
 
-    /// Folds the scalings into `coefficients` (inputs + 1 × varying outputs, the constant last).
-    fn folded(inputs: &Inputs, coefficients: &Array2<f64>, outputs: &MinMax) -> Self {
+    /// The affine map with these `coefficients` of the scaled inputs (inputs + 1 × varying outputs, the constant last), the
+    /// scaling of the inputs folded in.
+    fn affine(inputs: &Inputs, coefficients: &Array2<f64>, outputs: &MinMax) -> Self {
         let (centre, to_inputs) = inputs.affine();
-        let ranges = outputs.middles_and_half_widths();
-        let varying = outputs.varying();
-        let mut base: Vec<f64> = ranges.iter().map(|range| range.0).collect();
         let n = inputs.count();
-        let mut matrix = to_inputs.t().dot(&coefficients.slice_axis(Axis(0), Slice::from(..n)));
-        for (output, &target) in varying.iter().enumerate() {
-            let half_width = ranges[target].1;
-            matrix.column_mut(output).mapv_inplace(|value| value * half_width);
-            base[target] += coefficients[[n, output]] * half_width;
-        }
-        Self {
-            quantity: inputs.quantity(),
-            values: vec![0.0; centre.len()],
-            centre,
-            matrix: matrix.as_standard_layout().into_owned(),
-            base,
-            changes: vec![0.0; varying.len()],
-            varying,
-        }
-    }
-}
-
-impl AffineMap {
-    /// Writes the centred channels. Returns `true` if all readings are valid; a separate pass for this check would
-    /// take 6 % more time.
-    #[inline(always)]
-    fn read(&mut self, readings: &[f64], of: impl Fn(f64) -> f64) -> bool {
-        let mut all_valid = true;
-        for ((value, &reading), centre) in self.values.iter_mut().zip(readings).zip(&self.centre) {
-            *value = of(reading) - centre;
-            all_valid &= self.quantity.accepts(reading);
-        }
-        all_valid
-    }
-}
-
-impl Decoder for AffineMap {
-    fn channels(&self) -> usize {
-        self.centre.len()
-    }
-
-    fn outputs(&self) -> usize {
-        self.base.len()
-    }
-
-    fn decode_row(&mut self, _row_index: usize, readings: &[f64], targets: &mut [f64]) -> Result<(), DecodeError> {
-        let all_valid = match self.quantity {
-            Quantity::Conductance => self.read(readings, |ohm| 1.0 / ohm),
-            quantity => self.read(readings, |reading| quantity.of(reading)),
-        };
-        if !all_valid {
-            DecodeError::check_for(self.quantity, readings)?;
-        }
-        self.changes.fill(0.0);
-        let width = self.changes.len();
-        let matrix = self.matrix.as_slice().expect("made in standard layout");
-        for (channel, value) in self.values.iter().enumerate() {
-            let row = &matrix[channel * width..(channel + 1) * width];
-            for (change, weight) in self.changes.iter_mut().zip(row) {
-                *change += value * weight;
-            }
-        }
-        targets.copy_from_slice(&self.base);
-        for (&target, change) in self.varying.iter().zip(&self.changes) {
-            targets[target] += change;
-        }
-        Ok(())
-    }
-
-    fn description(&self) -> Result<Description, NotDescribed> {
-        let map = AffineLayer::of_varying(&self.matrix, &self.varying, &self.base);
-        Ok(Description::of_maps(vec![LayeredMap {
-            quantity: self.quantity,
-            centre: self.centre.clone(),
-            layers: vec![Layer::Affine(map)],
-        }]))
+        let folded = to_inputs.t().dot(&coefficients.slice_axis(Axis(0), Slice::from(..n)));
+        let constants = coefficients.row(n).to_vec();
+        let mut builder = Builder::new(centre.len());
+        let changes = builder.changes(inputs.quantity(), &centre, Precision::Double);
+        let scaled = builder.affine_of(&changes, folded, &constants);
+        let targets = builder.restored(scaled, outputs);
+        builder.finish(targets)
     }
 }
 
@@ -220,9 +160,9 @@ impl AffineStart {
         }
     }
 
-    /// Describes the coordinates (3·M2) of the nodes of row-wire `row` at the estimate, before they are clamped to
+    /// The program of the coordinates (3·M2) of the nodes of row-wire `row` at the estimate, before they are clamped to
     /// the stroke.
-    pub(super) fn description(&self, model: &SensorModel, row: usize) -> LayeredMap {
+    pub(super) fn program(&self, model: &SensorModel, row: usize) -> Program {
         let (readings, nodes) = (self.means_ohm.len(), model.scale.nodes_per_row());
         let middles = (0..nodes).flat_map(|node| model.displaced_mm(row, node, DVec3::Z * self.middle_mm).to_array());
         let weight = |(reading, coordinate): (usize, usize)| match coordinate % 3 {
@@ -230,14 +170,12 @@ impl AffineStart {
             2 => -self.gains_mm[coordinate / 3 * readings + reading] * self.means_ohm[reading],
             _ => 0.0,
         };
-        LayeredMap {
-            quantity: Quantity::Conductance,
-            centre: self.means_ohm.iter().map(|ohm| 1.0 / ohm).collect(),
-            layers: vec![Layer::Affine(AffineLayer {
-                weights: Array2::from_shape_fn((readings, 3 * nodes), weight),
-                biases: middles.collect(),
-            })],
-        }
+        let mut builder = Builder::new(readings);
+        let means = Vec::from_iter(self.means_ohm.iter().map(|ohm| 1.0 / ohm));
+        let changes = builder.changes(Quantity::Conductance, &means, Precision::Double);
+        let weights = Array2::from_shape_fn((readings, 3 * nodes), weight);
+        let coordinates = builder.affine_of(&changes, weights, &Vec::from_iter(middles));
+        builder.finish(coordinates)
     }
 
     /// Writes the estimate for readings in ohm, before it is clamped to the stroke.
@@ -299,63 +237,12 @@ impl LinearFit {
     }
 }
 
-/// Decoder that always answers the mean targets of the training set: the baseline.
-#[derive(Clone, Debug, PartialEq)]
-pub struct TrainingMean {
-    channels: usize,
-    targets: Array1<f64>,
-}
-
-impl TrainingMean {
-    /// Computes the mean targets over all samples.
-    ///
-    /// # Panics
-    /// If there are no samples.
-    pub fn fit(training: &Dataset) -> Self {
-        let targets = training.targets();
-        // As the mean of deviations, so that a large offset does not hide small changes.
-        let first = targets.row(0);
-        let off = (&targets - &first).mean_axis(Axis(0));
-        Self {
-            channels: training.channels(),
-            targets: off.expect("a training set has samples") + first,
-        }
-    }
-}
-
-impl Decoder for TrainingMean {
-    fn channels(&self) -> usize {
-        self.channels
-    }
-
-    fn outputs(&self) -> usize {
-        self.targets.len()
-    }
-
-    fn decode_row(&mut self, _row_index: usize, _readings: &[f64], targets: &mut [f64]) -> Result<(), DecodeError> {
-        targets.copy_from_slice(self.targets.as_slice().expect("a mean is contiguous"));
-        Ok(())
-    }
-
-    fn description(&self) -> Result<Description, NotDescribed> {
-        let mean = AffineLayer {
-            weights: Array2::zeros((self.channels, self.targets.len())),
-            biases: self.targets.to_vec(),
-        };
-        Ok(Description::of_maps(vec![LayeredMap {
-            quantity: Quantity::Raw,
-            centre: vec![0.0; self.channels],
-            layers: vec![Layer::Affine(mean)],
-        }]))
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::{
         dataset::{Dataset, Seed, Stream},
-        decoupling::decode_set,
+        decoupling::{ProgramDecoder, decode_set},
         network::ScalingChoice,
         scene::Scene,
         sensor::SensorModel,
@@ -367,6 +254,10 @@ mod tests {
     }
 
     /// Returns `set` with its third target replaced by a function of the readings.
+    fn answers(map: Program, set: &Dataset) -> Array2<f64> {
+        decode_set(&mut ProgramDecoder::new(map), set).unwrap()
+    }
+
     fn with_target(set: &Dataset, target: impl Fn(&[f64]) -> f64) -> Dataset {
         let mut targets = set.targets().to_owned();
         for sample in 0..set.samples() {
@@ -385,8 +276,7 @@ mod tests {
     #[test]
     fn an_affine_relation_is_found_exactly() {
         let set = with_target(&draw("10x6_3x18", 300), |ohm| 3.0 * ohm[0] - 0.5 * ohm[17] + 4.0);
-        let mut map = AffineMap::least_squares(&set, Quantity::Resistance).unwrap();
-        let answer = decode_set(&mut map, &set).unwrap();
+        let answer = answers(Program::least_squares(&set, Quantity::Resistance).unwrap(), &set);
         for (ours, truth) in answer.column(2).iter().zip(set.targets().column(2)) {
             assert!((ours - truth).abs() < 1e-10 * truth.abs());
         }
@@ -396,11 +286,10 @@ mod tests {
     fn too_few_or_duplicate_samples_give_a_finite_map() {
         let other = draw("10x6_3x18", 10);
         for set in [draw("1x6_3x18", 1), draw("1x6_3x18", 2), other.select(&[3; 50])] {
-            let least_squares = AffineMap::least_squares(&set, Quantity::Resistance).unwrap();
-            let ridge = AffineMap::ridge(&set, InputChoice::BEST, NoiseSource::default()).unwrap();
-            for mut map in [least_squares, ridge] {
-                let answer = decode_set(&mut map, &other).unwrap();
-                assert!(answer.iter().all(|value| value.is_finite()));
+            let least_squares = Program::least_squares(&set, Quantity::Resistance).unwrap();
+            let ridge = Program::ridge(&set, InputChoice::BEST, NoiseSource::default()).unwrap();
+            for map in [least_squares, ridge] {
+                assert!(answers(map, &other).iter().all(|value| value.is_finite()));
             }
         }
     }
@@ -413,33 +302,10 @@ mod tests {
                 scaling,
                 ..InputChoice::BEST
             };
-            let answer = decode_set(
-                &mut AffineMap::ridge(&set, choice, NoiseSource::default()).unwrap(),
-                &set,
-            )
-            .unwrap();
+            let answer = answers(Program::ridge(&set, choice, NoiseSource::default()).unwrap(), &set);
             for (answer, truth) in answer.rows().into_iter().zip(set.targets().rows()) {
                 assert_eq!(answer[0], truth[0], "constant targets keep their value");
                 assert!((answer[2] - truth[2]).abs() < 1e-6, "{} {}", answer[2], truth[2]);
-            }
-        }
-    }
-
-    #[test]
-    fn readings_outside_the_domain_are_refused() {
-        let set = draw("1x4_2x12", 30);
-        let mut readings = set.sample_readings(0).to_vec();
-        readings[5] = -1.0;
-        for (quantity, is_refused) in [
-            (Quantity::Resistance, true),
-            (Quantity::Conductance, true),
-            (Quantity::Raw, false),
-        ] {
-            let mut map = AffineMap::least_squares(&set, quantity).unwrap();
-            let result = map.decode(&readings, &mut [0.0; 12]);
-            assert_eq!(result.is_err(), is_refused, "{quantity}");
-            if let Err(error) = result {
-                assert!(error.to_string().starts_with("row 1, reading 6: -1"), "{error}");
             }
         }
     }

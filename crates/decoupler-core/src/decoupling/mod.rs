@@ -3,25 +3,18 @@
 //!
 //! | decoder | how it decodes |
 //! |---|---|
-//! | [`TrainingMean`] | always answers the mean of the training set: the baseline |
-//! | [`AffineMap`] | an affine map, by least squares or ridge regression with leave-one-out cross-validation |
-//! | [`RadialBasisNetwork`] | Gaussians around centres |
-//! | [`TakagiSugeno`] | fuzzy rules with affine consequents |
-//! | [`CompiledNetworks`] | trained networks, fast, in double or single precision |
+//! | [`ProgramDecoder`] | evaluates a [`Program`]: trained networks, and all decoders that are fitted to samples |
 //! | [`NewtonDecoder`] | solves Eq. (2) by the Gauss-Newton method |
 //! | [`PolishedDecoder`] | another decoder's answer, improved by a few Gauss-Newton steps |
 //! | [`PosteriorDecoder`] | the Gauss-Newton method with noise and prior |
 //!
-//! [`DecoderKind`] lists them with their names and meanings, and fits each. Decoders of readings alone come as
-//! [`PerRow`](crate::dataset::PerRow): one shared by all row-wires, or one per row-wire. [`resistance_residual`]
-//! measures how well an answer explains the readings, without ground truth. [`Description`] contains what a decoder
-//! computes, as plain numbers, for programs that decode without this one.
+//! [`DecoderKind`] lists them with their names and meanings, and fits each. A [`Program`] is the only forward pass outside
+//! training; exports print it for other languages. [`resistance_residual`] measures how well an answer explains the
+//! readings, without ground truth.
 
 mod affine_map;
 mod clusters;
-mod compiled;
 mod decoder;
-mod description;
 mod equation_decoders;
 mod equations;
 mod gauss_newton;
@@ -31,6 +24,7 @@ mod least_squares;
 mod newton;
 mod plain_newton;
 mod posterior;
+mod program;
 mod radial_basis;
 mod ridge;
 mod row_problem;
@@ -38,17 +32,13 @@ mod side_by_side;
 mod takagi_sugeno;
 mod units;
 
-pub use affine_map::{AffineMap, TrainingMean};
-pub use compiled::{CompiledNetworks, Real};
-pub use decoder::{DecodeError, Decoder, SolvedRows, decode_set, resistance_residual};
-pub use description::{AffineLayer, Description, Layer, LayeredMap, NotDescribed};
+pub use decoder::{DecodeError, Decoder, Description, NotDescribed, SolvedRows, decode_set, resistance_residual};
 pub use equation_decoders::{NewtonDecoder, PolishedDecoder, PosteriorDecoder};
 pub use equations::{Estimate, Estimator};
 pub use kind::{DecoderKind, DecoderKindError, Fit, FitError, FitProblem, Precision};
 pub use newton::{LARGEST_ERROR, Newton, NewtonReport, NewtonRules, NewtonStop, Solution};
 pub(crate) use posterior::SampledPosterior;
 pub use posterior::{Posterior, PosteriorReport};
-pub use radial_basis::RadialBasisNetwork;
+pub use program::{Builder, Changes, Domain, Function, Node, NodeId, Operation, Program, ProgramDecoder};
 pub(crate) use row_problem::{GaussianPrior, Range, ranges};
 pub use row_problem::{RowChoice, RowProblemDescription};
-pub use takagi_sugeno::TakagiSugeno;

@@ -119,7 +119,7 @@ mod tests {
 
     use crate::{
         dataset::{Seed, Stream},
-        decoupling::{AffineMap, Decoder, RadialBasisNetwork, TakagiSugeno, decode_set},
+        decoupling::{Decoder, Program, ProgramDecoder, decode_set},
         network::{InputChoice, Quantity},
         scene::standard_normal,
     };
@@ -165,11 +165,16 @@ mod tests {
             let part = |samples: std::ops::Range<usize>| set.select(&samples.collect::<Vec<_>>());
             let (training, test) = (part(0..fitted), part(fitted..y.len()));
             let (choice, none) = (InputChoice::MEASURED, NoiseSource::default());
-            let ridge = r2(&mut AffineMap::ridge(&training, choice, none).unwrap(), &test);
+            let ridge = r2(
+                &mut ProgramDecoder::new(Program::ridge(&training, choice, none).unwrap()),
+                &test,
+            );
             assert!((ridge - r2_ridge).abs() < 2e-3, "{name}: ridge {ridge}, {r2_ridge}");
             let mut rng = Seed(0).rng(Stream::Expectation);
-            let mut basis = RadialBasisNetwork::fit(&training, choice, none, &mut rng).unwrap();
-            let mut fuzzy = TakagiSugeno::fit(&training, Quantity::Raw, none, &mut rng).unwrap();
+            let basis = Program::radial_basis(&training, choice, none, &mut rng).unwrap();
+            let mut basis = ProgramDecoder::new(basis);
+            let fuzzy = Program::fuzzy(&training, Quantity::Raw, none, &mut rng).unwrap();
+            let mut fuzzy = ProgramDecoder::new(fuzzy);
             for (decoder, ours) in [("basis", r2(&mut basis, &test)), ("fuzzy", r2(&mut fuzzy, &test))] {
                 assert!(
                     (ours - r2_kernel_ridge).abs() < 0.02,
@@ -187,7 +192,7 @@ mod tests {
         let targets = Array2::from_shape_fn((25, 1), |(s, _)| readings[[s, 0]] + standard_normal(&mut rng));
         let map = |order: Vec<usize>| {
             let set = set_of(readings.select(Axis(0), &order), targets.select(Axis(0), &order));
-            AffineMap::ridge(&set, InputChoice::MEASURED, NoiseSource::default()).unwrap()
+            ProgramDecoder::new(Program::ridge(&set, InputChoice::MEASURED, NoiseSource::default()).unwrap())
         };
         let new = Array2::from_shape_simple_fn((40, 18), || standard_normal(&mut rng));
         let test = set_of(new, Array2::zeros((40, 1)));
@@ -213,7 +218,8 @@ mod tests {
             set_of(readings, concatenate![Axis(1), exact, noise])
         };
         let (training, test) = (draw(40), draw(500));
-        let mut map = AffineMap::ridge(&training, InputChoice::MEASURED, NoiseSource::default()).unwrap();
+        let map = Program::ridge(&training, InputChoice::MEASURED, NoiseSource::default()).unwrap();
+        let mut map = ProgramDecoder::new(map);
         let squares = (decode_set(&mut map, &test).unwrap() - test.targets()).mapv(|error| error * error);
         let mse = squares.mean_axis(Axis(0)).unwrap();
         let first = test.targets().slice_axis(Axis(1), Slice::from(..1)).var(0.0);

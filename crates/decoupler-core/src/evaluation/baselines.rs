@@ -3,7 +3,7 @@ use serde::{Deserialize, Serialize};
 use super::{Coverage, Errors, NoReference, RunError, RunSettings, Source, TestErrors};
 use crate::{
     dataset::{Dataset, PerRow},
-    decoupling::{AffineMap, TrainingMean},
+    decoupling::{Program, ProgramDecoder},
     network::{InputChoice, Quantity},
     scene::{NoiseSource, Rows},
     sensor::ArrayScale,
@@ -78,18 +78,19 @@ impl Scores {
 pub(super) fn fit_baselines(
     training: &Dataset,
     settings: &RunSettings,
-) -> Result<(PerRow<TrainingMean>, PerRow<AffineMap>), RunError> {
-    let mean = |set: &Dataset| Ok::<_, RunError>(TrainingMean::fit(set));
+) -> Result<(ProgramDecoder, ProgramDecoder), RunError> {
+    let mean = |set: &Dataset| Ok::<_, RunError>(Program::mean(set));
     let mean = PerRow::fit(training, settings.source.row_model(), mean)?;
     let ridge = |inputs| {
-        let of_set = move |set: &Dataset| AffineMap::ridge(set, inputs, NoiseSource::default());
+        let of_set = move |set: &Dataset| Program::ridge(set, inputs, NoiseSource::default());
         PerRow::fit(training, settings.source.row_model(), of_set)
     };
     let linear = match settings.source {
         Source::Simulated(simulation) if simulation.scene.rows == Rows::Known => ridge(InputChoice::PAPER)?,
-        Source::Simulated(_) => PerRow::shared(AffineMap::least_squares(training, Quantity::Resistance)?),
+        Source::Simulated(_) => PerRow::shared(Program::least_squares(training, Quantity::Resistance)?),
         Source::Measured(_) => ridge(settings.inputs)?,
     };
+    let [mean, linear] = [mean, linear].map(|programs| ProgramDecoder::new(Program::each(&programs)));
     Ok((mean, linear))
 }
 

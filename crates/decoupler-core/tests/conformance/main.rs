@@ -3,6 +3,8 @@
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 mod cases;
+mod programs;
+mod reference;
 
 use cases::{Case, bits, cases};
 use decoupler_core::decoupling::{DecodeError, DecoderKind, decode_set};

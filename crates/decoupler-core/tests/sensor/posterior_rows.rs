@@ -1,8 +1,8 @@
 //! Rows with noise that are solved side by side have the same answers as alone.
 
 use decoupler_core::{
-    dataset::{Dataset, PerRow, Seed, Stream},
-    decoupling::{Decoder, PolishedDecoder, Posterior, PosteriorDecoder, TrainingMean, decode_set},
+    dataset::{Dataset, Seed, Stream},
+    decoupling::{Decoder, PolishedDecoder, Posterior, PosteriorDecoder, Program, ProgramDecoder, decode_set},
     scene::{Movement, Noise, Rows, Scene},
     sensor::SensorModel,
 };
@@ -14,7 +14,7 @@ fn posterior(model: &SensorModel, scene: &Scene) -> PosteriorDecoder {
 }
 
 fn polished(model: &SensorModel, scene: &Scene, set: &Dataset, steps: usize) -> PolishedDecoder {
-    let first = Box::new(PerRow::shared(TrainingMean::fit(set)));
+    let first = Box::new(ProgramDecoder::new(Program::mean(set)));
     let rows: Vec<usize> = (0..model.scale.rows()).collect();
     let mut rng = Seed(1).rng(Stream::Expectation);
     PolishedDecoder::new(first, model, scene, &rows, steps, &mut rng).unwrap()

@@ -1,14 +1,13 @@
 use glam::DVec3;
-use ndarray::Array2;
 
 use super::row_search::{EXPLAINED, RowSearch, Trial};
 use crate::{
+    dataset::PerRow,
     decoupling::{
-        AffineLayer, DecodeError, Decoder, Description, LARGEST_ERROR, Layer, LayeredMap, Newton, NewtonReport,
-        NewtonRules, NotDescribed, Posterior, PosteriorReport, RowProblemDescription, Solution, SolvedRows,
-        affine_map::AffineStart, row_problem::ranges, side_by_side::LANES,
+        DecodeError, Decoder, Description, LARGEST_ERROR, Newton, NewtonReport, NewtonRules, NotDescribed, Posterior,
+        PosteriorReport, Program, RowProblemDescription, Solution, SolvedRows, affine_map::AffineStart,
+        row_problem::ranges, side_by_side::LANES,
     },
-    network::Quantity,
     scene::Scene,
     sensor::{Axes, SensorError, SensorModel},
 };
@@ -93,25 +92,18 @@ impl NewtonDecoder {
 
 /// Coordinates of the nodes of a row-wire at the start of the iteration: the affine estimate if nodes move along z
 /// only, and mid-range otherwise.
-fn start_of((model, scene): (&SensorModel, &Scene), row: usize) -> LayeredMap {
+fn start_of((model, scene): (&SensorModel, &Scene), row: usize) -> Program {
     let ranges = ranges(model, scene);
     let channels = model.scale.columns();
     if scene.movement.axes() == Axes::Z {
-        return AffineStart::new(model, row, ranges[0]).description(model, row);
+        return AffineStart::new(model, row, ranges[0]).program(model, row);
     }
     let nodes = 0..model.scale.nodes_per_row();
     let middles = nodes.zip(ranges.chunks_exact(3)).flat_map(|(node, ranges)| {
         let middle = DVec3::new(ranges[0].middle(), ranges[1].middle(), ranges[2].middle());
         model.displaced_mm(row, node, middle).to_array()
     });
-    LayeredMap {
-        quantity: Quantity::Conductance,
-        centre: vec![1.0; channels],
-        layers: vec![Layer::Affine(AffineLayer {
-            weights: Array2::zeros((channels, model.scale.coordinates_per_row())),
-            biases: middles.collect(),
-        })],
-    }
+    Program::constant(channels, &Vec::from_iter(middles))
 }
 
 impl PlainFirst for NewtonDecoder {
@@ -180,7 +172,7 @@ impl Decoder for NewtonDecoder {
         }
         let of_scene = (&self.model, &self.scene);
         Ok(Description {
-            maps: rows.iter().map(|&row| start_of(of_scene, row)).collect(),
+            program: Program::each(&PerRow::each(rows.iter().map(|&row| start_of(of_scene, row)).collect())),
             equations: Some(RowProblemDescription::new(
                 of_scene,
                 (rows, row_choice),

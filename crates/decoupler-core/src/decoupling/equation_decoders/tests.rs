@@ -2,8 +2,8 @@ use ndarray::Array2;
 
 use super::*;
 use crate::{
-    dataset::{Dataset, PerRow, Seed, Stream},
-    decoupling::{Decoder, Newton, NewtonRules, Posterior, Solution, SolvedRows, TrainingMean, decode_set},
+    dataset::{Dataset, Seed, Stream},
+    decoupling::{Decoder, Newton, NewtonRules, Posterior, Program, ProgramDecoder, Solution, SolvedRows, decode_set},
     scene::{Movement, Noise, Rows, Scene},
     sensor::SensorModel,
 };
@@ -16,7 +16,7 @@ fn solved(mut decoder: impl Decoder, set: &Dataset) -> SolvedRows {
 }
 
 fn polish(model: &SensorModel, scene: &Scene, set: &Dataset, steps: usize) -> PolishedDecoder {
-    let first = Box::new(PerRow::shared(TrainingMean::fit(set)));
+    let first = Box::new(ProgramDecoder::new(Program::mean(set)));
     let rows = Vec::from_iter(0..model.scale.rows());
     let mut rng = Seed(0).rng(Stream::Expectation);
     PolishedDecoder::new(first, model, scene, &rows, steps, &mut rng).unwrap()

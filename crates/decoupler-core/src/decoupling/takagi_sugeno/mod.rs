@@ -3,13 +3,13 @@
 mod consequents;
 mod selection;
 
-use ndarray::{Array2, Axis, Slice};
+use ndarray::{Array2, Axis};
 use rand::Rng;
-use serde::{Deserialize, Serialize};
 
 use super::{
-    AffineLayer, DecodeError, Decoder, Description, Layer, LayeredMap, NotDescribed,
+    Precision,
     affine_map::LinearFit,
+    program::{Builder, Program},
     units::{Units, with_noise},
 };
 use crate::{
@@ -17,47 +17,26 @@ use crate::{
     network::{InputChoice, Inputs, MinMax, Quantity, ScalingChoice, ScalingError},
     scene::NoiseSource,
 };
-use selection::{Antecedents, normalise};
+use selection::Antecedents;
 
-/// A fuzzy system of Takagi and Sugeno (1985): rules "if the readings x are near centre i, then the coordinates are
-/// Cᵢ·x + dᵢ", blended by their normalised firing strengths.
-///
-/// The antecedents are Gaussian memberships on whitened readings, centred on clusters of the training samples; the
-/// consequents of all rules are fitted together by least squares with a small ridge penalty. Cross-validation chooses
-/// the number of rules, the number of inputs of their memberships, and the penalty of each target.
-///
-/// In 30 dimensions distances hardly differ, so memberships use only the leading 3 or 10 principal components, with a
-/// width four times the distance between centres. Measured on the simulated 10×10_5×30 array with 12 rules, the
-/// held-out error of a known row-wire is 0.011 % with 10 components, 0.026 % with 15, and 0.040 % with 30 or 3, and
-/// that of one map for all row-wires 0.45 % with 3 components and 0.71 % with 11; narrower memberships were never
-/// clearly better.
-#[derive(Clone, Debug, Serialize, Deserialize)]
-pub struct TakagiSugeno {
-    quantity: Quantity,
-    /// Value subtracted from each channel.
-    centre: Vec<f64>,
-    /// Logarithms of the memberships from centred channels, the whitening folded in: (M4 + 1) × rules, the constant last.
-    antecedents: Array2<f64>,
-    /// Coordinates in millimetres from centred channels, the scalings folded in: for each rule (M4 + 1) × varying
-    /// coordinates, the constant last.
-    consequents: Array2<f64>,
-    /// Middle of the range of every target; constant targets keep it.
-    middles: Vec<f64>,
-    /// Indices of the varying targets.
-    varying: Vec<usize>,
-    /// Centred channels and a 1.
-    values: Vec<f64>,
-    strengths: Vec<f64>,
-    changes: Vec<f64>,
-}
-
-impl TakagiSugeno {
-    /// Fits to a training set, on this quantity of the readings, whitened; `unseen` is as in [`Inputs::fit`]; `rng`
-    /// draws the noise, the folds of the cross-validation and the initial cluster centres.
+impl Program {
+    /// Fits a fuzzy system of Takagi and Sugeno (1985): rules "if the readings x are near centre i, then the coordinates are
+    /// Cᵢ·x + dᵢ", blended by their normalised firing strengths. On this quantity of the readings, whitened; `unseen` is as
+    /// in [`Inputs::fit`]; `rng` draws the noise, the folds of the cross-validation and the initial cluster centres.
+    ///
+    /// The antecedents are Gaussian memberships on whitened readings, centred on clusters of the training samples; the
+    /// consequents of all rules are fitted together by least squares with a small ridge penalty. Cross-validation chooses
+    /// the number of rules, the number of inputs of their memberships, and the penalty of each target.
+    ///
+    /// In 30 dimensions distances hardly differ, so memberships use only the leading 3 or 10 principal components, with a
+    /// width four times the distance between centres. Measured on the simulated 10×10_5×30 array with 12 rules, the
+    /// held-out error of a known row-wire is 0.011 % with 10 components, 0.026 % with 15, and 0.040 % with 30 or 3, and
+    /// that of one map for all row-wires 0.45 % with 3 components and 0.71 % with 11; narrower memberships were never
+    /// clearly better.
     ///
     /// # Errors
     /// If values cannot be scaled.
-    pub fn fit(
+    pub fn fuzzy(
         training: &Dataset,
         quantity: Quantity,
         unseen: NoiseSource,
@@ -73,127 +52,32 @@ impl TakagiSugeno {
         let noise = LinearFit::new(&inputs, units.clone(), none.view())?.variances();
         let choice = selection::choose(&units, &noise, rng);
         let scaled = consequents::fit_consequents(&choice.antecedents, &units, &choice.penalties, &noise)?;
-        Ok(Self::new(&inputs, &choice.antecedents, &scaled, &outputs))
+        Ok(Self::of_rules(&inputs, &choice.antecedents, &scaled, &outputs))
     }
 
-    /// Folds the scalings into the rules.
-    fn new(inputs: &Inputs, antecedents: &Antecedents, scaled: &Array2<f64>, outputs: &MinMax) -> Self {
+    /// The rules with the whitening folded in.
+    fn of_rules(inputs: &Inputs, antecedents: &Antecedents, scaled: &Array2<f64>, outputs: &MinMax) -> Self {
+        let double = Precision::Double;
         let (centre, to_inputs) = inputs.affine();
-        let (channels, n, rules) = (centre.len(), inputs.count(), antecedents.rules());
+        let n = inputs.count();
         let (slopes, offsets) = antecedents.logarithms(n);
-        let slopes = slopes.dot(&to_inputs);
-        let ranges = outputs.middles_and_half_widths();
-        let varying = outputs.varying();
-        let mut consequents = Array2::zeros((rules * (channels + 1), varying.len()));
-        let of_rules = consequents.axis_chunks_iter_mut(Axis(0), channels + 1);
-        for (mut folded, scaled) in of_rules.zip(scaled.axis_chunks_iter(Axis(0), n + 1)) {
-            let (gains, constant) = scaled.split_at(Axis(0), n);
-            let (mut folded_gains, mut folded_constant) = folded.view_mut().split_at(Axis(0), channels);
-            folded_gains.assign(&to_inputs.t().dot(&gains));
-            folded_constant.assign(&constant);
+        let mut weights = Array2::zeros((centre.len(), 0));
+        let mut biases = Vec::new();
+        for of_rule in scaled.axis_chunks_iter(Axis(0), n + 1) {
+            let (gains, constants) = of_rule.split_at(Axis(0), n);
+            let gains = to_inputs.t().dot(&gains);
+            weights.append(Axis(1), gains.view()).expect("one row for each channel");
+            biases.extend(constants.row(0));
         }
-        for (mut column, &coordinate) in consequents.columns_mut().into_iter().zip(&varying) {
-            column *= ranges[coordinate].1;
-        }
-        let mut values = vec![0.0; channels];
-        values.push(1.0);
-        Self {
-            quantity: inputs.quantity(),
-            centre,
-            antecedents: Array2::from_shape_fn((channels + 1, rules), |(channel, rule)| {
-                slopes.get((rule, channel)).copied().unwrap_or(offsets[rule])
-            }),
-            consequents,
-            middles: ranges.iter().map(|range| range.0).collect(),
-            changes: vec![0.0; varying.len()],
-            varying,
-            values,
-            strengths: vec![0.0; rules],
-        }
-    }
-
-    /// Number of rules.
-    pub fn rules(&self) -> usize {
-        self.strengths.len()
-    }
-}
-
-impl Decoder for TakagiSugeno {
-    fn channels(&self) -> usize {
-        self.centre.len()
-    }
-
-    fn outputs(&self) -> usize {
-        self.middles.len()
-    }
-
-    fn decode_row(&mut self, _row_index: usize, readings: &[f64], targets: &mut [f64]) -> Result<(), DecodeError> {
-        DecodeError::check_for(self.quantity, readings)?;
-        for ((value, &reading), centre) in self.values.iter_mut().zip(readings).zip(&self.centre) {
-            *value = self.quantity.of(reading) - centre;
-        }
-        let in_order = "made in standard layout";
-        let antecedents = self.antecedents.as_slice().expect(in_order);
-        let consequents = self.consequents.as_slice().expect(in_order);
-        self.strengths.fill(0.0);
-        add_products(&mut self.strengths, &self.values, 1.0, antecedents);
-        normalise(&mut self.strengths);
-        self.changes.fill(0.0);
-        let of_rule = self.values.len() * self.changes.len();
-        for (rule, &strength) in self.strengths.iter().enumerate() {
-            if strength > 0.0 {
-                let consequents = &consequents[rule * of_rule..(rule + 1) * of_rule];
-                add_products(&mut self.changes, &self.values, strength, consequents);
-            }
-        }
-        targets.copy_from_slice(&self.middles);
-        for (&target, &change) in self.varying.iter().zip(&self.changes) {
-            // Readings 1e300 times those of the training set overflow.
-            if change.is_finite() {
-                targets[target] += change;
-            }
-        }
-        Ok(())
-    }
-
-    fn description(&self) -> Result<Description, NotDescribed> {
-        let (channels, outputs, rules) = (self.channels(), self.outputs(), self.rules());
-        let memberships = AffineLayer {
-            weights: self.antecedents.slice_axis(Axis(0), Slice::from(..channels)).to_owned(),
-            biases: self.antecedents.row(channels).to_vec(),
-        };
-        let mut consequents = AffineLayer::linear(Array2::zeros((channels, rules * outputs)));
-        let of_rules = self.consequents.axis_chunks_iter(Axis(0), channels + 1);
-        for (rule, of_rule) in of_rules.enumerate() {
-            let first = rule * outputs;
-            consequents.biases[first..first + outputs].copy_from_slice(&self.middles);
-            for (column, &target) in of_rule.columns().into_iter().zip(&self.varying) {
-                let (gains, constant) = column.split_at(Axis(0), channels);
-                consequents.weights.column_mut(first + target).assign(&gains);
-                consequents.biases[first + target] += constant[0];
-            }
-        }
-        Ok(Description::of_maps(vec![LayeredMap {
-            quantity: self.quantity,
-            centre: self.centre.clone(),
-            layers: vec![Layer::Rules {
-                memberships,
-                consequents,
-            }],
-        }]))
-    }
-}
-
-/// Adds `factor` · values · matrix to `sums`; the matrix is values × sums, row by row.
-fn add_products(sums: &mut [f64], values: &[f64], factor: f64, matrix: &[f64]) {
-    if sums.is_empty() {
-        return;
-    }
-    for (value, row) in values.iter().zip(matrix.chunks_exact(sums.len())) {
-        let value = factor * value;
-        for (sum, weight) in sums.iter_mut().zip(row) {
-            *sum += value * weight;
-        }
+        let mut builder = Builder::new(centre.len());
+        let changes = builder.changes(inputs.quantity(), &centre, double);
+        let to_logits = slopes.dot(&to_inputs).reversed_axes();
+        // A row-wire with fewer rules than another one has copies that never fire.
+        let logits = builder.affine_padded(&changes, to_logits, &offsets.to_vec(), f64::MIN);
+        let vectors = builder.affine_of(&changes, weights, &biases);
+        let blended = builder.blend(logits, vectors);
+        let targets = builder.restored(blended, outputs);
+        builder.finish(targets)
     }
 }
 
@@ -202,7 +86,7 @@ mod tests {
     use super::{consequents::Penalty, *};
     use crate::{
         dataset::{Seed, Stream},
-        decoupling::{AffineMap, decode_set},
+        decoupling::{Decoder, ProgramDecoder, decode_set},
         scene::{Noise, Rows, Scene},
         sensor::SensorModel,
     };
@@ -218,14 +102,9 @@ mod tests {
         (draw(samples, Stream::Training), draw(100, Stream::Test))
     }
 
-    fn fit(set: &Dataset, quantity: Quantity) -> TakagiSugeno {
-        TakagiSugeno::fit(
-            set,
-            quantity,
-            NoiseSource::default(),
-            &mut Seed(0).rng(Stream::Expectation),
-        )
-        .unwrap()
+    fn fit(set: &Dataset, quantity: Quantity) -> ProgramDecoder {
+        let mut rng = Seed(0).rng(Stream::Expectation);
+        ProgramDecoder::new(Program::fuzzy(set, quantity, NoiseSource::default(), &mut rng).unwrap())
     }
 
     /// `set` with other readings and targets.
@@ -256,7 +135,8 @@ mod tests {
                 quantity,
                 ..InputChoice::BEST
             };
-            let mut ridge = AffineMap::ridge(&training, choice, NoiseSource::default()).unwrap();
+            let ridge = Program::ridge(&training, choice, NoiseSource::default()).unwrap();
+            let mut ridge = ProgramDecoder::new(ridge);
             let mut fuzzy = fit(&training, quantity);
             let (ours, theirs) = (squared_error(&mut fuzzy, &test), squared_error(&mut ridge, &test));
             assert!(ours < most * theirs, "{quantity:?}: {ours} {theirs}");
@@ -292,8 +172,7 @@ mod tests {
         };
         let outputs_count = units.y.ncols();
         let scaled = consequents::fit_consequents(&antecedents, &units, &vec![penalty; outputs_count], &[]).unwrap();
-        let mut folded = TakagiSugeno::new(&inputs, &antecedents, &scaled, &outputs);
-        assert_eq!(folded.rules(), 8);
+        let mut folded = ProgramDecoder::new(Program::of_rules(&inputs, &antecedents, &scaled, &outputs));
         // Rule by rule in the scaled inputs and targets.
         let x = inputs.of(test.readings());
         let strengths = antecedents.firing_strengths(x.view());
@@ -382,7 +261,7 @@ mod tests {
         targets[[3, 2]] = f64::NAN;
         let set = Dataset::new(set.readings().to_owned(), targets, None, set.groups().to_vec()).unwrap();
         let mut rng = Seed(0).rng(Stream::Expectation);
-        let error = TakagiSugeno::fit(&set, Quantity::Conductance, NoiseSource::default(), &mut rng).unwrap_err();
+        let error = Program::fuzzy(&set, Quantity::Conductance, NoiseSource::default(), &mut rng).unwrap_err();
         assert!(
             matches!(
                 error,
@@ -395,7 +274,7 @@ mod tests {
             "{error}"
         );
         let none = set.select(&[]);
-        let error = TakagiSugeno::fit(&none, Quantity::Conductance, NoiseSource::default(), &mut rng).unwrap_err();
+        let error = Program::fuzzy(&none, Quantity::Conductance, NoiseSource::default(), &mut rng).unwrap_err();
         assert_eq!(error, ScalingError::Empty);
     }
 
@@ -406,7 +285,6 @@ mod tests {
             fit(&training, Quantity::Resistance),
             fit(&training, Quantity::Resistance),
         );
-        assert!(first.rules() > 1);
         assert_eq!(squared_error(&mut first, &test), squared_error(&mut second, &test));
     }
 }
