@@ -115,6 +115,9 @@ pub enum NotDescribed {
         /// Number of unknowns of a row.
         unknowns: usize,
     },
+    /// The decoder is a system of fuzzy rules.
+    #[error("fuzzy rules are only for comparison and cannot be exported: take another decoder, such as rbf or ridge")]
+    Rules,
     /// The decoder cannot be described.
     #[error("this decoder cannot be exported for other programs: take another decoder")]
     Unknown,

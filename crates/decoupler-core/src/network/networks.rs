@@ -54,8 +54,17 @@ impl<'de> Visitor<'de> for OneOrMany {
         while let Some(network) = sequence.next_element()? {
             all.push(network);
         }
-        if all.is_empty() {
+        let Some(first): Option<&DecouplingNetwork> = all.first() else {
             return Err(serde::de::Error::custom("the list of networks is empty"));
+        };
+        let shape = |network: &DecouplingNetwork| {
+            let inputs = &network.inputs;
+            (inputs.quantity(), inputs.channels(), network.outputs.channels())
+        };
+        if all.iter().any(|network| shape(network) != shape(first)) {
+            return Err(serde::de::Error::custom(
+                "the networks of the row-wires differ in their readings or targets",
+            ));
         }
         Ok(Networks::each(all))
     }

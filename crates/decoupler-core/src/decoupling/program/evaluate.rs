@@ -169,6 +169,10 @@ impl Decoder for ProgramDecoder {
     }
 
     fn description(&self) -> Result<Description, NotDescribed> {
+        let is_blend = |node: &Node| matches!(node.operation, Operation::Blend { .. });
+        if self.program.nodes().iter().any(is_blend) {
+            return Err(NotDescribed::Rules);
+        }
         Ok(Description {
             program: self.program.clone(),
             equations: None,

@@ -1,12 +1,12 @@
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
-use decoupler_core::{
-    decoupling::{AffineLayer, Layer},
-    network::Quantity,
-};
+use decoupler_core::network::Quantity;
 use ndarray::{Array1, Array2, ArrayView1};
 
-use super::portable::{FoldedMap, Portable};
+use super::{
+    layers::{AffineLayer, Layer},
+    portable::{FoldedMap, Portable},
+};
 
 /// Answer of a decoder to a reading, and its sensitivity to rounding.
 #[derive(Clone, Debug)]
@@ -97,10 +97,6 @@ fn taken(layer: &Layer<Twofold>, inputs: &[Twofold]) -> Step {
             }
         }
         Layer::Gaussians { centres } => gaussians(centres, inputs),
-        Layer::Rules {
-            memberships,
-            consequents,
-        } => blended(&sums(memberships, inputs), &sums(consequents, inputs)),
     }
 }
 
@@ -143,48 +139,6 @@ fn gaussians(centres: &Array2<Twofold>, inputs: &[Twofold]) -> Step {
         magnitudes,
         slopes,
     }
-}
-
-/// The consequents blended by the memberships with these logarithms.
-fn blended(logarithms: &Step, consequents: &Step) -> Step {
-    let rules = logarithms.values.len();
-    let outputs = consequents.values.len() / rules;
-    let largest = (logarithms.values.iter().copied()).fold(logarithms.values[0], |largest, value| {
-        if value.to_f64() > largest.to_f64() {
-            value
-        } else {
-            largest
-        }
-    });
-    let strengths: Vec<Twofold> = logarithms.values.iter().map(|&value| (value - largest).exp()).collect();
-    let total = strengths.iter().fold(Twofold::ZERO, |sum, &strength| sum + strength);
-    let mut step = Step {
-        values: vec![Twofold::ZERO; outputs],
-        magnitudes: vec![0.0; outputs],
-        slopes: Array2::zeros((outputs, logarithms.slopes.ncols())),
-    };
-    let shares: Vec<Twofold> = strengths.iter().map(|&strength| strength / total).collect();
-    for (rule, &share) in shares.iter().enumerate() {
-        for (output, sum) in step.values.iter_mut().enumerate() {
-            *sum = *sum + share * consequents.values[rule * outputs + output];
-        }
-    }
-    for (rule, share) in shares.iter().map(|share| share.to_f64()).enumerate() {
-        let of_logarithm =
-            logarithms.magnitudes[rule] + logarithms.values[rule].to_f64().abs() + largest.to_f64().abs();
-        for output in 0..outputs {
-            let place = rule * outputs + output;
-            let answer = consequents.values[place].to_f64();
-            // ∂(Σ φ y)/∂ ln φ of one rule.
-            let of_share = share * (answer - step.values[output].to_f64());
-            step.magnitudes[output] +=
-                share * (answer.abs() + consequents.magnitudes[place]) + of_share.abs() * of_logarithm;
-            let mut slopes = step.slopes.row_mut(output);
-            slopes.scaled_add(share, &consequents.slopes.row(place));
-            slopes.scaled_add(of_share, &logarithms.slopes.row(rule));
-        }
-    }
-    step
 }
 
 impl Exact {

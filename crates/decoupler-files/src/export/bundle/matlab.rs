@@ -4,16 +4,13 @@ use std::fmt::Write;
 
 use super::{
     folder::{Call, Draft},
+    layers::Layer,
     meaning::Meaning,
     portable::Portable,
     report::{BundleCheck, BundleError},
     weights::{Arithmetic, Weights, names},
 };
-use decoupler_core::{
-    decoupling::{AffineLayer, Layer},
-    network::Quantity,
-    text::counted,
-};
+use decoupler_core::{network::Quantity, text::counted};
 
 /// Writes the function `name`. The matrices of the rows are stacked vertically.
 pub(super) fn write(name: &str, portable: &Portable, weights: &Weights) -> String {
@@ -133,34 +130,10 @@ fn steps(portable: &Portable) -> String {
                 block(0),
                 count = centres.ncols(),
             ),
-            Layer::Rules {
-                memberships,
-                consequents,
-            } => rules(
-                memberships,
-                consequents,
-                [block(0), constants(1), block(2), constants(3)],
-            ),
         };
         inputs = layer.outputs(inputs);
     }
     text
-}
-
-fn rules<T>(memberships: &AffineLayer<T>, consequents: &AffineLayer<T>, tables: [String; 4]) -> String {
-    let [slopes, offsets, gains, constants] = tables;
-    let rules = memberships.outputs();
-    format!(
-        "    logarithms = v * {slopes} + {offsets};\n    \
-         strengths = exp(logarithms - max(logarithms, [], 2));\n    \
-         strengths = strengths ./ sum(strengths, 2);\n    \
-         of_rules = v * {gains} + {constants};\n    \
-         v = zeros(numel(mine), {outputs});\n    \
-         for g = 1:{rules}\n        \
-         v = v + strengths(:, g) .* of_rules(:, (g - 1) * {outputs} + (1:{outputs}));\n    \
-         end\n",
-        outputs = consequents.outputs() / rules,
-    )
 }
 
 fn push_matrix(text: &mut String, name: &str, columns: usize, values: impl Iterator<Item = f64>) {

@@ -1,11 +1,13 @@
-use decoupler_core::{
-    decoupling::{AffineLayer, Layer, LayeredMap, RowProblemDescription},
-    network::Quantity,
-};
+use decoupler_core::{decoupling::RowProblemDescription, network::Quantity};
 use ndarray::Array2;
 use thiserror::Error;
 
-use super::{exact::Twofold, exported_decoder::ExportedDecoder, meaning::Meaning};
+use super::{
+    exact::Twofold,
+    exported_decoder::ExportedDecoder,
+    layers::{AffineLayer, Layer, LayeredMap},
+    meaning::Meaning,
+};
 use crate::export::format_number;
 
 /// Everything that a decoder computes, from readings (in ohm, or as the user has them) to outputs (in mm, or in the units of
@@ -65,23 +67,18 @@ pub enum FoldError {
         /// Number of the network, from 1.
         network: usize,
     },
-    /// The networks of a file read different quantities.
-    #[error("the networks of the rows read different quantities: train them together")]
-    Quantities,
 }
 
 impl Portable {
     /// Folds the scaling of the decoder of `exported` into its layers.
     ///
     /// # Errors
-    /// A folded weight is not a finite number, or the maps read different quantities.
+    /// A folded weight is not a finite number.
     pub(super) fn of(exported: &ExportedDecoder<'_>) -> Result<Self, FoldError> {
         let description = exported.description();
-        let quantity = description.maps[0].quantity;
-        if description.maps.iter().any(|map| map.quantity != quantity) {
-            return Err(FoldError::Quantities);
-        }
-        let mut maps: Vec<_> = description.maps.iter().map(FoldedMap::of).collect();
+        let layered = LayeredMap::of(&description.program).expect("decoders that are described are chains of layers");
+        let quantity = layered[0].quantity;
+        let mut maps: Vec<_> = layered.iter().map(FoldedMap::of).collect();
         if let Some(index) = maps.iter().position(|map| !is_finite(map, quantity)) {
             return Err(FoldError::NotFinite { network: index + 1 });
         }
@@ -202,18 +199,11 @@ pub(super) struct FoldedMap {
     pub(super) layers: Vec<Layer<Twofold>>,
 }
 
-/// Difference of the logarithms of memberships between a rule and its copy that never fires.
-const NEVER: f64 = -1000.0;
-
 impl FoldedMap {
     /// Folds neighbouring affine layers into one, and the quantity into the first.
     pub(super) fn of(map: &LayeredMap) -> Self {
         // Rounded to single precision: r − R₀ is the same number in both precisions; the biases absorb the difference.
-        let centre: Vec<f64> = map
-            .centre
-            .iter()
-            .map(|&value| f64::from(map.quantity.resistance_ohm(value) as f32))
-            .collect();
+        let centre: Vec<f64> = map.centre.iter().map(|&ohm| f64::from(ohm as f32)).collect();
         let mut pending = Some(of_changes(map, &centre));
         let mut layers = Vec::new();
         for layer in &map.layers {
@@ -222,19 +212,6 @@ impl FoldedMap {
             match (layer, &pending) {
                 (Layer::Affine(next), Some(before)) => pending = Some(joined(before, &next)),
                 (Layer::Affine(next), None) => pending = Some(next),
-                (
-                    Layer::Rules {
-                        memberships,
-                        consequents,
-                    },
-                    Some(before),
-                ) => {
-                    layers.push(Layer::Rules {
-                        memberships: joined(before, &memberships),
-                        consequents: joined(before, &consequents),
-                    });
-                    pending = None;
-                }
                 (layer, _) => {
                     layers.extend(pending.take().map(Layer::Affine));
                     layers.push(layer);
@@ -262,22 +239,22 @@ impl FoldedMap {
     }
 }
 
-/// The centred values of the quantity as an affine map of the changes from `centre`.
+/// The changes from the centre of `map`, which its first layer takes, as an affine map of those from `centre`.
 fn of_changes(map: &LayeredMap, centre: &[f64]) -> AffineLayer<Twofold> {
     let channels = centre.len();
+    let one = Twofold::from(1.0);
     let mut weights = Array2::from_elem((channels, channels), Twofold::ZERO);
     let mut biases = Vec::new();
-    for (channel, (&ohm, &value)) in centre.iter().zip(&map.centre).enumerate() {
-        weights[[channel, channel]] = match map.quantity {
-            Quantity::Conductance => Twofold::from(1.0) / Twofold::from(ohm),
-            Quantity::Resistance | Quantity::LogResistance | Quantity::Raw => Twofold::from(1.0),
+    for (channel, (&to_ohm, &from_ohm)) in centre.iter().zip(&map.centre).enumerate() {
+        let (to, from) = (Twofold::from(to_ohm), Twofold::from(from_ohm));
+        let (weight, bias) = match map.quantity {
+            Quantity::Resistance | Quantity::Raw => (one, to - from),
+            // The program takes (r − R₀)/r.
+            Quantity::Conductance => (-(from / to), one - from / to),
+            Quantity::LogResistance => (one, to.ln() - from.ln()),
         };
-        let at_centre = match map.quantity {
-            Quantity::Resistance | Quantity::Raw => Twofold::from(ohm),
-            Quantity::Conductance => Twofold::from(1.0) / Twofold::from(ohm),
-            Quantity::LogResistance => Twofold::from(ohm).ln(),
-        };
-        biases.push(at_centre - Twofold::from(value));
+        weights[[channel, channel]] = weight;
+        biases.push(bias);
     }
     AffineLayer { weights, biases }
 }
@@ -306,13 +283,12 @@ fn joined(first: &AffineLayer<Twofold>, second: &AffineLayer<Twofold>) -> Affine
     AffineLayer { weights, biases }
 }
 
-/// Number of a layer's outputs, Gaussians or rules; 0 for a layer without tables.
+/// Number of a layer's outputs or Gaussians; 0 for a layer without tables.
 fn own_width(layer: &Layer<Twofold>) -> usize {
     match layer {
         Layer::Affine(affine) => affine.outputs(),
         Layer::Tanh => 0,
         Layer::Gaussians { centres } => centres.ncols(),
-        Layer::Rules { memberships, .. } => memberships.outputs(),
     }
 }
 
@@ -334,34 +310,5 @@ fn widened(layer: &Layer<Twofold>, inputs: usize, width: usize) -> Layer<Twofold
         Layer::Gaussians { centres } => Layer::Gaussians {
             centres: wide(centres, width),
         },
-        Layer::Rules {
-            memberships,
-            consequents,
-        } => {
-            let (rules, outputs) = (memberships.outputs(), consequents.outputs() / memberships.outputs());
-            // The padding consists of copies of the first rule with negligible memberships.
-            let source = |rule: usize| if rule < rules { rule } else { 0 };
-            let of_rule = |column: usize| source(column / outputs) * outputs + column % outputs;
-            let pick = |table: &Array2<Twofold>, columns: usize, of: &dyn Fn(usize) -> usize| {
-                let value = |(input, column)| table.get((input, of(column))).copied().unwrap_or(Twofold::ZERO);
-                Array2::from_shape_fn((inputs, columns), value)
-            };
-            let offset = |rule: usize| {
-                let never = if rule < rules { 0.0 } else { NEVER };
-                memberships.biases[source(rule)] + Twofold::from(never)
-            };
-            Layer::Rules {
-                memberships: AffineLayer {
-                    weights: pick(&memberships.weights, width, &source),
-                    biases: (0..width).map(offset).collect(),
-                },
-                consequents: AffineLayer {
-                    weights: pick(&consequents.weights, width * outputs, &of_rule),
-                    biases: (0..width * outputs)
-                        .map(|column| consequents.biases[of_rule(column)])
-                        .collect(),
-                },
-            }
-        }
     }
 }

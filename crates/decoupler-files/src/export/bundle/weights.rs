@@ -1,15 +1,13 @@
 //! Bundles as one JSON file with the numbers of a decoder, layer by layer.
 
-use decoupler_core::{
-    decoupling::{AffineLayer, Layer},
-    network::Quantity,
-};
+use decoupler_core::network::Quantity;
 use ndarray::ArrayView1;
 use serde_json::{Map, Value, json};
 
 use super::{
     exported_decoder::Metadata,
     folder::Draft,
+    layers::{AffineLayer, Layer},
     portable::{FoldedMap, Portable},
     report::{BundleCheck, BundleError},
     vectors::Vector,
@@ -154,27 +152,6 @@ fn apply(layer: &Layer<f64>, digits: Digits, values: Vec<f64>) -> Vec<f64> {
             };
             centres.columns().into_iter().map(gaussian).collect()
         }
-        Layer::Rules {
-            memberships,
-            consequents,
-        } => {
-            let logarithms = sums(digits, &values, memberships);
-            let largest = logarithms.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-            let strengths: Vec<f64> = logarithms
-                .iter()
-                .map(|logarithm| digits.round(libm::exp(digits.round(logarithm - largest))))
-                .collect();
-            let total = strengths.iter().fold(0.0, |sum, strength| digits.round(sum + strength));
-            let of_rules = sums(digits, &values, consequents);
-            let mut blended = vec![0.0; consequents.outputs() / strengths.len()];
-            for (strength, answers) in strengths.iter().zip(of_rules.chunks_exact(blended.len().max(1))) {
-                let share = digits.round(strength / total);
-                for (sum, answer) in blended.iter_mut().zip(answers) {
-                    *sum = digits.round(*sum + digits.round(share * answer));
-                }
-            }
-            blended
-        }
     }
 }
 
@@ -276,7 +253,6 @@ pub(super) fn names<T>(layers: &[Layer<T>]) -> Vec<LayerNames> {
             (Layer::Affine(_), Some(_)) => ("inputs", affine("input").to_vec()),
             (Layer::Tanh, _) => ("activations", Vec::new()),
             (Layer::Gaussians { .. }, _) => ("gaussians", vec!["gaussian_centres".to_owned()]),
-            (Layer::Rules { .. }, _) => ("blended", [affine("membership"), affine("consequent")].concat()),
         };
         LayerNames {
             result: result.to_owned(),
@@ -296,10 +272,6 @@ fn shapes(layer: &Layer<f64>) -> Vec<Vec<usize>> {
         Layer::Affine(layer) => affine(layer).to_vec(),
         Layer::Tanh => Vec::new(),
         Layer::Gaussians { centres } => vec![vec![centres.nrows(), centres.ncols()]],
-        Layer::Rules {
-            memberships,
-            consequents,
-        } => [affine(memberships), affine(consequents)].concat(),
     }
 }
 

@@ -3,11 +3,12 @@ use super::{
     iteration, number, push_array, type_name,
 };
 use crate::export::bundle::{
+    layers::Layer,
     meaning::Meaning,
     portable::Portable,
     weights::{Arithmetic, Digits, Weights, names},
 };
-use decoupler_core::{decoupling::Layer, network::Quantity};
+use decoupler_core::network::Quantity;
 
 /// Declarations of the interface in floating point.
 pub(super) fn header<'a>(
@@ -161,41 +162,6 @@ fn statements<T>(layer: &Layer<T>, tables: &[String], inputs: &Values, result: &
             input = inputs.at("i", digits),
             centres = tables[0],
         ),
-        Layer::Rules {
-            memberships,
-            consequents,
-        } => {
-            let array = |name: &str, count: usize| Values {
-                name: name.to_owned(),
-                count,
-                digits,
-            };
-            let rules = memberships.outputs();
-            let (strengths, of_rules) = (array("strengths", rules), array("of_rules", consequents.outputs()));
-            format!(
-                "    {kind} strengths[{rules}];\n    {kind} of_rules[{all}];\n{}{}    \
-                 {kind} largest = strengths[0];\n    \
-                 {kind} total = 0;\n    \
-                 for (int j = 1; j < {rules}; ++j) {{\n        \
-                 if (strengths[j] > largest) {{\n            \
-                 largest = strengths[j];\n        \
-                 }}\n    \
-                 }}\n    \
-                 for (int j = 0; j < {rules}; ++j) {{\n        \
-                 strengths[j] = exp{f}(strengths[j] - largest);\n        \
-                 total += strengths[j];\n    \
-                 }}\n    \
-                 for (int k = 0; k < {count}; ++k) {{\n        \
-                 {name}[k] = 0;\n        \
-                 for (int j = 0; j < {rules}; ++j) {{\n            \
-                 {name}[k] += strengths[j] / total * of_rules[j * {count} + k];\n        \
-                 }}\n    \
-                 }}\n",
-                sums(&tables[..2], inputs, &strengths),
-                sums(&tables[2..], inputs, &of_rules),
-                all = of_rules.count,
-            )
-        }
     }
 }
 

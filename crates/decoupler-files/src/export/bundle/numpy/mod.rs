@@ -3,13 +3,14 @@
 mod npz;
 
 use decoupler_core::{
-    decoupling::{Layer, RowChoice, RowProblemDescription},
+    decoupling::{RowChoice, RowProblemDescription},
     network::Quantity,
 };
 
 use self::npz::NamedArray;
 use super::{
     folder::{Call, Draft},
+    layers::Layer,
     meaning::Meaning,
     portable::Portable,
     report::{BundleCheck, BundleError},
@@ -199,18 +200,6 @@ fn steps(portable: &Portable, arithmetic: Arithmetic) -> String {
             Layer::Gaussians { .. } => {
                 format!("    v = np.exp(-((v[:, :, None] - {}) ** 2).sum(axis=1))\n", table(0))
             }
-            Layer::Rules { memberships, .. } => format!(
-                "    logarithms = v @ {} + {}\n    \
-                 strengths = np.exp(logarithms - logarithms.max(axis=1, keepdims=True))\n    \
-                 strengths /= strengths.sum(axis=1, keepdims=True)\n    \
-                 of_rules = (v @ {} + {}).reshape(len(v), {}, -1)\n    \
-                 v = (strengths[:, :, None] * of_rules).sum(axis=1)\n",
-                table(0),
-                table(1),
-                table(2),
-                table(3),
-                memberships.outputs(),
-            ),
         };
     }
     text

@@ -72,7 +72,6 @@ fn apply<'a>(node: &Node, input: impl Fn(usize) -> Result<&'a Tensor, String>) -
                 ..tensor.clone()
             })
         }
-        "Softmax" => softmax(input(0)?),
         "Reshape" => reshape(input(0)?, input(1)?),
         other => Err(format!("the operation {other} is not known")),
     }
@@ -368,24 +367,6 @@ pub(super) fn reduce_sum(tensor: &Tensor, is_kept: bool) -> Outcome {
         shape: [&[rows], kept, rest].concat(),
         values,
     })
-}
-
-/// Softmax along the last axis.
-pub(super) fn softmax(tensor: &Tensor) -> Outcome {
-    let (Values::Real(digits, values), Some(&size)) = (&tensor.values, tensor.shape.last()) else {
-        return Err("it does not fit its elements".to_owned());
-    };
-    let mut shares = Vec::with_capacity(values.len());
-    for row in values.chunks_exact(size.max(1)) {
-        let largest = row.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-        let powers = row
-            .iter()
-            .map(|value| digits.round(libm::exp(digits.round(value - largest))));
-        let powers: Vec<f64> = powers.collect();
-        let total = powers.iter().fold(0.0, |sum, power| digits.round(sum + power));
-        shares.extend(powers.iter().map(|power| digits.round(power / total)));
-    }
-    Ok(Tensor::real(*digits, tensor.shape.clone(), shares))
 }
 
 /// Reshapes the elements; a size of 0 keeps the original size.

@@ -9,11 +9,12 @@ use super::{
 };
 use crate::export::bundle::{
     exported_decoder::Metadata,
+    layers::Layer,
     meaning::{Meaning, comment},
     portable::Portable,
     weights::{Arithmetic, Digits, Table, Weights, names},
 };
-use decoupler_core::{decoupling::Layer, evaluation::Channel, network::Quantity};
+use decoupler_core::{evaluation::Channel, network::Quantity};
 
 const OPSET: i64 = 13;
 /// The first version of the format with opset 13.
@@ -179,20 +180,6 @@ fn add_layers(builder: &mut GraphBuilder, portable: &Portable, weights: &Weights
                 let sums = builder.sum(&squares, "second_axis", false, "squared_distances");
                 let negative = builder.node("Neg", &[&sums], "logarithms_of_gaussians");
                 builder.node("Exp", &[&negative], &result)
-            }
-            Layer::Rules { memberships, .. } => {
-                let tables = [&all[0], &all[1]].map(String::as_str);
-                let logarithms = add_affine(builder, portable, &values, tables, "membership_logarithms");
-                let strengths = builder.node("Softmax", &[&logarithms], "strengths");
-                let strengths = builder.node("Unsqueeze", &[&strengths, "second_axis"], "strengths_of_rules");
-                let tables = [&all[2], &all[3]].map(String::as_str);
-                let of_rules = add_affine(builder, portable, &values, tables, "consequents");
-                let rules = memberships.outputs() as i64;
-                let shape = Tensor::int([3], vec![0, rules, portable.outputs as i64]);
-                let shape = builder.constant("shape_of_consequents", &shape);
-                let of_rules = builder.node("Reshape", &[&of_rules, &shape], "consequents_of_rules");
-                let blended = builder.node("MatMul", &[&strengths, &of_rules], "blended_rules");
-                builder.node("Squeeze", &[&blended, "second_axis"], &result)
             }
         };
     }

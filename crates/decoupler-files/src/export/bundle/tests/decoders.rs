@@ -12,24 +12,24 @@ use crate::export::{
         choice::Taking,
         exact::decode_exactly,
         export_bundle,
+        layers::{AffineLayer, Layer, LayeredMap},
         portable::{FoldedMap, Portable},
         vectors::Vectors,
     },
 };
 use decoupler_core::{
-    decoupling::{AffineLayer, DecoderKind, Layer, LayeredMap},
+    decoupling::DecoderKind,
     evaluation::SimulatedSettings,
     network::{Quantity, ScalingChoice},
     scene::{Movement, Rows},
 };
 
 /// Decoders that consist of layers.
-const LAYERED: [BundleDecoder; 5] = [
+const LAYERED: [BundleDecoder; 4] = [
     BundleDecoder::Kind(DecoderKind::Mean),
     BundleDecoder::Kind(DecoderKind::Ridge),
     BundleDecoder::Linear,
     BundleDecoder::Kind(DecoderKind::RadialBasis),
-    BundleDecoder::Kind(DecoderKind::Fuzzy),
 ];
 const EQUATIONS: [BundleDecoder; 2] = [
     BundleDecoder::Kind(DecoderKind::Newton),
@@ -109,20 +109,12 @@ fn every_decoder_of_layers_is_exported_in_every_format() {
     }
 }
 
-/// Padding to the numbers of rules and Gaussians of the other rows changes no answer.
+/// Padding to the number of Gaussians of the other rows changes no answer.
 #[test]
 fn padding_maps_of_different_sizes_has_no_effect() {
     let affine = |weights, biases: &[f64]| AffineLayer {
         weights,
         biases: biases.to_vec(),
-    };
-    let rules = |memberships, consequents| LayeredMap {
-        quantity: Quantity::Raw,
-        centre: vec![0.3, -0.1],
-        layers: vec![Layer::Rules {
-            memberships,
-            consequents,
-        }],
     };
     let gaussians = |inputs, centres, outputs| LayeredMap {
         quantity: Quantity::Raw,
@@ -133,30 +125,18 @@ fn padding_maps_of_different_sizes_has_no_effect() {
             Layer::Affine(outputs),
         ],
     };
-    let pairs = [
-        [
-            rules(
-                affine(array![[1.0], [-0.5]], &[0.1]),
-                affine(array![[2.0], [1.0]], &[0.7]),
-            ),
-            rules(
-                affine(array![[1.0, 0.4, -1.0], [-0.5, 0.2, 0.3]], &[0.1, -0.3, 0.2]),
-                affine(array![[2.0, 0.3, 1.0], [1.0, -2.0, 0.1]], &[0.7, 0.1, -1.0]),
-            ),
-        ],
-        [
-            gaussians(
-                affine(array![[1.0], [0.5]], &[0.2]),
-                array![[0.4]],
-                affine(array![[3.0]], &[0.1]),
-            ),
-            gaussians(
-                affine(array![[1.0, -1.0], [0.5, 0.3]], &[0.2, 0.0]),
-                array![[0.4, 0.1, -0.2], [-0.3, 0.9, 0.0]],
-                affine(array![[3.0], [-1.0], [0.5]], &[0.1]),
-            ),
-        ],
-    ];
+    let pairs = [[
+        gaussians(
+            affine(array![[1.0], [0.5]], &[0.2]),
+            array![[0.4]],
+            affine(array![[3.0]], &[0.1]),
+        ),
+        gaussians(
+            affine(array![[1.0, -1.0], [0.5, 0.3]], &[0.2, 0.0]),
+            array![[0.4, 0.1, -0.2], [-0.3, 0.9, 0.0]],
+            affine(array![[3.0], [-1.0], [0.5]], &[0.1]),
+        ),
+    ]];
     let file = run_of(settings(Rows::All, 1e-3));
     let any = Portable::of(&(&file).into()).unwrap();
     let any = Portable {
