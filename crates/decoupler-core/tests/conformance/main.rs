@@ -7,7 +7,10 @@ mod programs;
 mod reference;
 
 use cases::{Case, bits, cases};
-use decoupler_core::decoupling::{DecodeError, DecoderKind, decode_set};
+use decoupler_core::{
+    decoupling::{DecodeError, DecoderKind, decode_set},
+    network::Quantity,
+};
 
 #[test]
 fn frames_equal_rows_bit_for_bit() {
@@ -86,8 +89,13 @@ fn invalid_readings_are_named() {
         let (channels, outputs) = (decoder.channels(), decoder.outputs());
         let mut targets = vec![0.0; frames.rows() * outputs];
         for value in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, -3.0, 0.0] {
-            // The mean of the training set answers whatever the readings are.
-            let is_refused = kind != DecoderKind::Mean && !quantity.accepts(value);
+            // The mean of the training set answers whatever the readings are, if they are numbers.
+            let quantity = if kind == DecoderKind::Mean {
+                Quantity::Raw
+            } else {
+                quantity
+            };
+            let is_refused = !quantity.accepts(value);
             let check = |found: Result<(), DecodeError>, row_index: usize| match found.err() {
                 Some(error) => {
                     assert!(is_refused, "{name}, {value}: {error}");
@@ -134,8 +142,8 @@ fn decoding_does_not_allocate() {
         };
         // Buffers of solvers grow to the number of rows.
         work();
-        if kind.needs_sensor() && name.contains("Shared") {
-            // The search for an unknown row-wire allocates.
+        if kind.needs_sensor() && (name.contains("Shared") || name.contains("noisy")) {
+            // The search for an unknown row-wire allocates, and so does the posterior.
             continue;
         }
         assert_eq!(allocation_counter::measure(work).count_total, 0, "{name}");

@@ -112,7 +112,7 @@ fn every_operation_by_hand() {
     ];
     for (name, add, expected) in cases {
         let found = decoded(&of_one(2, add), &readings);
-        let is_close = |(found, expected): (&f64, &f64)| (found - expected).abs() < 1e-15 * expected.abs().max(1.0);
+        let is_close = |(found, expected): (&f64, &f64)| (found - expected).abs() < 1e-12;
         assert!(
             found.iter().zip(&expected).all(is_close),
             "{name}: {found:?} {expected:?}"
@@ -171,7 +171,7 @@ fn programs_equal_their_definition_whatever_their_sizes() {
             assert_eq!(program.rows(), rows);
             let readings = random(&mut rng, 40, inputs);
             let row_indices = Vec::from_iter((0..40).map(|sample| sample * 7 % rows));
-            let found = program.clone().answers(&row_indices, readings.view());
+            let found = ProgramDecoder::new(program.clone()).answers(&row_indices, readings.view());
             let tolerance = match precision {
                 Precision::Double => 1e-13,
                 Precision::Single => 1e-5,
@@ -220,7 +220,7 @@ fn the_program_of_a_decoder_equals_its_answers() {
             case.decoder.decode_row(row, readings, &mut targets).unwrap();
             let expected = answer(&program, row, readings, &mut States::new()).unwrap();
             for (found, expected) in targets.iter().zip(&expected) {
-                let tolerance = if is_single { 1e-4 } else { 1e-9 };
+                let tolerance = if is_single { 1e-4 } else { 1e-7 };
                 let off = (found - expected).abs() / expected.abs().max(1.0);
                 assert!(off < tolerance, "{}: {found} {expected}", case.name);
             }
@@ -282,7 +282,7 @@ fn single_precision_keeps_the_digits_of_readings_that_hardly_differ() {
         let expected = outputs.restore(mlp.forward(inputs.of(readings.view()).view()).view());
         let network = DecouplingNetwork::new(inputs, mlp, outputs);
         for (precision, tolerance) in [(Precision::Double, 1e-9), (Precision::Single, 1e-6)] {
-            let found = network.program(precision).answers(&[0; 20], readings.view());
+            let found = ProgramDecoder::new(network.program(precision)).answers(&[0; 20], readings.view());
             let off = (found - &expected)
                 .iter()
                 .fold(0.0_f64, |most, off| most.max(off.abs()));
@@ -338,17 +338,18 @@ fn samples_that_cannot_be_decoded_are_nan_and_the_others_are_not_affected() {
         b.affine(valid, array![[1.0], [1.0]], &[0.5], Precision::Double)
     });
     let mut readings = Array2::from_shape_fn((50, 2), |(s, c)| (s + c) as f64 + 1.0);
-    let invalid = [0, 16, 17, 33, 49];
+    let invalid = [0, 16, 17, 35, 49];
     invalid.iter().for_each(|&sample| readings[[sample, 1]] = -1.0);
-    let answers = program.clone().answers(&[0; 50], readings.view());
+    let mut decoder = ProgramDecoder::new(program);
+    let answers = decoder.answers(&[0; 50], readings.view());
     for (sample, answer) in answers.iter().enumerate() {
         let expected = 2.0 * sample as f64 + 3.5;
         assert!(answer.is_nan() == invalid.contains(&sample) && (answer.is_nan() || *answer == expected));
     }
     let flat = readings.as_slice().unwrap();
-    let found = ProgramDecoder::new(program).decode_rows(&[0; 33], &flat[34..100], &mut [0.0; 33]);
+    let found = decoder.decode_rows(&[0; 32], &flat[36..100], &mut [0.0; 32]);
     let expected = DecodeError {
-        row_index: 16,
+        row_index: 17,
         channel: 1,
         value: -1.0,
     };

@@ -1,9 +1,9 @@
-use ndarray::Array2;
+use ndarray::{Array2, ArrayView2};
 use pulp::{Simd, WithSimd};
 
 use super::{
     Node, NodeId, Operation, Program,
-    kernel::{self, LANES, Padded, Placement},
+    kernel::{self, LANES, Placement, Table},
 };
 use crate::{
     dataset::{MemoryStream, PerRow, Series},
@@ -43,14 +43,11 @@ enum Work {
     /// The readings, or those that were checked.
     Readings,
     Constants(PerRow<Vec<f64>>),
-    Affine(PerRow<Padded<f64>>),
-    AffineSingle(PerRow<Padded<f32>>),
+    /// Weights with biases, or points.
+    Table(PerRow<Table>),
     Placement(PerRow<Placement>),
-    Distances(PerRow<Padded<f64>>),
-    DistancesSingle(PerRow<Padded<f32>>),
-    Blend {
-        shares: Vec<f64>,
-    },
+    /// Scratch for the shares of a blend.
+    Blend(Vec<f64>),
     History(MemoryStream),
 }
 
@@ -66,9 +63,7 @@ impl ProgramDecoder {
         for node in program.nodes() {
             let work = Work::of(node, &program);
             let stride = match (&work, &node.operation) {
-                (Work::Affine(_) | Work::AffineSingle(_) | Work::Distances(_) | Work::DistancesSingle(_), _) => {
-                    node.size.next_multiple_of(LANES)
-                }
+                (Work::Table(_), _) => node.size.next_multiple_of(LANES),
                 (_, Operation::Map(_, of) | Operation::Valid { of, .. }) => nodes[of.index()].stride,
                 _ => node.size,
             };
@@ -125,6 +120,32 @@ impl ProgramDecoder {
                 stream.restart();
             }
         }
+    }
+
+    /// Answers to `readings` (samples × channels), each with the index of its row-wire: samples × outputs. NaN where a
+    /// reading cannot be decoded.
+    ///
+    /// # Panics
+    /// If the numbers of samples differ, or there is no such row-wire.
+    pub fn answers(&mut self, row_indices: &[usize], readings: ArrayView2<'_, f64>) -> Array2<f64> {
+        let (channels, outputs) = (self.channels(), self.outputs());
+        assert_eq!(readings.dim(), (row_indices.len(), channels));
+        let mut answers = Array2::from_elem((row_indices.len(), outputs), f64::NAN);
+        let readings = readings.as_standard_layout();
+        let readings = readings.as_slice().expect("in standard layout");
+        let mut targets = answers.as_slice_mut().expect("in standard layout");
+        let (mut row_indices, mut readings) = (row_indices, readings);
+        // After an invalid sample, those before it are decoded once more, and then those after it.
+        while let Err(DecodeError { row_index, .. }) = self.decode_rows(row_indices, readings, targets) {
+            let valid = &mut targets[..row_index * outputs];
+            let before = self.decode_rows(&row_indices[..row_index], &readings[..row_index * channels], valid);
+            debug_assert_eq!(before, Ok(()));
+            targets[row_index * outputs..(row_index + 1) * outputs].fill(f64::NAN);
+            row_indices = &row_indices[row_index + 1..];
+            readings = &readings[(row_index + 1) * channels..];
+            targets = &mut targets[(row_index + 1) * outputs..];
+        }
+        answers
     }
 
     /// Decodes `count` rows; `row_index` gives the index of the row-wire of each.
@@ -186,33 +207,39 @@ impl Work {
             Operation::Select { tables, .. } => PerRow::each(tables.clone()),
             _ => panic!("the tables of an operation are constants"),
         };
-        let is_single = node.precision == Precision::Single;
         match &node.operation {
             Operation::Readings => Self::Readings,
+            Operation::Valid { of, .. } if matches!(program.node(*of).operation, Operation::Readings) => Self::Readings,
             Operation::Select { tables, .. } => {
-                let rounded = |&value: &f64| if is_single { f64::from(value as f32) } else { value };
+                let rounded = |&value: &f64| match node.precision {
+                    Precision::Double => value,
+                    Precision::Single => f64::from(value as f32),
+                };
                 let of_row = |table: &Array2<f64>| table.iter().map(rounded).collect();
                 Self::Constants(PerRow::each(tables.iter().map(of_row).collect()))
             }
-            Operation::Valid { of, .. } if matches!(program.node(*of).operation, Operation::Readings) => Self::Readings,
-            Operation::Affine { weights, biases, .. } => {
+            Operation::Affine { of, weights, biases } => {
+                let inputs = program.node(*of).size;
                 let (weights, biases) = (tables(weights), tables(biases));
                 let rows = weights.values().len().max(biases.values().len());
-                let pairs = Vec::from_iter((0..rows).map(|row| (weights.at(row), biases.at(row))));
-                let placements: Option<_> = pairs.iter().map(|(w, b)| Placement::new(w, b)).collect();
-                match placements {
-                    _ if is_single => Self::AffineSingle(PerRow::each(pairs.iter().map(Padded::stacked).collect())),
-                    Some(placements) => Self::Placement(PerRow::each(placements)),
-                    None => Self::Affine(PerRow::each(pairs.iter().map(Padded::stacked).collect())),
+                let rows = || (0..rows).map(|row| (weights.at(row), biases.at(row)));
+                let placements = rows().map(|(weights, biases)| Placement::new(weights, biases));
+                match placements.collect() {
+                    Some(placements) if node.precision == Precision::Double => {
+                        Self::Placement(PerRow::each(placements))
+                    }
+                    _ => {
+                        let stacked =
+                            rows().map(|(weights, biases)| Table::new(node.precision, inputs, &[weights, biases]));
+                        Self::Table(PerRow::each(stacked.collect()))
+                    }
                 }
             }
-            Operation::SquaredDistances { points, .. } if is_single => {
-                Self::DistancesSingle(tables(points).map(Padded::new))
+            Operation::SquaredDistances { of, points } => {
+                let inputs = program.node(*of).size;
+                Self::Table(tables(points).map(|points| Table::new(node.precision, inputs, &[points])))
             }
-            Operation::SquaredDistances { points, .. } => Self::Distances(tables(points).map(Padded::new)),
-            Operation::Blend { logits, .. } => Self::Blend {
-                shares: vec![0.0; program.node(*logits).size],
-            },
+            Operation::Blend { logits, .. } => Self::Blend(vec![0.0; program.node(*logits).size]),
             Operation::History { of, memory } => {
                 let stream = MemoryStream::new(memory, program.node(*of).size);
                 Self::History(stream.expect("checked when the program was built"))
@@ -307,7 +334,7 @@ impl ProgramDecoder {
         for (index, node) in program.nodes().iter().enumerate() {
             let (before, rest) = nodes.split_at_mut(index);
             let Prepared { work, stride, values } = &mut rest[0];
-            let (stride, is_single) = (*stride, node.precision == Precision::Single);
+            let (stride, precision) = (*stride, node.precision);
             // The last values are written where they are wanted, unless they have padding.
             let values = if index == output && stride == outputs {
                 &mut *targets
@@ -327,65 +354,48 @@ impl ProgramDecoder {
             match (&node.operation, work) {
                 (Operation::Readings | Operation::Select { .. }, _) => {}
                 (Operation::Valid { of, domain }, work) => {
-                    let channels = operand(*of).stride;
                     let block = rows.block(operand(*of)).expect("constants need no check");
-                    // Invalid readings are rare: one vectorised pass finds whether there are any.
+                    // Invalid readings are rare: one vectorised pass finds whether there may be any.
                     if !block.iter().fold(true, |all, &value| all & domain.contains(value)) {
-                        let place = block.iter().position(|&value| !domain.contains(value)).unwrap_or(0);
-                        return Err(DecodeError {
-                            row_index: place / channels,
-                            channel: place % channels,
-                            value: block[place],
-                        });
+                        for row_index in 0..rows.count {
+                            let values = &row(*of, row_index)[..node.size];
+                            if let Some(channel) = values.iter().position(|&value| !domain.contains(value)) {
+                                let value = values[channel];
+                                return Err(DecodeError {
+                                    row_index,
+                                    channel,
+                                    value,
+                                });
+                            }
+                        }
                     }
                     if !matches!(work, Work::Readings) {
                         values[..block.len()].copy_from_slice(block);
                     }
                 }
-                (Operation::Subtract(one, other), _) if is_single => {
-                    of_rows!(|r, results| kernel::pairs::<f32>(row(*one, r), row(*other, r), results, |x, y| x - y));
-                }
                 (Operation::Subtract(one, other), _) => {
-                    of_rows!(|r, results| kernel::pairs::<f64>(row(*one, r), row(*other, r), results, |x, y| x - y));
-                }
-                (Operation::Divide(one, other), _) if is_single => {
-                    of_rows!(|r, results| kernel::pairs::<f32>(row(*one, r), row(*other, r), results, |x, y| x / y));
+                    of_rows!(|r, results| kernel::subtract(precision, row(*one, r), row(*other, r), results));
                 }
                 (Operation::Divide(one, other), _) => {
-                    of_rows!(|r, results| kernel::pairs::<f64>(row(*one, r), row(*other, r), results, |x, y| x / y));
+                    of_rows!(|r, results| kernel::divide(precision, row(*one, r), row(*other, r), results));
                 }
-                (Operation::Map(function, of), _) => match (rows.block(operand(*of)), is_single) {
-                    (Some(block), true) => kernel::map::<f32>(*function, block, values),
-                    (Some(block), false) => kernel::map::<f64>(*function, block, values),
-                    (None, true) => of_rows!(|r, results| kernel::map::<f32>(*function, row(*of, r), results)),
-                    (None, false) => of_rows!(|r, results| kernel::map::<f64>(*function, row(*of, r), results)),
+                (Operation::Map(function, of), _) => match rows.block(operand(*of)) {
+                    Some(block) => kernel::map(precision, *function, block, values),
+                    None => of_rows!(|r, results| kernel::map(precision, *function, row(*of, r), results)),
                 },
-                (Operation::Affine { of, .. }, work) => {
-                    let inputs = program.node(*of).size;
-                    match work {
-                        Work::Placement(tables) => {
-                            of_rows!(|r, results| tables.at((rows.index)(r)).apply(row(*of, r), results));
-                        }
-                        Work::Affine(tables) => {
-                            of_rows!(|r, results| tables.at((rows.index)(r)).affine(&row(*of, r)[..inputs], results));
-                        }
-                        Work::AffineSingle(tables) => {
-                            of_rows!(|r, results| tables.at((rows.index)(r)).affine(&row(*of, r)[..inputs], results));
-                        }
-                        _ => unreachable!("prepared as an affine map"),
-                    }
+                (Operation::Affine { of, .. }, Work::Placement(placements)) => {
+                    of_rows!(|r, results| placements.at((rows.index)(r)).apply(row(*of, r), results));
                 }
-                (Operation::SquaredDistances { of, .. }, Work::Distances(tables)) => {
+                (Operation::Affine { of, .. }, Work::Table(tables)) => {
                     let inputs = program.node(*of).size;
-                    of_rows!(|r, results| tables
-                        .at((rows.index)(r))
-                        .squared_distances(&row(*of, r)[..inputs], results));
+                    of_rows!(|r, results| tables.at_mut((rows.index)(r)).affine(&row(*of, r)[..inputs], results));
                 }
-                (Operation::SquaredDistances { of, .. }, Work::DistancesSingle(tables)) => {
+                (Operation::SquaredDistances { of, .. }, Work::Table(tables)) => {
                     let inputs = program.node(*of).size;
-                    of_rows!(|r, results| tables
-                        .at((rows.index)(r))
-                        .squared_distances(&row(*of, r)[..inputs], results));
+                    of_rows!(|r, results| {
+                        let points = tables.at_mut((rows.index)(r));
+                        points.squared_distances(&row(*of, r)[..inputs], results);
+                    });
                 }
                 (Operation::Clip { of, low, high }, _) => of_rows!(|r, results| {
                     let limits = row(*low, r).iter().zip(row(*high, r));
@@ -393,7 +403,10 @@ impl ProgramDecoder {
                         // Written so that NaN passes through.
                         let above = if value < low { low } else { value };
                         let clipped = if above > high { high } else { above };
-                        *result = if is_single { f64::from(clipped as f32) } else { clipped };
+                        *result = match precision {
+                            Precision::Double => clipped,
+                            Precision::Single => f64::from(clipped as f32),
+                        };
                     }
                 }),
                 (Operation::Concatenate(parts), _) => of_rows!(|r, results| {
@@ -404,7 +417,7 @@ impl ProgramDecoder {
                         first += size;
                     }
                 }),
-                (Operation::Blend { logits, of }, Work::Blend { shares }) => {
+                (Operation::Blend { logits, of }, Work::Blend(shares)) => {
                     let count = shares.len();
                     of_rows!(|r, results| kernel::blend(&row(*logits, r)[..count], row(*of, r), shares, results));
                 }

@@ -8,7 +8,10 @@ use std::ops::{Add, Div, Mul, Sub};
 use ndarray::Array2;
 
 use super::Function;
-use crate::network::{exp, tanh, tanh_single};
+use crate::{
+    decoupling::Precision,
+    network::{exp, tanh, tanh_single},
+};
 
 /// Floating-point type of an operation.
 pub(super) trait Real:
@@ -65,7 +68,15 @@ impl Real for f32 {
 /// Writes a function of each value. In single precision, all but the hyperbolic tangent are computed in double precision
 /// and rounded.
 #[inline(always)]
-pub(super) fn map<T: Real>(function: Function, values: &[f64], results: &mut [f64]) {
+pub(super) fn map(precision: Precision, function: Function, values: &[f64], results: &mut [f64]) {
+    match precision {
+        Precision::Double => map_in::<f64>(function, values, results),
+        Precision::Single => map_in::<f32>(function, values, results),
+    }
+}
+
+#[inline(always)]
+fn map_in<T: Real>(function: Function, values: &[f64], results: &mut [f64]) {
     match function {
         Function::Log => each::<T>(values, results, f64::ln),
         Function::Log1p => each::<T>(values, results, f64::ln_1p),
@@ -87,18 +98,90 @@ fn each<T: Real>(values: &[f64], results: &mut [f64], function: impl Fn(f64) -> 
     }
 }
 
-/// Writes a function of pairs of values.
+/// Writes the differences of pairs of values.
 #[inline(always)]
-pub(super) fn pairs<T: Real>(one: &[f64], other: &[f64], results: &mut [f64], function: impl Fn(T, T) -> T) {
+pub(super) fn subtract(precision: Precision, one: &[f64], other: &[f64], results: &mut [f64]) {
+    match precision {
+        Precision::Double => pairs::<f64>(one, other, results, |one, other| one - other),
+        Precision::Single => pairs::<f32>(one, other, results, |one, other| one - other),
+    }
+}
+
+/// Writes the quotients of pairs of values.
+#[inline(always)]
+pub(super) fn divide(precision: Precision, one: &[f64], other: &[f64], results: &mut [f64]) {
+    match precision {
+        Precision::Double => pairs::<f64>(one, other, results, |one, other| one / other),
+        Precision::Single => pairs::<f32>(one, other, results, |one, other| one / other),
+    }
+}
+
+#[inline(always)]
+fn pairs<T: Real>(one: &[f64], other: &[f64], results: &mut [f64], function: impl Fn(T, T) -> T) {
     for ((result, &one), &other) in results.iter_mut().zip(one).zip(other) {
         *result = function(T::of(one), T::of(other)).to_f64();
+    }
+}
+
+/// A table (rows × columns) in the precision of its node.
+#[derive(Clone, Debug)]
+pub(super) enum Table {
+    Double(Padded<f64>),
+    Single {
+        table: Padded<f32>,
+        /// The values rounded to single precision.
+        rounded: Vec<f32>,
+    },
+}
+
+impl Table {
+    /// Lays out tables one after the other, for this number of values.
+    pub(super) fn new(precision: Precision, values: usize, tables: &[&Array2<f64>]) -> Self {
+        match precision {
+            Precision::Double => Self::Double(Padded::new(tables)),
+            Precision::Single => Self::Single {
+                table: Padded::new(tables),
+                rounded: vec![0.0; values],
+            },
+        }
+    }
+
+    /// Writes [values, 1] · table with padding: an affine map whose biases are the last row.
+    #[inline(always)]
+    pub(super) fn affine(&mut self, values: &[f64], results: &mut [f64]) {
+        match self {
+            Self::Double(table) => table.affine(values, results),
+            Self::Single { table, rounded } => {
+                round(values, rounded);
+                table.affine(rounded, results);
+            }
+        }
+    }
+
+    /// Writes the squared distances of the values from each column, with padding.
+    #[inline(always)]
+    pub(super) fn squared_distances(&mut self, values: &[f64], results: &mut [f64]) {
+        match self {
+            Self::Double(table) => table.squared_distances(values, results),
+            Self::Single { table, rounded } => {
+                round(values, rounded);
+                table.squared_distances(rounded, results);
+            }
+        }
+    }
+}
+
+#[inline(always)]
+fn round(values: &[f64], rounded: &mut [f32]) {
+    for (rounded, &value) in rounded.iter_mut().zip(values) {
+        *rounded = value as f32;
     }
 }
 
 /// The number of columns of a table is padded to a multiple of this.
 pub(super) const LANES: usize = 4;
 
-/// A table (rows × columns) with its columns padded to whole vector registers.
+/// A table with its columns padded to whole vector registers.
 #[derive(Clone, Debug)]
 pub(super) struct Padded<T> {
     width: usize,
@@ -106,33 +189,18 @@ pub(super) struct Padded<T> {
 }
 
 impl<T: Real> Padded<T> {
-    pub(super) fn new(table: &Array2<f64>) -> Self {
-        let mut padded = Self {
-            width: table.ncols().next_multiple_of(LANES),
-            values: Vec::new(),
-        };
-        padded.push(table);
-        padded
-    }
-
-    /// Lays out two tables, one after the other.
-    pub(super) fn stacked((first, second): &(&Array2<f64>, &Array2<f64>)) -> Self {
-        let mut padded = Self::new(first);
-        padded.push(second);
-        padded
-    }
-
-    fn push(&mut self, table: &Array2<f64>) {
-        for row in table.rows() {
-            self.values.extend(row.iter().map(|&value| T::of(value)));
-            let length = self.values.len().next_multiple_of(self.width.max(1));
-            self.values.resize(length, T::ZERO);
+    fn new(tables: &[&Array2<f64>]) -> Self {
+        let width = tables[0].ncols().next_multiple_of(LANES);
+        let mut values = Vec::new();
+        for row in tables.iter().flat_map(|table| table.rows()) {
+            values.extend(row.iter().map(|&value| T::of(value)));
+            values.resize(values.len().next_multiple_of(width.max(1)), T::ZERO);
         }
+        Self { width, values }
     }
 
-    /// Writes [values, 1] · table with padding: an affine map whose biases are the last row.
     #[inline(always)]
-    pub(super) fn affine(&self, values: &[f64], results: &mut [f64]) {
+    fn affine(&self, values: &[T], results: &mut [f64]) {
         let mut first = 0;
         while first < self.width {
             first += match self.width - first {
@@ -147,24 +215,23 @@ impl<T: Real> Padded<T> {
     /// Writes the sums `first..first + B` and returns B. Even and odd values are summed separately to hide the latency of
     /// additions.
     #[inline(always)]
-    fn sums<const B: usize>(&self, values: &[f64], first: usize, results: &mut [f64]) -> usize {
+    fn sums<const B: usize>(&self, values: &[T], first: usize, results: &mut [f64]) -> usize {
         let mut even = *self.columns::<B>(values.len(), first);
         let mut odd = [T::ZERO; B];
         let mut pairs = values.chunks_exact(2);
         let mut row = 0;
         for pair in &mut pairs {
             let (of_even, of_odd) = (self.columns::<B>(row, first), self.columns::<B>(row + 1, first));
-            let (one, other) = (T::of(pair[0]), T::of(pair[1]));
             for lane in 0..B {
-                even[lane] = even[lane] + one * of_even[lane];
-                odd[lane] = odd[lane] + other * of_odd[lane];
+                even[lane] = even[lane] + pair[0] * of_even[lane];
+                odd[lane] = odd[lane] + pair[1] * of_odd[lane];
             }
             row += 2;
         }
         if let [value] = *pairs.remainder() {
             let of_even = self.columns::<B>(row, first);
             for lane in 0..B {
-                even[lane] = even[lane] + T::of(value) * of_even[lane];
+                even[lane] = even[lane] + value * of_even[lane];
             }
         }
         for lane in 0..B {
@@ -173,9 +240,8 @@ impl<T: Real> Padded<T> {
         B
     }
 
-    /// Writes the squared distances of the values from each column, with padding.
     #[inline(always)]
-    pub(super) fn squared_distances(&self, values: &[f64], results: &mut [f64]) {
+    fn squared_distances(&self, values: &[T], results: &mut [f64]) {
         let mut first = 0;
         while first < self.width {
             first += match self.width - first {
@@ -188,12 +254,12 @@ impl<T: Real> Padded<T> {
 
     /// Writes the squared distances `first..first + B` and returns B.
     #[inline(always)]
-    fn distances<const B: usize>(&self, values: &[f64], first: usize, results: &mut [f64]) -> usize {
+    fn distances<const B: usize>(&self, values: &[T], first: usize, results: &mut [f64]) -> usize {
         let mut squares = [T::ZERO; B];
         for (row, &value) in values.iter().enumerate() {
             let points = self.columns::<B>(row, first);
             for lane in 0..B {
-                let apart = T::of(value) - points[lane];
+                let apart = value - points[lane];
                 squares[lane] = squares[lane] + apart * apart;
             }
         }

@@ -5,7 +5,7 @@ use ndarray::{Array2, ArrayView2, Axis, Slice};
 use super::{Builder, Function, NodeId, Program, ProgramDecoder};
 use crate::{
     dataset::{Dataset, PerRow},
-    decoupling::{DecodeError, Decoder, Precision},
+    decoupling::Precision,
     network::{DecouplingNetwork, Mlp, Quantity},
 };
 
@@ -38,7 +38,7 @@ impl PerRow<DecouplingNetwork> {
     /// If the set has a different number of channels, or a row-wire without a network.
     pub fn decouple(&self, set: &Dataset) -> Array2<f64> {
         let row_indices = Vec::from_iter((0..set.samples()).map(|sample| set.row_index(sample)));
-        self.program(Precision::Double).answers(&row_indices, set.readings())
+        self.decoder().answers(&row_indices, set.readings())
     }
 }
 
@@ -78,7 +78,7 @@ impl DecouplingNetwork {
     /// readings that cannot be decoded.
     pub fn decouple(&self, resistances_ohm: ArrayView2<'_, f64>) -> Array2<f64> {
         let row_indices = vec![0; resistances_ohm.nrows()];
-        self.program(Precision::Double).answers(&row_indices, resistances_ohm)
+        ProgramDecoder::new(self.program(Precision::Double)).answers(&row_indices, resistances_ohm)
     }
 }
 
@@ -89,7 +89,7 @@ impl Mlp {
         let (weights, biases) = layer(self.hidden_layer());
         let sums = builder.affine(builder.readings(), weights, &biases, Precision::Double);
         let outputs = output_layer(&mut builder, self, sums, Precision::Double);
-        builder.finish(outputs).answers(&vec![0; inputs.nrows()], inputs)
+        ProgramDecoder::new(builder.finish(outputs)).answers(&vec![0; inputs.nrows()], inputs)
     }
 }
 
@@ -104,33 +104,4 @@ fn layer(layer: ArrayView2<'_, f64>) -> (Array2<f64>, Vec<f64>) {
     let inputs = layer.nrows() - 1;
     let weights = layer.slice_axis(Axis(0), Slice::from(..inputs)).to_owned();
     (weights, layer.row(inputs).to_vec())
-}
-
-impl Program {
-    /// Answers to `readings` (samples × channels), each with the index of its row-wire: samples × outputs. NaN where a
-    /// reading cannot be decoded.
-    ///
-    /// # Panics
-    /// If the numbers of samples differ, or there is no such row-wire.
-    pub fn answers(self, row_indices: &[usize], readings: ArrayView2<'_, f64>) -> Array2<f64> {
-        let (channels, outputs) = (self.channels(), self.outputs());
-        assert_eq!(readings.dim(), (row_indices.len(), channels));
-        let mut decoder = ProgramDecoder::new(self);
-        let mut answers = Array2::from_elem((row_indices.len(), outputs), f64::NAN);
-        let readings = readings.as_standard_layout();
-        let readings = readings.as_slice().expect("in standard layout");
-        let mut targets = answers.as_slice_mut().expect("in standard layout");
-        let (mut row_indices, mut readings) = (row_indices, readings);
-        // After an invalid sample, those before it are decoded once more, and then those after it.
-        while let Err(DecodeError { row_index, .. }) = decoder.decode_rows(row_indices, readings, targets) {
-            let valid = &mut targets[..row_index * outputs];
-            let before = decoder.decode_rows(&row_indices[..row_index], &readings[..row_index * channels], valid);
-            debug_assert_eq!(before, Ok(()));
-            targets[row_index * outputs..(row_index + 1) * outputs].fill(f64::NAN);
-            row_indices = &row_indices[row_index + 1..];
-            readings = &readings[(row_index + 1) * channels..];
-            targets = &mut targets[(row_index + 1) * outputs..];
-        }
-        answers
-    }
 }
