@@ -4,7 +4,7 @@ use super::{Coverage, Errors, NoReference, RunError, RunSettings, Source, TestEr
 use crate::{
     dataset::{Dataset, PerRow},
     decoupling::{Program, ProgramDecoder},
-    network::{InputChoice, Quantity},
+    network::Quantity,
     scene::{NoiseSource, Rows},
     sensor::ArrayScale,
 };
@@ -81,14 +81,14 @@ pub(super) fn fit_baselines(
 ) -> Result<(ProgramDecoder, ProgramDecoder), RunError> {
     let mean = |set: &Dataset| Ok::<_, RunError>(Program::mean(set));
     let mean = PerRow::fit(training, settings.source.row_model(), mean)?;
-    let ridge = |inputs| {
-        let of_set = move |set: &Dataset| Program::ridge(set, inputs, NoiseSource::default());
+    let ridge = |quantity| {
+        let of_set = move |set: &Dataset| Program::ridge(set, quantity, NoiseSource::default());
         PerRow::fit(training, settings.source.row_model(), of_set)
     };
     let linear = match settings.source {
-        Source::Simulated(simulation) if simulation.scene.rows == Rows::Known => ridge(InputChoice::PAPER)?,
+        Source::Simulated(simulation) if simulation.scene.rows == Rows::Known => ridge(Quantity::Resistance)?,
         Source::Simulated(_) => PerRow::shared(Program::least_squares(training, Quantity::Resistance)?),
-        Source::Measured(_) => ridge(settings.inputs)?,
+        Source::Measured(_) => ridge(settings.inputs.quantity)?,
     };
     let [mean, linear] = [mean, linear].map(|programs| ProgramDecoder::new(Program::each(&programs)));
     Ok((mean, linear))

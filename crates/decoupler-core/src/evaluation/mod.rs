@@ -19,7 +19,6 @@ mod pressed;
 pub mod recorded;
 mod reference;
 mod remark;
-mod ridge_path;
 mod run;
 mod run_sets;
 mod settings;

@@ -1,7 +1,7 @@
 //! The order in which a search tries features, hidden nodes, methods and committees.
 
 use super::{
-    super::{Initialization, RunError, ridge_path::RidgePath},
+    super::{Initialization, RunError},
     TriedModel, describe_features,
     fold_errors::{FoldErrors, variances},
     search::{COMMITTEE, Candidate, End, Measured, SCREENED, Search},
@@ -9,6 +9,7 @@ use super::{
 };
 use crate::{
     dataset::{Memory, SplitBy},
+    decoupling::{Regression, ridge},
     network::{InputChoice, LARGEST_HIDDEN, Quantity, ScalingChoice, Shape},
     training::{Damping, Method, RegularizationSettings, ScaledConjugateGradientSettings, TrainingError},
 };
@@ -131,7 +132,7 @@ impl Search<'_> {
         for (number, (memory, inputs)) in sets.into_iter().enumerate() {
             self.expected = count - number + FEATURE_SETS + 1 + 4 + 3 + FINALISTS;
             let width = memory.features(self.samples.set.channels());
-            let work = RidgePath::multiplications(self.samples.set.samples(), width, self.folds.count());
+            let work = Regression::multiplications(self.samples.set.samples(), width, self.folds.count());
             if number > 0 && self.work + work > 0.2 * self.budget() {
                 continue;
             }
@@ -142,14 +143,13 @@ impl Search<'_> {
             };
             let values = set.readings().mapv(|reading| inputs.quantity.of(reading));
             self.work += work;
-            let path = RidgePath::new(values.view(), set.targets(), &self.folds);
-            let error = match path {
-                Some(path) => {
-                    let errors = FoldErrors::new(path.squares(), &variances(set.targets()), &self.folds);
+            let error = match ridge(values.view(), set.targets(), &self.folds) {
+                Ok(fit) => {
+                    let errors = FoldErrors::new(&fit.squares, &variances(set.targets()), &self.folds);
                     self.record(&memory, inputs, TriedModel::Ridge, &errors, work);
                     errors.relative()
                 }
-                None => f64::INFINITY,
+                Err(_) => f64::INFINITY,
             };
             // The plain readings are always tried, and many inputs are not multiplied unless that helps.
             let plain = plain_error.get_or_insert(error);
