@@ -46,6 +46,10 @@ enum Work {
     /// Weights with biases, or points.
     Table(PerRow<Table>),
     Placement(PerRow<Placement>),
+    /// A division whose dividend is the difference of these nodes.
+    OfDifference(NodeId, NodeId),
+    /// Not at all: the only node that takes it does without.
+    Skipped,
     /// Scratch for the shares of a blend.
     Blend(Vec<f64>),
     History(MemoryStream),
@@ -73,10 +77,22 @@ impl ProgramDecoder {
                 values: Vec::new(),
             });
         }
+        // A relative change takes one pass over the readings, not two.
+        let differences =
+            nodes
+                .iter()
+                .zip(program.nodes())
+                .filter_map(|(prepared, node)| match (&prepared.work, &node.operation) {
+                    (Work::OfDifference(..), Operation::Divide(difference, _)) => Some(difference.index()),
+                    _ => None,
+                });
+        for difference in Vec::from_iter(differences) {
+            nodes[difference].work = Work::Skipped;
+        }
         let widest = nodes.iter().map(|node| node.stride).max().unwrap_or(0);
         let chunk = (CHUNK_VALUES / widest.max(1)).clamp(1, CHUNK_ROWS);
         for node in &mut nodes {
-            if !matches!(node.work, Work::Readings | Work::Constants(_)) {
+            if !matches!(node.work, Work::Readings | Work::Constants(_) | Work::Skipped) {
                 node.values = vec![0.0; chunk * node.stride];
             }
         }
@@ -239,6 +255,14 @@ impl Work {
                 let inputs = program.node(*of).size;
                 Self::Table(tables(points).map(|points| Table::new(node.precision, inputs, &[points])))
             }
+            Operation::Divide(dividend, _) => match program.node(*dividend) {
+                Node {
+                    operation: Operation::Subtract(one, other),
+                    precision: Precision::Double,
+                    ..
+                } if program.uses(*dividend) == 1 => Self::OfDifference(*one, *other),
+                _ => Self::Plain,
+            },
             Operation::Blend { logits, .. } => Self::Blend(vec![0.0; program.node(*logits).size]),
             Operation::History { of, memory } => {
                 let stream = MemoryStream::new(memory, program.node(*of).size);
@@ -352,7 +376,7 @@ impl ProgramDecoder {
                 };
             }
             match (&node.operation, work) {
-                (Operation::Readings | Operation::Select { .. }, _) => {}
+                (Operation::Readings | Operation::Select { .. }, _) | (_, Work::Skipped) => {}
                 (Operation::Valid { of, domain }, work) => {
                     let block = rows.block(operand(*of)).expect("constants need no check");
                     // Invalid readings are rare: one vectorised pass finds whether there may be any.
@@ -375,6 +399,12 @@ impl ProgramDecoder {
                 }
                 (Operation::Subtract(one, other), _) => {
                     of_rows!(|r, results| kernel::subtract(precision, row(*one, r), row(*other, r), results));
+                }
+                (Operation::Divide(_, divisor), Work::OfDifference(one, other)) => {
+                    of_rows!(|r, results| {
+                        let operands = [row(*one, r), row(*other, r), row(*divisor, r)];
+                        kernel::subtract_and_divide(precision, operands, results);
+                    });
                 }
                 (Operation::Divide(one, other), _) => {
                     of_rows!(|r, results| kernel::divide(precision, row(*one, r), row(*other, r), results));

@@ -116,6 +116,18 @@ pub(super) fn divide(precision: Precision, one: &[f64], other: &[f64], results: 
     }
 }
 
+/// Writes (one − other) / divisor, with the difference in double precision.
+#[inline(always)]
+pub(super) fn subtract_and_divide(precision: Precision, [one, other, divisor]: [&[f64]; 3], results: &mut [f64]) {
+    let all = results.iter_mut().zip(one).zip(other).zip(divisor);
+    match precision {
+        Precision::Double => all.for_each(|(((result, one), other), divisor)| *result = (one - other) / divisor),
+        Precision::Single => all.for_each(|(((result, one), other), &divisor)| {
+            *result = f64::from((one - other) as f32 / divisor as f32);
+        }),
+    }
+}
+
 #[inline(always)]
 fn pairs<T: Real>(one: &[f64], other: &[f64], results: &mut [f64], function: impl Fn(T, T) -> T) {
     for ((result, &one), &other) in results.iter_mut().zip(one).zip(other) {

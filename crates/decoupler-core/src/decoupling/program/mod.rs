@@ -206,6 +206,12 @@ impl Program {
         tables.max().unwrap_or(1)
     }
 
+    /// Number of times that a node is taken, as an operand or as the targets.
+    fn uses(&self, id: NodeId) -> usize {
+        let operands = self.nodes.iter().flat_map(|node| node.operation.operands());
+        operands.chain([self.output]).filter(|&operand| operand == id).count()
+    }
+
     /// Joins the programs of the row-wires, which consist of the same operations, into one that selects their constants by
     /// the row-wire. Smaller tables are padded: to weights of 0, unless the table states another padding. A node is in
     /// single precision only if it is for every row-wire.
@@ -291,6 +297,19 @@ impl Operation {
             *operand = moved(operand);
         }
         operation
+    }
+
+    /// Nodes from which the operation computes.
+    pub fn operands(&self) -> Vec<NodeId> {
+        match self {
+            Self::Readings | Self::Select { .. } => Vec::new(),
+            Self::Valid { of, .. } | Self::Map(_, of) | Self::History { of, .. } => vec![*of],
+            Self::Subtract(one, other) | Self::Divide(one, other) => vec![*one, *other],
+            Self::SquaredDistances { of, points: other } | Self::Blend { logits: other, of } => vec![*of, *other],
+            Self::Affine { of, weights, biases } => vec![*of, *weights, *biases],
+            Self::Clip { of, low, high } | Self::CountOutside { of, low, high } => vec![*of, *low, *high],
+            Self::Concatenate(parts) => parts.clone(),
+        }
     }
 
     fn operands_mut(&mut self) -> Vec<&mut NodeId> {
