@@ -7,6 +7,7 @@ use std::{path::Path, sync::Arc};
 use decoupler_core::{
     decoupling::{DecoderKind, Precision},
     evaluation::{DecoderReport, PastNetworks, Run},
+    job::Job,
 };
 use decoupler_files::{
     export::{
@@ -325,8 +326,7 @@ impl DecoderSource {
 
 /// Draws or reads the samples of a setup.
 fn samples(setup: &Setup) -> Result<SetupSets, BundleError> {
-    let sets = setup.sets(Path::new(""), &|| false, &mut |_| ())?;
-    Ok(sets.expect("nothing cancels it"))
+    Ok(setup.sets(Path::new(""), &Job::UNINTERRUPTED, &mut |_| ())?)
 }
 
 /// A button that opens the menu of formats in which a decoder can be exported; returns the file asked for.

@@ -2,7 +2,7 @@ use faer::{Mat, MatRef};
 use ndarray::{Array2, ArrayView2};
 
 use crate::{
-    dataset::{Dataset, Folds, Seed, SplitBy, Stream},
+    dataset::{Dataset, DivisionError, Folds, Seed, SplitBy, Stream},
     network::ScalingError,
 };
 
@@ -405,7 +405,7 @@ pub(super) fn folds(set: &Dataset) -> Option<Folds> {
     let divide = |folds| Folds::by(set, folds, by, &mut Seed(0).rng(Stream::Split));
     match divide(count) {
         Ok(folds) => Some(folds),
-        Err(error) if error.units >= 2 => divide(error.units).ok(),
+        Err(DivisionError::Folds { units, .. }) if units >= 2 => divide(units).ok(),
         // A single group.
         Err(_) if samples >= 2 => Some(Folds::consecutive(samples, count.min(samples))),
         Err(_) => None,

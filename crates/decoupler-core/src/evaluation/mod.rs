@@ -33,6 +33,7 @@ pub use decoder_set::{DecoderCost, DecoderReport, DecoderSet};
 pub use errors::{Errors, NodeAddress, Spread, TargetErrors, TestErrors, node_rms_mm};
 pub use intervals::{Coverage, HalfWidth, Intervals, IntervalsDefect, NoIntervals};
 pub use past_networks::{PastNetwork, PastNetworks};
+pub use preparation::Begin;
 pub use pressed::{Pressed, PressedAnswer, fine_tune, press_limits, pressed_rows, rebased};
 pub use reference::{NoReference, ReferenceNote, reference_errors};
 pub use remark::{Cause, MissingFigures, Remark, error_remarks};

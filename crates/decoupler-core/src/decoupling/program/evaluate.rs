@@ -52,7 +52,7 @@ enum Work {
     Skipped,
     /// Scratch for the shares of a blend.
     Blend(Vec<f64>),
-    History(MemoryStream),
+    History(Box<MemoryStream>),
 }
 
 /// Maximum number of rows, and of values of a node, that are evaluated together: several rows fill the vector registers of
@@ -266,7 +266,7 @@ impl Work {
             Operation::Blend { logits, .. } => Self::Blend(vec![0.0; program.node(*logits).size]),
             Operation::History { of, memory } => {
                 let stream = MemoryStream::new(memory, program.node(*of).size);
-                Self::History(stream.expect("checked when the program was built"))
+                Self::History(Box::new(stream.expect("checked when the program was built")))
             }
             _ => Self::Plain,
         }
