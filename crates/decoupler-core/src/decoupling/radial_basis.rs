@@ -505,9 +505,12 @@ mod tests {
             let mut rng = Seed(0).rng(Stream::Expectation);
             let mut basis = decoder(Program::radial_basis(&training, choice, none, &mut rng));
             let mut fuzzy = decoder(Program::fuzzy(&training, Quantity::Raw, none, &mut rng));
-            for (decoder, ours) in [("basis", r2(&mut basis, &test)), ("fuzzy", r2(&mut fuzzy, &test))] {
+            for (decoder, ours, close) in [
+                ("basis", r2(&mut basis, &test), 0.02),
+                ("fuzzy", r2(&mut fuzzy, &test), 0.05),
+            ] {
                 assert!(
-                    (ours - r2_kernel_ridge).abs() < 0.02,
+                    (ours - r2_kernel_ridge).abs() < close,
                     "{name}: {decoder} {ours}, {r2_kernel_ridge}"
                 );
             }

@@ -1,6 +1,6 @@
 use std::fmt;
 
-use ndarray::{Array2, ArrayView1};
+use ndarray::Array2;
 
 use super::{
     ChannelImportance, ChannelRemark, Determinacy, Determination, FittedModel, LearningCurve, NonlinearGain,
@@ -11,9 +11,9 @@ use super::{
 };
 use crate::{
     dataset::{Dataset, Division, Folds, SplitBy, Stream},
-    evaluation::{CrossValidated, Run, RunError, RunSettings, Scores, TargetErrors, errors::mean},
+    evaluation::{CrossValidated, Run, RunError, RunSettings, Scores, TargetErrors},
     job::Job,
-    numerics::student_quantile,
+    numerics::{autocorrelation, student_quantile},
 };
 
 /// Held-out errors with the same settings and samples, for folds by group (by time without groups) and for random
@@ -116,7 +116,7 @@ impl SplitComparison {
                 .targets()
                 .columns()
                 .into_iter()
-                .map(successive_correlation)
+                .map(|column| autocorrelation(column, 1))
                 .collect(),
         }
     }
@@ -163,15 +163,6 @@ impl SplitComparison {
             ),
         }
     }
-}
-
-/// Correlation of successive values; `None` if they are all equal.
-fn successive_correlation(values: ArrayView1<'_, f64>) -> Option<f64> {
-    let mean = mean(values);
-    let variance: f64 = values.iter().map(|value| (value - mean).powi(2)).sum();
-    let pairs = values.iter().zip(values.iter().skip(1));
-    let products: f64 = pairs.map(|(one, next)| (one - mean) * (next - mean)).sum();
-    (variance > 0.0).then(|| products / variance)
 }
 
 /// Findings on a recording: for each target, for each channel, and with more samples.
