@@ -54,7 +54,7 @@ class _SampleDecoder(Decoder):
 
 
 class RidgeDecoder(_SampleDecoder):
-    """Affine map by ridge regression, the penalty of each target chosen by leave-one-out error.
+    """Affine map by ridge regression, the penalty of each target chosen by cross-validation.
 
     It is the baseline of the program's error table.
 
@@ -62,8 +62,6 @@ class RidgeDecoder(_SampleDecoder):
     ----------
     inputs : {"raw", "resistance", "conductance", "log"}, default="raw"
         Quantity computed from each reading. All but "raw" need resistances above 0.
-    scaling : {"minmax", "whiten"}, default="minmax"
-        Scaling of the inputs: each to [-1, 1], or whitened principal components.
     rows : int or str, default=None
         Index or name of the column of `X` with the row-wire of each sample: there is then one map
         for each row-wire. None for one map of all columns.
@@ -87,9 +85,8 @@ class RidgeDecoder(_SampleDecoder):
 
     _kind = "ridge"
 
-    def __init__(self, *, inputs: str = "raw", scaling: str = "minmax", rows: int | str | None = None) -> None:
+    def __init__(self, *, inputs: str = "raw", rows: int | str | None = None) -> None:
         self.inputs = inputs
-        self.scaling = scaling
         self.rows = rows
 
 

@@ -81,7 +81,7 @@ pub fn fit_decoder(
     let unseen = NoiseSource::default();
     let mut rng = Seed(seed).rng(Stream::Expectation);
     let mut fit = |set: &Dataset| match kind {
-        "ridge" => Program::ridge(set, choice, unseen).map_err(|error| error.to_string()),
+        "ridge" => Program::ridge(set, choice.quantity, unseen).map_err(|error| error.to_string()),
         "rbf" => Program::radial_basis(set, choice, unseen, &mut rng).map_err(|error| error.to_string()),
         "fuzzy" => Program::fuzzy(set, choice.quantity, unseen, &mut rng).map_err(|error| error.to_string()),
         other => Err(format!("'{other}' is not a decoder: give ridge, rbf or fuzzy")),

@@ -8,7 +8,8 @@ use std::{
 
 use decoupler_core::{
     dataset::{Dataset, Division, Split, SplitBy},
-    evaluation::{Channel, Intervals, Problem, Run, RunSettings, TestErrors},
+    evaluation::{Begin, Channel, Intervals, Problem, Run, RunSettings, TestErrors},
+    job::Job,
     network::Networks,
     training::{EpochRecord, Stage, StopReason},
 };
@@ -102,13 +103,15 @@ impl Saved<'_> {
         columns.write(&data, training).map_err(text)?;
         columns.write(&tested, test).map_err(text)?;
         let setup = Setup::recording(self.settings, columns.plan(data, tested, self.division));
-        let sets = setup.sets(Path::new(""), &|| false, &mut |_| ()).map_err(text)?;
-        let sets = sets.expect("nothing cancels it");
+        let sets = setup
+            .sets(Path::new(""), &Job::UNINTERRUPTED, &mut |_| ())
+            .map_err(text)?;
+        let sets = sets;
         if samples_crc32(&sets.sets.split.training) != self.origin.crc32 {
             return Err("the files with the samples do not read back as the samples of fit".to_owned());
         }
         // Measures the baselines.
-        let run = sets.run(&setup, &|| false).map_err(text)?.expect("nothing cancels it");
+        let run = sets.run(&setup, Begin::Initialize, &Job::UNINTERRUPTED).map_err(text)?;
         let mut file = NetworkFile::from_run(&run, sets.recorded()).map_err(text)?;
         file.drift = sets.drift_reference();
         file.network = self.networks.clone();

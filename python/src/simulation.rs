@@ -2,7 +2,8 @@
 
 use decoupler_core::{
     dataset::{Dataset, Seed},
-    evaluation::{Preset, SimulatedSettings, Workload},
+    evaluation::{Preset, RunSets, SimulatedSettings},
+    job::Job,
     scene::{Loading, Movement, Noise, NoisySets, Rows},
 };
 use decoupler_files::machine::memory_budget;
@@ -94,11 +95,7 @@ pub fn simulate<'py>(
     settings: &Bound<'py, PyAny>,
 ) -> PyResult<(Bound<'py, PyDict>, Option<Bound<'py, PyDict>>, Bound<'py, PyDict>, f64)> {
     let settings = settings.extract::<Settings>()?.simulated(sensor)?;
-    settings.check_counts().map_err(value_error)?;
-    Workload::of(&settings)
-        .and_then(|workload| workload.check_memory(memory_budget()))
-        .map_err(value_error)?;
-    let sets = detached(py, || settings.draw_sets())?;
+    let sets = detached(py, || RunSets::draw(&settings, memory_budget(), &Job::UNINTERRUPTED))?;
     let validation = sets.split.validation.as_ref();
     Ok((
         arrays(py, &sets.split.training)?,

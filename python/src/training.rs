@@ -5,9 +5,10 @@ use std::sync::{Mutex, PoisonError};
 use decoupler_core::{
     dataset::{Dataset, Seed, Split, SplitBy},
     evaluation::{
-        Channel, Combination, Initialization, Intervals, Measured, NoIntervals, Problem, RecordedSize, Run, RunError,
-        RunSettings, Workload,
+        Begin, Channel, Combination, Initialization, Intervals, Measured, NoIntervals, Problem, RecordedSize, Run,
+        RunError, RunSets, RunSettings, Workload,
     },
+    job::Job,
     network::{Quantity, ScalingChoice},
     scene::RowModel,
     training::{EpochRecord, Method, StoppingRules},
@@ -251,7 +252,14 @@ pub fn train(
     Workload::of_recording(&run_settings, size)
         .check_memory(memory_budget())
         .map_err(value_error)?;
-    let mut run = detached(py, move || Run::on_split(run_settings, split))?;
+    let mut run = detached(py, move || {
+        Run::new(
+            run_settings,
+            RunSets::without_test(split),
+            Begin::Initialize,
+            &Job::UNINTERRUPTED,
+        )
+    })?;
     let mut interruption = step_to_the_end(py, &mut run, callback.as_ref());
     run.stop();
     let mut warning = run.defect().map(|defect| defect.to_string());
@@ -331,7 +339,7 @@ fn calibrate(
             }
             interruption.is_some()
         };
-        Ok::<_, RunError>(Intervals::cross_validate(settings, set, by, &is_cancelled))
+        Ok::<_, RunError>(Intervals::cross_validate(settings, set, by, &Job::new(&is_cancelled)))
     })?;
     if let Some(signal) = interruption.into_inner().unwrap_or_else(PoisonError::into_inner) {
         return Err(signal);

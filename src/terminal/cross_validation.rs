@@ -16,10 +16,11 @@ use super::{
 use decoupler_core::{
     dataset::{Division, Folds, SplitBy, Stream},
     evaluation::{
-        Channel, CrossValidated, ErrorTable, Problem, RecordedSize, Run, RunError, RunSettings, Scores, TestErrors,
-        Workload,
+        Begin, Channel, CrossValidated, ErrorTable, Problem, RecordedSize, Run, RunError, RunSets, RunSettings, Scores,
+        TestErrors, Workload,
         recorded::{Determination, NonlinearGain, SplitComparison, channel_remarks},
     },
+    job::Job,
 };
 use decoupler_files::{
     export::{describe_channels, describe_determinacy, error_table},
@@ -73,16 +74,17 @@ impl Train {
         Workload::of_recording(settings, RecordedSize::of(settings, set)).check_memory(memory_budget())?;
         let assigned = Folds::by(set, folds, by, &mut settings.seed.rng(Stream::Split));
         let assigned = assigned.map_err(|error| Failure::Arguments(error.to_string()))?;
-        let validated = CrossValidated::on_folds(settings, set, assigned, || false)?.expect("nothing cancels it");
+        let validated = CrossValidated::on_folds(settings, set, assigned, &Job::UNINTERRUPTED)?;
         let (mut optimism, mut end) = (Vec::new(), Ok(()));
         if by == SplitBy::Random {
             let honest = SplitBy::honest(set);
             let graceful = Graceful::begin();
             announce_comparison(honest);
             let is_cancelled = || graceful.is_end_requested();
-            match SplitComparison::complete(settings, set, folds, (by, &validated), &is_cancelled)? {
-                Some(comparison) => optimism = sentences(&comparison, &recording.targets),
-                None => end = Err(Failure::InterruptedComparison { by: honest }),
+            match SplitComparison::complete(settings, set, folds, (by, &validated), &Job::new(&is_cancelled)) {
+                Ok(comparison) => optimism = sentences(&comparison, &recording.targets),
+                Err(RunError::Cancelled(_)) => end = Err(Failure::InterruptedComparison { by: honest }),
+                Err(error) => return Err(error.into()),
             }
         }
         print_folds(plan, &recording, settings, &validated, optimism, self.json)?;
@@ -107,7 +109,8 @@ impl Train {
         let honest = || -> Result<Run, RunError> {
             let division = Division { by, ..plan.division };
             let parts = division.divide(set, &mut settings.seed.rng(Stream::Split))?;
-            Run::on_sets(settings, parts.split(set), parts.test_set(set))
+            let sets = RunSets::new(parts.split(set), parts.test_set(set));
+            Run::with_baselines(settings, sets, Begin::Initialize, &Job::UNINTERRUPTED)
         };
         let mut honest = match honest() {
             Ok(honest) => honest,

@@ -10,6 +10,7 @@ use decoupler_core::{
     calibration::PressLimits,
     dataset::{Dataset, Division, SimulationError, SplitBy, Stream},
     evaluation::{Channel, Errors, Problem, TestErrors, fine_tune, press_limits, pressed_rows},
+    job::Job,
     network::{DecouplingNetwork, Networks},
     sensor::SensorModel,
     text::{counted, inert},
@@ -468,12 +469,12 @@ impl FineTune {
         let mut training = settings.training;
         training.stopping.epochs = self.epochs.unwrap_or(training.stopping.epochs);
         let bar = progress_bar(self.json, 1, "fine-tuning {spinner}");
-        let tuned = fine_tune(&file.network, &split, training, memory_budget(), &|| false);
+        let tuned = fine_tune(&file.network, &split, training, memory_budget(), &Job::UNINTERRUPTED);
         bar.finish_and_clear();
-        let tuned = tuned?.expect("nothing cancels it");
+        let tuned = tuned?;
         let stroke_mm = settings.source.stroke_mm();
         let errors = |set: &Dataset, networks: &Networks| Errors::measure(set, &networks.decouple(set), stroke_mm);
-        let simulated = settings.draw_test()?;
+        let simulated = settings.source.draw_test(settings.seed)?;
         let report = Report {
             training_samples: split.training.samples(),
             validation_samples: split.validation.as_ref().map_or(0, Dataset::samples),

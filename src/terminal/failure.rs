@@ -247,7 +247,6 @@ fn is_argument_error(error: &RunError) -> bool {
             | RunError::Simulation(SimulationError::Count(_) | SimulationError::Scene(_))
             | RunError::Training(_)
             | RunError::Memory { .. }
-            | RunError::Folds(_)
             | RunError::Division(_)
     )
 }

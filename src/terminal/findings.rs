@@ -18,6 +18,7 @@ use decoupler_core::{
             StudyStep,
         },
     },
+    job::Job,
     network::LARGEST_HIDDEN,
     scene::RowModel,
     text::capitalised,
@@ -116,16 +117,22 @@ impl StudyArguments {
         let divided = (&plan.division, folds);
         let budget_s = self.budget.or(self.model.is_none().then_some(BUDGET_S));
         let is_spent = || budget_s.is_some_and(|budget_s| begun.elapsed().as_secs_f64() > budget_s);
-        let ends: [&dyn Fn() -> bool; 2] = [&|| false, &is_spent];
         // Steps of ridge regression first.
         begin(StudyStep::Memory);
-        let gain = memory_gain(&settings, &recording, (by, folds), &is_spent)?;
+        let gain = memory_gain(&settings, &recording, (by, folds), &Job::new(&is_spent))?;
         let time_of_networks = time_of_networks(&settings, &recording.set, folds);
         let affords_networks = budget_s.is_none_or(|budget_s| time_of_networks.as_secs_f64() <= LONGEST * budget_s);
         let model = self.model.or((!affords_networks).then_some(FittedModel::Ridge));
-        let found = Findings::measure(&settings, &recording.set, divided, model, &begin, ends);
+        let found = Findings::measure(
+            &settings,
+            &recording.set,
+            divided,
+            model,
+            &begin,
+            (&Job::UNINTERRUPTED, &is_spent),
+        );
         bar.finish_and_clear();
-        let Some(findings) = found? else { return Ok(()) };
+        let findings = found?;
         let measured = gain.as_ref().and_then(|gain| gain.as_ref().ok());
         let mut report = Report::new(&plan, &recording, &settings, folds, (&findings, measured));
         let mut steps = Vec::new();
@@ -188,7 +195,7 @@ fn memory_gain(
     settings: &RunSettings,
     recording: &Recording,
     divided: (SplitBy, usize),
-    is_spent: &dyn Fn() -> bool,
+    in_time: &Job<'_>,
 ) -> Result<Option<Result<MemoryGain, Spent>>, Failure> {
     let history = recording.history();
     let given = recording.memory().cloned();
@@ -201,8 +208,10 @@ fn memory_gain(
         Ok(recording.set.with_readings(features))
     };
     let (without, with) = (set(&Memory::default())?, set(&memory)?);
-    let measured = MemoryGain::measure(settings, &memory, [&without, &with], divided, is_spent)?;
-    Ok(Some(measured.ok_or(Spent)))
+    match MemoryGain::measure(settings, &memory, [&without, &with], divided, in_time) {
+        Err(RunError::Cancelled(_)) => Ok(Some(Err(Spent))),
+        measured => Ok(Some(Ok(measured?))),
+    }
 }
 
 /// The object printed by `inspect --targets --json`.

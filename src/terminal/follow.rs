@@ -15,7 +15,7 @@ use clap::Args;
 use decoupler_core::{
     dataset::{Place, SimulationError},
     evaluation::Simulation,
-    live::{FaultEvent, FaultMonitor, LeftOutDecoder},
+    live::{FaultEvent, LeftOutDecoder, WireCheck, equation_decoder},
     scene::Noise,
 };
 use decoupler_files::{
@@ -333,7 +333,7 @@ pub(super) struct Faults {
 }
 
 struct Watch {
-    monitor: FaultMonitor,
+    check: WireCheck,
     left_out: LeftOutDecoder,
     /// Latest readings of every row read: rows × M4.
     frame_ohm: Vec<f64>,
@@ -357,7 +357,7 @@ impl Faults {
                 "fault detection needs the noise of the readings, and the network was trained without noise; give \
                  --noise REL",
             )
-        } else if !FaultMonitor::is_affordable(scale, &scene) {
+        } else if !WireCheck::is_affordable(scale, &scene) {
             Some("the array is too large")
         } else {
             None
@@ -372,8 +372,10 @@ impl Faults {
         let rows = scene.rows.read(scale.rows()).map_err(SimulationError::from)?;
         Ok(Self {
             watch: Some(Watch {
-                monitor: FaultMonitor::new(sensor, &scene, &rows).map_err(Failure::Sensor)?,
-                left_out: LeftOutDecoder::new(sensor, &scene, &rows).map_err(Failure::Sensor)?,
+                check: WireCheck::new(sensor, &scene, &rows).map_err(Failure::Sensor)?,
+                left_out: equation_decoder(sensor, &scene, &rows)
+                    .and_then(|decoder| LeftOutDecoder::new(sensor, &scene, &rows, decoder))
+                    .map_err(Failure::Sensor)?,
                 frame_ohm: vec![0.0; rows.len() * scale.columns()],
                 is_new: vec![false; rows.len()],
                 columns: scale.columns(),
@@ -427,7 +429,7 @@ impl Faults {
     pub(super) fn check(&mut self, line: u64) {
         let Some(watch) = &mut self.watch else { return };
         watch.is_new.fill(false);
-        match watch.monitor.check(&watch.frame_ohm) {
+        match watch.check.check(&watch.frame_ohm) {
             Some(FaultEvent::Named(fault)) => {
                 warn(&format!(
                     "line {line}: {fault}; left out from here on; frames are decoded from the other readings \
@@ -445,7 +447,7 @@ impl Faults {
             }
             None => {}
         }
-        watch.left_out.leave_out(watch.monitor.named());
+        watch.left_out.leave_out(watch.check.named());
     }
 }
 

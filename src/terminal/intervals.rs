@@ -5,6 +5,7 @@ use std::io::Write;
 use clap::ValueEnum;
 use decoupler_core::{
     evaluation::{Channel, Intervals, Run},
+    job::Job,
     live::{Drift, DriftEvent, DriftMonitor},
 };
 use decoupler_files::{
@@ -54,7 +55,7 @@ pub(super) fn calibrate(run: &mut Run, sets: &SetupSets, when: WhenCalibrated) {
             }
             let graceful = Graceful::begin();
             let is_cancelled = || graceful.is_end_requested();
-            Intervals::cross_validate(run.settings(), &sets.sets.split.training, by, &is_cancelled)
+            Intervals::cross_validate(run.settings(), &sets.sets.split.training, by, &Job::new(&is_cancelled))
         }
     };
     match calibrated {

@@ -8,7 +8,7 @@ use std::{
 
 use clap::{Args, ValueEnum};
 use decoupler_core::{
-    dataset::{FoldUnit, Seed},
+    dataset::{Seed, SplitBy},
     evaluation::{
         CrossValidation, MAX_STARTS,
         experiments::{
@@ -193,9 +193,9 @@ impl Reproduce {
         if let Some(cross_validation) = &mut experiment.cross_validation {
             cross_validation.folds = self.k;
             cross_validation.repeats = self.repeats;
-            cross_validation.unit = match self.folds {
-                Unit::Sample => FoldUnit::Sample,
-                Unit::Snapshot => FoldUnit::Snapshot,
+            cross_validation.by = match self.folds {
+                Unit::Sample => SplitBy::Random,
+                Unit::Snapshot => SplitBy::Group,
             };
         }
         experiment

@@ -11,8 +11,10 @@ use decoupler_core::{
     dataset::{Dataset, LARGEST_SAMPLES, Seed, SimulationError, Stream},
     decoupling::{Decoder, Precision, decode_set},
     evaluation::{
-        DecoderSet, RecordedSize, Run, RunError, RunSettings, SimulatedSettings, Simulation, Workload, error_remarks,
+        DecoderSet, RecordedSize, Run, RunError, RunSets, RunSettings, SimulatedSettings, Simulation, Workload,
+        error_remarks,
     },
+    job::Job,
     scene::{Fault, FaultySensor},
     sensor::{ArrayScale, SensorModel},
 };
@@ -36,7 +38,7 @@ use super::{
 pub(super) fn sets(setup: &Setup, is_json: bool) -> Result<SetupSets, Failure> {
     announce(setup.settings())?;
     let sets = following(setup, is_json, |on_progress| {
-        setup.sets(working_folder(), &|| false, on_progress)
+        setup.sets(working_folder(), &Job::UNINTERRUPTED, on_progress)
     });
     Ok(sets?)
 }
@@ -45,14 +47,13 @@ pub(super) fn sets(setup: &Setup, is_json: bool) -> Result<SetupSets, Failure> {
 pub(super) fn following<T>(
     setup: &Setup,
     is_json: bool,
-    read: impl FnOnce(&mut dyn FnMut(Progress)) -> Result<Option<T>, SetupError>,
+    read: impl FnOnce(&mut dyn FnMut(Progress)) -> Result<T, SetupError>,
 ) -> Result<T, SetupError> {
-    let read = with_bar(is_json || setup.plan().is_none(), |watch| {
+    with_bar(is_json || setup.plan().is_none(), |watch| {
         read(&mut |progress| {
             let _ = watch(progress);
         })
-    });
-    Ok(read?.expect("nothing cancels it"))
+    })
 }
 
 /// Calls `import` with a progress bar of the bytes read.
@@ -211,7 +212,7 @@ impl Simulate {
         let networks = if kind.needs_network() {
             announce(&(*settings).into())?;
             let mut run = Run::prepare(*settings)?;
-            while run.step().is_none() {}
+            run.finish(&Job::UNINTERRUPTED).map_err(RunError::from)?;
             let scores = run.scores();
             let remarks = scores.map(|scores| error_remarks(settings, &scores, run.stop_reason()));
             let remarks = remarks.into_iter().flatten();
@@ -230,6 +231,8 @@ impl Simulate {
         } else {
             None
         };
-        Ok(DecoderSet::new(settings, networks)?.decoder(kind, Precision::Double)?)
+        let sets = RunSets::draw(settings, memory_budget(), &Job::UNINTERRUPTED)?;
+        let set = DecoderSet::new((*settings).into(), sets.split.training, networks);
+        Ok(set.decoder(kind, Precision::Double)?)
     }
 }

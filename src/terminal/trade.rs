@@ -5,6 +5,7 @@ use decoupler_core::{
     dataset::{Dataset, LARGEST_SAMPLES, Seed},
     decoupling::DecoderKind,
     evaluation::{Preset, RunError, RunSets, SimulatedSettings, TradeOffPoint, Workload, measure_trade_off},
+    job::Job,
     network::LARGEST_HIDDEN,
     sensor::{ArrayScale, SensorModel},
     training::{Method, StoppingRules},
@@ -109,7 +110,7 @@ impl Trade {
                 (Some(recordings), Some(plan)) => divided(recordings, plan, case.setup.settings().seed)?,
                 _ => {
                     let SetupSets { sets, recordings: read } = following(&case.setup, self.json, |on_progress| {
-                        case.setup.sets(working_folder(), &|| false, on_progress)
+                        case.setup.sets(working_folder(), &Job::UNINTERRUPTED, on_progress)
                     })?;
                     if let Some(read) = &read {
                         self.import.save_recipe(&case.setup)?;
@@ -139,9 +140,15 @@ impl Trade {
                 }
                 Err(error) => level.refused.push(format!("{kind}: {error}")),
             };
-            let is_whole = measure_trade_off(settings, &sets, &self.hidden, &case.decoders, is_cancelled, on_point)?;
-            bar.inc(1);
-            Ok(is_whole)
+            let job = Job::new(&is_cancelled);
+            match measure_trade_off(settings, &sets, &self.hidden, &case.decoders, &job, on_point) {
+                Err(RunError::Cancelled(_)) => Ok(false),
+                measured => {
+                    measured?;
+                    bar.inc(1);
+                    Ok(true)
+                }
+            }
         });
         bar.finish_and_clear();
         drop(graceful);
@@ -380,14 +387,9 @@ mod tests {
                 let sets = sets(&case.setup, true)?.sets;
                 let keep =
                     |_, point: Result<TradeOffPoint, RunError>, _: Option<&_>| level.level.points.push(point.unwrap());
-                Ok(measure_trade_off(
-                    case.setup.settings(),
-                    &sets,
-                    &[],
-                    &case.decoders,
-                    || false,
-                    keep,
-                )?)
+                let job = Job::UNINTERRUPTED;
+                measure_trade_off(case.setup.settings(), &sets, &[], &case.decoders, &job, keep)?;
+                Ok(true)
             })
         };
         for (place, preset) in Preset::ALL.into_iter().enumerate() {

@@ -18,7 +18,8 @@ use super::{
 };
 use decoupler_core::{
     decoupling::DecoderKind,
-    evaluation::{DecoderReport, DecoderSet, Run, RunError, Source, auto::DEFAULT_BUDGET_S},
+    evaluation::{Begin, DecoderReport, DecoderSet, Run, RunError, Source, auto::DEFAULT_BUDGET_S},
+    job::Job,
     text::counted,
     training::TrainingSettings,
 };
@@ -98,7 +99,7 @@ impl Train {
                 };
                 self.import.save_recipe(&setup)?;
                 announce_recording(&setup, &sets);
-                let run = sets.run(&setup, &|| false)?.expect("nothing cancels it");
+                let run = sets.run(&setup, Begin::Initialize, &Job::UNINTERRUPTED)?;
                 (run, sets)
             }
         };
@@ -181,7 +182,7 @@ impl Train {
             &self.training.fixed(setup.settings()),
             self.budget.unwrap_or(DEFAULT_BUDGET_S),
             working_folder(),
-            &|| false,
+            &Job::UNINTERRUPTED,
             &mut |progress| match progress {
                 ChoosingProgress::Reading(_) => bar.set_message("Reading the recording"),
                 ChoosingProgress::Trying(progress) => {
@@ -191,7 +192,7 @@ impl Train {
             },
         );
         bar.finish_and_clear();
-        Ok(chosen?.expect("nothing cancels it"))
+        Ok(chosen?)
     }
 
     /// Decoders to measure: those given, by default all for a simulated array and none for a recording.
@@ -252,7 +253,7 @@ impl Train {
         }
         announce(&file.settings)?;
         let resumed = following(&saved, self.json, |on_progress| {
-            file.resume_unless(&|| false, on_progress)
+            file.resume(&Job::UNINTERRUPTED, on_progress)
         });
         let (mut run, mut sets) = resumed.map_err(|error| match error {
             SetupError::Run(source) => Failure::Resume {
@@ -367,7 +368,7 @@ pub(super) fn measure_decoders(
         return Ok(());
     }
     let training = sets.sets.split.training.clone();
-    let set = DecoderSet::on_set(file.settings, training, Some(file.network.clone()));
+    let set = DecoderSet::new(file.settings, training, Some(file.network.clone()));
     for kind in kinds {
         for &precision in kind.precisions() {
             reports.extend(set.measure(*kind, precision, &sets.sets.test)?);

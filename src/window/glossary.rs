@@ -226,7 +226,7 @@ terms! { SENSOR_TERMS:
          than half of the rows is preserved.",
         "gain = R unloaded / R of the model at rest";
     WIRE_FAULT = "Fault",
-        "A broken, shorted, drifting or stuck wire, reported after four consecutive frames that contradict Eq. (2).";
+        "An open, stuck or shorted wire, or a changed gain, reported after four consecutive frames that contradict Eq. (2).";
 }
 
 terms! { SCENE_TERMS:

@@ -1,12 +1,12 @@
 //! Preview of settings before a training: their test set and the baselines.
 
 use super::{
-    job::{Job, JobError},
+    job::{Background, JobError},
     test_view::{TestView, TestViewError},
 };
 use decoupler_core::{
-    evaluation::{Baselines, Run, SimulatedSettings},
-    training::{GradientDescentSettings, Method, TrainingSettings},
+    evaluation::{Baselines, RunSets, SimulatedSettings},
+    job::Job,
 };
 use decoupler_files::machine::memory_budget;
 
@@ -22,7 +22,7 @@ pub enum PreviewEvent {
 }
 
 /// Draws the test set of these settings; replaces an earlier request.
-pub fn draw(job: &mut Job<PreviewEvent>, settings: SimulatedSettings) {
+pub fn draw(job: &mut Background<PreviewEvent>, settings: SimulatedSettings) {
     job.start(
         move |_| PreviewEvent::Drawn(Box::new(settings), TestView::draw(&settings)),
         |drawn| drawn.unwrap_or_else(PreviewEvent::Failed),
@@ -30,15 +30,20 @@ pub fn draw(job: &mut Job<PreviewEvent>, settings: SimulatedSettings) {
 }
 
 /// Computes the baselines of these settings; replaces an earlier request.
-pub fn compare(job: &mut Job<PreviewEvent>, settings: SimulatedSettings) {
+pub fn compare(job: &mut Background<PreviewEvent>, settings: SimulatedSettings) {
     job.start(
-        move |report| PreviewEvent::Compared(Box::new(settings), baselines(&settings, &|| report.is_cancelled())),
+        move |report| {
+            PreviewEvent::Compared(
+                Box::new(settings),
+                baselines(&settings, &Job::new(&|| report.is_cancelled())),
+            )
+        },
         |compared| compared.unwrap_or_else(PreviewEvent::Failed),
     );
 }
 
 /// Returns the baselines of the settings; `None` if computing them would delay the next request.
-fn baselines(settings: &SimulatedSettings, is_cancelled: &dyn Fn() -> bool) -> Option<Baselines> {
+fn baselines(settings: &SimulatedSettings, job: &Job<'_>) -> Option<Baselines> {
     /// About a tenth of a second.
     const MAX_TERMS: usize = 50_000_000;
     let scale = settings.source.sensor.scale;
@@ -48,19 +53,6 @@ fn baselines(settings: &SimulatedSettings, is_cancelled: &dyn Fn() -> bool) -> O
     if samples.saturating_mul(resistances + linear_map) > MAX_TERMS {
         return None;
     }
-    // Baselines depend on neither the network nor its method, so the cheapest settings suffice.
-    let training = TrainingSettings {
-        method: Method::GradientDescent(GradientDescentSettings::default()),
-        ..TrainingSettings::default()
-    };
-    let cheapest = SimulatedSettings {
-        hidden: 1,
-        starts: 1,
-        training,
-        ..*settings
-    };
-    Run::prepare_unless(cheapest, memory_budget(), is_cancelled)
-        .ok()??
-        .baselines()
-        .cloned()
+    let sets = RunSets::draw(settings, memory_budget(), job).ok()?;
+    Baselines::measure(&(*settings).into(), &sets, job).ok()
 }

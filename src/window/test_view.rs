@@ -136,7 +136,7 @@ impl TestView {
     /// # Errors
     /// If the sensor, the scene or the number of samples is invalid.
     pub fn draw(settings: &SimulatedSettings) -> Result<Self, TestViewError> {
-        Ok(Self::of(settings, Arc::new(settings.draw_test()?))?)
+        Ok(Self::of(settings, Arc::new(settings.source.draw_test(settings.seed)?))?)
     }
 
     /// Prepares the surface for an existing test set.

@@ -185,7 +185,7 @@ fn a_fault_is_named_and_left_out() {
         folder.path(),
     );
     let report = String::from_utf8(output.stderr).unwrap();
-    assert!(report.contains("column-wire 4: no signal"), "{report}");
+    assert!(report.contains("column-wire 4: stuck"), "{report}");
     let last = String::from_utf8(output.stdout).unwrap();
     let last: serde_json::Value = serde_json::from_str(last.lines().last().unwrap()).unwrap();
     assert_eq!(last["left_out"], "column-wire 4");

@@ -6,7 +6,7 @@ use std::{
     process::{Command, Stdio},
 };
 
-use decoupler_core::{dataset::SplitBy, evaluation::Intervals};
+use decoupler_core::{dataset::SplitBy, evaluation::Intervals, job::Job};
 use decoupler_files::export::NetworkFile;
 use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
 use serde_json::Value;
@@ -251,11 +251,10 @@ fn a_choice_of_settings_gives_the_intervals() {
     let file = NetworkFile::load(&folder.path().join("n.json")).unwrap();
     let sets = file
         .setup()
-        .sets(folder.path(), &|| false, &mut |_| ())
-        .unwrap()
+        .sets(folder.path(), &Job::UNINTERRUPTED, &mut |_| ())
         .unwrap();
     let (training, by) = (&sets.sets.split.training, SplitBy::Time);
-    let by_cross_validation = Intervals::cross_validate(&file.settings, training, by, &|| false).unwrap();
+    let by_cross_validation = Intervals::cross_validate(&file.settings, training, by, &Job::UNINTERRUPTED).unwrap();
     assert_ne!(file.intervals, Some(by_cross_validation));
     assert_eq!(
         file.intervals.as_ref().unwrap().targets[0].as_ref().unwrap().samples,

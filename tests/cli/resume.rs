@@ -8,7 +8,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use decoupler_core::evaluation::Run;
+use decoupler_core::{evaluation::Run, job::Job};
 use decoupler_files::export::{CheckpointFile, NetworkFile};
 use serde_json::Value;
 use tempfile::TempDir;
@@ -251,8 +251,9 @@ fn more_epochs_and_another_method_continue_from_the_current_weights() {
     let folder = folder.path();
     let before = CheckpointFile::load(&folder.join("run.checkpoint"))
         .unwrap()
-        .resume()
-        .unwrap();
+        .resume(&Job::UNINTERRUPTED, &mut |_| ())
+        .unwrap()
+        .0;
     let text = success(&format!("{RESUME} --epochs 20 --out more.json"), folder);
     assert!(text.contains("Ended after 20 epochs"), "{text}");
     success(&format!("train {UNTIL} 20 --method gdm --out whole.json"), folder);

@@ -1,5 +1,6 @@
 use std::fs;
 
+use decoupler_core::job::Job;
 use decoupler_files::export::CheckpointFile;
 
 use crate::{
@@ -31,7 +32,7 @@ fn damage_is_detected_and_impossible_states_are_refused() {
             // Other settings may ask for other samples, as many as a million.
             if let Ok(read) = CheckpointFile::load(&path)
                 && read.settings.source == file.settings.source
-                && let Ok(mut resumed) = read.resume()
+                && let Ok((mut resumed, _)) = read.resume(&Job::UNINTERRUPTED, &mut |_| ())
             {
                 resumed.step();
                 assert!(resumed.scores().is_some());
@@ -51,7 +52,7 @@ fn any_input() {
             match CheckpointFile::load(&path) {
                 // Others may ask for a million samples.
                 Ok(file) if small.contains(&file.settings.source) => {
-                    if let Ok(mut resumed) = file.resume() {
+                    if let Ok((mut resumed, _)) = file.resume(&Job::UNINTERRUPTED, &mut |_| ()) {
                         resumed.step();
                         assert!(resumed.scores().is_some());
                     }

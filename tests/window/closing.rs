@@ -3,7 +3,7 @@
 use std::{fs, path::Path, time::Instant};
 
 use decoupler::window::{Effect, Phase};
-use decoupler_core::training::StopReason;
+use decoupler_core::{job::Job, training::StopReason};
 use decoupler_files::export::CheckpointFile;
 use eframe::egui::{Key, ViewportCommand, ViewportEvent, ViewportId};
 
@@ -147,7 +147,7 @@ fn a_training_saved_on_closing_resumes_where_it_stopped() {
     assert_eq!(files_in(folder.path()), ["kept.checkpoint"]);
     let file = CheckpointFile::load(&path).unwrap();
     assert_eq!(file.settings, endless().into());
-    let run = file.resume().unwrap();
+    let run = file.resume(&Job::UNINTERRUPTED, &mut |_| ()).unwrap().0;
     assert!(run.leader().latest().epoch >= shown && run.stop_reason().is_none());
 }
 
@@ -218,7 +218,15 @@ fn a_training_on_a_recording_is_saved_at_closing() {
     drop(driver);
     let file = CheckpointFile::load(&path).unwrap();
     assert_eq!(file.settings.training.stopping.epochs, 1_000_000);
-    assert!(file.resume().unwrap().leader().latest().epoch >= 3);
+    assert!(
+        file.resume(&Job::UNINTERRUPTED, &mut |_| ())
+            .unwrap()
+            .0
+            .leader()
+            .latest()
+            .epoch
+            >= 3
+    );
 }
 
 #[test]

@@ -5,6 +5,7 @@ use std::{fs, path::Path, time::Duration};
 use decoupler::window::{Notice, Phase};
 use decoupler_core::{
     evaluation::{Run, SimulatedSettings, Spread, StartRecord},
+    job::Job,
     training::{Method, MomentumSettings, StopReason, StoppingRules},
 };
 use decoupler_files::export::{CheckpointFile, NetworkFile, format_number};
@@ -220,7 +221,11 @@ fn checkpoints_of_the_terminal_open_in_the_window_and_the_windows_in_the_termina
     assert_eq!(driver.table(), table_of(&whole));
     assert_eq!(driver.state().run.as_ref().unwrap().history, whole.leader().history());
 
-    let mut run = CheckpointFile::load(&window).unwrap().resume().unwrap();
+    let mut run = CheckpointFile::load(&window)
+        .unwrap()
+        .resume(&Job::UNINTERRUPTED, &mut |_| ())
+        .unwrap()
+        .0;
     while run.step().is_none() {}
     assert_eq!(run.starts(), whole.starts());
     // One that has ended opens as ended, and can be given more epochs.

@@ -2,7 +2,9 @@
 
 use decoupler::window::DecoderResult;
 use decoupler_core::{
-    evaluation::{DecoderSet, Run, SimulatedSettings},
+    evaluation::{DecoderSet, Run, RunSets, SimulatedSettings},
+    job::Job,
+    machine::MemoryBudget,
     scene::{Noise, Rows},
 };
 use decoupler_files::export::format_number;
@@ -45,7 +47,18 @@ fn table(driver: &Driver) -> Vec<String> {
 
 /// The same cells computed by the library.
 fn table_of(run: &Run) -> Vec<String> {
-    let set = DecoderSet::new(&run.settings().simulated().unwrap(), Some(run.network())).unwrap();
+    let set = DecoderSet::new(
+        *run.settings(),
+        RunSets::draw(
+            &run.settings().simulated().unwrap(),
+            MemoryBudget::UNLIMITED,
+            &Job::UNINTERRUPTED,
+        )
+        .unwrap()
+        .split
+        .training,
+        Some(run.network()),
+    );
     let limit = run
         .baselines()
         .unwrap()

@@ -10,6 +10,7 @@ use decoupler_core::{
         recorded::{Findings, FittedModel},
     },
     identifiability::Identifiability,
+    job::Job,
     sensor::SensorModel,
 };
 use decoupler_files::{
@@ -223,9 +224,9 @@ fn the_analysis_of_a_recording_agrees_with_the_library() {
         division,
         model,
         &|_| (),
-        [&|| false, &|| false],
+        (&Job::UNINTERRUPTED, &|| false),
     );
-    let found = found.unwrap().unwrap();
+    let found = found.unwrap();
     let sentence = |text: &str| {
         let (first, rest) = text.split_at(1);
         format!("{}{rest}.", first.to_uppercase())
@@ -304,8 +305,8 @@ fn a_cross_validation_of_a_recording_agrees_with_the_library() {
         .unwrap();
     let (settings, set) = (setup.settings(), &recording.set);
     let folds = Folds::by(set, 3, SplitBy::Time, &mut settings.seed.rng(Stream::Split)).unwrap();
-    let validated = CrossValidated::on_folds(settings, set, folds, || false);
-    let errors = validated.unwrap().unwrap().scores(set);
+    let validated = CrossValidated::on_folds(settings, set, folds, &Job::UNINTERRUPTED);
+    let errors = validated.unwrap().scores(set);
     let shown = driver.texts();
     for target in errors.network.targets() {
         let cell = format!("network, RMSE: {}", format_number(target.rmse));

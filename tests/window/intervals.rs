@@ -6,6 +6,7 @@ use decoupler::window::{Effect, Phase};
 use decoupler_core::{
     dataset::SplitBy,
     evaluation::{Coverage, Intervals},
+    job::Job,
     training::StopReason,
 };
 use decoupler_files::export::format_number;
@@ -32,9 +33,9 @@ fn intervals_are_calibrated_at_the_end_of_a_training() {
     driver.wait_for_kept_run();
 
     let setup = driver.state().run.as_ref().unwrap().setup.clone();
-    let sets = setup.sets(Path::new(""), &|| false, &mut |_| ()).unwrap().unwrap();
+    let sets = setup.sets(Path::new(""), &Job::UNINTERRUPTED, &mut |_| ()).unwrap();
     let training = &sets.sets.split.training;
-    let expected = Intervals::cross_validate(setup.settings(), training, SplitBy::Time, &|| false).unwrap();
+    let expected = Intervals::cross_validate(setup.settings(), training, SplitBy::Time, &Job::UNINTERRUPTED).unwrap();
     assert_eq!(driver.kept(0).intervals.as_ref(), Some(&expected));
     let coverage: Coverage = driver.state().result().unwrap().coverage[0].unwrap();
     // 90 % of the noise is within 0.09.

@@ -145,7 +145,7 @@ fn a_broken_wire_is_reported_left_out_and_cleared_once_it_is_repaired() {
     pick(&mut driver, "Wire fault", "Broken column-wire");
     driver.enter("Column-wire", "7");
     driver.wait("the name of the wire", |driver| driver.has("Fault: column-wire 7"));
-    assert!(driver.says("Column-wire 7: no signal") && driver.says("Its readings are left out"));
+    assert!(driver.says("Column-wire 7: open") && driver.says("Its readings are left out"));
     wait_for_frames(&mut driver, 20);
     let errors = driver.views().live.shown.frame.as_ref().unwrap().errors.unwrap();
     let [by_all, left_out] = errors.since_named_mm.unwrap();

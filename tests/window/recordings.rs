@@ -9,7 +9,8 @@ use std::{
 use decoupler::window::Phase;
 use decoupler_core::{
     dataset::{Division, Seed},
-    evaluation::{Measured, Run, RunSettings},
+    evaluation::{Begin, Measured, Run, RunSets, RunSettings},
+    job::Job,
     scene::RowModel,
 };
 use decoupler_files::import::{Plan, Recipe};
@@ -155,7 +156,13 @@ pub(crate) fn settings() -> RunSettings {
 pub(crate) fn trained(plan: &Plan) -> Run {
     let watch = &mut |_| std::ops::ControlFlow::Continue(());
     let sets = plan.sets(Path::new(""), Seed::default(), watch).unwrap();
-    let mut run = Run::on_sets(settings(), sets.split, sets.test).unwrap();
+    let mut run = Run::with_baselines(
+        settings(),
+        RunSets::new(sets.split, sets.test),
+        Begin::Initialize,
+        &Job::UNINTERRUPTED,
+    )
+    .unwrap();
     while run.step().is_none() {}
     run
 }

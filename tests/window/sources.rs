@@ -5,7 +5,8 @@ use std::{fmt::Write as _, fs, path::Path, sync::Arc};
 use decoupler::window::{Effect, Phase, SourceKind};
 use decoupler_core::{
     dataset::Division,
-    evaluation::{ErrorMeasure, Measured, Run, RunSettings},
+    evaluation::{Begin, ErrorMeasure, Measured, Run, RunSettings},
+    job::Job,
     scene::RowModel,
 };
 use decoupler_files::{
@@ -127,8 +128,8 @@ fn setup(folder: &Path, name: &str, text: &str, targets: &[&str]) -> Setup {
 
 /// Returns a run of the library that has begun.
 pub(crate) fn begun(setup: &Setup) -> Run {
-    let sets = setup.sets(Path::new(""), &|| false, &mut |_| ()).unwrap().unwrap();
-    sets.run(setup, &|| false).unwrap().unwrap()
+    let sets = setup.sets(Path::new(""), &Job::UNINTERRUPTED, &mut |_| ()).unwrap();
+    sets.run(setup, Begin::Initialize, &Job::UNINTERRUPTED).unwrap()
 }
 
 /// The same, trained to the end.

@@ -3,7 +3,10 @@
 use std::{fs, path::Path};
 
 use decoupler::window::{PlannedLevel, SourceKind, TradeOffEnding, TradeOffPlan};
-use decoupler_core::evaluation::{Preset, TradeOffPoint, fastest_under, measure_trade_off, most_accurate_under};
+use decoupler_core::{
+    evaluation::{Preset, TradeOffPoint, fastest_under, measure_trade_off, most_accurate_under},
+    job::Job,
+};
 use decoupler_files::export::format_percent;
 use eframe::egui::vec2;
 
@@ -45,9 +48,17 @@ fn by_library(plan: &TradeOffPlan, level: &PlannedLevel) -> Vec<TradeOffPoint> {
     let mut points = Vec::new();
     for run in &level.runs {
         let on_point = |_, point: Result<TradeOffPoint, _>, _: Option<&_>| points.push(point.unwrap());
-        let sets = run.setup.sets(Path::new(""), &|| false, &mut |_| ()).unwrap().unwrap();
+        let sets = run.setup.sets(Path::new(""), &Job::UNINTERRUPTED, &mut |_| ()).unwrap();
         let settings = run.setup.settings();
-        measure_trade_off(settings, &sets.sets, &plan.hidden, &run.decoders, || false, on_point).unwrap();
+        measure_trade_off(
+            settings,
+            &sets.sets,
+            &plan.hidden,
+            &run.decoders,
+            &Job::UNINTERRUPTED,
+            on_point,
+        )
+        .unwrap();
     }
     points
 }

@@ -8,6 +8,7 @@ use decoupler_core::{
     calibration::{Calibration, ParameterStatus, SensorParameter},
     dataset::{Dataset, Division, Seed, Stream},
     evaluation::{Errors, Preset, Run, SimulatedSettings, fine_tune, pressed_rows, rebased},
+    job::Job,
     machine::MemoryBudget,
     network::Networks,
     scene::{Loading, Noise},
@@ -56,16 +57,13 @@ fn main() -> Result<(), Box<dyn Error>> {
         &parts.split(&moved(&frames)?),
         settings.training,
         MemoryBudget::UNLIMITED,
-        &|| false,
+        &Job::UNINTERRUPTED,
     )?;
     let (stroke_mm, after) = (settings.source.stroke_mm(), moved(&test)?);
     let z_mm = |set: &Dataset, networks: &Networks| Errors::measure(set, &networks.decouple(set), stroke_mm).z_mm;
     println!("Z error, nominal geometry:  {:.4} mm", z_mm(&test, &before));
     println!("Z error, calibrated:        {:.4} mm", z_mm(&after, &calibrated));
-    println!(
-        "Z error, fine-tuned:        {:.4} mm",
-        z_mm(&after, &tuned.expect("nothing cancels it"))
-    );
+    println!("Z error, fine-tuned:        {:.4} mm", z_mm(&after, &tuned));
     Ok(())
 }
 

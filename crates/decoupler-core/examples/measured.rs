@@ -5,8 +5,9 @@
 use std::error::Error;
 
 use decoupler_core::{
-    dataset::{Dataset, FoldUnit, Seed, Stream, hold_out},
-    evaluation::{CrossValidation, Measured, Run, RunSettings},
+    dataset::{Dataset, Seed, SplitBy, Stream},
+    evaluation::{Begin, CrossValidation, Measured, Run, RunSets, RunSettings},
+    job::Job,
     ndarray::Array2,
     scene::RowModel,
 };
@@ -25,23 +26,29 @@ fn main() -> Result<(), Box<dyn Error>> {
     let folds = CrossValidation {
         folds: 5,
         repeats: 1,
-        unit: FoldUnit::Snapshot,
+        by: SplitBy::Group,
     };
-    if let Some(validated) = folds.run(&settings, &set, 0, || false)? {
-        let scores = validated.scores(&set);
-        let rows = [
-            ("training mean", scores.baselines.mean),
-            ("ridge", scores.baselines.linear),
-            ("network", scores.network),
-        ];
-        for (name, errors) in rows {
-            let errors = errors.targets().iter().map(|target| format!("{:.4}", target.rmse));
-            println!("{name:<14} RMSE {}", Vec::from_iter(errors).join("  "));
-        }
+    let validated = folds.run(&settings, &set, 0, &Job::UNINTERRUPTED)?;
+    let scores = validated.scores(&set);
+    let rows = [
+        ("training mean", scores.baselines.mean),
+        ("ridge", scores.baselines.linear),
+        ("network", scores.network),
+    ];
+    for (name, errors) in rows {
+        let errors = errors.targets().iter().map(|target| format!("{:.4}", target.rmse));
+        println!("{name:<14} RMSE {}", Vec::from_iter(errors).join("  "));
     }
     let test = set.select(&Vec::from_iter(500..600));
-    let split = hold_out(set.select(&Vec::from_iter(0..500)), 5, &mut Seed(0).rng(Stream::Split));
-    let mut run = Run::on_sets(settings, split, test)?;
+    let training = set.select(&Vec::from_iter(0..500));
+    let parts = SplitBy::Group.hold_out(&training, 5, &mut Seed(0).rng(Stream::Split));
+    let split = parts.split(&training);
+    let mut run = Run::with_baselines(
+        settings,
+        RunSets::new(split, test),
+        Begin::Initialize,
+        &Job::UNINTERRUPTED,
+    )?;
     while run.step().is_none() {}
     println!("one network, last 100 moments: R² {:?}", run.errors().targets()[0].r2);
     Ok(())

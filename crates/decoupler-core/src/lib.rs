@@ -8,6 +8,7 @@
 //! |---|---|
 //! | `numerics` | quantiles of distributions and of samples |
 //! | [`text`] | numbers, counts and names as text |
+//! | [`job`] | work that can be cancelled |
 //! | [`sensor`] | array scale, geometry, the resistance model and its Jacobian |
 //! | [`calibration`] | geometry and resistivity fitted to the readings of known deformations |
 //! | [`identifiability`] | deformation patterns that the readings determine, and how well |
@@ -85,13 +86,13 @@
 //! A **training** is a value that is stepped one epoch at a time; pausing only means not calling `step`.
 //!
 //! ```
-//! use decoupler_core::evaluation::{Run, SimulatedSettings};
+//! use decoupler_core::{evaluation::{Run, SimulatedSettings}, job::Job};
 //!
 //! let mut settings = SimulatedSettings::default(); // The paper's main experiment,
 //! settings.source.sensor.scale = "10x6_3x18".parse()?; // on its smallest array,
 //! settings.training.stopping.epochs = 20; // cut short.
 //! let mut run = Run::prepare(settings)?;
-//! while run.step().is_none() {}
+//! run.finish(&Job::UNINTERRUPTED)?;
 //! let scores = run.scores().expect("the baselines are measured");
 //! assert!(scores.network.percent() < scores.baselines.mean.percent());
 //! # Ok::<(), Box<dyn std::error::Error>>(())
@@ -108,7 +109,8 @@
 //!
 //! let mut settings = Preset::Best.settings(); // Known rows.
 //! settings.source.sensor.scale = "10x6_3x18".parse()?;
-//! let (test, source) = (settings.draw_test()?, settings.source);
+//! let source = settings.source;
+//! let test = source.draw_test(settings.seed)?;
 //! let frames = test.frames()?;
 //! let rows = Vec::from_iter(0..frames.rows());
 //! let mut newton = NewtonDecoder::new(&source.sensor, &source.scene, &rows, NewtonRules::default())?;
@@ -126,6 +128,7 @@ pub mod dataset;
 pub mod decoupling;
 pub mod evaluation;
 pub mod identifiability;
+pub mod job;
 pub mod live;
 pub mod machine;
 pub mod network;

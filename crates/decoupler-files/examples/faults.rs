@@ -9,21 +9,14 @@ use decoupler_core::{
     dataset::{Seed, Stream},
     decoupling::Decoder,
     evaluation::{Preset, Run, SimulatedSettings},
-    live::{FaultEvent, FaultMonitor, FaultyWire, LeftOutDecoder},
+    live::{FaultEvent, FaultyWire, LeftOutDecoder, WireCheck, equation_decoder},
     rand::{Rng, RngExt},
     scene::{ConverterEnd, Fault, Indenter, Loading, Noise},
     sensor::ArrayScale,
 };
 use decoupler_files::live::Simulated;
 
-const KINDS: [&str; 6] = [
-    "open row",
-    "open column",
-    "short rows",
-    "short columns",
-    "gain",
-    "stuck",
-];
+const KINDS: [&str; 5] = ["open row", "open column", "short columns", "gain", "stuck"];
 /// Number of frames between presses that are decoded, and in all with each fault.
 const FRAMES: usize = 20;
 
@@ -51,7 +44,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mut run = Run::prepare(settings)?;
     while run.step().is_none() {}
     let mut network = run.network().decoder();
-    let mut tallies: [Tally; 6] = Default::default();
+    let mut tallies: [Tally; 5] = Default::default();
     let mut rng = Seed(1).rng(Stream::Live);
     for trial in 0..faults {
         let kind = trial % KINDS.len();
@@ -97,14 +90,10 @@ fn draw(kind: usize, scale: ArrayScale, rng: &mut impl Rng) -> (Fault, FaultyWir
             (Fault::OpenColumn { column, before_node }, FaultyWire::Column(column))
         }
         2 => {
-            let row = below(scale.rows() - 1);
-            (Fault::ShortedRows { row }, FaultyWire::Rows(row))
-        }
-        3 => {
             let column = below(scale.columns() - 1);
             (Fault::ShortedColumns { column }, FaultyWire::Columns(column))
         }
-        4 => {
+        3 => {
             let sign = if below(2) == 0 { 1.0 } else { -1.0 };
             let relative = sign * 0.01 * 20.0_f64.powf(rng.random());
             (Fault::Gain { column, relative }, FaultyWire::Column(column))
@@ -133,7 +122,7 @@ fn examine(
     let mut intact = Simulated::new(sensor, scene, seed, 10.0)?;
     let mut source = Simulated::new(sensor, scene, seed, 10.0)?;
     source.set_fault(Some(fault))?;
-    let mut monitor = FaultMonitor::new(sensor, scene, source.rows())?;
+    let mut check = WireCheck::new(sensor, scene, source.rows())?;
     let (mut intact_ohm, mut frame_ohm) = (vec![0.0; source.readings()], vec![0.0; source.readings()]);
     let mut answer_mm = vec![0.0; source.rows().len() * network.outputs()];
     let mut left_out: Option<LeftOutDecoder> = None;
@@ -141,7 +130,7 @@ fn examine(
     for frame in 0..FRAMES {
         intact.next_frame(&mut intact_ohm)?;
         source.next_frame(&mut frame_ohm)?;
-        if let Some(FaultEvent::Named(found)) = monitor.check(&frame_ohm) {
+        if let Some(FaultEvent::Named(found)) = check.check(&frame_ohm) {
             if found.wire == wire {
                 tally.right += 1;
                 tally.frames += frame + 1;
@@ -149,7 +138,12 @@ fn examine(
                 tally.wrong += 1;
                 println!("{fault}: {found}");
             }
-            let mut decoder = LeftOutDecoder::new(sensor, scene, source.rows())?;
+            let mut decoder = LeftOutDecoder::new(
+                sensor,
+                scene,
+                source.rows(),
+                equation_decoder(sensor, scene, source.rows())?,
+            )?;
             decoder.leave_out(Some(found));
             left_out = Some(decoder);
         }
@@ -177,16 +171,16 @@ fn examine(
     Ok(())
 }
 
-/// Number of events of the monitor in frames without a fault.
+/// Number of events of the check in frames without a fault.
 fn false_alarms(settings: &SimulatedSettings, frames: usize) -> Result<usize, Box<dyn Error>> {
     let (sensor, scene) = (&settings.source.sensor, &settings.source.scene);
     let mut source = Simulated::new(sensor, scene, Seed(12345), 100.0)?;
-    let mut monitor = FaultMonitor::new(sensor, scene, source.rows())?;
+    let mut check = WireCheck::new(sensor, scene, source.rows())?;
     let mut frame_ohm = vec![0.0; source.readings()];
     let mut alarms = 0;
     for _ in 0..frames {
         source.next_frame(&mut frame_ohm)?;
-        alarms += usize::from(monitor.check(&frame_ohm).is_some());
+        alarms += usize::from(check.check(&frame_ohm).is_some());
     }
     Ok(alarms)
 }

@@ -10,7 +10,8 @@ use std::{
 use clap::ValueEnum;
 use decoupler_core::{
     decoupling::DecoderKind,
-    evaluation::{Run, Workload},
+    evaluation::{Begin, Run, Workload},
+    job::Job,
 };
 use decoupler_files::{
     export::{
@@ -189,7 +190,7 @@ pub(super) fn train(
         Some(resumed) => resumed,
         None => {
             let sets = sets(&trial.setup, true)?;
-            let run = sets.run(&trial.setup, &|| false)?.expect("nothing cancels it");
+            let run = sets.run(&trial.setup, Begin::Initialize, &Job::UNINTERRUPTED)?;
             (run, sets, Duration::ZERO)
         }
     };
@@ -252,7 +253,7 @@ fn resumed(trial: &PlannedTrial, claim: &Claim) -> Option<(Run, SetupSets, Durat
         return None;
     }
     let before = file.wall_time.unwrap_or_default();
-    let (run, sets) = file.resume_unless(&|| false, &mut |_| ()).ok()??;
+    let (run, sets) = file.resume(&Job::UNINTERRUPTED, &mut |_| ()).ok()?;
     Some((run, sets, before))
 }
 

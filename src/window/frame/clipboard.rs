@@ -12,7 +12,7 @@ use eframe::egui::{ColorImage, Id, Response, ScrollArea, Ui};
 
 use super::{DecouplerWindow, Desktop};
 use crate::window::{
-    job::{Job, JobError, Wake},
+    job::{Background, JobError, Wake},
     shared::{Effect, Export, ExportGroup, Matter, Notice},
     theme::space,
     widgets::{dim_ui, take_claim, take_value_under},
@@ -147,14 +147,14 @@ type Copied = (Option<Content>, Notice);
 #[derive(Debug)]
 pub(super) struct Copying {
     clipboard: Clipboard,
-    job: Job<Result<Copied, JobError>>,
+    job: Background<Result<Copied, JobError>>,
 }
 
 impl Copying {
     pub(super) fn new(clipboard: Clipboard, wake: Wake) -> Self {
         Self {
             clipboard,
-            job: Job::prompt("clipboard", wake),
+            job: Background::prompt("clipboard", wake),
         }
     }
 

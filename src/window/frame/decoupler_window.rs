@@ -16,7 +16,7 @@ use super::{
 };
 use crate::signals::on_termination;
 use crate::window::{
-    job::{Job, Wake},
+    job::{Background, Wake},
     preview::PreviewEvent,
     shared::{Action, Effect, Matter, Notice, Offers, Phase, RunsWorker, Shared},
     theme::{self, Theme, space},
@@ -43,7 +43,7 @@ pub struct DecouplerWindow {
     pub(super) worker: Worker,
     /// Folder for the checkpoints of running trainings, and the interval at which they are saved.
     pub(super) keeping: Option<(PathBuf, Duration)>,
-    pub(super) previews: Job<PreviewEvent>,
+    pub(super) previews: Background<PreviewEvent>,
     pub(super) runs: RunsWorker,
     pub(super) files: Files,
     pub(super) copying: Copying,
@@ -95,7 +95,7 @@ impl DecouplerWindow {
             opened: None,
             worker: Worker::start(Arc::clone(&wake)),
             keeping: None,
-            previews: Job::new("preview", Arc::clone(&wake)),
+            previews: Background::new("preview", Arc::clone(&wake)),
             runs: RunsWorker::start(Arc::clone(&wake)),
             files: Files::new(Arc::clone(&wake)),
             copying: Copying::new(Clipboard::of(desktop), Arc::clone(&wake)),

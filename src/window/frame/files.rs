@@ -26,7 +26,7 @@ use super::{
     remembered::{MIN_SIZE_POINTS, Remembered, WindowFile},
 };
 use crate::window::{
-    job::{Job, JobError, Wake},
+    job::{Background, JobError, Wake},
     shared::{Effect, FileInUse, FileTask, refuse_in_use},
     theme::{Theme, radius, space, type_size},
 };
@@ -40,7 +40,7 @@ type Written = Result<Result<String, String>, JobError>;
 /// Files that are being written.
 pub struct Files {
     wake: Wake,
-    under_way: Vec<(PathBuf, Job<Written>)>,
+    under_way: Vec<(PathBuf, Background<Written>)>,
 }
 
 impl Files {
@@ -58,7 +58,7 @@ impl Files {
         path: PathBuf,
         write: impl FnOnce(&Path) -> Result<String, X> + Send + 'static,
     ) {
-        let mut job = Job::prompt("file", Arc::clone(&self.wake));
+        let mut job = Background::prompt("file", Arc::clone(&self.wake));
         let target = path.clone();
         job.start(
             move |_| write(&target).map_err(|error| error.to_string()),
@@ -117,7 +117,7 @@ pub enum Answer {
 #[derive(Debug)]
 pub struct Dialogs {
     desktop: Desktop,
-    asked: Vec<(FileTask, Job<Answer>)>,
+    asked: Vec<(FileTask, Background<Answer>)>,
 }
 
 impl Dialogs {
@@ -137,7 +137,7 @@ impl Dialogs {
         }
         let choice = choice(task);
         let asked = Instant::now();
-        let mut job = Job::prompt("file dialog", wake);
+        let mut job = Background::prompt("file dialog", wake);
         job.start(
             move |_| match pollster::block_on(choice) {
                 Some(file) => Answer::Chosen(file.path().to_owned()),
@@ -286,7 +286,7 @@ pub(super) enum Found {
 /// Paths that are being checked.
 pub(super) struct PathChecks {
     wake: Wake,
-    under_way: Vec<(PathBuf, Job<Found>)>,
+    under_way: Vec<(PathBuf, Background<Found>)>,
 }
 
 impl PathChecks {
@@ -301,7 +301,7 @@ impl PathChecks {
     /// Checks `path`, which must not be one of the files `used`.
     pub(super) fn start(&mut self, path: PathBuf, used: Vec<FileInUse>) {
         // Each check has its own thread: one that never ends does not block the others.
-        let mut job = Job::prompt("path", Arc::clone(&self.wake));
+        let mut job = Background::prompt("path", Arc::clone(&self.wake));
         let checked = path.clone();
         job.start(
             move |_| check_path(&checked, &used),

@@ -15,7 +15,7 @@ use serde::{Deserialize, Deserializer, Serialize, de::DeserializeOwned};
 
 use super::DecouplerWindow;
 use crate::window::{
-    job::{Job, JobError, Wake},
+    job::{Background, JobError, Wake},
     shared::{Matter, SourceKind},
 };
 
@@ -169,7 +169,7 @@ pub(super) struct Memory {
     /// Contents of the file, or those being written to it.
     written: Remembered,
     latest: Remembered,
-    job: Job<Written>,
+    job: Background<Written>,
     has_reported: bool,
 }
 
@@ -180,7 +180,7 @@ impl Memory {
             path,
             written: remembered.clone(),
             latest: remembered,
-            job: Job::prompt("memory", wake),
+            job: Background::prompt("memory", wake),
             has_reported: false,
         }
     }

@@ -1,6 +1,6 @@
-//! Background work: a [`Job`] runs one task at a time on a named thread; a newer task replaces an older one.
+//! Background work: [`Background`] work runs one task at a time on a named thread; a newer task replaces an older one.
 //!
-//! A task sends events through a [`Report`], which wakes the window; the window receives them with [`Job::next_event`].
+//! A task sends events through a [`Report`], which wakes the window; the window receives them with [`Background::next_event`].
 //! Every task has its own mailbox, so events of an older task are never seen.
 
 use std::{
@@ -39,7 +39,7 @@ pub enum JobError {
 }
 
 /// Background work, one task at a time. Dropping it cancels the task and waits briefly for its end.
-pub(super) struct Job<E> {
+pub(super) struct Background<E> {
     name: &'static str,
     wake: Wake,
     /// True for long computations, which run at lower priority than the window.
@@ -53,7 +53,7 @@ struct Piece<E> {
     is_abandoned: bool,
 }
 
-impl<E: Send + 'static> Job<E> {
+impl<E: Send + 'static> Background<E> {
     /// Creates a job without work. `name` is the name of its threads; `wake` is called after each event. The work runs at lower
     /// priority than the window.
     pub(super) fn new(name: &'static str, wake: Wake) -> Self {
@@ -113,7 +113,7 @@ impl<E: Send + 'static> Job<E> {
     }
 }
 
-impl<E> Job<E> {
+impl<E> Background<E> {
     /// Returns the next event, if one has arrived.
     pub(super) fn next_event(&self) -> Option<E> {
         self.mailbox()?.next_event()
@@ -156,16 +156,18 @@ impl<E> Job<E> {
     }
 }
 
-impl<E> Drop for Job<E> {
+impl<E> Drop for Background<E> {
     fn drop(&mut self) {
         self.cancel();
         self.wait(LONGEST_WAIT);
     }
 }
 
-impl<E> fmt::Debug for Job<E> {
+impl<E> fmt::Debug for Background<E> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("Job").field("name", &self.name).finish_non_exhaustive()
+        f.debug_struct("Background")
+            .field("name", &self.name)
+            .finish_non_exhaustive()
     }
 }
 
@@ -293,6 +295,11 @@ impl<E> Report<E> {
     /// Returns true if the work should end.
     pub(in crate::window) fn is_cancelled(&self) -> bool {
         self.mailbox.is_cancelled.load(Ordering::Relaxed)
+    }
+
+    /// Returns the result of the work, without the error with which cancelled work ends.
+    pub(in crate::window) fn unless_cancelled<X>(&self, result: Result<(), X>) -> Result<(), X> {
+        if self.is_cancelled() { Ok(()) } else { result }
     }
 
     /// Sends an event that is never replaced.

@@ -7,7 +7,7 @@ use std::{
     time::Duration,
 };
 
-use super::{Job, JobError, Report};
+use super::{Background, JobError, Report};
 
 /// Timeout, far longer than any test takes.
 const LONG: Duration = Duration::from_secs(60);
@@ -20,12 +20,12 @@ enum Event {
     Ended(Result<(), JobError>),
 }
 
-fn job() -> Job<Event> {
-    Job::new("test", Arc::new(|| ()))
+fn job() -> Background<Event> {
+    Background::new("test", Arc::new(|| ()))
 }
 
 /// Waits for the end and returns all events.
-fn all_of(job: &mut Job<Event>) -> Vec<Event> {
+fn all_of(job: &mut Background<Event>) -> Vec<Event> {
     job.wait(LONG);
     let events = std::iter::from_fn(|| job.next_event()).collect();
     assert!(!job.is_under_way());
@@ -138,7 +138,7 @@ fn unreceived_progress_is_replaced_and_its_data_is_kept() {
 fn received_progress_is_not_added_again() {
     let (woke, wakes) = channel();
     let (go_on, may_go_on) = channel();
-    let mut job = Job::new("test", Arc::new(move || woke.send(()).unwrap_or(())));
+    let mut job = Background::new("test", Arc::new(move || woke.send(()).unwrap_or(())));
     job.start(
         move |report| {
             for step in 1..=3 {
@@ -165,7 +165,7 @@ fn a_panic_is_reported_with_its_message_and_the_window_is_woken() {
         }))
     };
     let (woke, wakes) = channel();
-    let mut job = Job::new("test", Arc::new(move || woke.send(()).unwrap_or(())));
+    let mut job = Background::new("test", Arc::new(move || woke.send(()).unwrap_or(())));
     job.start(|_| panic!("a plain reason"), Event::Ended);
     wakes.recv_timeout(LONG).unwrap();
     assert_eq!(all_of(&mut job), [expected("a plain reason")]);

@@ -8,14 +8,15 @@ use resvg::usvg::roxmltree::Document;
 use super::*;
 use crate::window::theme;
 use decoupler_core::{
-    dataset::FoldUnit,
+    dataset::SplitBy,
     decoupling::DecoderKind,
     evaluation::{
-        CrossValidation, Preset, Run, SimulatedSettings, TradeOffLevel, TradeOffLimits, TradeOffPoint,
+        CrossValidation, Preset, Run, RunSets, SimulatedSettings, TradeOffLevel, TradeOffLimits, TradeOffPoint,
         experiments::{Axis, Experiment, ExperimentResults, PaperTable, TrialSamples, run_experiments},
         measure_trade_off,
     },
     identifiability::Identifiability,
+    job::Job,
     machine::MemoryBudget,
     sensor::Axes,
     training::EpochRecord,
@@ -185,7 +186,7 @@ fn figures_of_experiments_are_the_same_on_screen_and_in_print() {
     table_2.cross_validation = Some(CrossValidation {
         folds: 2,
         repeats: 2,
-        unit: FoldUnit::Sample,
+        by: SplitBy::Random,
     });
     // Two cells of four trials, each with an error of Z and of X; the error of Y may be exactly 0.
     assert!(same("Fig. 5", experiment_figure(&results(table_2))).circles >= 2 * 2 * 4 + 2);
@@ -206,7 +207,7 @@ fn figures_of_decoders_and_rows_are_the_same_on_screen_and_in_print() {
     for preset in Preset::ALL {
         let kinds = [DecoderKind::Ridge, DecoderKind::Network, DecoderKind::Newton];
         let settings = small(preset);
-        let sets = settings.draw_sets().unwrap();
+        let sets = RunSets::draw(&settings, MemoryBudget::UNLIMITED, &Job::UNINTERRUPTED).unwrap();
         let on_point = |_, point: Result<TradeOffPoint, _>, _: Option<&_>| {
             let preset = Some(preset);
             points.push(TradeOffPoint {
@@ -214,7 +215,7 @@ fn figures_of_decoders_and_rows_are_the_same_on_screen_and_in_print() {
                 ..point.unwrap()
             });
         };
-        measure_trade_off(&settings.into(), &sets, &[3], &kinds, || false, on_point).unwrap();
+        measure_trade_off(&settings.into(), &sets, &[3], &kinds, &Job::UNINTERRUPTED, on_point).unwrap();
     }
     let level = TradeOffLevel {
         noise: Some(0.0),

@@ -7,6 +7,7 @@ use std::{path::Path, sync::Arc};
 use decoupler_core::{
     decoupling::{DecoderKind, Precision},
     evaluation::{DecoderReport, PastNetworks, Run},
+    job::Job,
 };
 use decoupler_files::{
     export::{
@@ -325,8 +326,7 @@ impl DecoderSource {
 
 /// Draws or reads the samples of a setup.
 fn samples(setup: &Setup) -> Result<SetupSets, BundleError> {
-    let sets = setup.sets(Path::new(""), &|| false, &mut |_| ())?;
-    Ok(sets.expect("nothing cancels it"))
+    Ok(setup.sets(Path::new(""), &Job::UNINTERRUPTED, &mut |_| ())?)
 }
 
 /// A button that opens the menu of formats in which a decoder can be exported; returns the file asked for.
@@ -346,6 +346,10 @@ pub fn decoder_export_ui(
 
 /// The formats in which a decoder can be exported, such as "C99, f32"; returns the file asked for.
 pub fn decoder_forms_ui(ui: &mut Ui, kind: DecoderKind, source: &DecoderSource) -> Option<FileTask> {
+    if kind == DecoderKind::Fuzzy {
+        ui.label("Fuzzy rules are only for comparison and cannot be exported");
+        return None;
+    }
     let decoder = BundleDecoder::Kind(kind);
     let mut asked = None;
     for form in bundles().filter(|(format, precision)| format.check_for(decoder, *precision).is_ok()) {

@@ -19,7 +19,7 @@ use std::{
 use decoupler_files::export::{KeptRun, KeptRuns, NetworkFile, RunFolder};
 
 use crate::window::{
-    job::{Job, JobError, Wake, caught},
+    job::{Background, JobError, Wake, caught},
     shared::Notice,
 };
 
@@ -68,7 +68,7 @@ pub(super) enum RunsEvent {
 #[derive(Debug)]
 pub struct RunsWorker {
     requests: Option<Sender<RunsRequest>>,
-    job: Job<RunsEvent>,
+    job: Background<RunsEvent>,
     /// Requests that were not answered yet.
     unanswered: Cell<usize>,
 }
@@ -77,7 +77,7 @@ impl RunsWorker {
     /// Starts the thread. `wake` is called after each event.
     pub fn start(wake: Wake) -> Self {
         let (requests, incoming) = channel();
-        let mut job = Job::new(THREAD, wake);
+        let mut job = Background::new(THREAD, wake);
         job.start(
             move |report| {
                 let mut folder = RunFolder::default();

@@ -1,6 +1,7 @@
 use decoupler_core::{
     dataset::{Dataset, SplitBy},
     evaluation::{Intervals, NoIntervals, Run},
+    job::Job,
     training::StopReason,
 };
 use decoupler_files::{export::format_duration, import::SetupSets};
@@ -37,11 +38,11 @@ impl Calibration {
     }
 
     /// Calibrates the intervals of `run`, which has ended, without further trainings if its settings were chosen.
-    /// `is_cancelled` is polled in every epoch.
+    /// The job is checked in every epoch.
     ///
     /// # Errors
     /// The reason why there are none.
-    pub fn calibrate(&self, run: &Run, is_cancelled: &dyn Fn() -> bool) -> Result<Intervals, String> {
+    pub fn calibrate(&self, run: &Run, job: &Job<'_>) -> Result<Intervals, String> {
         let calibrated = match &self.chosen {
             _ if run.stop_reason() == Some(StopReason::Stopped) => {
                 return Err("no 90 % intervals: the training was stopped before its end".to_owned());
@@ -55,7 +56,7 @@ impl Calibration {
                         format_duration(time)
                     ));
                 }
-                Intervals::cross_validate(run.settings(), &self.training, self.by, is_cancelled)
+                Intervals::cross_validate(run.settings(), &self.training, self.by, job)
             }
         };
         calibrated.map_err(|reason| format!("no 90 % intervals: {reason}"))

@@ -27,7 +27,7 @@ use ndarray::Array2;
 
 use super::{calibration::Calibration, keeping::Kept, training_loop::TrainingLoop};
 use crate::window::{
-    job::{Job, JobError, Wake},
+    job::{Background, JobError, Wake},
     test_view::{Frame, TargetCharts, TestSet, TestViewError},
 };
 
@@ -263,7 +263,7 @@ pub fn furthest_epoch(run: &Run) -> usize {
 #[derive(Debug)]
 pub struct Worker {
     // Dropped first: a thread that finds no one to send requests must know that it is cancelled.
-    job: Job<Event>,
+    job: Background<Event>,
     /// Shared with the thread that waits for signals.
     requests: Arc<Mutex<Sender<Request>>>,
     kept: Kept,
@@ -281,7 +281,7 @@ impl Worker {
     pub fn start(wake: Wake) -> Self {
         let (requests, incoming) = channel();
         let cancelled = Arc::<AtomicU64>::default();
-        let mut job = Job::new("training", wake);
+        let mut job = Background::new("training", wake);
         let snapshot = Arc::<AtomicUsize>::default();
         let kept = Kept::default();
         let (in_thread, shown, keeps) = (Arc::clone(&cancelled), Arc::clone(&snapshot), kept.clone());

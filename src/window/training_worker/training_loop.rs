@@ -24,11 +24,12 @@ use crate::window::{
 use decoupler_core::{
     dataset::SplitBy,
     evaluation::{
-        PastNetworks, Run, RunError, Scores, TestErrors,
+        Begin, PastNetworks, Run, Scores, TestErrors,
         auto::{AutoFixed, DEFAULT_BUDGET_S},
         network_frame_time,
         recorded::Determination,
     },
+    job::Job,
     training::TrainingSettings,
 };
 use decoupler_files::{
@@ -36,7 +37,7 @@ use decoupler_files::{
         CheckpointFile, CheckpointPlace, NetworkFile, describe_coverage, describe_determinacy, describe_samples,
         describe_worse_than_ridge,
     },
-    import::{ChoosingProgress, Plan, Progress, Setup, SetupSets},
+    import::{ChoosingProgress, Plan, Progress, Setup, SetupError, SetupSets},
     machine::system_cause,
 };
 
@@ -132,15 +133,13 @@ impl<'a> TrainingLoop<'a> {
     fn answer(&mut self, request: Request) {
         match request {
             Request::Train(setup) => {
-                let prepared = self.prepare_setup(&setup, |sets, is_cancelled| sets.run(&setup, is_cancelled));
+                let prepared = self.prepare_setup(&setup, Begin::Initialize);
                 self.begin(prepared, None, Event::Began);
             }
             Request::Choose(setup) => {
-                let prepared = self.choose(&setup).map(|prepared| {
-                    prepared.map(|(trained, began)| {
-                        let asked = Setup::clone(&setup);
-                        (trained, Box::new(Began { asked, ..*began }))
-                    })
+                let prepared = self.choose(&setup).map(|(trained, began)| {
+                    let asked = Setup::clone(&setup);
+                    (trained, Box::new(Began { asked, ..*began }))
                 });
                 self.begin(prepared, None, Event::Began);
             }
@@ -149,9 +148,7 @@ impl<'a> TrainingLoop<'a> {
                 self.begin(prepared, None, Event::Opened);
             }
             Request::TakeUp(setup, states) => {
-                let resume =
-                    |sets: SetupSets, is_cancelled: &dyn Fn() -> bool| sets.resume(&setup, states, is_cancelled);
-                let prepared = self.prepare_setup(&setup, resume);
+                let prepared = self.prepare_setup(&setup, Begin::Resume(states));
                 self.begin(prepared.map_err(|error| error.to_string()), None, Event::Opened);
             }
             Request::Continue(training) => self.continue_training(training),
@@ -173,9 +170,16 @@ impl<'a> TrainingLoop<'a> {
                 Err(error) => self.unkept(format!("'{}': {}", folder.display(), system_cause(&error))),
             },
             Request::ResumeLeft => {
-                let left = self.keeping.take_left();
-                let prepared = left.as_ref().map_or(Ok(None), |left| self.open(left.path()));
-                self.begin(prepared, left, Event::Resumed);
+                match self.keeping.take_left() {
+                    Some(left) => {
+                        let prepared = self.open(left.path());
+                        self.begin(prepared, Some(left), Event::Resumed);
+                    }
+                    None => {
+                        self.preparations += 1;
+                        self.report.send(Event::Abandoned);
+                    }
+                }
                 self.offer_left();
             }
             Request::DiscardLeft => {
@@ -205,12 +209,12 @@ impl<'a> TrainingLoop<'a> {
         self.report.send(Event::Unkept(reason));
     }
 
-    /// Restores the training saved in the checkpoint at `path`; returns `None` if cancelled.
-    fn open(&self, path: &Path) -> Result<Option<(TrainedRun, Box<Began>)>, String> {
+    /// Restores the training saved in the checkpoint at `path`.
+    fn open(&self, path: &Path) -> Result<(TrainedRun, Box<Began>), String> {
         let file = CheckpointFile::load(path).map_err(|error| error.to_string())?;
-        let prepared = self.prepare(|is_cancelled, on_progress| {
-            let resumed = file.resume_unless(is_cancelled, on_progress)?;
-            Ok(resumed.map(|(run, sets)| TrainedRun::new(run, &sets)))
+        let prepared = self.prepare(|job, on_progress| {
+            let (run, sets) = file.resume(job, on_progress)?;
+            Ok(TrainedRun::new(run, &sets))
         });
         prepared.map_err(|error| format!("'{}': {error}", path.display()))
     }
@@ -224,33 +228,19 @@ impl<'a> TrainingLoop<'a> {
         });
     }
 
-    /// Draws or reads the samples of `setup` and initialises its networks; returns `None` if cancelled.
-    fn prepare_setup(
-        &self,
-        setup: &Setup,
-        run: impl FnOnce(SetupSets, &dyn Fn() -> bool) -> Result<Option<Run>, RunError>,
-    ) -> Result<Option<(TrainedRun, Box<Began>)>, TestViewError> {
-        self.prepare(|is_cancelled, on_progress| {
-            let Some(sets) = setup.sets(Path::new(""), is_cancelled, on_progress)? else {
-                return Ok(None);
-            };
-            let (recorded, drift, calibration) =
-                (sets.recorded().cloned(), sets.drift_reference(), Calibration::of(&sets));
-            let of_samples = describe_samples(&sets);
-            Ok(run(sets, is_cancelled)?.map(|run| TrainedRun {
-                run,
-                recorded,
-                drift,
-                of_samples,
-                calibration,
-            }))
+    /// Draws or reads the samples of `setup` and begins its trainings.
+    fn prepare_setup(&self, setup: &Setup, begin: Begin) -> Result<(TrainedRun, Box<Began>), TestViewError> {
+        self.prepare(|job, on_progress| {
+            let sets = setup.sets(Path::new(""), job, on_progress)?;
+            let run = sets.run(setup, begin, job)?;
+            Ok(TrainedRun::new(run, &sets))
         })
     }
 
-    /// Reads the recording of `setup`, chooses its settings and initialises the networks; returns `None` if cancelled.
-    fn choose(&self, setup: &Setup) -> Result<Option<(TrainedRun, Box<Began>)>, TestViewError> {
+    /// Reads the recording of `setup`, chooses its settings and initialises the networks.
+    fn choose(&self, setup: &Setup) -> Result<(TrainedRun, Box<Began>), TestViewError> {
         let report = self.report;
-        self.prepare(|is_cancelled, on_progress| {
+        self.prepare(|job, on_progress| {
             let mut on_choosing = |progress| match progress {
                 ChoosingProgress::Reading(progress) => on_progress(progress),
                 ChoosingProgress::Trying(progress) => {
@@ -258,44 +248,44 @@ impl<'a> TrainingLoop<'a> {
                 }
             };
             let (fixed, folder) = (AutoFixed::default(), Path::new(""));
-            let chosen = setup.choose(&fixed, DEFAULT_BUDGET_S, folder, is_cancelled, &mut on_choosing)?;
-            let Some(chosen) = chosen else { return Ok(None) };
-            let run = chosen.sets.run(&chosen.setup, is_cancelled)?;
-            Ok(run.map(|run| TrainedRun::new(run, &chosen.sets)))
+            let chosen = setup.choose(&fixed, DEFAULT_BUDGET_S, folder, job, &mut on_choosing)?;
+            let run = chosen.sets.run(&chosen.setup, Begin::Initialize, job)?;
+            Ok(TrainedRun::new(run, &chosen.sets))
         })
     }
 
-    /// Prepares a run with `get`, which can be cancelled and reports the progress of reading a recording; returns `None` if
-    /// cancelled.
+    /// Prepares a run with `get`, which can be cancelled and reports the progress of reading a recording.
     fn prepare(
         &self,
-        get: impl FnOnce(&dyn Fn() -> bool, &mut dyn FnMut(Progress)) -> Result<Option<TrainedRun>, TestViewError>,
-    ) -> Result<Option<(TrainedRun, Box<Began>)>, TestViewError> {
+        get: impl FnOnce(&Job<'_>, &mut dyn FnMut(Progress)) -> Result<TrainedRun, TestViewError>,
+    ) -> Result<(TrainedRun, Box<Began>), TestViewError> {
         let (number, cancelled, report) = (self.preparations + 1, self.cancelled, self.report);
         let is_cancelled = || cancelled.load(Ordering::Relaxed) >= number || report.is_cancelled();
-        let trained = get(&is_cancelled, &mut |progress| {
+        let job = Job::new(&is_cancelled);
+        let trained = get(&job, &mut |progress| {
             report.progress(Event::Reading(progress), |_, _| ());
         })?;
-        Ok(trained.map(begun).transpose()?.filter(|_| !is_cancelled()))
+        let begun = begun(trained)?;
+        job.check().map_err(SetupError::from)?;
+        Ok(begun)
     }
 
     /// Replaces the current run by a new one; the current run and its files stay if the new one is invalid. A run resumed from
     /// the checkpoint `left` is kept there.
     fn begin<X>(
         &mut self,
-        prepared: Result<Option<(TrainedRun, Box<Began>)>, X>,
+        prepared: Result<(TrainedRun, Box<Began>), X>,
         left: Option<CheckpointPlace>,
         event: fn(Result<Box<Began>, X>) -> Event,
     ) {
         self.preparations += 1;
         let (trained, began) = match prepared {
-            Ok(Some(prepared)) => prepared,
-            failed => {
+            Ok(prepared) => prepared,
+            Err(error) => {
                 if let Some(left) = left {
                     self.keeping.put_back(left);
                 }
-                let failed = failed.err().map_or(Event::Abandoned, |error| event(Err(error)));
-                return self.report.send(failed);
+                return self.report.send(event(Err(error)));
             }
         };
         let has_ended = trained.run.stop_reason().is_some();
@@ -392,7 +382,7 @@ impl<'a> TrainingLoop<'a> {
     fn end(&mut self, is_cancelled: &dyn Fn(&Self) -> bool) {
         let calibrated = self.run.as_ref().and_then(|TrainedRun { run, calibration, .. }| {
             let calibration = calibration.as_ref()?;
-            let calibrated = calibration.calibrate(run, &|| is_cancelled(self));
+            let calibrated = calibration.calibrate(run, &Job::new(&|| is_cancelled(self)));
             Some((calibrated, calibration.by()))
         });
         self.no_intervals = None;

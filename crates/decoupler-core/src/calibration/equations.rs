@@ -1,192 +1,207 @@
+use faer::Mat;
+
 use super::{CalibrationError, PressedRow, SensorParameter};
-use crate::sensor::{DVec3, SensorError, SensorModel};
+use crate::{
+    numerics::{Linearised, Stop, minimise},
+    sensor::{Axes, RowConductance, SensorModel},
+};
 
 /// Number of parameters.
-pub(super) const COUNT: usize = SensorParameter::COUNT;
+pub(super) const COUNT: usize = SensorParameter::ALL.len();
 
-/// Derivatives of one reading with respect to each parameter, in the order of [`SensorParameter::ALL`].
+/// Derivatives of ln R with respect to each parameter in the order of [`SensorParameter::ALL`], relative to its reference.
 pub(super) type Slopes = [f64; COUNT];
 
-/// Writes ln R of Eq. (2) for every column-wire (M4) and its derivatives with respect to the parameters.
-///
-/// With s = Σ 1/d and R = g/s, ∂ ln R/∂θ = −(1/s) ∂s/∂θ for a length θ, where ∂(1/d)/∂θ = −(d · ∂d/∂θ)/d³ for the vector
-/// d between a node and an electrode; and ∂ ln R/∂g = 1/g.
-pub(super) fn log_resistances(model: &SensorModel, pressed: &PressedRow, mut write: impl FnMut(usize, f64, &Slopes)) {
-    let SensorModel {
-        scale,
-        geometry,
-        resistivity_ohm_per_mm: g,
-    } = model;
-    let middle = |count: usize| (count - 1) as f64 / 2.0;
-    let row = pressed.row as f64;
-    let first_x = geometry.row_x0_mm - geometry.column_node_x0_mm + geometry.row_pitch_mm * row;
-    for column in 0..scale.columns() {
-        let columns_off = middle(scale.columns()) - column as f64;
-        let (mut sum, mut slopes) = (0.0, [0.0; COUNT]);
-        for (node, displacement) in pressed.displacements_mm.iter().enumerate() {
-            let nodes_off = node as f64 - middle(scale.nodes_per_row());
-            let y = geometry.node_pitch_mm * nodes_off + geometry.column_pitch_mm * columns_off + displacement.y;
-            let z = geometry.height_mm - displacement.z;
-            for electrode in 0..scale.nodes_per_column() {
-                let electrode = electrode as f64;
-                let x = first_x - geometry.column_node_pitch_mm * electrode + displacement.x;
-                let inverse = DVec3::new(x, y, z).length_recip();
-                let cubed = inverse * inverse * inverse;
-                sum += inverse;
-                let [by_x, by_y, by_z] = [-x * cubed, -y * cubed, -z * cubed];
-                let by = [
-                    by_z,
-                    row * by_x,
-                    nodes_off * by_y,
-                    columns_off * by_y,
-                    -by_x,
-                    -electrode * by_x,
-                ];
-                for (slope, by) in slopes.iter_mut().zip(by) {
-                    *slope += by;
+/// The readings of known presses, and the nominal sensor.
+pub(super) struct Problem<'a> {
+    pub(super) nominal: &'a SensorModel,
+    /// See [`SensorParameter::reference`].
+    pub(super) references: Slopes,
+    pub(super) samples: &'a [PressedRow],
+}
+
+impl<'a> Problem<'a> {
+    pub(super) fn new(nominal: &'a SensorModel, samples: &'a [PressedRow]) -> Self {
+        Self {
+            nominal,
+            references: SensorParameter::ALL.map(|parameter| parameter.reference(nominal)),
+            samples,
+        }
+    }
+
+    /// Number of readings.
+    pub(super) fn readings(&self) -> usize {
+        self.samples.len() * self.nominal.scale.columns()
+    }
+
+    /// Calls `take` for every reading m with its sample, its column-wire, its residual ln m − ln R of `model`, and the
+    /// derivatives of ln R.
+    ///
+    /// With s = Σ 1/d of Eq. (2) and R = g/s, ∂ ln R/∂θ = −(1/s) ∂s/∂θ for a length θ, and ∂ ln R/∂g = 1/g. A length that
+    /// moves the nodes moves them along an axis in proportion to their number, so that ∂s/∂θ is a sum of derivatives by
+    /// displacements. For the pitch of the column nodes it follows from Euler's theorem: s is homogeneous of degree −1 in
+    /// all lengths.
+    pub(super) fn residuals(&self, model: &SensorModel, mut take: impl FnMut(&PressedRow, usize, f64, &Slopes)) {
+        let (scale, geometry) = (model.scale, &model.geometry);
+        let middle = |count: usize| (count - 1) as f64 / 2.0;
+        let mut conductance = RowConductance::new(model, Axes::Xyz);
+        for sample in self.samples {
+            conductance.evaluate(model, sample.row, &sample.displacements_mm);
+            for (column, (&sum, &reading_ohm)) in conductance.sums().iter().zip(&sample.resistances_ohm).enumerate() {
+                let by = |node: usize, axis: usize| conductance.derivatives(3 * node + axis)[column];
+                let mut by_all = [0.0; 3];
+                let (mut by_node_pitch, mut by_displacements) = (0.0, 0.0);
+                for (node, displacement_mm) in sample.displacements_mm.iter().enumerate() {
+                    by_node_pitch += (node as f64 - middle(scale.nodes_per_row())) * by(node, 1);
+                    for (axis, sum) in by_all.iter_mut().enumerate() {
+                        *sum += by(node, axis);
+                        by_displacements += displacement_mm[axis] * by(node, axis);
+                    }
+                }
+                let [by_x, by_y, by_depth] = by_all;
+                let mut slopes = [0.0; COUNT];
+                let mut by_scale = by_displacements + (geometry.row_x0_mm - geometry.column_node_x0_mm) * by_x;
+                for (slope, parameter) in slopes.iter_mut().zip(SensorParameter::ALL) {
+                    *slope = match parameter {
+                        SensorParameter::Height => -by_depth,
+                        SensorParameter::RowPitch => sample.row as f64 * by_x,
+                        SensorParameter::NodePitch => by_node_pitch,
+                        SensorParameter::ColumnPitch => (middle(scale.columns()) - column as f64) * by_y,
+                        SensorParameter::ColumnNodeX => -by_x,
+                        SensorParameter::ColumnNodePitch | SensorParameter::Resistivity => 0.0,
+                    };
+                    if parameter != SensorParameter::ColumnNodeX {
+                        by_scale += *slope * parameter.of(model);
+                    }
+                }
+                if scale.nodes_per_column() > 1 {
+                    slopes[COUNT - 2] = -(sum + by_scale) / geometry.column_node_pitch_mm;
+                }
+                slopes.iter_mut().for_each(|slope| *slope /= -sum);
+                slopes[COUNT - 1] = 1.0 / model.resistivity_ohm_per_mm;
+                slopes
+                    .iter_mut()
+                    .zip(&self.references)
+                    .for_each(|(slope, reference)| *slope *= reference);
+                let ln_ohm = (model.resistivity_ohm_per_mm / sum).ln();
+                take(sample, column, reading_ohm.ln() - ln_ohm, &slopes);
+            }
+        }
+    }
+
+    /// Linearises the equations at `model` for all parameters.
+    pub(super) fn linearise(&self, model: &SensorModel) -> Linearised {
+        let mut sums = Linearised {
+            gram: Mat::zeros(COUNT, COUNT),
+            descent: vec![0.0; COUNT],
+            squares: 0.0,
+        };
+        self.residuals(model, |_, _, residual, slopes| {
+            sums.squares += residual * residual;
+            for (one, slope) in slopes.iter().enumerate() {
+                sums.descent[one] += slope * residual;
+                for (other, value) in slopes.iter().enumerate() {
+                    sums.gram[(one, other)] += slope * value;
                 }
             }
-        }
-        slopes.iter_mut().for_each(|slope| *slope /= -sum);
-        slopes[COUNT - 1] = 1.0 / g;
-        write(column, (g / sum).ln(), &slopes);
-    }
-}
-
-/// Displacements that nodes may have in samples of known presses.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct PressLimits {
-    /// Largest downward displacement.
-    pub largest_depth_mm: f64,
-    /// Largest sideways displacement, along x and along y.
-    pub largest_shift_mm: f64,
-}
-
-impl PressLimits {
-    /// Tolerance beyond the limits for measurement errors of a displacement, relative to the height.
-    const TOLERANCE: f64 = 0.02;
-    /// Factor by which a reading may differ from the value that the sensor model and the other readings suggest.
-    pub const LARGEST_FACTOR: f64 = 1e3;
-
-    /// Limits for a sensor without a known scene: nodes move down as far as the column-wires, and sideways by any
-    /// distance.
-    pub fn of_sensor(model: &SensorModel) -> Self {
-        Self {
-            largest_depth_mm: model.geometry.height_mm,
-            largest_shift_mm: f64::INFINITY,
-        }
+        });
+        sums
     }
 
-    /// Checks samples of known presses on a sensor like `nominal`, before they are used to calibrate it or to train a
-    /// network. A sensor whose readings all differ from those of `nominal` by the same factor passes.
+    /// The nominal sensor with changes of the parameters `free`, relative to their references.
+    pub(super) fn changed(&self, free: &[SensorParameter], changes: &[f64]) -> SensorModel {
+        let mut model = *self.nominal;
+        for (parameter, change) in free.iter().zip(changes) {
+            *parameter.field(&mut model) += change * self.references[parameter.index()];
+        }
+        model
+    }
+
+    /// Fits the parameters `free` from `start` (their changes), on the logarithms of the resistances, so that relative
+    /// errors count alike: minimises `Σ r² + prior_weight · Σ θ²` over the changes θ, and returns them.
     ///
-    /// # Errors
-    /// If the nominal sensor is impossible, or a sample does not belong to the array, has a reading that is not a
-    /// resistance or is implausible, or a displacement outside these limits.
-    pub fn check(self, nominal: &SensorModel, samples: &[PressedRow]) -> Result<(), CalibrationError> {
-        nominal
-            .check()
-            .map_err(|source: SensorError| CalibrationError::Sensor(source))?;
-        for (sample, pressed) in samples.iter().enumerate() {
-            check_shape(nominal, sample, pressed)?;
-            self.check_displacements(nominal, sample, pressed)?;
-            let mut readings = pressed.resistances_ohm.iter().enumerate();
-            if let Some((column, &ohm)) = readings.find(|(_, ohm)| !(**ohm > 0.0 && ohm.is_finite())) {
-                return Err(CalibrationError::Reading { sample, column, ohm });
+    /// The fit has converged when a step would be negligible compared with the uncertainty of the parameters. Exact
+    /// readings converge when rounding is reached.
+    pub(super) fn fit(
+        &self,
+        free: &[SensorParameter],
+        start: &[f64],
+        prior_weight: f64,
+    ) -> Result<Vec<f64>, CalibrationError> {
+        /// Convergence tolerance: length of the remaining step, in standard deviations of the parameters.
+        const OFFSET: f64 = 1e-4;
+        /// Relative change of Σ r² that is attributed to rounding.
+        const ROUNDING_OF_SUM: f64 = 1e-14;
+        /// Rounding error of a residual: that of a reading, a resistance and their logarithms.
+        const ROUNDING: f64 = 16.0 * f64::EPSILON;
+        let redundancy = self.readings().saturating_sub(free.len()).max(1) as f64;
+        let share = (OFFSET * OFFSET / redundancy).max(ROUNDING_OF_SUM);
+        let rounding = self.readings() as f64 * ROUNDING * ROUNDING;
+        let linearise = |changes: &[f64]| {
+            let model = self.changed(free, changes);
+            let mut nodes = self.samples.iter().flat_map(|sample| &sample.displacements_mm);
+            let is_possible = model.check().is_ok() && nodes.all(|node| node.z < model.geometry.height_mm);
+            let all = is_possible.then(|| self.linearise(&model))?;
+            let mut found = restricted(&all, free);
+            for (unknown, change) in changes.iter().enumerate() {
+                found.gram[(unknown, unknown)] += prior_weight;
+                found.descent[unknown] -= prior_weight * change;
+                found.squares += prior_weight * change * change;
             }
+            Some(found)
+        };
+        let report = minimise(start, linearise, |squares| share * squares + rounding);
+        match report.stop {
+            Stop::Converged => Ok(report.at),
+            Stop::NoStepHelps | Stop::StepsTaken | Stop::NotFinite => Err(CalibrationError::NotConverged),
         }
-        check_factors(nominal, samples)
     }
 
-    fn check_displacements(
-        self,
-        nominal: &SensorModel,
-        sample: usize,
-        pressed: &PressedRow,
-    ) -> Result<(), CalibrationError> {
-        let height_mm = nominal.geometry.height_mm;
-        let tolerance_mm = Self::TOLERANCE * height_mm;
-        for (node, displacement) in pressed.displacements_mm.iter().enumerate() {
-            if !(displacement.is_finite() && displacement.z < height_mm) {
-                return Err(CalibrationError::Displacement { sample, node });
-            }
-            let depth_mm = displacement.z;
-            if depth_mm < -tolerance_mm || depth_mm > self.largest_depth_mm + tolerance_mm {
-                return Err(CalibrationError::Depth {
-                    sample,
-                    node,
-                    depth_mm,
-                    largest_mm: self.largest_depth_mm,
-                });
-            }
-            let shift_mm = displacement.truncate().abs().max_element();
-            if shift_mm > self.largest_shift_mm + tolerance_mm {
-                return Err(CalibrationError::Shift {
-                    sample,
-                    node,
-                    shift_mm,
-                    largest_mm: self.largest_shift_mm,
-                });
+    /// Fits the parameters `free` with a normal prior around their nominal values, whose standard deviation is `tolerance`
+    /// relative to their references, and with the noise estimated from the residuals. This fit exists for any number of
+    /// readings.
+    pub(super) fn fit_with_prior(
+        &self,
+        free: &[SensorParameter],
+        tolerance: f64,
+    ) -> Result<Vec<f64>, CalibrationError> {
+        /// Maximum iterations of the noise estimate, and the relative change at which it has converged.
+        const ROUNDS: usize = 20;
+        const SETTLED: f64 = 1e-2;
+        let redundancy = self.readings().saturating_sub(free.len()).max(1) as f64;
+        let variance_at = |changes: &[f64]| {
+            let squares = self.linearise(&self.changed(free, changes)).squares;
+            (squares / redundancy).max(f64::EPSILON * f64::EPSILON)
+        };
+        let mut changes = vec![0.0; free.len()];
+        let mut variance = variance_at(&changes);
+        for _ in 0..ROUNDS {
+            changes = self.fit(free, &changes, variance / (tolerance * tolerance))?;
+            let last = std::mem::replace(&mut variance, variance_at(&changes));
+            if (variance / last - 1.0).abs() <= SETTLED {
+                break;
             }
         }
-        Ok(())
+        Ok(changes)
     }
 }
 
-fn check_shape(nominal: &SensorModel, sample: usize, pressed: &PressedRow) -> Result<(), CalibrationError> {
-    let scale = nominal.scale;
-    let counts = [
-        ("displacements", pressed.displacements_mm.len(), scale.nodes_per_row()),
-        ("readings", pressed.resistances_ohm.len(), scale.columns()),
-    ];
-    let wrong = counts.into_iter().find(|(_, found, expected)| found != expected);
-    let row = ("as row-wire number", pressed.row + 1, scale.rows());
-    match wrong.or_else(|| (pressed.row >= scale.rows()).then_some(row)) {
-        Some((what, found, expected)) => Err(CalibrationError::Shape {
-            sample,
-            what,
-            found,
-            expected,
-            scale: scale.to_string(),
+/// The equations of some parameters only.
+pub(super) fn restricted(all: &Linearised, free: &[SensorParameter]) -> Linearised {
+    let index = |unknown: usize| free[unknown].index();
+    Linearised {
+        gram: Mat::from_fn(free.len(), free.len(), |one, other| {
+            all.gram[(index(one), index(other))]
         }),
-        None => Ok(()),
-    }
-}
-
-/// Compares ln of each reading and of the resistance of `nominal` with the median of their differences.
-fn check_factors(nominal: &SensorModel, samples: &[PressedRow]) -> Result<(), CalibrationError> {
-    let mut differences = Vec::with_capacity(samples.len() * nominal.scale.columns());
-    for pressed in samples {
-        let resistances_ohm = nominal.row_resistances(pressed.row, &pressed.displacements_mm)?;
-        let pairs = pressed.resistances_ohm.iter().zip(resistances_ohm);
-        differences.extend(pairs.map(|(read_ohm, ohm)| read_ohm.ln() - ohm.ln()));
-    }
-    let mut sorted = differences.clone();
-    sorted.sort_by(f64::total_cmp);
-    let Some(median) = sorted.get(sorted.len() / 2) else {
-        return Ok(());
-    };
-    let is_absurd = |difference: &f64| (difference - median).abs() > PressLimits::LARGEST_FACTOR.ln();
-    match differences.iter().position(is_absurd) {
-        Some(place) => {
-            let (sample, column) = (place / nominal.scale.columns(), place % nominal.scale.columns());
-            let ohm = samples[sample].resistances_ohm[column];
-            let expected_ohm = ohm / (differences[place] - median).exp();
-            Err(CalibrationError::Absurd {
-                sample,
-                column,
-                ohm,
-                expected_ohm,
-            })
-        }
-        None => Ok(()),
+        descent: free.iter().map(|parameter| all.descent[parameter.index()]).collect(),
+        squares: all.squares,
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::sensor::ArrayScale;
+    use crate::sensor::{ArrayScale, DVec3};
 
     fn pressed(scale: ArrayScale, row: usize) -> PressedRow {
         let displacement = |node: usize| DVec3::new(0.03 * node as f64, -0.02, 0.17 * (node % 5) as f64);
@@ -205,6 +220,9 @@ mod tests {
             let mut model = SensorModel::new(text.parse().unwrap());
             (model.geometry.column_node_x0_mm, model.geometry.row_pitch_mm) = (12.3, 1.4);
             let pressed = pressed(model.scale, row);
+            let samples = [pressed.clone()];
+            let mut problem = Problem::new(&model, &samples);
+            problem.references = [1.0; COUNT];
             let ln_ohm = |model: &SensorModel| -> Vec<f64> {
                 let ohm = model.row_resistances(row, &pressed.displacements_mm).unwrap();
                 ohm.into_iter().map(f64::ln).collect()
@@ -218,8 +236,8 @@ mod tests {
                     ln_ohm(&moved)
                 };
                 let (above, below) = (moved(step), moved(-step));
-                log_resistances(&model, &pressed, |column, ours, slopes| {
-                    assert!((ours - at[column]).abs() < 1e-13, "{text}");
+                problem.residuals(&model, |_, column, residual, slopes| {
+                    assert!((residual + at[column]).abs() < 1e-13, "{text}");
                     let expected = (above[column] - below[column]) / (2.0 * step);
                     let error = (slopes[index] - expected).abs();
                     assert!(

@@ -1,240 +1,124 @@
-use std::collections::HashMap;
-
-use faer::Mat;
+use std::collections::BTreeMap;
 
 use super::{
-    CalibrationError, PressedRow, SensorParameter,
-    equations::{COUNT, Slopes, log_resistances},
+    CalibratedParameter, CalibrationError, CalibrationWarning, ParameterStatus, PressLimits, PressedRow,
+    SensorParameter,
+    equations::{COUNT, Problem, Slopes, restricted},
 };
-use crate::sensor::SensorModel;
+use crate::{
+    numerics::{Linearised, Spectrum, two_sided_normal_quantile},
+    sensor::SensorModel,
+};
 
-/// Sums of the linearised equations at one sensor model, with every parameter relative to its reference.
-pub(super) struct LinearisedFit {
-    /// JᵀJ.
-    pub(super) gram: [[f64; COUNT]; COUNT],
-    /// Jᵀr, with r = ln of the readings − ln R.
-    gradient: [f64; COUNT],
-    /// Σ r².
-    pub(super) squares: f64,
+/// A sensor model fitted to readings of known deformations.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Calibration {
+    /// The fitted model; parameters that the readings do not determine have their nominal values.
+    pub model: SensorModel,
+    /// All parameters, with the status of each.
+    pub parameters: Vec<CalibratedParameter>,
+    /// Number of readings fitted.
+    pub readings: usize,
+    /// Root mean square of the relative errors of the nominal model's resistances.
+    pub nominal_residual: f64,
+    /// Root mean square of the relative errors of the fitted model's resistances.
+    pub residual: f64,
+    /// Warnings that the readings do not fit the sensor model, with likely causes and remedies.
+    pub warnings: Vec<CalibrationWarning>,
 }
 
-impl LinearisedFit {
-    pub(super) fn at(model: &SensorModel, references: &Slopes, samples: &[PressedRow]) -> Self {
-        let mut sums = Self {
-            gram: [[0.0; COUNT]; COUNT],
-            gradient: [0.0; COUNT],
-            squares: 0.0,
-        };
-        residuals(model, references, samples, |_, _, residual, slopes| {
-            sums.squares += residual * residual;
-            for (one, slope) in slopes.iter().enumerate() {
-                sums.gradient[one] += slope * residual;
-                for (other, value) in slopes.iter().enumerate().take(one + 1) {
-                    sums.gram[one][other] += slope * value;
-                }
-            }
-        });
-        for one in 0..COUNT {
-            for other in 0..one {
-                sums.gram[other][one] = sums.gram[one][other];
-            }
+impl Calibration {
+    /// Tolerance of nominal values, relative to [`SensorParameter::reference`]: a parameter is changed only if the
+    /// readings determine it better than this.
+    pub(super) const NOMINAL_TOLERANCE: f64 = 0.1;
+
+    /// Fits geometry and resistivity of Eq. (2) to `samples`, starting from `nominal`.
+    ///
+    /// A fit with the prior that nominal values are correct to ±10 % (two standard deviations), which exists for any
+    /// number of readings, decides which parameters the readings determine; these are then fitted without a prior.
+    ///
+    /// Parameters that the readings do not determine to ±10 % are held at their nominal values, one after another,
+    /// the least certain first. The intervals of the others allow for errors of ±10 % in the nominal values, for a
+    /// misfit of single crossings and for a drift from frame to frame.
+    ///
+    /// # Errors
+    /// If the nominal sensor is impossible, a sample does not belong to the array or has a reading that is not a
+    /// resistance, or the fit does not converge.
+    pub fn fit(nominal: &SensorModel, samples: &[PressedRow]) -> Result<Self, CalibrationError> {
+        PressLimits::of_sensor(nominal).check(nominal, samples)?;
+        // The position of the first row-wire is not fitted, so it alone leaves no ambiguity.
+        if let Some(row) = samples.first().map(|sample| sample.row).filter(|&row| row > 0)
+            && samples.iter().all(|sample| sample.row == row)
+        {
+            return Err(CalibrationError::OneRow { row });
         }
-        sums
-    }
-}
-
-/// Calls `take` for every reading with its sample, its column-wire, its residual and its derivatives.
-pub(super) fn residuals(
-    model: &SensorModel,
-    references: &Slopes,
-    samples: &[PressedRow],
-    mut take: impl FnMut(&PressedRow, usize, f64, &Slopes),
-) {
-    for sample in samples {
-        log_resistances(model, sample, |column, ln_ohm, slopes| {
-            let scaled: Slopes = std::array::from_fn(|index| slopes[index] * references[index]);
-            take(sample, column, sample.resistances_ohm[column].ln() - ln_ohm, &scaled);
-        });
-    }
-}
-
-/// Outcome of a fit.
-pub(super) struct CalibratedFit {
-    pub(super) model: SensorModel,
-    /// The equations linearised there, without the prior.
-    pub(super) here: LinearisedFit,
-    pub(super) iterations: usize,
-}
-
-/// Fits the parameters `free` (indices in [`SensorParameter::ALL`]) from `start`, by the Levenberg-Marquardt method
-/// (Marquardt 1963) on the logarithms of the resistances, so that relative errors count alike:
-/// minimises `Σ r² + prior_weight · Σ θ²`, with θ the change of a parameter from `nominal` in proportion to its reference.
-///
-/// The fit has converged when the Gauss-Newton step would lower this objective by an amount that is negligible
-/// compared with the uncertainty of the parameters (the relative offset of Bates and Watts 1981), whatever the length
-/// of the step: poorly determined patterns do not delay convergence. Exact readings converge when rounding is
-/// reached.
-pub(super) fn fit(
-    (nominal, start): (&SensorModel, &SensorModel),
-    free: &[usize],
-    references: &Slopes,
-    samples: &[PressedRow],
-    prior_weight: f64,
-) -> Result<CalibratedFit, CalibrationError> {
-    /// Iteration limit.
-    const MAX: usize = 200;
-    /// Convergence tolerance: length of the remaining step, in standard deviations of the parameters.
-    const OFFSET: f64 = 1e-4;
-    /// Relative change of Σ r² that is attributed to rounding.
-    const ROUNDING_OF_SUM: f64 = 1e-14;
-    /// Rounding error of a residual: that of a reading, a resistance and their logarithms.
-    const ROUNDING: f64 = 16.0 * f64::EPSILON;
-    /// Damping, relative to the largest eigenvalue of JᵀJ, beyond which the fit stops.
-    const LARGEST_DAMPING: f64 = 1e6;
-    let readings: usize = samples.iter().map(|sample| sample.resistances_ohm.len()).sum();
-    let redundancy = readings.saturating_sub(free.len()).max(1) as f64;
-    let share = (OFFSET * OFFSET / redundancy).max(ROUNDING_OF_SUM);
-    let changes = |model: &SensorModel| -> Vec<f64> {
-        let change = |&index: &usize| {
-            let parameter = SensorParameter::ALL[index];
-            (parameter.of(model) - parameter.of(nominal)) / references[index]
-        };
-        free.iter().map(change).collect()
-    };
-    let penalty = |changes: &[f64]| prior_weight * changes.iter().map(|change| change * change).sum::<f64>();
-    let (mut model, mut damping) = (*start, 1e-6);
-    let mut here = LinearisedFit::at(&model, references, samples);
-    let mut moved = changes(&model);
-    for iteration in 1..=MAX {
-        let mut gram = here.gram;
-        free.iter().for_each(|&index| gram[index][index] += prior_weight);
-        let decomposition = Decomposition::of(&gram, free)?;
-        let gradient = free.iter().zip(&moved);
-        let gradient: Vec<f64> = gradient
-            .map(|(&index, moved)| here.gradient[index] - prior_weight * moved)
-            .collect();
-        let squares = here.squares + penalty(&moved);
-        let newton = decomposition.solve(&gradient, 0.0);
-        let gain: f64 = newton.iter().zip(&gradient).map(|(step, slope)| step * slope).sum();
-        if gain <= share * squares + readings as f64 * ROUNDING * ROUNDING {
-            return Ok(CalibratedFit {
-                model,
-                here,
-                iterations: iteration,
+        let problem = Problem::new(nominal, samples);
+        let readings = problem.readings();
+        if readings <= COUNT {
+            return Err(CalibrationError::TooFew {
+                readings,
+                parameters: COUNT,
             });
         }
+        let at_nominal = problem.linearise(nominal);
+        // Others move no reading, such as the row pitch where only the first row is read.
+        let mut free = Vec::from(SensorParameter::ALL);
+        free.retain(|parameter| at_nominal.gram[(parameter.index(), parameter.index())] > 0.0);
+        let mut start: Option<Vec<f64>> = None;
         loop {
-            let step = decomposition.solve(&gradient, damping * decomposition.largest());
-            let mut candidate = model;
-            for (&index, change) in free.iter().zip(&step) {
-                *SensorParameter::ALL[index].field(&mut candidate) += change * references[index];
-            }
-            let is_possible = candidate.check().is_ok() && is_above_columns(&candidate, samples);
-            let next = is_possible.then(|| (LinearisedFit::at(&candidate, references, samples), changes(&candidate)));
+            let changes = match &start {
+                None => problem.fit_with_prior(&free, 0.5 * Self::NOMINAL_TOLERANCE)?,
+                Some(start) => problem.fit(&free, start, 0.0)?,
+            };
+            let model = problem.changed(&free, &changes);
+            let here = problem.linearise(&model);
+            let spectrum = Spectrum::of(&restricted(&here, &free).gram).ok_or(CalibrationError::NotConverged)?;
+            let noise_variance = here.squares / (readings - free.len()) as f64;
+            let variances = variances(&problem, &model, &free, &spectrum, noise_variance);
+            let factor = two_sided_normal_quantile(0.05 / free.len().max(1) as f64);
             // False for NaN.
-            if let Some(next) = next.filter(|(next, moved)| next.squares + penalty(moved) < squares) {
-                model = candidate;
-                (here, moved) = next;
-                damping = (damping * 0.1).max(1e-15);
-                break;
+            let is_determined = |variance: f64| factor * variance.sqrt() <= Self::NOMINAL_TOLERANCE;
+            let of_free = variances.iter().enumerate();
+            if let Some((least_certain, &variance)) = of_free.max_by(|(_, one), (_, other)| one.total_cmp(other))
+                && !is_determined(variance)
+            {
+                free.remove(least_certain);
+                start = None;
+                continue;
             }
-            damping *= 10.0;
-            if damping > LARGEST_DAMPING {
-                return Err(CalibrationError::NotConverged);
+            if start.is_none() {
+                start = Some(changes);
+                continue;
             }
-        }
-    }
-    Err(CalibrationError::NotConverged)
-}
-
-/// Fits the parameters `free` with a normal prior around their nominal values, whose standard deviation is
-/// `tolerance` relative to their references, and with the noise estimated from the residuals. This fit exists for any
-/// number of readings.
-pub(super) fn fit_with_prior(
-    nominal: &SensorModel,
-    free: &[usize],
-    references: &Slopes,
-    samples: &[PressedRow],
-    tolerance: f64,
-) -> Result<CalibratedFit, CalibrationError> {
-    /// Maximum iterations of the noise estimate, and the relative change at which it has converged.
-    const ROUNDS: usize = 20;
-    const SETTLED: f64 = 1e-2;
-    let readings: usize = samples.iter().map(|sample| sample.resistances_ohm.len()).sum();
-    let redundancy = readings.saturating_sub(free.len()).max(1) as f64;
-    let variance_of = |here: &LinearisedFit| (here.squares / redundancy).max(f64::EPSILON * f64::EPSILON);
-    let mut variance = variance_of(&LinearisedFit::at(nominal, references, samples));
-    let mut start = *nominal;
-    for round in 1.. {
-        let weight = variance / (tolerance * tolerance);
-        let fitted = fit((nominal, &start), free, references, samples, weight)?;
-        let last = std::mem::replace(&mut variance, variance_of(&fitted.here));
-        if round == ROUNDS || (variance / last - 1.0).abs() <= SETTLED {
-            return Ok(fitted);
-        }
-        start = fitted.model;
-    }
-    Err(CalibrationError::NotConverged)
-}
-
-/// Returns `true` if every node stays above the column-wires.
-fn is_above_columns(model: &SensorModel, samples: &[PressedRow]) -> bool {
-    let mut nodes = samples.iter().flat_map(|sample| &sample.displacements_mm);
-    nodes.all(|displacement| displacement.z < model.geometry.height_mm)
-}
-
-/// Eigenvalues and eigenvectors of JᵀJ for some of the parameters.
-pub(super) struct Decomposition {
-    /// Squares of the singular values of J, largest first.
-    pub(super) values: Vec<f64>,
-    /// Parameter × pattern.
-    vectors: Mat<f64>,
-}
-
-impl Decomposition {
-    pub(super) fn of(gram: &[[f64; COUNT]; COUNT], free: &[usize]) -> Result<Self, CalibrationError> {
-        let matrix = Mat::from_fn(free.len(), free.len(), |one, other| gram[free[one]][free[other]]);
-        let svd = matrix.thin_svd().map_err(|_| CalibrationError::NotConverged)?;
-        Ok(Self {
-            values: svd.S().column_vector().iter().copied().collect(),
-            vectors: svd.U().to_owned(),
-        })
-    }
-
-    /// Largest eigenvalue; 0 without parameters.
-    pub(super) fn largest(&self) -> f64 {
-        self.values.first().copied().unwrap_or(0.0)
-    }
-
-    /// (JᵀJ + damping · I)⁻¹ `right`, leaving out patterns below rounding.
-    pub(super) fn solve(&self, right: &[f64], damping: f64) -> Vec<f64> {
-        let mut solution = vec![0.0; right.len()];
-        for (pattern, &value) in self.values.iter().enumerate() {
-            if value > self.rounding() {
-                let along: f64 = (0..right.len()).map(|k| self.vectors[(k, pattern)] * right[k]).sum();
-                for (k, part) in solution.iter_mut().enumerate() {
-                    *part += self.vectors[(k, pattern)] * along / (value + damping);
+            let of_held = held_variances(&here, &free, &spectrum);
+            let standing = |parameter: SensorParameter| match free.iter().position(|&free| free == parameter) {
+                Some(place) => {
+                    let half_width = factor * (variances[place] + of_held[place]).sqrt();
+                    ParameterStatus::Determined(half_width * problem.references[parameter.index()])
                 }
-            }
+                None => ParameterStatus::Nominal,
+            };
+            let parameters = Vec::from(SensorParameter::ALL.map(|parameter| CalibratedParameter {
+                parameter,
+                nominal: parameter.of(nominal),
+                value: parameter.of(&model),
+                standing: standing(parameter),
+            }));
+            let rms = |squares: f64| (squares / readings as f64).sqrt();
+            return Ok(Self {
+                warnings: CalibrationWarning::of(&problem, &model, &parameters),
+                model,
+                parameters,
+                readings,
+                nominal_residual: rms(at_nominal.squares),
+                residual: rms(here.squares),
+            });
         }
-        solution
     }
 
-    /// Diagonal entry of (JᵀJ)⁻¹; infinite if the parameter is part of a pattern below rounding.
-    pub(super) fn inverse_diagonal(&self, parameter: usize) -> f64 {
-        let part = |(pattern, &value): (usize, &f64)| {
-            let share = self.vectors[(parameter, pattern)].powi(2);
-            match value > self.rounding() {
-                true => share / value,
-                false if share > 1e-12 => f64::INFINITY,
-                false => 0.0,
-            }
-        };
-        self.values.iter().enumerate().map(part).sum()
-    }
-
-    fn rounding(&self) -> f64 {
-        self.largest() * f64::EPSILON * 16.0
+    /// Returns the fitted parameter of this kind.
+    pub fn parameter(&self, parameter: SensorParameter) -> CalibratedParameter {
+        self.parameters[parameter.index()]
     }
 }
 
@@ -242,35 +126,31 @@ impl Decomposition {
 /// for independent errors and the cluster-robust variances with clusters by crossing (a misfit of one wire in every
 /// frame) and by frame (a drift of all readings), from the sandwich formula `A⁻¹ (Σ_c g_c g_cᵀ) A⁻¹`, A = JᵀJ, g_c =
 /// Σ_{i ∈ c} J_i r_i, times G/(G−1) for G clusters (Liang and Zeger 1986).
-pub(super) fn variances(
+fn variances(
+    problem: &Problem<'_>,
     model: &SensorModel,
-    free: &[usize],
-    references: &Slopes,
-    samples: &[PressedRow],
-    (decomposition, noise_variance): (&Decomposition, f64),
+    free: &[SensorParameter],
+    spectrum: &Spectrum,
+    noise_variance: f64,
 ) -> Vec<f64> {
-    let mut by_crossing: HashMap<(usize, usize), Slopes> = HashMap::new();
-    let mut by_frame: HashMap<usize, Slopes> = HashMap::new();
-    residuals(model, references, samples, |sample, column, residual, slopes| {
-        let crossing = by_crossing.entry((sample.row, column)).or_insert([0.0; COUNT]);
-        let frame = by_frame.entry(sample.frame).or_insert([0.0; COUNT]);
-        for (index, slope) in slopes.iter().enumerate() {
-            crossing[index] += slope * residual;
-            frame[index] += slope * residual;
+    let mut clusterings: [BTreeMap<(usize, usize), Slopes>; 2] = Default::default();
+    problem.residuals(model, |sample, column, residual, slopes| {
+        let clusters = [(sample.row, column), (sample.frame, 0)];
+        for (clustering, cluster) in clusterings.iter_mut().zip(clusters) {
+            let score = clustering.entry(cluster).or_default();
+            score
+                .iter_mut()
+                .zip(slopes)
+                .for_each(|(sum, slope)| *sum += slope * residual);
         }
     });
-    let mut variances: Vec<f64> = (0..free.len())
-        .map(|parameter| noise_variance * decomposition.inverse_diagonal(parameter))
-        .collect();
-    // In a fixed order, for bit-identical sums.
-    let clusterings = [sorted(by_crossing), sorted(by_frame)];
+    let independent = (0..free.len()).map(|place| noise_variance * spectrum.inverse_diagonal(place));
+    let mut variances: Vec<f64> = independent.collect();
     for scores in clusterings.iter().filter(|scores| scores.len() >= 3 * free.len()) {
         let mut of_clusters = vec![0.0; free.len()];
-        for score in scores {
-            let right: Vec<f64> = free.iter().map(|&index| score[index]).collect();
-            for (sum, part) in of_clusters.iter_mut().zip(decomposition.solve(&right, 0.0)) {
-                *sum += part * part;
-            }
+        for score in scores.values() {
+            let right: Vec<f64> = free.iter().map(|parameter| score[parameter.index()]).collect();
+            add_squares(&mut of_clusters, &spectrum.solve(&right, 0.0), 1.0);
         }
         let clusters = scores.len() as f64;
         for (variance, sum) in variances.iter_mut().zip(of_clusters) {
@@ -280,8 +160,25 @@ pub(super) fn variances(
     variances
 }
 
-fn sorted<K: Ord>(scores: HashMap<K, Slopes>) -> Vec<Slopes> {
-    let mut scores: Vec<(K, Slopes)> = scores.into_iter().collect();
-    scores.sort_by(|(one, _), (other, _)| one.cmp(other));
-    scores.into_iter().map(|(_, score)| score).collect()
+/// Variances of the fitted parameters due to errors of the held ones, whose tolerance is two standard deviations:
+/// those of −(J_fᵀJ_f)⁻¹ J_fᵀJ_h.
+fn held_variances(here: &Linearised, free: &[SensorParameter], spectrum: &Spectrum) -> Vec<f64> {
+    let mut sums = vec![0.0; free.len()];
+    for held in SensorParameter::ALL
+        .into_iter()
+        .filter(|parameter| !free.contains(parameter))
+    {
+        let right = free
+            .iter()
+            .map(|parameter| here.gram[(parameter.index(), held.index())]);
+        let parts = spectrum.solve(&Vec::from_iter(right), 0.0);
+        add_squares(&mut sums, &parts, Calibration::NOMINAL_TOLERANCE / 2.0);
+    }
+    sums
+}
+
+fn add_squares(sums: &mut [f64], parts: &[f64], factor: f64) {
+    sums.iter_mut()
+        .zip(parts)
+        .for_each(|(sum, part)| *sum += (factor * part).powi(2));
 }

@@ -7,10 +7,14 @@
 
 mod equations;
 mod fit;
-mod report;
+mod limits;
+mod parameter;
+mod warning;
 
-pub use equations::PressLimits;
-pub use report::{CalibratedParameter, Calibration, CalibrationWarning, ParameterStatus, SensorParameter};
+pub use fit::Calibration;
+pub use limits::PressLimits;
+pub use parameter::{CalibratedParameter, ParameterStatus, SensorParameter};
+pub use warning::CalibrationWarning;
 
 use thiserror::Error;
 

@@ -54,9 +54,33 @@ pub enum DivisionError {
         /// Name of the unit of division: sample or group.
         unit: &'static str,
     },
+    /// The set cannot be divided into so many folds.
+    #[error("{folds} folds of {units} {unit}s: give from 2 folds to as many as there are {unit}s")]
+    Folds {
+        /// Number of folds requested.
+        folds: usize,
+        /// Number of units in the set.
+        units: usize,
+        /// Name of the unit of the folds: sample, snapshot or group.
+        unit: &'static str,
+    },
     /// The test samples belong to other row-wires.
     #[error(transparent)]
     Rows(#[from] DatasetError),
+}
+
+impl DivisionError {
+    /// Checks that so many units, named `unit`, fill `folds` folds.
+    ///
+    /// # Errors
+    /// If there are fewer than two folds, or more folds than units.
+    pub(crate) fn check_folds(folds: usize, units: usize, unit: &'static str) -> Result<(), Self> {
+        if (2..=units).contains(&folds) {
+            Ok(())
+        } else {
+            Err(Self::Folds { folds, units, unit })
+        }
+    }
 }
 
 impl Default for Division {
@@ -224,35 +248,6 @@ pub struct Split {
     pub validation: Option<Dataset>,
 }
 
-/// Holds out `held_out` snapshots for validation, chosen by `rng`; at least one snapshot remains for training. Whole
-/// snapshots are held out, so that no validation sample was read at the same moment as a training sample.
-pub fn hold_out(set: Dataset, held_out: usize, rng: &mut impl Rng) -> Split {
-    let snapshots = set.snapshots();
-    let held_out = held_out.min(snapshots.len().saturating_sub(1));
-    if held_out == 0 {
-        return Split {
-            training: set,
-            validation: None,
-        };
-    }
-    let mut order: Vec<usize> = (0..snapshots.len()).collect();
-    order.shuffle(rng);
-    let (validation, training) = order.split_at(held_out);
-    let samples = |chosen: &[usize]| -> Vec<usize> {
-        let mut samples: Vec<usize> = chosen
-            .iter()
-            .flat_map(|&snapshot| &snapshots[snapshot])
-            .copied()
-            .collect();
-        samples.sort_unstable();
-        samples
-    };
-    Split {
-        training: set.select(&samples(training)),
-        validation: Some(set.select(&samples(validation))),
-    }
-}
-
 /// Rule by which the samples of a recording are divided into training, validation and test samples, or into folds.
 ///
 /// Neighbouring frames of a recording are nearly the same, so a test sample whose neighbours are in the training set
@@ -264,9 +259,12 @@ pub enum SplitBy {
     /// targets). Consecutive samples of one group stay together.
     #[default]
     Time,
-    /// Whole groups, drawn at random: no group is in two parts.
+    /// Whole groups, drawn at random: no group is in two parts. The groups of a simulated array are its snapshots.
+    #[serde(alias = "snapshot")]
     Group,
-    /// Single samples, drawn at random. Optimistic if neighbouring samples are alike.
+    /// Single samples, drawn at random, as in the cross-validation of the paper. Optimistic if neighbouring samples are
+    /// alike, or row-wires of one snapshot.
+    #[serde(alias = "sample")]
     Random,
 }
 
@@ -324,6 +322,22 @@ impl SplitBy {
             }
             Self::Group => set.snapshots(),
             Self::Random => (0..set.samples()).map(|sample| vec![sample]).collect(),
+        }
+    }
+
+    /// Holds out `held_out` units of `set` for validation, drawn at random unless in order of time; at least one unit
+    /// remains for training.
+    pub fn hold_out(self, set: &Dataset, held_out: usize, rng: &mut impl Rng) -> DividedSamples {
+        let mut validation = self.units(set);
+        let held_out = held_out.min(validation.len().saturating_sub(1));
+        if held_out > 0 && self != Self::Time {
+            validation.shuffle(rng);
+        }
+        let training = validation.split_off(held_out);
+        DividedSamples {
+            training: ascending(training),
+            validation: ascending(validation),
+            test: Vec::new(),
         }
     }
 
@@ -489,7 +503,8 @@ mod tests {
     fn split(samples: usize, held_out: usize) -> (Dataset, Split) {
         let model = SensorModel::new("10x6_3x18".parse().unwrap());
         let set = Dataset::simulate(&model, &Scene::default(), samples, &mut Seed(0).rng(Stream::Training)).unwrap();
-        (set.clone(), hold_out(set, held_out, &mut Seed(0).rng(Stream::Split)))
+        let parts = SplitBy::Group.hold_out(&set, held_out, &mut Seed(0).rng(Stream::Split));
+        (set.clone(), parts.split(&set))
     }
 
     #[test]

@@ -1,37 +1,6 @@
-use std::fmt;
-
 use rand::{Rng, seq::SliceRandom};
-use serde::{Deserialize, Serialize};
-use thiserror::Error;
 
-use super::{Dataset, SplitBy};
-
-/// Unit of the folds of a cross-validation.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum FoldUnit {
-    /// Single samples, as in the paper. Rows of one snapshot can then be in both the training and the test set.
-    #[default]
-    Sample,
-    /// Whole snapshots, so that no test sample was read at the same moment as a training sample.
-    Snapshot,
-}
-
-impl FoldUnit {
-    /// Name of one unit.
-    pub(crate) fn name(self) -> &'static str {
-        match self {
-            Self::Sample => "sample",
-            Self::Snapshot => "snapshot",
-        }
-    }
-}
-
-impl fmt::Display for FoldUnit {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.pad(self.name())
-    }
-}
+use super::{Dataset, DividedSamples, DivisionError, SplitBy};
 
 /// Folds of a k-fold cross-validation: every sample is in exactly one.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -40,41 +9,16 @@ pub struct Folds {
     folds: Vec<Vec<usize>>,
 }
 
-/// Error for a number of folds into which the set cannot be divided.
-#[derive(Clone, Debug, PartialEq, Eq, Error)]
-#[error("{folds} folds of {units} {unit}s: give from 2 folds to as many as there are {unit}s")]
-pub struct FoldsError {
-    /// Number of folds requested.
-    pub folds: usize,
-    /// Number of units in the set.
-    pub units: usize,
-    /// Name of the unit of the folds: sample, snapshot or group.
-    pub unit: &'static str,
-}
-
 impl Folds {
-    /// Shuffles the samples of `set` and divides them into `folds` folds, whose sizes differ by at most one sample (or
-    /// snapshot).
-    ///
-    /// # Errors
-    /// If there are fewer than two folds, or more folds than units.
-    pub fn deal(set: &Dataset, folds: usize, unit: FoldUnit, rng: &mut impl Rng) -> Result<Self, FoldsError> {
-        let units = match unit {
-            FoldUnit::Sample => SplitBy::Random.units(set),
-            FoldUnit::Snapshot => SplitBy::Group.units(set),
-        };
-        check(folds, units.len(), unit.name())?;
-        Ok(Self::shuffled(&units, folds, rng))
-    }
-
     /// Divides `set` into `folds` folds by the rule of a split: consecutive blocks of about the same number of samples,
     /// whole groups at random, or single samples at random.
     ///
     /// # Errors
     /// If there are fewer than two folds, or more folds than samples (or groups).
-    pub fn by(set: &Dataset, folds: usize, by: SplitBy, rng: &mut impl Rng) -> Result<Self, FoldsError> {
+    pub fn by(set: &Dataset, folds: usize, by: SplitBy, rng: &mut impl Rng) -> Result<Self, DivisionError> {
         let units = by.units(set);
-        check(folds, units.len(), by.unit_name(units.len(), set.samples()))?;
+        let unit = by.unit_name(units.len(), set.samples());
+        DivisionError::check_folds(folds, units.len(), unit)?;
         Ok(match by {
             SplitBy::Time => Self::blocks(&units, folds),
             SplitBy::Group | SplitBy::Random => Self::shuffled(&units, folds, rng),
@@ -131,20 +75,24 @@ impl Folds {
         &self.folds[fold]
     }
 
+    /// Divides the samples with fold `fold` for the test. If `holds_out` and there are at least three folds, the next fold
+    /// is the validation set.
+    pub fn divided(&self, fold: usize, holds_out: bool) -> DividedSamples {
+        let next = (fold + 1) % self.count();
+        let validation = (holds_out && self.count() > 2).then_some(next);
+        DividedSamples {
+            training: self.without(&[fold, validation.unwrap_or(fold)]),
+            validation: validation.map_or_else(Vec::new, |next| self.test(next).to_vec()),
+            test: self.test(fold).to_vec(),
+        }
+    }
+
     /// Indices of the samples in all folds except those given, ascending.
     pub fn without(&self, folds: &[usize]) -> Vec<usize> {
         let kept = self.folds.iter().enumerate().filter(|(fold, _)| !folds.contains(fold));
         let mut samples: Vec<usize> = kept.flat_map(|(_, samples)| samples).copied().collect();
         samples.sort_unstable();
         samples
-    }
-}
-
-fn check(folds: usize, units: usize, unit: &'static str) -> Result<(), FoldsError> {
-    if (2..=units).contains(&folds) {
-        Ok(())
-    } else {
-        Err(FoldsError { folds, units, unit })
     }
 }
 
@@ -162,18 +110,18 @@ mod tests {
         Dataset::simulate(&model, &Scene::default(), samples, &mut Seed(0).rng(Stream::Training)).unwrap()
     }
 
-    fn deal(set: &Dataset, folds: usize, unit: FoldUnit, seed: u64) -> Folds {
-        Folds::deal(set, folds, unit, &mut Seed(seed).rng(Stream::Split)).unwrap()
+    fn deal(set: &Dataset, folds: usize, by: SplitBy, seed: u64) -> Folds {
+        Folds::by(set, folds, by, &mut Seed(seed).rng(Stream::Split)).unwrap()
     }
 
     #[test]
     fn every_sample_is_in_exactly_one_test_fold_and_never_in_its_own_training() {
         let set = set(130);
         for (folds, unit) in [
-            (10, FoldUnit::Sample),
-            (7, FoldUnit::Sample),
-            (4, FoldUnit::Snapshot),
-            (13, FoldUnit::Snapshot),
+            (10, SplitBy::Random),
+            (7, SplitBy::Random),
+            (4, SplitBy::Group),
+            (13, SplitBy::Group),
         ] {
             let assigned = deal(&set, folds, unit, 1);
             let mut tested = vec![0; set.samples()];
@@ -187,7 +135,7 @@ mod tests {
             }
             assert!(tested.iter().all(|&times| times == 1), "{folds} folds by {unit}");
             let sizes = (0..folds).map(|fold| assigned.test(fold).len());
-            let unit_size = if unit == FoldUnit::Sample { 1 } else { 10 };
+            let unit_size = if unit == SplitBy::Random { 1 } else { 10 };
             assert!(sizes.clone().max().unwrap() - sizes.min().unwrap() <= unit_size);
         }
     }
@@ -195,14 +143,14 @@ mod tests {
     #[test]
     fn folds_by_snapshot_never_split_one() {
         let set = set(130);
-        let assigned = deal(&set, 5, FoldUnit::Snapshot, 2);
+        let assigned = deal(&set, 5, SplitBy::Group, 2);
         for fold in 0..5 {
             for snapshot in assigned.test(fold).chunks(10) {
                 assert_eq!(snapshot[0] % 10, 0);
                 assert!(snapshot.windows(2).all(|pair| pair[0] + 1 == pair[1]));
             }
         }
-        let by_sample = deal(&set, 5, FoldUnit::Sample, 2);
+        let by_sample = deal(&set, 5, SplitBy::Random, 2);
         let splits = |samples: &[usize]| {
             samples
                 .iter()
@@ -214,7 +162,7 @@ mod tests {
     #[test]
     fn a_seed_gives_the_same_folds_and_another_gives_others() {
         let set = set(100);
-        for unit in [FoldUnit::Sample, FoldUnit::Snapshot] {
+        for unit in [SplitBy::Random, SplitBy::Group] {
             assert_eq!(deal(&set, 5, unit, 3), deal(&set, 5, unit, 3));
             assert_ne!(deal(&set, 5, unit, 3), deal(&set, 5, unit, 4));
         }
@@ -224,15 +172,15 @@ mod tests {
     fn too_many_folds_are_refused() {
         let set = set(100);
         for (folds, unit) in [
-            (0, FoldUnit::Sample),
-            (1, FoldUnit::Sample),
-            (101, FoldUnit::Sample),
-            (11, FoldUnit::Snapshot),
+            (0, SplitBy::Random),
+            (1, SplitBy::Random),
+            (101, SplitBy::Random),
+            (11, SplitBy::Group),
         ] {
-            let error = Folds::deal(&set, folds, unit, &mut Seed(0).rng(Stream::Split)).unwrap_err();
+            let error = Folds::by(&set, folds, unit, &mut Seed(0).rng(Stream::Split)).unwrap_err();
             assert!(error.to_string().contains(&folds.to_string()), "{error}");
         }
-        assert_eq!(deal(&set, 100, FoldUnit::Sample, 0).test(0).len(), 1);
+        assert_eq!(deal(&set, 100, SplitBy::Random, 0).test(0).len(), 1);
     }
 
     #[test]
@@ -262,17 +210,5 @@ mod tests {
         );
         let error = Folds::by(&uneven, 5, SplitBy::Time, &mut Seed(0).rng(Stream::Split)).unwrap_err();
         assert!(error.to_string().contains("5 folds of 4 groups"), "{error}");
-    }
-
-    #[test]
-    fn folds_by_group_or_at_random_match_those_by_snapshot_or_sample() {
-        let set = set(130);
-        for (by, unit) in [
-            (SplitBy::Group, FoldUnit::Snapshot),
-            (SplitBy::Random, FoldUnit::Sample),
-        ] {
-            let assigned = Folds::by(&set, 5, by, &mut Seed(6).rng(Stream::Split)).unwrap();
-            assert_eq!(assigned, deal(&set, 5, unit, 6), "{by}");
-        }
     }
 }

@@ -2,7 +2,7 @@
 //! and the snapshot it belongs to.
 //!
 //! Simulated samples are drawn as whole snapshots, with resistances as readings and the absolute coordinates of the
-//! row's nodes as targets; measured samples are built from their parts by [`Dataset::new`]. [`hold_out`], [`Division`]
+//! row's nodes as targets; measured samples are built from their parts by [`Dataset::new`]. [`Division`]
 //! and [`Folds`] divide a set, and [`Frames`] groups it into whole frames. A [`Memory`] adds inputs from
 //! the past, which it takes from the [`History`] of a recording or from a [`MemoryStream`]; [`Continuation`] decides in both
 //! which rows continue each other.
@@ -19,8 +19,8 @@ mod simulation;
 mod span;
 
 pub use continuation::{Continuation, Place, RowOrder, Series};
-pub use division::{DividedSamples, Division, DivisionError, Split, SplitBy, SplitByError, hold_out};
-pub use folds::{FoldUnit, Folds, FoldsError};
+pub use division::{DividedSamples, Division, DivisionError, Split, SplitBy, SplitByError};
+pub use folds::Folds;
 pub use frames::{Frames, FramesError, PerRow};
 pub use history::{History, MemoryStream};
 pub use memory::{LARGEST_LAG, Memory, MemoryConstants, MemoryError, MemoryState};

@@ -1,18 +1,16 @@
 use faer::{Mat, Side, linalg::solvers::Solve};
 use glam::DVec3;
-use ndarray::{Array1, Array2, ArrayView2, Axis, Slice};
+use ndarray::{Array2, Axis};
 
 use super::{
     Precision,
-    least_squares::fit_least_squares,
     program::{Builder, Program},
-    ridge::Ridge,
+    ridge::{Regression, Standard, folds},
     row_problem::Range,
-    units::Units,
 };
 use crate::{
     dataset::Dataset,
-    network::{InputChoice, InputScaling, Inputs, MinMax, Quantity, ScalingError, channel_noise},
+    network::{MinMax, Quantity, ScalingError, channel_noise},
     scene::NoiseSource,
     sensor::{Axes, RowConductance, SensorModel},
 };
@@ -40,45 +38,62 @@ impl Program {
         builder.finish(targets)
     }
 
-    /// Fits an affine map to `training` by least squares, on `quantity` of the readings.
+    /// Fits an affine map to `training` by least squares, on `quantity` of the readings. Of the maps that fit equally well it
+    /// is the one of minimum norm.
     ///
     /// # Errors
     /// If values cannot be scaled.
     pub fn least_squares(training: &Dataset, quantity: Quantity) -> Result<Self, ScalingError> {
-        let values = training.readings().mapv(|reading| quantity.of(reading));
-        let inputs = Inputs::new(quantity, InputScaling::MinMax(MinMax::fit(values.view())?));
-        let outputs = MinMax::fit(training.targets())?;
-        let coefficients = fit_least_squares(training, &inputs, &outputs)?;
-        Ok(Self::affine(&inputs, &coefficients, &outputs))
+        Self::affine(training, quantity, NoiseSource::default(), |regression| {
+            regression.least_squares()
+        })
     }
 
-    /// Fits an affine map to `training` by ridge regression, with the penalty of each target chosen by leave-one-out
-    /// error; `unseen` is as in [`Inputs::fit`].
+    /// Fits an affine map to `training` by ridge regression on the standardised `quantity` of the readings, with the penalty
+    /// of each target chosen by cross-validation on blocks of samples, or on whole groups; `unseen` is as in
+    /// [`Inputs::fit`](crate::network::Inputs::fit).
     ///
     /// # Errors
     /// If values cannot be scaled.
-    pub fn ridge(training: &Dataset, choice: InputChoice, unseen: NoiseSource) -> Result<Self, ScalingError> {
-        let inputs = Inputs::fit_all(choice, training.readings())?;
-        let outputs = MinMax::fit(training.targets())?;
-        let y = outputs.scale(training.targets());
-        let units = Units::of(training, inputs.of(training.readings()), y);
-        let changes = inputs.changes_of(&channel_noise(inputs.quantity(), training.readings(), unseen));
-        let fit = LinearFit::new(&inputs, units, changes.view())?;
-        Ok(Self::affine(&inputs, &fit.coefficients(), &outputs))
+    pub fn ridge(training: &Dataset, quantity: Quantity, unseen: NoiseSource) -> Result<Self, ScalingError> {
+        let folds = folds(training);
+        Self::affine(training, quantity, unseen, |regression| {
+            Ok(regression.ridge(folds.as_ref())?.map)
+        })
     }
 
-    /// The affine map with these `coefficients` of the scaled inputs (inputs + 1 × varying outputs, the constant last), the
-    /// scaling of the inputs folded in.
-    fn affine(inputs: &Inputs, coefficients: &Array2<f64>, outputs: &MinMax) -> Self {
-        let (centre, to_inputs) = inputs.affine();
-        let n = inputs.count();
-        let folded = to_inputs.t().dot(&coefficients.slice_axis(Axis(0), Slice::from(..n)));
-        let constants = coefficients.row(n).to_vec();
-        let mut builder = Builder::new(centre.len());
-        let changes = builder.changes(inputs.quantity(), &centre, Precision::Double);
-        let scaled = builder.affine_of(&changes, folded, &constants);
-        let targets = builder.restored(scaled, outputs);
-        builder.finish(targets)
+    fn affine(
+        training: &Dataset,
+        quantity: Quantity,
+        unseen: NoiseSource,
+        map: impl FnOnce(&Regression<'_>) -> Result<Array2<f64>, ScalingError>,
+    ) -> Result<Self, ScalingError> {
+        let readings = training.readings();
+        quantity.check(readings)?;
+        let standard = Standard::fit(readings, |reading| quantity.of(reading))?;
+        let outputs = MinMax::fit(training.targets())?;
+        let (ranges, varying) = (outputs.middles_and_half_widths(), outputs.varying());
+        let channels = training.channels();
+        let map = map(&Regression {
+            samples: training.samples(),
+            features: channels,
+            outputs: varying.len(),
+            write: &|sample, features, targets| {
+                let values = readings.row(sample).into_iter().map(|&reading| quantity.of(reading));
+                standard.write(values, features);
+                for (scaled, &target) in targets.iter_mut().zip(&varying) {
+                    *scaled = (training.sample_targets(sample)[target] - ranges[target].0) / ranges[target].1;
+                }
+            },
+            noise: channel_noise(quantity, readings, unseen).changes(&standard.scale),
+        })?;
+        let weight = |(channel, output): (usize, usize)| map[[channel, output]] * standard.scale[channel];
+        let weights = Array2::from_shape_fn((channels, varying.len()), weight);
+        let mut builder = Builder::new(channels);
+        let changes = builder.changes(quantity, &standard.centre, Precision::Double);
+        let scaled = builder.affine_of(&changes, weights, &map.row(channels).to_vec());
+        let targets = builder.restored(scaled, &outputs);
+        Ok(builder.finish(targets))
     }
 }
 
@@ -189,62 +204,15 @@ impl AffineStart {
     }
 }
 
-/// Ridge regression on scaled inputs, with the penalty of each output chosen by leave-one-out error.
-///
-/// The penalty acts on inputs in proportion to their standard deviations, whether they are whitened or not: it
-/// suppresses weak components first, in which noise is largest.
-pub(super) struct LinearFit {
-    ridge: Ridge,
-    /// Standard deviation of each input before whitening, relative to the largest.
-    sizes: Array1<f64>,
-    /// Number of samples.
-    samples: f64,
-}
-
-impl LinearFit {
-    /// Fits to `units` of the scaled inputs and outputs. `unseen` (sources × inputs) are the changes of the inputs by
-    /// one standard deviation of each noise source that the training samples lack.
-    pub fn new(inputs: &Inputs, units: Units, unseen: ArrayView2<'_, f64>) -> Result<Self, ScalingError> {
-        let sizes = Array1::from(inputs.deviations());
-        let largest = sizes.iter().copied().fold(0.0, f64::max);
-        let sizes = sizes / largest;
-        let Units { x, y, weights } = units;
-        let x = x * &sizes;
-        let ridge = Ridge::new(x.view(), y.view(), &weights, (&unseen * &sizes).view())?;
-        Ok(Self {
-            ridge,
-            sizes,
-            samples: weights.iter().sum(),
-        })
-    }
-
-    /// Coefficients of the scaled inputs: inputs + 1 × outputs, the constant last.
-    pub fn coefficients(&self) -> Array2<f64> {
-        let mut coefficients = self.ridge.coefficients(&self.ridge.best_penalties());
-        for (mut gains, &size) in coefficients.rows_mut().into_iter().zip(&self.sizes) {
-            gains *= size;
-        }
-        coefficients
-    }
-
-    /// Variances of the noise of the scaled inputs that has the same effect as the best penalty for all outputs together.
-    pub fn variances(&self) -> Vec<f64> {
-        /// Noise variance beyond which the inputs carry no information.
-        const LARGEST: f64 = 1e12;
-        let penalty = self.ridge.common_penalty();
-        let variance = |size: &f64| (penalty / self.samples / (size * size)).min(LARGEST);
-        self.sizes.iter().map(variance).collect()
-    }
-}
-
 #[cfg(test)]
 mod tests {
+    use rand::{SeedableRng, rngs::ChaCha8Rng};
+
     use super::*;
     use crate::{
         dataset::{Dataset, Seed, Stream},
         decoupling::{ProgramDecoder, decode_set},
-        network::ScalingChoice,
-        scene::Scene,
+        scene::{Scene, standard_normal},
         sensor::SensorModel,
     };
 
@@ -287,7 +255,7 @@ mod tests {
         let other = draw("10x6_3x18", 10);
         for set in [draw("1x6_3x18", 1), draw("1x6_3x18", 2), other.select(&[3; 50])] {
             let least_squares = Program::least_squares(&set, Quantity::Resistance).unwrap();
-            let ridge = Program::ridge(&set, InputChoice::BEST, NoiseSource::default()).unwrap();
+            let ridge = Program::ridge(&set, Quantity::Conductance, NoiseSource::default()).unwrap();
             for map in [least_squares, ridge] {
                 assert!(answers(map, &other).iter().all(|value| value.is_finite()));
             }
@@ -297,17 +265,69 @@ mod tests {
     #[test]
     fn ridge_recovers_targets_affine_in_the_quantity() {
         let set = with_target(&draw("1x4_2x12", 60), |ohm| 4.0 + 20.0 / ohm[3] - 7.0 / ohm[8]);
-        for scaling in [ScalingChoice::Whitening, ScalingChoice::MinMax] {
-            let choice = InputChoice {
-                scaling,
-                ..InputChoice::BEST
-            };
-            let answer = answers(Program::ridge(&set, choice, NoiseSource::default()).unwrap(), &set);
-            for (answer, truth) in answer.rows().into_iter().zip(set.targets().rows()) {
-                assert_eq!(answer[0], truth[0], "constant targets keep their value");
-                assert!((answer[2] - truth[2]).abs() < 1e-6, "{} {}", answer[2], truth[2]);
-            }
+        let map = Program::ridge(&set, Quantity::Conductance, NoiseSource::default()).unwrap();
+        let answer = answers(map, &set);
+        for (answer, truth) in answer.rows().into_iter().zip(set.targets().rows()) {
+            assert_eq!(answer[0], truth[0], "constant targets keep their value");
+            assert!((answer[2] - truth[2]).abs() < 1e-6, "{} {}", answer[2], truth[2]);
         }
+    }
+
+    #[test]
+    fn overflow_is_an_error() {
+        let readings = Array2::from_shape_fn((3, 1), |(s, _)| [f64::MAX, -f64::MAX, 3.0][s]);
+        let targets = Array2::from_shape_fn((3, 1), |(s, _)| s as f64);
+        let set = Dataset::new(readings, targets, None, vec![0, 1, 2]).unwrap();
+        assert_eq!(
+            Program::least_squares(&set, Quantity::Raw),
+            Err(ScalingError::NotConverged)
+        );
+    }
+
+    /// Two channels that are constant apart from a rare pulse (one also from rounding) and their decaying averages: in
+    /// training they carry no information, later they vary.
+    #[test]
+    fn averages_of_channels_that_were_constant_leave_ridge_better_than_the_mean() {
+        let draw = |samples: usize, is_training: bool, seed: u64| {
+            let mut rng = ChaCha8Rng::seed_from_u64(seed);
+            let mut averages = [[0.0; 4]; 2];
+            let mut readings = Array2::zeros((samples, 13));
+            let mut targets = Array2::zeros((samples, 1));
+            for sample in 0..samples {
+                for channel in 0..3 {
+                    readings[[sample, channel]] = standard_normal(&mut rng);
+                }
+                let is_pressed = !is_training && sample % 50 < 25;
+                let pulse = f64::from(u8::from(is_training && (500..503).contains(&sample)));
+                let values = [
+                    pulse + f64::from(u8::from(is_pressed)),
+                    5.3 * (1.0 + 1e-16 * standard_normal(&mut rng)) + f64::from(u8::from(is_pressed)),
+                ];
+                for (place, (value, averages)) in values.into_iter().zip(&mut averages).enumerate() {
+                    readings[[sample, 3 + 5 * place]] = value;
+                    for (k, (average, span)) in averages.iter_mut().zip([3.0, 10.0, 30.0, 100.0]).enumerate() {
+                        *average = if sample == 0 {
+                            value
+                        } else {
+                            *average + (value - *average) / span
+                        };
+                        readings[[sample, 4 + 5 * place + k]] = *average;
+                    }
+                }
+                targets[[sample, 0]] =
+                    readings[[sample, 0]] - 0.5 * readings[[sample, 1]] + 0.3 * standard_normal(&mut rng);
+            }
+            Dataset::new(readings, targets, None, (0..samples).collect()).unwrap()
+        };
+        let (training, test) = (draw(1000, true, 1), draw(500, false, 2));
+        let map = Program::ridge(&training, Quantity::Raw, NoiseSource::default()).unwrap();
+        let rmse = |program: Program| {
+            let off = answers(program, &test) - test.targets();
+            off.mapv(|error| error * error).mean().unwrap().sqrt()
+        };
+        // The noise of the targets is 0.3.
+        let (ours, mean) = (rmse(map), rmse(Program::mean(&training)));
+        assert!(ours < mean, "{ours} {mean}");
     }
 
     /// The mean distance of a uniform compression from the middle is a quarter of the stroke.

@@ -95,7 +95,7 @@ impl DecoderKind {
             Self::Ridge => Entry {
                 word: "ridge",
                 name: "Ridge",
-                meaning: "The best affine map of the chosen inputs, ridge-regularised",
+                meaning: "The best affine map of the chosen inputs: ridge regression, with the penalty of each target chosen by cross-validation",
                 needs: Needs::Nothing,
                 fit: fit_ridge,
             },
@@ -109,7 +109,7 @@ impl DecoderKind {
             Self::RadialBasis => Entry {
                 word: "rbf",
                 name: "Radial basis",
-                meaning: "A radial-basis network by kernel ridge regression: Gaussians around all training samples, or around 1000 of more than 4000, their width and penalties chosen on blocks of samples",
+                meaning: "A radial-basis network by kernel ridge regression: Gaussians around all training samples, or around 1000 of more than 4000, their width and penalties chosen by cross-validation",
                 needs: Needs::Nothing,
                 fit: fit_radial_basis,
             },
@@ -255,7 +255,7 @@ fn fit_mean(problem: &FitProblem<'_>) -> Fit {
 }
 
 fn fit_ridge(problem: &FitProblem<'_>) -> Fit {
-    problem.of_samples(|set| Program::ridge(set, problem.inputs, problem.unseen))
+    problem.of_samples(|set| Program::ridge(set, problem.inputs.quantity, problem.unseen))
 }
 
 fn fit_radial_basis(problem: &FitProblem<'_>) -> Fit {

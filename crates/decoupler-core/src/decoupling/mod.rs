@@ -13,12 +13,10 @@
 //! readings, without ground truth.
 
 mod affine_map;
-mod clusters;
 mod decoder;
 mod equation_decoders;
 mod equations;
 mod gauss_newton;
-mod kernel_ridge;
 mod kind;
 mod least_squares;
 mod newton;
@@ -30,7 +28,6 @@ mod ridge;
 mod row_problem;
 mod side_by_side;
 mod takagi_sugeno;
-mod units;
 
 pub use decoder::{DecodeError, Decoder, Description, NotDescribed, SolvedRows, decode_set, resistance_residual};
 pub use equation_decoders::{NewtonDecoder, PolishedDecoder, PosteriorDecoder};
@@ -40,5 +37,6 @@ pub use newton::{LARGEST_ERROR, Newton, NewtonReport, NewtonRules, NewtonStop, S
 pub(crate) use posterior::SampledPosterior;
 pub use posterior::{Posterior, PosteriorReport};
 pub use program::{Builder, Changes, Domain, Function, Node, NodeId, Operation, Program, ProgramDecoder};
+pub(crate) use ridge::{Regression, ridge};
 pub(crate) use row_problem::{GaussianPrior, Range, ranges};
 pub use row_problem::{RowChoice, RowProblemDescription};

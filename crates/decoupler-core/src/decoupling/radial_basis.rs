@@ -1,16 +1,18 @@
 //! Radial-basis networks, fitted and compiled for fast decoding.
 
-use ndarray::{Array1, Axis};
+use std::{borrow::Cow, ops::Range};
+
+use faer::{Mat, Side, linalg::solvers::Solve};
+use ndarray::{Array1, Array2, ArrayView1, Axis};
 use rand::Rng;
 
 use super::{
     Precision,
-    kernel_ridge::KernelRidge,
     program::{Builder, Function, Program},
-    units::{Units, with_noise},
+    ridge::{Choice, folds},
 };
 use crate::{
-    dataset::Dataset,
+    dataset::{Dataset, Folds},
     network::{InputChoice, Inputs, MinMax, ScalingChoice, ScalingError},
     scene::NoiseSource,
 };
@@ -21,7 +23,7 @@ impl Program {
     /// `rng` draws the noise.
     ///
     /// Up to 4000 training samples are all centres, of more there are 1000 centres. The width of the Gaussians and the
-    /// penalty of each target are chosen by the error on blocks of training samples that are left out. Inputs that are
+    /// penalty of each target are chosen by cross-validation on folds of the training samples. Inputs that are
     /// scaled to [−1, 1] are divided by their standard deviation.
     ///
     /// # Errors
@@ -42,7 +44,8 @@ impl Program {
             // Components below the noise have less than unit variance on purpose.
             ScalingChoice::Whitening => Array1::ones(x.ncols()),
         };
-        let kernel = KernelRidge::fit(&Units::of(&training, x * &scales, y))?;
+        let folds = |samples: &[usize]| folds(&training.select(samples));
+        let kernel = KernelRidge::fit(&(x * &scales), &y, folds);
         Ok(Self::of_kernel(&inputs, &scales, &kernel, &outputs))
     }
 
@@ -71,16 +74,231 @@ impl Program {
     }
 }
 
+/// Returns `training` with the noise that its readings lack: a nonlinear map learns the effect of noise from samples.
+pub(super) fn with_noise<'a>(training: &'a Dataset, unseen: NoiseSource, rng: &mut impl Rng) -> Cow<'a, Dataset> {
+    let mut training = Cow::Borrowed(training);
+    if !unseen.is_none() {
+        training.to_mut().disturb_by(unseen, rng);
+    }
+    training
+}
+
+/// At most `count` evenly spaced indices of so many samples.
+pub(super) fn thinned(samples: usize, count: usize) -> Vec<usize> {
+    let kept = count.min(samples);
+    (0..kept).map(|place| place * samples / kept).collect()
+}
+
+/// Kernel ridge regression with Gaussians of one width (Saunders, Gammerman and Vovk 1998), which is the mean of a
+/// Gaussian process (Rasmussen and Williams 2006, eq. 2.23).
+///
+/// With K the Gaussians of all pairs of samples, the coefficients are (K + penalty · 1)⁻¹ (y − ȳ). The width is common to
+/// all outputs, and each has its own penalty, both chosen by cross-validation.
+///
+/// Up to [`Self::MAX_SAMPLES`] samples are all centres. Of more, [`Self::SUBSET`] are centres, and the coefficients
+/// minimise the penalised error on up to [`Self::MAX_ROWS`] samples (subset of regressors, ibid., section 8.3.1).
+#[derive(Clone, Debug)]
+struct KernelRidge {
+    /// Centres × inputs.
+    centres: Array2<f64>,
+    /// 1 / (2 · width²).
+    sharpness: f64,
+    /// Centres + 1 × outputs, the constant last.
+    coefficients: Array2<f64>,
+}
+
+/// Maximum number of samples from which width and penalties are chosen.
+const MAX_SEARCHED: usize = 900;
+/// Products of sharpness and total variance of the inputs that are compared, as powers of 2.
+const SHARPNESS_EXPONENTS: Range<f64> = -9.0..7.0;
+/// Exponent at which the search begins.
+const FIRST_EXPONENT: f64 = -1.0;
+
+/// Penalties that are compared, in descending order; the first leaves only the mean.
+fn penalties() -> Vec<f64> {
+    std::iter::once(f64::INFINITY)
+        .chain((0..=9).map(|place| 0.1_f64.powi(place)))
+        .collect()
+}
+
+impl KernelRidge {
+    /// Maximum number of samples that are all centres.
+    const MAX_SAMPLES: usize = 4000;
+    /// Number of centres in larger sets.
+    const SUBSET: usize = 1000;
+    /// Maximum number of samples to which the coefficients of a larger set are fitted.
+    const MAX_ROWS: usize = 20_000;
+
+    /// Fits outputs `y` (samples × outputs) on inputs `x` (samples × inputs), which should have comparable scales; `folds`
+    /// divides some of the samples. There is at least one sample.
+    fn fit(x: &Array2<f64>, y: &Array2<f64>, folds: impl Fn(&[usize]) -> Option<Folds>) -> Self {
+        let samples = x.nrows();
+        let searched = thinned(samples, MAX_SEARCHED);
+        let (of_x, of_y) = (x.select(Axis(0), &searched), y.select(Axis(0), &searched));
+        let (sharpness, penalties) = choose(&of_x, &of_y, folds(&searched).as_ref());
+        let means = y.mean_axis(Axis(0)).expect("there are samples");
+        let (centres, gains) = if samples <= Self::MAX_SAMPLES {
+            let off = Mat::from_fn(samples, y.ncols(), |s, t| y[[s, t]] - means[t]);
+            let mut kernel = gaussians(x, x, sharpness);
+            let gains = solve(&penalties, &off, |penalty| {
+                (0..samples).for_each(|sample| kernel[(sample, sample)] = 1.0 + penalty);
+                kernel.clone()
+            });
+            (x.clone(), gains)
+        } else {
+            let centres = x.select(Axis(0), &thinned(samples, Self::SUBSET));
+            let rows = thinned(samples, Self::MAX_ROWS);
+            let (mut gram, mut right) = (
+                Mat::zeros(Self::SUBSET, Self::SUBSET),
+                Mat::zeros(Self::SUBSET, y.ncols()),
+            );
+            for chunk in rows.chunks(Self::SUBSET) {
+                let basis = gaussians(&x.select(Axis(0), chunk), &centres, sharpness);
+                gram += basis.transpose() * &basis;
+                right += basis.transpose() * Mat::from_fn(chunk.len(), y.ncols(), |s, t| y[[chunk[s], t]] - means[t]);
+            }
+            // Gram matrix and kernel both lose half of the digits.
+            let rounding = f64::EPSILON * (rows.len() * Self::SUBSET) as f64;
+            let kernel = gaussians(&centres, &centres, sharpness);
+            let gains = solve(&penalties, &right, |penalty| {
+                let mut matrix = &gram + faer::Scale(penalty) * &kernel;
+                (0..Self::SUBSET).for_each(|centre| matrix[(centre, centre)] += rounding);
+                matrix
+            });
+            (centres, gains)
+        };
+        let count = centres.nrows();
+        Self {
+            coefficients: Array2::from_shape_fn((count + 1, y.ncols()), |(row, output)| {
+                if row < count {
+                    gains[(row, output)]
+                } else {
+                    means[output]
+                }
+            }),
+            centres,
+            sharpness,
+        }
+    }
+}
+
+/// Chooses the sharpness, and the penalty of each output, by the error on held-out folds.
+fn choose(x: &Array2<f64>, y: &Array2<f64>, folds: Option<&Folds>) -> (f64, Vec<f64>) {
+    let variance = x.var_axis(Axis(0), 0.0).sum();
+    // Without variance, all Gaussians are 1.
+    let Some(folds) = folds.filter(|_| variance > 0.0) else {
+        return (0.0, vec![f64::INFINITY; y.ncols()]);
+    };
+    let all = penalties();
+    let judge = |exponent: f64| {
+        let sharpness = exponent.exp2() / variance;
+        let kernel = gaussians(x, x, sharpness);
+        let errors =
+            (0..folds.count()).map(|fold| held_out(&kernel, y, &folds.without(&[fold]), folds.test(fold), &all));
+        let choice = Choice::new(&errors.collect::<Vec<_>>(), y.ncols());
+        let total = |output: usize| choice.squares.iter().map(|fold| fold[output]).sum::<f64>();
+        // The geometric mean over the outputs, whose errors have different sizes.
+        let score: f64 = (0..y.ncols())
+            .map(|output| total(output).max(f64::MIN_POSITIVE).ln())
+            .sum();
+        (
+            score,
+            (sharpness, choice.levels.iter().map(|&level| all[level]).collect()),
+        )
+    };
+    let mut at = FIRST_EXPONENT;
+    let mut best = judge(at);
+    for step in [1.0, -1.0] {
+        while SHARPNESS_EXPONENTS.contains(&(at + step)) {
+            let next = judge(at + step);
+            if next.0 >= best.0 {
+                break;
+            }
+            (best, at) = (next, at + step);
+        }
+    }
+    best.1
+}
+
+/// Sums of squared errors (penalty × output) on the samples `test` of fits to the samples `training`; infinite where the
+/// kernel is numerically singular.
+fn held_out(
+    kernel: &Mat<f64>,
+    y: &Array2<f64>,
+    training: &[usize],
+    test: &[usize],
+    penalties: &[f64],
+) -> Vec<Vec<f64>> {
+    let part = |rows: &[usize]| Mat::from_fn(rows.len(), training.len(), |i, j| kernel[(rows[i], training[j])]);
+    let means = y
+        .select(Axis(0), training)
+        .mean_axis(Axis(0))
+        .expect("a fold leaves samples");
+    let off = |rows: &[usize]| Mat::from_fn(rows.len(), y.ncols(), |s, t| y[[rows[s], t]] - means[t]);
+    let (own, across, fitted, targets) = (part(training), part(test), off(training), off(test));
+    let of_penalty = |&penalty: &f64| {
+        let squares = |errors: Mat<f64>| errors.col_iter().map(|column| column.squared_norm_l2()).collect();
+        if penalty.is_infinite() {
+            return squares(targets.clone());
+        }
+        let mut matrix = own.clone();
+        (0..training.len()).for_each(|sample| matrix[(sample, sample)] += penalty);
+        match matrix.llt(Side::Lower) {
+            Ok(factor) => squares(&across * factor.solve(&fitted) - &targets),
+            Err(_) => vec![f64::INFINITY; y.ncols()],
+        }
+    };
+    penalties.iter().map(of_penalty).collect()
+}
+
+/// Solves for the outputs of each penalty together; a penalty at which the matrix is numerically singular is raised. The
+/// gains of an output with an infinite penalty are 0.
+fn solve(penalties: &[f64], right: &Mat<f64>, mut matrix: impl FnMut(f64) -> Mat<f64>) -> Mat<f64> {
+    let mut gains = Mat::zeros(right.nrows(), penalties.len());
+    let mut left: Vec<usize> = (0..penalties.len()).filter(|&t| penalties[t].is_finite()).collect();
+    while let Some(&first) = left.first() {
+        let penalty = penalties[first];
+        let (same, others): (Vec<usize>, _) = left.into_iter().partition(|&output| penalties[output] == penalty);
+        left = others;
+        let of_same = Mat::from_fn(right.nrows(), same.len(), |row, place| right[(row, same[place])]);
+        let mut raised = std::iter::successors(Some(penalty), |penalty| Some(10.0 * penalty)).take_while(|&p| p < 1e3);
+        // If none is large enough, values are not finite: the mean is all that is left.
+        let Some(solved) = raised.find_map(|penalty| Some(matrix(penalty).llt(Side::Lower).ok()?.solve(&of_same)))
+        else {
+            continue;
+        };
+        for (place, &output) in same.iter().enumerate() {
+            gains.col_mut(output).copy_from(solved.col(place));
+        }
+    }
+    gains
+}
+
+/// Gaussians between the rows of `x` and `centres`.
+fn gaussians(x: &Array2<f64>, centres: &Array2<f64>, sharpness: f64) -> Mat<f64> {
+    Mat::from_fn(x.nrows(), centres.nrows(), |i, j| {
+        (-sharpness * distance2(x.row(i), centres.row(j))).exp()
+    })
+}
+
+/// Squared Euclidean distance.
+#[inline]
+pub(super) fn distance2(a: ArrayView1<'_, f64>, b: ArrayView1<'_, f64>) -> f64 {
+    a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum()
+}
+
 #[cfg(test)]
 mod tests {
     use dashu_float::{FBig, round::mode::HalfEven};
-    use ndarray::ArrayView1;
+
+    use serde::Deserialize;
 
     use super::*;
     use crate::{
         dataset::{Seed, Stream},
-        decoupling::{Decoder, ProgramDecoder, clusters::distance2},
-        scene::{Rows, Scene},
+        decoupling::{Decoder, ProgramDecoder, decode_set},
+        network::Quantity,
+        scene::{Rows, Scene, standard_normal},
         sensor::SensorModel,
     };
 
@@ -101,12 +319,7 @@ mod tests {
         let inputs = Inputs::fit(InputChoice::BEST, set.readings(), NoiseSource::default()).unwrap();
         let outputs = MinMax::fit(set.targets()).unwrap();
         let (x, y) = (inputs.of(set.readings()), outputs.scale(set.targets()));
-        let units = Units {
-            x: x.clone(),
-            y,
-            weights: vec![1.0; 300],
-        };
-        let kernel = KernelRidge::fit(&units).unwrap();
+        let kernel = KernelRidge::fit(&x, &y, |samples| folds(&set.select(samples)));
         let program = Program::of_kernel(&inputs, &Array1::ones(x.ncols()), &kernel, &outputs);
         let mut network = ProgramDecoder::new(program);
         let KernelRidge {
@@ -163,5 +376,144 @@ mod tests {
 
     fn gaussian(x: ArrayView1<'_, f64>, centre: ArrayView1<'_, f64>, sharpness: f64) -> f64 {
         (-sharpness * distance2(x, centre)).exp()
+    }
+
+    /// Samples of a smooth function of three inputs that wander slowly, with noise of this standard deviation, and of
+    /// noise alone.
+    fn wandering(count: usize, noise: f64, seed: u64) -> (Array2<f64>, Array2<f64>) {
+        let mut rng = Seed(seed).rng(Stream::Training);
+        let mut state = [0.0; 3];
+        let (mut x, mut y) = (Array2::zeros((count, 3)), Array2::zeros((count, 2)));
+        for sample in 0..count {
+            for (input, value) in state.iter_mut().enumerate() {
+                *value = 0.8 * *value + 0.6 * standard_normal(&mut rng);
+                x[[sample, input]] = *value;
+            }
+            let truth = (1.5 * state[0]).sin() + 0.5 * state[1] * state[2];
+            y[[sample, 0]] = truth + noise * standard_normal(&mut rng);
+            y[[sample, 1]] = standard_normal(&mut rng);
+        }
+        (x, y)
+    }
+
+    fn fitted((x, y): &(Array2<f64>, Array2<f64>)) -> KernelRidge {
+        KernelRidge::fit(x, y, |samples| Some(Folds::consecutive(samples.len(), 5)))
+    }
+
+    fn rmse(fit: &KernelRidge, (x, y): &(Array2<f64>, Array2<f64>)) -> Vec<f64> {
+        let count = fit.centres.nrows();
+        let basis = Array2::from_shape_fn((x.nrows(), count + 1), |(sample, centre)| match centre < count {
+            true => gaussian(x.row(sample), fit.centres.row(centre), fit.sharpness),
+            false => 1.0,
+        });
+        let squares = (basis.dot(&fit.coefficients) - y).mapv(|error| error * error);
+        squares.mean_axis(Axis(0)).unwrap().mapv(f64::sqrt).to_vec()
+    }
+
+    /// The normal equations say y − ȳ − K a = penalty · a.
+    #[test]
+    fn coefficients_solve_the_equations_with_the_penalty_of_each_output() {
+        let (x, y) = wandering(120, 0.3, 1);
+        let fit = fitted(&(x.clone(), y.clone()));
+        for t in 0..2 {
+            let gains = fit.coefficients.column(t);
+            let rest: Vec<f64> = (0..120)
+                .map(|sample| {
+                    let kernel = |other: usize| gaussian(x.row(sample), x.row(other), fit.sharpness);
+                    y[[sample, t]] - gains[120] - (0..120).map(|other| kernel(other) * gains[other]).sum::<f64>()
+                })
+                .collect();
+            let square: f64 = gains.iter().take(120).map(|gain| gain * gain).sum();
+            let product: f64 = gains.iter().zip(&rest).map(|(gain, rest)| gain * rest).sum();
+            let penalty = if square > 0.0 { product / square } else { continue };
+            let is_compared = penalties()
+                .into_iter()
+                .any(|compared| (compared / penalty - 1.0).abs() < 1e-6);
+            assert!(is_compared, "{penalty}");
+            for (rest, gain) in rest.iter().zip(gains) {
+                assert!((rest - penalty * gain).abs() < 1e-8, "{t}");
+            }
+        }
+    }
+
+    #[test]
+    fn new_samples_are_answered_well_next_to_an_output_of_noise_alone() {
+        for (noise, most) in [(0.0, 0.02), (0.05, 0.1), (0.3, 0.2)] {
+            let errors = rmse(&fitted(&wandering(500, noise, 2)), &wandering(500, 0.0, 3));
+            assert!(errors[0] < most && errors[1] < 1.1, "noise {noise}: {errors:?}");
+        }
+    }
+
+    #[test]
+    fn larger_sets_have_fewer_centres_and_are_as_accurate() {
+        let fit = fitted(&wandering(KernelRidge::MAX_SAMPLES + 1, 0.1, 7));
+        assert_eq!(fit.centres.nrows(), KernelRidge::SUBSET);
+        let error = rmse(&fit, &wandering(300, 0.0, 8))[0];
+        assert!(error < 0.05, "{error}");
+    }
+
+    #[test]
+    fn extreme_sets_are_finite() {
+        let same = (Array2::ones((40, 3)), wandering(40, 0.1, 9).1);
+        for (x, y) in [wandering(1, 0.1, 9), wandering(3, 0.1, 9), same] {
+            let folds = |samples: &[usize]| (samples.len() > 1).then(|| Folds::consecutive(samples.len(), 2));
+            let fit = KernelRidge::fit(&x, &y, folds);
+            assert!(fit.coefficients.iter().all(|value| value.is_finite()));
+        }
+    }
+
+    /// A case of `tests/fixtures/repeated_samples.py`.
+    #[derive(Deserialize)]
+    struct Case {
+        name: String,
+        x: Vec<Vec<f64>>,
+        y: Vec<f64>,
+        r2_ridge: f64,
+        r2_kernel_ridge: f64,
+    }
+
+    fn r2(decoder: &mut dyn Decoder, test: &Dataset) -> f64 {
+        let targets = test.targets();
+        let off = decode_set(decoder, test).unwrap() - targets;
+        let varied = &targets - targets.mean().unwrap();
+        1.0 - off.mapv(|error| error * error).sum() / varied.mapv(|value| value * value).sum()
+    }
+
+    #[test]
+    fn repeated_coarse_samples_count_as_in_scikit_learn() {
+        let cases = include_str!("../../tests/fixtures/repeated_samples.json");
+        let cases: Vec<Case> = serde_json::from_str(cases).unwrap();
+        assert_eq!(cases.len(), 3);
+        for Case {
+            name,
+            x,
+            y,
+            r2_ridge,
+            r2_kernel_ridge,
+        } in cases
+        {
+            let readings = Array2::from_shape_fn((x.len(), x[0].len()), |(s, c)| x[s][c]);
+            let targets = Array2::from_shape_fn((y.len(), 1), |(s, _)| y[s]);
+            let set = Dataset::new(readings, targets, None, (0..y.len()).collect()).unwrap();
+            let fitted = 4 * y.len() / 5;
+            let part = |samples: std::ops::Range<usize>| set.select(&samples.collect::<Vec<_>>());
+            let (training, test) = (part(0..fitted), part(fitted..y.len()));
+            let (choice, none) = (InputChoice::MEASURED, NoiseSource::default());
+            let decoder = |program: Result<Program, ScalingError>| ProgramDecoder::new(program.unwrap());
+            let ridge = r2(&mut decoder(Program::ridge(&training, Quantity::Raw, none)), &test);
+            assert!((ridge - r2_ridge).abs() < 0.01, "{name}: ridge {ridge}, {r2_ridge}");
+            let mut rng = Seed(0).rng(Stream::Expectation);
+            let mut basis = decoder(Program::radial_basis(&training, choice, none, &mut rng));
+            let mut fuzzy = decoder(Program::fuzzy(&training, Quantity::Raw, none, &mut rng));
+            for (decoder, ours, close) in [
+                ("basis", r2(&mut basis, &test), 0.02),
+                ("fuzzy", r2(&mut fuzzy, &test), 0.05),
+            ] {
+                assert!(
+                    (ours - r2_kernel_ridge).abs() < close,
+                    "{name}: {decoder} {ours}, {r2_kernel_ridge}"
+                );
+            }
+        }
     }
 }

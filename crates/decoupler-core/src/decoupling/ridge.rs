@@ -1,240 +1,424 @@
-use faer::Mat;
-use ndarray::{Array2, ArrayView2, Axis};
+use faer::{Mat, MatRef};
+use ndarray::{Array2, ArrayView2};
 
-use super::gauss_newton::minima;
-use crate::network::ScalingError;
+use crate::{
+    dataset::{Dataset, DivisionError, Folds, Seed, SplitBy, Stream},
+    network::ScalingError,
+};
 
-/// Ridge regressions of outputs on inputs for any penalty, from one singular value decomposition, with their
-/// leave-one-out errors.
+/// Ridge regression of outputs on features, with the penalty of each output chosen by cross-validation.
 ///
-/// With A = U S Vᵀ the centred inputs and t = penalty / (s² + penalty) the fraction of a singular direction that the
-/// penalty removes, the answers to the training samples are ȳ + U (1 − t) Uᵀ(y − ȳ). Without sample i, its answer
-/// would be wrong by residual_i / (1 − leverage_i) (Golub, Heath and Wahba 1979). Residual and 1 − leverage are
-/// computed as their values without penalty plus U t Uᵀ(y − ȳ) and Σ t u²: if the map goes through every sample and
-/// both vanish, they keep full relative accuracy.
+/// Minimises `‖y − ȳ − (X − x̄) B‖² + α ‖B‖²` (Hoerl and Kennard 1970, doi:10.1080/00401706.1970.10488634), with α the
+/// number of samples times one of [`levels`]. Features should have comparable sizes; [`Standard`] makes them so.
 ///
-/// A sample may represent several copies. Its row of A and of y is then multiplied by the square root of their
-/// number, and the error is that of leaving out all copies at once.
-pub(super) struct Ridge {
-    x_mean: Vec<f64>,
-    y_mean: Vec<f64>,
-    /// Singular values s, above rounding.
-    singular: Vec<f64>,
-    /// Right singular vectors: inputs × singular values.
-    directions: Mat<f64>,
-    /// Uᵀ(y − ȳ): singular values × outputs.
-    projected: Mat<f64>,
-    left_out: LeftOut,
+/// Each fold is reduced to R of a QR decomposition of [1, X, Y], block by block of its samples, so that memory does not
+/// grow with their number (Golub and Van Loan, Matrix Computations, section 6.5.2). The R of several folds below each
+/// other are the R of their union, whose singular value decomposition gives the maps of all penalties; and the squared
+/// errors of a map on a fold are those on its R. Products XᵀX would lose components below 1e-8 of the largest, which
+/// determine much of a deformation if there is no noise.
+pub(crate) struct Regression<'a> {
+    /// Number of samples.
+    pub samples: usize,
+    /// Number of features.
+    pub features: usize,
+    /// Number of outputs.
+    pub outputs: usize,
+    /// Writes the features and the outputs of a sample.
+    pub write: &'a dyn Fn(usize, &mut [f64], &mut [f64]),
+    /// Changes of the features by one standard deviation of each source of noise that the samples lack (sources ×
+    /// features). The map then minimises the expected error with this noise.
+    pub noise: Array2<f64>,
 }
 
-/// Samples that are left out, and additional noise.
-struct LeftOut {
-    /// Left singular vectors U of the samples: samples × singular values.
-    samples: Mat<f64>,
-    /// Squares of the entries of U.
-    squares: Mat<f64>,
-    /// The same vectors of the noise: its sources × singular values.
-    noise: Mat<f64>,
-    /// Residuals without penalty: samples × outputs.
-    residual: Mat<f64>,
-    /// 1 − leverage of each sample without penalty.
-    free: Vec<f64>,
-    /// Sum of the squared errors of the mean of all other samples, for each output.
-    of_mean: Vec<f64>,
+/// A cross-validated ridge regression.
+#[derive(Debug)]
+pub(crate) struct Ridge {
+    /// Map fitted to all samples: features + 1 × outputs, the constant last.
+    pub map: Array2<f64>,
+    /// Sums of squared held-out errors: fold × output.
+    pub squares: Vec<Vec<f64>>,
 }
 
-/// Maximum number of samples that are left out in turn: evenly spaced ones of a larger set give as good an estimate.
-const MAX_LEFT_OUT: usize = 4000;
+/// Minimum number of samples in a block of a QR decomposition.
+const BLOCK: usize = 512;
 
-impl Ridge {
-    /// Decomposes the inputs `x` (samples × inputs) for the outputs `y` (samples × outputs); `weights` are the
-    /// numbers of samples that each row represents.
+impl Regression<'_> {
+    /// Fits the map. Without folds, or if no map has a smaller held-out error, an output is answered with its mean.
     ///
-    /// `unseen` (sources × inputs) are the changes of the inputs by one standard deviation of each noise source that
-    /// `x` lacks. The coefficients then minimise the expected error with this noise.
+    /// # Errors
+    /// If there are no samples, or the equations have no finite solution.
+    pub fn ridge(&self, folds: Option<&Folds>) -> Result<Ridge, ScalingError> {
+        let all: Vec<usize> = (0..self.samples).collect();
+        let parts: Vec<&[usize]> = match folds {
+            Some(folds) => (0..folds.count()).map(|fold| folds.test(fold)).collect(),
+            None => vec![&all],
+        };
+        let factors: Vec<Mat<f64>> = parts.iter().map(|samples| self.factor(samples)).collect();
+        let mut errors = Vec::new();
+        for (fold, held_out) in factors.iter().enumerate().take(folds.map_or(0, Folds::count)) {
+            let others = factors.iter().enumerate().filter(|(other, _)| *other != fold);
+            let training = self.samples - parts[fold].len();
+            let fit = self.spectrum(others.map(|(_, factor)| factor), training)?;
+            let (basis, targets) = fit.seen_from(held_out, &self.noise, parts[fold].len());
+            let penalties: Vec<f64> = levels().map(|level| level * training as f64).collect();
+            errors.push(fit.filter.held_out(basis.as_ref(), targets.as_ref(), &penalties));
+        }
+        let choice = Choice::new(&errors, self.outputs);
+        let fit = self.spectrum(factors.iter(), self.samples)?;
+        let levels: Vec<f64> = levels().collect();
+        let penalties = choice.levels.iter().map(|&level| levels[level] * self.samples as f64);
+        Ok(Ridge {
+            map: fit.map(&penalties.collect::<Vec<_>>()),
+            squares: choice.squares,
+        })
+    }
+
+    /// Returns the least-squares map of minimum norm: features + 1 × outputs, the constant last.
     ///
-    /// # Panics
-    /// If the lengths differ.
-    pub fn new(
-        x: ArrayView2<'_, f64>,
-        y: ArrayView2<'_, f64>,
-        weights: &[f64],
-        unseen: ArrayView2<'_, f64>,
-    ) -> Result<Self, ScalingError> {
-        let (samples, inputs) = x.dim();
-        assert_eq!((y.nrows(), weights.len()), (samples, samples));
+    /// # Errors
+    /// If there are no samples, or the equations have no finite solution.
+    pub fn least_squares(&self) -> Result<Array2<f64>, ScalingError> {
+        let all: Vec<usize> = (0..self.samples).collect();
+        let fit = self.spectrum([&self.factor(&all)].into_iter(), self.samples)?;
+        Ok(fit.map(&vec![0.0; self.outputs]))
+    }
+
+    /// Approximate number of multiplications of [`Self::ridge`].
+    pub fn multiplications(samples: usize, features: usize, folds: usize) -> f64 {
+        let [samples, features, folds] = [samples, features + 1, folds].map(|size| size as f64);
+        let order = features.min(samples);
+        // QR decompositions of the samples and of the folds below each other, and singular value decompositions.
+        samples * features * order + folds * (folds + 10.0) * features * order * order
+    }
+
+    /// R of [1, X, Y] of some samples; these rows themselves if they are fewer than the columns.
+    fn factor(&self, samples: &[usize]) -> Mat<f64> {
+        let columns = 1 + self.features + self.outputs;
+        let (mut x, mut y) = (vec![0.0; self.features], vec![0.0; self.outputs]);
+        let mut factor = Mat::<f64>::zeros(0, columns);
+        for block in samples.chunks(BLOCK.max(4 * columns)) {
+            let before = factor.nrows();
+            let mut joined = Mat::zeros(before + block.len(), columns);
+            joined.subrows_mut(0, before).copy_from(&factor);
+            for (row, &sample) in block.iter().enumerate() {
+                (self.write)(sample, &mut x, &mut y);
+                joined[(before + row, 0)] = 1.0;
+                for (column, &value) in x.iter().chain(&y).enumerate() {
+                    joined[(before + row, column + 1)] = value;
+                }
+            }
+            factor = if joined.nrows() > columns {
+                joined.qr().thin_R().to_owned()
+            } else {
+                joined
+            };
+        }
+        factor
+    }
+
+    /// Decomposes the union of samples with these factors.
+    fn spectrum<'f>(
+        &self,
+        factors: impl Iterator<Item = &'f Mat<f64>>,
+        samples: usize,
+    ) -> Result<Spectrum, ScalingError> {
         if samples == 0 {
             return Err(ScalingError::Empty);
         }
-        let total: f64 = weights.iter().sum();
-        let column = ArrayView2::from_shape((samples, 1), weights).expect("as many as samples");
-        // As the mean of deviations, so that a large offset does not hide small changes.
-        let mean = |values: &ArrayView2<'_, f64>| {
-            let first = values.row(0);
-            ((values - &first) * column).sum_axis(Axis(0)) / total + first
-        };
-        let (x_mean, y_mean) = (mean(&x), mean(&y));
-        let roots: Vec<f64> = weights.iter().map(|weight| weight.sqrt()).collect();
-        // The squared error that noise adds, summed over all samples, is that of these additional rows.
-        let root = total.sqrt();
-        let a = Mat::from_fn(samples + unseen.nrows(), inputs, |row, i| {
-            match row.checked_sub(samples) {
-                None => roots[row] * (x[[row, i]] - x_mean[i]),
-                Some(source) => root * unseen[[source, i]],
+        let (n, m) = (self.features, self.outputs);
+        // The squared error that noise adds, summed over the samples, is that of these additional rows.
+        let root = (samples as f64).sqrt();
+        let noise = Mat::from_fn(self.noise.nrows(), 1 + n + m, |source, column| {
+            match column.checked_sub(1) {
+                Some(feature) if feature < n => root * self.noise[[source, feature]],
+                _ => 0.0,
             }
         });
-        let b = Mat::from_fn(samples, y.ncols(), |s, t| roots[s] * (y[[s, t]] - y_mean[t]));
-        let svd = a.thin_svd().map_err(|_| ScalingError::NotConverged)?;
-        drop(a);
+        let factors: Vec<&Mat<f64>> = factors.collect();
+        let factors = || factors.iter().copied().chain([&noise]);
+        let mut joined = Mat::zeros(factors().map(Mat::nrows).sum(), 1 + n + m);
+        let mut first = 0;
+        for factor in factors() {
+            joined.subrows_mut(first, factor.nrows()).copy_from(factor);
+            first += factor.nrows();
+        }
+        if !joined.is_all_finite() {
+            return Err(ScalingError::NotConverged);
+        }
+        let r = joined.qr().thin_R().to_owned();
+        let means: Vec<f64> = (1..1 + n + m).map(|column| r[(0, column)] / r[(0, 0)]).collect();
+        let rows = (r.nrows() - 1).min(n);
+        let svd = r.submatrix(1, 1, rows, n).thin_svd();
+        let svd = svd.map_err(|_| ScalingError::NotConverged)?;
         let mut singular: Vec<f64> = svd.S().column_vector().iter().copied().collect();
-        let smallest = f64::EPSILON * inputs as f64 * singular.first().copied().unwrap_or(0.0);
+        let smallest = f64::EPSILON * (n + 1) as f64 * singular.first().copied().unwrap_or(0.0);
         singular.retain(|&value| value > smallest);
         let kept = singular.len();
-        let u = svd.U().subcols(0, kept);
-        let (of_samples, of_noise) = u.split_at_row(samples);
-        let projected = of_samples.transpose() * &b;
-        let rest = &b - of_samples * &projected;
-        let stride = samples.div_ceil(MAX_LEFT_OUT);
-        let chosen: Vec<usize> = (0..samples).step_by(stride).collect();
-        let is_all_spanned = unseen.nrows() == 0 && kept + 1 >= samples;
-        let share = |sample: usize| 1.0 - weights[sample] / total;
-        let free = |&sample: &usize| {
-            let free = share(sample) - of_samples.row(sample).squared_norm_l2();
-            // A sample that alone spans a direction; the remainder is rounding.
-            let is_rounding = free < f64::EPSILON * samples as f64;
-            if is_all_spanned || is_rounding { 0.0 } else { free }
-        };
-        let free: Vec<f64> = chosen.iter().map(free).collect();
-        let rows = chosen.len();
-        let residual = |row: usize, t: usize| if free[row] > 0.0 { rest[(chosen[row], t)] } else { 0.0 };
-        let of_mean = |t: usize| {
-            chosen
-                .iter()
-                .map(|&sample| (b[(sample, t)] / share(sample)).powi(2))
-                .sum()
-        };
-        let part = (chosen.iter().map(|&sample| weights[sample]).sum::<f64>() / total).sqrt();
-        let of_chosen = Mat::from_fn(rows, kept, |row, k| of_samples[(chosen[row], k)]);
-        let left_out = LeftOut {
-            squares: Mat::from_fn(rows, kept, |row, k| of_chosen[(row, k)] * of_chosen[(row, k)]),
-            samples: of_chosen,
-            noise: Mat::from_fn(unseen.nrows(), kept, |row, k| part * of_noise[(row, k)]),
-            residual: Mat::from_fn(rows, y.ncols(), residual),
-            of_mean: (0..y.ncols()).map(of_mean).collect(),
-            free,
-        };
-        Ok(Self {
-            x_mean: x_mean.to_vec(),
-            y_mean: y_mean.to_vec(),
+        let projected = svd.U().subcols(0, kept).transpose() * r.submatrix(1, 1 + n, rows, m);
+        Ok(Spectrum {
             directions: svd.V().subcols(0, kept).to_owned(),
-            singular,
-            projected,
-            left_out,
+            filter: Filter {
+                projected: Mat::from_fn(kept, m, |k, t| singular[k] * projected[(k, t)]),
+                eigenvalues: singular.iter().map(|value| value * value).collect(),
+            },
+            means,
+        })
+    }
+}
+
+/// Singular directions of centred features.
+struct Spectrum {
+    /// Means of the features and of the outputs.
+    means: Vec<f64>,
+    /// Features × directions.
+    directions: Mat<f64>,
+    filter: Filter,
+}
+
+impl Spectrum {
+    /// Features in the singular directions, and outputs, of held-out samples with this factor, both relative to the
+    /// means; and the same for the noise.
+    fn seen_from(&self, factor: &Mat<f64>, noise: &Array2<f64>, samples: usize) -> (Mat<f64>, Mat<f64>) {
+        let (n, root) = (self.directions.nrows(), (samples as f64).sqrt());
+        let (rows, outputs) = (factor.nrows(), self.means.len() - n);
+        let centred = |row: usize, column: usize| factor[(row, 1 + column)] - factor[(row, 0)] * self.means[column];
+        let features = Mat::from_fn(rows + noise.nrows(), n, |row, i| match row.checked_sub(rows) {
+            None => centred(row, i),
+            Some(source) => root * noise[[source, i]],
+        });
+        let targets = Mat::from_fn(rows + noise.nrows(), outputs, |row, t| {
+            if row < rows { centred(row, n + t) } else { 0.0 }
+        });
+        (features * &self.directions, targets)
+    }
+
+    /// Map with a penalty for each output: features + 1 × outputs, the constant last.
+    fn map(&self, penalties: &[f64]) -> Array2<f64> {
+        let gains = &self.directions * self.filter.gains(penalties);
+        let n = gains.nrows();
+        Array2::from_shape_fn((n + 1, penalties.len()), |(i, t)| {
+            if i < n {
+                return gains[(i, t)];
+            }
+            let shift: f64 = (0..n).map(|i| self.means[i] * gains[(i, t)]).sum();
+            self.means[n + t] - shift
+        })
+    }
+}
+
+/// Gains in eigendirections for any penalty: the projected outputs divided by eigenvalue + penalty.
+struct Filter {
+    eigenvalues: Vec<f64>,
+    /// Eigendirections × outputs.
+    projected: Mat<f64>,
+}
+
+impl Filter {
+    /// Gains (eigendirections × outputs) with a penalty for each output, 0 for an infinite one.
+    pub fn gains(&self, penalties: &[f64]) -> Mat<f64> {
+        Mat::from_fn(self.eigenvalues.len(), penalties.len(), |k, t| {
+            self.projected[(k, t)] / (self.eigenvalues[k] + penalties[t])
         })
     }
 
-    /// Returns the penalty with the minimum leave-one-out error for each output; infinite if none is better than the
-    /// mean.
-    pub fn best_penalties(&self) -> Vec<f64> {
-        let Some(decades) = self.decades() else {
-            return vec![f64::INFINITY; self.y_mean.len()];
+    /// Sums of squared errors (penalty × output) on held-out samples, given in the eigendirections (samples ×
+    /// eigendirections) and with their outputs (samples × outputs), both relative to the means of the others.
+    pub fn held_out(&self, basis: MatRef<'_, f64>, targets: MatRef<'_, f64>, penalties: &[f64]) -> Vec<Vec<f64>> {
+        let outputs = targets.ncols();
+        let of_penalty = |&penalty: &f64| {
+            let errors = basis * self.gains(&vec![penalty; outputs]) - targets;
+            errors.col_iter().map(|column| column.squared_norm_l2()).collect()
         };
-        let errors = |decades: &[f64]| {
-            let penalties: Vec<f64> = decades.iter().map(|decade| 10.0_f64.powf(*decade)).collect();
-            self.leave_one_out(&penalties)
-        };
-        let found = minima(decades, self.y_mean.len(), errors);
-        let penalty = |((decade, error), of_mean): ((f64, f64), &f64)| {
-            if error < *of_mean {
-                10.0_f64.powf(decade)
-            } else {
-                f64::INFINITY
-            }
-        };
-        found.into_iter().zip(&self.left_out.of_mean).map(penalty).collect()
+        penalties.iter().map(of_penalty).collect()
     }
+}
 
-    /// Returns the penalty with the minimum leave-one-out error of all outputs together; infinite if none is better
-    /// than the mean.
-    pub fn common_penalty(&self) -> f64 {
-        let Some(decades) = self.decades() else {
-            return f64::INFINITY;
+/// Penalties relative to the number of samples, in descending order. The first leaves only the mean, and the last is
+/// without effect in double precision.
+fn levels() -> impl Iterator<Item = f64> {
+    let powers = (0..=48).map(|place| 10.0_f64.powf(4.0 - 0.5 * f64::from(place)));
+    std::iter::once(f64::INFINITY).chain(powers)
+}
+
+/// Penalties chosen by the held-out error.
+pub(super) struct Choice {
+    /// Index of the penalty of each output.
+    pub levels: Vec<usize>,
+    /// Sums of squared errors with these penalties: fold × output.
+    pub squares: Vec<Vec<f64>>,
+}
+
+impl Choice {
+    /// Chooses the first penalty, in descending order, that is as good as the best. Where errors hardly depend on the
+    /// penalty, a smaller one would give large gains to features that the folds cannot judge, such as a channel that
+    /// varied only once. `errors` are those of [`Filter::held_out`], for each fold.
+    pub fn new(errors: &[Vec<Vec<f64>>], outputs: usize) -> Self {
+        /// Ratio of squared errors up to which one penalty is as good as another.
+        const AS_GOOD: f64 = 1.01;
+        let levels = errors.first().map_or(0, Vec::len);
+        let level = |output: usize| {
+            let total = |level: usize| errors.iter().map(|fold| fold[level][output]).sum::<f64>();
+            let best = (0..levels).map(total).fold(f64::INFINITY, f64::min);
+            (0..levels).find(|&level| total(level) <= AS_GOOD * best).unwrap_or(0)
         };
-        let error = |decades: &[f64]| {
-            let penalties = vec![10.0_f64.powf(decades[0]); self.y_mean.len()];
-            vec![self.leave_one_out(&penalties).iter().sum()]
+        let levels: Vec<usize> = (0..outputs).map(level).collect();
+        let chosen = |fold: &Vec<Vec<f64>>| levels.iter().enumerate().map(|(t, &level)| fold[level][t]).collect();
+        Self {
+            squares: errors.iter().map(chosen).collect(),
+            levels,
+        }
+    }
+}
+
+/// Centre and scale of each feature. A feature that is constant, or nearly so, has the scale 0: its deviations are
+/// rounding, and divided by their size they would turn a later change into an enormous one. A feature that varied much less
+/// than others, such as an average over a rare pulse, keeps some of the difference for the same reason.
+pub(crate) struct Standard {
+    /// Means.
+    pub centre: Vec<f64>,
+    /// Reciprocal standard deviations, limited by [`Self::SMALLEST`].
+    pub scale: Vec<f64>,
+}
+
+impl Standard {
+    /// Deviation of a constant feature, relative to its largest absolute value.
+    const CONSTANT: f64 = 1e-12;
+    /// Smallest deviation by which a feature is divided, relative to the largest deviation of a feature.
+    const SMALLEST: f64 = 0.1;
+
+    /// Computes them for `of` the values (samples × features).
+    ///
+    /// # Errors
+    /// If there are no values, or they overflow.
+    pub fn fit(values: ArrayView2<'_, f64>, of: impl Fn(f64) -> f64) -> Result<Self, ScalingError> {
+        let (samples, features) = values.dim();
+        if samples == 0 {
+            return Err(ScalingError::Empty);
+        }
+        let first: Vec<f64> = values.row(0).iter().map(|&value| of(value)).collect();
+        let (mut shift, mut largest) = (vec![0.0; features], vec![0.0_f64; features]);
+        for row in values.rows() {
+            for (feature, &value) in row.iter().enumerate() {
+                let value = of(value);
+                shift[feature] += (value - first[feature]) / samples as f64;
+                largest[feature] = largest[feature].max(value.abs());
+            }
+        }
+        let centre: Vec<f64> = first.iter().zip(&shift).map(|(first, shift)| first + shift).collect();
+        // Relative to the largest value, whose square may overflow.
+        let mut squares = vec![0.0; features];
+        for row in values.rows() {
+            for (feature, &value) in row.iter().enumerate() {
+                let off = (of(value) - centre[feature]) / largest[feature].max(f64::MIN_POSITIVE);
+                squares[feature] += off * off / samples as f64;
+            }
+        }
+        let deviation = |(square, largest): (&f64, &f64)| match square.sqrt() {
+            relative if relative > Self::CONSTANT => relative * largest,
+            _ => 0.0,
         };
-        let (decade, error) = minima(decades, 1, error)[0];
-        if error < self.left_out.of_mean.iter().sum() {
-            10.0_f64.powf(decade)
+        let deviations: Vec<f64> = squares.iter().zip(&largest).map(deviation).collect();
+        let smallest = Self::SMALLEST * deviations.iter().copied().fold(0.0, f64::max);
+        let scale = |&deviation: &f64| match deviation {
+            0.0 => 0.0,
+            _ => 1.0 / deviation.max(smallest),
+        };
+        let standard = Self {
+            scale: deviations.iter().map(scale).collect(),
+            centre,
+        };
+        let all = standard
+            .centre
+            .iter()
+            .chain(&deviations)
+            .chain(&squares)
+            .chain(&standard.scale);
+        if all.copied().all(f64::is_finite) {
+            Ok(standard)
         } else {
-            f64::INFINITY
+            Err(ScalingError::NotConverged)
         }
     }
 
-    /// Range of the logarithms of penalties. Beyond it, a penalty has no effect in double precision, or removes
-    /// nearly everything.
-    fn decades(&self) -> Option<(f64, f64)> {
-        let (largest, smallest) = (self.singular.first()?, self.singular.last()?);
-        Some((2.0 * smallest.log10() - 16.0, 2.0 * largest.log10() + 4.0))
+    /// Writes the standardised features of a sample with these values.
+    pub fn write(&self, values: impl Iterator<Item = f64>, features: &mut [f64]) {
+        for ((feature, value), (centre, scale)) in
+            features.iter_mut().zip(values).zip(self.centre.iter().zip(&self.scale))
+        {
+            *feature = (value - centre) * scale;
+        }
     }
+}
 
-    /// Sum of the squared leave-one-out errors for each output with its penalty, including the contribution of noise.
-    fn leave_one_out(&self, penalties: &[f64]) -> Vec<f64> {
-        let LeftOut {
-            samples,
-            squares,
-            noise,
-            residual,
-            free,
-            ..
-        } = &self.left_out;
-        let (kept, outputs) = self.projected.shape();
-        let taken = |penalty: f64, k: usize| penalty / (self.singular[k] * self.singular[k] + penalty);
-        let lost = Mat::from_fn(kept, outputs, |k, t| taken(penalties[t], k) * self.projected[(k, t)]);
-        let residual = residual + samples * &lost;
-        let answers = noise * (&self.projected - &lost);
-        // Leverages depend on the penalty alone.
-        let distinct = if penalties.iter().all(|penalty| *penalty == penalties[0]) {
-            outputs.min(1)
-        } else {
+/// Cross-validated ridge regression of `targets` (samples × targets) on standardised `inputs` (samples × inputs). Its map
+/// takes the inputs as they are.
+///
+/// # Errors
+/// If there are no samples, or the equations have no finite solution.
+pub(crate) fn ridge(
+    inputs: ArrayView2<'_, f64>,
+    targets: ArrayView2<'_, f64>,
+    folds: &Folds,
+) -> Result<Ridge, ScalingError> {
+    let standard = Standard::fit(inputs, |value| value)?;
+    let offsets = Standard::fit(targets, |value| value)?.centre;
+    let regression = Regression {
+        samples: inputs.nrows(),
+        features: inputs.ncols(),
+        outputs: targets.ncols(),
+        write: &|sample, features, outputs| {
+            standard.write(inputs.row(sample).iter().copied(), features);
+            // Squares of a large offset would hide the changes.
+            let off = targets.row(sample).into_iter().zip(&offsets);
             outputs
-        };
-        let leverages = squares * Mat::from_fn(kept, distinct, |k, t| taken(penalties[t], k));
-        let of_output = |t: usize| {
-            let leverages = leverages.col(t.min(distinct - 1));
-            let rows = free.iter().zip(leverages.iter()).enumerate();
-            let errors = rows.map(|(row, (free, leverage))| (residual[(row, t)] / (free + leverage)).powi(2));
-            errors.sum::<f64>() + answers.col(t).squared_norm_l2()
-        };
-        (0..outputs).map(of_output).collect()
+                .iter_mut()
+                .zip(off)
+                .for_each(|(output, (target, offset))| *output = target - offset);
+        },
+        noise: Array2::zeros((0, inputs.ncols())),
+    };
+    let Ridge { mut map, squares } = regression.ridge(Some(folds))?;
+    for (t, mut column) in map.columns_mut().into_iter().enumerate() {
+        column[inputs.ncols()] += offsets[t];
+        for (i, (centre, scale)) in standard.centre.iter().zip(&standard.scale).enumerate() {
+            column[i] *= scale;
+            column[inputs.ncols()] -= centre * column[i];
+        }
     }
+    Ok(Ridge { map, squares })
+}
 
-    /// Coefficients with a penalty for each output: inputs + 1 × outputs, the constant last. For an infinite penalty
-    /// they are 0, and the constant is the mean.
-    pub fn coefficients(&self, penalties: &[f64]) -> Array2<f64> {
-        let (kept, outputs) = self.projected.shape();
-        let shrunk = Mat::from_fn(kept, outputs, |k, t| {
-            let s = self.singular[k];
-            s / (s * s + penalties[t]) * self.projected[(k, t)]
-        });
-        let gains = &self.directions * shrunk;
-        Array2::from_shape_fn((gains.nrows() + 1, outputs), |(i, t)| {
-            if i < gains.nrows() {
-                return gains[(i, t)];
-            }
-            let shifts = self.x_mean.iter().enumerate().map(|(i, mean)| mean * gains[(i, t)]);
-            self.y_mean[t] - shifts.sum::<f64>()
-        })
+/// Folds by which a decoder chooses penalties and widths: blocks in the order of the samples between groups, or whole groups
+/// if these are scattered. Of few samples a fold holds out a tenth, of more a fifth; there are fewer folds if there are fewer
+/// groups. `None` for a single sample.
+pub(super) fn folds(set: &Dataset) -> Option<Folds> {
+    /// Number of samples up to which there are ten folds.
+    const FEW: usize = 200;
+    let samples = set.samples();
+    let count = if samples <= FEW { 10 } else { 5 };
+    let runs = set.groups().chunk_by(|one, next| one == next).count();
+    let by = if runs == set.snapshots().len() {
+        SplitBy::Time
+    } else {
+        SplitBy::Group
+    };
+    let divide = |folds| Folds::by(set, folds, by, &mut Seed(0).rng(Stream::Split));
+    match divide(count) {
+        Ok(folds) => Some(folds),
+        Err(DivisionError::Folds { units, .. }) if units >= 2 => divide(units).ok(),
+        // A single group.
+        Err(_) if samples >= 2 => Some(Folds::consecutive(samples, count.min(samples))),
+        Err(_) => None,
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::*;
-    use ndarray::Array1;
+    use faer::{Side, linalg::solvers::Solve};
+    use ndarray::{Axis, concatenate};
     use rand::{SeedableRng, rngs::ChaCha8Rng};
 
+    use super::*;
     use crate::scene::standard_normal;
 
     fn normal(rows: usize, columns: usize, seed: u64) -> Array2<f64> {
@@ -242,164 +426,317 @@ mod tests {
         Array2::from_shape_simple_fn((rows, columns), || standard_normal(&mut rng))
     }
 
-    fn none(inputs: usize) -> Array2<f64> {
-        Array2::zeros((0, inputs))
+    /// Calls `of` with the regression of `y` on `x`.
+    fn with<T>(x: &Array2<f64>, y: &Array2<f64>, noise: &Array2<f64>, of: impl FnOnce(&Regression<'_>) -> T) -> T {
+        of(&Regression {
+            samples: x.nrows(),
+            features: x.ncols(),
+            outputs: y.ncols(),
+            write: &|sample, features, outputs| {
+                features
+                    .iter_mut()
+                    .zip(x.row(sample))
+                    .for_each(|(feature, value)| *feature = *value);
+                outputs
+                    .iter_mut()
+                    .zip(y.row(sample))
+                    .for_each(|(output, value)| *output = *value);
+            },
+            noise: noise.clone(),
+        })
     }
 
-    fn ones(x: &Array2<f64>) -> Vec<f64> {
-        vec![1.0; x.nrows()]
+    fn none(features: usize) -> Array2<f64> {
+        Array2::zeros((0, features))
     }
 
-    fn fit(x: &Array2<f64>, y: &Array2<f64>) -> (Array2<f64>, Vec<f64>) {
-        let ridge = Ridge::new(x.view(), y.view(), &ones(x), none(x.ncols()).view()).unwrap();
-        let penalties = ridge.best_penalties();
-        (ridge.coefficients(&penalties), penalties)
+    /// Map with these penalties.
+    fn map(x: &Array2<f64>, y: &Array2<f64>, penalties: &[f64]) -> Array2<f64> {
+        let all: Vec<usize> = (0..x.nrows()).collect();
+        with(x, y, &none(x.ncols()), |regression| {
+            let factor = regression.factor(&all);
+            regression
+                .spectrum([&factor].into_iter(), x.nrows())
+                .unwrap()
+                .map(penalties)
+        })
     }
 
-    /// Coefficients without the constant.
-    fn gains(map: &Array2<f64>) -> ArrayView2<'_, f64> {
-        map.slice_axis(Axis(0), ndarray::Slice::from(..map.nrows() - 1))
+    fn ridge_of(x: &Array2<f64>, y: &Array2<f64>) -> Ridge {
+        let folds = Folds::consecutive(x.nrows(), 5);
+        with(x, y, &none(x.ncols()), |regression| {
+            regression.ridge(Some(&folds)).unwrap()
+        })
     }
 
+    /// Map by dense normal equations, with noise of the features.
+    fn dense(x: &Array2<f64>, y: &Array2<f64>, noise: &Array2<f64>, penalty: f64) -> Array2<f64> {
+        let (n, samples) = (x.ncols(), x.nrows() as f64);
+        let (x_mean, y_mean) = (x.mean_axis(Axis(0)).unwrap(), y.mean_axis(Axis(0)).unwrap());
+        let (a, b) = (x - &x_mean, y - &y_mean);
+        let gram = a.t().dot(&a) + samples * noise.t().dot(noise);
+        let right = a.t().dot(&b);
+        let gram = Mat::from_fn(n, n, |i, j| gram[[i, j]] + if i == j { penalty } else { 0.0 });
+        let gains = gram
+            .llt(Side::Lower)
+            .unwrap()
+            .solve(Mat::from_fn(n, y.ncols(), |i, t| right[[i, t]]));
+        let gains = Array2::from_shape_fn((n, y.ncols()), |(i, t)| gains[(i, t)]);
+        let constant = (&y_mean - &x_mean.dot(&gains)).insert_axis(Axis(0));
+        concatenate![Axis(0), gains, constant]
+    }
+
+    fn answers(map: &Array2<f64>, x: &Array2<f64>) -> Array2<f64> {
+        concatenate![Axis(1), x.view(), Array2::ones((x.nrows(), 1))].dot(map)
+    }
+
+    /// `Ridge(alpha).fit(X, Y)` of scikit-learn 1.9.1.
     #[test]
-    fn an_affine_relation_is_found_and_noise_is_not_fitted() {
-        let x = normal(60, 20, 1);
-        let clean = Array2::from_shape_fn((60, 1), |(s, _)| 3.0 * x[[s, 0]] - x[[s, 5]] + 0.5);
-        let (exact, _) = fit(&x, &clean);
-        assert!((exact[[0, 0]] - 3.0).abs() < 1e-8 && (exact[[5, 0]] + 1.0).abs() < 1e-8);
-        assert!((exact[[20, 0]] - 0.5).abs() < 1e-8);
-        // Pure noise: nearly everything is left out.
-        let (fitted, penalties) = fit(&x, &normal(60, 1, 2));
-        assert!(penalties[0] > 1.0);
-        assert!(fitted.iter().take(20).map(|c| c * c).sum::<f64>() < 0.2);
-    }
-
-    /// Compares with fits that leave out each sample in turn.
-    #[test]
-    fn leave_one_out_errors_match_refits() {
-        for (samples, inputs) in [(25, 6), (9, 8), (9, 20)] {
-            let mut x = normal(samples, inputs, 3);
-            // Singular values over six decades.
-            for (i, mut column) in x.columns_mut().into_iter().enumerate() {
-                column *= 10.0_f64.powf(-6.0 * i as f64 / inputs as f64);
+    fn maps_agree_with_scikit_learn() {
+        let x = Array2::from_shape_fn((12, 4), |(s, i)| {
+            (((s + 1) * (i + 2)) as f64 * 0.37).sin() + 0.1 * i as f64
+        });
+        let y = Array2::from_shape_fn((12, 2), |(s, t)| {
+            if t == 0 {
+                (0.5 * s as f64).cos()
+            } else {
+                s as f64 / 10.0
             }
-            let y = normal(samples, 2, 4);
-            let noise = normal(3, inputs, 5) * 0.03;
-            for unseen in [none(inputs), noise] {
-                let ridge = Ridge::new(x.view(), y.view(), &ones(&x), unseen.view()).unwrap();
-                for penalty in [1e-9, 1e-4, 1.0] {
-                    let mut expected = 0.0;
-                    for left_out in 0..samples {
-                        let others: Vec<usize> = (0..samples).filter(|&sample| sample != left_out).collect();
-                        let (x_others, y_others) = (x.select(Axis(0), &others), y.select(Axis(0), &others));
-                        // The noise has the same weight as for all samples.
-                        let weight = (samples as f64 / others.len() as f64).sqrt();
-                        let fit = Ridge::new(
-                            x_others.view(),
-                            y_others.view(),
-                            &ones(&x_others),
-                            (&unseen * weight).view(),
-                        )
-                        .unwrap();
-                        let map = fit.coefficients(&[penalty; 2]);
-                        let answer = x.row(left_out).dot(&gains(&map)) + map.row(inputs);
-                        expected += (&answer - &y.row(left_out)).mapv(|error| error * error).sum();
-                    }
-                    let map = ridge.coefficients(&[penalty; 2]);
-                    let added = unseen.dot(&gains(&map));
-                    expected += samples as f64 * added.mapv(|change| change * change).sum();
-                    let ratio = ridge.leave_one_out(&[penalty; 2]).iter().sum::<f64>() / expected;
-                    assert!((ratio - 1.0).abs() < 1e-6, "{samples}×{inputs}, {penalty}: {ratio}");
+        });
+        let expected = [
+            [
+                [
+                    0.7725829902392267,
+                    0.2875275745862320,
+                    0.0524090749323276,
+                    0.0748474797196868,
+                    -0.2930655791031472,
+                ],
+                [
+                    -0.0218899707884899,
+                    -0.1287208317818264,
+                    -0.1494507891867129,
+                    -0.0379494409531939,
+                    0.6151677022094031,
+                ],
+            ],
+            [
+                [
+                    0.8476439326105294,
+                    0.3294899345390301,
+                    0.0676554929504225,
+                    0.0809650436755034,
+                    -0.3208247180978437,
+                ],
+                [
+                    -0.0268328423043098,
+                    -0.1442218510316254,
+                    -0.1658656686125996,
+                    -0.0435504509120380,
+                    0.6235925836239433,
+                ],
+            ],
+        ];
+        for (penalty, expected) in [0.5, 1e-3].into_iter().zip(expected) {
+            let ours = map(&x, &y, &[penalty; 2]);
+            for (t, expected) in expected.iter().enumerate() {
+                for (i, expected) in expected.iter().enumerate() {
+                    assert!((ours[[i, t]] - expected).abs() < 1e-12, "{penalty}: {ours}");
                 }
             }
         }
     }
 
-    /// If the map goes through all samples, residuals and 1 − leverage are pure rounding unless computed separately.
+    /// Many blocks of samples, fewer samples than features, and scattered folds.
     #[test]
-    fn interpolating_fits_keep_distinct_errors() {
-        let x = normal(12, 30, 6);
-        let ridge = Ridge::new(x.view(), normal(12, 1, 7).view(), &ones(&x), none(30).view()).unwrap();
-        let smooth = [1e-3, 1e-6, 1e-9, 1e-12].map(|penalty| ridge.leave_one_out(&[penalty])[0]);
-        for pair in smooth.windows(2) {
-            assert!((pair[1] / pair[0] - 1.0).abs() < 1e-3, "{smooth:?}");
-        }
-    }
-
-    #[test]
-    fn unseen_noise_gives_a_penalty_of_its_size() {
-        // One input of variance 1 and noise of variance 1/4: the best gain is 1 / (1 + 1/4).
-        let x = normal(20_000, 1, 8);
-        let unseen = Array2::from_elem((1, 1), 0.5);
-        let ridge = Ridge::new(x.view(), x.view(), &ones(&x), unseen.view()).unwrap();
-        let gain = ridge.coefficients(&ridge.best_penalties())[[0, 0]];
-        assert!((gain - 0.8).abs() < 0.01, "{gain}");
-    }
-
-    /// Compares with fits to all copies, leaving out all copies of each sample in turn.
-    #[test]
-    fn a_weight_equals_copies_left_out_together() {
-        let (x, y) = (normal(9, 4, 9), normal(9, 2, 10));
-        let weights = [1.0, 3.0, 2.0, 7.0, 1.0, 1.0, 5.0, 2.0, 4.0];
-        let copies: Vec<usize> = (0..9).flat_map(|s| vec![s; weights[s] as usize]).collect();
-        let fit_to = |samples: &[usize]| {
-            let (x, y) = (x.select(Axis(0), samples), y.select(Axis(0), samples));
-            Ridge::new(x.view(), y.view(), &ones(&x), none(4).view()).unwrap()
-        };
-        let ridge = Ridge::new(x.view(), y.view(), &weights, none(4).view()).unwrap();
-        // A separate penalty for each output.
-        for penalties in [[1e-6, 0.3], [10.0, 1e-2]] {
-            let (ours, truth) = (ridge.coefficients(&penalties), fit_to(&copies).coefficients(&penalties));
-            assert!(
-                (&ours - &truth).iter().all(|error| error.abs() < 1e-12),
-                "{ours} {truth}"
-            );
-            let mut expected = Array1::<f64>::zeros(2);
-            for (left_out, weight) in weights.iter().enumerate() {
-                let others: Vec<usize> = copies.iter().copied().filter(|&s| s != left_out).collect();
-                let map = fit_to(&others).coefficients(&penalties);
-                let answer = x.row(left_out).dot(&gains(&map)) + map.row(4);
-                expected += &(*weight * (&answer - &y.row(left_out)).mapv(|error| error * error));
-            }
-            let errors = ridge.leave_one_out(&penalties);
-            for (ours, truth) in errors.iter().zip(&expected) {
-                assert!((ours / truth - 1.0).abs() < 1e-9, "{errors:?} {expected}");
+    fn held_out_errors_and_maps_match_refits_by_normal_equations() {
+        for (samples, features) in [(3000, 6), (25, 6), (9, 20)] {
+            let mut x = normal(samples, features, 3) * 0.3 + 7.0;
+            x.column_mut(2).fill(0.0);
+            let noisy = normal(samples, 2, 4);
+            let y = Array2::from_shape_fn((samples, 2), |(s, t)| x[[s, t]] + 0.5 * noisy[[s, t]] + 100.0);
+            for noise in [none(features), normal(3, features, 5) * 0.2] {
+                let folds = Folds::consecutive(samples, 3);
+                let ridge = with(&x, &y, &noise, |regression| regression.ridge(Some(&folds)).unwrap());
+                let mut best = vec![f64::INFINITY; 2];
+                for level in levels().skip(1).filter(|level| (1e-9..10.0).contains(level)) {
+                    let mut squares = vec![Vec::new(); 3];
+                    for (fold, squares) in squares.iter_mut().enumerate() {
+                        let (others, test) = (folds.without(&[fold]), folds.test(fold));
+                        let part = |of: &Array2<f64>, rows: &[usize]| of.select(Axis(0), rows);
+                        let penalty = level * others.len() as f64;
+                        let map = dense(&part(&x, &others), &part(&y, &others), &noise, penalty);
+                        let off = answers(&map, &part(&x, test)) - part(&y, test);
+                        let gains = map.slice_axis(Axis(0), ndarray::Slice::from(..features));
+                        let added = noise.dot(&gains).mapv(|change| change * change).sum_axis(Axis(0));
+                        let added = added * test.len() as f64;
+                        *squares = (off.mapv(|error| error * error).sum_axis(Axis(0)) + added).to_vec();
+                    }
+                    for (t, best) in best.iter_mut().enumerate() {
+                        let total: f64 = squares.iter().map(|squares| squares[t]).sum();
+                        *best = best.min(total);
+                        // The chosen penalty is one of these.
+                        let ours: f64 = ridge.squares.iter().map(|fold| fold[t]).sum();
+                        if (ours / total - 1.0).abs() < 1e-9 {
+                            let penalty = level * samples as f64;
+                            let map = dense(&x, &y, &noise, penalty);
+                            let off = (&ridge.map.column(t) - &map.column(t)).mapv(f64::abs).sum();
+                            assert!(off < 1e-6, "{samples}×{features}, {level}: {off}");
+                        }
+                    }
+                }
+                for (t, best) in best.iter().enumerate() {
+                    let ours: f64 = ridge.squares.iter().map(|fold| fold[t]).sum();
+                    assert!(ours < 1.0101 * best, "{samples}×{features}: {ours} {best}");
+                }
             }
         }
     }
 
     #[test]
-    fn each_output_has_its_own_penalty() {
-        let x = normal(40, 12, 11);
-        let mut y = normal(40, 3, 12);
-        // Exact, noisy, and noise alone.
-        for s in 0..40 {
-            y[[s, 0]] = x[[s, 3]] - x[[s, 4]];
+    fn an_affine_relation_is_found_exactly_and_noise_is_answered_with_the_mean() {
+        let x = normal(60, 20, 1);
+        let mut y = normal(60, 3, 2);
+        for s in 0..60 {
+            y[[s, 0]] = 3.0 * x[[s, 0]] - x[[s, 5]] + 0.5;
             y[[s, 1]] += x[[s, 7]];
         }
-        let (together, penalties) = fit(&x, &y);
-        for (t, together_penalty) in penalties.iter().enumerate() {
-            let (alone, penalty) = fit(&x, &y.select(Axis(1), &[t]));
-            assert!((together_penalty / penalty[0]).ln().abs() < 0.1 || *together_penalty == penalty[0]);
-            assert!(
-                (&together.column(t) - &alone.column(0))
-                    .iter()
-                    .all(|error| error.abs() < 1e-2)
-            );
-        }
+        let map = ridge_of(&x, &y).map;
         assert!(
-            penalties[0] < 1e-6 && penalties[1] > 1e-3 && penalties[2] > 10.0,
-            "{penalties:?}"
+            (map[[0, 0]] - 3.0).abs() < 1e-8 && (map[[5, 0]] + 1.0).abs() < 1e-8 && (map[[20, 0]] - 0.5).abs() < 1e-8
         );
+        assert!((0.3..1.1).contains(&map[[7, 1]]), "{}", map[[7, 1]]);
+        let of_noise: f64 = map.column(2).iter().take(20).map(|gain| gain * gain).sum();
+        assert!(of_noise < 0.05, "{of_noise}");
+        // Each output as if it were alone.
+        for t in 0..3 {
+            let alone = ridge_of(&x, &y.select(Axis(1), &[t])).map;
+            assert!((&alone.column(0) - &map.column(t)).iter().all(|off| off.abs() < 1e-9));
+        }
+    }
+
+    /// The best gain for one feature of variance 1 with noise of variance 1/4 is 1 / (1 + 1/4).
+    #[test]
+    fn noise_that_the_samples_lack_shrinks_the_gains() {
+        let x = normal(20_000, 1, 8);
+        let folds = Folds::consecutive(20_000, 5);
+        let noise = Array2::from_elem((1, 1), 0.5);
+        let ridge = with(&x, &x, &noise, |regression| regression.ridge(Some(&folds)).unwrap());
+        assert!((ridge.map[[0, 0]] - 0.8).abs() < 0.02, "{}", ridge.map);
     }
 
     #[test]
-    fn no_or_one_sample_and_no_inputs_or_outputs() {
-        assert!(Ridge::new(normal(0, 3, 0).view(), normal(0, 2, 0).view(), &[], none(3).view()).is_err());
-        for (samples, inputs, outputs) in [(1, 3, 2), (2, 3, 2), (5, 0, 2), (5, 3, 0)] {
-            let (map, _) = fit(&normal(samples, inputs, 1), &normal(samples, outputs, 2));
-            assert_eq!(map.dim(), (inputs + 1, outputs));
-            assert!(map.iter().all(|value| value.is_finite()));
+    fn least_squares_has_the_minimum_norm() {
+        // Equal columns share their gain.
+        let first = normal(10, 1, 9);
+        let x = concatenate![Axis(1), first, first];
+        let least = with(&x, &(&first * 3.0 + 1.0), &none(2), |regression| {
+            regression.least_squares().unwrap()
+        });
+        for (ours, expected) in least.column(0).iter().zip([1.5, 1.5, 1.0]) {
+            assert!((ours - expected).abs() < 1e-12, "{least}");
         }
+        // Fewer samples than features: through all samples.
+        let (x, y) = (normal(6, 20, 10), normal(6, 2, 11));
+        let least = with(&x, &y, &none(20), |regression| regression.least_squares().unwrap());
+        assert!((answers(&least, &x) - y).iter().all(|off| off.abs() < 1e-12));
+    }
+
+    #[test]
+    fn constant_features_have_no_scale_and_extremes_have_one() {
+        let x = normal(50, 1, 12);
+        for (size, offset, varies) in [
+            (1.0, 0.0, true),
+            (0.0, 5.3, false),
+            (0.0, 0.0, false),
+            (1e-16, 5.3, false),
+            (1e-9, 5.3, true),
+            (1e-200, 0.0, true),
+            (1e200, 0.0, true),
+        ] {
+            let values = x.mapv(|value| size * value + offset);
+            let standard = Standard::fit(values.view(), |value| value).unwrap();
+            assert_eq!(standard.scale[0] > 0.0, varies, "{size} {offset}");
+            if varies {
+                let mut scaled = [0.0];
+                let square = |value: &f64| {
+                    standard.write([*value].into_iter(), &mut scaled);
+                    scaled[0] * scaled[0]
+                };
+                let variance = values.iter().map(square).sum::<f64>() / 50.0;
+                assert!((variance - 1.0).abs() < 1e-6, "{size} {offset}: {variance}");
+            }
+        }
+        let none = Array2::zeros((0, 2));
+        assert!(matches!(
+            Standard::fit(none.view(), |value| value),
+            Err(ScalingError::Empty)
+        ));
+    }
+
+    #[test]
+    fn inputs_are_standardised_and_large_offsets_kept() {
+        let inputs = Array2::from_shape_fn((60, 3), |(s, i)| {
+            ((7 * s + 13 * i * s + i) as f64).sin() * 10.0_f64.powi(2 * i as i32)
+        });
+        let targets = Array2::from_shape_fn((60, 2), |(s, t)| match t {
+            0 => 3.0 * inputs[[s, 0]] - 0.2 * inputs[[s, 2]] + 5.0,
+            _ => inputs[[s, 1]] + 1e6,
+        });
+        let map = ridge(inputs.view(), targets.view(), &Folds::consecutive(60, 4))
+            .unwrap()
+            .map;
+        for (found, expected) in [
+            (map[[0, 0]], 3.0),
+            (map[[1, 0]], 0.0),
+            (map[[2, 0]], -0.2),
+            (map[[3, 0]], 5.0),
+            (map[[1, 1]], 1.0),
+            (map[[3, 1]], 1e6),
+        ] {
+            assert!((found - expected).abs() < 1e-6, "{map}");
+        }
+    }
+
+    #[test]
+    fn no_or_one_sample_and_no_features_or_outputs() {
+        for (samples, features, outputs) in [(1, 3, 2), (2, 3, 2), (5, 0, 2), (5, 3, 0)] {
+            let (x, y) = (normal(samples, features, 1), normal(samples, outputs, 2));
+            let folds = (samples > 1).then(|| Folds::consecutive(samples, 2));
+            let ridge = with(&x, &y, &none(features), |regression| {
+                regression.ridge(folds.as_ref()).unwrap()
+            });
+            assert_eq!(ridge.map.dim(), (features + 1, outputs));
+            assert!(ridge.map.iter().all(|value| value.is_finite()));
+        }
+        let (x, y) = (normal(0, 3, 0), normal(0, 2, 0));
+        let empty = with(&x, &y, &none(3), |regression| regression.ridge(None).map(|_| ()));
+        assert_eq!(empty, Err(ScalingError::Empty));
+    }
+
+    #[test]
+    fn folds_leave_groups_whole() {
+        let set = |groups: Vec<usize>| {
+            let values = Array2::zeros((groups.len(), 1));
+            Dataset::new(values.clone(), values, None, groups).unwrap()
+        };
+        // Groups one after another, scattered, few of them, and a single one.
+        for (groups, count) in [
+            ((0..60).map(|s| s / 4).collect::<Vec<_>>(), 10),
+            ((0..300).map(|s| s / 4).collect(), 5),
+            ((0..60).map(|s| s % 15).collect(), 10),
+            ((0..60).map(|s| s % 3).collect(), 3),
+        ] {
+            let set = set(groups.clone());
+            let folds = folds(&set).unwrap();
+            assert_eq!(folds.count(), count);
+            for fold in 0..count {
+                let others = folds.without(&[fold]);
+                let is_elsewhere = |sample: &usize| others.iter().any(|&other| groups[other] == groups[*sample]);
+                assert!(!folds.test(fold).iter().any(is_elsewhere), "{groups:?}");
+            }
+        }
+        assert_eq!(folds(&set(vec![7; 60])).unwrap().test(0), Vec::from_iter(0..6));
+        assert!(folds(&set(vec![7])).is_none());
     }
 }

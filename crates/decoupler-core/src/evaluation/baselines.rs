@@ -1,10 +1,14 @@
 use serde::{Deserialize, Serialize};
 
-use super::{Coverage, Errors, NoReference, RunError, RunSettings, Source, TestErrors};
+use super::{
+    Coverage, Errors, NoReference, RunError, RunSets, RunSettings, SimulatedSettings, Source, TestErrors,
+    reference_errors, run_sets::check_sets,
+};
 use crate::{
-    dataset::{Dataset, PerRow},
-    decoupling::{Program, ProgramDecoder},
-    network::{InputChoice, Quantity},
+    dataset::{Dataset, PerRow, Stream},
+    decoupling::{Program, ProgramDecoder, decode_set},
+    job::Job,
+    network::Quantity,
     scene::{NoiseSource, Rows},
     sensor::ArrayScale,
 };
@@ -41,6 +45,35 @@ pub struct Scores<E = TestErrors> {
 }
 
 impl Baselines {
+    /// Fits the baselines to the training set and measures them on the test set.
+    ///
+    /// # Errors
+    /// If the settings are invalid, the sets do not belong together, samples cannot be scaled, or the job is cancelled.
+    pub fn measure(settings: &RunSettings, sets: &RunSets, job: &Job<'_>) -> Result<Self, RunError> {
+        let [mean, linear] = mean_and_linear(settings, sets)?;
+        job.check()?;
+        let reference = match settings.simulated() {
+            Some(simulated) => {
+                let SimulatedSettings { source, seed, .. } = simulated;
+                let mut rng = seed.rng(Stream::Expectation);
+                Some(reference_errors(&source.sensor, &source.scene, &sets.test, &mut rng)?)
+            }
+            None => None,
+        };
+        job.check()?;
+        let (reference, no_reference) = match reference {
+            Some(Ok(errors)) => (Some(TestErrors::Nodes(errors)), None),
+            Some(Err(reason)) => (None, Some(reason)),
+            None => (None, None),
+        };
+        Ok(Self {
+            mean,
+            linear,
+            reference,
+            no_reference,
+        })
+    }
+
     /// Returns the errors on the nodes, if the targets are nodes of an array.
     pub fn nodes(&self) -> Option<Baselines<Errors>> {
         Some(Baselines {
@@ -71,6 +104,20 @@ impl Scores {
     }
 }
 
+/// Returns the errors of the training mean and of the linear baseline on the test set.
+///
+/// # Errors
+/// If the settings are invalid, the sets do not belong together, or samples cannot be scaled.
+pub(super) fn mean_and_linear(settings: &RunSettings, sets: &RunSets) -> Result<[TestErrors; 2], RunError> {
+    check_sets(settings, sets)?;
+    let (mut mean, mut linear) = fit_baselines(&sets.split.training, settings)?;
+    let errors = |answers| TestErrors::measure(&settings.source, &sets.test, &answers);
+    Ok([
+        errors(decode_set(&mut mean, &sets.test)?),
+        errors(decode_set(&mut linear, &sets.test)?),
+    ])
+}
+
 /// Fits the baselines: the training mean and an affine map on the readings, one for each row-wire if networks know the
 /// row. The map is the least-squares solution for simulated samples of unknown row-wires or of a single one. Otherwise
 /// it is ridge regression, since a row-wire can have fewer samples than readings, and measured samples can be too few
@@ -81,14 +128,14 @@ pub(super) fn fit_baselines(
 ) -> Result<(ProgramDecoder, ProgramDecoder), RunError> {
     let mean = |set: &Dataset| Ok::<_, RunError>(Program::mean(set));
     let mean = PerRow::fit(training, settings.source.row_model(), mean)?;
-    let ridge = |inputs| {
-        let of_set = move |set: &Dataset| Program::ridge(set, inputs, NoiseSource::default());
+    let ridge = |quantity| {
+        let of_set = move |set: &Dataset| Program::ridge(set, quantity, NoiseSource::default());
         PerRow::fit(training, settings.source.row_model(), of_set)
     };
     let linear = match settings.source {
-        Source::Simulated(simulation) if simulation.scene.rows == Rows::Known => ridge(InputChoice::PAPER)?,
+        Source::Simulated(simulation) if simulation.scene.rows == Rows::Known => ridge(Quantity::Resistance)?,
         Source::Simulated(_) => PerRow::shared(Program::least_squares(training, Quantity::Resistance)?),
-        Source::Measured(_) => ridge(settings.inputs)?,
+        Source::Measured(_) => ridge(settings.inputs.quantity)?,
     };
     let [mean, linear] = [mean, linear].map(|programs| ProgramDecoder::new(Program::each(&programs)));
     Ok((mean, linear))

@@ -4,10 +4,11 @@ use ndarray::{Array2, Axis};
 use rand::RngExt;
 use serde::{Deserialize, Serialize};
 
-use super::{Baselines, Run, RunError, RunSettings, Scores, TestErrors, baselines::fit_baselines};
+use super::{Baselines, Begin, Run, RunError, RunSets, RunSettings, Scores, TestErrors, baselines::fit_baselines};
 use crate::{
-    dataset::{Dataset, FoldUnit, Folds, Seed, Split, Stream},
+    dataset::{Dataset, Folds, Seed, SplitBy, Stream},
     decoupling::decode_set,
+    job::{Cancelled, Job},
     training::TrainingError,
 };
 
@@ -23,8 +24,9 @@ pub struct CrossValidation {
     pub folds: usize,
     /// Number of repeats, each with the samples reshuffled.
     pub repeats: usize,
-    /// Unit of the folds.
-    pub unit: FoldUnit,
+    /// Rule by which samples are assigned to the folds.
+    #[serde(alias = "unit")]
+    pub by: SplitBy,
 }
 
 impl Default for CrossValidation {
@@ -33,7 +35,7 @@ impl Default for CrossValidation {
         Self {
             folds: 10,
             repeats: 10,
-            unit: FoldUnit::Sample,
+            by: SplitBy::Random,
         }
     }
 }
@@ -66,18 +68,18 @@ pub struct Effort {
 
 impl CrossValidation {
     /// Runs repeat `repeat` (from 0) of the cross-validation on `set`; each repeat has its own seed, derived from that
-    /// of `settings`. Returns `None` if cancelled.
+    /// of `settings`.
     ///
     /// # Errors
-    /// If the folds cannot be filled, or the settings are invalid.
+    /// If the folds cannot be filled, the settings are invalid, or the job is cancelled.
     pub fn run(
         &self,
         settings: &RunSettings,
         set: &Dataset,
         repeat: usize,
-        is_cancelled: impl Fn() -> bool,
-    ) -> Result<Option<CrossValidated>, RunError> {
-        self.run_with_tested(settings, (set, set), repeat, is_cancelled)
+        job: &Job<'_>,
+    ) -> Result<CrossValidated, RunError> {
+        self.run_with_tested(settings, (set, set), repeat, job)
     }
 
     /// As [`Self::run`], on folds of `set`, tested on the same samples of `tested`, whose readings may have other
@@ -87,27 +89,21 @@ impl CrossValidation {
         settings: &RunSettings,
         (set, tested): (&Dataset, &Dataset),
         repeat: usize,
-        is_cancelled: impl Fn() -> bool,
-    ) -> Result<Option<CrossValidated>, RunError> {
+        job: &Job<'_>,
+    ) -> Result<CrossValidated, RunError> {
         let seed = nth_seed(settings.seed, repeat);
-        let folds = Folds::deal(set, self.folds, self.unit, &mut seed.rng(Stream::Split))?;
-        CrossValidated::of_sets(&RunSettings { seed, ..*settings }, (set, tested), folds, is_cancelled)
+        let folds = Folds::by(set, self.folds, self.by, &mut seed.rng(Stream::Split))?;
+        CrossValidated::of_sets(&RunSettings { seed, ..*settings }, (set, tested), folds, job)
     }
 }
 
 impl CrossValidated {
-    /// Cross-validates on `folds` of `set`; each fold has its own seed, derived from that of `settings`. Returns `None`
-    /// if cancelled.
+    /// Cross-validates on `folds` of `set`; each fold has its own seed, derived from that of `settings`.
     ///
     /// # Errors
-    /// If the settings are invalid.
-    pub fn on_folds(
-        settings: &RunSettings,
-        set: &Dataset,
-        folds: Folds,
-        is_cancelled: impl Fn() -> bool,
-    ) -> Result<Option<Self>, RunError> {
-        Self::of_sets(settings, (set, set), folds, is_cancelled)
+    /// If the settings are invalid, or the job is cancelled.
+    pub fn on_folds(settings: &RunSettings, set: &Dataset, folds: Folds, job: &Job<'_>) -> Result<Self, RunError> {
+        Self::of_sets(settings, (set, set), folds, job)
     }
 
     /// Trains on folds of `set` and tests on the same samples of `tested`.
@@ -115,8 +111,8 @@ impl CrossValidated {
         settings: &RunSettings,
         (set, tested): (&Dataset, &Dataset),
         folds: Folds,
-        is_cancelled: impl Fn() -> bool,
-    ) -> Result<Option<Self>, RunError> {
+        job: &Job<'_>,
+    ) -> Result<Self, RunError> {
         let is_measured = settings.source.simulation().is_none();
         let holds_out = !is_measured || settings.training.method.needs_validation();
         let mut effort = Effort::default();
@@ -124,7 +120,7 @@ impl CrossValidated {
         let (mut network, mut mean, mut linear) = (empty(), empty(), empty());
         for fold in 0..folds.count() {
             let (samples, test) = (folds.test(fold), tested.select(folds.test(fold)));
-            let split = split(set, &folds, fold, holds_out);
+            let split = folds.divided(fold, holds_out).split(set);
             let (mut of_mean, mut of_linear) = fit_baselines(&split.training, settings)?;
             let answers_of_mean = decode_set(&mut of_mean, &test)?;
             scatter(&mut mean, samples, &answers_of_mean);
@@ -133,7 +129,7 @@ impl CrossValidated {
                 seed: nth_seed(settings.seed, fold),
                 ..*settings
             };
-            let mut run = match Run::of_networks_on_sets(settings, split, test) {
+            let mut run = match Run::new(settings, RunSets::new(split, test), Begin::Initialize, job) {
                 // Every target is constant without this fold: the constant is the answer.
                 Err(RunError::Training(TrainingError::NothingVaries)) if set.has_varying_target() => {
                     scatter(&mut network, samples, &answers_of_mean);
@@ -141,19 +137,16 @@ impl CrossValidated {
                 }
                 run => run?,
             };
-            let Some(of_fold) = Effort::train(&mut run, &is_cancelled) else {
-                return Ok(None);
-            };
+            effort.add(Effort::train(&mut run, job)?);
             scatter(&mut network, samples, &run.decouple_test());
-            effort.add(of_fold);
         }
-        Ok(Some(Self {
+        Ok(Self {
             folds,
             network,
             mean,
             linear,
             effort,
-        }))
+        })
     }
 
     /// Returns the errors of each target over all samples of `set`, the set that was cross-validated.
@@ -186,13 +179,11 @@ impl Default for Effort {
 }
 
 impl Effort {
-    /// Trains `run` to its end; returns `None` if cancelled.
-    pub(super) fn train(run: &mut Run, is_cancelled: impl Fn() -> bool) -> Option<Self> {
+    /// Trains `run` to its end, unless the job is cancelled.
+    pub(super) fn train(run: &mut Run, job: &Job<'_>) -> Result<Self, Cancelled> {
         let mut effort = Self::default();
         while run.stop_reason().is_none() {
-            if is_cancelled() {
-                return None;
-            }
+            job.check()?;
             let at_work = run.trainers().iter().filter(|trainer| trainer.stop_reason().is_none());
             let at_work = at_work.count() as f64;
             let begun = Instant::now();
@@ -203,29 +194,13 @@ impl Effort {
             effort.epochs += trainer.latest().epoch;
             effort.seconds += trainer.elapsed().as_secs_f64();
         }
-        Some(effort)
+        Ok(effort)
     }
 
     fn add(&mut self, other: Self) {
         self.epochs += other.epochs;
         self.seconds += other.seconds;
         self.min_epoch_seconds = self.min_epoch_seconds.min(other.min_epoch_seconds);
-    }
-}
-
-/// Returns the training and validation sets for test fold `fold`: the fold after it is the validation set, if one is
-/// held out.
-fn split(set: &Dataset, folds: &Folds, fold: usize, holds_out: bool) -> Split {
-    let chooses = (fold + 1) % folds.count();
-    if folds.count() < 3 || !holds_out {
-        return Split {
-            training: set.select(&folds.without(&[fold])),
-            validation: None,
-        };
-    }
-    Split {
-        training: set.select(&folds.without(&[fold, chooses])),
-        validation: Some(set.select(folds.test(chooses))),
     }
 }
 

@@ -3,7 +3,7 @@ use std::time::Instant;
 use ndarray::Array2;
 
 use super::{
-    MissingFigures, Remark, RunError, RunSettings, SimulatedSettings, Source, TestErrors, baselines::fit_baselines,
+    MissingFigures, Remark, RunError, RunSettings, Source, TestErrors, baselines::fit_baselines,
     preparation::unseen_noise, table::frame_us,
 };
 use crate::{
@@ -61,17 +61,8 @@ pub struct DecoderSet {
 }
 
 impl DecoderSet {
-    /// Draws the training set of `settings`. `networks` must have been trained with these settings.
-    ///
-    /// # Errors
-    /// If the settings are invalid.
-    pub fn new(settings: &SimulatedSettings, networks: Option<Networks>) -> Result<Self, RunError> {
-        let training = settings.draw()?.0.training;
-        Ok(Self::on_set((*settings).into(), training, networks))
-    }
-
-    /// Uses an existing training set instead of drawing one; see [`Self::new`].
-    pub fn on_set(settings: RunSettings, training: Dataset, networks: Option<Networks>) -> Self {
+    /// Returns decoders fitted to `training`. `networks` must have been trained on it with these settings.
+    pub fn new(settings: RunSettings, training: Dataset, networks: Option<Networks>) -> Self {
         Self {
             settings,
             training,

@@ -1,8 +1,7 @@
 use faer::Mat;
 use ndarray::{Array2, ArrayView2};
 
-use super::ridge_path::RidgePath;
-use crate::{dataset::Folds, network::Mlp};
+use crate::{dataset::Folds, decoupling::ridge, network::Mlp};
 
 /// Weights of hidden nodes in the linear range of tanh that make a network answer like ridge regression.
 ///
@@ -34,7 +33,7 @@ impl LinearStart {
         if samples < 2 * BLOCKS || inputs.ncols() == 0 {
             return None;
         }
-        let map = RidgePath::new(inputs, targets, &Folds::consecutive(samples, BLOCKS))?.coefficients()?;
+        let map = ridge(inputs, targets, &Folds::consecutive(samples, BLOCKS)).ok()?.map;
         let (n, m) = (inputs.ncols(), targets.ncols());
         let mean: Vec<f64> = inputs
             .columns()

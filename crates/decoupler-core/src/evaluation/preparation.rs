@@ -4,187 +4,65 @@ use rand::Rng;
 use rayon::prelude::*;
 
 use super::{
-    Baselines, Errors, Initialization, NoReference, Run, RunError, RunSets, RunSettings, SimulatedSettings, Simulation,
-    Source, StartTrainer, TestErrors, baselines::fit_baselines, linear_start::LinearStart, reference_errors,
-    run_sets::check_sets,
+    Baselines, Initialization, Run, RunError, RunSets, RunSettings, SimulatedSettings, Simulation, Source,
+    StartTrainer, linear_start::LinearStart, run_sets::check_sets,
 };
 use crate::{
-    dataset::{Dataset, PerRow, Split, Stream},
-    decoupling::decode_set,
+    dataset::{Dataset, PerRow, Split},
+    job::Job,
     machine::MemoryBudget,
     network::{Inputs, MinMax, Mlp, Shape, nguyen_widrow},
     scene::{NoiseSource, NoisySets, RowModel},
     training::{Examples, Problem, ResumeError, Trainer, TrainerState, check_width},
 };
 
+/// Weights with which the trainings of a run begin.
+#[derive(Clone, Debug, Default)]
+pub enum Begin {
+    /// Those of the [`Initialization`] of the settings.
+    #[default]
+    Initialize,
+    /// Those of saved trainings, start by start and in each row by row: [`Run::states`].
+    Resume(Vec<TrainerState>),
+}
+
 impl Run {
-    /// Draws and scales the sets, initialises the networks and measures the baselines, without a limit of memory.
+    /// Draws the sets of a simulated array, measures the baselines, and initialises the networks, without a limit of
+    /// memory.
     ///
     /// # Errors
     /// If the settings are invalid.
     pub fn prepare(settings: SimulatedSettings) -> Result<Self, RunError> {
-        whole(Self::prepare_unless(settings, MemoryBudget::UNLIMITED, &|| false))
+        let sets = RunSets::draw(&settings, MemoryBudget::UNLIMITED, &Job::UNINTERRUPTED)?;
+        Self::with_baselines(settings.into(), sets, Begin::Initialize, &Job::UNINTERRUPTED)
     }
 
-    /// As [`Self::prepare`], if the run fits into `memory`; returns `None` once `is_cancelled`, which is called between the
-    /// parts of the work.
-    pub fn prepare_unless(
-        settings: SimulatedSettings,
-        memory: MemoryBudget,
-        is_cancelled: &dyn Fn() -> bool,
-    ) -> Result<Option<Self>, RunError> {
-        match settings.checked_sets_unless(memory, is_cancelled)? {
-            Some(sets) => Self::on_unless(settings.into(), sets, is_cancelled),
-            None => Ok(None),
-        }
-    }
-
-    /// Prepares a run on existing sets, recorded or from a cross-validation; see [`Self::prepare`].
+    /// As [`Self::new`], and measures the baselines.
     ///
     /// # Errors
-    /// If the settings are invalid, or the sets do not belong together.
-    pub fn on_sets(settings: RunSettings, split: Split, test: Dataset) -> Result<Self, RunError> {
-        whole(Self::on_unless(settings, RunSets::new(split, test), &|| false))
-    }
-
-    /// As [`Self::on_sets`]; returns `None` once `is_cancelled`, which is called between the parts of the work.
-    pub fn on_unless(
-        settings: RunSettings,
-        sets: RunSets,
-        is_cancelled: &dyn Fn() -> bool,
-    ) -> Result<Option<Self>, RunError> {
-        Self::with_baselines(settings, sets, is_cancelled, |tasks| begin(settings, tasks))
-    }
-
-    /// Resumes a run of these settings from the states of all its trainings.
-    ///
-    /// # Errors
-    /// If the settings are invalid, or the states are damaged or from another run.
-    pub fn resume(settings: SimulatedSettings, states: Vec<TrainerState>) -> Result<Self, RunError> {
-        settings.check_states(&states)?;
-        let sets = settings.sets_unless(&|| false)?.expect("nothing cancels it");
-        whole(Self::resume_unless(settings.into(), states, sets, &|| false))
-    }
-
-    /// Resumes a run on the sets it was started on; see [`Self::resume`].
-    ///
-    /// # Errors
-    /// As [`Self::on_sets`], or if the states are damaged or do not match these settings and sets.
-    pub fn resume_on_sets(
-        settings: RunSettings,
-        states: Vec<TrainerState>,
-        split: Split,
-        test: Dataset,
-    ) -> Result<Self, RunError> {
-        whole(Self::resume_unless(
-            settings,
-            states,
-            RunSets::new(split, test),
-            &|| false,
-        ))
-    }
-
-    /// As [`Self::resume_on_sets`]; returns `None` once `is_cancelled`, which is called between the parts of the work.
-    pub fn resume_unless(
-        settings: RunSettings,
-        states: Vec<TrainerState>,
-        sets: RunSets,
-        is_cancelled: &dyn Fn() -> bool,
-    ) -> Result<Option<Self>, RunError> {
-        let resumed = Self::with_baselines(settings, sets, is_cancelled, |tasks| resume(settings, states, tasks))?;
-        Ok(resumed.map(|mut run| {
-            // The total wall time of parallel trainings is not known.
-            run.wall_time = match &run.starts[..] {
-                [only] if only.rows().len() == 1 => Some(only.elapsed()),
-                _ => None,
-            };
-            run
-        }))
-    }
-
-    /// Prepares a run with the trainings of `begin`; `None` once `is_cancelled`.
-    fn with_baselines(
-        settings: RunSettings,
-        sets: RunSets,
-        is_cancelled: &dyn Fn() -> bool,
-        begin: impl FnOnce(&[Task]) -> Result<Vec<StartTrainer>, RunError>,
-    ) -> Result<Option<Self>, RunError> {
-        let [mean, linear] = mean_and_linear(&settings, &sets)?;
-        if is_cancelled() {
-            return Ok(None);
-        }
-        let reference = match settings.simulated() {
-            Some(simulated) => Some(reference(&simulated, &sets.test)?),
-            None => None,
-        };
-        let (reference, no_reference) = match reference {
-            Some(Ok(errors)) => (Some(TestErrors::Nodes(errors)), None),
-            Some(Err(reason)) => (None, Some(reason)),
-            None => (None, None),
-        };
-        let baselines = Baselines {
-            mean,
-            linear,
-            reference,
-            no_reference,
-        };
-        if is_cancelled() {
-            return Ok(None);
-        }
-        let run = Self::of_networks(settings, sets, is_cancelled, begin)?;
-        Ok(run.map(|run| Self {
+    /// As [`Self::new`], or if a baseline cannot be fitted.
+    pub fn with_baselines(settings: RunSettings, sets: RunSets, begin: Begin, job: &Job<'_>) -> Result<Self, RunError> {
+        let baselines = Baselines::measure(&settings, &sets, job)?;
+        let run = Self::new(settings, sets, begin, job)?;
+        Ok(Self {
             baselines: Some(baselines),
             ..run
-        }))
+        })
     }
 
-    /// Prepares a run without the Bayesian reference, and measures the training mean and the linear baseline. Returns
-    /// `None` once `is_cancelled`.
-    pub(super) fn without_reference(
-        settings: RunSettings,
-        sets: RunSets,
-        is_cancelled: &dyn Fn() -> bool,
-    ) -> Result<Option<(Self, [TestErrors; 2])>, RunError> {
-        let measured = mean_and_linear(&settings, &sets)?;
-        if is_cancelled() {
-            return Ok(None);
-        }
-        let run = Self::of_networks(settings, sets, is_cancelled, |tasks| begin(settings, tasks))?;
-        Ok(run.map(|run| (run, measured)))
-    }
-
-    /// Prepares a run of networks only, without baselines and reference, such as the run of a fold.
-    pub(super) fn of_networks_on_sets(settings: RunSettings, split: Split, test: Dataset) -> Result<Self, RunError> {
-        settings.check_network()?;
-        check_sets(&settings, &split, &test)?;
-        let sets = RunSets::new(split, test);
-        whole(Self::of_networks(settings, sets, &|| false, |tasks| {
-            begin(settings, tasks)
-        }))
-    }
-
-    /// Prepares a run without a test set, baselines and reference, for programs that need only its networks. Their
-    /// training is bit-identical to that of [`Self::on_sets`].
+    /// Scales the sets and begins the trainings.
     ///
     /// # Errors
-    /// As [`Self::on_sets`].
-    pub fn on_split(settings: RunSettings, split: Split) -> Result<Self, RunError> {
-        let none = split.training.select(&[]);
-        Self::of_networks_on_sets(settings, split, none)
-    }
-
-    /// As [`Self::with_baselines`], without baselines and reference, for settings and sets that were checked.
-    fn of_networks(
-        settings: RunSettings,
-        RunSets {
+    /// If the settings are invalid, the sets do not belong together, saved trainings are damaged or do not match settings
+    /// and sets, the networks are too wide for the memory of the sets, or the job is cancelled.
+    pub fn new(settings: RunSettings, sets: RunSets, begin: Begin, job: &Job<'_>) -> Result<Self, RunError> {
+        check_sets(&settings, &sets)?;
+        let RunSets {
             split,
             test,
             problem,
             memory,
-        }: RunSets,
-        is_cancelled: &dyn Fn() -> bool,
-        begin: impl FnOnce(&[Task]) -> Result<Vec<StartTrainer>, RunError>,
-    ) -> Result<Option<Self>, RunError> {
+        } = sets;
         let tasks = tasks(&settings, &split, &test)?;
         // The tasks hold the scaled samples; large sets need not be held twice.
         drop(split);
@@ -192,13 +70,19 @@ impl Run {
         let samples = first.problem.training.samples();
         let trainings = settings.starts * tasks.values().len();
         check_width(&settings.training.method, first.shape, samples, trainings, memory)?;
-        if is_cancelled() {
-            return Ok(None);
-        }
+        job.check()?;
         let begun = Instant::now();
-        let starts = begin(tasks.values())?;
-        let wall_time = Some(begun.elapsed());
-        Ok(Some(Self {
+        let (starts, is_resumed) = match begin {
+            Begin::Initialize => (initialize(settings, tasks.values())?, false),
+            Begin::Resume(states) => (resume(settings, states, tasks.values())?, true),
+        };
+        let wall_time = match &starts[..] {
+            _ if !is_resumed => Some(begun.elapsed()),
+            [only] if only.rows().len() == 1 => Some(only.elapsed()),
+            // The total wall time of parallel trainings is not known.
+            _ => None,
+        };
+        Ok(Self {
             wall_time,
             settings,
             test,
@@ -208,29 +92,12 @@ impl Run {
             starts,
             baselines: None,
             intervals: None,
-        }))
+        })
     }
 }
 
-/// Checks settings and sets, and returns the errors of the training mean and of the linear baseline on the test set.
-fn mean_and_linear(settings: &RunSettings, RunSets { split, test, .. }: &RunSets) -> Result<[TestErrors; 2], RunError> {
-    settings.check_network()?;
-    check_sets(settings, split, test)?;
-    let (mut mean, mut linear) = fit_baselines(&split.training, settings)?;
-    let errors = |answers| TestErrors::measure(&settings.source, test, &answers);
-    Ok([
-        errors(decode_set(&mut mean, test)?),
-        errors(decode_set(&mut linear, test)?),
-    ])
-}
-
-/// Returns the run of a preparation that cannot be cancelled.
-fn whole(prepared: Result<Option<Run>, RunError>) -> Result<Run, RunError> {
-    Ok(prepared?.expect("nothing cancels it"))
-}
-
 /// Begins trainings from random initialisations.
-fn begin(settings: RunSettings, tasks: &[Task]) -> Result<Vec<StartTrainer>, RunError> {
+fn initialize(settings: RunSettings, tasks: &[Task]) -> Result<Vec<StartTrainer>, RunError> {
     let starts = (0..settings.starts).into_par_iter().map(|number| {
         let mut rng = settings.seed.start_rng(number);
         let begun: Vec<_> = tasks.iter().map(|task| (task, task.start(&mut rng))).collect();
@@ -276,13 +143,6 @@ fn check_states(states: &[TrainerState], expected: usize) -> Result<(), RunError
     } else {
         Err(RunError::Starts { found, expected })
     }
-}
-
-/// Returns the errors of the Bayesian reference on `test`, or the reason why there are none.
-pub(super) fn reference(settings: &SimulatedSettings, test: &Dataset) -> Result<Result<Errors, NoReference>, RunError> {
-    let SimulatedSettings { source, seed, .. } = settings;
-    let mut rng = seed.rng(Stream::Expectation);
-    Ok(reference_errors(&source.sensor, &source.scene, test, &mut rng)?)
 }
 
 /// Training problem of one network, for one row-wire or for all.
@@ -389,12 +249,16 @@ mod tests {
     use crate::{evaluation::SimulatedSettings, network::InputChoice, scene::Noise};
 
     /// Returns a run of few samples, cancelled at poll number `poll` of the token, from 0, and the number of polls.
-    fn cancelled_at(poll: usize, prepare: &dyn Fn(&dyn Fn() -> bool) -> Option<Run>) -> (Option<Run>, usize) {
+    fn cancelled_at(poll: usize, prepare: &dyn Fn(&Job<'_>) -> Result<Run, RunError>) -> (Option<Run>, usize) {
         let polls = Cell::new(0);
-        let run = prepare(&|| {
+        let is_cancelled = || {
             polls.set(polls.get() + 1);
             polls.get() > poll
-        });
+        };
+        let run = match prepare(&Job::new(&is_cancelled)) {
+            Err(RunError::Cancelled(_)) => None,
+            run => Some(run.unwrap()),
+        };
         (run, polls.get())
     }
 
@@ -407,13 +271,26 @@ mod tests {
         (settings.source.samples, settings.source.validation_samples) = (1028, 4);
         for inputs in [InputChoice::PAPER, InputChoice::BEST] {
             settings.inputs = inputs;
-            let (split, test) = settings.draw().unwrap();
+            let drawn = RunSets::draw(&settings, MemoryBudget::UNLIMITED, &Job::UNINTERRUPTED).unwrap();
+            let (split, test) = (drawn.split, Dataset::clone(&drawn.test));
             let split_of_one = Split {
                 training: split.training.select(&Vec::from_iter(0..1025)),
                 validation: split.validation,
             };
-            let mut with_test = Run::on_sets(settings.into(), split_of_one.clone(), test).unwrap();
-            let mut without = Run::on_split(settings.into(), split_of_one).unwrap();
+            let mut with_test = Run::with_baselines(
+                settings.into(),
+                RunSets::new(split_of_one.clone(), test),
+                Begin::Initialize,
+                &Job::UNINTERRUPTED,
+            )
+            .unwrap();
+            let mut without = Run::new(
+                settings.into(),
+                RunSets::without_test(split_of_one),
+                Begin::Initialize,
+                &Job::UNINTERRUPTED,
+            )
+            .unwrap();
             while with_test.step().is_none() {}
             while without.step().is_none() {}
             assert_eq!(with_test.network(), without.network());
@@ -425,7 +302,7 @@ mod tests {
     fn blocks_are_scaled_like_all_samples_at_once() {
         let mut settings = SimulatedSettings::default();
         settings.source.samples = 1030;
-        let (split, _) = settings.draw().unwrap();
+        let RunSets { split, .. } = RunSets::draw(&settings, MemoryBudget::UNLIMITED, &Job::UNINTERRUPTED).unwrap();
         for choice in [InputChoice::PAPER, InputChoice::BEST] {
             let whole = Inputs::fit(choice, split.training.readings(), NoiseSource::default()).unwrap();
             let all = whole.of(split.training.readings());
@@ -444,19 +321,16 @@ mod tests {
         (settings.hidden, settings.source.samples, settings.source.test_samples) = (3, 40, 8);
         let whole = Run::prepare(settings).unwrap();
         let (states, answers_mm) = (whole.states(), whole.decouple_test());
-        let begun = |is_cancelled: &dyn Fn() -> bool| {
-            Run::prepare_unless(settings, MemoryBudget::UNLIMITED, is_cancelled).unwrap()
-        };
-        let resumed = |is_cancelled: &dyn Fn() -> bool| {
-            let sets = settings.sets_unless(is_cancelled).unwrap()?;
-            Run::resume_unless(settings.into(), states.clone(), sets, is_cancelled).unwrap()
-        };
-        for prepare in [&begun as &dyn Fn(&dyn Fn() -> bool) -> Option<Run>, &resumed] {
-            let (run, parts) = cancelled_at(usize::MAX, prepare);
+        for begin in [Begin::Initialize, Begin::Resume(states)] {
+            let prepare = |job: &Job<'_>| {
+                let sets = RunSets::draw(&settings, MemoryBudget::UNLIMITED, job)?;
+                Run::with_baselines(settings.into(), sets, begin.clone(), job)
+            };
+            let (run, parts) = cancelled_at(usize::MAX, &prepare);
             assert_eq!(run.map(|run| run.decouple_test()).as_ref(), Some(&answers_mm));
             assert!(parts >= 4, "polled only {parts} times");
             for part in 0..parts {
-                let (run, polls) = cancelled_at(part, prepare);
+                let (run, polls) = cancelled_at(part, &prepare);
                 assert!(run.is_none() && polls == part + 1, "part {part}: {polls} polls");
             }
         }
@@ -472,7 +346,8 @@ mod tests {
             sets: NoisySets::Test,
             ..noise
         };
-        let (split, test) = settings.draw().unwrap();
+        let RunSets { split, test, .. } =
+            RunSets::draw(&settings, MemoryBudget::UNLIMITED, &Job::UNINTERRUPTED).unwrap();
         let task = Task::new(&settings.into(), &split.training, None, &test).unwrap();
         task.scaling.0
     }

@@ -11,6 +11,7 @@ use crate::{
     calibration::{PressLimits, PressedRow},
     dataset::{Dataset, PerRow, Split},
     decoupling::{DecodeError, Decoder},
+    job::Job,
     machine::{MemoryBudget, node_pairs_per_row},
     network::{DecouplingNetwork, Networks},
     scene::Touch,
@@ -235,19 +236,19 @@ pub fn press_limits(simulation: &Simulation) -> PressLimits {
 }
 
 /// Continues the training of `networks` on other samples, such as frames of the real sensor after training on its
-/// calibrated model; returns `None` if cancelled. Scalings do not change. The weights with the lowest validation error
+/// calibrated model. Scalings do not change. The weights with the lowest validation error
 /// are returned, possibly the initial ones: with a validation set, fine-tuning cannot increase the validation error.
 ///
 /// # Errors
 /// If the samples do not have the channels, targets or rows of the networks, a setting is out of range, or the
-/// networks are too wide for `memory`.
+/// networks are too wide for `memory`, or the job is cancelled.
 pub fn fine_tune(
     networks: &Networks,
     split: &Split,
     training: TrainingSettings,
     memory: MemoryBudget,
-    is_cancelled: &dyn Fn() -> bool,
-) -> Result<Option<Networks>, RunError> {
+    job: &Job<'_>,
+) -> Result<Networks, RunError> {
     check_networks(networks, split)?;
     let mut tuned = Vec::with_capacity(networks.values().len());
     for (index, network) in networks.values().iter().enumerate() {
@@ -269,9 +270,7 @@ pub fn fine_tune(
         check_width(&training.method, shape, samples, 1, memory)?;
         let mut trainer = Trainer::new(network.mlp().clone(), problem, training)?;
         while trainer.step().is_none() {
-            if is_cancelled() {
-                return Ok(None);
-            }
+            job.check()?;
         }
         tuned.push(DecouplingNetwork::new(
             network.inputs().clone(),
@@ -279,7 +278,7 @@ pub fn fine_tune(
             network.outputs().clone(),
         ));
     }
-    Ok(Some(PerRow::each(tuned)))
+    Ok(PerRow::each(tuned))
 }
 
 #[cfg(test)]

@@ -13,8 +13,9 @@ use super::{
     TestErrors, starts::lowest,
 };
 use crate::{
-    dataset::{Dataset, DivisionError, FoldsError, PerRow, SimulationError, SplitBy},
+    dataset::{Dataset, DivisionError, PerRow, SimulationError, SplitBy},
     decoupling::{DecodeError, FitError},
+    job::{Cancelled, Job},
     machine::MemoryBudget,
     network::{DecouplingNetwork, Inputs, MinMax, Mlp, Networks, ScalingError},
     scene::SceneError,
@@ -69,6 +70,18 @@ impl Run {
         }
         self.wall_time = self.wall_time.map(|time| time.saturating_add(begun.elapsed()));
         self.stop_reason()
+    }
+
+    /// Trains to the end.
+    ///
+    /// # Errors
+    /// If the job is cancelled, which is checked before every epoch; the run can then be continued.
+    pub fn finish(&mut self, job: &Job<'_>) -> Result<(), Cancelled> {
+        while self.stop_reason().is_none() {
+            job.check()?;
+            self.step();
+        }
+        Ok(())
     }
 
     /// Wall time of all starts together, without pauses; `None` if the run was resumed and the time before is not
@@ -172,7 +185,7 @@ impl Run {
         self.starts.par_iter().map(record).collect()
     }
 
-    /// Returns the states of all trainings for [`Self::resume`]: start by start, and in each row by row.
+    /// Returns the states of all trainings for [`Begin::Resume`](super::Begin::Resume): start by start, and in each row by row.
     pub fn states(&self) -> Vec<TrainerState> {
         self.starts.iter().flat_map(StartTrainer::states).collect()
     }
@@ -346,9 +359,6 @@ pub enum RunError {
     /// A decoder cannot be fitted.
     #[error(transparent)]
     Fit(#[from] FitError),
-    /// Folds cannot be filled.
-    #[error(transparent)]
-    Folds(#[from] FoldsError),
     /// Samples cannot be divided.
     #[error(transparent)]
     Division(#[from] DivisionError),
@@ -406,6 +416,9 @@ pub enum RunError {
         /// Memory that it may use.
         memory: MemoryBudget,
     },
+    /// The caller cancelled the work.
+    #[error(transparent)]
+    Cancelled(#[from] Cancelled),
     /// A saved training cannot be resumed.
     #[error("start {}: {source}", .start + 1)]
     Resume {

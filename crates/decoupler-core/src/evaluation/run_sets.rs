@@ -2,10 +2,11 @@ use std::sync::Arc;
 
 use super::{Problem, RunError, RunSettings, SimulatedSettings, Simulation, Source, Workload};
 use crate::{
-    dataset::{Dataset, LARGEST_SAMPLES, Split, Stream, hold_out},
+    dataset::{Dataset, LARGEST_SAMPLES, Seed, Split, SplitBy, Stream},
+    job::Job,
     machine::MemoryBudget,
     network::Networks,
-    scene::RowModel,
+    scene::{Noise, RowModel},
     training::TrainingError,
 };
 
@@ -23,6 +24,52 @@ pub struct RunSets {
 }
 
 impl RunSets {
+    /// Draws the sets of a simulated array, after a check that samples and trainings fit into `memory`.
+    ///
+    /// # Errors
+    /// If the settings are invalid, the run does not fit into memory, or the job is cancelled.
+    pub fn draw(settings: &SimulatedSettings, memory: MemoryBudget, job: &Job<'_>) -> Result<Self, RunError> {
+        settings.check_counts()?;
+        settings.training.check().map_err(TrainingError::from)?;
+        Workload::of(settings)?.check_memory(memory)?;
+        let (source, seed) = (&settings.source, settings.seed);
+        let rows = source.model_size()?.rows;
+        let held_out = source.validation_samples.div_ceil(rows);
+        let total = (source.samples.div_ceil(rows) + held_out) * rows;
+        if total > LARGEST_SAMPLES {
+            return Err(RunError::TooManySamples {
+                training: source.samples,
+                validation: source.validation_samples,
+                rows,
+                total,
+                max: LARGEST_SAMPLES,
+            });
+        }
+        let test = source.draw_test(seed)?;
+        job.check()?;
+        let drawn = source.draw_training(total, seed)?;
+        job.check()?;
+        // Whole snapshots, so that no validation sample was read at the same moment as a training sample.
+        let held_out = SplitBy::Group.hold_out(&drawn, held_out, &mut seed.rng(Stream::Split));
+        let split = if held_out.validation.is_empty() {
+            // Large sets need not be copied.
+            Split {
+                training: drawn,
+                validation: None,
+            }
+        } else {
+            held_out.split(&drawn)
+        };
+        Ok(Self::new(split, test).described(source.problem()).limited_to(memory))
+    }
+
+    /// Returns sets without test samples, for programs that need only the networks. Their training is bit-identical to
+    /// that with a test set.
+    pub fn without_test(split: Split) -> Self {
+        let none = split.training.select(&[]);
+        Self::new(split, none)
+    }
+
     /// Returns the sets of a run whose samples are all in memory, without a limit of memory for its trainings.
     pub fn new(split: Split, test: Dataset) -> Self {
         Self {
@@ -49,47 +96,15 @@ impl RunSets {
     }
 }
 
-impl SimulatedSettings {
-    /// Draws the sets of these settings, without a limit of memory.
-    ///
-    /// # Errors
-    /// If the settings are invalid.
-    pub fn draw_sets(&self) -> Result<RunSets, RunError> {
-        Ok(self.sets_unless(&|| false)?.expect("nothing cancels it"))
-    }
-
-    /// Draws the sets of these settings, after a check that samples and trainings fit into `memory`; returns `None` once
-    /// `is_cancelled`, which is called between the parts of the work.
-    ///
-    /// # Errors
-    /// If the settings are invalid, or the run does not fit into memory.
-    pub fn checked_sets_unless(
-        &self,
-        memory: MemoryBudget,
-        is_cancelled: &dyn Fn() -> bool,
-    ) -> Result<Option<RunSets>, RunError> {
-        Workload::of(self)?.check_memory(memory)?;
-        Ok(self.sets_unless(is_cancelled)?.map(|sets| sets.limited_to(memory)))
-    }
-
-    /// Draws the sets of these settings; returns `None` once `is_cancelled`, which is called between the parts of the
-    /// work.
-    ///
-    /// # Errors
-    /// If the settings are invalid.
-    pub(crate) fn sets_unless(&self, is_cancelled: &dyn Fn() -> bool) -> Result<Option<RunSets>, RunError> {
-        let sets = self.draw_unless(is_cancelled)?;
-        Ok(sets.map(|(split, test)| RunSets::new(split, test).described(self.source.problem())))
-    }
-}
-
-/// Checks that the sets of a run match each other and its settings.
-pub(super) fn check_sets(settings: &RunSettings, split: &Split, test: &Dataset) -> Result<(), RunError> {
+/// Checks the settings of the networks, and that the sets of a run match each other and these settings.
+pub(super) fn check_sets(settings: &RunSettings, sets: &RunSets) -> Result<(), RunError> {
+    settings.check_network()?;
+    let RunSets { split, test, .. } = sets;
     let training = &split.training;
     if matches!(settings.source, Source::Simulated(_)) && training.row_wires_read().is_none() {
         return Err(RunError::NoRowWires);
     }
-    let sets = [("validation", split.validation.as_ref()), ("test", Some(test))];
+    let sets = [("validation", split.validation.as_ref()), ("test", Some(&**test))];
     let sets = sets.into_iter().filter_map(|(name, set)| Some((name, set?)));
     for (name, set) in sets.clone() {
         let sizes = [
@@ -165,88 +180,48 @@ fn describe_rows(set: &Dataset) -> String {
     }
 }
 
-impl SimulatedSettings {
-    /// Draws the training, validation and test sets of these settings.
-    ///
-    /// # Errors
-    /// If the settings are invalid.
-    pub fn draw(&self) -> Result<(Split, Dataset), RunError> {
-        Ok(self.draw_unless(&|| false)?.expect("nothing cancels it"))
-    }
-
-    fn draw_unless(&self, is_cancelled: &dyn Fn() -> bool) -> Result<Option<(Split, Dataset)>, RunError> {
-        self.check_counts()?;
-        self.training.check().map_err(TrainingError::from)?;
-        let Simulation {
-            samples: training,
-            validation_samples: validation,
-            ..
-        } = self.source;
-        let rows = self.source.model_size()?.rows;
-        let held_out = validation.div_ceil(rows);
-        let total = (training.div_ceil(rows) + held_out) * rows;
-        if total > LARGEST_SAMPLES {
-            return Err(RunError::TooManySamples {
-                training,
-                validation,
-                rows,
-                total,
-                max: LARGEST_SAMPLES,
-            });
-        }
-        let test = self.draw_test()?;
-        if is_cancelled() {
-            return Ok(None);
-        }
-        let drawn = self.draw_training(total)?;
-        if is_cancelled() {
-            return Ok(None);
-        }
-        let split = hold_out(drawn, held_out, &mut self.seed.rng(Stream::Split));
-        Ok(Some((split, test)))
-    }
-
+impl Simulation {
     /// Draws at least `samples` samples with the noise of the training set.
     ///
     /// # Errors
     /// If the sensor, scene, or number of samples is invalid.
-    pub(super) fn draw_training(&self, samples: usize) -> Result<Dataset, RunError> {
-        let Simulation { sensor, scene, .. } = &self.source;
-        sensor.check()?;
-        scene.check()?;
-        let mut set = Dataset::simulate(sensor, scene, samples, &mut self.seed.rng(Stream::Training))?;
-        set.disturb(
-            sensor,
-            &scene.noise.in_training(),
-            &mut self.seed.rng(Stream::TrainingNoise),
-        )?;
-        Ok(set)
+    pub(super) fn draw_training(&self, samples: usize, seed: Seed) -> Result<Dataset, RunError> {
+        let noise = (self.scene.noise.in_training(), Stream::TrainingNoise);
+        self.draw_with(noise, samples, Stream::Training, seed)
     }
 
     /// Draws the samples of `set`, which [`Self::draw_training`] drew, with the noise of the test set; `None` if the
     /// noise is the same.
-    pub(super) fn draw_tested_folds(&self, set: &Dataset) -> Result<Option<Dataset>, RunError> {
-        let Simulation { sensor, scene, .. } = &self.source;
-        let noise = scene.noise.in_test();
-        if noise == scene.noise.in_training() {
+    pub(super) fn draw_tested_folds(&self, set: &Dataset, seed: Seed) -> Result<Option<Dataset>, RunError> {
+        let noise = self.scene.noise.in_test();
+        if noise == self.scene.noise.in_training() {
             return Ok(None);
         }
-        let mut tested = Dataset::simulate(sensor, scene, set.samples(), &mut self.seed.rng(Stream::Training))?;
-        tested.disturb(sensor, &noise, &mut self.seed.rng(Stream::TestNoise))?;
-        Ok(Some(tested))
+        let drawn = self.draw_with((noise, Stream::TestNoise), set.samples(), Stream::Training, seed);
+        drawn.map(Some)
     }
 
-    /// Draws the test set of these settings, for display before anything is trained.
+    /// Draws the test set, also for display before anything is trained.
     ///
     /// # Errors
     /// If the sensor, scene, or number of samples is invalid.
-    pub fn draw_test(&self) -> Result<Dataset, RunError> {
-        let Simulation { sensor, scene, .. } = &self.source;
+    pub fn draw_test(&self, seed: Seed) -> Result<Dataset, RunError> {
+        let noise = (self.scene.noise.in_test(), Stream::TestNoise);
+        self.draw_with(noise, self.test_samples, Stream::Test, seed)
+    }
+
+    fn draw_with(
+        &self,
+        (noise, of_noise): (Noise, Stream),
+        samples: usize,
+        stream: Stream,
+        seed: Seed,
+    ) -> Result<Dataset, RunError> {
+        let Self { sensor, scene, .. } = self;
         sensor.check()?;
         scene.check()?;
-        let samples = self.source.test_samples;
-        let mut set = Dataset::simulate(sensor, scene, samples, &mut self.seed.rng(Stream::Test))?;
-        set.disturb(sensor, &scene.noise.in_test(), &mut self.seed.rng(Stream::TestNoise))?;
+        let mut set = Dataset::simulate(sensor, scene, samples, &mut seed.rng(stream))?;
+        set.disturb(sensor, &noise, &mut seed.rng(of_noise))?;
         Ok(set)
     }
 }

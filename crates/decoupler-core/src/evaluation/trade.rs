@@ -1,9 +1,12 @@
 use super::{
-    DecoderReport, DecoderSet, Errors, Preset, Run, RunError, RunSets, RunSettings, Simulation, preparation::reference,
+    Begin, DecoderReport, DecoderSet, Errors, Preset, Run, RunError, RunSets, RunSettings, SimulatedSettings,
+    Simulation, reference_errors,
 };
 use crate::{
+    dataset::Stream,
     decoupling::DecoderKind,
     identifiability::{Identifiability, IdentifiabilityError, IdentifiabilityWarning},
+    job::Job,
     scene::{RelativeNoise, Rows},
     training::Method,
 };
@@ -61,21 +64,24 @@ impl TradeOffPoint {
 /// Each point is passed to `on_point` as soon as it is measured, or the reason why a decoder cannot be used with these
 /// samples, together with the run that trained the networks of the decoder, if it needs any. Decoders that solve the
 /// equations of a sensor are left out if there is no model of it. Training uses all threads; decoding is timed on one
-/// thread. Returns `false` if cancelled before the end.
+/// thread.
 ///
 /// # Errors
-/// If the settings are invalid, or a network cannot be trained with them on these samples.
+/// If the settings are invalid, a network cannot be trained with them on these samples, or the job is cancelled.
 pub fn measure_trade_off(
     settings: &RunSettings,
     sets: &RunSets,
     hidden: &[usize],
     decoders: &[DecoderKind],
-    is_cancelled: impl Fn() -> bool,
+    job: &Job<'_>,
     mut on_point: impl FnMut(DecoderKind, Result<TradeOffPoint, RunError>, Option<&Run>),
-) -> Result<bool, RunError> {
-    let mut set = DecoderSet::on_set(*settings, sets.split.training.clone(), None);
+) -> Result<(), RunError> {
+    let mut set = DecoderSet::new(*settings, sets.split.training.clone(), None);
     let reference = match settings.simulated() {
-        Some(simulated) => reference(&simulated, &sets.test)?.ok(),
+        Some(SimulatedSettings { source, seed, .. }) => {
+            let mut rng = seed.rng(Stream::Expectation);
+            reference_errors(&source.sensor, &source.scene, &sets.test, &mut rng)?.ok()
+        }
         None => None,
     };
     let offered = decoders
@@ -91,9 +97,7 @@ pub fn measure_trade_off(
     };
     for kind in without {
         for &precision in kind.precisions() {
-            if is_cancelled() {
-                return Ok(false);
-            }
+            job.check()?;
             if let Some(measured) = set.measure(kind, precision, &sets.test).transpose() {
                 let of_report = |report: DecoderReport| {
                     let fit_seconds = report.cost.fit_seconds;
@@ -105,14 +109,8 @@ pub fn measure_trade_off(
     }
     for &hidden in hidden.iter().filter(|_| !with_network.is_empty()) {
         let settings = RunSettings { hidden, ..*settings };
-        let Some(mut run) = Run::on_unless(settings, sets.clone(), &is_cancelled)? else {
-            return Ok(false);
-        };
-        while run.step().is_none() {
-            if is_cancelled() {
-                return Ok(false);
-            }
-        }
+        let mut run = Run::new(settings, sets.clone(), Begin::Initialize, job)?;
+        run.finish(job)?;
         let training_seconds = run.trainers().iter().map(|start| start.elapsed().as_secs_f64()).sum();
         set.set_networks(Some(run.network()));
         for &kind in &with_network {
@@ -124,7 +122,7 @@ pub fn measure_trade_off(
             }
         }
     }
-    Ok(true)
+    Ok(())
 }
 
 /// Marks the points (cost, error) on the Pareto front: those for which no other point is better in one coordinate and

@@ -1,7 +1,6 @@
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-use super::left_out_decoder::Polished;
 use crate::{numerics::median, scene::NoiseSource};
 
 /// Estimates the unloaded state from recent frames, without erasing a sustained contact.
@@ -298,6 +297,50 @@ impl ZeroGains {
     }
 }
 
+/// Iterations of median polish: two or three are enough.
+const ROUNDS: usize = 6;
+
+/// Values decomposed into a common part, row parts and column parts.
+struct Polished {
+    common: f64,
+    of_rows: Vec<f64>,
+    of_columns: Vec<f64>,
+    /// Residuals: rows × columns.
+    rest: Vec<f64>,
+}
+
+impl Polished {
+    /// Decomposes values (rows × columns) by median polish.
+    fn new(values: &[f64], columns: usize) -> Self {
+        let rows = values.len() / columns;
+        let mut found = Self {
+            common: 0.0,
+            of_rows: vec![0.0; rows],
+            of_columns: vec![0.0; columns],
+            rest: values.to_vec(),
+        };
+        for _ in 0..ROUNDS {
+            for column in 0..columns {
+                let shift = median((0..rows).map(|row| found.rest[row * columns + column]).collect());
+                (0..rows).for_each(|row| found.rest[row * columns + column] -= shift);
+                found.of_columns[column] += shift;
+            }
+            for row in 0..rows {
+                let of_row = &mut found.rest[row * columns..(row + 1) * columns];
+                let shift = median(of_row.to_vec());
+                of_row.iter_mut().for_each(|e| *e -= shift);
+                found.of_rows[row] += shift;
+            }
+            for parts in [&mut found.of_columns, &mut found.of_rows] {
+                let shift = median(parts.clone());
+                parts.iter_mut().for_each(|part| *part -= shift);
+                found.common += shift;
+            }
+        }
+        found
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use glam::{DVec2, DVec3};
@@ -503,6 +546,27 @@ mod tests {
         assert!(
             error.to_string().starts_with("row 1, column 5: the reading is 3.0"),
             "{error}"
+        );
+    }
+
+    /// Row and column parts with median 0 are recovered even if fewer than half of the rows are corrupted.
+    #[test]
+    fn additive_parts_are_found_despite_outliers() {
+        let (rows, columns) = ([-2.0, 0.0, 1.0, 0.0, 3.0], [0.5, 0.0, -0.25]);
+        let value = |index: usize| 10.0 + rows[index / 3] + columns[index % 3] - if index == 4 { 7.0 } else { 0.0 };
+        let values: Vec<f64> = (0..15).map(value).collect();
+        let found = Polished::new(&values, 3);
+        assert_eq!(
+            (found.common, &found.of_rows[..], &found.of_columns[..]),
+            (10.0, &rows[..], &columns[..])
+        );
+        assert_eq!(found.rest[4], -7.0);
+        assert!(
+            found
+                .rest
+                .iter()
+                .enumerate()
+                .all(|(index, rest)| index == 4 || *rest == 0.0)
         );
     }
 }

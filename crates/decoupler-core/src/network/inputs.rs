@@ -1,6 +1,6 @@
 use std::{fmt, str::FromStr};
 
-use ndarray::{Array1, Array2, ArrayView1, ArrayView2};
+use ndarray::{Array2, ArrayView1, ArrayView2};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
@@ -129,34 +129,15 @@ impl Inputs {
         resistances_ohm: ArrayView2<'_, f64>,
         unseen: NoiseSource,
     ) -> Result<Self, ScalingError> {
-        Self::fit_components(choice, resistances_ohm, unseen, resistances_ohm.nrows() / 2)
-    }
-
-    /// Fits the scaling with all components above the rounding of the readings, for a fit that itself penalises noise
-    /// and weak components; see [`Self::fit`].
-    pub(crate) fn fit_all(choice: InputChoice, resistances_ohm: ArrayView2<'_, f64>) -> Result<Self, ScalingError> {
-        Self::fit_components(choice, resistances_ohm, NoiseSource::default(), usize::MAX)
-    }
-
-    fn fit_components(
-        choice: InputChoice,
-        resistances_ohm: ArrayView2<'_, f64>,
-        unseen: NoiseSource,
-        max_components: usize,
-    ) -> Result<Self, ScalingError> {
         let quantity = choice.quantity;
-        let invalid = resistances_ohm
-            .indexed_iter()
-            .find(|(_, value)| !quantity.accepts(**value));
-        if let Some(((sample, channel), &value)) = invalid {
-            return Err(ScalingError::Reading { sample, channel, value });
-        }
+        quantity.check(resistances_ohm)?;
         let values = quantity.of_all(resistances_ohm);
         let scaling = match choice.scaling {
             ScalingChoice::MinMax => InputScaling::MinMax(MinMax::fit(values.view())?),
             ScalingChoice::Whitening => {
                 let rounding = channel_rounding(quantity, resistances_ohm);
                 let unseen = channel_noise(quantity, resistances_ohm, unseen);
+                let max_components = resistances_ohm.nrows() / 2;
                 InputScaling::Whitening(Whitening::fit(values.view(), &rounding, &unseen, max_components)?)
             }
         };
@@ -201,27 +182,6 @@ impl Inputs {
             InputScaling::MinMax(scaling) => scaling.scale(values.view()),
             InputScaling::Whitening(scaling) => scaling.scale(values.view()),
         }
-    }
-
-    /// Returns the divisor that equalises the size of each input: the deviation of a whitened component, or 1 for a
-    /// channel scaled by its range.
-    pub(crate) fn deviations(&self) -> Vec<f64> {
-        match &self.scaling {
-            InputScaling::MinMax(_) => vec![1.0; self.count()],
-            InputScaling::Whitening(scaling) => scaling.deviations().to_vec(),
-        }
-    }
-
-    /// Returns the changes of the inputs (sources × inputs) caused by one standard deviation of each source of `noise`:
-    /// the error of each channel that has one, and the common error.
-    pub(crate) fn changes_of(&self, noise: &ChannelNoise) -> Array2<f64> {
-        let (_, matrix) = self.affine();
-        let own = noise.own.iter().enumerate().filter(|(_, deviation)| **deviation > 0.0);
-        let mut changes: Vec<Array1<f64>> = own.map(|(c, &deviation)| &matrix.column(c) * deviation).collect();
-        if noise.common.iter().any(|&deviation| deviation > 0.0) {
-            changes.push(matrix.dot(&Array1::from(noise.common.clone())));
-        }
-        Array2::from_shape_fn((changes.len(), self.count()), |(source, input)| changes[source][input])
     }
 
     /// Returns the centre and matrix (inputs × M4) of the scaling: inputs = matrix · (values − centre).

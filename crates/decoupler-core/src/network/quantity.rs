@@ -1,8 +1,10 @@
 use std::{fmt, str::FromStr};
 
-use ndarray::{ArrayView1, ArrayView2, CowArray, Ix2};
+use ndarray::{Array2, ArrayView1, ArrayView2, CowArray, Ix2};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
+
+use super::ScalingError;
 
 /// Quantity computed from a resistance R as the input of a decoder.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
@@ -55,6 +57,17 @@ impl Quantity {
         match self {
             Self::Raw => reading.is_finite(),
             _ => (reading > 0.0) & (reading < f64::INFINITY),
+        }
+    }
+
+    /// Checks that the quantity is defined for all readings (samples × channels).
+    ///
+    /// # Errors
+    /// At the first reading for which it is not.
+    pub(crate) fn check(self, readings: ArrayView2<'_, f64>) -> Result<(), ScalingError> {
+        match readings.indexed_iter().find(|(_, value)| !self.accepts(**value)) {
+            Some(((sample, channel), &value)) => Err(ScalingError::Reading { sample, channel, value }),
+            None => Ok(()),
         }
     }
 
@@ -171,6 +184,21 @@ impl ChannelNoise {
         }
     }
 
+    /// Returns the changes of the values times `scale` caused by one standard deviation of each source (sources × channels):
+    /// the error of each channel that has one, and the common error.
+    pub(crate) fn changes(&self, scale: &[f64]) -> Array2<f64> {
+        let own: Vec<usize> = (0..scale.len()).filter(|&channel| self.own[channel] > 0.0).collect();
+        let has_common = self.common.iter().any(|&deviation| deviation > 0.0);
+        Array2::from_shape_fn(
+            (own.len() + usize::from(has_common), scale.len()),
+            |(source, channel)| match own.get(source) {
+                Some(&of) if of == channel => self.own[channel] * scale[channel],
+                Some(_) => 0.0,
+                None => self.common[channel] * scale[channel],
+            },
+        )
+    }
+
     /// Returns the variance of the error of Σ weight · value.
     pub fn variance(&self, weights: impl IntoIterator<Item = f64>) -> f64 {
         let (mut own, mut common) = (0.0, 0.0);
@@ -189,7 +217,6 @@ impl ChannelNoise {
 
 #[cfg(test)]
 mod tests {
-    use ndarray::Array2;
     use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
 
     use super::*;

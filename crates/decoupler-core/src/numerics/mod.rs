@@ -1,7 +1,9 @@
-//! Numerics that several modules share: quantiles of distributions, and figures of samples.
+//! Numerics that several modules share: least squares, distributions, special functions, and figures of samples.
 
+mod minimise;
 mod special;
 mod statistics;
 
-pub(crate) use special::{chi_squared_quantile, student_quantile, two_sided_normal_quantile};
-pub(crate) use statistics::{median, quantile};
+pub(crate) use minimise::{Linearised, Spectrum, Stop, minimise};
+pub(crate) use special::{chi_squared_quantile, normal_cdf, scaled_k0_k1, student_quantile, two_sided_normal_quantile};
+pub(crate) use statistics::{autocorrelation, median, quantile};

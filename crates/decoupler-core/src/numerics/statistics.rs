@@ -1,5 +1,7 @@
 //! Figures of samples.
 
+use ndarray::ArrayView1;
+
 /// Median of values, which must not be empty.
 pub(crate) fn median(mut values: Vec<f64>) -> f64 {
     values.sort_by(f64::total_cmp);
@@ -22,9 +24,33 @@ pub(crate) fn quantile(values: &[f64], level: f64) -> f64 {
     sorted[below] + share * (sorted[above] - sorted[below])
 }
 
+/// Autocorrelation of a series at this lag; `None` if all values are equal.
+pub(crate) fn autocorrelation(values: ArrayView1<'_, f64>, lag: usize) -> Option<f64> {
+    let first = *values.first()?;
+    // As the mean of deviations, so that a large offset does not hide small changes.
+    let mean = first + values.iter().map(|value| value - first).sum::<f64>() / values.len() as f64;
+    let variance: f64 = values.iter().map(|value| (value - mean).powi(2)).sum();
+    let pairs = values.iter().zip(values.iter().skip(lag));
+    let products: f64 = pairs.map(|(one, next)| (one - mean) * (next - mean)).sum();
+    (variance > 0.0).then(|| products / variance)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// R: acf(c(1, 2, 4, 3))$acf
+    #[test]
+    fn autocorrelations_agree_with_r() {
+        for offset in [0.0, 1e9] {
+            let series = [1.0, 2.0, 4.0, 3.0].map(|value| value + offset);
+            for (lag, expected) in [(0, 1.0), (1, 0.15), (2, -0.5), (3, -0.15)] {
+                let found = autocorrelation(ArrayView1::from(&series), lag);
+                assert!((found.unwrap_or(f64::NAN) - expected).abs() < 1e-12, "{lag}: {found:?}");
+            }
+        }
+        assert_eq!(autocorrelation(ArrayView1::from(&[2.0; 5]), 1), None);
+    }
 
     #[test]
     fn medians_and_quantiles_of_few_values() {

@@ -9,8 +9,8 @@ mod rows;
 pub use fault::{ConverterEnd, Fault, FaultError, FaultySensor};
 pub(crate) use loading::LatentRow;
 pub use loading::{Contact, DeformationSampler, Indenter, IndenterShape, Loading, Span};
+pub(crate) use noise::standard_normal;
 pub use noise::{Noise, NoisySets, RelativeNoise};
-pub(crate) use noise::{normal_cdf, standard_normal};
 pub use noise_source::{NoiseSource, Print, Touch};
 pub use rows::{RowModel, Rows};
 

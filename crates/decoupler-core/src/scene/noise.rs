@@ -131,11 +131,6 @@ pub(crate) fn standard_normal(rng: &mut impl Rng) -> f64 {
     length * (TAU * rng.random::<f64>()).cos()
 }
 
-/// Cumulative distribution function of the standard normal distribution.
-pub(crate) fn normal_cdf(x: f64) -> f64 {
-    0.5 * libm::erfc(-x * std::f64::consts::FRAC_1_SQRT_2)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -158,7 +158,8 @@ mod tests {
     use super::*;
     use crate::{
         dataset::{Seed, Stream},
-        scene::{NoisySets, normal_cdf},
+        numerics::normal_cdf,
+        scene::NoisySets,
     };
 
     fn disturbed(noise: Noise, resistance_ohm: f64, count: usize) -> Vec<f64> {

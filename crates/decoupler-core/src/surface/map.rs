@@ -1,33 +1,13 @@
-//! Interpolation from the values at the nodes to a surface.
-//!
-//! Errors in the coordinates of the nodes.
-//!
-//! Bilinear interpolation on a lattice: fast, and defined for every array.
-//!
-//! The natural cubic spline through nodes on a line, the curve of least bending energy.
-//!
-//! Between neighbours at a distance h it is `s = a z_i + b z_{i+1} + h²/6 ((a³ − a) m_i + (b³ − b) m_{i+1})`, where b is
-//! the fraction of the way from i to i + 1 and a = 1 − b. Its second derivatives m vanish at both ends and, for the slope
-//! to be continuous, satisfy
-//!
-//! ```text
-//! h_{i−1} m_{i−1} + 2 (h_{i−1} + h_i) m_i + h_i m_{i+1} = 6 ((z_{i+1} − z_i)/h_i − (z_i − z_{i−1})/h_{i−1})
-//! ```
-//!
-//! Beyond both ends the curve is straight. Through two nodes it is a line, through one a constant.
-
 use std::{
     fmt,
-    ops::RangeInclusive,
     sync::{Arc, Mutex, PoisonError, Weak},
 };
 
-use ndarray::{Array2, ArrayView1, Zip};
-
 use super::{
     error::{Axis, SurfaceError},
-    grid::{Grid, GridAxis, Point, SortedAxis, Weights},
-    scattered::{self, Scattered},
+    grid::{Grid, GridAxis, SortedAxis},
+    scattered::Scattered,
+    spline::{Point, Weights},
 };
 
 /// Maximum number of nodes for a spline; for more nodes, the cost of factorisation and matrix outweighs the benefit.
@@ -68,21 +48,15 @@ impl fmt::Display for Interpolation {
 pub struct SurfaceMap {
     grid: Grid,
     nodes: usize,
-    spline: Option<Spline>,
+    interpolation: Interpolation,
+    /// Weights of the spline; `None` if it is not used.
+    weights: Option<Weights>,
+    /// Row of the weights at each grid point; `None` where there is no surface.
+    rows: Vec<Option<usize>>,
+    /// See [`Self::beyond`].
+    beyond: Vec<f64>,
     /// Between the nodes of a lattice.
     bilinear: Option<Bilinear>,
-}
-
-#[derive(Clone, Debug)]
-enum Spline {
-    /// Weights of every grid point.
-    Surface(Weights),
-    /// Weights of the grid points along x, for nodes with one y.
-    AlongX(Weights),
-    /// Weights of the grid points along y, for nodes with one x.
-    AlongY(Weights),
-    /// Weights of the grid points between scattered nodes.
-    Scattered(Scattered),
 }
 
 /// A map in use, with its coordinates x and y.
@@ -128,28 +102,50 @@ impl SurfaceMap {
         let y = SortedAxis::new(Axis::Y, y_mm)?;
         let nodes = x_mm.len() * y_mm.len();
         let is_line = x_mm.len() == 1 || y_mm.len() == 1;
-        let spline_grid = grid(&x, &y, if is_line { GRID_POINTS } else { affordable(nodes) });
-        let spline = if nodes > MAX_SPLINE_NODES {
-            None
-        } else if x_mm.len() == 1 {
-            along(y_mm, &y, spline_grid.y_mm(), spline_grid.inside_y()).map(Spline::AlongY)
-        } else if y_mm.len() == 1 {
-            along(x_mm, &x, spline_grid.x_mm(), spline_grid.inside_x()).map(Spline::AlongX)
+        let mut interpolation = if is_line {
+            Interpolation::CubicSpline
         } else {
-            surface(x_mm, y_mm, &spline_grid).map(Spline::Surface)
+            Interpolation::ThinPlateSpline
         };
-        let grid = match spline {
-            Some(_) => spline_grid,
-            None => grid(&x, &y, GRID_POINTS),
+        let mut grid = self::grid(&x, &y, if is_line { GRID_POINTS } else { affordable(nodes) });
+        // A curve along a line of nodes is constant across it.
+        let row = |ix: usize, iy: usize, grid: &Grid| match (x_mm.len(), y_mm.len()) {
+            (1, _) => iy,
+            (_, 1) => ix,
+            _ => grid.index(ix, iy),
         };
+        let mut points = Vec::new();
+        let mut rows = Vec::with_capacity(grid.len());
+        for ix in 0..grid.x_mm().len() {
+            for iy in 0..grid.y_mm().len() {
+                let row = row(ix, iy, &grid);
+                rows.push(Some(row));
+                if row == points.len() {
+                    points.push(point_of(&grid, (ix, iy), (x_mm, y_mm)));
+                }
+            }
+        }
+        let places_mm = Vec::from_iter(x_mm.iter().flat_map(|&x| y_mm.iter().map(move |&y| (x, y))));
+        let weights = if nodes <= MAX_SPLINE_NODES {
+            Weights::new(&places_mm, &points)
+        } else {
+            None
+        };
+        if weights.is_none() {
+            interpolation = Interpolation::Bilinear;
+            grid = self::grid(&x, &y, GRID_POINTS);
+        }
         let bilinear = Bilinear::new(
             (&x.nodes_mm, &x.order, grid.x_mm()),
             (&y.nodes_mm, &y.order, grid.y_mm()),
         );
         Ok(Self {
+            beyond: grid.beyond(),
             grid,
             nodes,
-            spline,
+            interpolation,
+            weights,
+            rows,
             bilinear: Some(bilinear),
         })
     }
@@ -169,11 +165,19 @@ impl SurfaceMap {
                 most: MAX_SPLINE_NODES,
             });
         }
-        let (grid, scattered) = Scattered::new(places_mm, affordable(nodes))?;
+        let Scattered {
+            grid,
+            rows,
+            beyond,
+            weights,
+        } = Scattered::new(places_mm, affordable(nodes))?;
         Ok(Self {
             grid,
             nodes,
-            spline: Some(Spline::Scattered(scattered)),
+            interpolation: Interpolation::ThinPlateSpline,
+            weights: Some(weights),
+            rows,
+            beyond,
             bilinear: None,
         })
     }
@@ -186,10 +190,7 @@ impl SurfaceMap {
     /// Returns the distance of a grid point from the nodes as a fraction of the margin: 0 within their bounding rectangle
     /// or, for scattered nodes, their convex hull; 1 where the surface ends, and where scattered nodes have none.
     pub fn beyond(&self, ix: usize, iy: usize) -> f64 {
-        match &self.spline {
-            Some(Spline::Scattered(scattered)) => scattered.beyond(self.grid.index(ix, iy)),
-            _ => self.grid.beyond(ix, iy),
-        }
+        self.beyond[self.grid.index(ix, iy)]
     }
 
     /// Returns the number of nodes; for a lattice, rows × nodes per row.
@@ -199,11 +200,7 @@ impl SurfaceMap {
 
     /// Returns the interpolation used between the nodes.
     pub fn interpolation(&self) -> Interpolation {
-        match self.spline {
-            Some(Spline::Surface(_) | Spline::Scattered(_)) => Interpolation::ThinPlateSpline,
-            Some(Spline::AlongX(_) | Spline::AlongY(_)) => Interpolation::CubicSpline,
-            None => Interpolation::Bilinear,
-        }
+        self.interpolation
     }
 
     /// Writes the surface through `node_values` (for a lattice `rows × nodes_per_row`, row by row; in any unit) to `out`
@@ -218,28 +215,16 @@ impl SurfaceMap {
         assert_eq!(node_values.len(), self.nodes, "one value per node");
         assert_eq!(out.len(), self.grid.len(), "one value per grid point");
         // A missing value would affect the whole spline.
-        let spline = self
-            .spline
-            .as_ref()
-            .filter(|_| node_values.iter().all(|value| value.is_finite()));
-        let across = self.grid.y_mm().len();
-        match spline {
-            Some(Spline::Surface(weights)) => weights.evaluate_into(node_values, out),
-            Some(Spline::AlongX(weights)) => {
-                let curve = weights.evaluate(node_values);
-                let lines = out.chunks_exact_mut(across).zip(curve);
-                lines.for_each(|(line, value)| line.fill(value));
+        let is_whole = node_values.iter().all(|value| value.is_finite());
+        match (&self.weights, &self.bilinear) {
+            (Some(weights), _) if is_whole => {
+                let values = weights.evaluate(node_values);
+                for (out, row) in out.iter_mut().zip(&self.rows) {
+                    *out = row.map_or(f64::NAN, |row| values[row]);
+                }
             }
-            Some(Spline::AlongY(weights)) => {
-                let curve = weights.evaluate(node_values);
-                out.chunks_exact_mut(across)
-                    .for_each(|line| line.copy_from_slice(&curve));
-            }
-            Some(Spline::Scattered(scattered)) => scattered.evaluate_into(node_values, out),
-            None => match &self.bilinear {
-                Some(bilinear) => bilinear.evaluate_into(node_values, out),
-                None => out.fill(f64::NAN),
-            },
+            (_, Some(bilinear)) => bilinear.evaluate_into(node_values, out),
+            (_, None) => out.fill(f64::NAN),
         }
     }
 
@@ -268,36 +253,19 @@ fn grid(x: &SortedAxis, y: &SortedAxis, target: usize) -> Grid {
     )
 }
 
-/// The spline through the nodes on one line, at the grid points along it.
-fn along(nodes_mm: &[f64], sorted: &SortedAxis, points_mm: &[f64], inside: RangeInclusive<usize>) -> Option<Weights> {
-    let of_sorted = weights(&sorted.nodes_mm, points_mm);
-    let mut weights = Array2::zeros(of_sorted.dim());
-    for (column, &node) in of_sorted.columns().into_iter().zip(&sorted.order) {
-        weights.column_mut(node).assign(&column);
-    }
-    let points = points_mm.iter().enumerate().map(|(index, &point_mm)| Point {
-        is_inside: inside.contains(&index),
-        node: node_at(nodes_mm, point_mm),
-    });
-    Weights::checked(weights, points)
-}
-
-/// The spline through the nodes of the lattice, at every grid point.
-fn surface(x_mm: &[f64], y_mm: &[f64], grid: &Grid) -> Option<Weights> {
-    let places = |x_mm: &[f64], y_mm: &[f64]| -> Vec<_> {
-        let lines = x_mm.iter().map(|&x| y_mm.iter().map(move |&y| (x, y)));
-        lines.flatten().collect()
+/// A grid point of the lattice `x_mm × y_mm`; on a line of nodes, the nearest point on that line.
+fn point_of(grid: &Grid, (ix, iy): (usize, usize), (x_mm, y_mm): (&[f64], &[f64])) -> Point {
+    let on_axis = |nodes_mm: &[f64], point_mm: f64| match nodes_mm {
+        [only_mm] => *only_mm,
+        _ => point_mm,
     };
-    let weights = scattered::weights(&places(x_mm, y_mm), &places(grid.x_mm(), grid.y_mm()))?;
-    let points = (0..grid.x_mm().len()).flat_map(|ix| (0..grid.y_mm().len()).map(move |iy| (ix, iy)));
-    let points = points.map(|(ix, iy)| {
-        let (row, node) = (node_at(x_mm, grid.x_mm()[ix]), node_at(y_mm, grid.y_mm()[iy]));
-        Point {
-            is_inside: grid.is_inside(ix, iy),
-            node: row.zip(node).map(|(row, node)| row * y_mm.len() + node),
-        }
-    });
-    Weights::checked(weights, points)
+    let (x, y) = (on_axis(x_mm, grid.x_mm()[ix]), on_axis(y_mm, grid.y_mm()[iy]));
+    let (row, node) = (node_at(x_mm, x), node_at(y_mm, y));
+    Point {
+        place_mm: (x, y),
+        is_inside: grid.is_inside(ix, iy),
+        node: row.zip(node).map(|(row, node)| row * y_mm.len() + node),
+    }
 }
 
 fn node_at(nodes_mm: &[f64], point_mm: f64) -> Option<usize> {
@@ -313,9 +281,9 @@ struct Between {
     weight: f64,
 }
 
-/// Bilinear weights along both axes; beyond the outermost nodes the surface keeps its slope.
+/// Bilinear interpolation on a lattice, fast and defined for every array: weights along both axes. Beyond the outermost nodes the surface keeps its slope.
 #[derive(Clone, Debug)]
-pub(super) struct Bilinear {
+struct Bilinear {
     x: Vec<Between>,
     y: Vec<Between>,
     nodes_per_row: usize,
@@ -324,7 +292,7 @@ pub(super) struct Bilinear {
 impl Bilinear {
     /// Creates the weights. Each axis has the ascending node coordinates, their indices in the caller's order, and the
     /// grid coordinates.
-    pub(super) fn new(x: (&[f64], &[usize], &[f64]), y: (&[f64], &[usize], &[f64])) -> Self {
+    fn new(x: (&[f64], &[usize], &[f64]), y: (&[f64], &[usize], &[f64])) -> Self {
         Self {
             x: betweens(x.0, x.1, x.2),
             y: betweens(y.0, y.1, y.2),
@@ -332,7 +300,7 @@ impl Bilinear {
         }
     }
 
-    pub(super) fn evaluate_into(&self, node_values: &[f64], out: &mut [f64]) {
+    fn evaluate_into(&self, node_values: &[f64], out: &mut [f64]) {
         for (x, line) in self.x.iter().zip(out.chunks_exact_mut(self.y.len())) {
             let lower = &node_values[x.lower * self.nodes_per_row..][..self.nodes_per_row];
             let upper = &node_values[x.upper * self.nodes_per_row..][..self.nodes_per_row];
@@ -376,73 +344,4 @@ fn betweens(nodes_mm: &[f64], order: &[usize], points_mm: &[f64]) -> Vec<Between
             }
         })
         .collect()
-}
-
-/// Returns the matrix (`points × nodes`) from the values at the ascending `nodes_mm` to those at `points_mm`.
-pub(super) fn weights(nodes_mm: &[f64], points_mm: &[f64]) -> Array2<f64> {
-    let last = nodes_mm.len() - 1;
-    if last == 0 {
-        return Array2::ones((points_mm.len(), 1));
-    }
-    // In units of the extent, so that squares and quotients of lengths do not overflow.
-    let extent_mm = nodes_mm[last] - nodes_mm[0];
-    let widths: Vec<f64> = nodes_mm
-        .windows(2)
-        .map(|pair| (pair[1] - pair[0]) / extent_mm)
-        .collect();
-    let bends = second_derivatives(&widths);
-    let mut weights = Array2::zeros((points_mm.len(), nodes_mm.len()));
-    for (mut row, &point_mm) in weights.outer_iter_mut().zip(points_mm) {
-        let upper = nodes_mm.partition_point(|&node_mm| node_mm <= point_mm).clamp(1, last);
-        let lower = upper - 1;
-        let width = widths[lower];
-        let b = (point_mm - nodes_mm[lower]) / extent_mm / width;
-        let a = 1.0 - b;
-        row[lower] = a;
-        row[upper] = b;
-        // Beyond an end the cubic is continued with its slope there, where m is 0.
-        let (lower_part, upper_part) = if b < 0.0 {
-            (0.0, -b)
-        } else if b > 1.0 {
-            (-a, 0.0)
-        } else {
-            (a.powi(3) - a, b.powi(3) - b)
-        };
-        let mut add = |part: f64, bends: ArrayView1<'_, f64>| {
-            let factor = width * width / 6.0 * part;
-            Zip::from(&mut row)
-                .and(bends)
-                .for_each(|weight, bend| *weight += factor * bend);
-        };
-        add(lower_part, bends.row(lower));
-        add(upper_part, bends.row(upper));
-    }
-    weights
-}
-
-/// Returns the matrix (`nodes × nodes`) from values to second derivatives, by elimination of the tridiagonal equations,
-/// which are diagonally dominant and need no pivoting.
-fn second_derivatives(widths: &[f64]) -> Array2<f64> {
-    let last = widths.len();
-    let mut right = Array2::zeros((last + 1, last + 1));
-    let mut above = vec![0.0; last + 1];
-    for i in 1..last {
-        let (before, after) = (widths[i - 1], widths[i]);
-        right[[i, i - 1]] += 6.0 / before;
-        right[[i, i]] -= 6.0 / before + 6.0 / after;
-        right[[i, i + 1]] += 6.0 / after;
-        let pivot = 2.0 * (before + after) - before * above[i - 1];
-        above[i] = after / pivot;
-        let (done, mut rest) = right.view_mut().split_at(ndarray::Axis(0), i);
-        Zip::from(rest.row_mut(0))
-            .and(done.row(i - 1))
-            .for_each(|value, eliminated| *value = (*value - before * eliminated) / pivot);
-    }
-    for i in (1..last).rev() {
-        let (mut rest, done) = right.view_mut().split_at(ndarray::Axis(0), i + 1);
-        Zip::from(rest.row_mut(i))
-            .and(done.row(0))
-            .for_each(|value, next| *value -= above[i] * next);
-    }
-    right
 }

@@ -8,9 +8,12 @@
 
 mod error;
 mod grid;
+mod lattice;
 mod map;
 mod scattered;
+mod spline;
 
 pub use error::{Axis, SurfaceError};
-pub use grid::{Grid, Lattice};
+pub use grid::Grid;
+pub use lattice::Lattice;
 pub use map::{Interpolation, SurfaceMap};

@@ -3,7 +3,8 @@
 use decoupler_core::{
     calibration::Calibration,
     dataset::{Dataset, Division, Seed, Stream},
-    evaluation::{Errors, Preset, Run, SimulatedSettings, fine_tune, pressed_rows, rebased},
+    evaluation::{Errors, Preset, Run, RunError, SimulatedSettings, fine_tune, pressed_rows, rebased},
+    job::Job,
     machine::MemoryBudget,
     network::Networks,
     scene::{Loading, Noise},
@@ -75,22 +76,30 @@ fn calibration_and_fine_tuning_adapt_a_network_to_the_real_sensor() {
         .divide_for_training(&frames, &mut Seed(0).rng(Stream::Split))
         .unwrap();
     let split = parts.split(&frames);
-    let tuned = fine_tune(&networks, &split, settings.training, MemoryBudget::UNLIMITED, &|| false)
-        .unwrap()
-        .unwrap();
+    let tuned = fine_tune(
+        &networks,
+        &split,
+        settings.training,
+        MemoryBudget::UNLIMITED,
+        &Job::UNINTERRUPTED,
+    )
+    .unwrap();
     assert!(z_mm(&moved, &tuned) < 1.2 * calibrated);
     // A network of another sensor improves greatly with the frames.
     settings.source.sensor = nominal;
     let untold = trained(settings);
-    let tuned = fine_tune(&untold, &split, settings.training, MemoryBudget::UNLIMITED, &|| false)
-        .unwrap()
-        .unwrap();
+    let tuned = fine_tune(
+        &untold,
+        &split,
+        settings.training,
+        MemoryBudget::UNLIMITED,
+        &Job::UNINTERRUPTED,
+    )
+    .unwrap();
     assert!(z_mm(&moved, &tuned) < 0.5 * z_mm(&moved, &untold));
-    assert!(
-        fine_tune(&untold, &split, settings.training, MemoryBudget::UNLIMITED, &|| true)
-            .unwrap()
-            .is_none()
-    );
+    let cancelled = Job::new(&|| true);
+    let tuned = fine_tune(&untold, &split, settings.training, MemoryBudget::UNLIMITED, &cancelled);
+    assert!(matches!(tuned, Err(RunError::Cancelled(_))));
 }
 
 #[test]
@@ -105,7 +114,7 @@ fn samples_of_another_sensor_are_refused() {
         &split,
         settings.training,
         MemoryBudget::UNLIMITED,
-        &|| false,
+        &Job::UNINTERRUPTED,
     )
     .unwrap_err()
     .to_string();

@@ -3,11 +3,12 @@
 use decoupler_core::{
     dataset::{Dataset, DividedSamples, Division, Folds, Seed, SplitBy, Stream},
     evaluation::{
-        CrossValidated, Measured, RunSettings,
+        CrossValidated, Measured, RunError, RunSettings,
         recorded::{
             Doubling, FittedModel, Interval, LearningCurve, NonlinearGain, SplitComparison, channel_importance,
         },
     },
+    job::Job,
     scene::RowModel,
 };
 use ndarray::Array2;
@@ -47,12 +48,8 @@ fn a_random_split_is_optimistic_if_samples_of_a_group_are_alike() {
     let alike = Dataset::new(readings, targets, None, groups).unwrap();
     let compared = |set: &Dataset, by| {
         let assigned = Folds::by(set, 5, by, &mut Seed(0).rng(Stream::Split)).unwrap();
-        let validated = CrossValidated::on_folds(&settings(), set, assigned, || false)
-            .unwrap()
-            .unwrap();
-        SplitComparison::complete(&settings(), set, 5, (by, &validated), &|| false)
-            .unwrap()
-            .unwrap()
+        let validated = CrossValidated::on_folds(&settings(), set, assigned, &Job::UNINTERRUPTED).unwrap();
+        SplitComparison::complete(&settings(), set, 5, (by, &validated), &Job::UNINTERRUPTED).unwrap()
     };
     // For any split, random folds are compared with folds by group if there are groups.
     for by in SplitBy::ALL {
@@ -69,12 +66,10 @@ fn a_random_split_is_optimistic_if_samples_of_a_group_are_alike() {
     let sentence = of_independent.sentence(0, "y");
     assert!(sentence.starts_with("no significant difference"), "{sentence}");
     let assigned = Folds::by(&independent, 5, SplitBy::Random, &mut Seed(0).rng(Stream::Split)).unwrap();
-    let validated = CrossValidated::on_folds(&settings(), &independent, assigned, || false)
-        .unwrap()
-        .unwrap();
+    let validated = CrossValidated::on_folds(&settings(), &independent, assigned, &Job::UNINTERRUPTED).unwrap();
     let given = (SplitBy::Random, &validated);
-    let cancelled = SplitComparison::complete(&settings(), &independent, 5, given, &|| true).unwrap();
-    assert_eq!(cancelled, None);
+    let cancelled = SplitComparison::complete(&settings(), &independent, 5, given, &Job::new(&|| true));
+    assert!(matches!(cancelled, Err(RunError::Cancelled(_))));
 }
 
 /// The sentence on a random split for this recording, whose samples are in order of time.
@@ -82,11 +77,9 @@ fn sentence_on_random_split(set: &Dataset) -> String {
     let mut settings = settings();
     (settings.hidden, settings.training.stopping.epochs) = (2, 8);
     let folds = Folds::by(set, 5, SplitBy::Time, &mut Seed(0).rng(Stream::Split)).unwrap();
-    let validated = CrossValidated::on_folds(&settings, set, folds, || false)
-        .unwrap()
-        .unwrap();
-    let compared = SplitComparison::complete(&settings, set, 5, (SplitBy::Time, &validated), &|| false);
-    compared.unwrap().unwrap().sentence(0, "y")
+    let validated = CrossValidated::on_folds(&settings, set, folds, &Job::UNINTERRUPTED).unwrap();
+    let compared = SplitComparison::complete(&settings, set, 5, (SplitBy::Time, &validated), &Job::UNINTERRUPTED);
+    compared.unwrap().sentence(0, "y")
 }
 
 /// About one in a hundred sets may seem to change by chance: at most 5 of 100 with a probability of 0.9995.
@@ -128,8 +121,8 @@ fn the_error_grows_by_the_information_unique_to_a_left_out_channel() {
     let set = set(2000, 4, 5, |c, rng| 2.0 * c[0] + 0.5 * c[1] + 0.5 * normal(rng));
     let folds = Folds::by(&set, 5, SplitBy::Time, &mut Seed(0).rng(Stream::Split)).unwrap();
     let importance = |set: &Dataset, model| {
-        let found = channel_importance(&settings(), set, (&folds, SplitBy::Time), model, &|| false);
-        found.unwrap().unwrap()
+        let found = channel_importance(&settings(), set, (&folds, SplitBy::Time), model, &Job::UNINTERRUPTED);
+        found.unwrap()
     };
     let found = importance(&set, FittedModel::Ridge);
     // √(2² + 0.5²)/0.5, √(0.5² + 0.5²)/0.5, and no growth.
@@ -153,14 +146,9 @@ fn the_error_grows_by_the_information_unique_to_a_left_out_channel() {
         &few,
         (&folds, SplitBy::Time),
         FittedModel::Network,
-        &|| false,
+        &Job::UNINTERRUPTED,
     );
-    let growth: Vec<f64> = found
-        .unwrap()
-        .unwrap()
-        .iter()
-        .map(|of| of.growth[0].unwrap().value)
-        .collect();
+    let growth: Vec<f64> = found.unwrap().iter().map(|of| of.growth[0].unwrap().value).collect();
     assert!(
         growth[0] > 3.0 && (1.1..2.0).contains(&growth[1]) && growth[2] < 1.1,
         "{growth:?}"
@@ -177,8 +165,8 @@ fn a_learning_curve_predicts_the_error_with_twice_the_samples() {
             validation: Vec::new(),
             test: (2000..4000).collect(),
         };
-        let found = LearningCurve::measure(&settings(), &all, (&parts, by), FittedModel::Ridge, &|| false);
-        found.unwrap().unwrap().remove(0)
+        let found = LearningCurve::measure(&settings(), &all, (&parts, by), FittedModel::Ridge, &Job::UNINTERRUPTED);
+        found.unwrap().remove(0)
     };
     let theory = |samples: f64| 3.0 * (1.0 + 20.0 / (samples - 21.0)).sqrt();
     for by in [SplitBy::Time, SplitBy::Random, SplitBy::Group] {
@@ -227,9 +215,7 @@ fn a_learning_curve_predicts_the_error_with_twice_the_samples() {
 fn a_network_no_better_than_ridge_is_reported_as_such() {
     let gain = |set: &Dataset| {
         let folds = Folds::by(set, 5, SplitBy::Time, &mut Seed(0).rng(Stream::Split)).unwrap();
-        let validated = CrossValidated::on_folds(&settings(), set, folds, || false)
-            .unwrap()
-            .unwrap();
+        let validated = CrossValidated::on_folds(&settings(), set, folds, &Job::UNINTERRUPTED).unwrap();
         NonlinearGain::of_validated(set, &validated, SplitBy::Time)[0].unwrap()
     };
     let linear = gain(&set(400, 3, 7, |c, rng| c[0] + c[1] + normal(rng)));
@@ -245,9 +231,7 @@ fn folds_of_every_rule_are_checked_and_seeded() {
     for by in SplitBy::ALL {
         let validate = || {
             let folds = Folds::by(&set, 4, by, &mut Seed(1).rng(Stream::Split)).unwrap();
-            CrossValidated::on_folds(&settings(), &set, folds, || false)
-                .unwrap()
-                .unwrap()
+            CrossValidated::on_folds(&settings(), &set, folds, &Job::UNINTERRUPTED).unwrap()
         };
         let (one, other) = (validate(), validate());
         assert_eq!((&one.network, &one.linear), (&other.network, &other.linear), "{by}");

@@ -11,7 +11,8 @@ use super::{
 };
 use crate::import::{Progress, Recorded, Setup, SetupError, SetupSets};
 use decoupler_core::{
-    evaluation::{Run, RunSettings},
+    evaluation::{Begin, Run, RunSettings},
+    job::Job,
     training::TrainerState,
 };
 
@@ -66,36 +67,25 @@ impl CheckpointFile {
         Setup::of(self.settings, plan).expect("reading and writing check that a recording has its plan")
     }
 
-    /// Resumes the run from this epoch: draws or reads its samples again and restores every trainer.
+    /// Resumes the run from this epoch: draws or reads its samples again and restores every trainer. Returns the run and
+    /// its samples.
     ///
     /// # Errors
-    /// The settings are invalid, the recording has changed or is missing, or the states do not fit the settings or each
-    /// other.
-    pub fn resume(self) -> Result<Run, SetupError> {
-        let resumed = self.resume_unless(&|| false, &mut |_| ())?;
-        Ok(resumed.expect("nothing cancels it").0)
-    }
-
-    /// As [`Self::resume`], with the sets; returns `None` once `is_cancelled`, which is called between the parts of the work.
-    pub fn resume_unless(
-        self,
-        is_cancelled: &dyn Fn() -> bool,
-        on_progress: &mut dyn FnMut(Progress),
-    ) -> Result<Option<(Run, SetupSets)>, SetupError> {
+    /// The settings are invalid, the recording has changed or is missing, the states do not fit the settings or each
+    /// other, or the job is cancelled.
+    pub fn resume(self, job: &Job<'_>, on_progress: &mut dyn FnMut(Progress)) -> Result<(Run, SetupSets), SetupError> {
         let setup = self.setup();
         if let Some(settings) = setup.simulated() {
             settings.check_states(&self.starts)?;
         }
-        let Some(mut sets) = setup.sets(Path::new(""), is_cancelled, on_progress)? else {
-            return Ok(None);
-        };
+        let mut sets = setup.sets(Path::new(""), job, on_progress)?;
         sets.check_saved(self.recorded.as_ref())?;
         if let (Some(recordings), Some(saved)) = (&mut sets.recordings, self.recorded) {
             recordings.recorded.search = saved.search;
             recordings.recorded.chosen_intervals = saved.chosen_intervals;
         }
-        let run = sets.clone().resume(&setup, self.starts, is_cancelled)?;
-        Ok(run.map(|run| (run.with_wall_time(self.wall_time), sets)))
+        let run = sets.run(&setup, Begin::Resume(self.starts), job)?;
+        Ok((run.with_wall_time(self.wall_time), sets))
     }
 
     /// Writes the file whole or not at all.

@@ -391,7 +391,12 @@ fn describe_samples(source: &Simulation, cross_validation: Option<CrossValidatio
             source.validation_samples,
             source.test_samples
         ),
-        Some(CrossValidation { folds, repeats, unit }) => {
+        Some(CrossValidation { folds, repeats, by }) => {
+            let unit = match by {
+                SplitBy::Time => "block of time",
+                SplitBy::Group => "snapshot",
+                SplitBy::Random => "sample",
+            };
             let validation = match folds {
                 2 => "nothing held out for validation",
                 _ => "one of the other folds is held out for validation",

@@ -6,6 +6,7 @@ use decoupler_core::{
         ErrorTable, Intervals, PastNetwork, Problem, Run, RunSettings, Scores, SimulatedSettings, StartRecord,
         TargetPosition, TestErrors,
     },
+    job::Job,
     live::{DriftReference, NoDriftMonitor},
     network::{DecouplingNetwork, Networks},
 };
@@ -165,10 +166,9 @@ impl NetworkFile {
     /// The recording is missing or has changed, or the settings are invalid.
     pub fn test_set(&self) -> Result<Arc<Dataset>, SetupError> {
         if let Some(settings) = self.settings.simulated() {
-            return Ok(Arc::new(settings.draw_test()?));
+            return Ok(Arc::new(settings.source.draw_test(settings.seed)?));
         }
-        let sets = self.setup().sets(Path::new(""), &|| false, &mut |_| ())?;
-        let sets = sets.expect("nothing cancels it");
+        let sets = self.setup().sets(Path::new(""), &Job::UNINTERRUPTED, &mut |_| ())?;
         sets.check_saved(self.recorded.as_ref())?;
         Ok(sets.sets.test)
     }

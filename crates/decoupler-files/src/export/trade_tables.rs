@@ -192,6 +192,7 @@ mod tests {
     use ndarray::Array2;
 
     use super::*;
+    use decoupler_core::job::Job;
 
     #[test]
     fn a_long_training_on_a_recording_is_announced_with_faster_methods() {
@@ -229,7 +230,15 @@ mod tests {
         let mut points = Vec::new();
         let keep = |_, point: Result<TradeOffPoint, _>, _: Option<&_>| points.push(point.unwrap());
         let kinds = [DecoderKind::Ridge, DecoderKind::Network];
-        measure_trade_off(&settings, &RunSets::new(split, set(40)), &[2], &kinds, || false, keep).unwrap();
+        measure_trade_off(
+            &settings,
+            &RunSets::new(split, set(40)),
+            &[2],
+            &kinds,
+            &Job::UNINTERRUPTED,
+            keep,
+        )
+        .unwrap();
         let level = TradeOffLevel { noise: None, points };
         let fields = |table: &Table| Vec::from_iter(table.columns.iter().map(|column| column.field.clone()));
         let summary = trade_off_summary(&level);

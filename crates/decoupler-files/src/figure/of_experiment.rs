@@ -303,7 +303,7 @@ mod tests {
 
     use super::*;
     use decoupler_core::{
-        dataset::{FoldUnit, Seed},
+        dataset::{Seed, SplitBy},
         evaluation::{
             CrossValidation,
             experiments::{Finished, PaperTable, TrialSamples, run_experiments},
@@ -321,7 +321,7 @@ mod tests {
         experiment.cross_validation = Some(CrossValidation {
             folds: 2,
             repeats: 3,
-            unit: FoldUnit::Sample,
+            by: SplitBy::Random,
         });
         let mut results = ExperimentResults::new(experiment.clone());
         let mut finished = Vec::new();

@@ -6,10 +6,14 @@ use decoupler_core::{
         Intervals,
         auto::{AutoChoice, AutoFixed, AutoProgress, AutoSamples, SamplePast, choose_settings},
     },
+    job::Job,
     scene::RowModel,
 };
 
-use super::{ImportError, Plan, PlannedSets, Progress, Recording, Setup, SetupError, SetupSets, setup::watch};
+use super::{
+    ImportError, Plan, PlannedSets, Progress, Recording, Setup, SetupError, SetupSets,
+    setup::{unless_cancelled, watch},
+};
 use crate::machine::memory_budget;
 
 /// Setup whose settings were chosen from its training samples.
@@ -43,11 +47,10 @@ impl Setup {
     }
 
     /// Reads the recording, whose paths are relative to `folder`, and chooses settings by cross-validation on its training
-    /// samples, within `budget_s` seconds of one core; see [`choose_settings`]. A memory of the recipe is kept. Returns
-    /// `None` if `is_cancelled`, which is polled throughout, returns `true`.
+    /// samples, within `budget_s` seconds of one core; see [`choose_settings`]. A memory of the recipe is kept.
     ///
     /// # Errors
-    /// If the files cannot be read, or their samples cannot be split or scaled.
+    /// If the files cannot be read, their samples cannot be split or scaled, or the job is cancelled.
     ///
     /// # Panics
     /// If the setup is not that of a recording.
@@ -56,16 +59,13 @@ impl Setup {
         fixed: &AutoFixed,
         budget_s: f64,
         folder: &Path,
-        is_cancelled: &dyn Fn() -> bool,
+        job: &Job<'_>,
         on_progress: &mut dyn FnMut(ChoosingProgress),
-    ) -> Result<Option<ChosenSetup>, SetupError> {
+    ) -> Result<ChosenSetup, SetupError> {
         let plan = self.plan().expect("settings are chosen for a recording");
         let mut on_reading = |progress| on_progress(ChoosingProgress::Reading(progress));
-        let read = plan.recordings(folder, &mut watch(is_cancelled, &mut on_reading));
-        let (recording, test_recording) = match read {
-            Err(_) if is_cancelled() => return Ok(None),
-            read => read?,
-        };
+        let read = plan.recordings(folder, &mut watch(job, &mut on_reading));
+        let (recording, test_recording) = unless_cancelled(job, read)?;
         let raw = recording.with_memory(None).map_err(ImportError::from)?;
         let mut rng = self.settings().seed.rng(Stream::Split);
         let divided = match test_recording {
@@ -90,17 +90,15 @@ impl Setup {
                 ..fixed.clone()
             };
             let mut on_trying = |progress| on_progress(ChoosingProgress::Trying(progress));
-            let chosen = choose_settings(
+            Some(choose_settings(
                 self.settings(),
                 &fixed,
                 &samples,
                 budget_s,
                 memory_budget(),
-                is_cancelled,
+                job,
                 &mut on_trying,
-            )?;
-            let Some(choice) = chosen else { return Ok(None) };
-            Some(choice)
+            )?)
         };
         let mut plan = plan.clone();
         let mut settings = *self.settings();
@@ -110,11 +108,8 @@ impl Setup {
         }
         let memory = plan.import.memory.clone();
         let planned = planned(&plan, &raw, test_recording.as_ref(), memory.as_ref(), settings.seed)?;
-        let read = SetupSets::of_plan(&plan, folder, planned, &mut watch(is_cancelled, &mut |_| {}));
-        let mut sets = match read {
-            Err(_) if is_cancelled() => return Ok(None),
-            read => read?,
-        };
+        let read = SetupSets::of_plan(&plan, folder, planned, &mut watch(job, &mut |_| {}));
+        let mut sets = unless_cancelled(job, read)?;
         if let (Some(recordings), Some(choice)) = (&mut sets.recordings, &choice) {
             recordings.recorded.search = Some(choice.record.clone());
             // The answers are those of committees with the chosen settings, each trained without the fold that it answers to.
@@ -124,11 +119,11 @@ impl Setup {
             let (training, by) = (&sets.sets.split.training, plan.division.by);
             recordings.recorded.chosen_intervals = Some(Intervals::calibrate(training, choice.answers.view(), by));
         }
-        Ok(Some(ChosenSetup {
+        Ok(ChosenSetup {
             setup: Self::recording(settings, plan),
             sets,
             choice,
-        }))
+        })
     }
 }
 

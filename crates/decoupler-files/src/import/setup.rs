@@ -2,12 +2,12 @@ use std::{ops::ControlFlow, path::Path, sync::Arc};
 
 use decoupler_core::{
     evaluation::{
-        Intervals, NoIntervals, Run, RunError, RunSets, RunSettings, SimulatedSettings, Source,
+        Begin, Intervals, NoIntervals, Run, RunError, RunSets, RunSettings, SimulatedSettings, Source,
         experiments::{ExperimentRecording, RecordedSamples, TrialSamples},
     },
+    job::{Cancelled, Job},
     live::{DriftReference, NoDriftMonitor},
     text::clean_name,
-    training::TrainerState,
 };
 use ndarray::{Axis, Slice};
 use thiserror::Error;
@@ -60,6 +60,9 @@ pub enum SetupError {
     /// The samples cannot be drawn or trained on.
     #[error(transparent)]
     Run(#[from] RunError),
+    /// The caller cancelled the work.
+    #[error(transparent)]
+    Cancelled(#[from] Cancelled),
     /// The recording has changed.
     #[error("'{0}' has other samples than when the run was saved; use the original files, or train again")]
     OtherSamples(String),
@@ -150,30 +153,29 @@ impl Setup {
         }
     }
 
-    /// Draws the samples of a simulated array, or reads those of a recording, whose paths are relative to `folder`. Returns
-    /// `None` if `is_cancelled`, which is polled throughout, returns `true`; `on_progress` reports the progress of reading
-    /// files.
+    /// Draws the samples of a simulated array, or reads those of a recording, whose paths are relative to `folder`.
+    /// `on_progress` reports the progress of reading files.
     ///
     /// # Errors
-    /// If the settings are invalid, the files cannot be read, or their samples cannot be split.
+    /// If the settings are invalid, the files cannot be read, their samples cannot be split, or the job is cancelled.
     pub fn sets(
         &self,
         folder: &Path,
-        is_cancelled: &dyn Fn() -> bool,
+        job: &Job<'_>,
         on_progress: &mut dyn FnMut(Progress),
-    ) -> Result<Option<SetupSets>, SetupError> {
+    ) -> Result<SetupSets, SetupError> {
         let Some(plan) = &self.plan else {
             let settings = self.settings.simulated().expect("a setup without a plan is simulated");
-            let sets = settings.checked_sets_unless(memory_budget(), is_cancelled)?;
-            return Ok(sets.map(|sets| SetupSets { sets, recordings: None }));
+            let sets = RunSets::draw(&settings, memory_budget(), job)?;
+            return Ok(SetupSets { sets, recordings: None });
         };
         self.check_files()?;
-        let watch = &mut watch(is_cancelled, on_progress);
+        let watch = &mut watch(job, on_progress);
         let planned = plan.sets(folder, self.settings.seed, watch);
-        match planned.and_then(|planned| SetupSets::of_plan(plan, folder, planned, watch)) {
-            Err(_) if is_cancelled() => Ok(None),
-            sets => Ok(Some(sets?)),
-        }
+        unless_cancelled(
+            job,
+            planned.and_then(|planned| SetupSets::of_plan(plan, folder, planned, watch)),
+        )
     }
 }
 
@@ -193,38 +195,40 @@ impl Setup {
     /// are those of [`Self::sets`].
     ///
     /// # Errors
-    /// If the files cannot be read.
+    /// If the files cannot be read, or the job is cancelled.
     pub fn trial_samples(
         &self,
         folder: &Path,
-        is_cancelled: &dyn Fn() -> bool,
+        job: &Job<'_>,
         on_progress: &mut dyn FnMut(Progress),
-    ) -> Result<Option<TrialSamples>, SetupError> {
+    ) -> Result<TrialSamples, SetupError> {
         let Some(plan) = &self.plan else {
-            return Ok(Some(TrialSamples::Drawn(memory_budget())));
+            return Ok(TrialSamples::Drawn(memory_budget()));
         };
         self.check_files()?;
-        let (recording, test) = match plan.recordings(folder, &mut watch(is_cancelled, on_progress)) {
-            Err(_) if is_cancelled() => return Ok(None),
-            read => read?,
-        };
-        Ok(Some(TrialSamples::Recorded(RecordedSamples {
+        let (recording, test) = unless_cancelled(job, plan.recordings(folder, &mut watch(job, on_progress)))?;
+        Ok(TrialSamples::Recorded(RecordedSamples {
             problem: Arc::new(recording.problem()),
             set: Arc::new(recording.set),
             test: test.map(|test| Arc::new(test.set)),
             memory: memory_budget(),
-        })))
+        }))
     }
 }
 
-/// Returns a callback that reports progress and cancels the import if `is_cancelled`.
-pub(super) fn watch(
-    is_cancelled: &dyn Fn() -> bool,
-    on_progress: &mut dyn FnMut(Progress),
-) -> impl FnMut(Progress) -> ControlFlow<()> {
+/// Returns what was read, or that the job was cancelled, which is why it could not be.
+pub(super) fn unless_cancelled<T>(job: &Job<'_>, read: Result<T, ImportError>) -> Result<T, SetupError> {
+    if read.is_err() {
+        job.check()?;
+    }
+    Ok(read?)
+}
+
+/// Returns a callback that reports progress and ends the import once the job is cancelled.
+pub(super) fn watch(job: &Job<'_>, on_progress: &mut dyn FnMut(Progress)) -> impl FnMut(Progress) -> ControlFlow<()> {
     move |progress| {
         on_progress(progress);
-        if is_cancelled() {
+        if job.is_cancelled() {
             ControlFlow::Break(())
         } else {
             ControlFlow::Continue(())
@@ -260,25 +264,12 @@ impl SetupSets {
         })
     }
 
-    /// Prepares a run of `setup` on these datasets; returns `None` if cancelled.
+    /// Prepares a run of `setup` on these datasets, with its baselines.
     ///
     /// # Errors
-    /// As [`Run::on_sets`].
-    pub fn run(&self, setup: &Setup, is_cancelled: &dyn Fn() -> bool) -> Result<Option<Run>, RunError> {
-        Run::on_unless(setup.settings, self.sets.clone(), is_cancelled)
-    }
-
-    /// Resumes a run of `setup` on these datasets from the states of its trainings; returns `None` if cancelled.
-    ///
-    /// # Errors
-    /// As [`Run::resume_on_sets`].
-    pub fn resume(
-        self,
-        setup: &Setup,
-        states: Vec<TrainerState>,
-        is_cancelled: &dyn Fn() -> bool,
-    ) -> Result<Option<Run>, RunError> {
-        Run::resume_unless(setup.settings, states, self.sets, is_cancelled)
+    /// As [`Run::with_baselines`].
+    pub fn run(&self, setup: &Setup, begin: Begin, job: &Job<'_>) -> Result<Run, RunError> {
+        Run::with_baselines(setup.settings, self.sets.clone(), begin, job)
     }
 
     /// Describes the training readings of a recording, by which a later drift is detected.

@@ -12,13 +12,14 @@ use std::{
 };
 
 use decoupler_core::{
-    dataset::{FoldUnit, Seed, SplitBy},
+    dataset::{Seed, SplitBy},
     evaluation::{
-        CrossValidation, Measured, Run, RunSettings, SimulatedSettings, Simulation, TestErrors,
+        Begin, CrossValidation, Measured, Run, RunSets, RunSettings, SimulatedSettings, Simulation, TestErrors,
         experiments::{
             Axis, Experiment, ExperimentError, ExperimentResults, SummaryErrors, Trial, TrialSamples, run_experiments,
         },
     },
+    job::Job,
     machine::{MemoryBudget, MemorySource},
     scene::RowModel,
     sensor::{ArrayScale, SensorModel},
@@ -58,12 +59,12 @@ fn small(axis: Axis) -> Experiment {
     }
 }
 
-fn cross_validated(unit: FoldUnit) -> Experiment {
+fn cross_validated(unit: SplitBy) -> Experiment {
     Experiment {
         cross_validation: Some(CrossValidation {
             folds: 4,
             repeats: 2,
-            unit,
+            by: unit,
         }),
         ..small(Axis::Samples(vec![40, 20]))
     }
@@ -118,8 +119,8 @@ fn results_are_the_same_on_any_number_of_threads() {
             second_axis: Some(Axis::Method(Method::all()[..4].to_vec())),
             ..small(Axis::Hidden(vec![2, 5]))
         },
-        cross_validated(FoldUnit::Sample),
-        cross_validated(FoldUnit::Snapshot),
+        cross_validated(SplitBy::Random),
+        cross_validated(SplitBy::Group),
     ];
     let alone = run(&experiments, 1);
     assert!(alone.iter().all(ExperimentResults::is_complete));
@@ -144,7 +145,9 @@ fn a_trial_equals_the_run_with_its_settings() {
             assert_eq!(trial.errors, alone.scores().unwrap().network);
             let baselines = alone.baselines().unwrap();
             assert_eq!([&trial.mean, &trial.linear], [&baselines.mean, &baselines.linear]);
-            let taken_up = Run::resume(settings, trial.states.clone()).unwrap();
+            let sets = RunSets::draw(&settings, MemoryBudget::UNLIMITED, &Job::UNINTERRUPTED).unwrap();
+            let begin = Begin::Resume(trial.states.clone());
+            let taken_up = Run::new(settings.into(), sets, begin, &Job::UNINTERRUPTED).unwrap();
             assert_eq!(taken_up.network(), alone.network());
             assert_eq!(taken_up.stop_reason(), alone.stop_reason());
             z_percent.push(alone.errors().percent().unwrap());
@@ -160,7 +163,7 @@ fn a_trial_equals_the_run_with_its_settings() {
 
 #[test]
 fn cross_validation_decouples_every_sample_with_a_network_that_was_not_trained_on_it() {
-    for unit in [FoldUnit::Sample, FoldUnit::Snapshot] {
+    for unit in [SplitBy::Random, SplitBy::Group] {
         let mut experiment = cross_validated(unit);
         experiment.base.hidden = 6;
         for cell in &run(&[experiment], 2)[0].cells {
@@ -326,8 +329,9 @@ fn on_recording(setup: &Setup, axis: Axis, second_axis: Option<Axis>) -> Experim
 }
 
 fn samples_of(setup: &Setup) -> TrialSamples {
-    let samples = setup.trial_samples(Path::new(""), &|| false, &mut |_| {}).unwrap();
-    samples.expect("nothing cancels it")
+    setup
+        .trial_samples(Path::new(""), &Job::UNINTERRUPTED, &mut |_| {})
+        .unwrap()
 }
 
 fn run_on(experiment: &Experiment, samples: &TrialSamples, thread_count: usize) -> ExperimentResults {
@@ -372,7 +376,13 @@ fn a_trial_on_a_recording_equals_the_run_with_its_settings_and_division() {
             let mut settings = *setup.settings();
             settings.seed = seed;
             settings.training.method = [Method::recorded_regularization(), method("lm")][place % 2];
-            let mut alone = Run::on_sets(settings, sets.split, sets.test).unwrap();
+            let mut alone = Run::with_baselines(
+                settings,
+                RunSets::new(sets.split, sets.test),
+                Begin::Initialize,
+                &Job::UNINTERRUPTED,
+            )
+            .unwrap();
             while alone.step().is_none() {}
             assert_eq!(trial.seed, seed);
             assert_eq!(trial.errors, alone.errors(), "cell {place}");
@@ -381,7 +391,13 @@ fn a_trial_on_a_recording_equals_the_run_with_its_settings_and_division() {
             let sets = plan
                 .sets(Path::new(""), seed, &mut |_| ControlFlow::Continue(()))
                 .unwrap();
-            let taken_up = Run::resume_on_sets(settings, trial.states.clone(), sets.split, sets.test).unwrap();
+            let taken_up = Run::with_baselines(
+                settings,
+                RunSets::new(sets.split, sets.test),
+                Begin::Resume(trial.states.clone()),
+                &Job::UNINTERRUPTED,
+            )
+            .unwrap();
             assert_eq!(taken_up.network(), alone.network());
         }
         let summary = cell.summary();

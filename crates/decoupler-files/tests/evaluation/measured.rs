@@ -1,12 +1,13 @@
 //! Measured samples in the library: training, cross-validation and tables without any geometry.
 
 use decoupler_core::{
-    dataset::{Dataset, FoldUnit, PerRow, Split},
+    dataset::{Dataset, PerRow, Split, SplitBy},
     decoupling::{DecoderKind, Precision},
     evaluation::{
-        CrossValidation, DecoderSet, ErrorTable, Measured, Run, RunError, RunSettings, SimulatedSettings, Source,
-        TargetErrors,
+        Begin, CrossValidation, DecoderSet, ErrorTable, Measured, Run, RunError, RunSets, RunSettings,
+        SimulatedSettings, Source, TargetErrors,
     },
+    job::Job,
     network::{InputChoice, Quantity, ScalingChoice},
     scene::RowModel,
 };
@@ -47,7 +48,13 @@ fn split(set: &Dataset, first_test: usize) -> (Split, Dataset) {
 
 fn trained(settings: RunSettings, set: &Dataset, first_test: usize) -> Run {
     let (split, test) = split(set, first_test);
-    let mut run = Run::on_sets(settings, split, test).unwrap();
+    let mut run = Run::with_baselines(
+        settings,
+        RunSets::new(split, test),
+        Begin::Initialize,
+        &Job::UNINTERRUPTED,
+    )
+    .unwrap();
     while run.step().is_none() {}
     run
 }
@@ -119,15 +126,14 @@ fn every_fold_is_answered_by_networks_not_trained_on_it() {
         let validation = CrossValidation {
             folds: 5,
             repeats: 1,
-            unit,
+            by: unit,
         };
         let validated = validation
-            .run(&settings(RowModel::Shared), &set, 0, || false)
-            .unwrap()
+            .run(&settings(RowModel::Shared), &set, 0, &Job::UNINTERRUPTED)
             .unwrap();
         validated.scores(&set).network.targets()[0].r2.unwrap()
     };
-    let [by_sample, by_group] = [FoldUnit::Sample, FoldUnit::Snapshot].map(r2);
+    let [by_sample, by_group] = [SplitBy::Random, SplitBy::Group].map(r2);
     assert!(by_sample > 0.99, "samples of a test group are trained on: {by_sample}");
     assert!(by_group < 0.1, "an unseen group cannot be predicted: {by_group}");
 }
@@ -142,7 +148,7 @@ fn every_decoder_without_a_sensor_model_is_measured() {
     };
     let run = trained(settings, &set, 500);
     let (split, test) = split(&set, 500);
-    let decoders = DecoderSet::on_set(settings, split.training, Some(run.network()));
+    let decoders = DecoderSet::new(settings, split.training, Some(run.network()));
     for kind in DecoderKind::ALL {
         let report = decoders.measure(kind, Precision::Double, &test).unwrap();
         assert_eq!(report.is_none(), kind.needs_sensor(), "{kind}");
@@ -162,11 +168,23 @@ fn a_measured_training_resumes_bit_for_bit() {
     let set = recording(300, &[0], 5);
     let whole = trained(settings(RowModel::Shared), &set, 250);
     let (first, test) = split(&set, 250);
-    let mut paused = Run::on_sets(settings(RowModel::Shared), first.clone(), test.clone()).unwrap();
+    let mut paused = Run::with_baselines(
+        settings(RowModel::Shared),
+        RunSets::new(first.clone(), test.clone()),
+        Begin::Initialize,
+        &Job::UNINTERRUPTED,
+    )
+    .unwrap();
     for _ in 0..7 {
         paused.step();
     }
-    let mut resumed = Run::resume_on_sets(*paused.settings(), paused.states(), first, test).unwrap();
+    let mut resumed = Run::with_baselines(
+        *paused.settings(),
+        RunSets::new(first, test),
+        Begin::Resume(paused.states()),
+        &Job::UNINTERRUPTED,
+    )
+    .unwrap();
     while resumed.step().is_none() {}
     assert_eq!(resumed.network(), whole.network());
 }
@@ -176,10 +194,15 @@ fn mismatched_sets_are_named() {
     let set = recording(100, &[0, 1], 6);
     let (training, _) = split(&set, 80);
     let run = |rows, split: &Split, test| {
-        Run::on_sets(settings(rows), split.clone(), test)
-            .err()
-            .unwrap()
-            .to_string()
+        Run::with_baselines(
+            settings(rows),
+            RunSets::new(split.clone(), test),
+            Begin::Initialize,
+            &Job::UNINTERRUPTED,
+        )
+        .err()
+        .unwrap()
+        .to_string()
     };
     let narrow = Dataset::new(
         Array2::zeros((4, 3)),
@@ -214,7 +237,12 @@ fn mismatched_sets_are_named() {
     };
     let test = nameless.training.clone();
     assert!(matches!(
-        Run::on_sets(simulated, nameless, test),
+        Run::with_baselines(
+            simulated,
+            RunSets::new(nameless, test),
+            Begin::Initialize,
+            &Job::UNINTERRUPTED
+        ),
         Err(RunError::NoRowWires)
     ));
 }
@@ -224,7 +252,13 @@ fn the_error_on_a_test_set_without_a_row_lists_the_rows() {
     let set = recording(400, &[0, 1], 8);
     let (split, _) = split(&set, 300);
     let test = recording(50, &[1], 9).among_rows(&[0, 1]).unwrap();
-    let mut run = Run::on_sets(settings(RowModel::Each), split, test).unwrap();
+    let mut run = Run::with_baselines(
+        settings(RowModel::Each),
+        RunSets::new(split, test),
+        Begin::Initialize,
+        &Job::UNINTERRUPTED,
+    )
+    .unwrap();
     while run.step().is_none() {}
     assert!(run.errors().targets()[0].rmse < 0.05);
 }

@@ -1,7 +1,7 @@
 //! Samples keep their row-wire in all folds and selections.
 
 use decoupler_core::{
-    dataset::{Dataset, FoldUnit, Seed, Stream},
+    dataset::{Dataset, Seed, SplitBy, Stream},
     evaluation::{
         CrossValidation, Errors, SimulatedSettings, Simulation,
         experiments::{Axis, Experiment, ExperimentError, ExperimentResults, TrialSamples, run_experiments},
@@ -31,11 +31,11 @@ fn small(rows: Rows) -> SimulatedSettings {
     settings
 }
 
-fn experiment(rows: Rows, folds: usize, unit: FoldUnit) -> Experiment {
+fn experiment(rows: Rows, folds: usize, unit: SplitBy) -> Experiment {
     experiment_on(small(rows), folds, unit)
 }
 
-fn experiment_on(settings: SimulatedSettings, folds: usize, unit: FoldUnit) -> Experiment {
+fn experiment_on(settings: SimulatedSettings, folds: usize, unit: SplitBy) -> Experiment {
     Experiment {
         base: settings.into(),
         recording: None,
@@ -45,7 +45,7 @@ fn experiment_on(settings: SimulatedSettings, folds: usize, unit: FoldUnit) -> E
         cross_validation: Some(CrossValidation {
             folds,
             repeats: 1,
-            unit,
+            by: unit,
         }),
     }
 }
@@ -73,31 +73,25 @@ fn folds_are_counted_by_the_rows_read() {
             "single samples of one row-wire",
             Rows::One(2),
             24,
-            FoldUnit::Sample,
+            SplitBy::Random,
             true,
         ),
-        (
-            "as many snapshots as samples",
-            Rows::One(2),
-            24,
-            FoldUnit::Snapshot,
-            true,
-        ),
-        ("one more than there are", Rows::One(2), 25, FoldUnit::Snapshot, false),
-        ("single samples of known rows", Rows::Known, 6, FoldUnit::Sample, true),
-        ("whole snapshots of all rows", Rows::All, 6, FoldUnit::Snapshot, true),
-        ("more than there are snapshots", Rows::All, 7, FoldUnit::Snapshot, false),
+        ("as many snapshots as samples", Rows::One(2), 24, SplitBy::Group, true),
+        ("one more than there are", Rows::One(2), 25, SplitBy::Group, false),
+        ("single samples of known rows", Rows::Known, 6, SplitBy::Random, true),
+        ("whole snapshots of all rows", Rows::All, 6, SplitBy::Group, true),
+        ("more than there are snapshots", Rows::All, 7, SplitBy::Group, false),
     ];
     for (sentence, rows, folds, unit, is_possible) in cases {
         assert_eq!(experiment(rows, folds, unit).check().is_ok(), is_possible, "{sentence}");
     }
-    let missing = experiment(Rows::One(4), 2, FoldUnit::Sample).check();
+    let missing = experiment(Rows::One(4), 2, SplitBy::Random).check();
     assert!(matches!(missing, Err(ExperimentError::Scene(_))), "{missing:?}");
 }
 
 #[test]
 fn a_fold_without_samples_of_a_known_row_is_named() {
-    let results = finished(experiment(Rows::Known, 12, FoldUnit::Sample));
+    let results = finished(experiment(Rows::Known, 12, SplitBy::Random));
     let reason = results.cells[0].failures[0].reason.to_string();
     assert!(reason.contains("has no validation samples"), "{reason}");
 }
@@ -108,7 +102,7 @@ fn cross_validation_by_samples_works_for_one_row_and_for_known_rows() {
         let mut settings = small(rows);
         // Enough samples for every fold to have every row.
         settings.source.samples = 240;
-        let results = finished(experiment_on(settings, 3, FoldUnit::Sample));
+        let results = finished(experiment_on(settings, 3, SplitBy::Random));
         assert_eq!(results.cells[0].failures, []);
         let errors = &results.cells[0].trials[0].errors;
         assert!(errors.percent().unwrap() < 50.0, "{rows}: {errors:?}");
@@ -168,7 +162,7 @@ fn folds_are_tested_with_the_noise_of_the_test_set() {
             sets,
             ..Noise::relative(relative)
         };
-        let results = finished(experiment_on(settings, 4, FoldUnit::Snapshot));
+        let results = finished(experiment_on(settings, 4, SplitBy::Group));
         results.cells[0].trials[0].errors.nodes().unwrap().z_mm
     };
     let clean = z_mm(NoisySets::Both, 0.0);

@@ -2,10 +2,13 @@
 
 use decoupler_core::{
     dataset::Seed,
-    evaluation::{MAX_STARTS, Run, RunError, SimulatedSettings, Simulation, StartTrainer, Workload, best_start},
+    evaluation::{
+        Begin, MAX_STARTS, Run, RunError, RunSets, SimulatedSettings, Simulation, StartTrainer, Workload, best_start,
+    },
+    job::Job,
     machine::{MemoryBudget, MemorySource},
     sensor::SensorModel,
-    training::{Method, StopReason, StoppingRules, Trainer},
+    training::{Method, StopReason, StoppingRules, Trainer, TrainerState},
 };
 
 fn settings(starts: usize) -> SimulatedSettings {
@@ -45,6 +48,12 @@ fn bits(run: &Run) -> Vec<(Vec<u64>, usize, Option<StopReason>)> {
         (bits, trainer.latest().epoch, trainer.stop_reason())
     };
     run.trainers().iter().map(of).collect()
+}
+
+/// Resumes a run of these settings from saved states.
+fn resumed(settings: SimulatedSettings, states: Vec<TrainerState>) -> Result<Run, RunError> {
+    let sets = RunSets::draw(&settings, MemoryBudget::UNLIMITED, &Job::UNINTERRUPTED)?;
+    Run::new(settings.into(), sets, Begin::Resume(states), &Job::UNINTERRUPTED)
 }
 
 #[test]
@@ -115,7 +124,7 @@ fn pauses_and_restored_states_change_no_bit() {
             }
             if epoch % 5 == 2 {
                 let text = serde_json::to_string(&paused.states()).unwrap();
-                paused = Run::resume(settings, serde_json::from_str(&text).unwrap()).unwrap();
+                paused = resumed(settings, serde_json::from_str(&text).unwrap()).unwrap();
             }
             paused.step();
         }
@@ -193,11 +202,11 @@ fn too_many_starts_are_refused() {
         bytes: Workload::of(&wide).unwrap().bytes - 1,
         source: MemorySource::User,
     };
-    let error = Run::prepare_unless(wide, memory, &|| false).err().unwrap();
+    let error = RunSets::draw(&wide, memory, &Job::UNINTERRUPTED).err().unwrap();
     assert!(matches!(error, RunError::Memory { .. }), "{error}");
     let states = Run::prepare(settings(2)).unwrap().states();
     assert!(matches!(
-        Run::resume(settings(3), states),
+        resumed(settings(3), states),
         Err(RunError::Starts { found: 2, .. })
     ));
 }

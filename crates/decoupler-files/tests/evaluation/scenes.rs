@@ -6,11 +6,14 @@ use decoupler_core::{
     dataset::Seed,
     decoupling::{DecoderKind, Precision},
     evaluation::{
-        DecoderSet, Outlook, Preset, Run, SimulatedSettings, Simulation, TradeOffPoint, fastest_under,
-        measure_trade_off, most_accurate_under,
+        Begin, DecoderSet, Outlook, Preset, Run, RunError, RunSets, SimulatedSettings, Simulation, TradeOffPoint,
+        fastest_under, measure_trade_off, most_accurate_under,
     },
+    job::Job,
+    machine::MemoryBudget,
     scene::{Loading, Movement, Noise, Rows},
     sensor::SensorModel,
+    training::TrainerState,
 };
 use decoupler_files::{export::NetworkFile, import::Setup};
 
@@ -38,9 +41,26 @@ fn trained(settings: SimulatedSettings) -> Run {
 }
 
 fn z_percent(run: &Run, kind: DecoderKind, precision: Precision) -> f64 {
-    let set = DecoderSet::new(&run.settings().simulated().unwrap(), Some(run.network())).unwrap();
+    let set = DecoderSet::new(
+        *run.settings(),
+        RunSets::draw(
+            &run.settings().simulated().unwrap(),
+            MemoryBudget::UNLIMITED,
+            &Job::UNINTERRUPTED,
+        )
+        .unwrap()
+        .split
+        .training,
+        Some(run.network()),
+    );
     let report = set.measure(kind, precision, run.test()).unwrap().unwrap();
     report.errors.percent().unwrap()
+}
+
+/// Resumes a run of these settings from saved states.
+fn resumed(settings: SimulatedSettings, states: Vec<TrainerState>) -> Result<Run, RunError> {
+    let sets = RunSets::draw(&settings, MemoryBudget::UNLIMITED, &Job::UNINTERRUPTED)?;
+    Run::new(settings.into(), sets, Begin::Resume(states), &Job::UNINTERRUPTED)
 }
 
 #[test]
@@ -79,8 +99,15 @@ fn unknown_rows_are_identified() {
     assert_eq!(run.network().values().len(), 1);
     assert!(z_percent(&run, DecoderKind::Newton, Precision::Double) < 1e-9);
     settings.source.scene.noise = Noise::relative(1e-5);
-    let set = DecoderSet::new(&settings, None).unwrap();
-    let test = settings.draw_test().unwrap();
+    let set = DecoderSet::new(
+        settings.into(),
+        RunSets::draw(&settings, MemoryBudget::UNLIMITED, &Job::UNINTERRUPTED)
+            .unwrap()
+            .split
+            .training,
+        None,
+    );
+    let test = settings.source.draw_test(settings.seed).unwrap();
     let report = set
         .measure(DecoderKind::Newton, Precision::Double, &test)
         .unwrap()
@@ -125,7 +152,7 @@ fn known_rows_resume_from_saved_states_bit_for_bit() {
     let mut paused = Run::prepare(settings).unwrap();
     while paused.stop_reason().is_none() {
         let text = serde_json::to_string(&paused.states()).unwrap();
-        paused = Run::resume(settings, serde_json::from_str(&text).unwrap()).unwrap();
+        paused = resumed(settings, serde_json::from_str(&text).unwrap()).unwrap();
         paused.step();
     }
     assert_eq!(paused.network(), whole.network());
@@ -203,9 +230,17 @@ fn a_trade_off_has_a_point_for_every_choice() {
     settings.training.stopping.epochs = 3;
     let mut points: Vec<TradeOffPoint> = Vec::new();
     let keep = |_, point: Result<_, _>, _: Option<&_>| points.push(point.unwrap());
-    let sets = Setup::from(settings).sets(Path::new(""), &|| false, &mut |_| ());
-    let sets = sets.unwrap().unwrap().sets;
-    assert!(measure_trade_off(&settings.into(), &sets, &[2, 3], &DecoderKind::ALL, || false, keep).unwrap());
+    let sets = Setup::from(settings).sets(Path::new(""), &Job::UNINTERRUPTED, &mut |_| ());
+    let sets = sets.unwrap().sets;
+    measure_trade_off(
+        &settings.into(),
+        &sets,
+        &[2, 3],
+        &DecoderKind::ALL,
+        &Job::UNINTERRUPTED,
+        keep,
+    )
+    .unwrap();
     // Five without a network; network in two precisions and polish, each with two numbers of hidden nodes.
     assert_eq!(points.len(), 5 + 2 * 3);
     assert_eq!(points.iter().filter(|point| point.hidden() == Some(3)).count(), 3);
@@ -220,6 +255,8 @@ fn a_trade_off_has_a_point_for_every_choice() {
     );
     let mut none = 0;
     let count = |_, _: Result<_, _>, _: Option<&_>| none += 1;
-    assert!(!measure_trade_off(&settings.into(), &sets, &[2], &DecoderKind::ALL, || true, count).unwrap());
+    let cancelled = Job::new(&|| true);
+    let measured = measure_trade_off(&settings.into(), &sets, &[2], &DecoderKind::ALL, &cancelled, count);
+    assert!(matches!(measured, Err(RunError::Cancelled(_))));
     assert_eq!(none, 0);
 }

@@ -3,6 +3,7 @@
 use decoupler_core::{
     decoupling::{DecoderKind, Precision},
     evaluation::{Preset, TradeOffLevel, TradeOffLimits, TradeOffPoint, measure_trade_off},
+    job::Job,
 };
 use decoupler_files::{
     export::figures::{Picture, PictureFormat},
@@ -233,9 +234,9 @@ fn hollow_marks_of_the_trade_off_mean_32_bits_and_nothing_else() {
             });
         };
         let kinds = [DecoderKind::Ridge, DecoderKind::Network];
-        let sets = Setup::from(settings).sets("".as_ref(), &|| false, &mut |_| ());
-        let sets = sets.unwrap().unwrap().sets;
-        measure_trade_off(&settings.into(), &sets, &[3], &kinds, || false, on_point).unwrap();
+        let sets = Setup::from(settings).sets("".as_ref(), &Job::UNINTERRUPTED, &mut |_| ());
+        let sets = sets.unwrap().sets;
+        measure_trade_off(&settings.into(), &sets, &[3], &kinds, &Job::UNINTERRUPTED, on_point).unwrap();
     }
     let is_single = |single: bool| {
         let of_bits = points

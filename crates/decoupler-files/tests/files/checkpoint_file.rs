@@ -5,6 +5,7 @@ use std::{fs, path::PathBuf, time::Duration};
 use decoupler_core::{
     dataset::Seed,
     evaluation::{Run, SimulatedSettings, Simulation},
+    job::Job,
     sensor::SensorModel,
     training::{EpochRecord, Method, StopReason},
 };
@@ -76,7 +77,7 @@ fn a_run_from_a_file_continues_bit_for_bit() {
             .save(&path)
             .unwrap();
         let file = CheckpointFile::load(&path).unwrap();
-        let mut run = file.resume().unwrap();
+        let mut run = file.resume(&Job::UNINTERRUPTED, &mut |_| ()).unwrap().0;
         while run.step().is_none() {}
         let mut files = [&run, &whole].map(|run| NetworkFile::from_run(run, None).unwrap());
         files.iter_mut().for_each(|file| file.training.seconds = 0.0);
@@ -103,7 +104,11 @@ fn the_wall_time_is_that_of_all_sessions_or_unknown() {
         assert!(file.wall_time == run.wall_time() && file.wall_time > Some(Duration::ZERO));
         file.wall_time = saved;
         file.save(&path).unwrap();
-        let mut resumed = CheckpointFile::load(&path).unwrap().resume().unwrap();
+        let mut resumed = CheckpointFile::load(&path)
+            .unwrap()
+            .resume(&Job::UNINTERRUPTED, &mut |_| ())
+            .unwrap()
+            .0;
         let alone = (starts == 1).then(|| run.leader().elapsed());
         let before = resumed.wall_time();
         assert_eq!(before, saved.or(alone));
@@ -125,7 +130,11 @@ fn a_diverged_training_can_be_saved_and_continued_with_another_method() {
     let mut run = stepped(settings(diverging), 9);
     assert_eq!(run.stop_reason(), Some(StopReason::Diverged));
     CheckpointFile::from_run(&run, None).unwrap().save(&path).unwrap();
-    let mut read = CheckpointFile::load(&path).unwrap().resume().unwrap();
+    let mut read = CheckpointFile::load(&path)
+        .unwrap()
+        .resume(&Job::UNINTERRUPTED, &mut |_| ())
+        .unwrap()
+        .0;
     let text = |run: &Run| -> Vec<_> {
         let text = |record: &EpochRecord| format!("{record:?}");
         run.leader().history().iter().map(text).collect()
@@ -136,7 +145,11 @@ fn a_diverged_training_can_be_saved_and_continued_with_another_method() {
     for run in [&mut read, &mut run] {
         run.continue_with(Method::default()).unwrap();
         CheckpointFile::from_run(run, None).unwrap().save(&path).unwrap();
-        *run = CheckpointFile::load(&path).unwrap().resume().unwrap();
+        *run = CheckpointFile::load(&path)
+            .unwrap()
+            .resume(&Job::UNINTERRUPTED, &mut |_| ())
+            .unwrap()
+            .0;
         while run.step().is_none() {}
     }
     assert!(read.leader().best_mse() < 0.5 * before, "{before}");
@@ -254,7 +267,7 @@ fn invalid_contents_are_refused() {
         edit(&mut file);
         file.save(&path).unwrap();
         match CheckpointFile::load(&path) {
-            Ok(file) => file.resume().err().unwrap().to_string(),
+            Ok(file) => file.resume(&Job::UNINTERRUPTED, &mut |_| ()).err().unwrap().to_string(),
             Err(error) => error.to_string(),
         }
     };

@@ -8,7 +8,8 @@ use std::{
 
 use decoupler_core::{
     dataset::{Division, Seed, SplitBy},
-    evaluation::{Measured, Run, RunSettings, SimulatedSettings, Simulation, TargetErrors, TestErrors},
+    evaluation::{Begin, Measured, Run, RunSettings, SimulatedSettings, Simulation, TargetErrors, TestErrors},
+    job::Job,
     scene::RowModel,
 };
 use decoupler_files::{
@@ -59,8 +60,8 @@ fn settings() -> RunSettings {
 /// A run on the recording in `folder`, with its sets.
 fn prepared(folder: &Path) -> (Run, SetupSets) {
     let setup = Setup::recording(settings(), curved(folder));
-    let sets = setup.sets(folder, &|| false, &mut |_| ()).unwrap().unwrap();
-    let run = sets.run(&setup, &|| false).unwrap().unwrap();
+    let sets = setup.sets(folder, &Job::UNINTERRUPTED, &mut |_| ()).unwrap();
+    let run = sets.run(&setup, Begin::Initialize, &Job::UNINTERRUPTED).unwrap();
     (run, sets)
 }
 
@@ -108,8 +109,7 @@ fn networks_of_recordings_are_saved_with_the_names_of_their_channels() {
     assert_eq!(read.source_name(), "data");
     let sets = read
         .setup()
-        .sets(Path::new(""), &|| false, &mut |_| ())
-        .unwrap()
+        .sets(Path::new(""), &Job::UNINTERRUPTED, &mut |_| ())
         .unwrap();
     let bits = |file: &NetworkFile| file.network.decouple(&sets.sets.test).mapv(f64::to_bits);
     assert_eq!(bits(&read), bits(&file));
@@ -169,7 +169,7 @@ fn a_checkpoint_of_a_recording_resumes_bit_for_bit_or_reports_a_changed_recordin
     checkpoint.save(&path).unwrap();
     let read = CheckpointFile::load(&path).unwrap();
     assert_eq!(read, checkpoint);
-    let mut resumed = read.clone().resume().unwrap();
+    let mut resumed = read.clone().resume(&Job::UNINTERRUPTED, &mut |_| ()).unwrap().0;
     while resumed.step().is_none() {}
     assert_eq!(resumed.network(), whole.network);
     // A changed digit of a sample.
@@ -177,7 +177,7 @@ fn a_checkpoint_of_a_recording_resumes_bit_for_bit_or_reports_a_changed_recordin
     fs::write(&data, fs::read_to_string(&data).unwrap().replacen("0.", "0.0", 1)).unwrap();
     let error = whole.test_set().err().unwrap();
     assert!(matches!(error, SetupError::OtherSamples(_)), "{error}");
-    let error = read.resume().err().unwrap();
+    let error = read.resume(&Job::UNINTERRUPTED, &mut |_| ()).err().unwrap();
     assert!(matches!(error, SetupError::OtherSamples(_)), "{error}");
     assert!(error.to_string().contains("data.csv' has other samples"), "{error}");
 }
@@ -199,8 +199,9 @@ fn files_can_be_moved_together_with_their_recording() {
         assert_eq!(file.network, whole.network);
         let mut resumed = CheckpointFile::load(&folder.join("run.checkpoint"))
             .unwrap()
-            .resume()
-            .unwrap();
+            .resume(&Job::UNINTERRUPTED, &mut |_| ())
+            .unwrap()
+            .0;
         while resumed.step().is_none() {}
         assert_eq!(resumed.network(), whole.network, "{folder:?}");
     };
@@ -233,11 +234,16 @@ fn a_recording_that_is_missing_is_named_and_can_be_given_again() {
     fs::rename(&data, &renamed).unwrap();
     let mut read = CheckpointFile::load(&path).unwrap();
     assert_eq!(read.recorded.as_ref().unwrap().missing(), [data.as_path()]);
-    let error = read.clone().resume().err().unwrap().to_string();
+    let error = read
+        .clone()
+        .resume(&Job::UNINTERRUPTED, &mut |_| ())
+        .err()
+        .unwrap()
+        .to_string();
     assert!(error.contains("cannot read") && error.contains("data.csv"), "{error}");
     read.recorded = read.recorded.map(|recorded| recorded.relocated(&data, &renamed));
     assert_eq!(read.recorded.as_ref().unwrap().missing(), Vec::<&Path>::new());
-    let mut resumed = read.resume().unwrap();
+    let mut resumed = read.resume(&Job::UNINTERRUPTED, &mut |_| ()).unwrap().0;
     while resumed.step().is_none() {}
     assert_eq!(resumed.network(), whole.network);
 }

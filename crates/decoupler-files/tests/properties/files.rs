@@ -5,6 +5,7 @@ use std::sync::{Arc, LazyLock};
 use decoupler_core::{
     dataset::Dataset,
     evaluation::{Run, SimulatedSettings},
+    job::Job,
     network::{DecouplingNetwork, Mlp},
     training::Method,
 };
@@ -110,7 +111,7 @@ proptest! {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("run.checkpoint");
         CheckpointFile::from_run(&whole, None).unwrap().save(&path).unwrap();
-        let mut read = CheckpointFile::load(&path).unwrap().resume().unwrap();
+        let mut read = CheckpointFile::load(&path).unwrap().resume(&Job::UNINTERRUPTED, &mut |_| ()).unwrap().0;
         prop_assert_eq!(read.states(), whole.states());
         for _ in 0..after {
             whole.step();

@@ -3,7 +3,8 @@
 use decoupler_core::{
     dataset::Dataset,
     decoupling::{DecoderKind, Precision, decode_set},
-    evaluation::{DecoderReport, DecoderSet, Outlook, ReferenceNote, Run, RunDefect, SimulatedSettings},
+    evaluation::{DecoderReport, DecoderSet, Outlook, ReferenceNote, Run, RunDefect, RunSets, SimulatedSettings},
+    machine::MemoryBudget,
     ndarray::Array2,
     scene::{Loading, Noise, Rows},
 };
@@ -59,8 +60,13 @@ struct Measured {
 fn measured(settings: &SimulatedSettings) -> Result<Measured, Verdict> {
     let mut run = Run::prepare(*settings).map_err(|error| refused(&error))?;
     while run.step().is_none() {}
-    let set = DecoderSet::new(settings, Some(run.network())).map_err(|error| refused(&error))?;
-    let training = settings.draw().map_err(|error| refused(&error))?.0.training;
+    let sets = RunSets::draw(
+        settings,
+        MemoryBudget::UNLIMITED,
+        &decoupler_core::job::Job::UNINTERRUPTED,
+    );
+    let training = sets.map_err(|error| refused(&error))?.split.training;
+    let set = DecoderSet::new((*settings).into(), training.clone(), Some(run.network()));
     let mut answers = run.test().targets().to_owned();
     let shared = settings.source.scene.rows == Rows::All;
     for sample in 0..run.test().samples() {

@@ -98,11 +98,11 @@ fn judge_checkpoint(damage: Damage, place: f64) -> Verdict {
     rewrite(&path, damage, place);
     let resumed = match CheckpointFile::load(&path) {
         Err(error) => return refused_in(folder.path(), &error),
-        Ok(file) => file.resume(),
+        Ok(file) => file.resume(&decoupler_core::job::Job::UNINTERRUPTED, &mut |_| ()),
     };
     match resumed {
         Err(error) => refused(&error),
-        Ok(mut resumed) => {
+        Ok((mut resumed, _)) => {
             while resumed.step().is_none() {}
             while run.step().is_none() {}
             if resumed.decouple_test() == run.decouple_test() {

@@ -2,7 +2,8 @@
 
 use decoupler_core::{
     decoupling::{Decoder, DecoderKind},
-    evaluation::{DecoderSet, Run},
+    evaluation::{DecoderSet, Run, RunSets},
+    machine::MemoryBudget,
     scene::Noise,
 };
 
@@ -31,7 +32,18 @@ fn judge(noise: Noise, changed: impl Fn(f64) -> f64, is_all: bool) -> Vec<(Strin
     settings.source.scene.noise = noise;
     let mut run = Run::prepare(settings).unwrap();
     while run.step().is_none() {}
-    let set = DecoderSet::new(&settings, Some(run.network())).unwrap();
+    let set = DecoderSet::new(
+        settings.into(),
+        RunSets::draw(
+            &settings,
+            MemoryBudget::UNLIMITED,
+            &decoupler_core::job::Job::UNINTERRUPTED,
+        )
+        .unwrap()
+        .split
+        .training,
+        Some(run.network()),
+    );
     let mut readings = run.test().sample_readings(0).to_vec();
     let count = if is_all { readings.len() } else { 1 };
     readings[..count].iter_mut().for_each(|value| *value = changed(*value));

@@ -2,8 +2,9 @@
 
 use decoupler_core::{
     dataset::{Dataset, Seed},
-    evaluation::SimulatedSettings,
+    evaluation::{RunSets, SimulatedSettings},
     glam::DVec3,
+    machine::MemoryBudget,
     scene::Noise,
     sensor::SensorModel,
 };
@@ -23,7 +24,11 @@ fn largest_ohm(model: &SensorModel) -> f64 {
 }
 
 fn judge(settings: &SimulatedSettings) -> Vec<(String, Verdict)> {
-    let (split, test) = match settings.draw() {
+    let RunSets { split, test, .. } = match RunSets::draw(
+        settings,
+        MemoryBudget::UNLIMITED,
+        &decoupler_core::job::Job::UNINTERRUPTED,
+    ) {
         Ok(drawn) => drawn,
         Err(error) => return vec![("drawn".to_owned(), refused(&error))],
     };
@@ -36,7 +41,7 @@ fn judge(settings: &SimulatedSettings) -> Vec<(String, Verdict)> {
         },
         ..*settings
     };
-    let truth = clean.draw_test().unwrap();
+    let truth = clean.source.draw_test(clean.seed).unwrap();
     let mut cells = vec![
         ("training readings".to_owned(), judge_finite(&split.training)),
         ("test readings".to_owned(), judge_finite(&test)),
@@ -152,7 +157,7 @@ fn judge_seeds(settings: &SimulatedSettings) -> Verdict {
     let draw = |seed: u64| {
         let mut settings = *settings;
         settings.seed = Seed(seed);
-        settings.draw_test()
+        settings.source.draw_test(settings.seed)
     };
     match (draw(7), draw(7), draw(8)) {
         (Ok(one), Ok(same), Ok(other)) => {

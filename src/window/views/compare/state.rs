@@ -1,6 +1,6 @@
 use std::{fmt, path::Path, sync::Arc, time::Duration};
 
-use decoupler_core::text::counted;
+use decoupler_core::{job::Job, text::counted};
 use decoupler_files::{
     export::{KeptRun, NetworkFile, format_duration, format_percent},
     figure::surface::Surface,
@@ -11,7 +11,7 @@ use ndarray::Array2;
 
 use super::view::differences_from_paper;
 use crate::window::{
-    job::{Job, Wake},
+    job::{Background, Wake},
     shared::{Effect, PLACES, Phase, RightCard, RunList, Shared},
     test_view::{Frame, Positions, RecordedTest, TargetCharts, TestSet, TestView},
     theme::{space, type_size},
@@ -46,8 +46,8 @@ pub struct Place {
     pub problem: Option<String>,
     /// Target of a recording whose regression is shown.
     pub target: usize,
-    /// Job that prepares them.
-    job: Option<Job<Result<Box<Compared>, String>>>,
+    /// Work that prepares them.
+    job: Option<Background<Result<Box<Compared>, String>>>,
 }
 
 /// A run prepared for drawing.
@@ -81,19 +81,16 @@ impl Place {
 }
 
 impl Compared {
-    /// Simulates the test set of a run again, or reads it from the files of its recording; `None` once cancelled.
-    fn new(file: &NetworkFile, is_cancelled: &dyn Fn() -> bool) -> Result<Option<Self>, String> {
+    /// Simulates the test set of a run again, or reads it from the files of its recording.
+    fn new(file: &NetworkFile, job: &Job<'_>) -> Result<Self, String> {
         let test = match (file.settings.simulated(), &file.recorded) {
             (Some(settings), _) => TestSet::Array(TestView::draw(&settings).map_err(|error| error.to_string())?),
-            (None, Some(recorded)) => match recorded_test(file, recorded, is_cancelled)? {
-                Some(test) => TestSet::Recording(test),
-                None => return Ok(None),
-            },
+            (None, Some(recorded)) => TestSet::Recording(recorded_test(file, recorded, job)?),
             (None, None) => return Err("This run has no test samples.".to_owned()),
         };
         let answers = Arc::new(file.network.decouple(test.set()));
         let drawn = drawn(&test, &answers, 0);
-        Ok(Some(Self { test, answers, drawn }))
+        Ok(Self { test, answers, drawn })
     }
 
     /// Draws `snapshot`, or the last one if there are fewer.
@@ -105,11 +102,7 @@ impl Compared {
 }
 
 /// Reads the test samples of a network again.
-fn recorded_test(
-    file: &NetworkFile,
-    recorded: &Recorded,
-    is_cancelled: &dyn Fn() -> bool,
-) -> Result<Option<RecordedTest>, String> {
+fn recorded_test(file: &NetworkFile, recorded: &Recorded, job: &Job<'_>) -> Result<RecordedTest, String> {
     if let [missing, ..] = recorded.missing()[..] {
         return Err(format!(
             "The recording '{}' no longer exists, so its test samples cannot be shown. Put the file back to see them; \
@@ -117,10 +110,8 @@ fn recorded_test(
             missing.display()
         ));
     }
-    let sets = file.setup().sets(Path::new(""), is_cancelled, &mut |_| ());
-    let Some(sets) = sets.map_err(|error| error.to_string())? else {
-        return Ok(None);
-    };
+    let sets = file.setup().sets(Path::new(""), job, &mut |_| ());
+    let sets = sets.map_err(|error| error.to_string())?;
     let is_same = sets
         .recorded()
         .is_some_and(|now| now.samples_crc32 == recorded.samples_crc32);
@@ -131,12 +122,11 @@ fn recorded_test(
              file, or train again."
         ));
     }
-    let test = RecordedTest::new(
+    Ok(RecordedTest::new(
         Arc::clone(&sets.sets.test),
         Arc::new(file.problem.clone()),
         recorded.plan.test_order(),
-    );
-    Ok(Some(test))
+    ))
 }
 
 /// Draws `snapshot` of a test set, or the last one if there are fewer.
@@ -222,7 +212,7 @@ impl CompareView {
                     (place.id, place.job) = (Some(run.id), Some(prepare(run.file, &self.wake)));
                 }
             }
-            let Some(prepared) = place.job.as_ref().and_then(Job::next_event) else {
+            let Some(prepared) = place.job.as_ref().and_then(Background::next_event) else {
                 continue;
             };
             place.job = None;
@@ -240,14 +230,13 @@ impl CompareView {
 }
 
 /// Prepares the test set of a run and the answers of its network in the background.
-fn prepare(file: &Arc<NetworkFile>, wake: &Wake) -> Job<Result<Box<Compared>, String>> {
-    let mut job = Job::new("compared run", Arc::clone(wake));
+fn prepare(file: &Arc<NetworkFile>, wake: &Wake) -> Background<Result<Box<Compared>, String>> {
+    let mut job = Background::new("compared run", Arc::clone(wake));
     let file = Arc::clone(file);
     job.start(
-        move |report| Compared::new(&file, &|| report.is_cancelled()),
+        move |report| Compared::new(&file, &Job::new(&|| report.is_cancelled())),
         |prepared| match prepared {
-            Ok(Ok(Some(compared))) => Ok(Box::new(compared)),
-            Ok(Ok(None)) => Err("Reading the test samples was cancelled.".to_owned()),
+            Ok(Ok(compared)) => Ok(Box::new(compared)),
             Ok(Err(reason)) => Err(reason),
             Err(error) => Err(format!("The test samples of this run could not be prepared: {error}")),
         },

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use decoupler_core::{
-    dataset::FoldUnit,
+    dataset::SplitBy,
     evaluation::{
         MAX_STARTS,
         experiments::{AxisKind, PaperTable},
@@ -155,15 +155,17 @@ fn cross_validation_ui(ui: &mut Ui, form: &mut Form) {
     );
     let hint = "Number of shuffles into new folds, for each seed.";
     count_ui(ui, "Repeats", hint, &mut validation.repeats, 1..=MAX_TRIALS);
-    let units = [(FoldUnit::Sample, "By sample"), (FoldUnit::Snapshot, "By snapshot")];
-    if let Some(unit) = segmented_ui(ui, "Unit of the folds", &units, validation.unit, true) {
-        validation.unit = unit;
+    let units = [(SplitBy::Random, "By sample"), (SplitBy::Group, "By snapshot")];
+    if let Some(unit) = segmented_ui(ui, "Unit of the folds", &units, validation.by, true) {
+        validation.by = unit;
     }
     dim_ui(
         ui,
-        match validation.unit {
-            FoldUnit::Sample => "As in the paper: rows of one snapshot may be in both the training and the test folds.",
-            FoldUnit::Snapshot => "Whole snapshots: no training sample is from the same moment as a test sample.",
+        match validation.by {
+            SplitBy::Random => "As in the paper: rows of one snapshot may be in both the training and the test folds.",
+            SplitBy::Group | SplitBy::Time => {
+                "Whole snapshots: no training sample is from the same moment as a test sample."
+            }
         },
     );
 }

@@ -18,12 +18,13 @@ use decoupler_core::{
             worker_threads,
         },
     },
+    job::Job,
     training::EpochRecord,
 };
 use decoupler_files::{
     export::{ExperimentTable, sweep_specification},
     figure::{Figure, experiment_figure},
-    import::{Plan, Setup},
+    import::{Plan, Setup, SetupError},
 };
 use serde_json::Value;
 
@@ -32,7 +33,7 @@ use super::{
     sweep_folder::{OpenFolder, SweepFolder},
 };
 use crate::window::{
-    job::{Job, Wake},
+    job::{Background, Wake},
     shared::{Effect, Matter},
     widgets::SortBy,
 };
@@ -83,7 +84,7 @@ pub struct ExperimentsView {
     pub look: ExperimentLook,
     /// Experiment that is running.
     pub running: Option<Running>,
-    pub(super) job: Job<ExperimentEvent>,
+    pub(super) job: Background<ExperimentEvent>,
     pub(super) folder: SweepFolder,
     forms: HashMap<Topic, CheckedForm>,
     outcomes: HashMap<Topic, Outcome>,
@@ -214,7 +215,7 @@ impl ExperimentsView {
             look: ExperimentLook::default(),
             running: None,
             folder: SweepFolder::new(Arc::clone(&wake)),
-            job: Job::new("experiments", wake),
+            job: Background::new("experiments", wake),
             forms: HashMap::new(),
             outcomes: HashMap::new(),
         };
@@ -395,13 +396,14 @@ pub enum ExperimentEvent {
 
 /// Runs `experiment` on the samples of `setup`; a running experiment is cancelled, and ends after the epochs in
 /// progress.
-pub fn run(job: &mut Job<ExperimentEvent>, experiment: Experiment, setup: Setup) {
+pub fn run(job: &mut Background<ExperimentEvent>, experiment: Experiment, setup: Setup) {
     job.start(
         move |report| {
             // The paths of the window's plans are absolute.
-            let samples = setup.trial_samples(Path::new(""), &|| report.is_cancelled(), &mut |_| {});
-            let Some(samples) = samples.map_err(|error| error.to_string())? else {
-                return Ok(());
+            let samples = setup.trial_samples(Path::new(""), &Job::new(&|| report.is_cancelled()), &mut |_| {});
+            let samples = match samples {
+                Err(SetupError::Cancelled(_)) => return Ok(()),
+                samples => samples.map_err(|error| error.to_string())?,
             };
             if let TrialSamples::Recorded(recorded) = &samples {
                 report.send(ExperimentEvent::Read(Arc::clone(&recorded.problem)));

@@ -13,7 +13,7 @@ use eframe::egui::{Align, Label, Layout, RichText, Ui, vec2};
 use serde_json::Value;
 
 use crate::window::{
-    job::{Job, Report, Wake},
+    job::{Background, Report, Wake},
     shared::{Contents, Effect, FileTask, FileWords, Purpose},
     theme::{Theme, semibold, space, type_size},
     widgets::{
@@ -33,7 +33,7 @@ const FOLDER: FileWords = FileWords {
 #[derive(Debug)]
 pub(in crate::window::views::experiments) struct SweepFolder {
     pub(super) open: Option<OpenFolder>,
-    job: Job<FolderEvent>,
+    job: Background<FolderEvent>,
     choices: Sender<PathBuf>,
     chosen: Receiver<PathBuf>,
 }
@@ -55,7 +55,7 @@ impl SweepFolder {
         let (choices, chosen) = channel();
         Self {
             open: None,
-            job: Job::new("sweep folder", wake),
+            job: Background::new("sweep folder", wake),
             choices,
             chosen,
         }

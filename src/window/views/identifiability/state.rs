@@ -13,7 +13,7 @@ use decoupler_core::{
 };
 
 use super::{Analysis, Question, recording::RecordingStudy};
-use crate::window::job::{Job, Wake};
+use crate::window::job::{Background, Wake};
 
 /// The Identifiability view.
 #[derive(Debug)]
@@ -112,7 +112,7 @@ pub struct Answer {
 /// Handle of the analysis thread.
 #[derive(Debug)]
 pub struct IdentifiabilityWorker {
-    job: Job<Answered>,
+    job: Background<Answered>,
     /// The newest question, waiting while another is answered.
     waiting: Option<Question>,
 }
@@ -121,7 +121,7 @@ impl IdentifiabilityWorker {
     /// Creates a worker without a question; `wake` is called after each answer.
     pub fn new(wake: Wake) -> Self {
         Self {
-            job: Job::new("identifiability", wake),
+            job: Background::new("identifiability", wake),
             waiting: None,
         }
     }

@@ -38,7 +38,7 @@ fn warnings_ui(ui: &mut Ui, frame: &LiveFrame) {
         Watched::Named(diagnosis) => {
             let its = match diagnosis.wire {
                 FaultyWire::Row(_) | FaultyWire::Column(_) => "Its readings are left out",
-                FaultyWire::Rows(_) | FaultyWire::Columns(_) => "Their readings are left out",
+                FaultyWire::Columns(_) => "Their readings are left out",
             };
             let text = capitalised(&diagnosis.to_string());
             note_ui(

@@ -22,7 +22,7 @@ use super::{
     tools::LiveFile,
 };
 use crate::window::{
-    job::{Job, Wake},
+    job::{Background, Wake},
     shared::{Effect, RunList, Shared},
     theme::space,
     widgets::{
@@ -317,7 +317,7 @@ pub struct NetworkChoice {
     file: Option<(String, Arc<NetworkFile>)>,
     problem: Option<String>,
     chosen: Option<Receiver<PathBuf>>,
-    loading: Job<Result<Loaded, String>>,
+    loading: Background<Result<Loaded, String>>,
 }
 
 /// A network that was read for this view.
@@ -348,7 +348,7 @@ impl NetworkChoice {
             file: None,
             problem: None,
             chosen: None,
-            loading: Job::prompt("network file", wake),
+            loading: Background::prompt("network file", wake),
         }
     }
 

@@ -16,7 +16,7 @@ use super::{
     source_form::{NetworkChoice, SourceForm, SourceKind},
 };
 use crate::window::{
-    job::{Job, Wake},
+    job::{Background, Wake},
     shared::{Effect, Matter, Notice, Shared},
 };
 
@@ -52,7 +52,7 @@ pub struct LiveView {
     ended: Option<SourcePlan>,
     /// True if the window has received a frame and not yet reported to the thread that it was drawn.
     is_to_be_drawn: bool,
-    job: Job<LiveEvent>,
+    job: Background<LiveEvent>,
 }
 
 /// Decoding under way.
@@ -93,7 +93,7 @@ impl LiveView {
             node: None,
             ended: None,
             is_to_be_drawn: false,
-            job: Job::prompt("live", wake),
+            job: Background::prompt("live", wake),
         }
     }
 
@@ -353,7 +353,7 @@ const RECORDING: (&str, &str) = (
 /// The sample recording, written to a file next to the user's recordings, and the network that decodes it.
 #[derive(Debug)]
 pub struct Sample {
-    job: Job<Result<SampleFiles, String>>,
+    job: Background<Result<SampleFiles, String>>,
 }
 
 /// The sample on the disk.
@@ -371,7 +371,7 @@ impl Sample {
     /// Creates a sample that is not written yet; `wake` is called when it is.
     pub(super) fn new(wake: Wake) -> Self {
         Self {
-            job: Job::prompt("sample", wake),
+            job: Background::prompt("sample", wake),
         }
     }
 

@@ -14,6 +14,7 @@ use decoupler_core::{
         Preset, Run, RunSettings, TradeOffLevel, TradeOffLimits, TradeOffPoint, Workload, decoded_unit,
         measure_trade_off,
     },
+    job::Job,
     training::Method,
 };
 use decoupler_files::{
@@ -25,7 +26,7 @@ use decoupler_files::{
 
 use super::TradeOffForm;
 use crate::window::{
-    job::{Job, Report, Wake},
+    job::{Background, Report, Wake},
     shared::{DecoderSource, Effect, FileTask, Matter, NetworkSource, Shared, View as _},
 };
 
@@ -40,7 +41,7 @@ pub struct TradeOffView {
     pub outcome: Option<TradeOffOutcome>,
     /// Level, limits and marked point of the display.
     pub look: TradeOffLook,
-    pub(super) job: Job<TradeOffEvent>,
+    pub(super) job: Background<TradeOffEvent>,
 }
 
 /// Action on a point that the user has chosen.
@@ -147,7 +148,7 @@ impl TradeOffView {
             running: None,
             outcome: None,
             look: TradeOffLook::default(),
-            job: Job::new("trade-off", wake),
+            job: Background::new("trade-off", wake),
         }
     }
 
@@ -310,9 +311,9 @@ pub enum TradeOffEvent {
 }
 
 /// Measures `plan`; a running measurement is cancelled.
-pub fn measure(job: &mut Job<TradeOffEvent>, plan: TradeOffPlan) {
+pub fn measure(job: &mut Background<TradeOffEvent>, plan: TradeOffPlan) {
     job.start(
-        move |report| measure_all(&plan, report),
+        move |report| report.unless_cancelled(measure_all(&plan, report)),
         |ended| {
             let ended = ended.map_err(|error| format!("{error}; the points measured so far are kept"));
             TradeOffEvent::Ended(ended.and_then(|measured| measured))
@@ -323,6 +324,7 @@ pub fn measure(job: &mut Job<TradeOffEvent>, plan: TradeOffPlan) {
 /// Measures level by level and run by run, and reports each point as it is measured.
 fn measure_all(plan: &TradeOffPlan, report: &Report<TradeOffEvent>) -> Result<(), String> {
     let is_cancelled = || report.is_cancelled();
+    let job = Job::new(&is_cancelled);
     let mut last: Option<(&Setup, SetupSets)> = None;
     for (level, planned) in plan.levels.iter().enumerate() {
         for run in &planned.runs {
@@ -335,11 +337,8 @@ fn measure_all(plan: &TradeOffPlan, report: &Report<TradeOffEvent>) -> Result<()
                 // The samples of a recording are read only once.
                 Some((of, sets)) if of.plan().is_some() && of.plan() == run.setup.plan() => sets,
                 _ => {
-                    let sets = run.setup.sets(Path::new(""), &is_cancelled, &mut |_| ());
-                    let Some(sets) = sets.map_err(|error| error.to_string())? else {
-                        return Ok(());
-                    };
-                    sets
+                    let sets = run.setup.sets(Path::new(""), &job, &mut |_| ());
+                    sets.map_err(|error| error.to_string())?
                 }
             };
             let recorded = sets.recorded();
@@ -349,12 +348,12 @@ fn measure_all(plan: &TradeOffPlan, report: &Report<TradeOffEvent>) -> Result<()
             });
             // Several decoders share a network.
             let mut last_file: Option<Arc<NetworkFile>> = None;
-            let is_whole = measure_trade_off(
+            let measured = measure_trade_off(
                 run.setup.settings(),
                 &sets.sets,
                 &plan.hidden,
                 &run.decoders,
-                is_cancelled,
+                &job,
                 |kind, point, trained: Option<&Run>| {
                     report.send(match point {
                         Ok(point) => {
@@ -372,9 +371,7 @@ fn measure_all(plan: &TradeOffPlan, report: &Report<TradeOffEvent>) -> Result<()
                     });
                 },
             );
-            if !is_whole.map_err(|error| error.to_string())? {
-                return Ok(());
-            }
+            measured.map_err(|error| error.to_string())?;
             last = Some((&run.setup, sets));
         }
     }

@@ -9,6 +9,7 @@ use decoupler_core::{
     dataset::Dataset,
     decoupling::{DecoderKind, Precision},
     evaluation::{DecoderReport, DecoderSet, ErrorMeasure, Errors, Problem, Source},
+    job::Job,
     network::Networks,
 };
 use decoupler_files::{
@@ -19,7 +20,7 @@ use eframe::egui::{Button, CollapsingHeader, Ui, Vec2};
 
 use crate::window::{
     glossary,
-    job::{Job, JobError, Report, Wake},
+    job::{Background, JobError, Report, Wake},
     shared::{DecoderSource, FileTask, Phase, Shared, decoder_export_ui, target_choice_ui},
     theme::{Theme, space},
     training_worker::RunId,
@@ -37,7 +38,7 @@ enum MeasuringEvent {
 /// The window's end of the thread.
 #[derive(Debug)]
 pub struct DecoderMeasuring {
-    job: Job<MeasuringEvent>,
+    job: Background<MeasuringEvent>,
     /// The training whose networks are measured, and its number of epochs at that time.
     of: Option<(RunId, usize)>,
     /// True after an internal error: the decoders are measured again once the table is closed and opened.
@@ -48,7 +49,7 @@ impl DecoderMeasuring {
     /// Nothing measured yet. `wake` is called after each decoder and at the end.
     pub fn new(wake: Wake) -> Self {
         Self {
-            job: Job::new("decoders", wake),
+            job: Background::new("decoders", wake),
             of: None,
             has_failed: false,
         }
@@ -108,16 +109,11 @@ impl DecoderMeasuring {
 
 fn measure_all(setup: &Setup, networks: Networks, test: &Dataset, report: &Report<MeasuringEvent>) {
     let is_cancelled = || report.is_cancelled();
-    let sets = setup.sets(Path::new(""), &is_cancelled, &mut |_| ());
-    let set = match sets {
-        Ok(None) => return,
-        Ok(Some(sets)) => Ok(DecoderSet::on_set(
-            *setup.settings(),
-            sets.sets.split.training,
-            Some(networks),
-        )),
-        Err(error) => Err(error.to_string()),
-    };
+    let sets = setup.sets(Path::new(""), &Job::new(&is_cancelled), &mut |_| ());
+    let set = sets.map_err(|error| error.to_string()).map(|sets| {
+        let training = sets.sets.split.training;
+        DecoderSet::new(*setup.settings(), training, Some(networks))
+    });
     for (place, wanted) in DecoderResult::pending(&setup.settings().source).into_iter().enumerate() {
         if is_cancelled() {
             return;
@@ -384,6 +380,8 @@ mod tests {
     use egui_kittest::{Harness, kittest::Queryable as _};
 
     use super::*;
+    use decoupler_core::evaluation::RunSets;
+    use decoupler_core::machine::MemoryBudget;
 
     #[test]
     fn decoders_that_cannot_be_measured_say_why_and_none_stays_pending() {
@@ -443,11 +441,18 @@ mod tests {
             sets: NoisySets::Test,
             ..Noise::relative(0.5)
         };
-        let test = settings.draw_test().unwrap();
+        let test = settings.source.draw_test(settings.seed).unwrap();
         let mut without_noise = settings;
         without_noise.source.scene.noise = Noise::default();
         // Fitted without the noise that the readings have.
-        let set = DecoderSet::new(&without_noise, None).unwrap();
+        let set = DecoderSet::new(
+            without_noise.into(),
+            RunSets::draw(&without_noise, MemoryBudget::UNLIMITED, &Job::UNINTERRUPTED)
+                .unwrap()
+                .split
+                .training,
+            None,
+        );
         let report = set
             .measure(DecoderKind::Ridge, Precision::Double, &test)
             .unwrap()
@@ -481,8 +486,15 @@ mod tests {
         settings.source.sensor.scale = "10x6_3x4".parse().unwrap();
         settings.source.samples = 100;
         settings.source.test_samples = 10;
-        let set = DecoderSet::new(&settings, None).unwrap();
-        let test = settings.draw_test().unwrap();
+        let set = DecoderSet::new(
+            settings.into(),
+            RunSets::draw(&settings, MemoryBudget::UNLIMITED, &Job::UNINTERRUPTED)
+                .unwrap()
+                .split
+                .training,
+            None,
+        );
+        let test = settings.source.draw_test(settings.seed).unwrap();
         let report = set
             .measure(DecoderKind::Newton, Precision::Double, &test)
             .unwrap()

@@ -10,7 +10,7 @@ use decoupler_core::{
 use eframe::egui::{Align, Layout, RichText, Slider, Ui, Vec2, WidgetInfo, accesskit::Role};
 
 use crate::window::{
-    job::{Job, JobError, Wake},
+    job::{Background, JobError, Wake},
     shared::{RunResult, RunView, Shared},
     test_view::TestSet,
     theme::{Theme, space, type_size},
@@ -30,7 +30,7 @@ pub struct ScrubState {
     wanted: Option<usize>,
     /// Result of the network of an epoch.
     result: Option<RunResult>,
-    job: Job<Result<Option<RunResult>, JobError>>,
+    job: Background<Result<Option<RunResult>, JobError>>,
     /// Reason why the network of an epoch could not be shown, until it is reported.
     failure: Option<JobError>,
     /// When the replay began, in seconds, and at which epoch.
@@ -44,7 +44,7 @@ impl ScrubState {
             of: None,
             wanted: None,
             result: None,
-            job: Job::prompt("past network", wake),
+            job: Background::prompt("past network", wake),
             failure: None,
             replay: None,
         }

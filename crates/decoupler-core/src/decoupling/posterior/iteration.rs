@@ -8,7 +8,7 @@ use super::{
     gaussian::{LinearModel, LinearisedPosterior, Point, RoundedReading},
     pack::LANES,
 };
-use crate::{decoupling::LARGEST_ERROR, scene::normal_cdf};
+use crate::{decoupling::LARGEST_ERROR, numerics::normal_cdf};
 
 /// Iteration of a row towards its answer: the equations are relinearised at each mean.
 ///

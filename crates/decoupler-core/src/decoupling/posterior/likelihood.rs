@@ -5,7 +5,8 @@ use super::{
 };
 use crate::{
     decoupling::row_problem::{Range, RowProblem},
-    scene::{NoiseSource, normal_cdf},
+    numerics::normal_cdf,
+    scene::NoiseSource,
 };
 
 /// Linearised likelihood of the readings of one row-wire.

@@ -27,6 +27,7 @@ use serde::{Deserialize, Serialize};
 use super::{Initialization, RunError, RunSettings};
 use crate::{
     dataset::{Dataset, Folds, History, Memory, Span, SplitBy},
+    job::Job,
     machine::MemoryBudget,
     network::{InputChoice, Quantity, ScalingChoice},
     text::format_percent,
@@ -292,18 +293,18 @@ fn describe_network(hidden: usize, method: &Method, starts: usize) -> String {
 }
 
 /// Chooses settings for `samples` by cross-validation. `base` gives the source, the seed, and whatever is not searched;
-/// its inputs are raw readings. Networks whose equations do not fit into `memory` are not tried. `is_cancelled` is polled throughout; the result is then `None`.
+/// its inputs are raw readings. Networks whose equations do not fit into `memory` are not tried.
 ///
 /// # Errors
-/// If the samples cannot be divided into folds, or cannot be scaled.
+/// If the samples cannot be divided into folds, or cannot be scaled, or the job is cancelled.
 pub fn choose_settings(
     base: &RunSettings,
     fixed: &AutoFixed,
     samples: &AutoSamples<'_>,
     budget_s: f64,
     memory: MemoryBudget,
-    is_cancelled: &dyn Fn() -> bool,
+    job: &Job<'_>,
     on_progress: &mut dyn FnMut(AutoProgress),
-) -> Result<Option<AutoChoice>, RunError> {
-    search::Search::new(base, fixed, samples, budget_s, memory, is_cancelled, on_progress)?.run()
+) -> Result<AutoChoice, RunError> {
+    search::Search::new(base, fixed, samples, budget_s, memory, job, on_progress)?.run()
 }

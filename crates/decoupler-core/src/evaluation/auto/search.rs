@@ -7,6 +7,7 @@ use super::{
 };
 use crate::{
     dataset::{Dataset, Folds, Memory, Seed, SplitBy, Stream},
+    job::Job,
     machine::MemoryBudget,
     network::{InputChoice, InputScaling, Inputs, LARGEST_HIDDEN, ScalingChoice, Shape},
     training::{Method, TrainingError},
@@ -61,29 +62,8 @@ pub(super) struct Search<'a> {
     pub(super) networks: Vec<Measured>,
     /// Number of candidates still expected.
     pub(super) expected: usize,
-    is_cancelled: &'a dyn Fn() -> bool,
+    job: &'a Job<'a>,
     on_progress: &'a mut dyn FnMut(AutoProgress),
-}
-
-/// A search that was cancelled.
-pub(super) struct Cancelled;
-
-/// End of a search before its result.
-pub(super) enum End {
-    Cancelled,
-    Failed(RunError),
-}
-
-impl From<Cancelled> for End {
-    fn from(Cancelled: Cancelled) -> Self {
-        Self::Cancelled
-    }
-}
-
-impl From<RunError> for End {
-    fn from(error: RunError) -> Self {
-        Self::Failed(error)
-    }
 }
 
 impl<'a> Search<'a> {
@@ -93,7 +73,7 @@ impl<'a> Search<'a> {
         samples: &'a AutoSamples<'a>,
         budget_s: f64,
         memory: MemoryBudget,
-        is_cancelled: &'a dyn Fn() -> bool,
+        job: &'a Job<'a>,
         on_progress: &'a mut dyn FnMut(AutoProgress),
     ) -> Result<Self, RunError> {
         if variances(samples.set.targets()).iter().all(|variance| *variance == 0.0) {
@@ -111,22 +91,24 @@ impl<'a> Search<'a> {
             tried: Vec::new(),
             networks: Vec::new(),
             expected: 0,
-            is_cancelled,
+            job,
             on_progress,
         })
     }
 
-    pub(super) fn run(mut self) -> Result<Option<AutoChoice>, RunError> {
-        match self.stages() {
-            Ok(chosen) => Ok(Some(self.choice(chosen))),
-            Err(End::Cancelled) => Ok(None),
-            Err(End::Failed(error)) => Err(error),
-        }
+    pub(super) fn run(mut self) -> Result<AutoChoice, RunError> {
+        let chosen = self.stages()?;
+        Ok(self.choice(chosen))
     }
 
     /// Cross-validates a network within its part of the budget: what is left until `share`, divided by the number of
     /// candidates still to come in this stage. Returns its error; `None` if it was too expensive.
-    pub(super) fn try_network(&mut self, candidate: Candidate, share: f64, to_come: usize) -> Result<Option<f64>, End> {
+    pub(super) fn try_network(
+        &mut self,
+        candidate: Candidate,
+        share: f64,
+        to_come: usize,
+    ) -> Result<Option<f64>, RunError> {
         self.try_for(candidate, share, to_come, MIN_EPOCHS)
     }
 
@@ -137,7 +119,7 @@ impl<'a> Search<'a> {
         share: f64,
         to_come: usize,
         needed: usize,
-    ) -> Result<Option<f64>, End> {
+    ) -> Result<Option<f64>, RunError> {
         if let Some(place) = self.networks.iter().position(|network| network.candidate == candidate) {
             return Ok(Some(self.networks[place].best.errors.relative()));
         }
@@ -175,7 +157,7 @@ impl<'a> Search<'a> {
         let mut training = match FoldedTraining::new(&settings, &set, &self.folds, stride, self.memory) {
             Ok(training) => training,
             Err(_) if !is_first => return Ok(None),
-            Err(error) => return Err(error.into()),
+            Err(error) => return Err(error),
         };
         let weights = Shape {
             inputs: set.channels(),
@@ -194,9 +176,7 @@ impl<'a> Search<'a> {
             if used + epoch > limit && training.epoch() >= MIN_EPOCHS {
                 break;
             }
-            if (self.is_cancelled)() {
-                return Err(End::Cancelled);
-            }
+            self.job.check()?;
             training.step();
             used += epoch;
         }
@@ -261,10 +241,8 @@ impl<'a> Search<'a> {
         self.budget_s * MULTIPLICATIONS_PER_SECOND
     }
 
-    pub(super) fn announce(&mut self, name: String) -> Result<(), Cancelled> {
-        if (self.is_cancelled)() {
-            return Err(Cancelled);
-        }
+    pub(super) fn announce(&mut self, name: String) -> Result<(), RunError> {
+        self.job.check()?;
         let best = self
             .ranked()
             .first()

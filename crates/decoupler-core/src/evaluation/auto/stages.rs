@@ -1,14 +1,15 @@
 //! The order in which a search tries features, hidden nodes, methods and committees.
 
 use super::{
-    super::{Initialization, RunError, ridge_path::RidgePath},
+    super::{Initialization, RunError},
     TriedModel, describe_features,
     fold_errors::{FoldErrors, variances},
-    search::{COMMITTEE, Candidate, End, Measured, SCREENED, Search},
+    search::{COMMITTEE, Candidate, Measured, SCREENED, Search},
     spans::memories,
 };
 use crate::{
     dataset::{Memory, SplitBy},
+    decoupling::{Regression, ridge},
     network::{InputChoice, LARGEST_HIDDEN, Quantity, ScalingChoice, Shape},
     training::{Damping, Method, RegularizationSettings, ScaledConjugateGradientSettings, TrainingError},
 };
@@ -42,7 +43,7 @@ const PER_NOISE: f64 = 100.0;
 
 impl Search<'_> {
     /// Runs all stages; returns the index of the choice in [`Self::networks`].
-    pub(super) fn stages(&mut self) -> Result<usize, End> {
+    pub(super) fn stages(&mut self) -> Result<usize, RunError> {
         // Shares of the budget at the end of each stage.
         let [features, nodes, refined, all] = [0.35, 0.7, 0.85, 1.0];
         let feature_sets = self.screen_features()?;
@@ -106,7 +107,7 @@ impl Search<'_> {
     }
 
     /// Compares features by ridge regression; returns the plain readings and the best others.
-    fn screen_features(&mut self) -> Result<Vec<(Memory, InputChoice)>, End> {
+    fn screen_features(&mut self) -> Result<Vec<(Memory, InputChoice)>, RunError> {
         let plain = InputChoice {
             quantity: Quantity::Raw,
             scaling: self.fixed.scaling.unwrap_or_default(),
@@ -131,7 +132,7 @@ impl Search<'_> {
         for (number, (memory, inputs)) in sets.into_iter().enumerate() {
             self.expected = count - number + FEATURE_SETS + 1 + 4 + 3 + FINALISTS;
             let width = memory.features(self.samples.set.channels());
-            let work = RidgePath::multiplications(self.samples.set.samples(), width, self.folds.count());
+            let work = Regression::multiplications(self.samples.set.samples(), width, self.folds.count());
             if number > 0 && self.work + work > 0.2 * self.budget() {
                 continue;
             }
@@ -142,14 +143,13 @@ impl Search<'_> {
             };
             let values = set.readings().mapv(|reading| inputs.quantity.of(reading));
             self.work += work;
-            let path = RidgePath::new(values.view(), set.targets(), &self.folds);
-            let error = match path {
-                Some(path) => {
-                    let errors = FoldErrors::new(path.squares(), &variances(set.targets()), &self.folds);
+            let error = match ridge(values.view(), set.targets(), &self.folds) {
+                Ok(fit) => {
+                    let errors = FoldErrors::new(&fit.squares, &variances(set.targets()), &self.folds);
                     self.record(&memory, inputs, TriedModel::Ridge, &errors, work);
                     errors.relative()
                 }
-                None => f64::INFINITY,
+                Err(_) => f64::INFINITY,
             };
             // The plain readings are always tried, and many inputs are not multiplied unless that helps.
             let plain = plain_error.get_or_insert(error);
@@ -190,7 +190,7 @@ impl Search<'_> {
 
     /// Tries other numbers of hidden nodes on the best features and on the plain readings, which need more of them, and
     /// then the second best features with the number found.
-    fn vary_hidden(&mut self, share: f64) -> Result<(), End> {
+    fn vary_hidden(&mut self, share: f64) -> Result<(), RunError> {
         let Some(best) = self.best().cloned() else {
             return Ok(());
         };
@@ -227,7 +227,7 @@ impl Search<'_> {
     }
 
     /// Tries `base` with more hidden nodes while it helps, and with fewer if it does not.
-    fn vary_hidden_of(&mut self, base: &Candidate, share: f64) -> Result<(), End> {
+    fn vary_hidden_of(&mut self, base: &Candidate, share: f64) -> Result<(), RunError> {
         let first = HIDDEN
             .iter()
             .position(|&hidden| hidden == self.first_hidden())
@@ -250,7 +250,7 @@ impl Search<'_> {
     }
 
     /// Tries `base` with this many hidden nodes; returns `true` if it is the best so far of those with the same features.
-    fn improves(&mut self, base: &Candidate, hidden: usize, share: f64) -> Result<bool, End> {
+    fn improves(&mut self, base: &Candidate, hidden: usize, share: f64) -> Result<bool, RunError> {
         let alike = self
             .networks
             .iter()
@@ -269,7 +269,7 @@ impl Search<'_> {
     }
 
     /// Varies scaling, regularisation and method of the best network.
-    fn refine(&mut self, share: f64) -> Result<(), End> {
+    fn refine(&mut self, share: f64) -> Result<(), RunError> {
         let Some(best) = self
             .ranked()
             .first()
@@ -308,7 +308,7 @@ impl Search<'_> {
     }
 
     /// Cross-validates the best candidates again as committees, and decides.
-    fn decide(&mut self, share: f64) -> Result<usize, End> {
+    fn decide(&mut self, share: f64) -> Result<usize, RunError> {
         let wanted = self.fixed.starts.unwrap_or(COMMITTEE);
         let ranked = self.ranked().into_iter().take(FINALISTS);
         let best: Vec<(Candidate, usize)> = ranked

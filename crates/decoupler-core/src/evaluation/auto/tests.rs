@@ -4,7 +4,7 @@ use rand::RngExt as _;
 use super::*;
 use crate::{
     dataset::{Seed, SplitBy, Stream},
-    evaluation::{Combination, Measured, Run},
+    evaluation::{Begin, Combination, Measured, Run, RunSets},
     machine::MemoryBudget,
     scene::RowModel,
     training::Method,
@@ -30,7 +30,7 @@ fn creeping(samples: usize) -> (Array2<f64>, Array2<f64>) {
     (readings, targets)
 }
 
-fn choose(by: SplitBy, groups: Vec<usize>, fixed: &AutoFixed, is_cancelled: &dyn Fn() -> bool) -> Option<AutoChoice> {
+fn choose(by: SplitBy, groups: Vec<usize>, fixed: &AutoFixed, job: &Job<'_>) -> Result<AutoChoice, RunError> {
     let (readings, targets) = creeping(groups.len());
     let set = Dataset::new(readings.clone(), targets, None, groups).unwrap();
     let samples: Vec<usize> = (0..set.samples()).collect();
@@ -50,14 +50,18 @@ fn choose(by: SplitBy, groups: Vec<usize>, fixed: &AutoFixed, is_cancelled: &dyn
         &samples,
         BUDGET_S,
         MemoryBudget::UNLIMITED,
-        is_cancelled,
+        job,
         &mut |_| (),
     )
-    .unwrap()
 }
 
-fn in_time() -> Option<AutoChoice> {
-    choose(SplitBy::Time, (0..400).collect(), &AutoFixed::default(), &|| false)
+fn in_time() -> Result<AutoChoice, RunError> {
+    choose(
+        SplitBy::Time,
+        (0..400).collect(),
+        &AutoFixed::default(),
+        &Job::UNINTERRUPTED,
+    )
 }
 
 #[test]
@@ -102,7 +106,7 @@ fn given_settings_are_kept_and_groups_are_not_divided() {
         ..AutoFixed::default()
     };
     let groups: Vec<usize> = (0..300).map(|sample| sample / 50).collect();
-    let choice = choose(SplitBy::Group, groups.clone(), &fixed, &|| false).unwrap();
+    let choice = choose(SplitBy::Group, groups.clone(), &fixed, &Job::UNINTERRUPTED).unwrap();
     let settings = choice.settings;
     assert_eq!(
         (settings.hidden, settings.starts, settings.training.stopping.epochs),
@@ -122,7 +126,13 @@ fn given_settings_are_kept_and_groups_are_not_divided() {
 
 #[test]
 fn a_cancelled_search_has_no_result() {
-    assert!(choose(SplitBy::Time, (0..200).collect(), &AutoFixed::default(), &|| true).is_none());
+    let cancelled = choose(
+        SplitBy::Time,
+        (0..200).collect(),
+        &AutoFixed::default(),
+        &Job::new(&|| true),
+    );
+    assert!(matches!(cancelled, Err(RunError::Cancelled(_))));
 }
 
 /// Training stops at the chosen epoch and begins with the ridge regression that the search began with.
@@ -138,7 +148,13 @@ fn the_choice_trains_to_about_its_error() {
         training: part(0..400),
         validation: None,
     };
-    let mut run = Run::on_sets(choice.settings, split, part(400..600)).unwrap();
+    let mut run = Run::with_baselines(
+        choice.settings,
+        RunSets::new(split, part(400..600)),
+        Begin::Initialize,
+        &Job::UNINTERRUPTED,
+    )
+    .unwrap();
     while run.step().is_none() {}
     let mut square = 0.0;
     for (answer, target) in run.decouple_test().iter().zip(targets.iter().skip(400)) {
@@ -173,10 +189,9 @@ fn many_inputs_for_few_samples_get_weight_decay() {
         &samples,
         4.0,
         MemoryBudget::UNLIMITED,
-        &|| false,
+        &Job::UNINTERRUPTED,
         &mut |_| (),
     )
-    .unwrap()
     .unwrap();
     let Method::ScaledConjugateGradient(settings) = choice.settings.training.method else {
         panic!("{:?}", choice.record);

@@ -109,21 +109,32 @@ impl AxisKind {
 }
 
 impl Axis {
+    /// The setting that the axis varies, and its values as text.
+    fn described(&self) -> (AxisKind, Vec<String>) {
+        fn texts<T: ToString>(values: &[T]) -> Vec<String> {
+            values.iter().map(ToString::to_string).collect()
+        }
+        match self {
+            Self::Hidden(values) => (AxisKind::Hidden, texts(values)),
+            Self::Array(values) => (AxisKind::Array, texts(values)),
+            Self::Samples(values) => (AxisKind::Samples, texts(values)),
+            Self::Noise(values) => (AxisKind::Noise, texts(values)),
+            Self::Inputs(values) => (AxisKind::Inputs, texts(values)),
+            Self::Scaling(values) => (AxisKind::Scaling, texts(values)),
+            Self::Method(values) => {
+                let names = values.iter().map(|method| method.short_name().to_owned());
+                (AxisKind::Method, names.collect())
+            }
+            Self::Epochs(values) => (AxisKind::Epochs, texts(values)),
+            Self::Starts(values) => (AxisKind::Starts, texts(values)),
+            Self::Split(values) => (AxisKind::Split, texts(values)),
+            Self::Seed(values) => (AxisKind::Seed, texts(values)),
+        }
+    }
+
     /// Returns the setting that the axis varies.
     pub fn kind(&self) -> AxisKind {
-        match self {
-            Self::Hidden(_) => AxisKind::Hidden,
-            Self::Array(_) => AxisKind::Array,
-            Self::Samples(_) => AxisKind::Samples,
-            Self::Noise(_) => AxisKind::Noise,
-            Self::Inputs(_) => AxisKind::Inputs,
-            Self::Scaling(_) => AxisKind::Scaling,
-            Self::Method(_) => AxisKind::Method,
-            Self::Epochs(_) => AxisKind::Epochs,
-            Self::Starts(_) => AxisKind::Starts,
-            Self::Split(_) => AxisKind::Split,
-            Self::Seed(_) => AxisKind::Seed,
-        }
+        self.described().0
     }
 
     /// Returns the name of the setting.
@@ -133,16 +144,7 @@ impl Axis {
 
     /// Number of values.
     pub fn len(&self) -> usize {
-        match self {
-            Self::Hidden(values) | Self::Samples(values) | Self::Epochs(values) | Self::Starts(values) => values.len(),
-            Self::Array(values) => values.len(),
-            Self::Noise(values) => values.len(),
-            Self::Inputs(values) => values.len(),
-            Self::Scaling(values) => values.len(),
-            Self::Method(values) => values.len(),
-            Self::Split(values) => values.len(),
-            Self::Seed(values) => values.len(),
-        }
+        self.described().1.len()
     }
 
     /// Returns `true` if there are no values.
@@ -155,18 +157,7 @@ impl Axis {
     /// # Panics
     /// If `index` is out of range.
     pub fn label(&self, index: usize) -> String {
-        match self {
-            Self::Hidden(values) | Self::Samples(values) | Self::Epochs(values) | Self::Starts(values) => {
-                values[index].to_string()
-            }
-            Self::Array(values) => values[index].to_string(),
-            Self::Noise(values) => values[index].to_string(),
-            Self::Inputs(values) => values[index].to_string(),
-            Self::Scaling(values) => values[index].to_string(),
-            Self::Method(values) => values[index].short_name().to_owned(),
-            Self::Split(values) => values[index].to_string(),
-            Self::Seed(values) => values[index].to_string(),
-        }
+        self.described().1.swap_remove(index)
     }
 
     /// Writes value `index` to `cell`. A validation share that follows from the method is updated for a new method.

@@ -3,7 +3,7 @@ use thiserror::Error;
 
 use super::{Axis, AxisKind};
 use crate::{
-    dataset::{Division, DivisionError, FoldUnit, FoldsError, Seed, SplitBy},
+    dataset::{Division, DivisionError, Seed, SplitBy},
     evaluation::{CountError, CrossValidation, PublishedErrors, RunSettings, SimulatedSettings, Source},
     scene::SceneError,
     sensor::ArrayScale,
@@ -76,9 +76,6 @@ pub enum ExperimentError {
     /// The array has no such row-wire.
     #[error(transparent)]
     Scene(#[from] SceneError),
-    /// The folds cannot be filled.
-    #[error(transparent)]
-    Folds(#[from] FoldsError),
     /// Runs on this source do not have the setting.
     #[error("{of} have no setting '{axis}': vary another one")]
     NoSetting {
@@ -229,21 +226,16 @@ impl Experiment {
         };
         settings.check_counts()?;
         settings.source.scene.check()?;
-        let Some(CrossValidation { folds, unit, .. }) = self.cross_validation else {
+        let Some(CrossValidation { folds, by, .. }) = self.cross_validation else {
             return Ok(());
         };
         let rows = settings.source.model_size()?.rows;
         let snapshots = settings.source.samples.div_ceil(rows);
-        let units = match unit {
-            FoldUnit::Sample => snapshots * rows,
-            FoldUnit::Snapshot => snapshots,
+        let (units, unit) = match by {
+            SplitBy::Random => (snapshots * rows, "sample"),
+            SplitBy::Time | SplitBy::Group => (snapshots, "snapshot"),
         };
-        if (2..=units).contains(&folds) {
-            Ok(())
-        } else {
-            let unit = unit.name();
-            Err(FoldsError { folds, units, unit }.into())
-        }
+        Ok(DivisionError::check_folds(folds, units, unit)?)
     }
 
     fn check_recorded_cell(&self, cell: &Cell) -> Result<(), ExperimentError> {
@@ -389,7 +381,7 @@ mod tests {
                 table(|e| {
                     e.cross_validation = Some(CrossValidation {
                         folds: 11,
-                        unit: FoldUnit::Snapshot,
+                        by: SplitBy::Group,
                         repeats: 1,
                     });
                 }),

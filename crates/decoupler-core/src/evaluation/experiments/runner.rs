@@ -14,8 +14,9 @@ use rayon::{ThreadPool, ThreadPoolBuilder};
 use super::{Cell, Experiment, ExperimentError, Trial, TrialFailure, TrialSamples};
 use crate::{
     dataset::Seed,
-    evaluation::{CrossValidation, SimulatedSettings},
-    training::Method,
+    evaluation::{CrossValidation, RunError, SimulatedSettings},
+    job::{Cancelled, Job},
+    network::Shape,
 };
 
 /// A finished trial.
@@ -66,7 +67,9 @@ pub fn run_experiments(
             return Err(ExperimentError::OtherSamples);
         }
     }
-    let Queue { jobs, mut time_left } = Queue::new(experiments, samples, threads);
+    let jobs = queue(experiments, samples);
+    let all_work: f64 = jobs.iter().map(|job| job.work).sum();
+    let (mut work, mut seconds) = (0.0, 0.0);
     let threads = threads.get().min(jobs.len());
     // One single-threaded pool per worker: parallel code within a training stays on its thread, so that other trainings
     // do not affect its times.
@@ -86,7 +89,7 @@ pub fn run_experiments(
             let work_off = move || {
                 while let Some(job) = jobs.get(next.fetch_add(1, Ordering::Relaxed)) {
                     let begun = Instant::now();
-                    let Some(outcome) = job.run(samples, is_cancelled) else {
+                    let Ok(outcome) = job.run(samples, &Job::new(is_cancelled)) else {
                         break;
                     };
                     // The receiver is dropped only if the calling thread panicked.
@@ -99,14 +102,15 @@ pub fn run_experiments(
         }));
         drop(sender);
         for (done, (job, outcome, took)) in (1..).zip(receiver) {
-            time_left.finished(job.time_cell, took);
+            work += job.work;
+            seconds += took.as_secs_f64();
             on_finished(Finished {
                 experiment: job.experiment,
                 cell: job.cell,
                 outcome,
                 done,
                 trials: jobs.len(),
-                time_left: time_left.estimate(),
+                time_left: time_left((work, all_work), seconds, threads),
             });
         }
         for worker in workers {
@@ -117,68 +121,52 @@ pub fn run_experiments(
     Ok(())
 }
 
-/// Queue of jobs in the order of execution.
-struct Queue {
-    jobs: Vec<Job>,
-    time_left: TimeLeft,
-}
-
 /// A single trial.
-struct Job {
+struct TrialJob {
     experiment: usize,
     cell: usize,
-    /// Index of the cell among the cells of all experiments.
-    time_cell: usize,
     /// Settings of the cell.
     of_cell: Cell,
     seed: Seed,
     cross_validation: Option<CrossValidation>,
     repeat: usize,
+    /// Approximate number of multiplications.
     work: f64,
     /// Number of earlier trials of the same cell.
     round: usize,
 }
 
-impl Queue {
-    /// Orders the jobs: first one trial of every cell, so that preliminary tables appear early, then the second trials,
-    /// and so on; in each round the longest first, so that no core is idle for long at the end.
-    fn new(experiments: &[Experiment], samples: &TrialSamples, threads: NonZero<usize>) -> Self {
-        let mut jobs: Vec<Job> = Vec::new();
-        let mut cells = Vec::new();
-        for (number, experiment) in experiments.iter().enumerate() {
-            for (cell_number, cell) in experiment.cells().iter().enumerate() {
-                let work = work(experiment, cell, samples);
-                let seeds = experiment.seeds_of(&cell.settings);
-                let trials = seeds.flat_map(|seed| (0..experiment.repeats()).map(move |repeat| (seed, repeat)));
-                let before = jobs.len();
-                jobs.extend(trials.enumerate().map(|(round, (seed, repeat))| Job {
-                    experiment: number,
-                    cell: cell_number,
-                    time_cell: cells.len(),
-                    of_cell: *cell,
-                    seed,
-                    cross_validation: experiment.cross_validation,
-                    repeat,
-                    work,
-                    round,
-                }));
-                cells.push((work, jobs.len() - before));
-            }
+/// Returns the jobs in the order of execution: first one trial of every cell, so that preliminary tables appear early, then
+/// the second trials, and so on; in each round the longest first, so that no core is idle for long at the end.
+fn queue(experiments: &[Experiment], samples: &TrialSamples) -> Vec<TrialJob> {
+    let mut jobs: Vec<TrialJob> = Vec::new();
+    for (number, experiment) in experiments.iter().enumerate() {
+        for (cell_number, cell) in experiment.cells().iter().enumerate() {
+            let work = work(experiment, cell, samples);
+            let seeds = experiment.seeds_of(&cell.settings);
+            let trials = seeds.flat_map(|seed| (0..experiment.repeats()).map(move |repeat| (seed, repeat)));
+            jobs.extend(trials.enumerate().map(|(round, (seed, repeat))| TrialJob {
+                experiment: number,
+                cell: cell_number,
+                of_cell: *cell,
+                seed,
+                cross_validation: experiment.cross_validation,
+                repeat,
+                work,
+                round,
+            }));
         }
-        jobs.sort_by(|one, other| one.round.cmp(&other.round).then(other.work.total_cmp(&one.work)));
-        let time_left = TimeLeft::new(cells, threads.get());
-        Self { jobs, time_left }
     }
+    jobs.sort_by(|one, other| one.round.cmp(&other.round).then(other.work.total_cmp(&one.work)));
+    jobs
 }
 
-impl Job {
-    /// Runs the trial; returns `None` if cancelled.
-    fn run(&self, samples: &TrialSamples, is_cancelled: impl Fn() -> bool) -> Option<Result<Trial, TrialFailure>> {
-        if is_cancelled() {
-            return None;
-        }
+impl TrialJob {
+    /// Runs the trial.
+    fn run(&self, samples: &TrialSamples, job: &Job<'_>) -> Result<Result<Trial, TrialFailure>, Cancelled> {
+        job.check()?;
         let trial = match self.cross_validation {
-            None => Trial::on_sets(&self.of_cell, self.seed, samples, is_cancelled),
+            None => Trial::on_sets(&self.of_cell, self.seed, samples, job),
             Some(validation) => {
                 let settings = self
                     .of_cell
@@ -189,79 +177,28 @@ impl Job {
                     seed: self.seed,
                     ..settings
                 };
-                Trial::by_cross_validation(settings, validation, self.repeat, is_cancelled)
+                Trial::by_cross_validation(settings, validation, self.repeat, job)
             }
         };
-        trial.transpose().map(|trial| {
-            trial.map_err(|reason| TrialFailure {
+        match trial {
+            Err(RunError::Cancelled(cancelled)) => Err(cancelled),
+            trial => Ok(trial.map_err(|reason| TrialFailure {
                 seed: self.seed,
                 repeat: self.repeat,
                 reason,
-            })
-        })
-    }
-}
-
-/// Estimate of the remaining time from the finished jobs. Jobs of a cell with finished jobs are assumed to take their
-/// mean time; for other jobs it follows from the number of multiplications of the training, at the speed of all
-/// finished jobs.
-pub(super) struct TimeLeft {
-    threads: usize,
-    cells: Vec<CellTime>,
-}
-
-struct CellTime {
-    /// Approximate number of multiplications in one job.
-    work: f64,
-    jobs: usize,
-    finished: usize,
-    seconds: f64,
-}
-
-impl TimeLeft {
-    /// Creates an estimate from `(work, jobs)` of each cell: approximate number of multiplications per job, and number
-    /// of jobs.
-    pub(super) fn new(cells: impl IntoIterator<Item = (f64, usize)>, threads: usize) -> Self {
-        let cells = cells.into_iter().map(|(work, jobs)| CellTime {
-            work,
-            jobs,
-            finished: 0,
-            seconds: 0.0,
-        });
-        Self {
-            threads,
-            cells: cells.collect(),
+            })),
         }
     }
+}
 
-    /// Records the time of a finished job of cell `cell`.
-    pub(super) fn finished(&mut self, cell: usize, took: Duration) {
-        let cell = &mut self.cells[cell];
-        cell.finished += 1;
-        cell.seconds += took.as_secs_f64();
-    }
-
-    /// Returns the time until all jobs are finished; `None` before the first is finished.
-    pub(super) fn estimate(&self) -> Option<Duration> {
-        let (seconds, work) = self.cells.iter().fold((0.0, 0.0), |(seconds, work), cell| {
-            (seconds + cell.seconds, work + cell.work * cell.finished as f64)
-        });
-        if work == 0.0 {
-            return None;
-        }
-        let rest = self.cells.iter().map(|cell| {
-            let of_one = match cell.finished {
-                0 => cell.work * seconds / work,
-                finished => cell.seconds / finished as f64,
-            };
-            of_one * cell.jobs.saturating_sub(cell.finished) as f64
-        });
-        Duration::try_from_secs_f64(rest.sum::<f64>() / self.threads as f64).ok()
-    }
+/// Estimates the time until all jobs are finished, at the speed of the finished ones: `work` of all `all_work`
+/// multiplications in `seconds` on one thread.
+fn time_left((work, all_work): (f64, f64), seconds: f64, threads: usize) -> Option<Duration> {
+    Duration::try_from_secs_f64((all_work - work) * seconds / (work * threads as f64)).ok()
 }
 
 /// Approximate number of multiplications in one job of `cell`, if it runs all of its epochs.
-pub(super) fn work(experiment: &Experiment, cell: &Cell, samples: &TrialSamples) -> f64 {
+fn work(experiment: &Experiment, cell: &Cell, samples: &TrialSamples) -> f64 {
     let settings = &cell.settings;
     let (inputs, outputs, samples) = match (settings.source.simulation(), samples) {
         (Some(source), _) => {
@@ -273,17 +210,13 @@ pub(super) fn work(experiment: &Experiment, cell: &Cell, samples: &TrialSamples)
         }
         (None, TrialSamples::Drawn(_)) => (1, 1, 1),
     };
-    let (n1, h) = ((inputs + 1) as f64, settings.hidden as f64);
-    let (outputs, samples) = (outputs as f64, samples as f64);
-    // Forward and backward passes, and the test and validation sets.
-    let passes = 4.0 * samples * h * (n1 + outputs);
-    let second_order = samples * (h * n1).powi(2) / 4.0 + 0.5 * (h * n1).powi(3);
-    let epoch = match settings.training.method {
-        Method::LevenbergMarquardt(_) | Method::BayesianRegularization(_) => passes + second_order,
-        _ => passes,
+    let shape = Shape {
+        inputs,
+        hidden: settings.hidden,
+        outputs,
     };
-    let trainings = experiment.folds() * settings.starts * settings.training.stopping.epochs;
-    epoch * trainings as f64
+    let epochs = experiment.folds() * settings.starts * settings.training.stopping.epochs;
+    settings.training.method.epoch_multiplications(shape, samples) * epochs as f64
 }
 
 #[cfg(test)]
@@ -292,17 +225,10 @@ mod tests {
 
     #[test]
     fn the_remaining_time_follows_from_the_finished_jobs() {
-        let mut time = TimeLeft::new([(1.0, 4), (3.0, 2)], 2);
-        assert_eq!(time.estimate(), None);
-        time.finished(0, Duration::from_secs(2));
-        // 3 more jobs of 2 s, and 2 with three times the work: 18 s for two threads.
-        assert_eq!(time.estimate(), Some(Duration::from_secs(9)));
-        time.finished(1, Duration::from_secs(4));
-        // Now the measured time of the cell counts: 3 jobs of 2 s and 1 of 4 s.
-        assert_eq!(time.estimate(), Some(Duration::from_secs(5)));
-        for cell in [0, 0, 0, 1] {
-            time.finished(cell, Duration::from_secs(1));
-        }
-        assert_eq!(time.estimate(), Some(Duration::ZERO));
+        // A third of the work took 2 s.
+        assert_eq!(time_left((1.0, 3.0), 2.0, 1), Some(Duration::from_secs(4)));
+        assert_eq!(time_left((1.0, 3.0), 2.0, 2), Some(Duration::from_secs(2)));
+        assert_eq!(time_left((3.0, 3.0), 7.0, 2), Some(Duration::ZERO));
+        assert_eq!(time_left((0.0, 0.0), 0.0, 1), None);
     }
 }

@@ -6,8 +6,10 @@ use super::Cell;
 use crate::{
     dataset::{Dataset, Division, Seed},
     evaluation::{
-        CrossValidation, Effort, Problem, Run, RunError, RunSets, RunSettings, SimulatedSettings, TestErrors,
+        Begin, CrossValidation, Effort, Problem, Run, RunError, RunSets, RunSettings, SimulatedSettings, TestErrors,
+        baselines::mean_and_linear,
     },
+    job::Job,
     machine::MemoryBudget,
     training::TrainerState,
 };
@@ -34,7 +36,7 @@ pub struct Trial {
     pub seconds: f64,
     /// Time of the fastest epoch, which is least affected by other load on the machine.
     pub min_epoch_seconds: f64,
-    /// Final state of every training, for [`Run::resume`]; empty for a cross-validation, which has one network per
+    /// Final state of every training, for [`Begin::Resume`]; empty for a cross-validation, which has one network per
     /// fold.
     pub states: Vec<TrainerState>,
 }
@@ -57,24 +59,14 @@ impl Trial {
         self.seconds / self.networks.max(1) as f64
     }
 
-    /// Trains and tests with this seed on the sets of `cell`. Returns `None` if cancelled.
-    pub(super) fn on_sets(
-        cell: &Cell,
-        seed: Seed,
-        samples: &TrialSamples,
-        is_cancelled: impl Fn() -> bool,
-    ) -> Result<Option<Self>, RunError> {
+    /// Trains and tests with this seed on the sets of `cell`.
+    pub(super) fn on_sets(cell: &Cell, seed: Seed, samples: &TrialSamples, job: &Job<'_>) -> Result<Self, RunError> {
         let settings = RunSettings { seed, ..cell.settings };
-        let Some(sets) = samples.sets(cell, seed, &is_cancelled)? else {
-            return Ok(None);
-        };
-        let Some((mut run, [mean, linear])) = Run::without_reference(settings, sets, &is_cancelled)? else {
-            return Ok(None);
-        };
-        let Some(effort) = Effort::train(&mut run, &is_cancelled) else {
-            return Ok(None);
-        };
-        Ok(Some(Self {
+        let sets = samples.sets(cell, seed, job)?;
+        let [mean, linear] = mean_and_linear(&settings, &sets)?;
+        let mut run = Run::new(settings, sets, Begin::Initialize, job)?;
+        let effort = Effort::train(&mut run, job)?;
+        Ok(Self {
             seed,
             repeat: 0,
             errors: run.errors(),
@@ -85,26 +77,25 @@ impl Trial {
             seconds: effort.seconds,
             min_epoch_seconds: effort.min_epoch_seconds,
             states: run.states(),
-        }))
+        })
     }
 
-    /// Cross-validates on a set drawn with the seed of `settings`. Returns `None` if cancelled.
+    /// Cross-validates on a set drawn with the seed of `settings`.
     pub(super) fn by_cross_validation(
         settings: SimulatedSettings,
         validation: CrossValidation,
         repeat: usize,
-        is_cancelled: impl Fn() -> bool,
-    ) -> Result<Option<Self>, RunError> {
-        let set = settings.draw_training(settings.source.samples)?;
-        let tested = settings.draw_tested_folds(&set)?;
+        job: &Job<'_>,
+    ) -> Result<Self, RunError> {
+        let (simulation, seed) = (&settings.source, settings.seed);
+        let set = simulation.draw_training(simulation.samples, seed)?;
+        let tested = simulation.draw_tested_folds(&set, seed)?;
         let sets = (&set, tested.as_ref().unwrap_or(&set));
-        let Some(validated) = validation.run_with_tested(&settings.into(), sets, repeat, is_cancelled)? else {
-            return Ok(None);
-        };
+        let validated = validation.run_with_tested(&settings.into(), sets, repeat, job)?;
         let source = settings.source.into();
         let errors = |decoupled_mm| TestErrors::measure(&source, &set, decoupled_mm);
-        Ok(Some(Self {
-            seed: settings.seed,
+        Ok(Self {
+            seed,
             repeat,
             errors: errors(&validated.network),
             mean: errors(&validated.mean),
@@ -114,7 +105,7 @@ impl Trial {
             seconds: validated.effort.seconds,
             min_epoch_seconds: validated.effort.min_epoch_seconds,
             states: Vec::new(),
-        }))
+        })
     }
 }
 
@@ -156,13 +147,8 @@ impl RecordedSamples {
 }
 
 impl TrialSamples {
-    /// Returns the sets of a trial of `cell` with this seed; `None` once `is_cancelled`.
-    pub(super) fn sets(
-        &self,
-        cell: &Cell,
-        seed: Seed,
-        is_cancelled: &dyn Fn() -> bool,
-    ) -> Result<Option<RunSets>, RunError> {
+    /// Returns the sets of a trial of `cell` with this seed.
+    pub(super) fn sets(&self, cell: &Cell, seed: Seed, job: &Job<'_>) -> Result<RunSets, RunError> {
         match self {
             Self::Drawn(memory) => {
                 let mut settings = cell
@@ -170,11 +156,11 @@ impl TrialSamples {
                     .simulated()
                     .expect("the source of drawn samples is simulated");
                 settings.seed = seed;
-                settings.checked_sets_unless(*memory, is_cancelled)
+                RunSets::draw(&settings, *memory, job)
             }
             Self::Recorded(recorded) => {
                 let division = cell.division.expect("recorded samples have a division");
-                recorded.divided(&division, seed).map(Some)
+                recorded.divided(&division, seed)
             }
         }
     }

@@ -9,7 +9,8 @@ use thiserror::Error;
 
 use super::{CrossValidated, Run, RunError, RunSettings, recorded::Evidence};
 use crate::{
-    dataset::{Dataset, Folds, FoldsError, Seed, SplitBy, Stream},
+    dataset::{Dataset, DivisionError, Folds, Seed, SplitBy, Stream},
+    job::Job,
     text::counted,
 };
 pub use half_width::HalfWidth;
@@ -94,17 +95,17 @@ impl Intervals {
     /// answers.
     ///
     /// # Errors
-    /// If the settings are invalid, the set cannot be divided into folds or contains too few independent samples, or
-    /// `is_cancelled`, which is polled in every epoch.
+    /// If the settings are invalid, the set cannot be divided into folds or contains too few independent samples, or `job`,
+    /// which is checked in every epoch, is cancelled.
     pub fn cross_validate(
         settings: &RunSettings,
         set: &Dataset,
         by: SplitBy,
-        is_cancelled: &dyn Fn() -> bool,
+        job: &Job<'_>,
     ) -> Result<Self, NoIntervals> {
         let folds = by.folds_of(set, Self::FOLDS);
         let folds = Folds::by(set, folds, by, &mut settings.seed.rng(Stream::Split))?;
-        let validated = CrossValidated::on_folds(settings, set, folds, is_cancelled)?.ok_or(NoIntervals::Cancelled)?;
+        let validated = CrossValidated::on_folds(settings, set, folds, job)?;
         Self::calibrate(set, validated.network.view(), by).checked()
     }
 
@@ -181,7 +182,7 @@ pub enum NoIntervals {
     Cancelled,
     /// The samples cannot be divided into folds.
     #[error(transparent)]
-    Folds(#[from] FoldsError),
+    Folds(#[from] DivisionError),
     /// A training failed.
     #[error(transparent)]
     Run(#[from] RunError),

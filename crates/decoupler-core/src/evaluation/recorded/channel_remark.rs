@@ -4,6 +4,7 @@ use super::{FittedModel, Interval, evidence::Evidence};
 use crate::{
     dataset::{Dataset, Folds, SplitBy},
     evaluation::{RunError, RunSettings, errors::mean},
+    job::Job,
     sensor::short,
 };
 
@@ -254,32 +255,28 @@ pub struct ChannelImportance {
 /// Takes (channels + 1) × folds fits of `model`.
 ///
 /// # Errors
-/// If the settings are invalid.
+/// If the settings are invalid, or the job is cancelled.
 pub fn channel_importance(
     settings: &RunSettings,
     set: &Dataset,
     (folds, by): (&Folds, SplitBy),
     model: FittedModel,
-    is_cancelled: &dyn Fn() -> bool,
-) -> Result<Option<Vec<ChannelImportance>>, RunError> {
+    job: &Job<'_>,
+) -> Result<Vec<ChannelImportance>, RunError> {
     let channels = set.channels();
-    let Some(with_all) = model.held_out(settings, set, folds, is_cancelled)? else {
-        return Ok(None);
-    };
+    let with_all = model.held_out(settings, set, folds, job)?;
     let mut found = Vec::with_capacity(channels);
     // With a single channel, there would be nothing left to fit.
     for channel in (0..channels).filter(|_| channels > 1) {
         let others: Vec<usize> = (0..channels).filter(|&other| other != channel).collect();
-        let Some(without) = model.held_out(settings, &set.of_channels(&others), folds, is_cancelled)? else {
-            return Ok(None);
-        };
+        let without = model.held_out(settings, &set.of_channels(&others), folds, job)?;
         let growth = |target| rmse_ratio(set, [without.view(), with_all.view()], target, by);
         found.push(ChannelImportance {
             channel,
             growth: (0..set.outputs()).map(growth).collect(),
         });
     }
-    Ok(Some(found))
+    Ok(found)
 }
 
 /// Returns the ratio of the RMSE of the first answers to that of the second, both for the same samples; `None` if it is

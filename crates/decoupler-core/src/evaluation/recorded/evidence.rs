@@ -7,6 +7,7 @@ use crate::{
     dataset::{Dataset, Folds, SplitBy},
     decoupling::decode_set,
     evaluation::{CrossValidated, RunError, RunSettings, baselines::fit_baselines, cross_validation::scatter},
+    job::Job,
 };
 
 /// Independent units in a set of samples: its groups, or stretches in the order of the samples.
@@ -274,29 +275,25 @@ impl FittedModel {
         }
     }
 
-    /// Returns held-out answers for every sample of `set`, each by a model fitted without its fold; `None` if
-    /// cancelled.
+    /// Returns held-out answers for every sample of `set`, each by a model fitted without its fold.
     pub(super) fn held_out(
         self,
         settings: &RunSettings,
         set: &Dataset,
         folds: &Folds,
-        is_cancelled: &dyn Fn() -> bool,
-    ) -> Result<Option<Array2<f64>>, RunError> {
+        job: &Job<'_>,
+    ) -> Result<Array2<f64>, RunError> {
         if self == Self::Network {
-            let validated = CrossValidated::on_folds(settings, set, folds.clone(), is_cancelled)?;
-            return Ok(validated.map(|validated| validated.network));
+            return Ok(CrossValidated::on_folds(settings, set, folds.clone(), job)?.network);
         }
         let mut answers = Array2::zeros(set.targets().dim());
         for fold in 0..folds.count() {
-            if is_cancelled() {
-                return Ok(None);
-            }
+            job.check()?;
             let (_, mut ridge) = fit_baselines(&set.select(&folds.without(&[fold])), settings)?;
             let of_fold = decode_set(&mut ridge, &set.select(folds.test(fold)))?;
             scatter(&mut answers, folds.test(fold), &of_fold);
         }
-        Ok(Some(answers))
+        Ok(answers)
     }
 }
 

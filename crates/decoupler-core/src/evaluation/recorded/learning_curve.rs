@@ -4,7 +4,8 @@ use super::{FittedModel, Interval, evidence::Resampling};
 use crate::{
     dataset::{Dataset, DividedSamples, Seed, Split, SplitBy, Stream},
     decoupling::decode_set,
-    evaluation::{Run, RunError, RunSettings, baselines::fit_baselines, cross_validation::nth_seed},
+    evaluation::{Begin, Run, RunError, RunSets, RunSettings, baselines::fit_baselines, cross_validation::nth_seed},
+    job::Job,
     text::format_percent,
 };
 
@@ -64,19 +65,19 @@ impl LearningCurve {
     const NEGLIGIBLE: f64 = 1e-3;
 
     /// Fits `model` to all training samples of `parts`, to 1/√2 of them, and so on down to an eighth, and measures the
-    /// error on the test samples, target by target; `None` if cancelled. Subsets of the training set are stretches of
+    /// error on the test samples, target by target. Subsets of the training set are stretches of
     /// the recording, whole groups or single samples, depending on `by`, so that twice as many samples mean a recording
     /// twice as long, or twice as many groups. Takes up to 28 fits.
     ///
     /// # Errors
-    /// If the settings are invalid.
+    /// If the settings are invalid, or the job is cancelled.
     pub fn measure(
         settings: &RunSettings,
         set: &Dataset,
         (parts, by): (&DividedSamples, SplitBy),
         model: FittedModel,
-        is_cancelled: &dyn Fn() -> bool,
-    ) -> Result<Option<Vec<Self>>, RunError> {
+        job: &Job<'_>,
+    ) -> Result<Vec<Self>, RunError> {
         let (whole, test) = (parts.split(set), parts.test_set(set));
         let mut rng = settings.seed.rng(Stream::Resampling);
         let mut fits = Vec::new();
@@ -93,26 +94,21 @@ impl LearningCurve {
                 Self::REPEATS
             };
             for repeat in 0..repeats {
-                if is_cancelled() {
-                    return Ok(None);
-                }
+                job.check()?;
                 let chosen = choose(&whole.training, wanted, by, (repeat, repeats), &mut rng);
                 let split = Split {
                     training: whole.training.select(&chosen),
                     validation: whole.validation.clone(),
                 };
                 let seed = nth_seed(settings.seed, repeat);
-                let Some(squares) = squared_errors(settings, seed, split, &test, model, is_cancelled)? else {
-                    return Ok(None);
-                };
                 fits.push(TestSquares {
                     samples: chosen.len(),
-                    squares,
+                    squares: squared_errors(settings, seed, split, &test, model, job)?,
                 });
             }
         }
         let curve = |target| Self::of_target(&fits, &test, target, by, &mut rng);
-        Ok(Some((0..set.outputs()).map(curve).collect()))
+        Ok((0..set.outputs()).map(curve).collect())
     }
 
     fn of_target(fits: &[TestSquares], test: &Dataset, target: usize, by: SplitBy, rng: &mut impl Rng) -> Self {
@@ -274,25 +270,22 @@ fn choose(
     }
 }
 
-/// Returns the squared errors on `test` (samples × outputs) of a fit to `split`; `None` if cancelled.
+/// Returns the squared errors on `test` (samples × outputs) of a fit to `split`.
 fn squared_errors(
     settings: &RunSettings,
     seed: Seed,
     split: Split,
     test: &Dataset,
     model: FittedModel,
-    is_cancelled: &dyn Fn() -> bool,
-) -> Result<Option<ndarray::Array2<f64>>, RunError> {
+    job: &Job<'_>,
+) -> Result<ndarray::Array2<f64>, RunError> {
     // A stretch may have no variation to learn from: ridge regression then answers with its mean.
     let has_variation = split.training.has_varying_target();
     let answers = match model {
         FittedModel::Network if has_variation => {
-            let mut run = Run::of_networks_on_sets(RunSettings { seed, ..*settings }, split, test.clone())?;
-            while run.step().is_none() {
-                if is_cancelled() {
-                    return Ok(None);
-                }
-            }
+            let sets = RunSets::new(split, test.clone());
+            let mut run = Run::new(RunSettings { seed, ..*settings }, sets, Begin::Initialize, job)?;
+            run.finish(job)?;
             run.decouple_test()
         }
         _ => {
@@ -300,7 +293,7 @@ fn squared_errors(
             decode_set(&mut ridge, test)?
         }
     };
-    Ok(Some((answers - test.targets()).mapv(|error| error * error)))
+    Ok((answers - test.targets()).mapv(|error| error * error))
 }
 
 /// Error as a function of the number of training samples: floor + scale · n^(−exponent), the form that learning curves

@@ -2,6 +2,7 @@ use super::{FittedModel, Interval, channel_remark::rmse_ratio};
 use crate::{
     dataset::{Dataset, Folds, History, Memory, Span, SplitBy, Stream},
     evaluation::{RunError, RunSettings},
+    job::Job,
 };
 
 /// Held-out error of ridge regression with a memory, compared with its error without one: whether the past helps.
@@ -33,27 +34,25 @@ impl MemoryGain {
     }
 
     /// Compares `with`, samples with the features of `memory`, with the samples `without` by cross-validation with
-    /// `folds` folds by the rule `by`; returns `None` if cancelled.
+    /// `folds` folds by the rule `by`.
     ///
     /// # Errors
-    /// If the samples cannot be divided or scaled.
+    /// If the samples cannot be divided or scaled, or the job is cancelled.
     pub fn measure(
         settings: &RunSettings,
         memory: &Memory,
         [without, with]: [&Dataset; 2],
         (by, folds): (SplitBy, usize),
-        is_cancelled: &dyn Fn() -> bool,
-    ) -> Result<Option<Self>, RunError> {
+        job: &Job<'_>,
+    ) -> Result<Self, RunError> {
         let folds = Folds::by(without, folds, by, &mut settings.seed.rng(Stream::Split))?;
-        let held_out = |set| FittedModel::Ridge.held_out(settings, set, &folds, is_cancelled);
-        let (Some(before), Some(after)) = (held_out(without)?, held_out(with)?) else {
-            return Ok(None);
-        };
+        let held_out = |set| FittedModel::Ridge.held_out(settings, set, &folds, job);
+        let (before, after) = (held_out(without)?, held_out(with)?);
         let ratio = |target| rmse_ratio(without, [after.view(), before.view()], target, by);
-        Ok(Some(Self {
+        Ok(Self {
             memory: memory.clone(),
             ratios: (0..without.outputs()).map(ratio).collect(),
-        }))
+        })
     }
 
     /// Returns `true` if the memory reduces the error of the target by at least 5 %, and significantly.
@@ -127,8 +126,14 @@ mod tests {
             assert_eq!(memory, Memory::of_averages_s(&[0.1, 1.0]));
             let with = set.with_readings(history.features(&memory).unwrap());
             let settings = RunSettings::from(Measured { rows: RowModel::Shared });
-            let measured = MemoryGain::measure(&settings, &memory, [&set, &with], (SplitBy::Time, 5), &|| false);
-            let gain = measured.unwrap().unwrap();
+            let measured = MemoryGain::measure(
+                &settings,
+                &memory,
+                [&set, &with],
+                (SplitBy::Time, 5),
+                &Job::UNINTERRUPTED,
+            );
+            let gain = measured.unwrap();
             assert_eq!(gain.helps(0), creeps, "{gain:?}");
             let ratio = gain.ratios[0].unwrap();
             if creeps {

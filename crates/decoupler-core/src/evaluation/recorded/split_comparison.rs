@@ -1,6 +1,6 @@
 use std::fmt;
 
-use ndarray::{Array2, ArrayView1};
+use ndarray::Array2;
 
 use super::{
     ChannelImportance, ChannelRemark, Determinacy, Determination, FittedModel, LearningCurve, NonlinearGain,
@@ -11,8 +11,9 @@ use super::{
 };
 use crate::{
     dataset::{Dataset, Division, Folds, SplitBy, Stream},
-    evaluation::{CrossValidated, Run, RunError, RunSettings, Scores, TargetErrors, errors::mean},
-    numerics::student_quantile,
+    evaluation::{CrossValidated, Run, RunError, RunSettings, Scores, TargetErrors},
+    job::Job,
+    numerics::{autocorrelation, student_quantile},
 };
 
 /// Held-out errors with the same settings and samples, for folds by group (by time without groups) and for random
@@ -43,38 +44,32 @@ impl SplitComparison {
     const MIN_CORRELATION: f64 = 0.5;
 
     /// Compares random folds of `set` with folds by group if there are groups, otherwise by `by`, or by time if `by` is
-    /// random. `validated` is the cross-validation with `folds` folds by `by`. Returns `None` if cancelled. Takes up to
-    /// 2 × folds trainings.
+    /// random. `validated` is the cross-validation with `folds` folds by `by`. Takes up to 2 × folds trainings.
     ///
     /// # Errors
-    /// If the settings are invalid.
+    /// If the settings are invalid, or the job is cancelled.
     pub fn complete(
         settings: &RunSettings,
         set: &Dataset,
         folds: usize,
         (by, validated): (SplitBy, &CrossValidated),
-        is_cancelled: &dyn Fn() -> bool,
-    ) -> Result<Option<Self>, RunError> {
-        let validate = |rule: SplitBy| -> Result<Option<CrossValidated>, RunError> {
+        job: &Job<'_>,
+    ) -> Result<Self, RunError> {
+        let validate = |rule: SplitBy| -> Result<CrossValidated, RunError> {
             if rule == by {
-                return Ok(Some(validated.clone()));
+                return Ok(validated.clone());
             }
             let folds = rule.folds_of(set, folds);
             let folds = Folds::by(set, folds, rule, &mut settings.seed.rng(Stream::Split))?;
-            CrossValidated::on_folds(settings, set, folds, is_cancelled)
+            CrossValidated::on_folds(settings, set, folds, job)
         };
         let honest = SplitBy::honest(set);
-        let Some(of_honest) = validate(honest)? else {
-            return Ok(None);
-        };
-        let Some(random) = validate(SplitBy::Random)? else {
-            return Ok(None);
-        };
+        let (of_honest, random) = (validate(honest)?, validate(SplitBy::Random)?);
         let answers = [random.network.view(), of_honest.network.view()];
         let ratio = |target| rmse_ratio(set, answers, target, honest);
         let ratios = (0..set.outputs()).map(ratio).collect();
         let scores = [of_honest.scores(set), random.scores(set)];
-        Ok(Some(Self::of(set, honest, scores, ratios)))
+        Ok(Self::of(set, honest, scores, ratios))
     }
 
     /// Compares the test errors of two runs on parts of `set`, split by `by` and at random; `None` if a run is of a single fold.
@@ -121,7 +116,7 @@ impl SplitComparison {
                 .targets()
                 .columns()
                 .into_iter()
-                .map(successive_correlation)
+                .map(|column| autocorrelation(column, 1))
                 .collect(),
         }
     }
@@ -168,15 +163,6 @@ impl SplitComparison {
             ),
         }
     }
-}
-
-/// Correlation of successive values; `None` if they are all equal.
-fn successive_correlation(values: ArrayView1<'_, f64>) -> Option<f64> {
-    let mean = mean(values);
-    let variance: f64 = values.iter().map(|value| (value - mean).powi(2)).sum();
-    let pairs = values.iter().zip(values.iter().skip(1));
-    let products: f64 = pairs.map(|(one, next)| (one - mean) * (next - mean)).sum();
-    (variance > 0.0).then(|| products / variance)
 }
 
 /// Findings on a recording: for each target, for each channel, and with more samples.
@@ -244,48 +230,46 @@ impl Findings {
     }
 
     /// Analyses `set` by cross-validation with `folds` folds by the rule of `division`, whose test samples are used for
-    /// the learning curve; returns `None` if cancelled. `model` is fitted without each channel and to fewer samples. By
+    /// the learning curve. `model` is fitted without each channel and to fewer samples. By
     /// default it is the network if it is better than ridge regression for a target, otherwise ridge; with ridge, no
     /// network is trained at all. Once `is_spent` returns `true`, no network is trained any more and no channel left out; ridge
     /// regression comes first.
     ///
     /// # Errors
-    /// If the set cannot be divided, or the settings are invalid.
+    /// If the set cannot be divided, the settings are invalid, or the job is cancelled.
     pub fn measure(
         settings: &RunSettings,
         set: &Dataset,
         (division, folds): (&Division, usize),
         model: Option<FittedModel>,
         begin: &dyn Fn(StudyStep),
-        [is_cancelled, is_spent]: [&dyn Fn() -> bool; 2],
-    ) -> Result<Option<Self>, RunError> {
+        (job, is_spent): (&Job<'_>, &dyn Fn() -> bool),
+    ) -> Result<Self, RunError> {
         let by = division.by;
         let folds_by = |by| Folds::by(set, folds, by, &mut settings.seed.rng(Stream::Split));
-        let ends = || is_cancelled() || is_spent();
+        let ends = || job.is_cancelled() || is_spent();
+        let in_time = Job::new(&ends);
         begin(StudyStep::Folds);
         let judged = |answers: &Array2<f64>| Determination::measure(set, answers.view(), by);
-        let answers = FittedModel::Ridge.held_out(settings, set, &folds_by(by)?, is_cancelled)?;
-        let Some(answers) = answers else { return Ok(None) };
-        let ridge = judged(&answers);
+        let ridge = judged(&FittedModel::Ridge.held_out(settings, set, &folds_by(by)?, job)?);
         let (mut network, mut gains, mut comparison) = (vec![None; set.outputs()], vec![None; set.outputs()], None);
         let mut left_out = Vec::new();
         if model != Some(FittedModel::Ridge) {
-            match CrossValidated::on_folds(settings, set, folds_by(by)?, ends)? {
+            match unless_cancelled(CrossValidated::on_folds(settings, set, folds_by(by)?, &in_time))? {
                 None => left_out.push(StudyStep::Folds),
                 Some(validated) => {
                     network = judged(&validated.network).into_iter().map(Result::ok).collect();
                     gains = NonlinearGain::of_validated(set, &validated, by);
                     begin(StudyStep::OtherFolds);
-                    comparison = SplitComparison::complete(settings, set, folds, (by, &validated), &ends)?;
+                    let compared = SplitComparison::complete(settings, set, folds, (by, &validated), &in_time);
+                    comparison = unless_cancelled(compared)?;
                 }
             }
             if comparison.is_none() {
                 left_out.push(StudyStep::OtherFolds);
             }
         }
-        if is_cancelled() {
-            return Ok(None);
-        }
+        job.check()?;
         // If the readings determine nothing, the better answer is only closer to the mean.
         let is_worth_it = gains.iter().zip(&network).any(|(gain, network)| {
             let is_told = network.as_ref().is_some_and(|network| {
@@ -304,19 +288,19 @@ impl Findings {
         let mut model = model.unwrap_or(best);
         begin(StudyStep::Samples);
         let parts = division.divide(set, &mut settings.seed.rng(Stream::Split))?;
-        let mut curves = LearningCurve::measure(settings, set, (&parts, by), model, &ends)?;
-        if curves.is_none() {
-            left_out.push(StudyStep::Samples);
-            model = FittedModel::Ridge;
-            curves = LearningCurve::measure(settings, set, (&parts, by), model, is_cancelled)?;
-        }
-        let Some(curves) = curves else { return Ok(None) };
+        let curves = LearningCurve::measure(settings, set, (&parts, by), model, &in_time);
+        let curves = match unless_cancelled(curves)? {
+            Some(curves) => curves,
+            None => {
+                left_out.push(StudyStep::Samples);
+                model = FittedModel::Ridge;
+                LearningCurve::measure(settings, set, (&parts, by), model, job)?
+            }
+        };
         begin(StudyStep::Channels);
-        let importance = channel_importance(settings, set, (&folds_by(by)?, by), model, &ends)?;
-        if is_cancelled() {
-            return Ok(None);
-        }
-        let importance = importance.unwrap_or_else(|| {
+        let importance = channel_importance(settings, set, (&folds_by(by)?, by), model, &in_time);
+        job.check()?;
+        let importance = unless_cancelled(importance)?.unwrap_or_else(|| {
             left_out.push(StudyStep::Channels);
             Vec::new()
         });
@@ -327,14 +311,22 @@ impl Findings {
             gain,
             curve,
         };
-        Ok(Some(Self {
+        Ok(Self {
             model,
             targets: targets.map(target).collect(),
             remarks: channel_remarks(set, by),
             importance,
             comparison,
             left_out,
-        }))
+        })
+    }
+}
+
+/// Returns what was measured; `None` if the measurement was cancelled.
+fn unless_cancelled<T>(measured: Result<T, RunError>) -> Result<Option<T>, RunError> {
+    match measured {
+        Err(RunError::Cancelled(_)) => Ok(None),
+        measured => measured.map(Some),
     }
 }
 

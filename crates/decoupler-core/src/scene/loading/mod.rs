@@ -1,6 +1,5 @@
 //! Loadings of the surface, and the drawing of deformations.
 
-mod bessel;
 mod indenter;
 mod press;
 mod sampler;

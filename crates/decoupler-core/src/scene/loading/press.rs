@@ -1,6 +1,6 @@
 use glam::DVec2;
 
-use super::bessel::scaled_k0_k1;
+use crate::numerics::scaled_k0_k1;
 
 /// An indenter's body with its radius in millimetres.
 #[derive(Clone, Copy, Debug)]

@@ -4,7 +4,8 @@ use rand::{Rng, RngExt};
 
 use super::{Indenter, Loading, press::Press};
 use crate::{
-    scene::{Deformation, Movement, Scene, normal_cdf, standard_normal},
+    numerics::normal_cdf,
+    scene::{Deformation, Movement, Scene, standard_normal},
     sensor::{ArrayScale, Geometry, SensorModel},
 };
 

@@ -184,7 +184,7 @@ impl<'a> ExportedDecoder<'a> {
             Some(mut settings) => {
                 let rows = settings.source.model_size().map_or(1, |size| size.rows);
                 settings.source.test_samples = SNAPSHOTS[0] * rows;
-                let set = settings.draw_test().map_err(Box::new)?;
+                let set = settings.source.draw_test(settings.seed).map_err(Box::new)?;
                 let network = |sample| if portable.takes_row() { set.row_index(sample) } else { 0 };
                 let samples = 0..set.samples();
                 let drawn = samples.map(|sample| (network(sample), set.sample_readings(sample).to_vec()));
@@ -374,7 +374,7 @@ impl FittedDecoder {
         };
         let in_training = PerRow::fit(&training, settings.source.row_model(), of_row)?;
         let (reading_ranges, target_extremes) = in_training.values().iter().cloned().unzip();
-        let set = DecoderSet::on_set(settings, training, networks);
+        let set = DecoderSet::new(settings, training, networks);
         let decoder = match kind {
             BundleDecoder::Linear => Some(set.linear().map_err(Box::new)?),
             BundleDecoder::Kind(kind) => set.decoder(kind, Precision::Double).map_err(Box::new)?,
@@ -430,7 +430,7 @@ impl Origin {
     /// The samples cannot be scaled or decoded.
     pub(super) fn of_sets(setup: &Setup, sets: &SetupSets) -> Result<Self, BundleError> {
         let (settings, samples) = (*setup.settings(), &sets.sets);
-        let set = DecoderSet::on_set(settings, samples.split.training.clone(), None);
+        let set = DecoderSet::new(settings, samples.split.training.clone(), None);
         let mut linear = set.linear().map_err(Box::new)?;
         let answers = decode_set(&mut *linear, &samples.test).map_err(|error| Box::new(RunError::from(error)))?;
         Ok(Self {

@@ -10,7 +10,9 @@ use crate::{
 use decoupler_core::{
     dataset::SplitBy,
     decoupling::{DecoderKind, Precision},
-    evaluation::{DecoderSet, Measured, Run, RunSettings, SimulatedSettings},
+    evaluation::{Begin, DecoderSet, Measured, Run, RunSets, RunSettings, SimulatedSettings},
+    job::Job,
+    machine::MemoryBudget,
     scene::{Indenter, Loading, RowModel},
     training::Method,
 };
@@ -27,7 +29,18 @@ fn run() -> Run {
 
 /// The report under `name`, as a program reads it.
 fn report(name: &str, file: &NetworkFile, run: &Run) -> String {
-    let set = DecoderSet::new(&file.settings.simulated().unwrap(), Some(file.network.clone())).unwrap();
+    let set = DecoderSet::new(
+        file.settings,
+        RunSets::draw(
+            &file.settings.simulated().unwrap(),
+            MemoryBudget::UNLIMITED,
+            &Job::UNINTERRUPTED,
+        )
+        .unwrap()
+        .split
+        .training,
+        Some(file.network.clone()),
+    );
     let ridge = set.measure(DecoderKind::Ridge, Precision::Double, run.test()).unwrap();
     let (defect, decoders) = (run.defect(), [ridge.unwrap()]);
     let report = RunReport {
@@ -160,8 +173,8 @@ fn recorded_run(folder: &Path) -> (Run, NetworkFile) {
     let mut settings = RunSettings::from(Measured { rows: RowModel::Shared });
     (settings.hidden, settings.training.stopping.epochs) = (2, 5);
     let setup = Setup::recording(settings, plan);
-    let sets = setup.sets(folder, &|| false, &mut |_| ()).unwrap().unwrap();
-    let mut run = sets.run(&setup, &|| false).unwrap().unwrap();
+    let sets = setup.sets(folder, &Job::UNINTERRUPTED, &mut |_| ()).unwrap();
+    let mut run = sets.run(&setup, Begin::Initialize, &Job::UNINTERRUPTED).unwrap();
     while run.step().is_none() {}
     let file = NetworkFile::from_run(&run, sets.recorded()).unwrap();
     (run, file)
@@ -171,7 +184,7 @@ fn recorded_run(folder: &Path) -> (Run, NetworkFile) {
 fn a_report_of_a_recording_has_its_errors_figures_and_command() {
     let root = tempfile::tempdir().unwrap();
     let (run, file) = recorded_run(root.path());
-    let set = DecoderSet::on_set(file.settings, run.test().as_ref().clone(), Some(file.network.clone()));
+    let set = DecoderSet::new(file.settings, run.test().as_ref().clone(), Some(file.network.clone()));
     let ridge = set.measure(DecoderKind::Ridge, Precision::Double, run.test()).unwrap();
     let decoders = [ridge.unwrap()];
     let report = RunReport {

@@ -10,6 +10,7 @@ use decoupler_core::{
         Channel, CrossValidated, ErrorTable, RecordedSize, Workload,
         recorded::{Determination, Findings, FittedModel, NonlinearGain, SplitComparison, StudyStep, channel_remarks},
     },
+    job::Job,
 };
 use decoupler_files::{
     export::describe_channels,
@@ -18,14 +19,14 @@ use decoupler_files::{
 };
 
 use crate::window::{
-    job::{Job, Report, Wake},
+    job::{Background, Report, Wake},
     shared::{Effect, Matter, Notice, Unfinished},
 };
 
 /// Study of a recording: its background thread and its results.
 #[derive(Debug)]
 pub struct RecordingStudy {
-    job: Job<StudyEvent>,
+    job: Background<StudyEvent>,
     /// The work under way.
     pub(super) under_way: Option<UnderWay>,
     /// Progress of reading a file.
@@ -79,7 +80,7 @@ impl RecordingStudy {
     /// Creates a study without results; `wake` is called after each event.
     pub fn new(wake: Wake) -> Self {
         Self {
-            job: Job::new("recording study", wake),
+            job: Background::new("recording study", wake),
             under_way: None,
             reading: None,
             found: None,
@@ -125,7 +126,7 @@ impl RecordingStudy {
         (self.under_way, self.reading) = (Some(under_way), None);
         let choice = self.choice;
         self.job.start(
-            move |report| work(setup, &task, choice, report),
+            move |report| report.unless_cancelled(work(setup, &task, choice, report)),
             |ended| StudyEvent::Ended(ended.unwrap_or_else(|error| Err(error.to_string()))),
         );
     }
@@ -238,19 +239,17 @@ fn find(
     let division = (&plan.division, folds);
     let begin = |stage| report.send(StudyEvent::Began(stage));
     let is_cancelled = || report.is_cancelled();
-    let ends: [&dyn Fn() -> bool; 2] = [&is_cancelled, &|| false];
+    let ends: (&Job<'_>, &dyn Fn() -> bool) = (&Job::new(&is_cancelled), &|| false);
     let found = Findings::measure(setup.settings(), &recording.set, division, model, &begin, ends);
-    if let Some(findings) = found.map_err(|error| error.to_string())? {
-        report.send(StudyEvent::Found(Box::new(RecordingFindings {
-            setup,
-            folds: describe_folds(folds, plan.division.by),
-            samples: recording.set.samples(),
-            inputs: recording.inputs,
-            targets: recording.targets,
-            findings,
-            time: begun.elapsed(),
-        })));
-    }
+    report.send(StudyEvent::Found(Box::new(RecordingFindings {
+        findings: found.map_err(|error| error.to_string())?,
+        setup,
+        folds: describe_folds(folds, plan.division.by),
+        samples: recording.set.samples(),
+        inputs: recording.inputs,
+        targets: recording.targets,
+        time: begun.elapsed(),
+    })));
     Ok(())
 }
 
@@ -263,22 +262,17 @@ fn validate(
 ) -> Result<(), String> {
     let (settings, set, by) = (setup.settings(), &recording.set, plan.division.by);
     let is_cancelled = || report.is_cancelled();
+    let job = &Job::new(&is_cancelled);
     let workload = Workload::of_recording(settings, RecordedSize::of(settings, set));
     workload
         .check_memory(memory_budget())
         .map_err(|error| error.to_string())?;
     let assigned =
         Folds::by(set, folds, by, &mut settings.seed.rng(Stream::Split)).map_err(|error| error.to_string())?;
-    let validated =
-        CrossValidated::on_folds(settings, set, assigned, is_cancelled).map_err(|error| error.to_string())?;
-    let Some(validated) = validated else { return Ok(()) };
+    let validated = CrossValidated::on_folds(settings, set, assigned, job).map_err(|error| error.to_string())?;
     let comparison = if compares_random && by != SplitBy::Random {
-        let compared = SplitComparison::complete(settings, set, folds, (by, &validated), &is_cancelled);
-        let compared = compared.map_err(|error| error.to_string())?;
-        if compared.is_none() {
-            return Ok(());
-        }
-        compared
+        let compared = SplitComparison::complete(settings, set, folds, (by, &validated), job);
+        Some(compared.map_err(|error| error.to_string())?)
     } else {
         None
     };

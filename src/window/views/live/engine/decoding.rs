@@ -111,21 +111,20 @@ impl Decoding {
         if let Some(zero) = &self.zero {
             zero.apply(&mut frame_ohm);
         }
-        let decoded = self.decode_zeroed(readings_ohm, &frame_ohm, truth, now);
+        let decoded = self.decode_zeroed(&frame_ohm, truth, now);
         self.frame_ohm = frame_ohm;
         decoded
     }
 
     fn decode_zeroed(
         &mut self,
-        readings_ohm: &[f64],
         frame_ohm: &[f64],
         truth: Option<&Deformation>,
         now: Instant,
     ) -> Result<Option<f64>, String> {
         let by_all = self.decoder.decode(frame_ohm, &mut self.by_all_mm);
         by_all.map_err(|error| error.to_string())?;
-        if self.watch.check(readings_ohm, frame_ohm, now) {
+        if self.watch.check(frame_ohm, now) {
             self.since_named = Default::default();
         }
         let is_left_out = self.watch.decode(frame_ohm, &mut self.answer_mm);

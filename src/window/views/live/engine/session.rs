@@ -6,7 +6,7 @@ use std::{
 use decoupler_core::{
     decoupling::Decoder,
     evaluation::SimulatedSettings,
-    live::{FaultEvent, FaultMonitor, LeftOutDecoder},
+    live::{FaultEvent, LeftOutDecoder, WireCheck, equation_decoder},
     scene::Scene,
     sensor::{SensorError, SensorModel},
 };
@@ -400,7 +400,7 @@ pub(super) struct Watch {
 
 #[derive(Debug)]
 struct LiveParts {
-    monitor: FaultMonitor,
+    check: WireCheck,
     left_out: LeftOutDecoder,
 }
 
@@ -415,7 +415,7 @@ impl Watch {
     pub(super) fn new(sensor: &SensorModel, scene: &Scene, rows: &[usize]) -> Result<Self, SensorError> {
         let reason = if scene.noise.is_none() {
             Some("not looked for: without noise, deviations cannot be judged; give the noise of a reading")
-        } else if !FaultMonitor::is_affordable(sensor.scale, scene) {
+        } else if !WireCheck::is_affordable(sensor.scale, scene) {
             Some("not looked for: the array is too large to check every frame")
         } else {
             None
@@ -423,8 +423,8 @@ impl Watch {
         let parts = match reason {
             Some(_) => None,
             None => Some(LiveParts {
-                monitor: FaultMonitor::new(sensor, scene, rows)?,
-                left_out: LeftOutDecoder::new(sensor, scene, rows)?,
+                check: WireCheck::new(sensor, scene, rows)?,
+                left_out: LeftOutDecoder::new(sensor, scene, rows, equation_decoder(sensor, scene, rows)?)?,
             }),
         };
         Ok(Self {
@@ -446,15 +446,15 @@ impl Watch {
         }
     }
 
-    /// Checks a frame for faults, unless another was checked just now. `raw_ohm` are its readings, and `frame_ohm` the
-    /// same divided by the gains of the unloaded state. Returns `true` if the fault named has changed.
-    pub(super) fn check(&mut self, raw_ohm: &[f64], frame_ohm: &[f64], now: Instant) -> bool {
+    /// Checks a frame for faults, unless another was checked just now: its readings, divided by the gains of the unloaded
+    /// state. Returns `true` if the fault named has changed.
+    pub(super) fn check(&mut self, frame_ohm: &[f64], now: Instant) -> bool {
         let Some(parts) = &mut self.parts else { return false };
         let is_due = |checked: Instant| now.saturating_duration_since(checked) >= BETWEEN_CHECKS;
         if !self.checked.is_none_or(is_due) {
             return false;
         }
-        let Some(event) = parts.monitor.check_zeroed(raw_ohm, frame_ohm) else {
+        let Some(event) = parts.check.check(frame_ohm) else {
             self.checked = Some(Instant::now());
             return false;
         };
@@ -464,7 +464,7 @@ impl Watch {
             FaultEvent::Unexplained => Watched::Unexplained,
             FaultEvent::Recovered => Watched::Normal,
         };
-        parts.left_out.leave_out(parts.monitor.named());
+        parts.left_out.leave_out(parts.check.named());
         matches!(event, FaultEvent::Named(_))
     }
 

@@ -351,9 +351,11 @@ mod tests {
 
     use super::*;
     use crate::window::{
-        job::Job,
+        job::Background,
         views::live::engine::{SourcePlan, run},
     };
+    use decoupler_core::evaluation::Begin;
+    use decoupler_core::job::Job;
 
     /// A network of a recording, and the file that it was trained on.
     fn network(folder: &Path) -> (Arc<NetworkFile>, std::path::PathBuf) {
@@ -377,8 +379,8 @@ mod tests {
         let mut settings = RunSettings::from(Measured { rows: RowModel::Shared });
         settings.training.stopping.epochs = 3;
         let setup = Setup::recording(settings, plan);
-        let sets = setup.sets(Path::new(""), &|| false, &mut |_| ()).unwrap().unwrap();
-        let mut run = sets.run(&setup, &|| false).unwrap().unwrap();
+        let sets = setup.sets(Path::new(""), &Job::UNINTERRUPTED, &mut |_| ()).unwrap();
+        let mut run = sets.run(&setup, Begin::Initialize, &Job::UNINTERRUPTED).unwrap();
         while run.step().is_none() {}
         let file = NetworkFile::from_run(&run, sets.recorded()).unwrap();
         (Arc::new(file), path)
@@ -491,7 +493,7 @@ mod tests {
         let plan = plan(&network, &path);
         let (commands, incoming) = channel();
         let (woke, wakes) = channel();
-        let mut job: Job<LiveEvent> = Job::prompt("live", Arc::new(move || woke.send(()).unwrap_or(())));
+        let mut job: Background<LiveEvent> = Background::prompt("live", Arc::new(move || woke.send(()).unwrap_or(())));
         job.start(
             move |report| run(plan, &incoming, report),
             |ended| LiveEvent::Ended(ended.unwrap_or_else(|error| Err(error.to_string()))),

@@ -1,11 +1,13 @@
 use std::sync::Arc;
 
 use super::{section::Shown, state::Subject};
-use crate::window::job::{Job, JobError, Report, Wake};
+use crate::window::job::{Background, JobError, Report, Wake};
 use decoupler_core::{
     decoupling::{Decoder, DecoderKind, Precision},
-    evaluation::{DecoderSet, Pressed, PressedAnswer},
+    evaluation::{DecoderSet, Pressed, PressedAnswer, RunSets},
+    job::Job,
 };
+use decoupler_files::machine::memory_budget;
 
 /// Decoders compared with the network.
 const KINDS: [DecoderKind; 5] = [
@@ -43,8 +45,8 @@ struct Decoded {
 /// The other decoders under the finger: fitted in the background once the user presses, and asked there one touch at a
 /// time; the newest touch wins.
 pub(super) struct Comparing {
-    fits: Job<FitEvent>,
-    decoding: Job<Result<Decoded, JobError>>,
+    fits: Background<FitEvent>,
+    decoding: Background<Result<Decoded, JobError>>,
     of: Option<Subject>,
     decoders: Vec<Fitted>,
     rows: Vec<Compared>,
@@ -57,8 +59,8 @@ pub(super) struct Comparing {
 impl Comparing {
     pub(super) fn new(wake: &Wake) -> Self {
         Self {
-            fits: Job::new("fits", Arc::clone(wake)),
-            decoding: Job::prompt("comparison", Arc::clone(wake)),
+            fits: Background::new("fits", Arc::clone(wake)),
+            decoding: Background::prompt("comparison", Arc::clone(wake)),
             of: None,
             decoders: Vec::new(),
             rows: Vec::new(),
@@ -202,7 +204,12 @@ impl Comparing {
 
 /// Fits one decoder after the other, the fastest first.
 fn fit_all(subject: &Subject, report: &Report<FitEvent>) {
-    let set = DecoderSet::new(&subject.settings, Some((*subject.networks).clone())).map_err(|error| error.to_string());
+    let is_cancelled = || report.is_cancelled();
+    let sets = RunSets::draw(&subject.settings, memory_budget(), &Job::new(&is_cancelled));
+    let set = sets.map_err(|error| error.to_string()).map(|sets| {
+        let networks = Some((*subject.networks).clone());
+        DecoderSet::new(subject.settings.into(), sets.split.training, networks)
+    });
     for kind in KINDS {
         if report.is_cancelled() {
             return;

@@ -1,7 +1,8 @@
 use std::sync::Arc;
 
 use decoupler_core::{
-    evaluation::{Run, RunError, SimulatedSettings, ready_settings},
+    evaluation::{Begin, Run, RunError, RunSets, SimulatedSettings, ready_settings},
+    job::Job,
     network::Networks,
     scene::{Contact, Print, Touch},
 };
@@ -11,7 +12,7 @@ use glam::{DVec2, DVec3};
 
 use super::state::{Grip, Hand, PressState, Subject, Target, Tool};
 use crate::window::{
-    job::{Job, JobError, Wake},
+    job::{Background, JobError, Wake},
     shared::Shared,
     test_view::TestView,
     theme::Palette,
@@ -294,13 +295,13 @@ fn to_egui(at: DVec2) -> Pos2 {
 }
 
 /// Message of the thread to the window.
-type Trained = Result<Result<Option<Networks>, RunError>, JobError>;
+type Trained = Result<Result<Networks, RunError>, JobError>;
 
 /// A small network for the displayed sensor, trained quickly in the background once the user is about to press and there is
 /// no other.
 #[derive(Debug)]
 pub struct ReadyNetwork {
-    job: Job<Trained>,
+    job: Background<Trained>,
     /// Settings of the network that is there or being trained.
     of: Option<SimulatedSettings>,
     networks: Option<Arc<Networks>>,
@@ -311,7 +312,7 @@ pub struct ReadyNetwork {
 impl ReadyNetwork {
     pub(super) fn new(wake: Wake) -> Self {
         Self {
-            job: Job::prompt("ready network", wake),
+            job: Background::prompt("ready network", wake),
             of: None,
             networks: None,
             failure: None,
@@ -322,7 +323,8 @@ impl ReadyNetwork {
     pub(super) fn take_events(&mut self) {
         while let Some(trained) = self.job.next_event() {
             match trained {
-                Ok(Ok(networks)) => self.networks = networks.map(Arc::new),
+                Ok(Ok(networks)) => self.networks = Some(Arc::new(networks)),
+                Ok(Err(RunError::Cancelled(_))) => {}
                 Ok(Err(error)) => self.failure = Some(error.to_string()),
                 Err(error) => self.failure = Some(error.to_string()),
             }
@@ -339,11 +341,11 @@ impl ReadyNetwork {
         self.job.start(
             move |report| {
                 let is_cancelled = || report.is_cancelled();
-                let Some(mut run) = Run::prepare_unless(settings, memory_budget(), &is_cancelled)? else {
-                    return Ok(None);
-                };
-                while run.step().is_none() && !is_cancelled() {}
-                Ok(Some(run.network()))
+                let job = Job::new(&is_cancelled);
+                let sets = RunSets::draw(&settings, memory_budget(), &job)?;
+                let mut run = Run::new(settings.into(), sets, Begin::Initialize, &job)?;
+                run.finish(&job)?;
+                Ok(run.network())
             },
             |trained| trained,
         );

@@ -15,7 +15,7 @@ use super::{
     section::{Question, Shown},
 };
 use crate::window::{
-    job::{Job, JobError, Wake},
+    job::{Background, JobError, Wake},
     shared::{RunResult, Shared, SourceKind},
     surface_view::SurfaceViewResponse,
     test_view::TestView,
@@ -41,7 +41,7 @@ pub struct PressState {
     shown: Option<Shown>,
     comparing: Comparing,
     /// Answers that take longer than a frame.
-    answering: Job<Result<Result<Shown, String>, JobError>>,
+    answering: Background<Result<Result<Shown, String>, JobError>>,
     /// The question that could not be answered, and why.
     failed: Option<(Question, String)>,
 }
@@ -59,7 +59,7 @@ impl PressState {
             is_wanted: false,
             shown: None,
             comparing: Comparing::new(wake),
-            answering: Job::prompt("press", Arc::clone(wake)),
+            answering: Background::prompt("press", Arc::clone(wake)),
             failed: None,
         }
     }

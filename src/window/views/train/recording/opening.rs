@@ -30,7 +30,7 @@ use super::{
     draft::{Draft, file_name, missing},
     files_section::{Reopened, write_sample},
 };
-use crate::window::job::{Job, JobError, Report, Wake};
+use crate::window::job::{Background, JobError, Report, Wake};
 
 /// Files to be opened.
 #[derive(Clone, Debug)]
@@ -93,7 +93,7 @@ pub(super) enum OpeningEvent {
 /// Files under way.
 #[derive(Debug)]
 pub(super) struct Opening {
-    job: Job<OpeningEvent>,
+    job: Background<OpeningEvent>,
     /// Names of the files under way, and the progress of reading them.
     pub(super) under_way: Option<(String, Option<Progress>)>,
     /// True while the files of a plan are being opened.
@@ -103,7 +103,7 @@ pub(super) struct Opening {
 impl Opening {
     pub(super) fn new(wake: Wake) -> Self {
         Self {
-            job: Job::prompt("opening", wake),
+            job: Background::prompt("opening", wake),
             under_way: None,
             is_reopening: false,
         }
@@ -397,7 +397,7 @@ struct CheckingEvent(Result<Box<Checked>, String>);
 /// Current check, and the outcome of the last one.
 #[derive(Debug)]
 pub(super) struct Checking {
-    job: Job<CheckingEvent>,
+    job: Background<CheckingEvent>,
     asked: Option<(Arc<Plan>, Seed)>,
     /// Its outcome, once it is known.
     pub(super) checked: Option<Result<Box<Checked>, String>>,
@@ -406,7 +406,7 @@ pub(super) struct Checking {
 impl Checking {
     pub(super) fn new(wake: Wake) -> Self {
         Self {
-            job: Job::new("import", wake),
+            job: Background::new("import", wake),
             asked: None,
             checked: None,
         }

@@ -6,7 +6,8 @@ use crate::{
         posterior::{gaussian::RoundedReading, truncated::medians},
         row_problem::Range,
     },
-    scene::{normal_cdf, standard_normal},
+    numerics::normal_cdf,
+    scene::standard_normal,
 };
 
 const UNIT: Range = Range {

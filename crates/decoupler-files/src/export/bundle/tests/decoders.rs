@@ -20,6 +20,7 @@ use crate::export::{
 use decoupler_core::{
     decoupling::DecoderKind,
     evaluation::SimulatedSettings,
+    job::Job,
     network::{Quantity, ScalingChoice},
     scene::{Movement, Rows},
 };
@@ -42,7 +43,7 @@ fn settings(rows: Rows, noise: f64) -> SimulatedSettings {
 
 /// The decoder fitted to the training samples of `file`.
 fn decoder(file: &NetworkFile, kind: BundleDecoder) -> Result<ExportedDecoder<'_>, BundleError> {
-    let sets = file.setup().sets(Path::new(""), &|| false, &mut |_| ())?.unwrap();
+    let sets = file.setup().sets(Path::new(""), &Job::UNINTERRUPTED, &mut |_| ())?;
     ExportedDecoder::of_run(file, sets, kind)
 }
 

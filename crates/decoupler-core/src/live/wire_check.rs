@@ -1,0 +1,604 @@
+use std::{f64::consts::TAU, fmt, iter::Sum, mem::discriminant};
+
+use faer::{Mat, Side, linalg::solvers::Solve};
+
+use super::partial_decoder::{Missing, PartialDecoder, equation_decoder};
+use crate::{
+    decoupling::Decoder,
+    numerics::chi_squared_quantile,
+    scene::{Loading, Scene},
+    sensor::{ArrayScale, SensorError, SensorModel},
+};
+
+/// Faulty wire, counted from 0.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum FaultyWire {
+    /// A row-wire.
+    Row(usize),
+    /// A column-wire, its amplifier or its converter.
+    Column(usize),
+    /// This column-wire and the next.
+    Columns(usize),
+}
+
+/// Cause of a fault, as far as the readings determine it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum FaultCause {
+    /// Readings are at the end of the converter's range, or higher than those of the intact wire.
+    Open,
+    /// Readings do not change.
+    Stuck,
+    /// The two wires touch.
+    Shorted,
+    /// Readings are 1 + `relative` times the resistances.
+    Gain {
+        /// Relative error of the readings.
+        relative: f64,
+    },
+    /// The readings contradict all others in a way that no other cause explains.
+    Unknown,
+}
+
+/// Fault identified from the readings.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Diagnosis {
+    /// Faulty wire.
+    pub wire: FaultyWire,
+    /// Most probable cause.
+    pub cause: FaultCause,
+    /// Probability of this wire, summed over all causes, given that exactly one fault explains the readings.
+    pub probability: f64,
+}
+
+/// Event of a frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum FaultEvent {
+    /// A fault was identified: its wire should be left out.
+    Named(Diagnosis),
+    /// The readings contradict Eq. (2), and no fault of a single wire explains them.
+    Unexplained,
+    /// The readings agree with Eq. (2) again.
+    Recovered,
+}
+
+/// Checks whether Eq. (2) explains the frames, and identifies the faulty wire if it does not.
+///
+/// A frame is suspicious if its residual after decoding, χ² = Σ (ln m − ln R)²/σ² over all readings m with relative noise
+/// σ, exceeds a limit that intact frames exceed with a probability of 10⁻³. When [`Self::PERSISTENCE`] consecutive frames
+/// are suspicious, the faults of single wires that explain them by the same limit are compared by their evidence: the
+/// probability density of all readings by Laplace's approximation (MacKay, "Bayesian interpolation", Neural Computation
+/// 4, 1992), where readings of the faulty wire are predicted from the others. The most probable fault is named if its
+/// probability is at least [`Self::SURE`].
+///
+/// Faults that Eq. (2) explains by some deformation cannot be found: two row-wires that touch, for example.
+#[derive(Debug)]
+pub struct WireCheck {
+    partial: PartialDecoder,
+    axes: &'static [usize],
+    stroke_mm: f64,
+    /// Relative noise of each reading (standard deviation): rows × M4.
+    deviations: Vec<f64>,
+    /// Standard deviation of the gain error of a row; 0 for none.
+    common: f64,
+    /// Logarithm of the reading above which the converter clips.
+    log_full_scale: f64,
+    coordinates_mm: Vec<f64>,
+    /// Last event; [`FaultEvent::Recovered`] at first.
+    state: FaultEvent,
+    /// Consecutive suspicious frames, each rows × M4.
+    suspicious_ohm: Vec<f64>,
+    /// Number of consecutive suspicious frames since the last comparison.
+    suspicious: usize,
+    /// Number of suspicious frames at which faults are compared again.
+    next_comparison: usize,
+    /// Number of consecutive frames without a fault.
+    normal: usize,
+}
+
+/// Fit of some readings.
+#[derive(Clone, Copy, Debug, Default)]
+struct Fit {
+    /// −2 ln of the probability density of their logarithms.
+    score: f64,
+    chi_squared: f64,
+    /// Number of readings in χ².
+    readings: usize,
+    /// Number of rows decoded.
+    rows: usize,
+}
+
+/// Row without the readings of up to two columns.
+struct PartialRow {
+    fit: Fit,
+    /// The missing readings.
+    missing: [Predicted; 2],
+}
+
+/// A reading predicted from others.
+#[derive(Clone, Copy, Debug, Default)]
+struct Predicted {
+    log_reading: f64,
+    /// ln R̂ with the gain of the row.
+    log_ohm: f64,
+    variance: f64,
+    /// Part of the variance that is noise of the reading.
+    noise: f64,
+}
+
+/// A hypothesis about the fault in some frames.
+struct Hypothesis {
+    wire: FaultyWire,
+    cause: FaultCause,
+    fit: Fit,
+}
+
+/// Normal deviate that is exceeded with a probability of 10⁻³.
+const DEVIATE: f64 = 3.090_232_306_167_814;
+/// Increase of χ² per unknown by the prior of the decoder: at most an eighth if nodes anywhere in their ranges have a
+/// Gaussian prior with the variance of the range.
+const OF_PRIOR: f64 = 0.25;
+/// Factor by which presses may be deeper than in the scene.
+const DEEPER: f64 = 1.5;
+/// Minimum noise assumed: the accuracy of the model.
+const SMALLEST_NOISE: f64 = 1e-6;
+/// Range of the logarithm of an unknown reading or gain: from a seventh to sevenfold.
+const WIDTH: f64 = 4.0;
+/// Maximum number of column-wires examined in all frames.
+const MAX_SUSPECTS: usize = 6;
+/// Number of rows used to choose them.
+const WORST_ROWS: usize = 2;
+/// Largest array that is checked: unknowns of a row, and column-wires.
+const MAX_UNKNOWNS: usize = 64;
+const MAX_COLUMNS: usize = 128;
+/// Largest interval between comparisons of unexplained frames, in units of [`WireCheck::PERSISTENCE`].
+const LONGEST_WAIT: usize = 1024;
+
+impl WireCheck {
+    /// Number of consecutive frames that must be suspicious for a fault to be reported, or normal for it to be cleared.
+    pub const PERSISTENCE: usize = 4;
+    /// Minimum probability at which a fault is reported.
+    pub const SURE: f64 = 0.99;
+
+    /// Returns `true` unless the array is too large to check every frame.
+    pub fn is_affordable(scale: ArrayScale, scene: &Scene) -> bool {
+        scene.unknowns_per_row(scale) <= MAX_UNKNOWNS && scale.columns() <= MAX_COLUMNS
+    }
+
+    /// Prepares to check frames of `rows` with the noise of `scene`, which must not be zero. Presses may differ from those
+    /// of the scene.
+    ///
+    /// # Errors
+    /// If the model has no resistance.
+    pub fn new(model: &SensorModel, scene: &Scene, rows: &[usize]) -> Result<Self, SensorError> {
+        let compression = scene.largest_compression;
+        let any_press = Scene {
+            loading: Loading::RandomNodes,
+            largest_compression: (DEEPER * compression).min(0.5 * (1.0 + compression)),
+            ..*scene
+        };
+        Self::by(equation_decoder(model, &any_press, rows)?, model, scene, rows)
+    }
+
+    /// As [`Self::new`], with the residual of `decoder`, which answers with absolute coordinates.
+    ///
+    /// # Errors
+    /// If the model has no resistance.
+    pub fn by(
+        decoder: Box<dyn Decoder>,
+        model: &SensorModel,
+        scene: &Scene,
+        rows: &[usize],
+    ) -> Result<Self, SensorError> {
+        let partial = PartialDecoder::new(model, scene, rows, decoder)?;
+        let noise = scene.noise.in_test();
+        let source = noise.source(model)?;
+        let own = |&ohm: &f64| source.relative_to(ohm).own.max(SMALLEST_NOISE);
+        Ok(Self {
+            axes: scene.movement.axes().indices(),
+            stroke_mm: scene.stroke_mm(&model.geometry),
+            deviations: partial.half_way_ohm.iter().map(own).collect(),
+            // Rows are decoded one by one but share this error: it must not be penalised more than once in total.
+            common: noise.drift * (rows.len() as f64).sqrt(),
+            log_full_scale: (noise.range_ohm(model)?.1 * (1.0 - 1e-9)).ln(),
+            suspicious_ohm: Vec::with_capacity(Self::PERSISTENCE * partial.half_way_ohm.len()),
+            coordinates_mm: vec![0.0; model.scale.coordinates_per_row()],
+            state: FaultEvent::Recovered,
+            suspicious: 0,
+            next_comparison: Self::PERSISTENCE,
+            normal: 0,
+            partial,
+        })
+    }
+
+    /// Returns the fault currently reported.
+    pub fn named(&self) -> Option<Diagnosis> {
+        match self.state {
+            FaultEvent::Named(diagnosis) => Some(diagnosis),
+            FaultEvent::Unexplained | FaultEvent::Recovered => None,
+        }
+    }
+
+    /// Checks a frame of the row-wires read: rows × M4 readings in ohm, which must be finite and above 0. Each state is
+    /// reported once.
+    ///
+    /// # Panics
+    /// If the frame has the wrong length.
+    pub fn check(&mut self, frame_ohm: &[f64]) -> Option<FaultEvent> {
+        assert_eq!(frame_ohm.len(), self.deviations.len());
+        if self.is_explained(frame_ohm, None) {
+            self.suspicious = 0;
+            self.normal += 1;
+            if self.normal == Self::PERSISTENCE && self.state != FaultEvent::Recovered {
+                self.state = FaultEvent::Recovered;
+                self.next_comparison = Self::PERSISTENCE;
+                return Some(self.state);
+            }
+            return None;
+        }
+        self.normal = 0;
+        if self
+            .named()
+            .is_some_and(|named| self.is_explained(frame_ohm, Some(named.wire)))
+        {
+            self.suspicious = 0;
+            return None;
+        }
+        if self.suspicious.is_multiple_of(Self::PERSISTENCE) {
+            self.suspicious_ohm.clear();
+        }
+        self.suspicious_ohm.extend_from_slice(frame_ohm);
+        self.suspicious += 1;
+        if self.suspicious < self.next_comparison {
+            return None;
+        }
+        self.suspicious = 0;
+        let found = self.compare();
+        self.next_comparison = match found {
+            Some(_) => Self::PERSISTENCE,
+            None => (2 * self.next_comparison).min(LONGEST_WAIT * Self::PERSISTENCE),
+        };
+        let event = found.map_or(FaultEvent::Unexplained, FaultEvent::Named);
+        let last = std::mem::replace(&mut self.state, event);
+        let is_known = match (last, event) {
+            (FaultEvent::Named(last), FaultEvent::Named(named)) => {
+                last.wire == named.wire && discriminant(&last.cause) == discriminant(&named.cause)
+            }
+            _ => last == event,
+        };
+        (!is_known).then_some(event)
+    }
+
+    /// Returns `true` if some deformation explains the readings, excluding those of `left_out`.
+    fn is_explained(&mut self, frame_ohm: &[f64], left_out: Option<FaultyWire>) -> bool {
+        let missing = left_out.map_or([None; 2], FaultyWire::columns);
+        let mut all = Fit::default();
+        for (row_index, readings_ohm) in frame_ohm.chunks_exact(self.columns()).enumerate() {
+            if !left_out.is_some_and(|wire| wire.is_row(self.partial.rows[row_index])) {
+                all = [all, self.residual(row_index, readings_ohm, missing).0]
+                    .into_iter()
+                    .sum();
+            }
+        }
+        self.is_within_limit(all)
+    }
+
+    /// Returns `true` if χ² is that of intact wires; `false` for NaN.
+    fn is_within_limit(&self, fit: Fit) -> bool {
+        let unknowns = self.axes.len() * self.partial.displacements_mm.len() * fit.rows;
+        fit.chi_squared <= chi_squared_quantile(fit.readings, DEVIATE) + OF_PRIOR * unknowns as f64
+    }
+
+    fn columns(&self) -> usize {
+        self.partial.predicted_ohm.len()
+    }
+
+    /// Decodes a row, and returns its χ² with the most probable logarithm of its gain. The score is not set.
+    fn residual(&mut self, row_index: usize, readings_ohm: &[f64], missing: Missing) -> (Fit, f64) {
+        let decoded = (self.partial).decode_row(row_index, readings_ohm, missing, &mut self.coordinates_mm);
+        let mut fit = Fit {
+            rows: 1,
+            ..Fit::default()
+        };
+        if decoded.is_err() {
+            fit.chi_squared = f64::INFINITY;
+            return (fit, 0.0);
+        }
+        let (mut sum, mut weights) = (0.0, 0.0);
+        for column in (0..readings_ohm.len()).filter(|&column| !missing.contains(&Some(column))) {
+            let [log_reading, log_ohm] = [readings_ohm[column], self.partial.predicted_ohm[column]].map(f64::ln);
+            if log_reading < self.log_full_scale || log_ohm < self.log_full_scale {
+                let weight = self.deviations[row_index * readings_ohm.len() + column].powi(-2);
+                let misfit = log_reading - log_ohm;
+                fit.chi_squared += weight * misfit * misfit;
+                sum += weight * misfit;
+                weights += weight;
+                fit.readings += 1;
+            }
+            // Clipped readings are certain.
+        }
+        if self.common == 0.0 {
+            return (fit, 0.0);
+        }
+        let log_gain = sum / (weights + self.common.powi(-2));
+        fit.chi_squared -= sum * log_gain;
+        (fit, log_gain)
+    }
+
+    /// Decodes a row without the missing readings, and predicts these.
+    fn partial_row(&mut self, row_index: usize, readings_ohm: &[f64], missing: Missing) -> PartialRow {
+        let (mut fit, log_gain) = self.residual(row_index, readings_ohm, missing);
+        let partial = &self.partial;
+        let columns = readings_ohm.len();
+        let nodes = partial.displacements_mm.len();
+        let moving = nodes * self.axes.len();
+        let row = partial.rows[row_index];
+        let Ok(jacobian) = partial.model.row_jacobian(row, &partial.displacements_mm) else {
+            fit.score = f64::INFINITY;
+            return PartialRow {
+                fit,
+                missing: [Predicted::default(); 2],
+            };
+        };
+        // Slopes of ln R by the unknowns, in units of their prior standard deviations: the stroke, and that of the gain.
+        let slopes = |column: usize| {
+            Mat::from_fn(moving + 1, 1, |unknown, _| {
+                let (node, axis) = (unknown / self.axes.len(), unknown % self.axes.len());
+                if unknown == moving {
+                    self.common
+                } else {
+                    jacobian[[column, node, self.axes[axis]]] / partial.predicted_ohm[column] * self.stroke_mm
+                }
+            })
+        };
+        let mut precision = Mat::<f64>::identity(moving + 1, moving + 1);
+        for column in (0..columns).filter(|&column| !missing.contains(&Some(column))) {
+            let noise = self.deviations[row_index * columns + column].powi(2);
+            let [log_reading, log_ohm] = [readings_ohm[column], partial.predicted_ohm[column]].map(f64::ln);
+            if log_reading < self.log_full_scale || log_ohm < self.log_full_scale {
+                let slopes = slopes(column);
+                precision += faer::Scale(1.0 / noise) * &slopes * slopes.transpose();
+                fit.score += (TAU * noise).ln();
+            }
+        }
+        let factor = precision.llt(Side::Lower).ok();
+        let diagonal = factor
+            .iter()
+            .flat_map(|factor| factor.L().diagonal().column_vector().iter());
+        fit.score += fit.chi_squared + 2.0 * diagonal.map(|entry| entry.ln()).sum::<f64>();
+        let variance = |slopes: &Mat<f64>| {
+            let solved = factor.as_ref().map(|factor| factor.solve(slopes));
+            solved.map_or(f64::INFINITY, |solved| (slopes.transpose() * solved)[(0, 0)])
+        };
+        let predicted = missing.map(|column| {
+            column.map_or_else(Predicted::default, |column| {
+                let noise = self.deviations[row_index * columns + column].powi(2);
+                Predicted {
+                    log_reading: readings_ohm[column].ln(),
+                    log_ohm: partial.predicted_ohm[column].ln() + log_gain,
+                    variance: noise + variance(&slopes(column)),
+                    noise,
+                }
+            })
+        });
+        PartialRow {
+            fit,
+            missing: predicted,
+        }
+    }
+
+    /// All rows of the suspicious frames without the missing readings.
+    fn partial_rows(&mut self, missing: Missing) -> Vec<PartialRow> {
+        let frames_ohm = std::mem::take(&mut self.suspicious_ohm);
+        let (columns, rows) = (self.columns(), self.partial.rows.len());
+        let readings = frames_ohm.chunks_exact(columns).enumerate();
+        let found = readings
+            .map(|(line, ohm)| self.partial_row(line % rows, ohm, missing))
+            .collect();
+        self.suspicious_ohm = frames_ohm;
+        found
+    }
+
+    /// The fault that explains the suspicious frames, if there is one.
+    fn compare(&mut self) -> Option<Diagnosis> {
+        let intact: Vec<Fit> = self.partial_rows([None; 2]).iter().map(|row| row.fit).collect();
+        let mut hypotheses: Vec<Hypothesis> = (0..self.partial.rows.len())
+            .map(|row_index| self.of_row(row_index, &intact))
+            .collect();
+        let suspects = self.suspects(&intact);
+        for &column in &suspects {
+            let rows = self.partial_rows([Some(column), None]);
+            hypotheses.extend(self.of_column(column, &rows));
+            if suspects.contains(&(column + 1)) {
+                let rows = self.partial_rows([Some(column), Some(column + 1)]);
+                hypotheses.push(of_short(column, &rows));
+            }
+        }
+        hypotheses.retain(|hypothesis| self.is_within_limit(hypothesis.fit));
+        let best = hypotheses.iter().min_by(|a, b| a.fit.score.total_cmp(&b.fit.score))?;
+        let weight = |other: &Hypothesis| (-0.5 * (other.fit.score - best.fit.score)).exp();
+        let of_wire = hypotheses.iter().filter(|other| other.wire == best.wire);
+        let probability = of_wire.map(weight).sum::<f64>() / hypotheses.iter().map(weight).sum::<f64>();
+        (probability >= Self::SURE).then_some(Diagnosis {
+            wire: best.wire,
+            cause: best.cause,
+            probability,
+        })
+    }
+
+    /// A fault of a row-wire, which does not affect the other rows.
+    fn of_row(&self, row_index: usize, intact: &[Fit]) -> Hypothesis {
+        let (rows, columns) = (self.partial.rows.len(), self.columns());
+        let others = intact.iter().enumerate().filter(|(line, _)| line % rows != row_index);
+        let lines = self.suspicious_ohm.chunks_exact(columns).skip(row_index).step_by(rows);
+        let half_way_ohm = &self.partial.half_way_ohm[row_index * columns..][..columns];
+        let pairs = lines.flat_map(|line| line.iter().zip(half_way_ohm));
+        let is_clipped = |ohm: f64| ohm.ln() >= self.log_full_scale;
+        let is_open = pairs.clone().all(|(&ohm, half_way)| is_clipped(ohm) || ohm > *half_way);
+        // Clipped readings are certain without any current.
+        let uncertain = pairs.filter(|(ohm, _)| !(is_open && is_clipped(**ohm))).count();
+        let of_row = Fit {
+            score: 2.0 * WIDTH.ln() * uncertain as f64,
+            ..Fit::default()
+        };
+        Hypothesis {
+            wire: FaultyWire::Row(self.partial.rows[row_index]),
+            cause: if is_open { FaultCause::Open } else { FaultCause::Unknown },
+            fit: others.map(|(_, fit)| *fit).chain([of_row]).sum(),
+        }
+    }
+
+    /// Column-wires without which the worst rows of the last frame have the smallest χ², and the neighbours of the best:
+    /// two touching columns mask each other.
+    fn suspects(&mut self, intact: &[Fit]) -> Vec<usize> {
+        let (rows, columns) = (self.partial.rows.len(), self.columns());
+        let frames_ohm = std::mem::take(&mut self.suspicious_ohm);
+        let mut lines: Vec<usize> = (intact.len() - rows..intact.len()).collect();
+        lines.sort_by(|&a, &b| intact[b].chi_squared.total_cmp(&intact[a].chi_squared));
+        lines.truncate(WORST_ROWS);
+        let mut order: Vec<(f64, usize)> = Vec::with_capacity(columns);
+        for column in 0..columns {
+            let fits = lines.iter().map(|&line| {
+                let readings_ohm = &frames_ohm[line * columns..][..columns];
+                self.residual(line % rows, readings_ohm, [Some(column), None]).0
+            });
+            order.push((fits.map(|fit| fit.chi_squared).sum(), column));
+        }
+        self.suspicious_ohm = frames_ohm;
+        order.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let best = order[0].1;
+        let mut suspects: Vec<usize> = order.iter().take(MAX_SUSPECTS).map(|(_, column)| *column).collect();
+        suspects.extend([best.saturating_sub(1), (best + 1).min(columns - 1)]);
+        suspects.sort_unstable();
+        suspects.dedup();
+        suspects
+    }
+
+    /// Faults of a column-wire, from all rows without it.
+    fn of_column(&self, column: usize, rows: &[PartialRow]) -> [Hypothesis; 3] {
+        let rest: Fit = rows.iter().map(|row| row.fit).sum();
+        let readings = rows.iter().map(|row| row.missing[0]);
+        let count = rows.len();
+        let is_clipped = |reading: &Predicted| reading.log_reading >= self.log_full_scale;
+        let (level, of_level) = level(readings.clone().map(|reading| (reading.log_reading, reading.noise)));
+        let constant = if readings.clone().all(|reading| is_clipped(&reading)) {
+            // Certain without any current.
+            (FaultCause::Open, Fit::default())
+        } else if level >= self.log_full_scale {
+            (FaultCause::Open, of_level)
+        } else {
+            (FaultCause::Stuck, of_level)
+        };
+        let misfits = readings
+            .clone()
+            .map(|reading| (reading.log_reading - reading.log_ohm, reading.variance));
+        let (log_gain, of_gain) = self::level(misfits.clone());
+        let gain = FaultCause::Gain {
+            relative: log_gain.exp_m1(),
+        };
+        // A wire that is broken beyond some of its nodes has higher readings, which vary.
+        let is_high = misfits.clone().all(|(misfit, _)| misfit > 0.0);
+        let other = if is_high { FaultCause::Open } else { FaultCause::Unknown };
+        let of_other = Fit {
+            score: 2.0 * WIDTH.ln() * count as f64,
+            ..Fit::default()
+        };
+        [constant, (gain, of_gain), (other, of_other)].map(|(cause, fit)| Hypothesis {
+            wire: FaultyWire::Column(column),
+            cause,
+            fit: [rest, fit].into_iter().sum(),
+        })
+    }
+}
+
+/// Two columns that touch: their readings differ only by noise, and have the mean conductance of both.
+fn of_short(column: usize, rows: &[PartialRow]) -> Hypothesis {
+    let of_rows = rows.iter().flat_map(|row| {
+        let [one, other] = row.missing;
+        let noise = one.noise + other.noise;
+        let apart = normal(one.log_reading - other.log_reading, noise);
+        // The mean conductance is known at least as well as both on average.
+        let log_ohm = -(0.5 * ((-one.log_ohm).exp() + (-other.log_ohm).exp())).ln();
+        let misfit = 0.5 * (one.log_reading + other.log_reading) - log_ohm;
+        let mean = normal(misfit, 0.5 * (one.variance + other.variance) - 0.25 * noise);
+        [row.fit, apart, mean]
+    });
+    Hypothesis {
+        wire: FaultyWire::Columns(column),
+        cause: FaultCause::Shorted,
+        fit: of_rows.sum(),
+    }
+}
+
+/// Fit of a normal value with this misfit and variance.
+fn normal(misfit: f64, variance: f64) -> Fit {
+    let chi_squared = misfit * misfit / variance;
+    Fit {
+        score: chi_squared + (TAU * variance).ln(),
+        chi_squared,
+        readings: 1,
+        rows: 0,
+    }
+}
+
+/// Fit of values, each with its variance, that have a common unknown mean, uniform within [`WIDTH`]; and that mean.
+fn level(values: impl Iterator<Item = (f64, f64)> + Clone) -> (f64, Fit) {
+    let precision: f64 = values.clone().map(|(_, variance)| 1.0 / variance).sum();
+    let mean = values.clone().map(|(value, variance)| value / variance).sum::<f64>() / precision;
+    let mut fit: Fit = values.map(|(value, variance)| normal(value - mean, variance)).sum();
+    fit.score += 2.0 * WIDTH.ln() - (TAU / precision).ln();
+    fit.readings = fit.readings.saturating_sub(1);
+    (mean, fit)
+}
+
+impl Sum for Fit {
+    fn sum<I: Iterator<Item = Self>>(fits: I) -> Self {
+        fits.fold(Self::default(), |sum, fit| Self {
+            score: sum.score + fit.score,
+            chi_squared: sum.chi_squared + fit.chi_squared,
+            readings: sum.readings + fit.readings,
+            rows: sum.rows + fit.rows,
+        })
+    }
+}
+
+impl FaultyWire {
+    /// Returns `true` if only the readings of this row-wire are affected.
+    pub fn is_row(self, row: usize) -> bool {
+        self == Self::Row(row)
+    }
+
+    /// Returns the faulty column-wires.
+    pub fn columns(self) -> [Option<usize>; 2] {
+        match self {
+            Self::Row(_) => [None; 2],
+            Self::Column(column) => [Some(column), None],
+            Self::Columns(first) => [Some(first), Some(first + 1)],
+        }
+    }
+}
+
+impl fmt::Display for FaultyWire {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match *self {
+            Self::Row(row) => write!(f, "row-wire {}", row + 1),
+            Self::Column(column) => write!(f, "column-wire {}", column + 1),
+            Self::Columns(first) => write!(f, "column-wires {} and {}", first + 1, first + 2),
+        }
+    }
+}
+
+impl fmt::Display for Diagnosis {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}: ", self.wire)?;
+        match self.cause {
+            FaultCause::Open => write!(f, "open, as if broken or not connected"),
+            FaultCause::Stuck => write!(f, "stuck, its readings do not change"),
+            FaultCause::Shorted => write!(f, "shorted, the wires touch"),
+            FaultCause::Gain { relative } => {
+                write!(f, "gain changed, readings off by {:+.2} %", 100.0 * relative)
+            }
+            FaultCause::Unknown => write!(f, "its readings contradict all others"),
+        }?;
+        write!(f, " (probability {:.4})", self.probability)
+    }
+}

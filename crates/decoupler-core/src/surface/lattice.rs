@@ -1,0 +1,166 @@
+/// Points that are the nodes of a lattice: every x with every y, in any order.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Lattice {
+    x_mm: Vec<f64>,
+    y_mm: Vec<f64>,
+    places: Vec<usize>,
+}
+
+/// Largest difference of the coordinates along a line of the lattice, relative to the distance of the nearest neighbours.
+const SPREAD: f64 = 0.1;
+
+impl Lattice {
+    /// Finds the lattice whose nodes are these points (x, y), in millimetres. Coordinates along a line may differ by up
+    /// to a tenth of the distance of the nearest neighbours; their mean is used. `None` if the points do not form a
+    /// lattice: scattered, rotated, or with gaps.
+    pub fn of(places_mm: &[[f64; 2]]) -> Option<Self> {
+        if places_mm
+            .iter()
+            .flatten()
+            .any(|coordinate_mm| !coordinate_mm.is_finite())
+        {
+            return None;
+        }
+        let nearest_mm = nearest_distance_mm(places_mm);
+        let [x, y] =
+            [0, 1].map(|axis| Lines::of(&Vec::from_iter(places_mm.iter().map(|place| place[axis])), nearest_mm));
+        let (x, y) = (x?, y?);
+        if x.means_mm.len() * y.means_mm.len() != places_mm.len() {
+            return None;
+        }
+        let mut places = vec![None; places_mm.len()];
+        for (place, (ix, iy)) in x.line_of.iter().zip(&y.line_of).enumerate() {
+            // There are as many points as nodes: if a node has none, another has two.
+            let node = &mut places[ix * y.means_mm.len() + iy];
+            if node.replace(place).is_some() {
+                return None;
+            }
+        }
+        Some(Self {
+            x_mm: x.means_mm,
+            y_mm: y.means_mm,
+            places: places.into_iter().collect::<Option<_>>()?,
+        })
+    }
+
+    /// Returns the coordinates of the lines along x in millimetres, ascending.
+    pub fn x_mm(&self) -> &[f64] {
+        &self.x_mm
+    }
+
+    /// Returns the coordinates of the lines along y in millimetres, ascending.
+    pub fn y_mm(&self) -> &[f64] {
+        &self.y_mm
+    }
+
+    /// Returns the index of the point at each node, in the order of the values of a [`SurfaceMap`](super::SurfaceMap):
+    /// all y of the first x, then those of the next.
+    pub fn places(&self) -> &[usize] {
+        &self.places
+    }
+}
+
+/// Coordinates along one axis, grouped into lines.
+struct Lines {
+    /// Mean of each line, ascending.
+    means_mm: Vec<f64>,
+    /// Line of each coordinate.
+    line_of: Vec<usize>,
+}
+
+impl Lines {
+    fn of(coordinates_mm: &[f64], nearest_mm: f64) -> Option<Self> {
+        let mut order = Vec::from_iter(0..coordinates_mm.len());
+        order.sort_by(|&one, &other| coordinates_mm[one].total_cmp(&coordinates_mm[other]));
+        let lines = order.chunk_by(|&one, &next| coordinates_mm[next] - coordinates_mm[one] <= 0.5 * nearest_mm);
+        let (mut means_mm, mut line_of) = (Vec::new(), vec![0; coordinates_mm.len()]);
+        for (number, line) in lines.enumerate() {
+            let (first_mm, last_mm) = (coordinates_mm[line[0]], coordinates_mm[line[line.len() - 1]]);
+            if last_mm - first_mm > SPREAD * nearest_mm {
+                return None;
+            }
+            line.iter().for_each(|&place| line_of[place] = number);
+            let sum_mm = line.iter().map(|&place| coordinates_mm[place] - first_mm).sum::<f64>();
+            means_mm.push(first_mm + sum_mm / line.len() as f64);
+        }
+        (!means_mm.is_empty()).then_some(Self { means_mm, line_of })
+    }
+}
+
+/// Distance of the nearest two points; 0 for fewer.
+fn nearest_distance_mm(places_mm: &[[f64; 2]]) -> f64 {
+    let pairs = places_mm
+        .iter()
+        .enumerate()
+        .flat_map(|(index, one)| places_mm[..index].iter().map(move |other| (one, other)));
+    let distances = pairs.map(|(one, other)| (one[0] - other[0]).hypot(one[1] - other[1]));
+    distances.reduce(f64::min).unwrap_or(0.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// 3 × 4 points in shuffled order, each moved by up to `jitter`.
+    fn places(jitter: f64) -> Vec<[f64; 2]> {
+        let nodes = (0..12).map(|index| (7 * index + 3) % 12);
+        let moved = nodes.enumerate().map(|(number, node)| {
+            let [dx, dy] = [number % 3, number % 2].map(|part| jitter * (part as f64 - 0.5));
+            [
+                10.0 + 2.0 * f64::from(node / 4) + dx,
+                -1.0 + 5.0 * f64::from(node % 4) + dy,
+            ]
+        });
+        moved.collect()
+    }
+
+    #[test]
+    fn a_lattice_is_found_in_any_order_and_within_the_tolerance() {
+        for jitter in [0.0, 0.05] {
+            let places = places(jitter);
+            let lattice = Lattice::of(&places).unwrap();
+            assert_eq!((lattice.x_mm().len(), lattice.y_mm().len()), (3, 4));
+            let nodes = lattice
+                .x_mm()
+                .iter()
+                .flat_map(|x| lattice.y_mm().iter().map(move |y| [*x, *y]));
+            for (node, &place) in nodes.zip(lattice.places()) {
+                let off = (node[0] - places[place][0]).hypot(node[1] - places[place][1]);
+                assert!(off <= 2.0 * jitter, "{node:?} {:?}", places[place]);
+            }
+        }
+        let line = Lattice::of(&[[0.0, 3.0], [0.0, 1.0], [0.0, 2.0]]).unwrap();
+        assert_eq!(
+            (line.x_mm(), line.y_mm(), line.places()),
+            (&[0.0][..], &[1.0, 2.0, 3.0][..], &[1, 2, 0][..])
+        );
+        assert_eq!(Lattice::of(&[[4.0, 2.0]]).unwrap().places(), [0]);
+    }
+
+    #[test]
+    fn other_points_are_not_a_lattice() {
+        let whole = places(0.0);
+        assert_eq!(Lattice::of(&[]), None);
+        assert_eq!(Lattice::of(&whole[1..]), None, "a gap");
+        assert_eq!(Lattice::of(&places(0.2)), None, "beyond the tolerance");
+        let turned = whole.iter().map(|[x, y]| [0.9 * x - 0.4 * y, 0.4 * x + 0.9 * y]);
+        assert_eq!(Lattice::of(&Vec::from_iter(turned)), None, "turned");
+        let offset = (0..12).map(|node| {
+            [
+                f64::from(node / 4) * 2.0,
+                f64::from(node % 4) * 2.0 + f64::from(node / 4 % 2),
+            ]
+        });
+        assert_eq!(
+            Lattice::of(&Vec::from_iter(offset)),
+            None,
+            "every second line is offset"
+        );
+        let mut twice = whole.clone();
+        twice[3] = twice[4];
+        assert_eq!(Lattice::of(&twice), None, "a node with two points");
+        let mut none = whole;
+        none[5][0] = f64::NAN;
+        assert_eq!(Lattice::of(&none), None, "a NaN coordinate");
+    }
+}
